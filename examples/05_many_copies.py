@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from volery import Copies
+from volery import VectorizedSimulation
 from volery.scenario.load import parse_scenario
 
 SCENARIO = {
@@ -12,7 +12,7 @@ SCENARIO = {
     "uavs": [{"type": "iris", "position_m": [0.0, 0.0, 20.0]}],
 }
 
-with Copies(parse_scenario(SCENARIO), 256) as copies:
+with VectorizedSimulation(parse_scenario(SCENARIO), 256) as copies:
     copies.run(10.0)
     away = np.linalg.norm(copies.state().position_map[:, 0] - [0.0, 0.0, 20.0], axis=1)
     print(

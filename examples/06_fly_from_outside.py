@@ -1,6 +1,6 @@
 """Another program flies a UAV: rosbridge from roslibpy, as to any ROS robot.
 
-volery run hover --seconds 60 --door rosbridge
+volery run hover --seconds 60 --bridge rosbridge
 python examples/06_fly_from_outside.py            # pip install roslibpy
 """
 

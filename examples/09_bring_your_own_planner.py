@@ -1,6 +1,6 @@
 """A planner of your own flies UAVs from outside: it gets the map and sends waypoints, by rosbridge.
 
-volery run plug_in --seconds 600 --door rosbridge
+volery run plug_in --seconds 600 --bridge rosbridge
 python examples/09_bring_your_own_planner.py            # pip install roslibpy
 
 Nothing of Volery is imported. This planner is the simplest there is: each UAV flies the first rows

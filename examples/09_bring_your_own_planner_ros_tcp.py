@@ -1,6 +1,6 @@
 """The same from a plain socket: ROS-TCP, the protocol of Unity's ROS-TCP-Connector.
 
-volery run plug_in --seconds 600 --door ros-tcp
+volery run plug_in --seconds 600 --bridge ros-tcp
 python examples/09_bring_your_own_planner_ros_tcp.py
 
 Python's own library alone; any language with sockets can do it. A frame is a destination and a

@@ -1,6 +1,6 @@
 """An offboard program for MAVROS, over rosbridge: nothing in it is of Volery.
 
-volery run plug_in --uavs 1 --door mavlink --door rosbridge
+volery run plug_in --uavs 1 --bridge mavlink --bridge rosbridge
 python examples/13_mavros_offboard.py            # pip install roslibpy
 """
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from ros2_bench import DOMAIN
 
-_PROGRAM = Path(__file__).parent / "conformance" / "doors" / "plain_ros2.py"
+_PROGRAM = Path(__file__).parent / "conformance" / "bridges" / "plain_ros2.py"
 _PATIENCE_S = 60.0
 _START_S = 60.0
 """On a machine that is busy with other things."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from volery.core import rotations
 from volery.core.workers import Workers
-from volery.sensors.lidar import Echoes, LidarBatch, move_bodies, scan_rays
+from volery.sensors.lidar import Echoes, RayBatch, move_bodies, scan_rays
 from volery.sensors.lidar_model import LidarModel
 from volery.sensors.measurement_kernels import Surfaces, measure_scan
 from volery.vehicle.pose_history import PoseHistory
@@ -71,7 +71,7 @@ class PlainScene(Scene):
 
 
 def plain_echoes(
-    scene: PlainScene, model: LidarModel, batch: LidarBatch, history: PoseHistory
+    scene: PlainScene, model: LidarModel, batch: RayBatch, history: PoseHistory
 ) -> Echoes:
     """What `sample_echoes` yields, with intensities, in clear air."""
     scans, beams = len(batch.uav), model.beams

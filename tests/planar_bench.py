@@ -16,11 +16,11 @@ def box(x0, y0, x1, y1):
     return [(*a, *b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)]
 
 
-def wall(x0, y0, x1, y1, *doors):
-    """A wall along x or y with gaps; each door is where it begins and ends along the wall."""
+def wall(x0, y0, x1, y1, *bridges):
+    """A wall along x or y with gaps; each bridge is where it begins and ends along the wall."""
     across = abs(x1 - x0) > abs(y1 - y0)
     low, high = (x0, x1) if across else (y0, y1)
-    marks = [low, *(edge for door in doors for edge in door), high]
+    marks = [low, *(edge for bridge in bridges for edge in bridge), high]
     pieces = zip(marks[::2], marks[1::2], strict=True)
     return [(a, y0, b, y0) if across else (x0, a, x0, b) for a, b in pieces]
 
@@ -44,7 +44,7 @@ def storey():
 
 
 def corridor(length=60.0):
-    """A plain one with some things in its first metres, and a door near its end."""
+    """A plain one with some things in its first metres, and a bridge near its end."""
     walls = box(-4.0, -1.0, length, 1.0)
     walls += box(-3.0, -1.0, -2.4, -0.5) + box(1.0, 0.6, 1.7, 1.0) + box(4.0, -1.0, 4.5, -0.7)
     walls += box(length - 10.0, 0.5, length - 9.3, 1.0)

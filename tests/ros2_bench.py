@@ -9,7 +9,7 @@ import socket
 
 from ros_tcp_client import until
 
-from volery.bridges.ros2.environment import Ros2Terms, join_ros2
+from volery.bridges.ros2.environment import Ros2Environment, join_ros2
 from volery.bridges.ros2.middleware import Profile, ServiceSpec, TopicSpec
 from volery.bridges.ros2.names import NodeName
 from volery.graph.codecs.cdr import decode_cdr, encode_cdr
@@ -44,7 +44,7 @@ class Other:
     """Somebody else's node `/other` in the graph."""
 
     def __init__(self, terms=None):
-        self.participant = join_ros2(terms or Ros2Terms(domain_id=DOMAIN))
+        self.participant = join_ros2(terms or Ros2Environment(domain_id=DOMAIN))
         self.node = NodeName("/", "other")
         self.participant.add_node(self.node)
         self.participant.announce()

@@ -1,4 +1,4 @@
-"""A plain ROS-TCP client and a graph worked off by a thread. It shares no code with the doors."""
+"""A plain ROS-TCP client and a graph worked off by a thread. It shares no code with the bridges."""
 
 from __future__ import annotations
 

@@ -7,8 +7,8 @@ from concurrent.futures import Future
 
 from live_graph import LiveGraph
 
-from volery.bridges.rosbridge.message_encoder import Forms
-from volery.bridges.rosbridge.protocol import RosbridgePeer, Shared
+from volery.bridges.rosbridge.message_encoder import MessageEncoder
+from volery.bridges.rosbridge.protocol import RosbridgePeer, ServerContext
 from volery.graph.graph import Graph
 from volery.graph.messages import message_type
 from volery.graph.session import Gateway
@@ -39,7 +39,7 @@ class Bench:
         self.graph = Graph(lambda: TIME_NS, self._post)
         self.gateway = Gateway(self.graph, self._post)
         generation = shared.pop("generation", "ros2")
-        self.shared = Shared(Forms(generation), now_ns=lambda: TIME_NS, **shared)
+        self.shared = ServerContext(MessageEncoder(generation), now_ns=lambda: TIME_NS, **shared)
         self.now_s = 100.0
         self._depth = 0
 

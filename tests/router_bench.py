@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from volery.comms.addresses import Identity
-from volery.comms.protocol import Kind
+from volery.comms.protocol import StationFrameKind
 from volery.comms.server.router import Router
 from volery.comms.server.settings import RouterSettings
 from volery.comms.station.core import StationCore
@@ -78,5 +78,11 @@ class Bench:
                 return
         raise AssertionError("they never stop talking")
 
-    def send(self, source: int, destination: int, text: str, kind: Kind = Kind.SENSING) -> int:
+    def send(
+        self,
+        source: int,
+        destination: int,
+        text: str,
+        kind: StationFrameKind = StationFrameKind.SENSING,
+    ) -> int:
         return self.cores[source].send(kind, destination, text.encode(), self.now)

@@ -14,15 +14,15 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from volery.runtime import Copies, Simulation
+    from volery.runtime import Simulation, VectorizedSimulation
     from volery.scenario.load import load_scenario
     from volery.scenario.schema import Scenario
 
-__all__ = ["Copies", "Scenario", "Simulation", "load_scenario"]
+__all__ = ["Scenario", "Simulation", "VectorizedSimulation", "load_scenario"]
 __version__ = version("volery")
 
 _HOMES = {
-    "Copies": "volery.runtime",
+    "VectorizedSimulation": "volery.runtime",
     "Scenario": "volery.scenario.schema",
     "Simulation": "volery.runtime",
     "load_scenario": "volery.scenario.load",

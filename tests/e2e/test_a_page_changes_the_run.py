@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from volery.bridges.bridge_host import Doors
+from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.rosbridge.server import RosbridgeServer
 
 roslibpy = pytest.importorskip("roslibpy")
@@ -106,11 +106,11 @@ class Page:
 
 @pytest.fixture
 def opened(simulate):
-    """A run in real time behind a door, and a page that watches it."""
+    """A run in real time behind a bridge, and a page that watches it."""
     simulation = simulate(DATA)
     server = RosbridgeServer("127.0.0.1", 0)
-    with Doors(simulation.gateway) as doors:
-        doors.open(server)
+    with BridgeHost(simulation.gateway) as bridges:
+        bridges.open(server)
         simulation.be_prompt()
         thread = threading.Thread(target=lambda: simulation.run(600.0, speed=1.0))
         thread.start()

@@ -11,7 +11,7 @@ from volery.core.errors import CommandError, ScenarioError, SpawnError
 from volery.engine.events import EventKind
 from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import Header, Point, Pose, PoseStamped, Quaternion, time_from_ns
-from volery.runtime import Copies
+from volery.runtime import VectorizedSimulation
 from volery.scenario.load import parse_scenario
 from volery.world.materials import Material
 
@@ -235,7 +235,7 @@ def test_uavs_come_and_go_among_things(simulate, things_data):
 def test_copies_see_them_too(things_data):
     things_data["types"]["f450"]["plant"] = "kinematic"
     things_data["types"]["f450"]["sensors"] = things_data["types"]["f450"]["sensors"][:2]
-    with Copies(parse_scenario(things_data), 3) as copies:
+    with VectorizedSimulation(parse_scenario(things_data), 3) as copies:
         copies.run(0.1)
         ranges = copies.reading("uav1", "horizontal")["echoes"][:, 0]
         middle = ranges[:, ranges.shape[1] // 2]

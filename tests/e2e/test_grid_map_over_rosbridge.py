@@ -8,7 +8,7 @@ import time
 import numpy as np
 import pytest
 
-from volery.bridges.bridge_host import Doors
+from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.rosbridge.server import RosbridgeServer
 
 roslibpy = pytest.importorskip("roslibpy")
@@ -51,8 +51,8 @@ def running(simulate):
             simulation.run(0.2, speed=1.0)
 
     server = RosbridgeServer("127.0.0.1", 0)
-    with Doors(simulation.gateway) as doors:
-        doors.open(server)
+    with BridgeHost(simulation.gateway) as bridges:
+        bridges.open(server)
         simulation.be_prompt()
         thread = threading.Thread(target=run)
         thread.start()

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from volery import Simulation
-from volery.bridges.bridge_host import Doors
+from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.logs.log_writer import open_log
 from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.replay import Replay
@@ -117,9 +117,9 @@ def test_the_same_over_rosbridge_in_lock_step(inside: tuple[Said, Path], outside
     server = RosbridgeServer(port=0)
     with (
         Simulation(scenario_of(NODES[1 - outside : 2 - outside])) as simulation,
-        Doors(simulation.gateway) as doors,
+        BridgeHost(simulation.gateway) as bridges,
     ):
-        doors.open(server)
+        bridges.open(server)
         said = listen(simulation)
         flying, trouble = threading.Event(), []
 

@@ -10,7 +10,7 @@ import pytest
 
 from volery import Simulation
 from volery.autonomy.avoidance.gap_following import GapFollowing
-from volery.bridges.bridge_host import Doors
+from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.nodes.host import NodeHost
 from volery.bridges.ros_tcp.client import RosTcpClient
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
@@ -91,8 +91,8 @@ def in_memory(simulation):
 @contextmanager
 def over_rosbridge(simulation):
     server = RosbridgeServer(port=0)
-    with Doors(simulation.gateway) as doors:
-        doors.open(server)
+    with BridgeHost(simulation.gateway) as bridges:
+        bridges.open(server)
         yield lambda: RosbridgeClient(f"ws://127.0.0.1:{server.port}", name="gap_following")
 
 
@@ -100,8 +100,8 @@ def over_ros_tcp(generation):
     @contextmanager
     def way(simulation):
         endpoint = RosTcpEndpoint(port=0, generation=generation)
-        with Doors(simulation.gateway) as doors:
-            doors.open(endpoint)
+        with BridgeHost(simulation.gateway) as bridges:
+            bridges.open(endpoint)
             yield lambda: RosTcpClient(port=endpoint.port, name="gap_following")
 
     return way

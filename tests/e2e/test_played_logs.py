@@ -1,4 +1,4 @@
-"""`volery play`: a recorded log behind a door, in a process of its own."""
+"""`volery play`: a recorded log behind a bridge, in a process of its own."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def seek(client, second):
 
 def test_a_log_is_played_to_a_client(flight):
     process = subprocess.Popen(
-        [*PLAY, flight, "--paused", "--door", "rosbridge=0"], stderr=subprocess.PIPE, text=True
+        [*PLAY, flight, "--paused", "--bridge", "rosbridge=0"], stderr=subprocess.PIPE, text=True
     )
     try:
         head = process.stderr.readline()

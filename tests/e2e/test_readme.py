@@ -58,8 +58,8 @@ def test_the_volery_commands_exist():
 def test_the_volery_commands_run_as_they_stand(tmp_path):
     lines = "\n".join(blocks("sh")).splitlines()
     commands = [line.split("#")[0].split() for line in lines if line.startswith("volery ")]
-    # those that open doors or go through them: test_run_with_bridges.py
-    commands = [c for c in commands if "--door" not in c and c[1] not in ("topic", "service")]
+    # those that open bridges or go through them: test_run_with_bridges.py
+    commands = [c for c in commands if "--bridge" not in c and c[1] not in ("topic", "service")]
     assert len(commands) >= 7
     for command in commands:
         ended = ["--exit-at-end"] if "--page" in command else []

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from volery.bridges.bridge_host import Doors
+from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.logs.log_writer import open_log
 from volery.bridges.logs.recorded_flight import read_flight
 from volery.bridges.logs.records import LogWalk
@@ -27,7 +27,7 @@ from volery.graph.connection import call_and_wait
 from volery.graph.messages import Twist, Vector3, message_type
 from volery.graph.service_reply import ServiceReply
 from volery.runtime import Simulation
-from volery.runtime.replay.command_effects import Weight, weight_of
+from volery.runtime.replay.command_effects import CommandEffect, weight_of
 from volery.scenario.load import parse_scenario
 
 SENSORS = [
@@ -212,8 +212,8 @@ def recorded(path, speed, seed):
         simulation.enable_digest()
         simulation.graph.subscribe_all(log.write)
         server = RosbridgeServer("127.0.0.1", 0)
-        with Doors(simulation.gateway) as doors:
-            doors.open(server)
+        with BridgeHost(simulation.gateway) as bridges:
+            bridges.open(server)
             simulation.be_prompt()
             pilot = Pilot(server.port)
             chance = random.Random(seed)
@@ -276,7 +276,7 @@ def changes(path):
     return [
         (c.step, c.turn, c.taken.kind, c.taken.name, content_bytes(c.taken))
         for c in read_flight(path).commands
-        if weight_of(c.taken) is Weight.CHANGES
+        if weight_of(c.taken) is CommandEffect.CHANGES
     ]
 
 
@@ -309,11 +309,11 @@ def test_without_its_commands_the_flight_is_another_one(tmp_path):
 
 
 def test_a_flight_of_the_command_line_is_repeated(tmp_path):
-    """Quit by a client; repeated by another process, without doors."""
+    """Quit by a client; repeated by another process, without bridges."""
     path = tmp_path / "flight.mcap"
     words = [sys.executable, "-m", "volery.cli", "run", "hover", "--digest"]
     with subprocess.Popen(
-        [*words, "--uavs", "2", "--door", "rosbridge=0", "--record", path],
+        [*words, "--uavs", "2", "--bridge", "rosbridge=0", "--record", path],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

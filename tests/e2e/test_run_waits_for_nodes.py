@@ -80,8 +80,15 @@ def digests(text):
 def fly_with_node_outside():
     port = free_port()
     volery = [sys.executable, "-m", "volery.cli"]
-    door = ["--door", f"rosbridge={port}", "--wait-for", "climbing", "--wait-timeout", f"{HANG_S}"]
-    words = ["run", "climb.toml", "--trust", "--no-nodes", "--speed", "max", "--digest", *door]
+    bridge = [
+        "--bridge",
+        f"rosbridge={port}",
+        "--wait-for",
+        "climbing",
+        "--wait-timeout",
+        f"{HANG_S}",
+    ]
+    words = ["run", "climb.toml", "--trust", "--no-nodes", "--speed", "max", "--digest", *bridge]
     way = ["--via", f"rosbridge://127.0.0.1:{port}", "--namespace", "/uav1"]
     with (
         subprocess.Popen([*volery, *words], stdout=subprocess.PIPE, text=True) as run,
@@ -110,7 +117,7 @@ def test_a_lock_step_node_in_its_own_process_is_byte_for_byte_the_one_inside():
 
 def test_what_does_not_come_is_named():
     words = ["run", "hover", "--wait-for", "a,/uav1/b", "--wait-timeout", "0.1"]
-    result = CliRunner().invoke(app, [*words, "--door", f"rosbridge={free_port()}"])
+    result = CliRunner().invoke(app, [*words, "--bridge", f"rosbridge={free_port()}"])
     assert result.exit_code == 2
     assert "waits for a, /uav1/b, at most 0.1 s" in result.output
     assert "a, /uav1/b not connected within 0.1 s; connected: none" in result.output

@@ -1,4 +1,4 @@
-"""`volery run --door ...` and the programs that join it: terminal tools, nodes, the example."""
+"""`volery run --bridge ...` and the programs that join it: terminal tools, nodes, the example."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ VOLERY = [sys.executable, "-m", "volery.cli"]
 
 
 class Run:
-    """A simulation in a process of its own, its doors on free ports."""
+    """A simulation in a process of its own, its bridges on free ports."""
 
-    def __init__(self, *doors, scenario="hover", seconds=1200, port=0, more=()):
-        words = [word for door in doors for word in ("--door", f"{door}={port}")]
+    def __init__(self, *bridges, scenario="hover", seconds=1200, port=0, more=()):
+        words = [word for bridge in bridges for word in ("--bridge", f"{bridge}={port}")]
         self.process = subprocess.Popen(
             [*VOLERY, "run", scenario, "--seconds", str(seconds), *words, *more],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
         )
-        self.ports = [self._port() for _ in doors]
+        self.ports = [self._port() for _ in bridges]
         self._reader = threading.Thread(target=self.process.stderr.read)
         self._reader.start()
 
@@ -49,7 +49,7 @@ class Run:
             found = re.match(r"open .*127\.0\.0\.1:(\d+)", line)
             if found:
                 return int(found[1])
-        raise AssertionError(f"ended with {self.process.wait()} before its doors were open")
+        raise AssertionError(f"ended with {self.process.wait()} before its bridges were open")
 
     def close(self):
         self.process.terminate()
@@ -133,7 +133,7 @@ def test_services_are_listed_and_called(run, via):
     assert refused.startswith("error: /uav1/take_off refuses: ")
 
 
-def test_a_door_can_be_opened_on_several_ports():
+def test_a_bridge_can_be_opened_on_several_ports():
     run = Run("rosbridge", "rosbridge", seconds=60)
     try:
         first, second = run.ports
@@ -234,11 +234,11 @@ def test_the_example_flies_a_square(run):
     assert 0.8 < float(re.search(r"([\d.]+) m wide", said)[1]) < 2.5
 
 
-@pytest.mark.parametrize("door", ["rosbridge", "ros-tcp"])
-def test_a_planner_from_outside_gets_the_map_and_sends_waypoints(door):
-    name = {"rosbridge": "", "ros-tcp": "_ros_tcp"}[door]
+@pytest.mark.parametrize("bridge", ["rosbridge", "ros-tcp"])
+def test_a_planner_from_outside_gets_the_map_and_sends_waypoints(bridge):
+    name = {"rosbridge": "", "ros-tcp": "_ros_tcp"}[bridge]
     program = ROOT / f"examples/09_bring_your_own_planner{name}.py"
-    run = Run(door, scenario="plug_in", seconds=300)
+    run = Run(bridge, scenario="plug_in", seconds=300)
     try:
         said = output_of(program, run.ports[0], 3, timeout_s=200)
     finally:
@@ -262,12 +262,12 @@ def test_a_program_for_mavros_flies_unchanged():
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
-        (("--door", "rosbrige"), "Did you mean 'rosbridge'"),
-        (("--door", "rosbridge=x"), "PORT or HOST:PORT"),
-        (("--door", "rosbridge=0.0.0.0:0"), "other machines"),
+        (("--bridge", "rosbrige"), "Did you mean 'rosbridge'"),
+        (("--bridge", "rosbridge=x"), "PORT or HOST:PORT"),
+        (("--bridge", "rosbridge=0.0.0.0:0"), "other machines"),
     ],
 )
-def test_doors_that_cannot_be_opened(words, reason):
+def test_bridges_that_cannot_be_opened(words, reason):
     done = subprocess.run(
         [*VOLERY, "run", "hover", "--seconds", "1", *words],
         check=False,
@@ -282,7 +282,7 @@ def test_doors_that_cannot_be_opened(words, reason):
 
 def test_a_port_in_use_is_told(run):
     done = subprocess.run(
-        [*VOLERY, "run", "hover", "--seconds", "1", "--door", f"rosbridge={run.ports[0]}"],
+        [*VOLERY, "run", "hover", "--seconds", "1", "--bridge", f"rosbridge={run.ports[0]}"],
         check=False,
         capture_output=True,
         text=True,
@@ -319,7 +319,7 @@ def world(uri):
 
 
 def test_a_client_loads_another_world():
-    """The answer still comes; the doors open again where they were, and the client comes back."""
+    """The answer still comes; the bridges open again where they were, and the client comes back."""
     run = Run("rosbridge", seconds=600, port=free_port())
     client = RosbridgeClient(f"ws://127.0.0.1:{run.ports[0]}")
     try:
@@ -363,7 +363,7 @@ def test_a_client_loads_a_scenario_with_changes():
 
 
 def test_a_client_unloads_the_world_and_loads_one_again():
-    """In between the doors are open, the state is NO_WORLD, and little can be asked."""
+    """In between the bridges are open, the state is NO_WORLD, and little can be asked."""
     run = Run("rosbridge", seconds=600, port=free_port())
     client = RosbridgeClient(f"ws://127.0.0.1:{run.ports[0]}")
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from ros1_bench import missing_of_ros1, shared_master
 
-from volery.bridges.bridge_host import Doors
-from volery.bridges.ros1.bridge import Ros1Door
+from volery.bridges.bridge_host import BridgeHost
+from volery.bridges.ros1.bridge import Ros1Bridge
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.engine.events import EventKind
@@ -143,23 +143,23 @@ def test_it_goes_on_from_a_snapshot_as_it_did(tmp_path, simulate):
     np.testing.assert_array_equal([uav.position_map for uav in simulation.uavs.values()], once)
 
 
-def open_rosbridge(doors):
-    door = RosbridgeServer(port=0)
-    doors.open(door)
-    return f"rosbridge://127.0.0.1:{door.port}"
+def open_rosbridge(bridges):
+    bridge = RosbridgeServer(port=0)
+    bridges.open(bridge)
+    return f"rosbridge://127.0.0.1:{bridge.port}"
 
 
-def open_ros_tcp(doors):
-    door = RosTcpEndpoint(port=0)
-    doors.open(door)
-    return f"ros-tcp://127.0.0.1:{door.port}"
+def open_ros_tcp(bridges):
+    bridge = RosTcpEndpoint(port=0)
+    bridges.open(bridge)
+    return f"ros-tcp://127.0.0.1:{bridge.port}"
 
 
-def open_ros1(doors):
+def open_ros1(bridges):
     if missing_of_ros1():
         pytest.skip(f"no {', '.join(missing_of_ros1())}: see .ci/install_ros1")
     shared_master()
-    doors.open(Ros1Door())
+    bridges.open(Ros1Bridge())
     return "ros1"
 
 
@@ -167,13 +167,13 @@ def open_ros1(doors):
 # rospy uses what is deprecated and forgets to close sockets
 @pytest.mark.filterwarnings("ignore:notifyAll:DeprecationWarning")
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-@pytest.mark.parametrize("open_door", [open_rosbridge, open_ros_tcp, open_ros1])
-def test_each_node_in_a_process_of_its_own(open_door, tmp_path, simulate):
+@pytest.mark.parametrize("open_bridge", [open_rosbridge, open_ros_tcp, open_ros1])
+def test_each_node_in_a_process_of_its_own(open_bridge, tmp_path, simulate):
     simulation = simulate(meadow(tmp_path, 2, with_nodes=False))
     watch = Watch(simulation)
     simulation.step(1)
-    with Doors(simulation.gateway) as doors:
-        via = open_door(doors)
+    with BridgeHost(simulation.gateway) as bridges:
+        via = open_bridge(bridges)
         nodes = [start_node(via, name) for name in simulation.uavs]
         try:
             end = time.monotonic() + 180.0

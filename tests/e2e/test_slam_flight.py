@@ -16,7 +16,7 @@ from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.replay import Replay
 from volery.graph.messages import stamp_of
 from volery.runtime import Simulation
-from volery.runtime.replay.slam.offline_slam import SlamOptions, SlamRun
+from volery.runtime.replay.slam.offline_slam import OfflineSlam, SlamOptions
 from volery.runtime.replay.slam.sources import open_source
 from volery.scenario.load import parse_scenario
 
@@ -97,7 +97,7 @@ def test_it_follows_a_flight_and_says_the_same_on_its_log_in_another_process(tmp
 def _maps_alike(log, told):
     """What `volery slam` makes of the log alone is the way that was told in flight."""
     options = SlamOptions(start=(60.0, 120.0, 0.0, 0.0))
-    way = SlamRun(open_source(log), options).run().trajectory
+    way = OfflineSlam(open_source(log), options).run().trajectory
     flown = np.array([(stamp_of(p.message), *_place(p.message)) for p in told])
     there = np.stack([np.interp(way.time_ns, flown[:, 0], flown[:, k]) for k in (1, 2, 3)], 1)
     assert len(way.time_ns) > 300

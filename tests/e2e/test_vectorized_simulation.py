@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from volery.core.errors import CommandError, ScenarioError
-from volery.runtime import Copies
+from volery.runtime import VectorizedSimulation
 from volery.scenario.load import parse_scenario
 
 STATES = ("position_map", "velocity_map", "attitude", "omega_body", "rotor_speed")
@@ -28,7 +28,7 @@ def pair_data(flat_data):
 
 
 def make(data, count, **options):
-    return Copies(parse_scenario(data), count, **options)
+    return VectorizedSimulation(parse_scenario(data), count, **options)
 
 
 def states(source, copy):

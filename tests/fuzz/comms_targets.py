@@ -4,64 +4,66 @@ from __future__ import annotations
 
 from volery.comms import control_payloads
 from volery.comms.addresses import ALL, SERVER, Identity
-from volery.comms.protocol import FrameParser, Kind, encode_frame
+from volery.comms.protocol import StationFrameKind, StationFrameParser, encode_frame
 from volery.comms.server.router import Router
 from volery.comms.server.settings import RouterSettings
 from volery.comms.station.core import StationCore
 
 _HELLO = encode_frame(
-    Kind.HELLO,
+    StationFrameKind.HELLO,
     1,
     SERVER,
     7,
     payload=control_payloads.encode_hello(control_payloads.Hello(0, 1, 4, "a", "")),
 )
 _TALK = [
-    encode_frame(Kind.COMMAND, 1, 2, 7, 1, 5, b"command"),
-    encode_frame(Kind.SENSING, 1, ALL, 7, 2, 5, bytes(40)),
-    encode_frame(Kind.SENSING, 1, 9, 7, 3, 5),
+    encode_frame(StationFrameKind.COMMAND, 1, 2, 7, 1, 5, b"command"),
+    encode_frame(StationFrameKind.SENSING, 1, ALL, 7, 2, 5, bytes(40)),
+    encode_frame(StationFrameKind.SENSING, 1, 9, 7, 3, 5),
     encode_frame(
-        Kind.RECEIVED,
+        StationFrameKind.RECEIVED,
         1,
         SERVER,
         7,
         payload=control_payloads.encode_received([control_payloads.Received(2, 1, 1)]),
     ),
-    encode_frame(Kind.PING, 1, SERVER, 7),
+    encode_frame(StationFrameKind.PING, 1, SERVER, 7),
 ]
 _ANSWERS = [
     encode_frame(
-        Kind.WELCOME,
+        StationFrameKind.WELCOME,
         SERVER,
         1,
         payload=control_payloads.encode_welcome(control_payloads.Welcome(3, 1, (1,))),
     ),
-    encode_frame(Kind.SETTLED, SERVER, 1, payload=control_payloads.encode_settled((1, 2))),
     encode_frame(
-        Kind.REFUSAL,
+        StationFrameKind.SETTLED, SERVER, 1, payload=control_payloads.encode_settled((1, 2))
+    ),
+    encode_frame(
+        StationFrameKind.REFUSAL,
         SERVER,
         1,
         payload=control_payloads.encode_refusal(
             control_payloads.Refusal(control_payloads.Reason.FULL, 2, "full")
         ),
     ),
-    encode_frame(Kind.SENSING, 2, 1, 1, 1, 0, b"x"),
-    encode_frame(Kind.PONG, SERVER, 1),
+    encode_frame(StationFrameKind.SENSING, 2, 1, 1, 1, 0, b"x"),
+    encode_frame(StationFrameKind.PONG, SERVER, 1),
 ]
 _STREAMS = [b"".join((_HELLO, *_TALK[k:], *_TALK[:k])) for k in range(len(_TALK))]
 _BACK = [b"".join((*_ANSWERS[k:], *_ANSWERS[:k])) for k in range(len(_ANSWERS))]
 _FROM_2 = encode_frame(
-    Kind.HELLO,
+    StationFrameKind.HELLO,
     2,
     SERVER,
     1,
     payload=control_payloads.encode_hello(control_payloads.Hello(0, 2, 4, "b", "")),
-) + encode_frame(Kind.SENSING, 2, 1, 1, 1, 0, b"hello")
+) + encode_frame(StationFrameKind.SENSING, 2, 1, 1, 1, 0, b"hello")
 
 
 def wire(mutator):
     """Every byte is part of a frame, noise, or awaits the rest."""
-    parser = FrameParser()
+    parser = StationFrameParser()
     stream = mutator.bytes(_STREAMS + _BACK)
     frames = [one for piece in mutator.cut(stream) for one in parser.feed(piece)]
     frames += parser.finish()
@@ -81,7 +83,7 @@ def router(mutator):
     for step, piece in enumerate(mutator.cut(mutator.bytes(_STREAMS))):
         server.receive(one, piece, step)
     for connection in (one, two):
-        parser, said = FrameParser(), server.take(connection, 1)
+        parser, said = StationFrameParser(), server.take(connection, 1)
         assert sum(len(frame.data) for frame in parser.feed(said)) == len(said)
         server.disconnect(connection, 2)
     for seconds in range(1, 8):
@@ -89,9 +91,9 @@ def router(mutator):
     assert server.statistics.connections == 0
     core = StationCore(Identity(0, 1), 7)
     core.connected(0)
-    core.send(Kind.COMMAND, 2, b"command", 0)
+    core.send(StationFrameKind.COMMAND, 2, b"command", 0)
     for piece in mutator.cut(mutator.bytes(_BACK)):
         core.feed(piece, 0)
     core.tick(10**9)
-    FrameParser().feed(core.take())
+    StationFrameParser().feed(core.take())
     return 2

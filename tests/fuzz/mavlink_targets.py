@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 from volery.mavlink.autopilot.core import Autopilot
-from volery.mavlink.autopilot.vehicle import Build, FlightState
+from volery.mavlink.autopilot.vehicle import FlightState, VehicleInfo
 from volery.mavlink.codec import Codec, Parser, dialect
 from volery.mavlink.framing import Framer
 
-_BUILD = Build("iris", 4, 0.5, 12.0, 3.0, 1.5, 0.7, 4, 5.0, (47.4, 8.5, 488.0))
+_BUILD = VehicleInfo("iris", 4, 0.5, 12.0, 3.0, 1.5, 0.7, 4, 5.0, (47.4, 8.5, 488.0))
 _NAN = math.nan
 _HERE = (473977420, 85455940)
 

@@ -14,7 +14,7 @@ from volery.bridges.ros_tcp import wire as ros_tcp
 from volery.bridges.ros_tcp.session import EndpointSession
 from volery.bridges.ros_tcp.unity import Selection, UnitySession
 from volery.bridges.sensor_link import wire as sensor_link
-from volery.bridges.sensor_link.commands import Commands
+from volery.bridges.sensor_link.commands import SensorLinkCommands
 from volery.bridges.sensor_link.payloads import (
     PAYLOADS,
     decode_notice,
@@ -69,7 +69,7 @@ _STREAMS = [b"".join(_FRAMES[a : a + 3]) + bytes(8) for a in range(len(_FRAMES))
 
 def ros_tcp_wire(mutator):
     """However the stream is damaged and cut: whole frames within the limits, or an error."""
-    parser = ros_tcp.FrameParser(most_payload=40_000, most_destination=200)
+    parser = ros_tcp.RosTcpFrameParser(most_payload=40_000, most_destination=200)
     stream = mutator.bytes(_STREAMS)
     if mutator.chance(0.05):
         stream += frame("/big", bytes(30_000))
@@ -121,7 +121,7 @@ def _play(mutator, bench, session):
     steps = mutator.random.randrange(1, 12)
     calls = []
     for _ in range(steps):
-        session.take(ros_tcp.Frame(*_step(mutator)))
+        session.take(ros_tcp.RosTcpFrame(*_step(mutator)))
         if mutator.chance(0.3):
             bench.publisher.publish(String("x"))
             bench.work_off()
@@ -133,7 +133,7 @@ def _play(mutator, bench, session):
 
 
 def _drain(session):
-    parser, found = ros_tcp.FrameParser(), []
+    parser, found = ros_tcp.RosTcpFrameParser(), []
     while parts := session.outbox.gather():
         for part in parts:
             found += parser.feed(part)
@@ -186,7 +186,7 @@ def _link_seeds():
             message = filled(payload.msgtype, rng)
             found.append((int(kind), encode_payload(kind, message, "laser/horizontal/scan")))
     pose = m.Pose(m.Point(1.0, 2.0, 3.0), m.Quaternion(0.0, 0.0, 0.0, 1.0))
-    for kind in (sensor_link.Kind.POSE_COMMAND, sensor_link.Kind.GOAL_POSE):
+    for kind in (sensor_link.SensorLinkKind.POSE_COMMAND, sensor_link.SensorLinkKind.GOAL_POSE):
         stamped = m.PoseStamped(m.header(7, "map"), pose)
         found.append((int(kind), encode_payload(kind, stamped)))
     return found
@@ -203,7 +203,7 @@ _LINK_STREAMS = [b"".join(_LINK_FRAMES[a : a + 3]) for a in range(len(_LINK_FRAM
 
 def sensor_link_wire(mutator):
     """Every byte is part of a frame, noise, or awaits the rest."""
-    parser = sensor_link.FrameParser(4096 if mutator.chance(0.5) else 1 << 20)
+    parser = sensor_link.SensorLinkParser(4096 if mutator.chance(0.5) else 1 << 20)
     stream = mutator.bytes(_LINK_STREAMS)
     size = 0
     frames = [one for piece in mutator.cut(stream) for one in parser.feed(piece)]
@@ -229,7 +229,7 @@ def sensor_link_payloads(mutator):
         _, message = decode_payload(kind, payload, stamp_ns)
     except BridgeError:
         return 1
-    encode_cdr(message, PAYLOADS[sensor_link.Kind(kind)].msgtype)
+    encode_cdr(message, PAYLOADS[sensor_link.SensorLinkKind(kind)].msgtype)
     return 1
 
 
@@ -240,7 +240,7 @@ class _Link:
         self.hand = HandGraph()
         self.hand.graph.advertise("/uav1/odom", m.Odometry)
         self.session = self.hand.gateway.open("fuzz")
-        self.commands = Commands(self.session)
+        self.commands = SensorLinkCommands(self.session)
 
 
 def sensor_link_commands(mutator):
@@ -252,9 +252,9 @@ def sensor_link_commands(mutator):
         uav = mutator.pick((0, 1, 1, 1, 2, 65535))
         with contextlib.suppress(BridgeError):
             link.commands.take(
-                sensor_link.Frame(kind, uav, 0, 5, mutator.bytes([seed]))
+                sensor_link.SensorLinkFrame(kind, uav, 0, 5, mutator.bytes([seed]))
                 if mutator.chance(0.5)
-                else sensor_link.Frame(mutator.random.randrange(256), uav, 0, 5, seed)
+                else sensor_link.SensorLinkFrame(mutator.random.randrange(256), uav, 0, 5, seed)
             )
     link.hand.work_off()
     link.session.close()

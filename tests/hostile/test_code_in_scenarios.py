@@ -16,7 +16,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from volery.bridges.logs.log_writer import open_log
-from volery.bridges.logs.recorded_flight import Origin
+from volery.bridges.logs.recorded_flight import RecordedScenario
 from volery.cli import trust
 from volery.cli.app import app
 from volery.cli.trust import may_run_local_nodes
@@ -27,7 +27,7 @@ from volery.runtime.build.node_loading import find_node, is_local, local_nodes
 from volery.runtime.replay.scenario_record import scenario_of
 from volery.runtime.warmup.requirements import needs_of
 from volery.scenario.access import ScenarioAccess
-from volery.scenario.catalog import Shelf
+from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.load import load_scenario, parse_scenario
 from volery.scenario.schema import NodeEntry, Scenario
 
@@ -181,7 +181,7 @@ def test_only_nodes_are_started(trap: Trap, node: str) -> None:
 
 
 def scenario_from_log(trap: Trap, own: Scenario | None = None) -> Scenario:
-    return scenario_of(Origin("stranger", 1, "0", trap.content), own, folder=trap.folder)
+    return scenario_of(RecordedScenario("stranger", 1, "0", trap.content), own, folder=trap.folder)
 
 
 @pytest.mark.parametrize("installed", [False, True])
@@ -218,7 +218,7 @@ def test_an_upload_starts_no_module(trap: Trap, monkeypatch: pytest.MonkeyPatch)
     (folder / f"{trap.module}.py").write_bytes((trap.folder / f"{trap.module}.py").read_bytes())
     monkeypatch.chdir(folder)
     with pytest.raises(ScenarioError, match="shipped nodes only"):
-        Simulation(Shelf(trap.folder / "uploads").load("stranger"), threads=1)
+        Simulation(ScenarioCatalog(trap.folder / "uploads").load("stranger"), threads=1)
     assert not trap.has_run
 
 

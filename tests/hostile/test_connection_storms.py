@@ -27,7 +27,7 @@ SERVERS = """
     import asyncio, json, os, resource, sys, threading
     resource.setrlimit(resource.RLIMIT_NOFILE, ({descriptors}, {descriptors}))
     from live_graph import LiveGraph
-    from volery.bridges.bridge_host import Doors
+    from volery.bridges.bridge_host import BridgeHost
     from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
     from volery.bridges.rosbridge.server import RosbridgeServer
     from volery.bridges.sensor_link.server import SensorLink
@@ -38,28 +38,28 @@ SERVERS = """
     from volery.server.settings import PageSettings
 
     live = LiveGraph()
-    doors = Doors(live.gateway)
+    bridges = BridgeHost(live.gateway)
     made = {{
         "rosbridge": RosbridgeServer(port=0),
         "ros_tcp": RosTcpEndpoint(port=0),
         "sensor_link": SensorLink(port=0, image_port=0),
         "mavlink_tcp": MavlinkTcp(port=0),
     }}
-    for door in made.values():
-        doors.open(door)
+    for bridge in made.values():
+        bridges.open(bridge)
     comms = CommsServer(port=0)
-    doors.call(comms.start())
+    bridges.call(comms.start())
     with PageServer(PageSettings(port=0)) as page:
         page.building("hover", "A world that takes long to build.")
-        ports = {{name: door.port for name, door in made.items()}}
+        ports = {{name: bridge.port for name, bridge in made.items()}}
         print(json.dumps(ports | {{"page": page.port, "comms": comms.port}}), flush=True)
         for line in sys.stdin:
             files = [open(os.devnull) for _ in range(32)]  # as a world that is built, a log
             for file in files:
                 file.close()
             print(json.dumps({{"connections": SHARED.num_connections}}), flush=True)
-    doors.call(comms.stop())
-    doors.close()
+    bridges.call(comms.stop())
+    bridges.close()
     live.close()
 """
 

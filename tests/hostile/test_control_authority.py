@@ -13,27 +13,27 @@ from volery.bridges.rosbridge.rosapi_parameters import NamedParameters, Paramete
 from volery.core.errors import BridgeError, CommandError, GraphError
 from volery.graph.graph import Graph
 from volery.graph.parameters import Parameter
-from volery.runtime.vehicles.control_authority import Pilots, operator_name, same_operator
+from volery.runtime.vehicles.control_authority import ControlAuthority, operator_name, same_operator
 from volery.runtime.vehicles.control_targets import names_in, parts_of
 from volery.scenario.faults import parse_fault
-from volery.server.access_policy import PilotGate, service_of
-from volery.server.operator_names import CrewList
+from volery.server.access_policy import OperatorPolicy, service_of
+from volery.server.operator_names import OperatorNames
 
 NODE, PARAMETER = "/uav1/gap_following", "height_m"
 
 
 @pytest.fixture
 def pilots():
-    pilots = Pilots(lambda: ["uav1", "uav2"])
+    pilots = ControlAuthority(lambda: ["uav1", "uav2"])
     pilots.take("uav1", "Anna")
     return pilots
 
 
 @pytest.fixture
 def bob(pilots):
-    crew = CrewList()
+    crew = OperatorNames()
     crew.sign_in("Anna")
-    return PilotGate(crew.sign_in("Bob"), crew, pilots)
+    return OperatorPolicy(crew.sign_in("Bob"), crew, pilots)
 
 
 def call(service, args=None):
@@ -166,7 +166,7 @@ def test_one_operator_however_the_name_is_spelled(pilots, spelling):
     assert same_operator("Anna", spelling)
     pilots.take("uav1", spelling)
     assert operator_name(pilots.holder_of("uav1")).casefold() == "anna"
-    crew = CrewList()
+    crew = OperatorNames()
     crew.sign_in("Anna")
     assert spelling in crew
     assert crew.sign_in(spelling) not in ("Anna", spelling)
@@ -186,8 +186,8 @@ def test_nobody_takes_a_name_by_spelling_it_otherwise(bob):
 
 
 def test_whoever_is_spelled_otherwise_keeps_control(pilots):
-    crew = CrewList()
-    anna = PilotGate(crew.sign_in("anna"), crew, pilots)
+    crew = OperatorNames()
+    anna = OperatorPolicy(crew.sign_in("anna"), crew, pilots)
     assert anna.check(call("/uav1/land"))
     pilots.release("uav1", "ANNA")
     assert pilots.holder_of("uav1") == ""

@@ -173,7 +173,7 @@ def test_every_command_that_stays_ends_by_a_signal(tmp_path, command, number):
     log = write(tmp_path / "flight.mcap")
     words, sign = {
         "serve": (["serve", "--port", "0", "--recordings", tmp_path], "flying"),
-        "play": (["play", log, "--door", f"rosbridge={free_port()}"], "playing"),
+        "play": (["play", log, "--bridge", f"rosbridge={free_port()}"], "playing"),
         "comms": (["comms", "--port", "0"], "open "),
         "node": (["node", "gap_following", "--via", NOWHERE], ""),
     }[command]

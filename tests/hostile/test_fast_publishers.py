@@ -10,10 +10,10 @@ import pytest
 from live_graph import HandGraph
 from ros_tcp_client import frame
 
-from volery.bridges.ros_tcp.connection import Pipe
-from volery.bridges.ros_tcp.wire import FrameParser
+from volery.bridges.ros_tcp.connection import RosTcpConnection
+from volery.bridges.ros_tcp.wire import RosTcpFrameParser
 from volery.bridges.rosbridge.bulk_turns import BulkTurns
-from volery.bridges.rosbridge.protocol import RosbridgePeer, Shared
+from volery.bridges.rosbridge.protocol import RosbridgePeer, ServerContext
 from volery.bridges.rosbridge.websocket_session import Bell, converse, post_to
 from volery.core.errors import GraphError
 from volery.engine.pacing import Pacer
@@ -142,7 +142,7 @@ def test_rosbridge_reads_on_when_the_simulation_has_taken_enough(monkeypatch):
     async def serve():
         loop = asyncio.get_running_loop()
         bell, session = Bell(loop), graph.gateway.open("flood")
-        peer = RosbridgePeer(session, Shared(), wake=bell.ring, post=post_to(loop))
+        peer = RosbridgePeer(session, ServerContext(), wake=bell.ring, post=post_to(loop))
         talk = asyncio.create_task(converse(flood, bell, peer, BulkTurns()))
         while flood.read <= MAX_WAITING - 2:
             await asyncio.sleep(0.001)
@@ -166,7 +166,7 @@ def test_rosbridge_reads_no_more_of_a_client_over_its_share(monkeypatch):
         loop = asyncio.get_running_loop()
         bell = Bell(loop)
         peer = RosbridgePeer(
-            graph.gateway.open("flood"), Shared(), wake=bell.ring, post=post_to(loop)
+            graph.gateway.open("flood"), ServerContext(), wake=bell.ring, post=post_to(loop)
         )
         talk = asyncio.create_task(converse(flood, bell, peer, BulkTurns()))
         for _ in range(50):
@@ -197,9 +197,9 @@ def test_ros_tcp_reads_no_more_until_time_has_paid():
         theirs = socket.create_connection(listener.getsockname())
         ours, _ = listener.accept()
         listener.close()
-        pipe = Pipe(
+        pipe = RosTcpConnection(
             ours,
-            FrameParser(),
+            RosTcpFrameParser(),
             Outbox(),
             taken.append,
             taken.append,

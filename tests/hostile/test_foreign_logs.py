@@ -12,15 +12,15 @@ from typing import Any
 import pytest
 
 from volery.bridges.logs.log_writer import open_log
-from volery.bridges.logs.recorded_flight import Origin, read_flight
+from volery.bridges.logs.recorded_flight import RecordedScenario, read_flight
 from volery.core.errors import DataFileError, GraphError, RecordingError, ScenarioError, VoleryError
 from volery.graph import messages as m
 from volery.runtime import Simulation
 from volery.runtime.build.worlds import geometry_of
-from volery.runtime.replay.log_player import Player
+from volery.runtime.replay.log_player import LogPlayer
 from volery.runtime.replay.scenario_record import scenario_of
 from volery.scenario.access import SHIPPED_DATA, ScenarioAccess
-from volery.scenario.catalog import Shelf
+from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.load import load_scenario, parse_scenario
 
 SECRET = "swordfish"
@@ -93,12 +93,12 @@ def names_outside(secret: Path, own: Path) -> list[str]:
 def test_a_log_reads_below_its_own_folder_only(secret: Path, own: Path) -> None:
     for name in names_outside(secret, own):
         log = foreign_log(own / "flight.mcap", content(grid(name)))
-        with Player(log) as player, pytest.raises(DataFileError, match="may be read") as refused:
+        with LogPlayer(log) as player, pytest.raises(DataFileError, match="may be read") as refused:
             _ = player.geometry
         assert SECRET not in str(refused.value)
         assert str(secret) not in str(refused.value).replace(name[:80], "")
         log.unlink()
-    with Player(foreign_log(own / "good.mcap", content(grid("ground.csv")))) as player:
+    with LogPlayer(foreign_log(own / "good.mcap", content(grid("ground.csv")))) as player:
         assert player.geometry is not None
         assert player.geometry.terrain.bounds == (0.0, 0.0, 40.0, 40.0)
 
@@ -147,7 +147,7 @@ def test_every_key_that_names_a_file_is_confined(
         told["types"] = {"f450": {**TYPES["f450"], **named(MODELS[kind], file)}}
     if kind == "messages":
         told["messages"] = [str(secret)]
-    scenario = scenario_of(Origin("stranger", 1, "0", told), folder=own)
+    scenario = scenario_of(RecordedScenario("stranger", 1, "0", told), folder=own)
     with pytest.raises(VoleryError, match="may be read") as refused:
         Simulation(scenario, threads=1)
     assert SECRET not in str(refused.value)
@@ -161,7 +161,7 @@ def test_the_name_of_a_shipped_model_is_no_path(airframe: str, own: Path, tmp_pa
     name = airframe.replace("/DIR", str(tmp_path))
     told = content({}, types={"f450": {"airframe": name}})
     with pytest.raises(VoleryError, match="no airframe"):
-        Simulation(scenario_of(Origin("stranger", 1, "0", told), folder=own), threads=1)
+        Simulation(scenario_of(RecordedScenario("stranger", 1, "0", told), folder=own), threads=1)
 
 
 def test_a_beam_table_lies_beside_its_model(own: Path, secret: Path) -> None:
@@ -177,7 +177,9 @@ def test_a_beam_table_lies_beside_its_model(own: Path, secret: Path) -> None:
         (own / "mine.toml").write_text(head + table + tail)
         told = content({}, types={"f450": {"sensors": [{"kind": "lidar", "model": "mine.toml"}]}})
         with pytest.raises(VoleryError) as refused:
-            Simulation(scenario_of(Origin("stranger", 1, "0", told), folder=own), threads=1)
+            Simulation(
+                scenario_of(RecordedScenario("stranger", 1, "0", told), folder=own), threads=1
+            )
         assert SECRET not in str(refused.value)
         assert "lies in the folder of its model" in str(refused.value)
 
@@ -197,7 +199,7 @@ def test_an_upload_reads_below_its_own_folder_only(tmp_path: Path, secret: Path)
         type = "f450"
         position_m = [1.0, 1.0]
     """
-    shelf = Shelf(tmp_path / "uploads")
+    shelf = ScenarioCatalog(tmp_path / "uploads")
     for file in (str(secret / "ground.csv"), "../../elsewhere/ground.csv"):
         (folder / "scenario.toml").write_text(toml.format(file=file))
         with pytest.raises(DataFileError, match="may be read"):
@@ -219,13 +221,13 @@ def test_ones_own_scenario_keeps_its_names(tmp_path: Path, secret: Path) -> None
 def test_a_log_borrows_what_ones_own_scenario_names_itself(own: Path, secret: Path) -> None:
     file, other = str(secret / "ground.csv"), str(secret / "notes.txt")
     mine = parse_scenario(content(grid(file)), access=ScenarioAccess(own))
-    same = scenario_of(Origin("stranger", 1, "0", content(grid(file))), mine)
+    same = scenario_of(RecordedScenario("stranger", 1, "0", content(grid(file))), mine)
     assert geometry_of(same).terrain.bounds == (0.0, 0.0, 40.0, 40.0)
-    spoiled = scenario_of(Origin("stranger", 1, "0", content(grid(other))), mine)
+    spoiled = scenario_of(RecordedScenario("stranger", 1, "0", content(grid(other))), mine)
     with pytest.raises(DataFileError, match="may be read"):
         geometry_of(spoiled)
     with pytest.raises(ScenarioError, match="not of 'stranger'"):
-        scenario_of(Origin("another", 1, "0", content({}, name="another")), mine)
+        scenario_of(RecordedScenario("another", 1, "0", content({}, name="another")), mine)
 
 
 def test_a_log_of_an_upload_finds_its_files(tmp_path: Path) -> None:
@@ -238,8 +240,8 @@ def test_a_log_of_an_upload_finds_its_files(tmp_path: Path) -> None:
         'spacing_m = 20.0\n[types.f450]\n[[uavs]]\ntype = "f450"\nposition_m = [20.0, 20.0]\n'
     )
     log = foreign_log(tmp_path / "recordings" / "flight.mcap", told)
-    shelf = Shelf(tmp_path / "recordings" / "uploads", tmp_path / "recordings")
-    with Player(log, shelf=shelf) as player:
+    shelf = ScenarioCatalog(tmp_path / "recordings" / "uploads", tmp_path / "recordings")
+    with LogPlayer(log, shelf=shelf) as player:
         assert player.geometry is not None
 
 
@@ -258,7 +260,7 @@ def test_a_log_does_not_tell_where_files_lie(tmp_path: Path) -> None:
 @pytest.mark.parametrize("text", ["[]", "{}", '{"seed": "' + SECRET + '"}', "[" * 100_000])
 def test_a_broken_scenario_of_a_log_is_not_quoted(text: str) -> None:
     with pytest.raises(RecordingError) as refused:
-        Origin.from_json(text)
+        RecordedScenario.from_json(text)
     assert SECRET not in str(refused.value)
     assert len(str(refused.value)) < 200
 
@@ -273,7 +275,7 @@ def test_nodes_of_a_log_write_below_the_working_folder_only(
     kind = {"sensors": [], "nodes": [{"node": node, "parameters": {"folder": folder}}]}
     told = content({}, types={"f450": kind})
     with pytest.raises(ScenarioError, match="below the working folder only"):
-        Simulation(scenario_of(Origin("stranger", 1, "0", told), folder=own), threads=1)
+        Simulation(scenario_of(RecordedScenario("stranger", 1, "0", told), folder=own), threads=1)
 
 
 def test_clients_set_no_parameter_that_names_files() -> None:

@@ -30,9 +30,9 @@ from volery.graph.graph import Graph
 from volery.graph.messages import Published, String
 from volery.runtime.replay.command_log import CommandLog
 from volery.runtime.replay.slam.sources import open_source
-from volery.runtime.services.recording import Recording
+from volery.runtime.services.recording import RecordingServices
 from volery.server import log_check
-from volery.server.bounded_process import BoundedError, Bounds, run_bounded
+from volery.server.bounded_process import BoundedError, ProcessBounds, run_bounded
 
 CHUNK = 4 << 20
 """Bound of a chunk in these tests, in the place of 256 MiB."""
@@ -293,7 +293,7 @@ def test_logs_are_looked_into_in_a_process_that_ends(tmp_path, monkeypatch):
     good, bad = log_check.look_into([path, tmp_path / "bad.bag"])
     assert good == {"seconds": 0.0, "messages": 1, "trouble": ""}
     assert "neither an MCAP log" in bad["error"]
-    monkeypatch.setattr(log_check, "BOUNDS", Bounds(3 << 30, 60, wall_s=0.05))
+    monkeypatch.setattr(log_check, "BOUNDS", ProcessBounds(3 << 30, 60, wall_s=0.05))
     (late,) = log_check.look_into([path], play=True)
     assert "takes too long" in late["error"]
 
@@ -313,7 +313,7 @@ def test_a_child_keeps_to_its_bounds(tmp_path, monkeypatch, program, why):
     )
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     with pytest.raises(BoundedError, match=why):
-        run_bounded("greedy_child", (), Bounds(2 << 30, 1, wall_s=120.0))
+        run_bounded("greedy_child", (), ProcessBounds(2 << 30, 1, wall_s=120.0))
 
 
 def test_recordings_are_limited_in_number_and_bytes(tmp_path, monkeypatch):
@@ -332,7 +332,7 @@ def test_recordings_are_limited_in_number_and_bytes(tmp_path, monkeypatch):
 def test_a_recording_ends_where_the_folder_is_full(tmp_path, monkeypatch):
     monkeypatch.setattr(recordings_quota, "MAX_TOTAL_BYTES", 100_000)
     graph = Graph(lambda: 0)
-    recording = Recording(graph, tmp_path, CommandLog(graph, lambda: (0, 0)))
+    recording = RecordingServices(graph, tmp_path, CommandLog(graph, lambda: (0, 0)))
     recording._start(type("Request", (), {"path": "flight.mcap", "topics": (), "exclude": ()}))
     publisher = graph.advertise("/text", "std_msgs/msg/String")
     for _ in range(30):

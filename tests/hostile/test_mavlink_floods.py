@@ -7,9 +7,9 @@ import threading
 import pytest
 from live_graph import LiveGraph
 
-from volery.bridges.bridge_host import Doors
+from volery.bridges.bridge_host import BridgeHost
 from volery.mavlink.codec import dialect
-from volery.mavlink.links.connection import Party
+from volery.mavlink.links.connection import MavlinkConnection
 from volery.mavlink.links.rate_limits import FRAMES_PER_S, IntakeLimits
 from volery.mavlink.links.tcp_bridge import MavlinkTcp
 from volery.mavlink.links.udp_bridge import _UdpLink
@@ -98,7 +98,7 @@ class Vehicles:
 
 def test_frames_that_come_together_reach_a_vehicle_as_one_message():
     vehicles = Vehicles()
-    party = Party(vehicles, 7, 0)
+    party = MavlinkConnection(vehicles, 7, 0)
     for system in (1, 2, 3):
         party.greet(system)
     vehicles.taken.clear()
@@ -126,12 +126,12 @@ def test_who_floods_no_more_is_read_again():
 
 
 @pytest.fixture
-def door():
+def bridge():
     live = LiveGraph()
-    with Doors(live.gateway) as doors:
+    with BridgeHost(live.gateway) as bridges:
         made = MavlinkTcp(port=0)
-        doors.open(made)
-        made.in_loop = lambda action: doors.call(called(action))
+        bridges.open(made)
+        made.in_loop = lambda action: bridges.call(called(action))
         yield made
     live.close()
 
@@ -145,8 +145,8 @@ def heartbeat():
     return codec.heartbeat_encode(6, 8, 0, 0, 0).pack(codec)
 
 
-def connect(door):
-    return socket.create_connection(("127.0.0.1", door.port), PATIENCE_S)
+def connect(bridge):
+    return socket.create_connection(("127.0.0.1", bridge.port), PATIENCE_S)
 
 
 def until(true):
@@ -158,43 +158,43 @@ def until(true):
     raise AssertionError("it does not come true")
 
 
-def test_what_is_sent_too_fast_stays_with_the_sender(door, monkeypatch):
-    monkeypatch.setattr(door._intake, "_frames_per_s", 1e-3)
+def test_what_is_sent_too_fast_stays_with_the_sender(bridge, monkeypatch):
+    monkeypatch.setattr(bridge._intake, "_frames_per_s", 1e-3)
     sent, words = 0, heartbeat() * 1000
-    with connect(door) as client:
+    with connect(bridge) as client:
         client.settimeout(0.3)
         with contextlib.suppress(TimeoutError):
             while sent < 256 << 20:
                 sent += client.send(words)
         assert sent < 64 << 20  # what the two kernels' buffers hold
-        with connect(door) as other:  # who is read as before
-            until(lambda: len(door._clients) == 2)
+        with connect(bridge) as other:  # who is read as before
+            until(lambda: len(bridge._clients) == 2)
             other.sendall(heartbeat())
-            until(lambda: sum(one.party.has_spoken for one in door._clients.values()) == 2)
+            until(lambda: sum(one.party.has_spoken for one in bridge._clients.values()) == 2)
 
 
-def test_a_client_that_does_not_read_costs_no_memory(door):
+def test_a_client_that_does_not_read_costs_no_memory(bridge):
     frames = heartbeat() * 50
-    with connect(door):
-        until(lambda: door._clients)
-        (client,) = door._clients.values()
+    with connect(bridge):
+        until(lambda: bridge._clients)
+        (client,) = bridge._clients.values()
         for _ in range(100):
-            door.in_loop(lambda: [door._send(-1, frames) for _ in range(1000)])
-            size = door.in_loop(client.transport.get_write_buffer_size)
+            bridge.in_loop(lambda: [bridge._send(-1, frames) for _ in range(1000)])
+            size = bridge.in_loop(client.transport.get_write_buffer_size)
             assert size < 1 << 20
 
 
-def test_idle_clients_give_way_and_those_that_speak_stay(door):
+def test_idle_clients_give_way_and_those_that_speak_stay(bridge):
     with contextlib.ExitStack() as stack:
-        speaking = stack.enter_context(connect(door))
+        speaking = stack.enter_context(connect(bridge))
         speaking.sendall(heartbeat())
-        until(lambda: any(one.party.has_spoken for one in door._clients.values()))
+        until(lambda: any(one.party.has_spoken for one in bridge._clients.values()))
         for _ in range(100):
-            stack.enter_context(connect(door))
-        late = stack.enter_context(connect(door))
+            stack.enter_context(connect(bridge))
+        late = stack.enter_context(connect(bridge))
         late.sendall(heartbeat())
-        until(lambda: sum(one.party.has_spoken for one in door._clients.values()) == 2)
-        assert len(door._clients) <= 40
+        until(lambda: sum(one.party.has_spoken for one in bridge._clients.values()) == 2)
+        assert len(bridge._clients) <= 40
 
 
 @pytest.fixture
@@ -202,7 +202,7 @@ def udp_link():
     """Frames that a vehicle's UDP port has taken, its port, and the port of its agreed peer."""
     live = LiveGraph()
     vehicles = Vehicles()
-    with Doors(live.gateway) as doors, contextlib.ExitStack() as stack:
+    with BridgeHost(live.gateway) as bridges, contextlib.ExitStack() as stack:
         agreed = stack.enter_context(bound())
         own, peer = free_port(), agreed.getsockname()
 
@@ -213,10 +213,10 @@ def udp_link():
         async def closed():
             link.close()
 
-        link = doors.call(opened())
+        link = bridges.call(opened())
         vehicles.taken.clear()
         yield vehicles.taken, own, agreed, link
-        doors.call(closed())
+        bridges.call(closed())
     live.close()
 
 

@@ -17,9 +17,9 @@ from rosbridge_bench import Bench, FakeSimulation
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from volery.bridges.bridge_host import Doors
+from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.ros_tcp.session import EndpointSession
-from volery.bridges.ros_tcp.wire import FrameParser
+from volery.bridges.ros_tcp.wire import RosTcpFrameParser
 from volery.bridges.rosbridge import first_message
 from volery.bridges.rosbridge import message_budget as budget
 from volery.bridges.rosbridge.cbor_codec import encode_cbor
@@ -124,9 +124,9 @@ def test_a_stranger_may_send_little():
 @pytest.fixture
 def guarded():
     simulation = FakeSimulation()
-    with Doors(simulation.gateway) as doors:
+    with BridgeHost(simulation.gateway) as bridges:
         server = RosbridgeServer(port=0, token="secret")
-        doors.open(server)
+        bridges.open(server)
         yield f"ws://127.0.0.1:{server.port}"
     simulation.close()
 
@@ -229,7 +229,7 @@ def test_arrays_of_messages_are_counted_before_any_is_made(name):
 def test_a_client_of_ros_tcp_is_told(monkeypatch):
     graph = HandGraph()
     session = EndpointSession(graph.gateway, "hostile", "ros1", 10, lambda: None)
-    parser = FrameParser()
+    parser = RosTcpFrameParser()
 
     def take(destination, payload):
         for found in parser.feed(frame(destination, payload)):

@@ -13,7 +13,7 @@ from whole_world import offer_rosapi, whole_data
 
 from volery.bridges.logs.log_writer import open_log
 from volery.graph.service_reply import ServiceReply
-from volery.runtime.replay.log_player import Player
+from volery.runtime.replay.log_player import LogPlayer
 from volery.server.read_only import READ_ONLY_SERVICES
 
 TICK_S = 0.001
@@ -79,7 +79,7 @@ def log(simulate, tmp_path):
 
 @pytest.mark.parametrize("speed", [None, 1.0])
 def test_playback_charges_what_viewers_call(log, speed):
-    with Player(log, speed=speed, loop=True) as player:
+    with LogPlayer(log, speed=speed, loop=True) as player:
         offer_rosapi(player)
         player._is_late = True  # as where it does not keep its pace; else there is time to spare
         offered = {*player.graph.services()} & READ_ONLY_SERVICES
@@ -88,7 +88,7 @@ def test_playback_charges_what_viewers_call(log, speed):
 
 
 def test_a_player_counts_a_logs_messages_once(log, monkeypatch):
-    with Player(log, paused=True) as player:
+    with LogPlayer(log, paused=True) as player:
         first = player.describe()
         monkeypatch.setattr(player._playback.log, "counts", lambda: 1 / 0)
         assert player.describe() == first
@@ -96,7 +96,7 @@ def test_a_player_counts_a_logs_messages_once(log, monkeypatch):
 
 def test_new_subscribers_share_a_budget_of_a_player(log):
     """What was published last is read from the log for each of them."""
-    with Player(log, paused=True) as player:
+    with LogPlayer(log, paused=True) as player:
         player._budget._now_s = lambda: player._budget._last_s
         readings = []
         show = player._playback.show_to_newcomers

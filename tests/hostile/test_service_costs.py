@@ -11,7 +11,7 @@ from volery.engine.call_budget import MAX_FRACTION
 from volery.graph.messages import String
 from volery.runtime.services import scenario_loading
 from volery.scenario import load
-from volery.scenario.catalog import Shelf
+from volery.scenario.catalog import ScenarioCatalog
 from volery.server.read_only import READ_ONLY_SERVICES
 
 
@@ -36,7 +36,7 @@ def test_worlds_are_read_once(simulate, flat_data, tmp_path, monkeypatch):
     folder.mkdir(parents=True)
     text = '[types.f450]\n[[uavs]]\ntype = "f450"\nposition_m = [0, 0]\n'
     (folder / "scenario.toml").write_text(f'name = "mine"\n{text}')
-    shelf = Shelf(tmp_path / "scenarios")
+    shelf = ScenarioCatalog(tmp_path / "scenarios")
     client = Client(simulate(flat_data, shelf=shelf))
     worlds = client.call("/get_available_worlds", None).worlds
     assert "mine" in [world.name for world in worlds]

@@ -16,7 +16,7 @@ from live_graph import LiveGraph
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from volery.bridges.bridge_host import Doors
+from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.comms.addresses import Identity
 from volery.comms.server.settings import RouterSettings
@@ -140,9 +140,9 @@ def page(slow):
 @pytest.fixture
 def rosbridge(slow):
     live = LiveGraph()
-    with Doors(live.gateway) as doors:
+    with BridgeHost(live.gateway) as bridges:
         server = RosbridgeServer(port=0, token=TOKEN)
-        doors.open(server)
+        bridges.open(server)
         yield server
     live.close()
 

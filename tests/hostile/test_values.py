@@ -13,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 import volery
-from volery.bridges.bridge_host import Doors
+from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.logs.reader import summarize
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.cli.app import app
@@ -287,9 +287,9 @@ def test_absurd_options_are_refused_in_a_line(words):
 @pytest.mark.parametrize("header", ["Host", "Origin", "Authorization"])
 def test_a_header_given_twice_is_a_bad_request(simulate, flat_data, caplog, header):
     simulation = simulate(flat_data)
-    with Doors(simulation.gateway) as doors:
+    with BridgeHost(simulation.gateway) as bridges:
         server = RosbridgeServer(port=0)
-        doors.open(server)
+        bridges.open(server)
         request = (
             f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\nUpgrade: websocket\r\n"
             "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"

@@ -20,7 +20,7 @@ from websockets.frames import Opcode
 from websockets.sync.client import connect
 
 from volery.bridges import frame_limits
-from volery.bridges.bridge_host import Doors
+from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.frame_limits import (
     FRAMES_PER_S,
     MAX_FRAGMENTS,
@@ -30,7 +30,7 @@ from volery.bridges.frame_limits import (
 )
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.core.listener import MAX_UNPROVEN
-from volery.runtime.idle_server import Lobby
+from volery.runtime.idle_server import IdleServer
 from volery.server.http_protocol import READ_BYTES
 
 sys.path.append(str(Path(__file__).parents[1] / "unit" / "server"))
@@ -51,16 +51,16 @@ UPGRADE = (
 
 @pytest.fixture(scope="module")
 def server():
-    with serving(Lobby(lambda _: None)) as server:
+    with serving(IdleServer(lambda _: None)) as server:
         yield server
 
 
 @pytest.fixture(scope="module")
 def rosbridge():
     live = LiveGraph()
-    with Doors(live.gateway) as doors:
+    with BridgeHost(live.gateway) as bridges:
         server = RosbridgeServer(port=0)
-        doors.open(server)
+        bridges.open(server)
         yield server
     live.close()
 

@@ -15,20 +15,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 from live_graph import LiveGraph
 
-from volery.bridges.bridge_host import Doors
+from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.bridges.ros_tcp.wire import frame as ros_tcp_frame
 from volery.bridges.sensor_link.payloads import encode_payload
 from volery.bridges.sensor_link.server import SensorLink
-from volery.bridges.sensor_link.wire import Kind as SensorKind
+from volery.bridges.sensor_link.wire import SensorLinkKind as SensorKind
 from volery.bridges.sensor_link.wire import encode_frame as sensor_frame
 from volery.comms.control_payloads import Hello, encode_hello
-from volery.comms.protocol import Kind, encode_frame
+from volery.comms.protocol import SensorLinkKind, encode_frame
 from volery.comms.server.tcp import CommsServer
 from volery.core.preamble import Preamble
 from volery.graph import messages as m
 from volery.mavlink.codec import dialect
-from volery.mavlink.hil.px4_bridge import Px4Door
+from volery.mavlink.hil.px4_bridge import Px4Bridge
 from volery.mavlink.links.tcp_bridge import MavlinkTcp
 
 PATIENCE_S = 60.0
@@ -82,7 +82,7 @@ def test_what_is_not_refused_passes_unchanged(pieces):
 
 
 class Graph:
-    """A graph with a UAV, and doors to it."""
+    """A graph with a UAV, and bridges to it."""
 
     def __init__(self):
         self.live = LiveGraph()
@@ -91,14 +91,14 @@ class Graph:
         for topic, kind in (("/uav1/pose_command", m.PoseStamped), ("/in", m.String)):
             subscribe = partial(self.live.graph.subscribe, topic, self.heard.append, kind)
             self.live.do(subscribe)
-        self.doors = Doors(self.live.gateway)
+        self.bridges = BridgeHost(self.live.gateway)
 
-    def open(self, door):
-        self.doors.open(door)
-        return door
+    def open(self, bridge):
+        self.bridges.open(bridge)
+        return bridge
 
     def close(self):
-        self.doors.close()
+        self.bridges.close()
         self.live.close()
 
 
@@ -148,7 +148,9 @@ def pose():
 
 
 def hello():
-    return encode_frame(Kind.HELLO, 2, 0, payload=encode_hello(Hello(0, 2, 4, "page", "")))
+    return encode_frame(
+        SensorLinkKind.HELLO, 2, 0, payload=encode_hello(Hello(0, 2, 4, "page", ""))
+    )
 
 
 def ports(graph, comms, name):
@@ -161,7 +163,7 @@ def ports(graph, comms, name):
         return graph.open(RosTcpEndpoint(port=0)).port, ros_tcp_frame("/in", b"\0" * 8)
     if name == "px4":
         port = free_port()
-        graph.open(Px4Door(port=port))
+        graph.open(Px4Bridge(port=port))
         return port, heartbeat()
     link = graph.open(SensorLink(port=0, image_port=0))
     return (link.port if name == "sensor_link" else link.image_port), pose()
@@ -216,9 +218,9 @@ def test_tls_is_sent_away(graph, comms, name):
 
 def test_a_page_does_not_keep_a_px4_from_its_port(graph):
     port = free_port()
-    door = graph.open(Px4Door(port=port))
+    bridge = graph.open(Px4Bridge(port=port))
     idle = socket.create_connection(("127.0.0.1", port))
     with idle, socket.create_connection(("127.0.0.1", port)) as px4:
         px4.sendall(heartbeat())
         assert is_ended(idle)
-        assert door.connected == ("uav1",)
+        assert bridge.connected == ("uav1",)

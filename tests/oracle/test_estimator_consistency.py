@@ -122,7 +122,12 @@ def flight():
     return estimator, {name: np.array(v) for name, v in seen.items()}, before, np.array(jumps)
 
 
-AIDS = [r.Aid.GNSS_POSITION, r.Aid.GNSS_VELOCITY, r.Aid.PRESSURE_HEIGHT, r.Aid.MAGNETIC_HEADING]
+AIDS = [
+    r.AidingSource.GNSS_POSITION,
+    r.AidingSource.GNSS_VELOCITY,
+    r.AidingSource.PRESSURE_HEIGHT,
+    r.AidingSource.MAGNETIC_HEADING,
+]
 
 
 def test_errors_are_as_large_as_the_covariance_says(flight):

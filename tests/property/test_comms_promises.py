@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from router_bench import MS, Bench
 
 from volery.comms.addresses import ALL, batch_address
-from volery.comms.protocol import Kind
+from volery.comms.protocol import StationFrameKind
 
 STATIONS = (0, 1, 4)
 RECEIVERS = {
@@ -58,7 +58,9 @@ class History:
         receivers = [each for each in RECEIVERS[to] if each != source or to == source]
         count = sum(len(texts) for texts in self.sent.values())
         text = f"{source} {count}"
-        self.bench.send(source, to, text, Kind.COMMAND if count % 2 else Kind.SENSING)
+        self.bench.send(
+            source, to, text, StationFrameKind.COMMAND if count % 2 else StationFrameKind.SENSING
+        )
         for each in receivers:
             self.sent.setdefault((source, each), []).append(text.encode())
 

@@ -21,8 +21,8 @@ from ros1_bench import (
 )
 from rosbags.highlevel import AnyReader
 
-from volery.bridges.bridge_host import Doors
-from volery.bridges.ros1.bridge import Ros1Door
+from volery.bridges.bridge_host import BridgeHost
+from volery.bridges.ros1.bridge import Ros1Bridge
 from volery.bridges.ros1.environment import load_rospy
 from volery.bridges.ros1.node import join_ros1
 from volery.core.errors import BridgeError, GraphError
@@ -73,17 +73,17 @@ def live(master):
 
 
 @pytest.fixture(scope="module")
-def door(live, master):
-    door = Ros1Door(remote_services={"/remote": TRIGGER})
-    with Doors(live.gateway) as doors:
-        doors.open(door)
-        yield door
+def bridge(live, master):
+    bridge = Ros1Bridge(remote_services={"/remote": TRIGGER})
+    with BridgeHost(live.gateway) as bridges:
+        bridges.open(bridge)
+        yield bridge
     assert "/use_sim_time" not in tool("rosparam", "list")
 
 
 @pytest.fixture
-def registered(door, live):
-    """Waits until the door has registered a topic or service of the graph."""
+def registered(bridge, live):
+    """Waits until the bridge has registered a topic or service of the graph."""
 
     def wait(name, method="getTopicTypes"):
         node = join_ros1("volery")
@@ -206,7 +206,7 @@ def test_the_late_get_what_was_latched_each_publisher_s_own(live, registered):
         assert early.next()[0] == "new"  # and nothing twice
 
 
-def test_a_slow_reader_delays_nobody(live, door, registered):
+def test_a_slow_reader_delays_nobody(live, bridge, registered):
     publish = live.publisher("/flood", STRING)
     registered("/flood")
     with peer("hang", "/flood") as slow, peer("listen", "/flood", "--count=1000000") as quick:
@@ -221,7 +221,7 @@ def test_a_slow_reader_delays_nobody(live, door, registered):
         last = ""
         while last != "last":
             last = quick.next()[0]
-        assert wait_until(lambda: door.dropped.get("/flood", 0) > 50)
+        assert wait_until(lambda: bridge.dropped.get("/flood", 0) > 50)
 
 
 def subscribed():
@@ -248,7 +248,7 @@ def test_commands_come_in_and_do_not_come_back(live, registered):
     assert heard[0].count("linear") <= len(seen)  # each once
 
 
-def test_topics_without_publishers_come_in_as_they_appear(live, door):
+def test_topics_without_publishers_come_in_as_they_appear(live, bridge):
     with peer("talk", "/from_outside") as talker:
         assert talker.next() == "ready"
         seen = live.collect("/from_outside", STRING)
@@ -339,7 +339,7 @@ def test_packages_for_ros1_have_the_sums_of_the_bridge(own_types):
     assert dict(zip(names, sums, strict=True)) == {name: ros1_codec().md5(name) for name in names}
 
 
-def test_services_of_ros1_for_the_graph(live, door):
+def test_services_of_ros1_for_the_graph(live, bridge):
     def call():
         come, got = threading.Event(), []
         reply = ServiceReply(got.append, got.append)
@@ -388,7 +388,7 @@ def test_a_bag_is_recorded(live, registered, tmp_path):
     np.testing.assert_array_equal(map_read.data, tree)
 
 
-def test_one_node_a_process(door):
+def test_one_node_a_process(bridge):
     with pytest.raises(BridgeError, match="one a process"):
         join_ros1("another")
 
@@ -431,7 +431,7 @@ def test_a_master_that_began_anew_is_told_everything(live, master, registered):
     registered("/lasting")
     master.stop()
     live.publisher("/appeared_meanwhile", STRING)
-    threading.Event().wait(1.5)  # the door looks for topics and for the master
+    threading.Event().wait(1.5)  # the bridge looks for topics and for the master
     master.start()
     registered("/lasting")
     registered("/appeared_meanwhile")

@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 
 from volery.comms.addresses import Identity
-from volery.comms.protocol import Frame, Kind
+from volery.comms.protocol import StationFrame, StationFrameKind
 from volery.comms.station.tcp import Station
 from volery.core.errors import CommsError
 
@@ -115,9 +115,9 @@ class Traffic:
         self._turn += 1
         number = self._sent[source, to] = self._sent.get((source, to), 0) + 1
         stamp = _STAMP.pack(time.monotonic_ns(), number)
-        self._stations[source].send(Kind.SENSING, to, stamp.ljust(_BYTES, b"\0"))
+        self._stations[source].send(StationFrameKind.SENSING, to, stamp.ljust(_BYTES, b"\0"))
 
-    def _take(self, to: int, frame: Frame) -> None:
+    def _take(self, to: int, frame: StationFrame) -> None:
         sent_ns, number = _STAMP.unpack_from(frame.payload)
         self.latencies_ns.append(time.monotonic_ns() - sent_ns)
         pair = frame.source, to

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.sensors.lidar import LidarBatch, make_batch, scan_rays, stack_mounts
+from volery.sensors.lidar import RayBatch, make_batch, scan_rays, stack_mounts
 from volery.sensors.lidar_model import load_lidar
 from volery.sensors.mount import make_mount
 from volery.vehicle.pose_history import PoseHistory, new_history
@@ -36,7 +36,7 @@ def forest_of(extent: float, terrain: Terrain) -> Forest:
     )
 
 
-def scans_of(scene: Scene, extent: float) -> tuple[LidarBatch, PoseHistory]:
+def scans_of(scene: Scene, extent: float) -> tuple[RayBatch, PoseHistory]:
     """Two scans of each UAV from places at least half a metre from anything."""
     rng = np.random.default_rng(1)
     places = rng.uniform((0, 0, 2), (extent, extent, 5), (50 * _UAVS, 3))
@@ -58,7 +58,7 @@ def scans_of(scene: Scene, extent: float) -> tuple[LidarBatch, PoseHistory]:
     return batch, new_history(places, attitude, 1_000_000)
 
 
-def rays_of(batch: LidarBatch, history: PoseHistory) -> tuple[Array, Array]:
+def rays_of(batch: RayBatch, history: PoseHistory) -> tuple[Array, Array]:
     """The scans' beams as rays (R, 3), (R, 3), scan after scan."""
     model = load_lidar()
     scans = [scan_rays(model, batch, scan, history)[:2] for scan in range(len(batch.uav))]

@@ -14,7 +14,7 @@ from volery.engine.events import EventKind
 from volery.graph.messages import Published, stamp_of
 from volery.report.alignment import Alignment, at_times, ate_rmse_m, common_times, umeyama
 from volery.report.logged_flights import ESTIMATES, TRUTH
-from volery.report.trajectories import Way
+from volery.report.trajectories import RecordedTrajectory
 from volery.report.trunk_survey import LEVEL, NODDING, TrunkSurvey
 from volery.runtime import Simulation
 from volery.scenario import overrides
@@ -43,14 +43,14 @@ class Flown:
     """Time, and the places (T, 2) on its list, whenever it is published."""
 
     @property
-    def way(self) -> Way:
+    def way(self) -> RecordedTrajectory:
         """Where it truly was."""
-        return Way.of_rows(self.truth)
+        return RecordedTrajectory.of_rows(self.truth)
 
     @property
-    def own_way(self) -> Way:
+    def own_way(self) -> RecordedTrajectory:
         """Where it thought it was."""
-        return Way.of_rows(self.estimate)
+        return RecordedTrajectory.of_rows(self.estimate)
 
     def way_and_own(self) -> tuple[Array, Array]:
         """Places (N, 3) where it truly was, and where it thought it was at these times."""

@@ -59,15 +59,15 @@ def _scenario(count: int, physics_hz: int = 1000) -> Any:
 
 def _fly_ten(*, streams: bool) -> tuple[float, list[float]]:
     """CPU seconds a second in real time, and milliseconds from commands to their answers."""
-    from volery.bridges.bridge_host import Doors
+    from volery.bridges.bridge_host import BridgeHost
     from volery.mavlink.links.udp_bridge import MavlinkUdp
     from volery.runtime import Simulation
 
     plain, outfitted = _scenario(_VEHICLES)
     simulation = Simulation(outfitted if streams else plain)
-    with simulation, Doors(simulation.gateway) as doors:
+    with simulation, BridgeHost(simulation.gateway) as bridges:
         if streams:
-            doors.open(MavlinkUdp(port=_PORT))
+            bridges.open(MavlinkUdp(port=_PORT))
         simulation.run(_LIFT_S, speed=1.0)
         before = time.process_time()
         simulation.run(_STEADY_S, speed=1.0)

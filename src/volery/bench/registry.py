@@ -179,7 +179,7 @@ BENCHES: dict[str, Bench] = {
         ),
         Bench(
             "bridge",
-            "Bridges: messages through the doors, clients in processes of their own; the lines are "
+            "Bridges: messages to clients in processes of their own; the lines are "
             "L = alpha S + beta through the medians of 100 messages a size, 0 to 2.5 MB; sizes and "
             "end points beside the published ones in [bridge_latency.md](bridge_latency.md)",
             {
@@ -314,7 +314,7 @@ BENCHES: dict[str, Bench] = {
         ),
         Bench(
             "hostile",
-            "Hostile clients: a run in real time while clients attack its doors, each attack a "
+            "Hostile clients: a run in real time while clients attack its bridges, each attack a "
             "process of its own on one core; real-time factor, delay of another client's service "
             "call, memory that stays; the worst of all attacks, and of each",
             {

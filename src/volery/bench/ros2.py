@@ -1,4 +1,4 @@
-"""The bench `ros2`: the ROS 2 door over DDS, with a subscriber in a process of its own."""
+"""The bench `ros2`: the ROS 2 bridge over DDS, with a subscriber in a process of its own."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from volery.bench.bridge.measuring import (
     stream_ages,
     stream_scenario,
 )
-from volery.bridges.ros2.bridge import Ros2Door
-from volery.bridges.ros2.environment import Ros2Terms
+from volery.bridges.ros2.bridge import Ros2Bridge
+from volery.bridges.ros2.environment import Ros2Environment
 from volery.core.errors import VoleryError
 from volery.runtime import Simulation
 from volery.scenario.load import load_scenario
@@ -38,8 +38,8 @@ _SETTLED_S = 1.0
 
 def measure() -> dict[str, float]:
     """Figures of the bench."""
-    with in_real_time(load_scenario("hover")) as (simulation, doors):
-        doors.open(_door())
+    with in_real_time(load_scenario("hover")) as (simulation, bridges):
+        bridges.open(_bridge())
         images, lost = _images(simulation)
     alpha, beta = fit_line(images)
     figures = {"alpha_s_per_mb": alpha, "beta_s": beta, "images_lost": float(lost)}
@@ -49,8 +49,8 @@ def measure() -> dict[str, float]:
     return {**figures, **_streams()}
 
 
-def _door() -> Ros2Door:
-    return Ros2Door(Ros2Terms(domain_id=_DOMAIN))
+def _bridge() -> Ros2Bridge:
+    return Ros2Bridge(Ros2Environment(domain_id=_DOMAIN))
 
 
 class _Peer:
@@ -92,8 +92,8 @@ def _images(simulation: Simulation) -> tuple[list[tuple[int, float]], int]:
 
 def _streams() -> dict[str, float]:
     """Scans of ten UAVs to one subscriber; then another one that stands still."""
-    with in_real_time(stream_scenario()) as (simulation, doors):
-        doors.open(_door())
+    with in_real_time(stream_scenario()) as (simulation, bridges):
+        bridges.open(_bridge())
         topics = [
             f"/{uav}/laser/{name}/scan"
             for uav in simulation.uav_names

@@ -10,7 +10,7 @@ import sys
 import time
 from collections.abc import Callable
 
-from volery.bridges.ros2.environment import Ros2Terms, join_ros2
+from volery.bridges.ros2.environment import Ros2Environment, join_ros2
 from volery.bridges.ros2.middleware import Profile, TopicSpec
 from volery.bridges.ros2.names import NodeName
 from volery.graph.codecs.cdr import decode_cdr
@@ -24,7 +24,7 @@ def main() -> None:
     domain, kind, *topics = sys.argv[1:]
     msgtype = _TYPES[kind]
     came: list[tuple[str, bytes, int]] = []
-    participant = join_ros2(Ros2Terms(domain_id=int(domain)))
+    participant = join_ros2(Ros2Environment(domain_id=int(domain)))
     node = NodeName("/", "bench_peer")
     participant.add_node(node)
 

@@ -23,8 +23,8 @@ from volery.autonomy.search.calls import JOIN
 from volery.bench.bridge.native_ros1 import ros1_master
 from volery.bench.registry import Measured
 from volery.bench.search_peer import CALLED, CALLING, Called, Calling
-from volery.bridges.bridge_host import Doors
-from volery.bridges.ros1.bridge import Ros1Door
+from volery.bridges.bridge_host import BridgeHost
+from volery.bridges.ros1.bridge import Ros1Bridge
 from volery.bridges.ros1.environment import rospy_is_installed
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.bridges.rosbridge.server import RosbridgeServer
@@ -44,10 +44,13 @@ def measure() -> Measured:
     """Medians and 95th percentiles in ms; `lock_step` is in one process, in wall time."""
     figures = _lock_step_figures()
     failures: dict[str, str] = {}
-    for name, door in (("rosbridge", RosbridgeServer(port=0)), ("ros_tcp", RosTcpEndpoint(port=0))):
-        with flying() as doors:
-            doors.open(door)
-            figures.update(call_figures(name, exchange(name, door.port)))
+    for name, bridge in (
+        ("rosbridge", RosbridgeServer(port=0)),
+        ("ros_tcp", RosTcpEndpoint(port=0)),
+    ):
+        with flying() as bridges:
+            bridges.open(bridge)
+            figures.update(call_figures(name, exchange(name, bridge.port)))
     try:
         figures.update(_ros1_figures())
     except VoleryError as error:
@@ -59,8 +62,8 @@ def _ros1_figures() -> dict[str, float]:
     """Those over a roscore. `VoleryError` where ROS 1 is not installed."""
     if shutil.which("rosmaster") is None or not rospy_is_installed():
         raise VoleryError("ROS 1 is not installed; .ci/install_ros1 does it on Debian")
-    with ros1_master(), flying() as doors:
-        doors.open(Ros1Door())
+    with ros1_master(), flying() as bridges:
+        bridges.open(Ros1Bridge())
         return call_figures("ros1", exchange("ros1", 0))
 
 
@@ -128,11 +131,11 @@ def _scenario() -> Any:
 
 
 @contextlib.contextmanager
-def flying() -> Iterator[Doors]:
-    """Doors of a simulation of two UAVs that runs in real time until the block ends."""
+def flying() -> Iterator[BridgeHost]:
+    """Bridges of a simulation of two UAVs that runs in real time until the block ends."""
     with Simulation(_scenario()) as simulation:
         simulation.step(1)
-        with Doors(simulation.gateway) as doors:
+        with BridgeHost(simulation.gateway) as bridges:
             simulation.be_prompt()
             over = threading.Event()
 
@@ -143,7 +146,7 @@ def flying() -> Iterator[Doors]:
             thread = threading.Thread(target=run)
             thread.start()
             try:
-                yield doors
+                yield bridges
             finally:
                 over.set()
                 thread.join()

@@ -2,8 +2,9 @@
 
     python -m volery.bench.search_peer rosbridge|ros_tcp|ros1 PORT called|calling CALLS
 
-PORT is that of the door on this computer, 0 with ros1, whose master the environment names. `called`
-is the node of a cooperative search, which tells when its handler ran, and ends with its input;
+PORT is that of the bridge on this computer, 0 with ros1, whose master the environment names.
+`called` is the node of a cooperative search, which tells when its handler ran, and ends with its
+input;
 `calling` calls it CALLS times. Both print JSON.
 """
 

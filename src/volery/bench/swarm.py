@@ -12,7 +12,7 @@ import time
 
 import numpy as np
 
-from volery.runtime import Copies, Simulation
+from volery.runtime import Simulation, VectorizedSimulation
 from volery.scenario.load import load_scenario, parse_scenario
 
 _ROUNDS = 5
@@ -47,7 +47,7 @@ def steps_a_second_of_copies(threads: int = 2) -> float:
     """Physics steps of all copies in a second of wall time, the median of a few rounds."""
     rng = np.random.default_rng(1)
     rates = []
-    with Copies(parse_scenario(_LONE), _COPIES, threads=threads) as copies:
+    with VectorizedSimulation(parse_scenario(_LONE), _COPIES, threads=threads) as copies:
         copies.run(0.1)
         for _ in range(_ROUNDS):
             start = time.perf_counter()

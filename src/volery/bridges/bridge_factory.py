@@ -1,6 +1,6 @@
 """Bridges by name, as the command line takes them: `rosbridge`, `ros-tcp=127.0.0.1:10001`.
 
-    doors.open(make_bridge("mavlink=14550", BridgeOptions(allow_remote=True)))
+    bridges.open(make_bridge("mavlink=14550", BridgeOptions(allow_remote=True)))
 
 Entry points of the group `volery.bridges` hold the names: those that ship, and those that other
 installed packages add.

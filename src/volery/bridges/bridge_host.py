@@ -1,11 +1,12 @@
-"""Doors: servers and clients that carry the graph to other programs, on one asyncio thread.
+"""Bridges: servers and clients that carry the graph to other programs, on one asyncio thread.
 
-    with Doors(simulation.gateway) as doors:
-        doors.open(RosTcpEndpoint(port=10000))
+    with BridgeHost(simulation.gateway) as bridges:
+        bridges.open(RosTcpEndpoint(port=10000))
         simulation.run(speed=1.0)
 
-Everything a door does runs in the thread of `Doors`; what it needs of the simulation it asks of the
-`Gateway`. A door that fails ends alone.
+Everything a bridge does runs in the thread of `BridgeHost`; what it needs of the simulation it asks
+of the
+`Gateway`. A bridge that fails ends alone.
 """
 
 from __future__ import annotations
@@ -26,49 +27,49 @@ _log = logging.getLogger(__name__)
 _LONGEST_START_S = 30.0
 
 
-class Doors:
-    """The thread in which doors work. Use it as a context manager, or call `close`."""
+class BridgeHost:
+    """The thread in which bridges work. Use it as a context manager, or call `close`."""
 
     def __init__(self, gateway: Gateway) -> None:
         self._gateway = gateway
-        self._doors: list[Bridge] = []
-        self._thread = LoopThread("volery-doors")
+        self._bridges: list[Bridge] = []
+        self._thread = LoopThread("volery-bridges")
         self._closed = False
         self._thread.start()
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the open doors."""
-        return tuple(door.name for door in self._doors)
+        """Names of the open bridges."""
+        return tuple(bridge.name for bridge in self._bridges)
 
-    def open(self, door: Bridge) -> None:
-        """Start a door; `BridgeError` where that is not possible."""
+    def open(self, bridge: Bridge) -> None:
+        """Start a bridge; `BridgeError` where that is not possible."""
         if self._closed:
-            raise BridgeError("the doors are closed")
+            raise BridgeError("the bridges are closed")
         try:
-            self.call(door.start(self._gateway), _LONGEST_START_S)
+            self.call(bridge.start(self._gateway), _LONGEST_START_S)
         except BaseException:
-            self.call(door.stop(), _LONGEST_START_S)
+            self.call(bridge.stop(), _LONGEST_START_S)
             raise
-        self._doors.append(door)
+        self._bridges.append(bridge)
 
     def call(self, work: Coroutine[Any, Any, T], timeout_s: float | None = None) -> T:
-        """Run a coroutine in the doors' thread and wait for its result."""
+        """Run a coroutine in the bridges' thread and wait for its result."""
         return self._thread.call(work, timeout_s)
 
     def close(self) -> None:
-        """Stop all doors and the thread; a second time nothing happens."""
+        """Stop all bridges and the thread; a second time nothing happens."""
         if self._closed:
             return
         self._closed = True
-        for door in reversed(self._doors):
+        for bridge in reversed(self._bridges):
             try:
-                self.call(door.stop(), _LONGEST_START_S)
+                self.call(bridge.stop(), _LONGEST_START_S)
             except Exception:
-                _log.exception("%s did not close in good order", door.name)
+                _log.exception("%s did not close in good order", bridge.name)
         self._thread.end()
 
-    def __enter__(self) -> Doors:
+    def __enter__(self) -> BridgeHost:
         return self
 
     def __exit__(self, *_exception: object) -> None:

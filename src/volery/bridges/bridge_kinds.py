@@ -15,7 +15,7 @@ from volery.graph.bridge_kind import (
 )
 
 if TYPE_CHECKING:
-    from volery.bridges.ros2.environment import Ros2Terms
+    from volery.bridges.ros2.environment import Ros2Environment
 
 
 def _rosbridge(address: Address, options: BridgeOptions) -> Bridge:
@@ -36,10 +36,10 @@ def _ros_tcp_endpoint(
     address: Address, options: BridgeOptions, generation: Literal["ros1", "ros2"]
 ) -> Bridge:
     from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
-    from volery.bridges.rosbridge.rosapi_bridge import WithRosApi
+    from volery.bridges.rosbridge.rosapi_bridge import RosApiBridge
 
     endpoint = RosTcpEndpoint(*address, generation=generation, anywhere=options.allow_remote)
-    return WithRosApi(endpoint)
+    return RosApiBridge(endpoint)
 
 
 def _ros_tcp_connector(address: Address, options: BridgeOptions) -> Bridge:
@@ -49,33 +49,33 @@ def _ros_tcp_connector(address: Address, options: BridgeOptions) -> Bridge:
 
 
 def _ros1(address: Address, options: BridgeOptions) -> Bridge:
-    from volery.bridges.ros1.bridge import Ros1Door
+    from volery.bridges.ros1.bridge import Ros1Bridge
 
     uri = f"http://{address.host}:{address.port}" if address.port else None
-    return Ros1Door(uri, anywhere=options.allow_remote)
+    return Ros1Bridge(uri, anywhere=options.allow_remote)
 
 
 def _ros2(address: Address, options: BridgeOptions) -> Bridge:
-    from volery.bridges.ros2.environment import Ros2Terms
+    from volery.bridges.ros2.environment import Ros2Environment
 
     if address.host != LOOPBACK:
         raise BridgeError("ros2=N names a domain; interfaces are chosen with --ros2-interface")
     domain_id = options.domain_id if address.port == NO_PORT else address.port
-    return _ros2_bridge(Ros2Terms("dds", domain_id, options.interfaces))
+    return _ros2_bridge(Ros2Environment("dds", domain_id, options.interfaces))
 
 
 def _ros2_zenoh(address: Address, options: BridgeOptions) -> Bridge:
-    from volery.bridges.ros2.environment import Ros2Terms
+    from volery.bridges.ros2.environment import Ros2Environment
 
     router = "" if address.port == NO_PORT else f"{address.host}:{address.port}"
-    return _ros2_bridge(Ros2Terms("zenoh", options.domain_id, router=router))
+    return _ros2_bridge(Ros2Environment("zenoh", options.domain_id, router=router))
 
 
-def _ros2_bridge(terms: Ros2Terms) -> Bridge:
-    from volery.bridges.ros2.bridge import Ros2Door
-    from volery.bridges.rosbridge.rosapi_bridge import WithRosApi
+def _ros2_bridge(terms: Ros2Environment) -> Bridge:
+    from volery.bridges.ros2.bridge import Ros2Bridge
+    from volery.bridges.rosbridge.rosapi_bridge import RosApiBridge
 
-    return WithRosApi(Ros2Door(terms))
+    return RosApiBridge(Ros2Bridge(terms))
 
 
 def _sensor_link(address: Address, options: BridgeOptions) -> Bridge:

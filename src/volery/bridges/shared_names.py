@@ -10,7 +10,7 @@ COMMANDS = ("*/cmd_vel", "*/trajectory", "*/goal_pose")
 _NOT_SHARED = frozenset({"/rosout", "/rosout_agg"})
 
 
-class Sharing:
+class SharedNames:
     """Patterns of names, as `fnmatch` has them.
 
     patterns: of topics and services that are shared at all. commands: of topics that others may

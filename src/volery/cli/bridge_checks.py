@@ -1,4 +1,4 @@
-"""Which doors go together, and which options need which door: told before anything is built."""
+"""Which bridges go together, and which options need which bridge: told before anything is built."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ BUILT_IN = ("mavlink", "mavlink-tcp", "mavlink-serial")
 """Bridges to the autopilots that Volery has for the UAVs."""
 
 _OUTSIDE = ("px4", "px4-serial", "ardupilot")
-"""Doors whose autopilots fly the UAVs."""
+"""Bridges whose autopilots fly the UAVs."""
 _EVERY = ("px4", "ardupilot")
 """Those of them that take all UAVs."""
 
@@ -28,28 +28,30 @@ _WITHOUT_TOKEN = (
 """Bridges that programs connect to, whose protocols carry no token."""
 
 
-def check_doors(options: RunOptions) -> None:
-    """`BridgeError` for doors that would fight over UAVs, and options that nothing would heed."""
+def check_bridges(options: RunOptions) -> None:
+    """`BridgeError` for bridges that would fight over UAVs, and options that nothing would heed."""
     names = _names(options)
     _check_autopilots(names)
     if options.mavlink_key is not None and not set(names) & set(BUILT_IN):
-        raise BridgeError("--mavlink-key signs MAVLink, and no such door is open: --door mavlink")
+        raise BridgeError(
+            "--mavlink-key signs MAVLink, and no such bridge is open: --bridge mavlink"
+        )
     heeds_silence = any(name in _OUTSIDE for name in names)
     waits_otherwise = options.autopilot_timeout_s != RunOptions.autopilot_timeout_s
     if (options.drop_silent or waits_otherwise) and not heeds_silence:
         raise BridgeError(
             "--autopilot-timeout and --drop-silent are about autopilots outside, and none of their "
-            f"doors is open: --door {', '.join(_OUTSIDE)}"
+            f"bridges is open: --bridge {', '.join(_OUTSIDE)}"
         )
-    domains = [text for text in options.doors if text.partition("=")[0] in _ROS2]
+    domains = [text for text in options.bridges if text.partition("=")[0] in _ROS2]
     if options.domain_id is not None and all(text.startswith("ros2=") for text in domains):
         said = (
-            f"{', '.join(domains)} has its own" if domains else "no door to ROS 2 is open: --ros2"
+            f"{', '.join(domains)} has its own" if domains else "no bridge to ROS 2 is open: --ros2"
         )
         raise BridgeError(f"--domain-id {options.domain_id}: {said}")
     if options.interfaces and "ros2" not in names:
         raise BridgeError(
-            "--ros2-interface is for ROS 2 over DDS, and no such door is open: --ros2"
+            "--ros2-interface is for ROS 2 over DDS, and no such bridge is open: --ros2"
         )
 
 
@@ -58,9 +60,9 @@ def token_gaps(options: RunOptions) -> list[str]:
     if options.token is None:
         return []
     return [
-        f"--door {text}: this bridge cannot ask for the --token, its protocol carries none. Every "
-        f"program that reaches its port commands the UAVs: {_remedy(text.partition('=')[0])}"
-        for text in options.doors
+        f"--bridge {text}: its protocol carries no token. Every program that reaches its port "
+        f"commands the UAVs: {_remedy(text.partition('=')[0])}"
+        for text in options.bridges
         if text.partition("=")[0] in _WITHOUT_TOKEN
         and not (text.partition("=")[0] in _BY_SIGNING and options.mavlink_key is not None)
     ]
@@ -70,15 +72,15 @@ def _remedy(name: str) -> str:
     if name in _BY_SIGNING:
         return "sign its frames with --mavlink-key"
     if name in _ROS2:
-        return "use --door rosbridge, or let ROS 2's own security (SROS 2) guard the domain"
+        return "use --bridge rosbridge, or let ROS 2's own security (SROS 2) guard the domain"
     return (
-        "use --door rosbridge, which asks for it, or keep the port on this machine and let remote "
-        "programs in by an SSH tunnel"
+        "use --bridge rosbridge, which asks for it, or keep the port on this machine and let "
+        "remote programs in by an SSH tunnel"
     )
 
 
 def check_autopilots(scenario: Scenario, options: RunOptions) -> None:
-    """`BridgeError` where a scenario brings autopilots for UAVs that doors bring others for."""
+    """`BridgeError` where a scenario brings autopilots for UAVs that bridges bring others for."""
     from volery.mavlink.scenario_setup import NODE
     from volery.scenario.node_names import is_same_node
 
@@ -89,7 +91,7 @@ def check_autopilots(scenario: Scenario, options: RunOptions) -> None:
         if outside and name in used and has_own:
             raise BridgeError(
                 f"scenario '{scenario.name}', type '{name}': has an autopilot of its own "
-                f"({NODE}); --door {outside[0]} would bring a second one"
+                f"({NODE}); --bridge {outside[0]} would bring a second one"
             )
 
 
@@ -98,16 +100,16 @@ def _check_autopilots(names: list[str]) -> None:
     outside = [name for name in names if name in _OUTSIDE]
     if built_in is not None and outside:
         raise BridgeError(
-            f"--door {built_in} and --door {outside[0]} would give each UAV two autopilots; "
+            f"--bridge {built_in} and --bridge {outside[0]} would give each UAV two autopilots; "
             f"the one at {outside[0]} speaks MAVLink by itself, at its own ports"
         )
     every = next((name for name in outside if name in _EVERY), None)
     if every is not None and len(outside) > 1:
         raise BridgeError(
-            f"--door {' and --door '.join(outside)} would give UAVs two autopilots: "
+            f"--bridge {' and --bridge '.join(outside)} would give UAVs two autopilots: "
             f"{every} serves all of them"
         )
 
 
 def _names(options: RunOptions) -> list[str]:
-    return [text.partition("=")[0] for text in options.doors]
+    return [text.partition("=")[0] for text in options.bridges]

@@ -1,4 +1,4 @@
-"""Opens the doors that `volery run` was asked for."""
+"""Opens the bridges that `volery run` was asked for."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from volery.core.errors import BridgeError
 
 if TYPE_CHECKING:
     from volery.bridges.bridge_factory import Bridge, BridgeOptions
-    from volery.mavlink.hil.px4_bridge import Px4Door
+    from volery.mavlink.hil.px4_bridge import Px4Bridge
     from volery.mavlink.hil.px4_processes import Px4Instances
     from volery.scenario.schema import Scenario
 
@@ -25,13 +25,13 @@ _LOOK_S = 0.05
 
 
 def fit_out(scenario: Scenario, options: RunOptions) -> Scenario:
-    """The scenario with what the doors of `options` need: autopilots, or sensors for real ones."""
+    """Returns the scenario with the autopilots or sensors that the bridges of `options` need."""
     if options.px4_dir is not None:
         from volery.mavlink.hil.px4_processes import find_px4
 
         find_px4(options.px4_dir)  # a wrong folder is told before anything is built
     check_autopilots(scenario, options)
-    names = {text.partition("=")[0] for text in options.doors}
+    names = {text.partition("=")[0] for text in options.bridges}
     if names & set(BUILT_IN):
         from volery.mavlink.scenario_setup import with_autopilots
 
@@ -48,20 +48,20 @@ def fit_out(scenario: Scenario, options: RunOptions) -> Scenario:
 
 
 @contextmanager
-def open_doors(simulation: Any, options: RunOptions) -> Iterator[None]:
-    """Hold the doors of `options` open, and say where they are; none where none was asked for."""
-    if not options.doors:
+def open_bridges(simulation: Any, options: RunOptions) -> Iterator[None]:
+    """Hold the bridges of `options` open, and say where they are; none where none was asked for."""
+    if not options.bridges:
         yield
         return
     from volery.bridges.bridge_factory import make_bridge
-    from volery.bridges.bridge_host import Doors
+    from volery.bridges.bridge_host import BridgeHost
 
     bridge_options = _bridge_options(options)
-    wanted = [make_bridge(text, bridge_options) for text in options.doors]
-    with Doors(simulation.gateway) as doors:
-        for door in wanted:
-            doors.open(door)
-            typer.echo(f"open    {door.name}", err=True)
+    wanted = [make_bridge(text, bridge_options) for text in options.bridges]
+    with BridgeHost(simulation.gateway) as bridges:
+        for bridge in wanted:
+            bridges.open(bridge)
+            typer.echo(f"open    {bridge.name}", err=True)
         simulation.be_prompt()
         with _px4_instances(simulation, wanted, options):
             yield
@@ -90,26 +90,26 @@ def _px4_instances(simulation: Any, bridges: list[Bridge], options: RunOptions) 
         yield
         return
     from volery.cli.px4 import parameters_for
-    from volery.mavlink.hil.px4_bridge import Px4Door
+    from volery.mavlink.hil.px4_bridge import Px4Bridge
     from volery.mavlink.hil.px4_processes import Px4Instances, find_px4
 
     build, count = find_px4(options.px4_dir), len(simulation.uav_names)
     parameters = [parameters_for(uav.airframe) for uav in simulation.uavs.values()]
-    door = next(bridge for bridge in bridges if isinstance(bridge, Px4Door))
+    bridge = next(bridge for bridge in bridges if isinstance(bridge, Px4Bridge))
     with Px4Instances(build, count, speed=options.speed, parameters=parameters) as instances:
         typer.echo(f"started {build.binary}, instances 0 to {count - 1}", err=True)
         end_s = time.monotonic() + _LONGEST_START_S
-        while len(door.connected) < count:
+        while len(bridge.connected) < count:
             if instances.wait(_LOOK_S) or time.monotonic() > end_s:
-                raise BridgeError(instances.failure or _missing(simulation, door, instances))
+                raise BridgeError(instances.failure or _missing(simulation, bridge, instances))
         yield
 
 
-def _missing(simulation: Any, door: Px4Door, instances: Px4Instances) -> str:
+def _missing(simulation: Any, bridge: Px4Bridge, instances: Px4Instances) -> str:
     """Which PX4s have not connected, where to, and what they said last."""
     return "\n".join(
-        f"{uav}: PX4 {number} has not connected to {door.address(number)} within "
+        f"{uav}: PX4 {number} has not connected to {bridge.address(number)} within "
         f"{_LONGEST_START_S:g} s; it said last:{instances.words_of(number) or ' nothing'}"
         for number, uav in enumerate(simulation.uav_names)
-        if uav not in door.connected
+        if uav not in bridge.connected
     )

@@ -11,9 +11,9 @@ import typer
 from volery.core.errors import BridgeError, UnreachableError
 
 if TYPE_CHECKING:
-    from volery.bridges.nodes.deferred_connection import LateLink
+    from volery.bridges.nodes.deferred_connection import DeferredConnection
     from volery.bridges.nodes.host import NodeHost
-    from volery.bridges.ros2.environment import Ros2Terms
+    from volery.bridges.ros2.environment import Ros2Environment
     from volery.graph.connection import GraphConnection
 
 
@@ -68,7 +68,7 @@ def await_link(via: str, name: str, patience_s: float = PATIENCE_S) -> GraphConn
             time.sleep(_AGAIN_S)
 
 
-def join_late(late: LateLink, host: NodeHost) -> GraphConnection:
+def join_late(late: DeferredConnection, host: NodeHost) -> GraphConnection:
     """Join the graph of nodes that are there already; their timers count from then on."""
     before_ns = host.now_ns()
     link = late.join()
@@ -76,7 +76,7 @@ def join_late(late: LateLink, host: NodeHost) -> GraphConnection:
     return link
 
 
-class LinkTold:
+class ConnectionOptions:
     """Says when a link's connection breaks, and when it is back; ask it again and again.
 
     For `NodeHost.spin` it is an end that never comes.
@@ -97,9 +97,9 @@ class LinkTold:
         return False
 
 
-def _ros2_terms(via: str) -> Ros2Terms:
+def _ros2_terms(via: str) -> Ros2Environment:
     """Of `ros2://DOMAIN?interface=NAME`, `ros2-zenoh://HOST:PORT?domain=DOMAIN`, `rclpy://DOMAIN`."""
-    from volery.bridges.ros2.environment import Ros2Terms
+    from volery.bridges.ros2.environment import Ros2Environment
 
     parts = urlsplit(via)
     asked = parse_qs(parts.query, keep_blank_values=True)
@@ -117,8 +117,8 @@ def _ros2_terms(via: str) -> Ros2Terms:
         raise BridgeError(f"'{via}': a domain is a number from 0 to 232, not '{domain}'")
     domain_id = int(domain) if domain else None
     if zenoh:
-        return Ros2Terms("zenoh", domain_id, router=parts.netloc)
-    return Ros2Terms("rclpy" if kind == "rclpy" else "dds", domain_id, interfaces)
+        return Ros2Environment("zenoh", domain_id, router=parts.netloc)
+    return Ros2Environment("rclpy" if kind == "rclpy" else "dds", domain_id, interfaces)
 
 
 def _address(via: str, port: int) -> tuple[str, int]:

@@ -21,7 +21,7 @@ from volery.core.errors import RecordingError, VoleryError
 from volery.core.plurals import counted
 
 if TYPE_CHECKING:
-    from volery.bridges.logs.log_writer import Log
+    from volery.bridges.logs.log_writer import LogWriter
     from volery.graph.graph import Subscription
     from volery.report.collect import FlightCollector
     from volery.scenario.changes import Changes
@@ -51,7 +51,7 @@ class RunOptions:
     report: Path | None = None
     digest: bool = False
     overwrite: bool = False
-    doors: tuple[str, ...] = ()
+    bridges: tuple[str, ...] = ()
     recordings: Path | None = None
     allow_remote: bool = False
     token: str | None = None
@@ -85,7 +85,7 @@ class _StoppedError(Exception):
     """A signal has come; raised between two steps."""
 
 
-class Flight:
+class CommandLineFlight:
     """One flight with its log, report and digest."""
 
     def __init__(
@@ -101,7 +101,7 @@ class Flight:
         self._interrupts = interrupts
         self._keys = Keys()
         self._wall_s = self._before_s = 0.0
-        self._log: Log | None = None
+        self._log: LogWriter | None = None
         self._recorded: Subscription | None = None
         self._collector: FlightCollector | None = None
         if options.digest:
@@ -156,7 +156,9 @@ class Flight:
         if not wait_for_clients(simulation, names, timeout_s, lambda: self._interrupts.pressed):
             raise _StoppedError
         if options.start_paused:
-            start_paused(simulation, can_be_resumed=bool(options.doors) or options.page is not None)
+            start_paused(
+                simulation, can_be_resumed=bool(options.bridges) or options.page is not None
+            )
 
     def _stay(self) -> None:
         """Keep the page open until Ctrl-C; what is flown past the end leaves no files."""

@@ -10,9 +10,9 @@ import typer
 from volery.cli import run_options
 from volery.cli.error_reporting import guarded
 from volery.cli.options import (
+    BridgesOption,
+    BridgeTokenOption,
     DomainOption,
-    DoorsOption,
-    DoorTokenOption,
     DropOption,
     InterfaceOption,
     MavlinkKeyOption,
@@ -52,9 +52,9 @@ def run(
     digest: run_options.Digest = False,
     page: run_options.Page = None,
     exit_at_end: run_options.ExitAtEnd = False,
-    door: DoorsOption = None,
+    bridge: BridgesOption = None,
     allow_remote: RemoteOption = False,
-    token: DoorTokenOption = None,
+    token: BridgeTokenOption = None,
     ros2: Ros2Option = False,
     domain_id: DomainOption = None,
     middleware: MiddlewareOption = "dds",
@@ -67,7 +67,7 @@ def run(
 ) -> None:
     """Fly a scenario.
 
-    Doors: rosbridge, ros-tcp (Unity), ros-tcp-2, ros-tcp-connector, ros1, ros2, ros2-zenoh,
+    Bridges: rosbridge, ros-tcp (Unity), ros-tcp-2, ros-tcp-connector, ros1, ros2, ros2-zenoh,
     sensor-link, comms, mavlink, mavlink-tcp, mavlink-serial, px4, px4-serial, ardupilot.
 
     At a terminal keys steer it: space pauses and goes on, . (or s) makes one physics step,
@@ -77,10 +77,10 @@ def run(
     from volery.cli.run import RunOptions, fly, parse_speed
 
     if middleware == "zenoh" and not ros2:
-        raise BridgeError("--middleware zenoh is of --ros2; without that, --door ros2-zenoh")
-    doors = (*(door or ()), *((("ros2" if middleware == "dds" else "ros2-zenoh"),) * ros2))
-    if px4_dir is not None and not any(text.partition("=")[0] == "px4" for text in doors):
-        doors = (*doors, "px4")
+        raise BridgeError("--middleware zenoh is of --ros2; without that, --bridge ros2-zenoh")
+    bridges = (*(bridge or ()), *((("ros2" if middleware == "dds" else "ros2-zenoh"),) * ros2))
+    if px4_dir is not None and not any(text.partition("=")[0] == "px4" for text in bridges):
+        bridges = (*bridges, "px4")
     options = RunOptions(
         scenario=scenario,
         uavs=uavs,
@@ -88,8 +88,8 @@ def run(
         seed=seed,
         nodes=not no_nodes,
         trust=trust,
-        speed=parse_speed(speed or ("1" if doors or page is not None else "max")),
-        doors=doors,
+        speed=parse_speed(speed or ("1" if bridges or page is not None else "max")),
+        bridges=bridges,
         domain_id=domain_id,
         interfaces=tuple(ros2_interface or ()),
         recordings=recordings,
@@ -156,7 +156,7 @@ def serve(
     speed: Annotated[str, typer.Option(help="Factor of real time, or max.")] = "1",
     threads: ThreadsOption = None,
     trust: TrustOption = False,
-    door: DoorsOption = None,
+    bridge: BridgesOption = None,
     traceback: TracebackOption = False,  # noqa: ARG001
 ) -> None:
     """Serve the page until Ctrl-C: one world after the other, as its visitors choose.
@@ -177,7 +177,7 @@ def serve(
                 seed=seed,
                 trust=trust,
                 speed=parse_speed(speed),
-                doors=tuple(door or ()),
+                bridges=tuple(bridge or ()),
                 recordings=recordings,
                 allow_remote=allow_remote,
                 token=token,
@@ -206,11 +206,11 @@ def play(
     speed: Annotated[str, typer.Option(help="Factor of real time, or max.")] = "1",
     loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end.")] = False,
     paused: Annotated[bool, typer.Option("--paused", help="Wait at the beginning.")] = False,
-    door: DoorsOption = None,
+    bridge: BridgesOption = None,
     allow_remote: RemoteOption = False,
-    token: DoorTokenOption = None,
+    token: BridgeTokenOption = None,
 ) -> None:
-    """Play a recorded log behind doors, rosbridge unless others are named, until Ctrl-C.
+    """Play a recorded log behind bridges, rosbridge unless others are named, until Ctrl-C.
 
     At a terminal keys steer it: space pauses and goes on, . (or s) makes one physics step,
     + and - double and halve the speed, m frees it, comma and slash leap 5 s back and forward.
@@ -221,7 +221,7 @@ def play(
     options = RunOptions(
         scenario="",
         speed=parse_speed(speed),
-        doors=tuple(door or ()),
+        bridges=tuple(bridge or ()),
         allow_remote=allow_remote,
         token=token,
     )
@@ -262,7 +262,7 @@ def px4(
         typer.Option(help="Fit PX4 to this airframe, by name or .toml file, not to its own Iris."),
     ] = None,
 ) -> None:
-    """Run PX4s for a simulation with `--door px4`, until Ctrl-C.
+    """Run PX4s for a simulation with `--bridge px4`, until Ctrl-C.
 
     Instance i flies the i-th UAV, counted from 0. After a reset of the simulation, and when a run
     has ended, they begin anew and wait for it.

@@ -15,10 +15,10 @@ import typer
 from volery.cli.tables import print_table
 from volery.comms.addresses import Identity
 from volery.comms.control_payloads import Refusal
-from volery.comms.protocol import Frame
+from volery.comms.protocol import StationFrame
 from volery.comms.server.tcp import PORT
 from volery.comms.station.core import FATAL
-from volery.comms.station.ground_station import HEAD, HELP, Ground
+from volery.comms.station.ground_station import HEAD, HELP, GroundStation
 from volery.comms.station.tcp import Station
 from volery.core.errors import CommsError
 
@@ -57,14 +57,14 @@ def command_station(
             token=token,
             planes_per_batch=planes_per_batch,
         )
-        desk.ground = Ground(station.send, planes_per_batch, lambda: station.joined)
+        desk.ground = GroundStation(station.send, planes_per_batch, lambda: station.joined)
         asyncio.run(desk.work(station))
 
 
 class _Desk:
     """Where lines come from and go to. log: a file for them, with the time."""
 
-    ground: Ground
+    ground: GroundStation
 
     def __init__(self, log: TextIO | None) -> None:
         self._log = log
@@ -121,7 +121,7 @@ class _Desk:
             except CommsError as error:
                 self._say(f"error: {error}")
 
-    def on_message(self, frame: Frame) -> None:
+    def on_message(self, frame: StationFrame) -> None:
         """What a station tells."""
         if line := self.ground.take(frame, self._now_ns()):
             self._say(line)

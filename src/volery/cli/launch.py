@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from volery.cli.connections import DEFAULT_VIA, LinkTold, await_link, join_late
+from volery.cli.connections import DEFAULT_VIA, ConnectionOptions, await_link, join_late
 from volery.cli.trust import may_run_local_nodes
 from volery.core.errors import BridgeError
 from volery.scenario.access import ScenarioAccess
@@ -34,7 +34,7 @@ def launch_profile(
     trust: whether modules beside it may run without a question. `BridgeError` where it names no
     nodes, `ScenarioError` for nodes that may not run.
     """
-    from volery.bridges.nodes.deferred_connection import LateLink
+    from volery.bridges.nodes.deferred_connection import DeferredConnection
     from volery.bridges.nodes.host import NodeHost
     from volery.bridges.nodes.profile import load_profile
 
@@ -48,7 +48,7 @@ def launch_profile(
     if namespace is not None:
         profile = profile.model_copy(update={"namespace": namespace})
     way = via or profile.via or os.environ.get("VOLERY_VIA") or DEFAULT_VIA
-    with closing(LateLink(profile.name, lambda: await_link(way, profile.name))) as late:
+    with closing(DeferredConnection(profile.name, lambda: await_link(way, profile.name))) as late:
         host = NodeHost(late, clock=profile.clock)
         started = start_profile(profile, host, access)
         try:
@@ -59,7 +59,7 @@ def launch_profile(
                 host.announce(node.full_name)
             names = ", ".join(node.get_name() for node in started)
             typer.echo(f"{names} run on {way}; Ctrl-C ends them", err=True)
-            host.spin(LinkTold(link, way))
+            host.spin(ConnectionOptions(link, way))
         finally:
             for node in started:
                 node.destroy_node()

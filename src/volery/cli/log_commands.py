@@ -92,10 +92,10 @@ def slam(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace older files.")] = False,
 ) -> None:
     """Map a recorded log: map.png, map.pgm and .yaml (map_server), path.tum, summary.json."""
-    from volery.cli.slam import SlamAsked, map_log
+    from volery.cli.slam import SlamArguments, map_log
 
     map_log(
-        SlamAsked(
+        SlamArguments(
             log, out, layout, uav, scan, odom, imu_topic, not no_odometry, imu, start, level_mount,
             nodding_mount, resolution, reach, loops, overwrite,
         )

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from volery.cli.connections import DEFAULT_VIA, ROS2_WAYS, LinkTold, await_link, join_late
+from volery.cli.connections import DEFAULT_VIA, ROS2_WAYS, ConnectionOptions, await_link, join_late
 from volery.cli.error_reporting import warn
 from volery.cli.graph_queries import topic_types
 from volery.cli.yaml_codec import from_yaml
@@ -40,7 +40,7 @@ def run_node(options: NodeOptions) -> None:
     """Run a node until Ctrl-C, or until it fails."""
     from pydantic import ValidationError
 
-    from volery.bridges.nodes.deferred_connection import LateLink
+    from volery.bridges.nodes.deferred_connection import DeferredConnection
     from volery.bridges.nodes.host import NodeHost
     from volery.bridges.nodes.profile import Profile, absolute_names, load_profile
     from volery.graph.messages import add_definitions
@@ -70,7 +70,7 @@ def run_node(options: NodeOptions) -> None:
         raise BridgeError(f"--lock-step: a period in s above 0, not {options.lock_step_s:g}")
     folder = options.profile.parent if options.profile else None
     access = ScenarioAccess(folder)  # the command line names the node itself
-    with closing(LateLink(name, lambda: await_link(via, name))) as late:
+    with closing(DeferredConnection(name, lambda: await_link(via, name))) as late:
         host = NodeHost(late, clock=profile.clock)
         context = host.context(absolute_names(profile.remap, namespace))
         node = start_node(entry, context, namespace, "volery node", access)
@@ -83,7 +83,7 @@ def run_node(options: NodeOptions) -> None:
             host.announce(node.full_name)
             typer.echo(f"{node.get_name()} runs on {via}; Ctrl-C ends it", err=True)
             _check_namespace(link, namespace)
-            host.spin(LinkTold(link, via))
+            host.spin(ConnectionOptions(link, via))
         finally:
             node.destroy_node()
 

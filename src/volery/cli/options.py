@@ -8,37 +8,37 @@ from typing import Annotated, Any, Literal
 import typer
 from typer.core import TyperCommand
 
-FLIGHT, FILES, DOORS = "The flight", "What is written", "Doors and who may enter"
+FLIGHT, FILES, BRIDGES = "The flight", "What is written", "Bridges and access"
 ROS2, AUTOPILOTS = "ROS 2", "Autopilots"
 """How a help groups many options."""
 
-DoorsOption = Annotated[
+BridgesOption = Annotated[
     list[str] | None,
     typer.Option(
-        help="Open a door to other programs: NAME or NAME=[HOST:]PORT, repeatable.",
-        rich_help_panel=DOORS,
+        help="Open a bridge to other programs: NAME or NAME=[HOST:]PORT, repeatable.",
+        rich_help_panel=BRIDGES,
     ),
 ]
 RemoteOption = Annotated[
     bool,
     typer.Option(
-        "--allow-remote", help="Let doors listen beyond this machine.", rich_help_panel=DOORS
+        "--allow-remote", help="Let bridges listen beyond this machine.", rich_help_panel=BRIDGES
     ),
 ]
 TokenOption = Annotated[
     str | None, typer.Option(envvar="VOLERY_TOKEN", help="What remote clients must show.")
 ]
-DoorTokenOption = Annotated[
+BridgeTokenOption = Annotated[
     str | None,
     typer.Option(
-        envvar="VOLERY_TOKEN", help="What remote clients must show.", rich_help_panel=DOORS
+        envvar="VOLERY_TOKEN", help="What remote clients must show.", rich_help_panel=BRIDGES
     ),
 ]
 Ros2Option = Annotated[
     bool,
     typer.Option(
         "--ros2",
-        help="Take part in a ROS 2 graph: the door ros2 or ros2-zenoh.",
+        help="Take part in a ROS 2 graph: the bridge ros2 or ros2-zenoh.",
         rich_help_panel=ROS2,
     ),
 ]
@@ -72,7 +72,7 @@ ThreadsOption = Annotated[
 Px4DirOption = Annotated[
     Path | None,
     typer.Option(
-        help="Run the PX4 of this folder for each UAV; opens the door px4.",
+        help="Run the PX4 of this folder for each UAV; opens the bridge px4.",
         rich_help_panel=AUTOPILOTS,
     ),
 ]

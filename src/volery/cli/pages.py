@@ -16,7 +16,7 @@ from volery.cli.flight import RunOptions
 from volery.core.errors import CommandError
 
 if TYPE_CHECKING:
-    from volery.scenario.catalog import Shelf
+    from volery.scenario.catalog import ScenarioCatalog
     from volery.scenario.schema import Scenario
     from volery.server.page_server import PageServer
     from volery.server.settings import PageSettings
@@ -55,7 +55,7 @@ def page_of(options: RunOptions) -> Iterator[Page]:
 
 
 @contextmanager
-def serving(settings: PageSettings, shelf: Shelf | None = None) -> Iterator[Page]:
+def serving(settings: PageSettings, shelf: ScenarioCatalog | None = None) -> Iterator[Page]:
     """Serve the page, with cards of what is on the shelf, and say where."""
     from volery.server.page import is_built
     from volery.server.page_server import PageServer

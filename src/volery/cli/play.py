@@ -1,4 +1,4 @@
-"""`volery play`: a recorded log behind doors, with a clock that can be put anywhere."""
+"""`volery play`: a recorded log behind bridges, with a clock that can be put anywhere."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from typing import Any
 
 import typer
 
-from volery.cli.bridges import open_doors
+from volery.cli.bridges import open_bridges
 from volery.cli.flight import RunOptions
 from volery.cli.interrupt import Interrupts, stopped_how
 from volery.cli.keyboard_control import steer
 from volery.cli.keys import Keys
 from volery.core.plurals import counted
 
-_DOORS = ("rosbridge",)
-"""Opened where no door is named: a log is played for somebody."""
+_BRIDGES = ("rosbridge",)
+"""Opened where no bridge is named: a log is played for somebody."""
 _LEAP_S = 5.0
 _LEAPS = {",": -_LEAP_S, "/": _LEAP_S}
 
@@ -34,17 +34,20 @@ def play(
 
     Raises `RecordingError` where there is no log, or nothing in it.
     """
-    from volery.runtime.replay.log_player import Player
+    from volery.runtime.replay.log_player import LogPlayer
     from volery.scenario.load import load_scenario
 
     own = None if scenario is None else load_scenario(scenario)
     with (
         Interrupts() as interrupts,
-        Player(log, speed=options.speed, loop=loop, paused=paused, own=own) as player,
+        LogPlayer(log, speed=options.speed, loop=loop, paused=paused, own=own) as player,
     ):
         interrupts.be_gentle()
         _introduce(player)
-        with open_doors(player, replace(options, doors=options.doors or _DOORS)), Keys() as keys:
+        with (
+            open_bridges(player, replace(options, bridges=options.bridges or _BRIDGES)),
+            Keys() as keys,
+        ):
 
             def look(_progress: Any) -> None:
                 if interrupts.pressed:

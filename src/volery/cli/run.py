@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from volery.cli.bridge_checks import check_doors, token_gaps
-from volery.cli.bridges import fit_out, open_doors
+from volery.cli.bridge_checks import check_bridges, token_gaps
+from volery.cli.bridges import fit_out, open_bridges
 from volery.cli.command_replay import recorded_flight, recorded_scenario
 from volery.cli.error_reporting import warn
-from volery.cli.flight import Flight, RunOptions
+from volery.cli.flight import CommandLineFlight, RunOptions
 from volery.cli.interrupt import Interrupts, stopped_code, stopped_how
 from volery.cli.output_paths import check_record, check_report
 from volery.cli.pages import Page, page_of
@@ -52,7 +52,7 @@ def parse_speed(text: str) -> float | None:
 
 def fly(options: RunOptions) -> int:
     """Fly a scenario as the options say, then those that clients load; return the exit code."""
-    check_doors(options)
+    check_bridges(options)
     for gap in token_gaps(options):
         warn(gap)
     options = with_trust(options)
@@ -96,21 +96,21 @@ def _build_and_fly(options: RunOptions, interrupts: Interrupts, page: Page) -> t
             simulation.repeat(flight)
         try:
             interrupts.be_gentle()
-            with spared_objects(), open_doors(simulation, options), page.showing(simulation):
-                code = Flight(simulation, options, progress, interrupts).fly()
+            with spared_objects(), open_bridges(simulation, options), page.showing(simulation):
+                code = CommandLineFlight(simulation, options, progress, interrupts).fly()
         finally:
             simulation.close()
     return code, change
 
 
 def _wait_for_world(options: RunOptions, interrupts: Interrupts, page: Page) -> tuple[int, _Change]:
-    """Keep the doors open with no world behind them; exit code, and what a client wants then."""
-    from volery.runtime.idle_server import Lobby
+    """Keep the bridges open with no world behind them; exit code, and what a client wants then."""
+    from volery.runtime.idle_server import IdleServer
 
     change = _Change(options)
-    lobby = Lobby(change.ask)
+    lobby = IdleServer(change.ask)
     typer.echo("no world is loaded; /load_world brings one, Ctrl-C ends", err=True)
-    with open_doors(lobby, options), page.showing(lobby):
+    with open_bridges(lobby, options), page.showing(lobby):
         while not (change.asked or lobby.quitting or interrupts.pressed):
             lobby.wait(_GLANCE_S)
         lobby.wait(_FAREWELL_S)

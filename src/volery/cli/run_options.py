@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from volery.cli.options import DOORS, FILES, FLIGHT
+from volery.cli.options import BRIDGES, FILES, FLIGHT
 
 # What is flown.
 Scenario = Annotated[str, typer.Argument(help="Name from `volery list`, or a TOML file.")]
@@ -29,7 +29,7 @@ NoNodes = Annotated[
 Speed = Annotated[
     str | None,
     typer.Option(
-        help="Set the factor of real time, such as 1 or 2.5, or max [default: 1 with doors or a "
+        help="Set the factor of real time, such as 1 or 2.5, or max [default: 1 with bridges or a "
         "page, else max].",
         rich_help_panel=FLIGHT,
     ),
@@ -105,7 +105,7 @@ Page = Annotated[
         metavar="[=HOST:PORT]",
         help="Show the flight on a page in the browser, at 127.0.0.1:8080 by default; the page "
         "stays open at the end until Ctrl-C.",
-        rich_help_panel=DOORS,
+        rich_help_panel=BRIDGES,
     ),
 ]
 ExitAtEnd = Annotated[
@@ -113,6 +113,6 @@ ExitAtEnd = Annotated[
     typer.Option(
         "--exit-at-end",
         help="End a run with a page where its scenario ends.",
-        rich_help_panel=DOORS,
+        rich_help_panel=BRIDGES,
     ),
 ]

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from volery.cli.bridge_checks import check_doors, token_gaps
-from volery.cli.bridges import fit_out, open_doors
+from volery.cli.bridge_checks import check_bridges, token_gaps
+from volery.cli.bridges import fit_out, open_bridges
 from volery.cli.error_reporting import complain_of, warn
 from volery.cli.flight import RunOptions
 from volery.cli.interrupt import Interrupts
@@ -25,7 +25,7 @@ from volery.scenario import changes
 from volery.scenario.changes import LogRequest
 
 if TYPE_CHECKING:
-    from volery.scenario.catalog import Shelf
+    from volery.scenario.catalog import ScenarioCatalog
     from volery.scenario.changes import WorldRequest
     from volery.scenario.schema import Scenario
     from volery.server.settings import PageSettings
@@ -57,13 +57,13 @@ def serve(options: ServeOptions) -> None:
 
     Raises `VoleryError` where the first scenario cannot be built or the server cannot listen.
     """
-    from volery.scenario.catalog import Shelf
+    from volery.scenario.catalog import ScenarioCatalog
 
-    check_doors(options.first)
+    check_bridges(options.first)
     for gap in token_gaps(options.first):
         warn(gap)
     first = _first_scenario(with_trust(options.first))
-    shelf = Shelf(options.page.uploads, options.page.recordings, given=first)
+    shelf = ScenarioCatalog(options.page.uploads, options.page.recordings, given=first)
     return_large_blocks()
     with Interrupts() as interrupts, serving(options.page, shelf) as page:
         host = _Host(options, page, interrupts, _Wish(first, options.first.speed, shelf))
@@ -75,7 +75,7 @@ def serve(options: ServeOptions) -> None:
 class _Wish:
     """What is to be flown next: the first scenario, then what clients ask for."""
 
-    def __init__(self, scenario: Scenario, speed: float | None, shelf: Shelf) -> None:
+    def __init__(self, scenario: Scenario, speed: float | None, shelf: ScenarioCatalog) -> None:
         self.shelf = shelf
         """What may be flown."""
         self.speed = speed
@@ -163,7 +163,7 @@ class _Host:
             self._present, self._wish.quit = scenario, simulation.quit
             self._interrupts.be_gentle()
             shown = page.showing(simulation, self._trouble)
-            with spared_objects(), open_doors(simulation, first), shown:
+            with spared_objects(), open_bridges(simulation, first), shown:
                 self._trouble = ""
                 typer.echo(f"flying  {scenario.name}", err=True)
                 self._stay(simulation)
@@ -171,9 +171,9 @@ class _Host:
 
     def _play(self, log: Path) -> None:
         """Open a log and stay with it."""
-        from volery.runtime.replay.log_player import Player
+        from volery.runtime.replay.log_player import LogPlayer
 
-        with Player(
+        with LogPlayer(
             log, on_load=self._wish.ask, on_close=self._return, shelf=self._wish.shelf
         ) as player:
             if player.scenario is not None:
@@ -183,7 +183,7 @@ class _Host:
             self._interrupts.be_gentle()
             first, page = self._options.first, self._page
             shown = page.showing(player, self._trouble)
-            with spared_objects(), open_doors(player, first), shown:
+            with spared_objects(), open_bridges(player, first), shown:
                 self._trouble = ""
                 typer.echo(f"playing {log.name}", err=True)
                 while not (self._wish.asked or player.quitting or self._interrupts.pressed):
@@ -213,11 +213,11 @@ class _Host:
             raise _StoppedError
 
     def _wait(self) -> None:
-        """Keep the doors open with no world behind them."""
-        from volery.runtime.idle_server import Lobby
+        """Keep the bridges open with no world behind them."""
+        from volery.runtime.idle_server import IdleServer
 
-        lobby = Lobby(self._wish.ask, self._wish.shelf)
-        with open_doors(lobby, self._options.first), self._page.showing(lobby, self._trouble):
+        lobby = IdleServer(self._wish.ask, self._wish.shelf)
+        with open_bridges(lobby, self._options.first), self._page.showing(lobby, self._trouble):
             typer.echo("no world is loaded", err=True)
             self._trouble = ""
             while not (self._wish.asked or lobby.quitting or self._interrupts.pressed):

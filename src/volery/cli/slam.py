@@ -19,7 +19,7 @@ from volery.core.plurals import counted
 
 if TYPE_CHECKING:
     from volery.runtime.replay.slam.initial_pose import Pose
-    from volery.runtime.replay.slam.offline_slam import Outcome, SlamOptions, SlamRun
+    from volery.runtime.replay.slam.offline_slam import OfflineSlam, SlamOptions, SlamResult
     from volery.runtime.replay.slam.sources import LogSource, TextSource
 
 _MAPS = ("map.png", "map.pgm", "map.yaml")
@@ -33,7 +33,7 @@ _DEGRADED = 0.1
 
 
 @dataclass(frozen=True)
-class SlamAsked:
+class SlamArguments:
     """The options as they were typed."""
 
     log: Path
@@ -54,18 +54,18 @@ class SlamAsked:
     overwrite: bool
 
 
-def map_log(asked: SlamAsked) -> None:
+def map_log(asked: SlamArguments) -> None:
     """Run the SLAM over a log, write what came of it and say so."""
     from volery.bridges.logs.text_layout import TextLayout
     from volery.runtime.replay.slam.offline_slam import SlamOptions
     from volery.runtime.replay.slam.sources import open_source
-    from volery.runtime.replay.slam.topic_selection import Asked, other_uavs
+    from volery.runtime.replay.slam.topic_selection import RequestedTopics, other_uavs
     from volery.scenario.data_files import load_data_file
 
     _check_folder(asked.out, overwrite=asked.overwrite)
     layout = None if asked.layout is None else load_data_file(asked.layout, TextLayout)
     source = open_source(asked.log, layout)
-    topics = Asked(
+    topics = RequestedTopics(
         asked.uav, asked.scan, asked.odometry, asked.imu_topic, asked.has_odometry, asked.has_imu
     )
     start = _numbers(asked.start, 4, "--start")
@@ -93,12 +93,12 @@ def map_log(asked: SlamAsked) -> None:
     _compare_ways(outcome)
 
 
-def _run(source: LogSource | TextSource, options: SlamOptions) -> SlamRun:
+def _run(source: LogSource | TextSource, options: SlamOptions) -> OfflineSlam:
     """Ready to begin; where the log lacks something it is told whether it is whole."""
-    from volery.runtime.replay.slam.offline_slam import SlamRun
+    from volery.runtime.replay.slam.offline_slam import OfflineSlam
 
     try:
-        return SlamRun(source, options)
+        return OfflineSlam(source, options)
     except RecordingError as error:
         if not source.damage:
             raise
@@ -133,7 +133,7 @@ class _Progress:
             typer.echo(f"{counted(scans, 'scan')}, {seconds:.0f} s of the log", err=True)
 
 
-def _advise(outcome: Outcome, topics: dict[str, str]) -> None:
+def _advise(outcome: SlamResult, topics: dict[str, str]) -> None:
     """Say that an IMU might help that the log has and that was not used."""
     from volery.runtime.replay.slam.topic_selection import IMU
 
@@ -147,7 +147,7 @@ def _advise(outcome: Outcome, topics: dict[str, str]) -> None:
         )
 
 
-def _compare_ways(outcome: Outcome) -> None:
+def _compare_ways(outcome: SlamResult) -> None:
     """Say that odometry and scans tell of ways that cannot both be right."""
     wheels, seen = outcome.wheels_m, outcome.trajectory.length_m
     if wheels is None or abs(wheels - seen) < _WAYS_APART_M:
@@ -179,7 +179,7 @@ def _numbers(text: str | None, count: int, option: str) -> Any:
     return found
 
 
-def _write(asked: SlamAsked, outcome: Outcome) -> float | None:
+def _write(asked: SlamArguments, outcome: SlamResult) -> float | None:
     """The path, and the map if there can be one: the width of its cells, m."""
     from volery.runtime.replay.slam.trajectory import write_tum
 
@@ -194,7 +194,7 @@ def _write(asked: SlamAsked, outcome: Outcome) -> float | None:
         return None
 
 
-def _write_map(asked: SlamAsked, outcome: Outcome) -> float:
+def _write_map(asked: SlamArguments, outcome: SlamResult) -> float:
     from volery.autonomy.mapping.grid_files import write_grid
     from volery.runtime.replay.slam.map_image import write_picture
     from volery.runtime.replay.slam.map_rendering import draw_map
@@ -214,8 +214,8 @@ def _write_map(asked: SlamAsked, outcome: Outcome) -> float:
 
 
 def _summary(
-    asked: SlamAsked,
-    outcome: Outcome,
+    asked: SlamArguments,
+    outcome: SlamResult,
     refused: int,
     cell_m: float | None,
     start: Pose | None,

@@ -55,8 +55,8 @@ def start_paused(simulation: Any, *, can_be_resumed: bool) -> None:
     """Hold the clock before the first step. `CommandError` where nothing could let it go on."""
     if not (can_be_resumed or sys.stdin.isatty()):
         raise CommandError(
-            "--start-paused: nothing can let this run go on; open the page (--page) or a door "
-            "(--door rosbridge), or start it at a terminal"
+            "--start-paused: nothing can let this run go on; open the page (--page) or a bridge "
+            "(--bridge rosbridge), or start it at a terminal"
         )
     simulation.pause()
     typer.echo(

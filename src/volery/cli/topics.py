@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import typer
 
-from volery.cli.connections import LinkTold, open_link
+from volery.cli.connections import ConnectionOptions, open_link
 from volery.cli.graph_queries import topic_types, type_of_topic
 from volery.cli.yaml_codec import read_message, to_yaml
 from volery.core.errors import BridgeError
@@ -141,7 +141,7 @@ def _repeat(
 def _messages(via: str, topic: str, name: str) -> Iterator[Published | None]:
     """Messages of a topic without an end, and None at least five times a second."""
     with closing(open_link(via, name)) as link:
-        come, told = threading.Event(), LinkTold(link, via)
+        come, told = threading.Event(), ConnectionOptions(link, via)
         mailbox = link.subscribe(topic, type_of_topic(link, topic), depth=_DEPTH, wake=come.set)
         while True:
             come.wait(0.2)

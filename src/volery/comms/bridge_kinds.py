@@ -6,9 +6,9 @@ from volery.graph.bridge_kind import Address, Bridge, BridgeKind, BridgeOptions
 
 
 def _comms(address: Address, options: BridgeOptions) -> Bridge:
-    from volery.comms.station.station_bridge import UavStations
+    from volery.comms.station.station_bridge import StationBridge
 
-    return UavStations(*address, token=options.token)
+    return StationBridge(*address, token=options.token)
 
 
 COMMS = BridgeKind(10200, _comms)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from volery.comms.protocol import Frame
+from volery.comms.protocol import StationFrame
 
 
 class Delivery(NamedTuple):
@@ -21,7 +21,7 @@ class Delivery(NamedTuple):
     """From the server's taking it to its being handed over; those behind it never overtake."""
 
 
-Link = Callable[[int, int, int, Frame], Delivery]
+Link = Callable[[int, int, int, StationFrame], Delivery]
 """Decides over one message: from time in ns by the router's clock, source, destination and frame.
 
 The destination is the station, also where the frame is addressed to many.
@@ -30,6 +30,6 @@ The destination is the station, also where the frame is addressed to many.
 AT_ONCE = Delivery()
 
 
-def ideal_link(_time_ns: int, _source: int, _destination: int, _frame: Frame) -> Delivery:
+def ideal_link(_time_ns: int, _source: int, _destination: int, _frame: StationFrame) -> Delivery:
     """Everything comes at once."""
     return AT_ONCE

@@ -15,7 +15,7 @@ from typing import Any
 
 from volery.comms.addresses import Identity
 from volery.comms.link_model import Delivery, Link, ideal_link
-from volery.comms.protocol import Frame
+from volery.comms.protocol import StationFrame
 from volery.comms.server.router import Router
 from volery.comms.server.settings import RouterSettings
 from volery.comms.server.statistics import Statistics
@@ -25,7 +25,7 @@ from volery.core.errors import CommsError
 _BOOT = 1
 
 
-class Exchange:
+class LocalNetwork:
     """Stations joined by a router, without bytes ever leaving the process.
 
     settings, link: as of `Router`. now_ns: the clock at the start.
@@ -90,7 +90,7 @@ class Exchange:
     def _copied(self, parts: Any) -> Any:
         return copy.deepcopy(parts, {id(self): self})  # whom the router asks for the link
 
-    def _decide(self, time_ns: int, source: int, destination: int, frame: Frame) -> Delivery:
+    def _decide(self, time_ns: int, source: int, destination: int, frame: StationFrame) -> Delivery:
         return self._link(time_ns, source, destination, frame)
 
     def _connection_of(self, address: int) -> int:
@@ -99,16 +99,16 @@ class Exchange:
                 return connection
         raise CommsError(f"there is no station {address}")
 
-    def advance(self, now_ns: int) -> list[tuple[int, Frame]]:
+    def advance(self, now_ns: int) -> list[tuple[int, StationFrame]]:
         """Pass on what is due: stations that get something, and what, in a fixed order."""
         for core in self._stations.values():
             core.tick(now_ns)
         self._router.tick(now_ns)
         return self._pass(now_ns)
 
-    def _pass(self, now_ns: int) -> list[tuple[int, Frame]]:
+    def _pass(self, now_ns: int) -> list[tuple[int, StationFrame]]:
         """Carry bytes to and fro until nobody has anything to say."""
-        came: list[tuple[int, Frame]] = []
+        came: list[tuple[int, StationFrame]] = []
         moved = True
         while moved:
             moved = False

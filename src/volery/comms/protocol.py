@@ -6,7 +6,7 @@ All numbers are little-endian and packed without padding:
 |---|---|---|---|
 | 0 | 4 | | sync word `AA 56 43 4D` |
 | 4 | 1 | u8 | version of the protocol, 1 |
-| 5 | 1 | u8 | kind, see `Kind` |
+| 5 | 1 | u8 | kind, see `StationFrameKind` |
 | 6 | 2 | u16 | source, an address |
 | 8 | 2 | u16 | destination, an address |
 | 10 | 2 | u16 | n, bytes of payload, at most 16,384 |
@@ -40,7 +40,7 @@ LONGEST_BYTES = HEAD_BYTES + PAYLOAD_LIMIT_BYTES + CRC_BYTES
 _HEAD = struct.Struct("<BBHHHIIq")
 
 
-class Kind(IntEnum):
+class StationFrameKind(IntEnum):
     """Kinds of frames; from 16 on messages between stations."""
 
     HELLO = 1
@@ -54,10 +54,10 @@ class Kind(IntEnum):
     SENSING = 17
 
 
-MESSAGES = frozenset({Kind.COMMAND, Kind.SENSING})
+MESSAGES = frozenset({StationFrameKind.COMMAND, StationFrameKind.SENSING})
 
 
-class Frame(NamedTuple):
+class StationFrame(NamedTuple):
     """One frame, its checks passed; `kind` may be one that is not known here."""
 
     kind: int
@@ -95,7 +95,7 @@ def encode_frame(
     return SYNC + guarded + crc_bytes(crc16(guarded))
 
 
-class FrameParser(FrameScanner[Frame]):
+class StationFrameParser(FrameScanner[StationFrame]):
     """Finds the radio network's frames in a stream of bytes."""
 
     def __init__(self) -> None:
@@ -108,11 +108,11 @@ class FrameParser(FrameScanner[Frame]):
             return Flaw.VERSION
         return Flaw.LENGTH if length > PAYLOAD_LIMIT_BYTES else int(length)
 
-    def frame_of(self, view: memoryview) -> Frame:
+    def frame_of(self, view: memoryview) -> StationFrame:
         """The frame of whole bytes."""
         data = bytes(view)
         _, kind, source, destination, _, session, sequence, time_ns = _HEAD.unpack_from(
             data, len(SYNC)
         )
         payload = data[HEAD_BYTES:-CRC_BYTES]
-        return Frame(kind, source, destination, session, sequence, time_ns, payload, data)
+        return StationFrame(kind, source, destination, session, sequence, time_ns, payload, data)

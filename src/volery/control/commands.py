@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from volery.control import batch_commands
-from volery.control.estimated_state import Motion
+from volery.control.estimated_state import EstimatedState
 from volery.control.flight_modes import FlightMode
 from volery.control.segment_store import SegmentStore
 from volery.control.setpoints import (
@@ -357,7 +357,7 @@ class FleetCommands:
         self._bodies["ground_budget"][i] = 0.0
         self._bodies["downwash_budget"][i] = 0.0
 
-    def believed(self, rows: NDArray[np.int64]) -> tuple[Motion, Array]:
+    def believed(self, rows: NDArray[np.int64]) -> tuple[EstimatedState, Array]:
         """What the controllers of the UAVs `rows` take for their motion, a row each.
 
         And their body rates (n, 3) rad/s, FLU.
@@ -365,10 +365,10 @@ class FleetCommands:
         rates = self._bodies["omega_body"][rows] + self._uavs["belief"]["rate_error"][rows]
         return self._believed(rows), rates
 
-    def _believed(self, i: int | NDArray[np.int64]) -> Motion:
+    def _believed(self, i: int | NDArray[np.int64]) -> EstimatedState:
         """What the controllers of UAV `i` take for its motion now."""
         body, belief = self._bodies[i], self._uavs["belief"][i]
-        return Motion(
+        return EstimatedState(
             body["position_map"] + belief["position_error"],
             body["velocity_map"] + belief["velocity_error"],
             rotations.multiply(belief["rotation_error"], body["attitude"]),

@@ -32,7 +32,7 @@ BELIEF = np.dtype(
 """The motion believed, and how far it is from the truth; `PILOT.errs` tells whether it is."""
 
 
-class Motion(NamedTuple):
+class EstimatedState(NamedTuple):
     """Position (3,) m, velocity (3,) m/s, attitude (4,) of one UAV, map."""
 
     position: Array

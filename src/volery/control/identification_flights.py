@@ -33,7 +33,7 @@ Inputs = Callable[[float], tuple[float, float, float, float]]
 """Roll, pitch, yaw (rad) and thrust (share of the weight) at a time (s)."""
 
 
-class Flight(NamedTuple):
+class IdentificationFlight(NamedTuple):
     """What was wanted and what came of it, K samples."""
 
     wanted: Array
@@ -48,7 +48,7 @@ class Flight(NamedTuple):
     """(K, 3) m/s^2, map: the mean over the last physics step."""
 
 
-def chirps_of_attitude(airframe: Airframe, axis: int) -> Flight:
+def chirps_of_attitude(airframe: Airframe, axis: int) -> IdentificationFlight:
     """Doublets, then a chirp, about one axis: 0 roll, 1 pitch, 2 yaw."""
     amplitude, fastest = (_TURN, 1.5) if axis == 2 else (_TILT, 3.0)
 
@@ -60,14 +60,14 @@ def chirps_of_attitude(airframe: Airframe, axis: int) -> Flight:
     return _fly(airframe, RigidBody(), inputs, 16.0)
 
 
-def chirps_of_thrust(airframe: Airframe) -> Flight:
+def chirps_of_thrust(airframe: Airframe) -> IdentificationFlight:
     """Doublets and a chirp of the thrust, a tenth of the weight up and down."""
     return _fly(
         airframe, RigidBody(), lambda t: (0.0, 0.0, 0.0, 1.0 + 0.1 * _test_signal(t, 4.0)), 16.0
     )
 
 
-def everything_at_once(airframe: Airframe, plant: Plant) -> Flight:
+def everything_at_once(airframe: Airframe, plant: Plant) -> IdentificationFlight:
     """Another flight: sums of sines about all axes and along the thrust, and steps on top."""
 
     def inputs(t: float) -> tuple[float, float, float, float]:
@@ -132,7 +132,7 @@ def _test_signal(t: float, fastest_hz: float) -> float:
     return math.sin(2.0 * math.pi * s * (0.2 + 0.5 * (fastest_hz - 0.2) * s / 11.0))
 
 
-def _fly(airframe: Airframe, plant: Plant, inputs: Inputs, seconds: float) -> Flight:
+def _fly(airframe: Airframe, plant: Plant, inputs: Inputs, seconds: float) -> IdentificationFlight:
     fleet = _fleet(airframe, plant)
     state = fleet.state
     steps = round(SAMPLE_S * 1e9 / fleet.dt_ns)
@@ -154,7 +154,9 @@ def _fly(airframe: Airframe, plant: Plant, inputs: Inputs, seconds: float) -> Fl
         )
         fleet.advance(steps, _AIR)
     flown = np.array(rows)
-    return Flight(flown[:, :3], flown[:, 3], flown[:, 4:7], flown[:, 7:10], flown[:, 10:])
+    return IdentificationFlight(
+        flown[:, :3], flown[:, 3], flown[:, 4:7], flown[:, 7:10], flown[:, 10:]
+    )
 
 
 def _fleet(airframe: Airframe, plant: Plant, count: int = 1) -> Fleet:

@@ -27,7 +27,7 @@ from volery.vehicle.plant_types import Plant
 STABLE_BELOW = 1.0
 
 
-class Term(NamedTuple):
+class StabilityTerm(NamedTuple):
     """A term of the motion that is stepped explicitly."""
 
     key: str
@@ -38,7 +38,7 @@ class Term(NamedTuple):
     """Of the motion, what the term takes away in a step."""
 
 
-def terms_of(airframe: Airframe, plant: Plant, dt: float, speed_m_s: float) -> list[Term]:
+def terms_of(airframe: Airframe, plant: Plant, dt: float, speed_m_s: float) -> list[StabilityTerm]:
     """The explicit terms of a vehicle at a speed through the air, the stiffest first."""
     if isinstance(plant, Kinematic):
         return []
@@ -47,7 +47,7 @@ def terms_of(airframe: Airframe, plant: Plant, dt: float, speed_m_s: float) -> l
         owner = f"identified model '{plant.name}'"
     else:
         found, owner = _rigid_body(airframe, speed_m_s), f"airframe '{airframe.name}'"
-    terms = [Term(key, owner, rate * dt) for key, rate in found.items()]
+    terms = [StabilityTerm(key, owner, rate * dt) for key, rate in found.items()]
     return sorted(terms, key=lambda term: -term.share)
 
 

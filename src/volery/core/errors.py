@@ -47,7 +47,7 @@ class GraphError(VoleryError):
 
 
 class BridgeError(VoleryError):
-    """A door to the graph cannot be opened, or its peer breaks the protocol."""
+    """A bridge to the graph cannot be opened, or its peer breaks the protocol."""
 
 
 class UnreachableError(BridgeError):

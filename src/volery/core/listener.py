@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 
 from volery.core.connection_limits import SHARED, ConnectionLimits
 from volery.core.rare_log import RareLog
-from volery.core.waiting_room import Look, Waiting, WaitingRoom
+from volery.core.waiting_room import Look, WaitingConnection, WaitingRoom
 
 MAX_UNPROVEN = 64
 """Connections to one listener that have sent no valid frame (modelling choice)."""
@@ -177,7 +177,7 @@ class Listener(socket.socket):
             room.release(event.descriptor).sock.close()
         return None
 
-    def _expire(self, waiting: Waiting) -> None:
+    def _expire(self, waiting: WaitingConnection) -> None:
         self.note_slow_client()
         waiting.sock.close()
 

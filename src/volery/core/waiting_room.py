@@ -55,7 +55,7 @@ class Event(NamedTuple):
     """Whether the client sends no more."""
 
 
-class Waiting(NamedTuple):
+class WaitingConnection(NamedTuple):
     """A connection that waits."""
 
     sock: socket.socket
@@ -81,13 +81,13 @@ class WaitingRoom:
         listening: int,
         look: Callable[[bytes], Look],
         patience_s: float | None,
-        expire: Callable[[Waiting], None],
+        expire: Callable[[WaitingConnection], None],
     ) -> None:
         self._listening = listening
         self._look = look
         self._patience_s = patience_s
         self._expire = expire
-        self._waiting: dict[int, Waiting] = {}
+        self._waiting: dict[int, WaitingConnection] = {}
         """By file descriptor, the oldest first."""
         self._timer: asyncio.TimerHandle | None = None
         self._epoll = select.epoll()
@@ -117,7 +117,7 @@ class WaitingRoom:
         """Lets a connection wait."""
         loop = asyncio.get_running_loop()
         sock.setblocking(False)
-        self._waiting[sock.fileno()] = Waiting(sock, address, loop.time())
+        self._waiting[sock.fileno()] = WaitingConnection(sock, address, loop.time())
         flags = select.EPOLLIN | select.EPOLLRDHUP | select.EPOLLET  # once for each piece
         self._epoll.register(sock.fileno(), flags)
         if self._timer is None and self._patience_s is not None:
@@ -128,7 +128,7 @@ class WaitingRoom:
         look = self._look_at(self._waiting[event.descriptor].sock)
         return None if event.is_end and look == _NOTHING else look
 
-    def release(self, descriptor: int) -> Waiting:
+    def release(self, descriptor: int) -> WaitingConnection:
         """Returns a connection that waits no longer."""
         waiting = self._waiting.pop(descriptor)
         self._epoll.unregister(descriptor)

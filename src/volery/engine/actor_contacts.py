@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from volery.control.fleet import Fleet
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
-from volery.world.actors import MovingThings
+from volery.world.actors import MovingActors
 from volery.world.scene import Scene, Solid
 from volery.world.scene_content import BodyShape
 
@@ -35,10 +35,10 @@ Touch = Callable[[int, int, Array, bool, int], None]
 """Tells of UAV, thing, (3,) m from its nearest point to the UAV, whether it is new, time in ns."""
 
 
-class ThingLooks:
+class ActorShapes:
     """The things of a world, and looks at their shapes from near by, in their own frames."""
 
-    def __init__(self, things: MovingThings) -> None:
+    def __init__(self, things: MovingActors) -> None:
         self.things = things
         self._reach = [2.0 * shape.radius + _FARTHEST_LOOK_M for shape in things.shapes]
         by_shape: dict[int, Scene] = {}
@@ -64,10 +64,10 @@ def _alone(shape: BodyShape) -> Scene:
     return Scene(None, None, solids=solids)
 
 
-class ThingContacts:
+class ActorContacts:
     """Looks from UAVs at things in time, and tells `touch` of those that meet."""
 
-    def __init__(self, fleet: Fleet, looks: ThingLooks, touch: Touch) -> None:
+    def __init__(self, fleet: Fleet, looks: ActorShapes, touch: Touch) -> None:
         things = looks.things
         self._fleet = fleet
         self._things = things
@@ -110,7 +110,7 @@ class ThingContacts:
         self._next_ns[rows] = 0
 
     def continue_from(
-        self, other: ThingContacts, own: NDArray[np.int64], theirs: NDArray[np.int64]
+        self, other: ActorContacts, own: NDArray[np.int64], theirs: NDArray[np.int64]
     ) -> None:
         """Know what UAVs of another fleet touch: own rows and the other's."""
         self._touching[own] = other._touching[theirs]

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from volery.control.fleet import Fleet
 from volery.core.compiled import brief_kernel
 from volery.core.vectors import norm
-from volery.engine.actor_contacts import ThingContacts, ThingLooks
+from volery.engine.actor_contacts import ActorContacts, ActorShapes
 from volery.engine.events import Event, EventKind
 from volery.world.scene import Scene
 
@@ -63,7 +63,7 @@ class Collisions:
         emit: Callable[[Event], None],
         *,
         copies: int = 1,
-        looks: ThingLooks | None = None,
+        looks: ActorShapes | None = None,
     ) -> None:
         self._fleet = fleet
         self._scene = scene
@@ -75,7 +75,7 @@ class Collisions:
         self._crew = len(names) // copies
         self._touching_uav = np.zeros((len(names), self._crew), dtype=bool)
         """Who touches whom (row, place of the other in the copy)."""
-        self._things = None if looks is None else ThingContacts(fleet, looks, self._touch_thing)
+        self._things = None if looks is None else ActorContacts(fleet, looks, self._touch_thing)
         """Touches of things that move by themselves, where there are any."""
         self._moving = None if looks is None else looks.things
         fleet.state.contact_budget[:] = 0.0

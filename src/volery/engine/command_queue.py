@@ -20,7 +20,7 @@ _MAX_ROUND_S = 0.02
 """CPU time of clients' commands between two ticks, where the engine has no time to spare."""
 
 
-class Moment(NamedTuple):
+class CommandTime(NamedTuple):
     """When a command is taken, the same however the run is sliced.
 
     turn: what has been done since the physics step, counted: ticks, meetings with partners, rounds
@@ -51,7 +51,7 @@ class _Command(NamedTuple):
 class ClientQueue:
     """Commands of one external client, taken in their order; `None` names no client: all else."""
 
-    def __init__(self, inbox: Inbox, client: Hashable = None) -> None:
+    def __init__(self, inbox: CommandQueue, client: Hashable = None) -> None:
         self._inbox = inbox
         self.client = client
         self.commands: deque[_Command] = deque()
@@ -65,7 +65,7 @@ class ClientQueue:
         return self._inbox.put(self, action)
 
 
-class Inbox:
+class CommandQueue:
     """What outside clients want done. Any thread may post; the engine's thread works it off.
 
     Commands are taken in the order of arrival. Those of an external client (`open_queue`) are

@@ -15,14 +15,14 @@ from volery.control.fleet import Fleet
 from volery.core.clock import NS_PER_S, Schedule, ns_from_s, s_from_ns
 from volery.core.errors import CommandError
 from volery.engine import event_collection
-from volery.engine.actor_contacts import ThingLooks
+from volery.engine.actor_contacts import ActorShapes
 from volery.engine.collisions import BOUNCE, CRASH, Collisions
-from volery.engine.command_queue import Inbox, Moment, Repeats
+from volery.engine.command_queue import CommandQueue, CommandTime, Repeats
 from volery.engine.events import Event, EventKind
 from volery.engine.fleet_resizing import common_rows, continue_bank
 from volery.engine.lock_step import Partner
-from volery.engine.one_shot_timers import Deadlines
-from volery.engine.scheduler import Agenda
+from volery.engine.one_shot_timers import OneShotTimers
+from volery.engine.scheduler import Scheduler
 from volery.engine.sensor_restart import Keys, restart_sensors
 from volery.engine.stages import STAGES, Tick, take_commands
 from volery.engine.state_check import StateCheck
@@ -93,7 +93,7 @@ class Engine:
         self.ground = terrain
         self.terrain = terrain.grid
         self.sink = sink
-        self.inbox = Inbox(on_post=on_post)
+        self.inbox = CommandQueue(on_post=on_post)
         self.while_waiting: Callable[[], bool] = lambda: True
         """Called now and then while a lock-step partner is waited for: whether the run goes on."""
         self.is_broken_off = False
@@ -101,7 +101,7 @@ class Engine:
         self.repeats: Repeats | None = None
         """Recorded commands to be taken again."""
         self.turn = 0
-        """Of the present moment; see `Moment`."""
+        """Of the present moment; see `CommandTime`."""
         self._commanded = False
         self.stands = True
         """Whether nothing is half done: states may be kept and taken back."""
@@ -112,16 +112,16 @@ class Engine:
         self._response = CRASH if crash_on_contact else BOUNCE
         self.things = scene.things
         """What moves through the world by itself, where there is anything."""
-        self._looks = None if self.things is None else ThingLooks(self.things)
+        self._looks = None if self.things is None else ActorShapes(self.things)
         self.collisions = self._new_collisions(copies)
         self.state_check = StateCheck(fleet)
         self.banks = tuple(banks)
         self.estimation = estimation
         """Estimators that listen to the sensors, where there are any."""
         self.sensor_agenda = self._new_agenda(after_step=-1)
-        self.timer_agenda: Agenda[Callable[[], Any]] = Agenda(self.dt_ns)
-        self.partner_agenda: Agenda[Partner] = Agenda(self.dt_ns)
-        self.deadlines = Deadlines(self.dt_ns)
+        self.timer_agenda: Scheduler[Callable[[], Any]] = Scheduler(self.dt_ns)
+        self.partner_agenda: Scheduler[Partner] = Scheduler(self.dt_ns)
+        self.deadlines = OneShotTimers(self.dt_ns)
         self.stage_seconds = {stage.__name__: 0.0 for stage in STAGES}
         """Wall time spent in each stage so far ..."""
         self.stage_cpu_s = dict(self.stage_seconds)
@@ -133,9 +133,9 @@ class Engine:
         return self.fleet.step * self.dt_ns
 
     @property
-    def moment(self) -> Moment:
+    def moment(self) -> CommandTime:
         """Where between two ticks, or in a meeting, the engine is."""
-        return Moment(self.fleet.step, self.turn)
+        return CommandTime(self.fleet.step, self.turn)
 
     def count_command(self) -> None:
         """Note that a command which may change results is taken at this moment."""
@@ -204,7 +204,8 @@ class Engine:
     def take_in(self, idle_s: float = 0.0) -> None:
         """Do what was posted and hand out what that published; between ticks.
 
-        idle_s: wall time to spare, in which clients may do more than their budget; see `Inbox`.
+        idle_s: wall time to spare, in which clients may do more than their budget; see
+        `CommandQueue`.
         """
         self.inbox.serve(self._hand_out, idle_s)
         self.take_repeats()
@@ -356,7 +357,7 @@ class Engine:
     # -------------------------------------------------------------------------------- inside
 
     @property
-    def _due(self) -> tuple[Agenda[Any] | Deadlines, ...]:
+    def _due(self) -> tuple[Scheduler[Any] | OneShotTimers, ...]:
         return self.sensor_agenda, self.timer_agenda, self.partner_agenda, self.deadlines
 
     def _from_now(self, period_s: float) -> Schedule:
@@ -374,8 +375,8 @@ class Engine:
             looks=self._looks,
         )
 
-    def _new_agenda(self, *, after_step: int) -> Agenda[SensorBank]:
-        agenda: Agenda[SensorBank] = Agenda(self.dt_ns)
+    def _new_agenda(self, *, after_step: int) -> Scheduler[SensorBank]:
+        agenda: Scheduler[SensorBank] = Scheduler(self.dt_ns)
         for bank in self.banks:
             agenda.add(
                 bank,

@@ -53,7 +53,7 @@ class EstimationSetup:
 
 
 @dataclass(frozen=True)
-class Pose:
+class PoseMeasurement:
     """Of a body in the map at `stamp_ns`, as some node tells it."""
 
     stamp_ns: int
@@ -122,7 +122,7 @@ class Estimation:
                 self.setup.ground_height_m,
             )
 
-    def take_pose(self, uav: int, pose: Pose, *, gap_ns: int) -> None:
+    def take_pose(self, uav: int, pose: PoseMeasurement, *, gap_ns: int) -> None:
         """Feed a pose in the map, such as a SLAM's, to the estimator of a UAV, a row of the fleet.
 
         A pose that is not at least `gap_ns` newer than the last one taken is left out, and so are

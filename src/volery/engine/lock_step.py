@@ -155,7 +155,7 @@ def check_terms(period_s: float, timeout_s: float, on_timeout: str, dt_ns: int) 
         raise CommandError(f'on_timeout must be "stop" or "leave", not {on_timeout!r}')
 
 
-class Waiting(Protocol):
+class PartnerBarrier(Protocol):
     """How the engine waits: it does meanwhile what others post, the partners' own messages too."""
 
     def take_in(self, idle_s: float) -> None:
@@ -171,7 +171,7 @@ class Waiting(Protocol):
         """End the wait; from any thread."""
 
 
-def meet(partners: Sequence[Partner], time_ns: int, engine: Waiting) -> bool:
+def meet(partners: Sequence[Partner], time_ns: int, engine: PartnerBarrier) -> bool:
     """Meet all `partners` at once; apply their replies in the order given.
 
     Returns whether it came about: a run that is to end waits for no partner.

@@ -9,7 +9,7 @@ from typing import Any
 Action = Callable[[], Any]
 
 
-class Deadlines:
+class OneShotTimers:
     """Actions in order of their time; those of one time in the order in which they were added."""
 
     def __init__(self, dt_ns: int) -> None:

@@ -24,7 +24,7 @@ class _Entry(Generic[What]):
 
 
 @dataclass(frozen=True)
-class Due(Generic[What]):
+class DueTask(Generic[What]):
     """A firing: the k-th of its schedule, nominally at `instant_ns`."""
 
     what: What
@@ -32,7 +32,7 @@ class Due(Generic[What]):
     instant_ns: int
 
 
-class Agenda(Generic[What]):
+class Scheduler(Generic[What]):
     """Periodic entries; each fires at the first physics step at or after its instant plus lag.
 
     Entries due at one step fire in the order in which they were added.
@@ -78,13 +78,13 @@ class Agenda(Generic[What]):
         steps = (e.due_step for e in self._heap if e.wanted is None or e.wanted())
         return min(steps, default=None)
 
-    def pop_due(self, step: int) -> list[Due[What]]:
+    def pop_due(self, step: int) -> list[DueTask[What]]:
         """All firings due at or before `step`, in order; their next ones are entered."""
         due = []
         while self._heap and self._heap[0].due_step <= step:
             entry = self._heap[0]
             if entry.wanted is None or entry.wanted():
-                due.append(Due(entry.what, entry.k, entry.schedule.instant_ns(entry.k)))
+                due.append(DueTask(entry.what, entry.k, entry.schedule.instant_ns(entry.k)))
             entry.k += 1
             entry.due_step = self._step_of(entry)
             heapq.heapreplace(self._heap, entry)

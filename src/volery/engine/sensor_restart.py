@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
-from volery.engine.scheduler import Agenda
+from volery.engine.scheduler import Scheduler
 from volery.sensors.bank import Bank
 from volery.sensors.samples import Samples
 
@@ -18,7 +18,7 @@ Keys = Mapping[tuple[int, str], np.uint64]
 
 
 def restart_sensors(
-    agenda: Agenda[Any], banks: Sequence[Bank], fleet: Fleet, uavs: NDArray[np.int64], keys: Keys
+    agenda: Scheduler[Any], banks: Sequence[Bank], fleet: Fleet, uavs: NDArray[np.int64], keys: Keys
 ) -> list[tuple[Samples, NDArray[np.int64]]]:
     """Put the sensors of `uavs` back to their start, after the UAVs themselves.
 

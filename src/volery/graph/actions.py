@@ -1,13 +1,13 @@
 """Actions: goals that take their time, tell how far they are, and may be cancelled.
 
-Whoever fulfils goals offers an action; doors that have actions send goals for their clients:
+Whoever fulfils goals offers an action; bridges that have actions send goals for their clients:
 
     actions.offer("/simulate_steps", "simulation_interfaces/action/SimulateSteps", take_goal)
     ...
     goal = actions.send("/simulate_steps", request, on_feedback, on_result)
     goal.cancel()
 
-Everything happens in the simulation's thread; a door gets there through `Gateway.post` and calls
+Everything happens in the simulation's thread; a bridge gets there through `Gateway.post` and calls
 `cancel` there too. Feedback and results may come from any thread.
 """
 

@@ -51,7 +51,7 @@ class QoSProfile:
     """Quality of service of a publisher or subscription.
 
     Inside the simulation nothing ever waits or is lost; the depth and reliability of a subscription
-    count where it goes through a door. Durability counts for publishers alone: every subscription
+    count where it goes through a bridge. Durability counts for publishers alone: every subscription
     gets what is latched. rclpy's `deadline`, `lifespan` and `liveliness` are without effect.
     """
 

@@ -1,6 +1,6 @@
-"""The graph for programs outside of the simulation's thread: what every door stands on.
+"""The graph for programs outside of the simulation's thread: what every bridge stands on.
 
-A door opens one `Session` for each of its clients. All its methods may be called by any thread.
+A bridge opens one `Session` for each of its clients. All its methods may be called by any thread.
 What a client publishes and calls is posted to the simulation's thread, which takes it in between
 two ticks, in the order of arrival; what it receives waits in a bounded `SubscriptionQueue` that
 keeps the newest. A client that does not read loses messages of its own and delays nobody.
@@ -85,7 +85,7 @@ class SessionInfo:
 
 
 class Gateway:
-    """Where doors open sessions for their clients; `watch` is told what those do."""
+    """Where bridges open sessions for their clients; `watch` is told what those do."""
 
     def __init__(
         self,

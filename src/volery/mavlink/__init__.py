@@ -2,6 +2,6 @@
 
 The autopilot (`autopilot.Autopilot`) takes frames and flight states with their simulated time and
 gives frames and commands to its UAV: it knows neither sockets nor graphs. `node.Autopilot` runs it
-inside the simulation, `udp_door`, `tcp_door` and `serial_door` carry its
+inside the simulation, `udp_bridge`, `tcp_bridge` and `serial_bridge` carry its
 frames.
 """

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from volery.graph.bridge_kind import Address, Bridge, BridgeKind, BridgeOptions
 
 if TYPE_CHECKING:
-    from volery.mavlink.hil.lock_step import Patience
+    from volery.mavlink.hil.lock_step import TimeoutPolicy
 
 
 def _mavlink(address: Address, options: BridgeOptions) -> Bridge:
@@ -29,9 +29,9 @@ def _mavlink_serial(address: Address, options: BridgeOptions) -> Bridge:
 
 
 def _px4(address: Address, options: BridgeOptions) -> Bridge:
-    from volery.mavlink.hil.px4_bridge import Px4Door
+    from volery.mavlink.hil.px4_bridge import Px4Bridge
 
-    return Px4Door(
+    return Px4Bridge(
         *address,
         patience=_patience_of(options),
         anywhere=options.allow_remote,
@@ -40,15 +40,15 @@ def _px4(address: Address, options: BridgeOptions) -> Bridge:
 
 
 def _px4_serial(address: Address, options: BridgeOptions) -> Bridge:
-    from volery.mavlink.hil.px4_serial_bridge import Px4Serial
+    from volery.mavlink.hil.px4_serial_bridge import Px4SerialBridge
 
-    return Px4Serial(*address, patience=_patience_of(options), notice_s=_notice_of(options))
+    return Px4SerialBridge(*address, patience=_patience_of(options), notice_s=_notice_of(options))
 
 
 def _ardupilot(address: Address, options: BridgeOptions) -> Bridge:
-    from volery.mavlink.hil.ardupilot_bridge import ArdupilotDoor
+    from volery.mavlink.hil.ardupilot_bridge import ArdupilotBridge
 
-    return ArdupilotDoor(
+    return ArdupilotBridge(
         *address,
         patience=_patience_of(options),
         anywhere=options.allow_remote,
@@ -56,10 +56,10 @@ def _ardupilot(address: Address, options: BridgeOptions) -> Bridge:
     )
 
 
-def _patience_of(options: BridgeOptions) -> Patience:
-    from volery.mavlink.hil.lock_step import Patience
+def _patience_of(options: BridgeOptions) -> TimeoutPolicy:
+    from volery.mavlink.hil.lock_step import TimeoutPolicy
 
-    return Patience(options.autopilot_timeout_s, options.drop_on_timeout)
+    return TimeoutPolicy(options.autopilot_timeout_s, options.drop_on_timeout)
 
 
 def _notice_of(options: BridgeOptions) -> float | None:

@@ -19,7 +19,7 @@ SIGNED = 1
 _SIGNATURE = 13
 
 
-class Frame(NamedTuple):
+class MavlinkFrame(NamedTuple):
     """One frame: its bytes, and what routing needs."""
 
     data: bytes
@@ -35,7 +35,7 @@ class Framer:
         self._rest = b""
         self._known = dialect().mavlink_map
 
-    def feed(self, data: bytes) -> list[Frame]:
+    def feed(self, data: bytes) -> list[MavlinkFrame]:
         """Frames that `data` completes; an unfinished one waits for the rest."""
         data, frames, at = self._rest + data, [], 0
         while at < len(data):
@@ -56,7 +56,7 @@ class Framer:
         self._rest = data[at:]
         return frames
 
-    def datagram(self, data: bytes) -> list[Frame]:
+    def datagram(self, data: bytes) -> list[MavlinkFrame]:
         """Frames of a datagram, in which they are whole or broken."""
         frames = self.feed(data)
         while self._rest:  # what looked like a beginning was none
@@ -64,7 +64,7 @@ class Framer:
             frames += self.feed(rest)
         return frames
 
-    def _frame(self, data: bytes) -> Frame | None:
+    def _frame(self, data: bytes) -> MavlinkFrame | None:
         """The frame of these bytes; None where they are none."""
         if data[0] == _FIRST:
             system, component, number = data[3], data[4], data[5]
@@ -79,7 +79,7 @@ class Framer:
         check = check_of(data[1:end] + bytes((crc_extra_of(number),)))
         if check != int.from_bytes(data[end : end + 2], "little"):
             return None
-        return Frame(data, number, system, component)
+        return MavlinkFrame(data, number, system, component)
 
 
 def lengths_of(data: bytes) -> Iterator[int]:

@@ -34,7 +34,7 @@ from volery.graph.messages import (
 )
 from volery.mavlink.autopilot import arming, commands, mode_transitions, offboard
 from volery.mavlink.autopilot.modes import mode_named
-from volery.mavlink.autopilot.setpoints import Setpoint
+from volery.mavlink.autopilot.setpoints import OffboardSetpoint
 
 if TYPE_CHECKING:
     from volery.graph.nodes.node import Node
@@ -49,7 +49,7 @@ _TOL, _LONG = "mavros_msgs/srv/CommandTOL", "mavros_msgs/srv/CommandLong"
 _SLOW_NS, _FAST_NS = 1_000_000_000, 30_000_000
 """The state comes with each heartbeat, the place at about PX4's rate of LOCAL_POSITION_NED."""
 _SOURCE: Source = (-1, 1, 240)
-"""System and component of MAVROS itself; the link is none of the doors'."""
+"""System and component of MAVROS itself; the link is none of the bridges'."""
 _log = logging.getLogger(__name__)
 _NOTHING = (math.nan, math.nan, math.nan)
 
@@ -73,7 +73,7 @@ class Mavros:
         self._velocity = publisher("local_position/velocity_local", TwistStamped)
         self._odom = publisher("local_position/odom", Odometry)
         self._global = publisher("global_position/global", NavSatFix)
-        subscriptions: dict[str, tuple[type[Any], Callable[[Any], Setpoint]]] = {
+        subscriptions: dict[str, tuple[type[Any], Callable[[Any], OffboardSetpoint]]] = {
             "setpoint_position/local": (PoseStamped, self._place),
             "setpoint_velocity/cmd_vel": (TwistStamped, lambda m: _velocity(m.twist)),
             "setpoint_velocity/cmd_vel_unstamped": (Twist, _velocity),
@@ -182,7 +182,7 @@ class Mavros:
 
     # ---------------------------------------------------------------------------------------- in
 
-    def _heard(self, read: Callable[[Any], Setpoint]) -> Callable[[Any], None]:
+    def _heard(self, read: Callable[[Any], OffboardSetpoint]) -> Callable[[Any], None]:
         def take(message: Any) -> None:
             try:
                 setpoint = read(message)
@@ -196,20 +196,20 @@ class Mavros:
         x, y, z = self._pilot.memory.origin
         return x + point.x, y + point.y, z + point.z
 
-    def _place(self, message: Any) -> Setpoint:
+    def _place(self, message: Any) -> OffboardSetpoint:
         q = message.pose.orientation
         turn = [q.x, q.y, q.z, q.w]
         yaw = float(yaw_of(turn)) if 0.5 < math.hypot(*turn) < 2.0 else math.nan
-        return _checked(Setpoint(position=self._in_map(message.pose.position), yaw=yaw))
+        return _checked(OffboardSetpoint(position=self._in_map(message.pose.position), yaw=yaw))
 
-    def _raw(self, message: Any) -> Setpoint:
+    def _raw(self, message: Any) -> OffboardSetpoint:
         mask = int(message.type_mask)
         if message.coordinate_frame not in (1, 8) or mask & 512:
             raise CommandError("no such setpoints")
         place = self._in_map(message.position) if message.coordinate_frame == 1 else _NOTHING
         push = message.acceleration_or_force
         return _checked(
-            Setpoint(
+            OffboardSetpoint(
                 _masked(place, mask),
                 _masked(_parts(message.velocity), mask >> 3),
                 _masked(_parts(push), mask >> 6),
@@ -264,11 +264,11 @@ class Mavros:
         return commands.do(self._pilot, _SOURCE, commands.Command(number, filled, None))
 
 
-def _velocity(twist: Any) -> Setpoint:
-    return _checked(Setpoint(velocity=_parts(twist.linear), yaw_rate=twist.angular.z))
+def _velocity(twist: Any) -> OffboardSetpoint:
+    return _checked(OffboardSetpoint(velocity=_parts(twist.linear), yaw_rate=twist.angular.z))
 
 
-def _attitude(message: Any) -> Setpoint:
+def _attitude(message: Any) -> OffboardSetpoint:
     mask, thrust = int(message.type_mask), float(message.thrust)
     if mask & 64 or not 0.0 <= thrust <= 1.0:
         raise CommandError("an attitude needs a thrust from 0 to 1")
@@ -276,13 +276,13 @@ def _attitude(message: Any) -> Setpoint:
         rates = _parts(message.body_rate)
         if mask & 7 or not all(map(math.isfinite, rates)):
             raise CommandError("three finite body rates are needed")
-        return Setpoint(rates=rates, thrust=thrust)
+        return OffboardSetpoint(rates=rates, thrust=thrust)
     q = message.orientation
     length = math.hypot(q.x, q.y, q.z, q.w)
     if not 0.9 <= length <= 1.1:
         raise CommandError("an attitude must be a unit quaternion")
     x, y, z, w = (part / length for part in (q.x, q.y, q.z, q.w))
-    return Setpoint(attitude=(x, y, z, w), thrust=thrust)
+    return OffboardSetpoint(attitude=(x, y, z, w), thrust=thrust)
 
 
 def _parts(vector: Any) -> Vector:
@@ -294,7 +294,7 @@ def _masked(vector: Vector, mask: int) -> Vector:
     return x, y, z
 
 
-def _checked(setpoint: Setpoint) -> Setpoint:
+def _checked(setpoint: OffboardSetpoint) -> OffboardSetpoint:
     parts = (*setpoint.position, *setpoint.velocity, *setpoint.acceleration)
     if all(map(math.isnan, parts)) or any(abs(part) > 1e6 for part in parts):
         raise CommandError("a setpoint without a number, or out of range")

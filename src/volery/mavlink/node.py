@@ -4,8 +4,9 @@
     node = "mavlink_autopilot"
     parameters = { px4 = { MIS_TAKEOFF_ALT = 5.0 } }
 
-Frames come on `mavlink/in` and go out on `mavlink/out`; `udp_door`, `tcp_door` and `serial_door`
-carry them. Beside them stand MAVROS's topics and services below `mavros/`, those of system 1 below
+Frames come on `mavlink/in` and go out on `mavlink/out`; `udp_bridge`, `tcp_bridge` and
+`serial_bridge` carry them. Beside them stand MAVROS's topics and services below `mavros/`, those of
+system 1 below
 `/mavros/` too.
 """
 
@@ -23,7 +24,7 @@ from volery.graph.nodes.node import Node
 from volery.mavlink.autopilot import core, streams
 from volery.mavlink.autopilot.graph_vehicle import GraphVehicle, build_of, state_of
 from volery.mavlink.autopilot.log_transfer import TransferPace
-from volery.mavlink.autopilot.state import Memory
+from volery.mavlink.autopilot.state import AutopilotState
 from volery.mavlink.mavros import Mavros
 
 PACKETS = "volery_interfaces/msg/MavlinkPackets"
@@ -34,7 +35,7 @@ MOST_SYSTEMS = 250
 """Ids above are ground stations' by custom."""
 
 
-class Autopilot(Node):
+class AutopilotNode(Node):
     """A PX4-like autopilot.
 
     Parameters: `system_id` (0: that of uavN is N; of other names the highest that is free), `px4`:
@@ -63,11 +64,11 @@ class Autopilot(Node):
         self.create_subscription(FluidPressure, "pressure", self._take_pressure, 1)
         self.create_subscription(Temperature, "pressure/temperature", self._take_temperature, 1)
 
-    def get_state(self) -> Memory:
-        """Everything that changes; links are the doors', who goes back keeps those there are."""
+    def get_state(self) -> AutopilotState:
+        """Everything that changes; links are the bridges', who goes back keeps those there are."""
         return self.core.memory
 
-    def set_state(self, state: Memory) -> None:
+    def set_state(self, state: AutopilotState) -> None:
         """Go on from a kept state, with the links of now."""
         links = self.core.memory.links
         self.core.memory = state

@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.perception.static_transforms import FixedJoints
+from volery.autonomy.perception.static_transforms import StaticTransforms
 from volery.bridges.logs.decoding import LogDecoder
-from volery.bridges.logs.recorded_flight import Origin
+from volery.bridges.logs.recorded_flight import RecordedScenario
 from volery.bridges.logs.records import LogRecord, LogWalk
 from volery.core.clock import NS_PER_S
 from volery.core.errors import GraphError, RecordingError, VoleryError
 from volery.graph.messages import stamp_of
-from volery.report.trajectories import Way
+from volery.report.trajectories import RecordedTrajectory
 from volery.report.trunk_survey import LEVEL, NODDING, TrunkSurvey
 
 Array = NDArray[np.float64]
@@ -42,8 +42,8 @@ class LoggedUav:
     """What a log tells of one UAV."""
 
     name: str
-    truth: Way | None
-    estimate: Way | None
+    truth: RecordedTrajectory | None
+    estimate: RecordedTrajectory | None
     trunks: Array
     """(T, 3) m, where the estimate puts them; of those seen three times."""
     is_founded: bool
@@ -60,17 +60,17 @@ class LoggedFlight:
     """Name, if it is told."""
     description: str
     lasts_s: float
-    origin: Origin | None = None
+    origin: RecordedScenario | None = None
     """The scenario, where the log tells it."""
     trouble: str = ""
     """What is wrong with the file: cut off, damaged chunks; empty for a whole one."""
 
 
 @dataclass(frozen=True)
-class LoggedWay:
+class LoggedTrajectory:
     """A way of a log, and what is wrong with the file."""
 
-    way: Way
+    way: RecordedTrajectory
     trouble: str
 
 
@@ -90,9 +90,9 @@ class _Rows:
             self.next_ns = time_ns + _POSE_NS
             self.poses.append((time_ns * 1e-9, *numbers))
 
-    def way(self) -> Way:
+    def way(self) -> RecordedTrajectory:
         """All of them."""
-        return Way.of_rows(self.poses)
+        return RecordedTrajectory.of_rows(self.poses)
 
 
 @dataclass
@@ -103,10 +103,10 @@ class _Log:
     """By topic."""
     surveys: dict[str, TrunkSurvey] = field(default_factory=dict)
     """By UAV."""
-    joints: FixedJoints = field(default_factory=FixedJoints)
+    joints: StaticTransforms = field(default_factory=StaticTransforms)
     types: dict[str, str] = field(default_factory=dict)
     scenario: dict[str, Any] = field(default_factory=dict)
-    origin: Origin | None = None
+    origin: RecordedScenario | None = None
     trouble: str = ""
     first_ns: int | None = None
     last_ns: int = 0
@@ -168,7 +168,7 @@ def read_flight(path: Path) -> LoggedFlight:
     return LoggedFlight(uavs, told["name"], told["description"], lasts_s, log.origin, log.trouble)
 
 
-def read_way(path: Path, topic: str | None = None) -> LoggedWay:
+def read_way(path: Path, topic: str | None = None) -> LoggedTrajectory:
     """One way of a log: that of `topic`, or of the only topic that there is to choose.
 
     `VoleryError` names the topics where that cannot be said.
@@ -176,13 +176,13 @@ def read_way(path: Path, topic: str | None = None) -> LoggedWay:
     log = _read(path)
     known = [name for name, rows in log.ways.items() if rows.poses and _tells_a_way(name)]
     if topic is None and len(known) == 1:
-        return LoggedWay(log.ways[known[0]].way(), log.trouble)
+        return LoggedTrajectory(log.ways[known[0]].way(), log.trouble)
     if topic is None or topic not in log.ways:
         what = "which way is meant?" if topic is None else f"there is no {topic}."
         if topic in log.types:
             what = f"{topic} tells no poses: it is a {log.types[topic]}."
         raise VoleryError(f"{path}: {what} Poses stand on: {', '.join(sorted(known)) or 'nothing'}")
-    return LoggedWay(log.ways[topic].way(), log.trouble)
+    return LoggedTrajectory(log.ways[topic].way(), log.trouble)
 
 
 def _tells_a_way(topic: str) -> bool:
@@ -210,8 +210,8 @@ def _content(message: Any) -> dict[str, Any]:
         return {}
 
 
-def _origin(message: Any) -> Origin | None:
+def _origin(message: Any) -> RecordedScenario | None:
     try:
-        return Origin.from_json(message.data)
+        return RecordedScenario.from_json(message.data)
     except (AttributeError, RecordingError):
         return None

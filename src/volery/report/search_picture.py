@@ -26,7 +26,7 @@ _AFTER = ("come", "hold", "home", "over_home", "land", "done")
 
 
 @dataclass
-class Search:
+class RecordedSearch:
     """What is drawn of one flight."""
 
     ways: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
@@ -39,9 +39,9 @@ class Search:
     trees: Trees | None = None
 
 
-def fly(scenario: Scenario) -> Search:
+def fly(scenario: Scenario) -> RecordedSearch:
     """Fly until all have met."""
-    told, phases = Search(), dict[str, str]()
+    told, phases = RecordedSearch(), dict[str, str]()
 
     def on_found(name: str, published: Any) -> None:
         if told.found is None:
@@ -68,7 +68,7 @@ def fly(scenario: Scenario) -> Search:
     return told
 
 
-def draw(search: Search, scenario: Scenario) -> Figure:
+def draw(search: RecordedSearch, scenario: Scenario) -> Figure:
     """The area from above."""
     figure = Figure(figsize=(8.0, 6.4), layout="constrained")
     axes = figure.add_subplot()

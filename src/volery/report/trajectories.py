@@ -15,7 +15,7 @@ _LONGEST_GAP_S = 0.5
 
 
 @dataclass(frozen=True)
-class Way:
+class RecordedTrajectory:
     """N poses, their times rising."""
 
     time_s: Array
@@ -26,7 +26,7 @@ class Way:
     """(N, 4) x y z w"""
 
     @classmethod
-    def of_rows(cls, rows: Sequence[Sequence[float]]) -> Way:
+    def of_rows(cls, rows: Sequence[Sequence[float]]) -> RecordedTrajectory:
         """Of rows of time, position and attitude."""
         table = np.array(rows, np.float64).reshape(-1, 8)
         return cls(table[:, 0], table[:, 1:4], table[:, 4:])

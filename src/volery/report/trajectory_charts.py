@@ -27,7 +27,7 @@ _STYLES = ("-", (0, (4, 2)))
 """Lines come in pairs, the second of each dashed."""
 
 
-class Line(NamedTuple):
+class ChartLine(NamedTuple):
     """A way as it is drawn."""
 
     label: str
@@ -37,7 +37,7 @@ class Line(NamedTuple):
     """(N, 3) m"""
 
 
-def ways_from_above(lines: Sequence[Line], trunks: Array, true: TrueTrunks) -> str:
+def ways_from_above(lines: Sequence[ChartLine], trunks: Array, true: TrueTrunks) -> str:
     """Ways over the map of trunks (T, 2 or 3) and the true ones, rings, as SVG."""
     figure, axes = new_axes(*_MAP_SIZE)
     if len(true.places):
@@ -55,7 +55,7 @@ def ways_from_above(lines: Sequence[Line], trunks: Array, true: TrueTrunks) -> s
     return as_svg(figure)
 
 
-def over_time(lines: Sequence[Line], axis: int) -> str:
+def over_time(lines: Sequence[ChartLine], axis: int) -> str:
     """One coordinate of ways over time, as SVG; axis 0 is x, 1 is y, 2 is z."""
     figure, axes = new_axes()
     start_s, clock = _clock_of(lines)
@@ -79,7 +79,7 @@ def date_text(time_s: float) -> str:
     return f"{datetime.fromtimestamp(time_s, UTC):%Y-%m-%d %H:%M:%S} UTC"
 
 
-def _clock_of(lines: Sequence[Line]) -> tuple[float, str]:
+def _clock_of(lines: Sequence[ChartLine]) -> tuple[float, str]:
     """Where the axis of time begins, s, and what stands below it."""
     starts = [float(line.time_s[0]) for line in lines if len(line.time_s)]
     if not starts or not is_date(min(starts)):

@@ -22,8 +22,14 @@ from volery.report.alignment import (
 )
 from volery.report.logged_flights import LoggedFlight, LoggedUav, read_flight, read_way
 from volery.report.page import STYLE, ReportError
-from volery.report.trajectories import Way
-from volery.report.trajectory_charts import Line, date_text, is_date, over_time, ways_from_above
+from volery.report.trajectories import RecordedTrajectory
+from volery.report.trajectory_charts import (
+    ChartLine,
+    date_text,
+    is_date,
+    over_time,
+    ways_from_above,
+)
 from volery.report.true_trunks import TrueTrunks, true_trunks
 
 Array = NDArray[np.float64]
@@ -115,9 +121,9 @@ def _estimate_section(uav: LoggedUav, trunks: TrueTrunks) -> list[str]:
     """Simulated against estimated: from above with the trunks, x and y over time."""
     lines = []
     if uav.truth is not None:
-        lines.append(Line("simulated", uav.truth.time_s, uav.truth.position))
+        lines.append(ChartLine("simulated", uav.truth.time_s, uav.truth.position))
     if uav.estimate is not None:
-        lines.append(Line("estimated", uav.estimate.time_s, uav.estimate.position))
+        lines.append(ChartLine("estimated", uav.estimate.time_s, uav.estimate.position))
     told = "Trajectory and trunk map."
     if len(uav.trunks):
         told = (
@@ -155,7 +161,7 @@ def _trunks_text(found: Array, near: TrueTrunks) -> str:
     return told
 
 
-def _error_text(estimate: Way, truth: Way) -> str:
+def _error_text(estimate: RecordedTrajectory, truth: RecordedTrajectory) -> str:
     known = common_times(estimate.time_s, truth.time_s)
     if known.sum() < _LEAST:
         return ""
@@ -172,7 +178,7 @@ def _error_text(estimate: Way, truth: Way) -> str:
 class _Laid(NamedTuple):
     """A real way laid over a simulated one."""
 
-    lines: list[Line]
+    lines: list[ChartLine]
     shift: TimeShift
     left_m: float
     """Root mean square distance."""
@@ -206,7 +212,7 @@ class _Laid(NamedTuple):
         return [f"{log}: it may be another flight: {doubt}" for doubt in found]
 
 
-def _laid_over(uav: LoggedUav, real: Way, log: Path) -> _Laid:
+def _laid_over(uav: LoggedUav, real: RecordedTrajectory, log: Path) -> _Laid:
     simulated = uav.truth or uav.estimate
     if simulated is None or min(real.lasts_s, simulated.lasts_s) < _LEAST_S:
         raise VoleryError(f"{log}: too few poses to lay it over {uav.name}")
@@ -222,8 +228,8 @@ def _laid_over(uav: LoggedUav, real: Way, log: Path) -> _Laid:
     there = at_times(simulated.time_s, simulated.position, times[known])
     aligned = umeyama(real.position[known], there).apply(real.position)
     lines = [
-        Line(f"simulated {uav.name}", simulated.time_s, simulated.position),
-        Line("real", times, aligned),
+        ChartLine(f"simulated {uav.name}", simulated.time_s, simulated.position),
+        ChartLine("real", times, aligned),
     ]
     left, size = (_rms(way) for way in (aligned[known] - there, there - there.mean(axis=0)))
     return _Laid(lines, shift, left, size, float(known.mean()))
@@ -267,7 +273,7 @@ def _lead(flight: LoggedFlight) -> list[str]:
     return [f'<p class="lead">{escape(text)}</p>' for text in texts if text]
 
 
-def _figures(lines: Sequence[Line], trunks: Array, true: TrueTrunks, told: str) -> list[str]:
+def _figures(lines: Sequence[ChartLine], trunks: Array, true: TrueTrunks, told: str) -> list[str]:
     def figure(svg: str, text: str) -> str:
         return f'<figure class="chart">{svg}<figcaption>{text}</figcaption></figure>'
 

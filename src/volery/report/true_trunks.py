@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.bridges.logs.recorded_flight import Origin
+from volery.bridges.logs.recorded_flight import RecordedScenario
 from volery.core.errors import VoleryError
 from volery.runtime.build.worlds import build_city, build_forest, build_terrain
 from volery.runtime.replay.scenario_record import scenario_of
@@ -52,7 +52,7 @@ def no_trunks(why: str) -> TrueTrunks:
     return TrueTrunks(np.zeros((0, 2)), np.zeros(0), why)
 
 
-def true_trunks(origin: Origin | None, folder: Path | None = None) -> TrueTrunks:
+def true_trunks(origin: RecordedScenario | None, folder: Path | None = None) -> TrueTrunks:
     """All trunks of the scenario that a log in `folder` tells of."""
     if origin is None:
         return no_trunks("The log tells of no scenario, so where trees truly stood is not known.")

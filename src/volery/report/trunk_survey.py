@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.mapping.vertical_structures import Columns
-from volery.autonomy.perception.static_transforms import FixedJoints, Mount
+from volery.autonomy.mapping.vertical_structures import VerticalStructures
+from volery.autonomy.perception.static_transforms import Mount, StaticTransforms
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
 from volery.graph.messages import stamp_of
-from volery.report.trajectories import Way
+from volery.report.trajectories import RecordedTrajectory
 from volery.report.trunks import TrunkMap, trunks_of_scan
 
 Array = NDArray[np.float64]
@@ -32,7 +32,7 @@ _NEAREST_M, _FARTHEST_M = 0.6, 20.0
 class TrunkSurvey:
     """Gathers a UAV's messages, and makes a map of them when its way is known."""
 
-    def __init__(self, joints: FixedJoints | None = None) -> None:
+    def __init__(self, joints: StaticTransforms | None = None) -> None:
         self._seen: list[tuple[str, float, float, Array]] = []
         """Frame, time of the first beam and between beams, s, trunks (K, 3)."""
         self._nodding: list[tuple[str, float, Array, NDArray[np.float32]]] = []
@@ -40,7 +40,7 @@ class TrunkSurvey:
         between them (3,); ranges."""
         self._nods: list[tuple[float, float]] = []
         self._next_ns = {LEVEL: 0, NODDING: 0}
-        self.joints = joints or FixedJoints()
+        self.joints = joints or StaticTransforms()
         """Where its LIDARs sit."""
 
     @property
@@ -73,9 +73,9 @@ class TrunkSurvey:
             beams = np.array([*angles, float(message.time_increment)])
             self._nodding.append((frame, first, beams, np.array(message.ranges, np.float32)))
 
-    def trunks(self, way: Way) -> TrunkMap:
+    def trunks(self, way: RecordedTrajectory) -> TrunkMap:
         """The map of trunks for a way that it was thought to have gone."""
-        columns = Columns(self._returns(way)) if self.is_founded else None
+        columns = VerticalStructures(self._returns(way)) if self.is_founded else None
         found = TrunkMap()
         for frame, first, step, seen in self._seen:
             mount = self.joints.mount_of(frame)
@@ -84,7 +84,7 @@ class TrunkSurvey:
             found.add(np.array(kept).reshape(-1, 3))
         return found
 
-    def _returns(self, way: Way) -> Array:
+    def _returns(self, way: RecordedTrajectory) -> Array:
         """Returns (N, 3) of the nodding LIDAR in the map."""
         nods = np.array(sorted(self._nods)).T
         found = [np.zeros((0, 3))]
@@ -103,7 +103,7 @@ class TrunkSurvey:
         return np.concatenate(found)
 
 
-def _placed(trunk: Array, seconds: float, mount: Mount, way: Way) -> Array | None:
+def _placed(trunk: Array, seconds: float, mount: Mount, way: RecordedTrajectory) -> Array | None:
     """Where in the map (3,) a trunk stands that a level scanner saw; None: the pose is unknown."""
     pose = way.pose_at(seconds)
     if pose is None:

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from volery.runtime.monitoring.progress import Progress
     from volery.runtime.simulation import Simulation
-    from volery.runtime.vectorized_simulation import Copies
+    from volery.runtime.vectorized_simulation import VectorizedSimulation
 
-__all__ = ["Copies", "Progress", "Simulation"]
+__all__ = ["Progress", "Simulation", "VectorizedSimulation"]
 
 _HOMES = {
-    "Copies": "volery.runtime.vectorized_simulation",
+    "VectorizedSimulation": "volery.runtime.vectorized_simulation",
     "Progress": "volery.runtime.monitoring.progress",
     "Simulation": "volery.runtime.simulation",
 }

@@ -17,8 +17,8 @@ from volery.engine.engine import Engine
 from volery.engine.events import Event
 from volery.runtime.build.estimation import build_estimation
 from volery.runtime.build.fleet import add_bodies, build_fleet
-from volery.runtime.build.placement import Start
-from volery.runtime.build.sensor_suites import Fitted, fit_sensors, refit
+from volery.runtime.build.placement import StartPose
+from volery.runtime.build.sensor_suites import SensorInstance, fit_sensors, refit
 from volery.runtime.build.sensors import build_banks
 from volery.runtime.vehicles.uav import Uav
 from volery.scenario.schema import Scenario
@@ -31,20 +31,20 @@ Reading: TypeAlias = dict[str, NDArray[Any]]
 
 
 @dataclass(frozen=True)
-class CopyEvent:
+class EnvironmentEvent:
     """Something that happened in one copy."""
 
     copy: int
     event: Event
 
 
-class CopyBlock:
+class EnvironmentBlock:
     """Copies `first`, `first` + 1, ... of a scenario, one for each of `seeds`."""
 
     def __init__(
         self,
         scenario: Scenario,
-        starts: Sequence[Start],
+        starts: Sequence[StartPose],
         terrain: Terrain,
         scene: Scene,
         seeds: Sequence[int],
@@ -78,7 +78,7 @@ class CopyBlock:
         self._bank_of = {id(bank.sensors): k for k, bank in enumerate(banks)}
         self._places = _places(banks)
         self._latest: list[Samples | None] = [None] * len(banks)
-        self._events: list[CopyEvent] = []
+        self._events: list[EnvironmentEvent] = []
         self._began_ns = np.zeros(copies, np.int64)
         self._stir_air(np.arange(copies))
         self._start_state = self.fleet.get_state()
@@ -180,7 +180,7 @@ class CopyBlock:
             return None
         return {name: array[rows] for name, array in _arrays(samples).items()}
 
-    def drain_events(self) -> list[CopyEvent]:
+    def drain_events(self) -> list[EnvironmentEvent]:
         """Events since the last call."""
         events, self._events = self._events, []
         return events
@@ -199,7 +199,7 @@ class CopyBlock:
         copy, name = event.uav.split("/")
         partner = event.partner.split("/")[-1]
         own = replace(event, uav=name, partner=partner)
-        self._events.append(CopyEvent(self._first + int(copy), own))
+        self._events.append(EnvironmentEvent(self._first + int(copy), own))
 
     def deliver(self) -> None:
         """Nothing is queued."""
@@ -224,7 +224,7 @@ class CopyBlock:
                 changed[name][rows] = _arrays(samples)[name][rows]
             self._latest[bank] = replace(last, **changed)
 
-    def _fit(self, copy: int) -> list[Fitted]:
+    def _fit(self, copy: int) -> list[SensorInstance]:
         return refit(self._fitted, self.seeds[copy], copy * len(self._starts))
 
     def _take_off(self, rows: NDArray[np.int64]) -> None:

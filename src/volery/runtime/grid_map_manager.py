@@ -13,7 +13,7 @@ from volery.world.grid_maps import GridMap
 from volery.world.scene import Solid
 
 
-class GridWorld:
+class GridMapManager:
     """Shows one grid map at a time in the world of an engine, from one physics step to the next.
 
     All maps of the scenario are read at the start, so that a broken file shows then. A change is

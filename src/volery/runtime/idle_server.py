@@ -4,28 +4,28 @@ from __future__ import annotations
 
 from typing import Any
 
-from volery.engine.command_queue import Inbox
+from volery.engine.command_queue import CommandQueue
 from volery.graph.graph import Graph
 from volery.graph.session import Gateway
 from volery.runtime.services.features import offer_features
 from volery.runtime.services.results import Fields, RefusedError, filled, offer_result
-from volery.runtime.services.simulation_state import WRONG_TRANSITION, State
+from volery.runtime.services.simulation_state import WRONG_TRANSITION, RunState
 from volery.runtime.services.worlds import OnLoad, offer_worlds
-from volery.scenario.catalog import Shelf
+from volery.scenario.catalog import ScenarioCatalog
 
 _SRV = "simulation_interfaces/srv"
 
 
-class Lobby:
-    """Stands behind the doors between two simulations, in the state NO_WORLD.
+class IdleServer:
+    """Stands behind the bridges between two simulations, in the state NO_WORLD.
 
     Clients can ask for features, state and worlds, load one, or quit. Its owner calls `wait` until
     `on_load` was called or it is `quitting`.
     """
 
-    def __init__(self, on_load: OnLoad, shelf: Shelf | None = None) -> None:
+    def __init__(self, on_load: OnLoad, shelf: ScenarioCatalog | None = None) -> None:
         self.quitting = False
-        self._inbox = Inbox()
+        self._inbox = CommandQueue()
         self.graph = Graph(lambda: 0, self._inbox.post)
         self.gateway = Gateway(self.graph, self._inbox.post)
         offer_features(self.graph, loads_worlds=True)
@@ -44,10 +44,10 @@ class Lobby:
         self.graph.deliver()
 
     def _get_state(self, _request: Any) -> Fields:
-        state = State.QUITTING if self.quitting else State.NO_WORLD
+        state = RunState.QUITTING if self.quitting else RunState.NO_WORLD
         return {"state": filled("simulation_interfaces/msg/SimulationState", {"state": int(state)})}
 
     def _set_state(self, request: Any) -> None:
-        if int(request.state.state) != State.QUITTING:
+        if int(request.state.state) != RunState.QUITTING:
             raise RefusedError(WRONG_TRANSITION, "no world is loaded; load one, or quit")
         self.quitting = True

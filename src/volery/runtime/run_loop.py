@@ -9,7 +9,7 @@ from collections.abc import Callable
 from volery.core.clock import ns_from_s, s_from_ns
 from volery.engine.engine import Engine
 from volery.engine.pacing import Pacer
-from volery.runtime.monitoring.progress import Progress, ProgressTeller
+from volery.runtime.monitoring.progress import Progress, ProgressPublisher
 
 
 class RunLoop:
@@ -65,7 +65,7 @@ class RunLoop:
             end_step = engine.fleet.step + self._whole_steps(seconds)
             find_end = lambda: end_step  # noqa: E731
         pacer.begin(speed, start_ns)
-        teller = ProgressTeller(on_progress, left, pacer)
+        teller = ProgressPublisher(on_progress, left, pacer)
         over = engine.fleet.step >= find_end() or self.quitting
 
         def while_waiting() -> bool:

@@ -32,40 +32,40 @@ from volery.runtime.build.fleet import place
 from volery.runtime.build.geometry import Geometry, WorldTopic
 from volery.runtime.build.graph import all_down, plan_faults
 from volery.runtime.build.message_loading import learn_messages
-from volery.runtime.build.placement import Start
+from volery.runtime.build.placement import StartPose
 from volery.runtime.build.radio import build_radio
 from volery.runtime.build.sensor_suites import lidar_mounts
 from volery.runtime.build.worlds import build_world
 from volery.runtime.checks import check_reset_seed, check_seconds, check_steps
 from volery.runtime.end_of_run import EndOfRun
-from volery.runtime.grid_map_manager import GridWorld
-from volery.runtime.monitoring import LiveTopics
-from volery.runtime.monitoring.output_sink import Outlet
+from volery.runtime.grid_map_manager import GridMapManager
+from volery.runtime.monitoring import Monitor
+from volery.runtime.monitoring.output_sink import OutputSink
 from volery.runtime.monitoring.progress import Progress
-from volery.runtime.monitoring.status import Told
+from volery.runtime.monitoring.status import StatusSources
 from volery.runtime.replay.command_log import CommandLog
-from volery.runtime.replay.command_replay import Repetition
+from volery.runtime.replay.command_replay import CommandReplay
 from volery.runtime.replay.scenario_record import tell_origin
 from volery.runtime.run_loop import RunLoop
-from volery.runtime.services import Services, open_services
+from volery.runtime.services import ServiceSet, open_services
 from volery.runtime.services.lock_step import open_lock_step
 from volery.runtime.services.weather_messages import WeatherTopics
 from volery.runtime.services.worlds import OnLoad
 from volery.runtime.snapshot import Snapshot
-from volery.runtime.snapshot_manager import Keeper
-from volery.runtime.vehicles.control_authority import Pilots
-from volery.runtime.vehicles.manager import Crew
+from volery.runtime.snapshot_manager import SnapshotManager
+from volery.runtime.vehicles.control_authority import ControlAuthority
+from volery.runtime.vehicles.manager import VehicleManager
 from volery.runtime.vehicles.rotor_layouts import rotor_layouts
 from volery.runtime.vehicles.spawning import Spawner
-from volery.runtime.vehicles.teleport import Relocator
+from volery.runtime.vehicles.teleport import Teleporter
 from volery.runtime.vehicles.uav import Uav
 from volery.runtime.warmup.parallel_compilation import compiled
 from volery.runtime.warmup.requirements import needs_of
-from volery.scenario.catalog import Shelf
+from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.faults import Fault, parse_fault
 from volery.scenario.schema import Scenario, UavType
 from volery.sensors.mount import Mount
-from volery.world.actors import MovingThings
+from volery.world.actors import MovingActors
 from volery.world.ground_cover import BARE_GROUND
 from volery.world.weather import Weather
 
@@ -92,15 +92,15 @@ class Simulation:
 
     uavs: Mapping[str, Uav]
     """In fleet order."""
-    pilots: Pilots
+    pilots: ControlAuthority
     """Who steers which UAV."""
     commands: CommandLog
     """What clients do, told on `/volery/log`."""
     gateway: Gateway
     """Where clients of other threads join the graph."""
-    outlet: Outlet
+    outlet: OutputSink
     """Where steps, measurements and events go."""
-    grid_world: GridWorld
+    grid_world: GridMapManager
     """The grid map whose blocks stand in the world, and how it is changed."""
     end: EndOfRun
     """What clients meet where the scenario has ended."""
@@ -114,7 +114,7 @@ class Simulation:
         threads: int = 2,
         recordings: Path | None = None,
         on_load: OnLoad | None = None,
-        shelf: Shelf | None = None,
+        shelf: ScenarioCatalog | None = None,
     ) -> None:
         if threads < 1:
             raise ScenarioError(f"threads must be at least 1 (found {threads})")
@@ -135,7 +135,7 @@ class Simulation:
             rotor_layouts=lambda: rotor_layouts(self.uavs),
         )
         publisher = GraphPublisher(self.graph)
-        self.outlet = Outlet(parts.fleet, self.graph, publisher)
+        self.outlet = OutputSink(parts.fleet, self.graph, publisher)
         self._engine = Engine(
             parts.fleet,
             self.scene,
@@ -149,15 +149,15 @@ class Simulation:
         )
         self.commands = CommandLog(self.graph, self._engine)
         self.gateway.watch = self.commands.watch
-        self._repetition: Repetition | None = None
+        self._repetition: CommandReplay | None = None
         tell_origin(self.graph, scenario)
-        self.grid_world = GridWorld(scenario, self._engine)
+        self.grid_world = GridMapManager(scenario, self._engine)
         self._world_topic = WorldTopic(self.graph, lambda: self.geometry)
         self.grid_world.on_blocks = lambda: self.post(self._world_topic.tell)
         self.radio = build_radio(scenario, self.graph, self._engine, self.forest)
         """What the UAVs speak to each other by; None: the scenario has none."""
         self._faults = FaultPlan(self._engine, self.radio)
-        self._crew = Crew(
+        self._crew = VehicleManager(
             scenario,
             self._engine,
             self.graph,
@@ -169,14 +169,14 @@ class Simulation:
             self.radio,
         )
         self.uavs = MappingProxyType(self._crew.uavs)
-        self.pilots = Pilots(lambda: self.uav_names)
+        self.pilots = ControlAuthority(lambda: self.uav_names)
         self._partners: list[Partner] = []
         self._replays: list[Replay] = []
         self._keep_time(publisher)
-        self._live = LiveTopics(
+        self._live = Monitor(
             self,
             self._engine,
-            Told(
+            StatusSources(
                 lambda: self._services.state,
                 lambda: self._services.recording,
                 lambda: self.end.waits,
@@ -191,12 +191,12 @@ class Simulation:
         self._loop = RunLoop(self._engine, self._pacer, scenario.duration_s, self._has_ended)
         self._loop.look = self._live.look
         self.end = EndOfRun(self._engine, self._pacer, self._loop, self.commands)
-        self._relocator = Relocator(self._engine, self.scene, self.terrain, self._crew)
+        self._relocator = Teleporter(self._engine, self.scene, self.terrain, self._crew)
         open_lock_step(self)
-        self._services: Services = open_services(
+        self._services: ServiceSet = open_services(
             self, recordings=recordings, on_load=on_load, shelf=shelf, every=self._engine.every
         )
-        self._keeper = Keeper(
+        self._keeper = SnapshotManager(
             self._engine,
             self.graph,
             self._faults,
@@ -373,7 +373,7 @@ class Simulation:
         self._check_open()
         if self._engine.moment > (0, 0):
             raise CommandError("a flight is repeated from its start; make a new simulation")
-        self._repetition = self._engine.repeats = Repetition(
+        self._repetition = self._engine.repeats = CommandReplay(
             flight, self.gateway, self._engine, self._pacer, self.commands
         )
         self.commands.repeats = self._loop.replays = True
@@ -529,7 +529,7 @@ class Simulation:
         self._relocator.move(self._row_of(name), velocity_map, omega_map)
 
     @property
-    def things(self) -> MovingThings | None:
+    def things(self) -> MovingActors | None:
         """People, vehicles and birds of the scenario; None where it has none."""
         return self.scene.things
 
@@ -607,7 +607,7 @@ class Simulation:
         return self._crew.publisher.cameras.log_rates()
 
     @property
-    def starts(self) -> tuple[Start, ...]:
+    def starts(self) -> tuple[StartPose, ...]:
         """Where the UAVs began, in fleet order."""
         return self._crew.starts
 
@@ -637,7 +637,7 @@ class Simulation:
 
     @property
     def client_names(self) -> frozenset[str]:
-        """Nodes outside, by full name, lock-step partners, and clients of doors that have them."""
+        """Full names of external nodes, of lock-step partners and of clients of bridges."""
         partners = (partner.name for partner in self._partners if not partner.has_left)
         sessions = (info.name for info in self.gateway.sessions() if " " in info.name)
         return frozenset((*outside_nodes(self.graph), *partners, *sessions))

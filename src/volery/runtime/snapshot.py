@@ -10,10 +10,10 @@ from typing import Any
 
 from volery.core.clock import s_from_ns
 from volery.core.errors import SnapshotError
-from volery.core.saved_state import KeepsState
+from volery.core.saved_state import Stateful
 from volery.engine.lock_step import Partner
 from volery.graph.nodes.node import Node
-from volery.runtime.build.placement import Start
+from volery.runtime.build.placement import StartPose
 
 NodeKey = tuple[str, int]
 """Namespace of a node, and which of those there it is."""
@@ -31,7 +31,7 @@ class Snapshot:
 
     time_ns: int
     owner: int
-    starts: tuple[Start, ...]
+    starts: tuple[StartPose, ...]
     """The UAVs that it is of."""
     state: dict[str, Any]
 
@@ -47,7 +47,7 @@ def keep_nodes(nodes: Sequence[Node]) -> NodeStates:
         node.join()
     return {
         key: copy.deepcopy(
-            (node.get_state() if isinstance(node, KeepsState) else None, node.save_base_state())
+            (node.get_state() if isinstance(node, Stateful) else None, node.save_base_state())
         )
         for key, node in _keyed(nodes)
     }
@@ -59,7 +59,7 @@ def put_back_nodes(nodes: Sequence[Node], states: NodeStates) -> None:
         state, base = copy.deepcopy(states[key])
         node.join()
         node.restore_base_state(base)
-        if isinstance(node, KeepsState):
+        if isinstance(node, Stateful):
             node.set_state(state)
 
 
@@ -73,7 +73,7 @@ def _keyed(nodes: Sequence[Node]) -> Iterator[tuple[NodeKey, Node]]:
 
 def without_state(nodes: Sequence[Node]) -> list[Node]:
     """The nodes that do not offer their state: a start has them made anew."""
-    return [node for node in nodes if not isinstance(node, KeepsState)]
+    return [node for node in nodes if not isinstance(node, Stateful)]
 
 
 def check_nodes(nodes: Sequence[Node], what: str) -> None:

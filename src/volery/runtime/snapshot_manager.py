@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from volery.comms.radio.network import RadioNet
+from volery.comms.radio.network import RadioNetwork
 from volery.core.errors import SnapshotError
 from volery.engine.engine import Engine
 from volery.engine.faults import FaultPlan
@@ -17,10 +17,10 @@ from volery.graph.graph import Graph
 from volery.graph.nodes.node import Node
 from volery.publishing.graph_publisher import GraphPublisher
 from volery.runtime.build.fleet import check_free
-from volery.runtime.build.placement import Start
-from volery.runtime.build.sensor_suites import Fitted
-from volery.runtime.grid_map_manager import GridWorld
-from volery.runtime.monitoring.output_sink import Outlet
+from volery.runtime.build.placement import StartPose
+from volery.runtime.build.sensor_suites import SensorInstance
+from volery.runtime.grid_map_manager import GridMapManager
+from volery.runtime.monitoring.output_sink import OutputSink
 from volery.runtime.run_loop import RunLoop
 from volery.runtime.snapshot import (
     NodeStates,
@@ -31,11 +31,11 @@ from volery.runtime.snapshot import (
     put_back_nodes,
     without_state,
 )
-from volery.runtime.vehicles.manager import Crew
+from volery.runtime.vehicles.manager import VehicleManager
 
 
 @dataclass
-class Keeper:
+class SnapshotManager:
     """Keeps and puts back the parts of one simulation.
 
     Make it when all parts stand at their start: that state is what `reset` goes back to.
@@ -46,13 +46,13 @@ class Keeper:
     faults: FaultPlan
     publisher: GraphPublisher
     loop: RunLoop
-    crew: Crew
+    crew: VehicleManager
     partners: list[Partner]
-    outlet: Outlet
-    grid_world: GridWorld
-    radio: RadioNet | None = None
+    outlet: OutputSink
+    grid_world: GridMapManager
+    radio: RadioNetwork | None = None
     _start: dict[str, Any] = field(init=False)
-    _starts: tuple[Start, ...] = field(init=False)
+    _starts: tuple[StartPose, ...] = field(init=False)
     _new_nodes: NodeStates = field(init=False)
     """States of nodes that have done nothing yet."""
 
@@ -134,7 +134,7 @@ class Keeper:
     def _nodes_of(self, name: str) -> list[Node]:
         return [node for node in self.crew.nodes if node.get_namespace() == f"/{name}"]
 
-    def _restart_sensors(self, rows: Any, fitted: Sequence[Fitted]) -> None:
+    def _restart_sensors(self, rows: Any, fitted: Sequence[SensorInstance]) -> None:
         self.engine.restart_sensors(rows, {(f.id.uav, f.id.name): f.key for f in fitted})
 
     def _check(self, what: str, *, to_start: bool = False) -> None:

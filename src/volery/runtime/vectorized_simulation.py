@@ -5,7 +5,7 @@ seed, and goes back to the start by itself. Copies neither see nor touch one ano
 out to the threads in blocks, and a block's UAVs are rows of one fleet: one kernel call moves them
 all.
 
-    with Copies(load_scenario("hover"), 1024) as copies:
+    with VectorizedSimulation(load_scenario("hover"), 1024) as copies:
         copies.command_velocity(np.tile([1.0, 0.0, 0.0], (1024, 1, 1)))
         copies.run(0.1)
         height = copies.state().position_map[:, 0, 2]
@@ -31,7 +31,7 @@ from volery.core.plurals import counted
 from volery.runtime.build.fleet import place
 from volery.runtime.build.worlds import build_city, build_forest, build_scene, build_terrain
 from volery.runtime.checks import check_reset_seed, check_seconds, check_steps
-from volery.runtime.environment_block import CopyBlock, CopyEvent, Reading
+from volery.runtime.environment_block import EnvironmentBlock, EnvironmentEvent, Reading
 from volery.runtime.vehicles.uav import Uav
 from volery.runtime.warmup.parallel_compilation import compiled
 from volery.runtime.warmup.requirements import needs_of
@@ -41,7 +41,7 @@ from volery.vehicle.fleet import FleetState
 Array = NDArray[np.float64]
 
 
-class Copies:
+class VectorizedSimulation:
     """`count` copies of `scenario`, each with `n` UAVs.
 
     seeds: one for each copy; by default the scenario's and those after it. threads: results do not
@@ -75,7 +75,7 @@ class Copies:
         self._starts = place(scenario, self.scene, self.terrain)
         ends = np.linspace(0, count, min(threads, count) + 1).round().astype(int).tolist()
         self._blocks = [
-            CopyBlock(scenario, self._starts, self.terrain, self.scene, seeds[a:b], a)
+            EnvironmentBlock(scenario, self._starts, self.terrain, self.scene, seeds[a:b], a)
             for a, b in itertools.pairwise(ends)
         ]
         self._first: list[int] = ends[:-1]
@@ -167,7 +167,7 @@ class Copies:
             self._pool.shutdown()
             self.scene.close()
 
-    def __enter__(self) -> Copies:
+    def __enter__(self) -> VectorizedSimulation:
         return self
 
     def __exit__(self, *_exception: object) -> None:
@@ -197,7 +197,7 @@ class Copies:
             return None
         return {name: np.concatenate([part[name] for part in found]) for name in found[0]}
 
-    def drain_events(self) -> list[CopyEvent]:
+    def drain_events(self) -> list[EnvironmentEvent]:
         """What has happened since the last call, by time and copy."""
         events = [event for block in self._blocks for event in block.drain_events()]
         return sorted(events, key=lambda e: (e.event.time_ns, e.copy))

@@ -13,7 +13,7 @@ Speed = Annotated[float, Field(gt=0.0, le=100.0)]
 _UAV_NAME = re.compile(r"uav\d+")
 
 
-class Waypoints(Data):
+class WaypointActor(Data):
     """Along straight lines from one waypoint to the next."""
 
     kind: Literal["waypoints"]
@@ -37,7 +37,7 @@ class Waypoints(Data):
         return self
 
 
-class Circle(Data):
+class CircleActor(Data):
     """Round and round at one height, leaning into the turn as what flies does."""
 
     kind: Literal["circle"]
@@ -49,7 +49,7 @@ class Circle(Data):
     clockwise: bool = False
 
 
-class FromOutside(Data):
+class ExternalActor(Data):
     """Stands where it is put by `/things/NAME/pose` or `/set_entity_state`."""
 
     kind: Literal["outside"]
@@ -58,12 +58,12 @@ class FromOutside(Data):
     yaw_deg: float = 0.0
 
 
-class Thing(Data):
+class Actor(Data):
     """One of them: every sensor sees it, and UAVs can hit it."""
 
     name: Name
     shape: Literal["person", "car", "bird"]
-    motion: Annotated[Waypoints | Circle | FromOutside, Field(discriminator="kind")]
+    motion: Annotated[WaypointActor | CircleActor | ExternalActor, Field(discriminator="kind")]
 
     @model_validator(mode="after")
     def _is_no_uav(self) -> Self:
@@ -72,10 +72,10 @@ class Thing(Data):
         return self
 
 
-Things = Annotated[tuple[Thing, ...], Field(max_length=1000)]
+Things = Annotated[tuple[Actor, ...], Field(max_length=1000)]
 
 
-def check_things(things: tuple[Thing, ...]) -> None:
+def check_things(things: tuple[Actor, ...]) -> None:
     """ValueError where two things have one name."""
     names = [thing.name for thing in things]
     twice = sorted({name for name in names if names.count(name) > 1})

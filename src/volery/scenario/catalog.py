@@ -16,7 +16,7 @@ _LOG_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_. -]{0,99}\.(mcap|bag)")
 _MAX_LOADED = 1_000
 
 
-class Shelf:
+class ScenarioCatalog:
     """The library and, where there is one, a folder with more: `FOLDER/NAME/scenario.toml`.
 
     Names of the library come first. A shipped scenario cannot be hidden by one of the folder.

@@ -33,7 +33,7 @@ _FORMER_PATHS = {
     "volery.autonomy.target_detection:TargetDetection": "target_detection",
     "volery.autonomy.task_manager:TaskManager": "task_manager",
     "volery.comms.radio_node:RadioNode": "radio",
-    "volery.mavlink.node:Autopilot": "mavlink_autopilot",
+    "volery.mavlink.node:AutopilotNode": "mavlink_autopilot",
 }
 """Names by the paths that recorded logs hold, from before nodes had names."""
 

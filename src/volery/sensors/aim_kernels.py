@@ -41,7 +41,7 @@ class MountTable(NamedTuple):
     """(M, 4) amplitude_rad, period_s, offset_rad, phase_rad."""
 
 
-class LidarBatch(NamedTuple):
+class RayBatch(NamedTuple):
     """S scans to be made at once."""
 
     uav: NDArray[np.int64]
@@ -58,7 +58,7 @@ class LidarBatch(NamedTuple):
 
 
 @inner_kernel
-def sensor_frame(batch: LidarBatch, scan: int, history: PoseHistory, time_ns: int) -> Frame:
+def sensor_frame(batch: RayBatch, scan: int, history: PoseHistory, time_ns: int) -> Frame:
     """Origin, x axis, y axis and z axis of the sensor in the map at a time."""
     # Number by number: slices of arrays would be counted in memory that threads share.
     row = batch.mount[scan]
@@ -75,7 +75,7 @@ def sensor_frame(batch: LidarBatch, scan: int, history: PoseHistory, time_ns: in
 @inner_kernel
 def aim_packets(
     table: BeamTable,
-    batch: LidarBatch,
+    batch: RayBatch,
     scan: int,
     history: PoseHistory,
     first: int,
@@ -127,7 +127,7 @@ def aim_packets(
 @inner_kernel
 def _aim_one_by_one(
     table: BeamTable,
-    batch: LidarBatch,
+    batch: RayBatch,
     scan: int,
     history: PoseHistory,
     packet: int,
@@ -149,7 +149,7 @@ def _aim_one_by_one(
 @kernel
 def sweep_rays(
     table: BeamTable,
-    batch: LidarBatch,
+    batch: RayBatch,
     scan: int,
     history: PoseHistory,
     packets: NDArray[np.float32],

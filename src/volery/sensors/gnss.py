@@ -18,7 +18,7 @@ from volery.core.clock import NS_PER_S, Schedule, ns_from_s
 from volery.core.errors import CommandError, DataFileError
 from volery.core.geodesy import LocalFrame
 from volery.sensors.bank import NoisyBank, rows_of
-from volery.sensors.gnss_denial import NOWHERE, Denial
+from volery.sensors.gnss_denial import NOWHERE, GnssDenial
 from volery.sensors.model import SensorModel, load_model
 from volery.sensors.noise import gauss_markov_of_sigma
 from volery.sensors.samples import GnssReadings, SensorId, owned
@@ -72,7 +72,7 @@ class GnssBank(NoisyBank):
         position_body: Array,
         keys: NDArray[np.uint64] | None,
         frame: LocalFrame,
-        denial: Denial = NOWHERE,
+        denial: GnssDenial = NOWHERE,
     ) -> None:
         super().__init__(schedule, sensors, keys, at_start=3, per_measurement=9)
         self.lag_ns = ns_from_s(model.delay_s)

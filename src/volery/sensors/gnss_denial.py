@@ -30,7 +30,7 @@ class Prism(NamedTuple):
         return np.asarray(inside & (self.lowest <= z) & (z <= self.highest))
 
 
-class Denial(NamedTuple):
+class GnssDenial(NamedTuple):
     """All that a scenario denies."""
 
     everywhere: bool = False
@@ -44,4 +44,4 @@ class Denial(NamedTuple):
         return covered
 
 
-NOWHERE = Denial()
+NOWHERE = GnssDenial()

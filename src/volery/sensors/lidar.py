@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from volery.core.workers import Workers, new_counter
-from volery.sensors.aim_kernels import LidarBatch, MountTable, poses_at, sweep_rays
+from volery.sensors.aim_kernels import MountTable, RayBatch, poses_at, sweep_rays
 from volery.sensors.beam_table import BeamTable, packets_of
 from volery.sensors.echo_kernels import Echoes, Surfaces
 from volery.sensors.lidar_kernels import PIECE, measure_batch, scan_batch
@@ -25,8 +25,8 @@ from volery.world.scene_kernels import new_block, thread_block
 
 __all__ = [
     "Echoes",
-    "LidarBatch",
     "MountTable",
+    "RayBatch",
     "make_batch",
     "move_bodies",
     "sample_echoes",
@@ -58,15 +58,15 @@ def make_batch(
     key: ArrayLike,
     scan_number: ArrayLike,
     mounts: MountTable,
-) -> LidarBatch:
-    """Batch of S scans from arrays (S,) or numbers for all; see `LidarBatch` for their meaning."""
+) -> RayBatch:
+    """Batch of S scans from arrays (S,) or numbers for all; see `RayBatch` for their meaning."""
     uavs = np.atleast_1d(np.asarray(uav, dtype=np.int64))
 
     def column(values: ArrayLike, kind: type) -> NDArray[Any]:
         # Of its own, as kernels are compiled for: a single scan's would be a read-only view.
         return np.array(np.broadcast_to(np.asarray(values, dtype=kind), uavs.shape))
 
-    return LidarBatch(
+    return RayBatch(
         uav=column(uavs, np.int64),
         mount=column(mount, np.int64),
         sweep_start_ns=column(sweep_start_ns, np.int64),
@@ -79,7 +79,7 @@ def make_batch(
 def sample_lidars(
     scene: Scene,
     model: LidarModel,
-    batch: LidarBatch,
+    batch: RayBatch,
     history: PoseHistory,
     workers: Workers | None = None,
 ) -> NDArray[np.float32]:
@@ -90,7 +90,7 @@ def sample_lidars(
 def sample_echoes(
     scene: Scene,
     model: LidarModel,
-    batch: LidarBatch,
+    batch: RayBatch,
     history: PoseHistory,
     *,
     intensities: bool = False,
@@ -117,7 +117,7 @@ def sample_echoes(
 def _clear_echoes(
     scene: Scene,
     model: LidarModel,
-    batch: LidarBatch,
+    batch: RayBatch,
     history: PoseHistory,
     intensities: bool,
     workers: Workers | None,
@@ -151,7 +151,7 @@ def _clear_echoes(
 
 
 def scan_rays(
-    model: LidarModel, batch: LidarBatch, scan: int, history: PoseHistory
+    model: LidarModel, batch: RayBatch, scan: int, history: PoseHistory
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """One scan's beams as rays: origins and unit directions (beams, 3), map, and times, ns.
 
@@ -162,7 +162,7 @@ def scan_rays(
 
 
 def _rays(
-    table: BeamTable, batch: LidarBatch, scan: int, history: PoseHistory
+    table: BeamTable, batch: RayBatch, scan: int, history: PoseHistory
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     count = table.rays
     rays = np.empty((6, count), dtype=np.float32)
@@ -171,7 +171,7 @@ def _rays(
     return rays[:3].T.astype(np.float64), rays[3:].T.astype(np.float64), times
 
 
-def _interval(model: LidarModel, batch: LidarBatch, history: PoseHistory) -> tuple[int, int]:
+def _interval(model: LidarModel, batch: RayBatch, history: PoseHistory) -> tuple[int, int]:
     """Start of the earliest sweep and end of the latest one."""
     count = history.position.shape[1]
     if int(batch.uav.min()) < 0 or int(batch.uav.max()) >= count:
@@ -194,7 +194,7 @@ def move_bodies(scene: Scene, history: PoseHistory, start: int, end: int) -> int
     return bodies
 
 
-def _sweep_number(model: LidarModel, batch: LidarBatch) -> int:
+def _sweep_number(model: LidarModel, batch: RayBatch) -> int:
     number = int(batch.scan_number[0])
     if not model.scan.is_fixed and (batch.scan_number != number).any():
         raise ValueError(f"scans of a {model.name} in one batch must have one scan number")

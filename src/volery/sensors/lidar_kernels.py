@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from volery.core.compiled import inner_kernel, kernel
 from volery.core.workers import fetch_add
-from volery.sensors.aim_kernels import LidarBatch, aim_packets, sensor_frame
+from volery.sensors.aim_kernels import RayBatch, aim_packets, sensor_frame
 from volery.sensors.beam_table import BeamTable
 from volery.sensors.echo_kernels import Echoes, LidarConstants, Surfaces
 from volery.sensors.measurement_kernels import measure
@@ -29,7 +29,7 @@ _CURVE_MARGIN_M = 0.5
 def _near_scan(
     scene: SceneHandle,
     lidar: LidarConstants,
-    batch: LidarBatch,
+    batch: RayBatch,
     scan: int,
     history: PoseHistory,
     near: NDArray[np.int32],
@@ -99,7 +99,7 @@ def _note(
 @inner_kernel
 def _measure(
     lidar: LidarConstants,
-    batch: LidarBatch,
+    batch: RayBatch,
     scan: int,
     row: int,
     surfaces: Surfaces,
@@ -122,7 +122,7 @@ def scan_batch(
     scene: SceneHandle,
     lidar: LidarConstants,
     table: BeamTable,
-    batch: LidarBatch,
+    batch: RayBatch,
     history: PoseHistory,
     bodies_start_ns: int,
     bodies_end_ns: int,
@@ -163,7 +163,7 @@ def scan_batch(
 @kernel
 def measure_batch(
     lidar: LidarConstants,
-    batch: LidarBatch,
+    batch: RayBatch,
     counter: NDArray[np.int64],
     surfaces: Surfaces,
     echoes: Echoes,

@@ -16,7 +16,7 @@ from volery.world.materials import REFLECTIVITY
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
-class Reach(SensorModel):
+class RangeLimits(SensorModel):
     """What distances are measured."""
 
     min_m: NonNegativeFloat
@@ -98,7 +98,7 @@ class LidarModel(SensorModel):
     echoes: Annotated[int, Field(ge=1, le=MOST_ECHOES)] = 1
     """Most echoes of a beam that are told apart."""
     scan: ScanPattern
-    range: Reach
+    range: RangeLimits
     noise: RangeNoise
     dropout: Dropout
     mixed_pixels: MixedPixels

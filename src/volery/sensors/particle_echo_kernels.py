@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from volery.core.compiled import inner_kernel, kernel
 from volery.core.rng import normal, random_bits, uniform
 from volery.core.workers import fetch_add
-from volery.sensors.aim_kernels import LidarBatch
+from volery.sensors.aim_kernels import RayBatch
 from volery.sensors.echo_kernels import MOST_ECHOES, Echoes, LidarConstants
 from volery.sensors.particle_echoes import KINDS, VOLUME, ParticleTable
 
@@ -147,7 +147,7 @@ def _see_particles(
 def weather_scans(
     lidar: LidarConstants,
     air: ParticleTable,
-    batch: LidarBatch,
+    batch: RayBatch,
     counter: NDArray[np.int64],
     echoes: Echoes,
 ) -> None:

@@ -12,12 +12,12 @@ from volery.core.errors import BridgeError, CommandError
 from volery.runtime.services.control_authority import HAND_OVER, RELEASE, TAKE
 from volery.runtime.vehicles.control_authority import (
     MOST_CHARACTERS,
-    Pilots,
+    ControlAuthority,
     operator_name,
     same_operator,
 )
 from volery.runtime.vehicles.control_targets import names_in, parts_of
-from volery.server.operator_names import CrewList
+from volery.server.operator_names import OperatorNames
 from volery.server.read_only import READ_ONLY_SERVICES
 
 _LOOKING = {"subscribe", "unsubscribe", "set_level", "status", "auth"}
@@ -27,7 +27,7 @@ _TOLD_AGAIN_S = 1.0
 _MOST_TOLD = 1000
 
 
-class ViewerGate:
+class ViewerPolicy:
     """Lets a client look on."""
 
     def check(self, operation: Operation) -> bool:
@@ -40,7 +40,7 @@ class ViewerGate:
         raise BridgeError(f"a viewer may not {doing[:120]}; show the pilots' token")
 
 
-class PilotGate:
+class OperatorPolicy:
     """Lets a client command the UAVs that nobody else holds.
 
     `name` is what the pilot is called; `crew` are all who are connected to this server. What it
@@ -48,7 +48,11 @@ class PilotGate:
     """
 
     def __init__(
-        self, name: str, crew: CrewList, pilots: Pilots, now_s: Callable[[], float] = time.monotonic
+        self,
+        name: str,
+        crew: OperatorNames,
+        pilots: ControlAuthority,
+        now_s: Callable[[], float] = time.monotonic,
     ) -> None:
         self.name = name
         self._crew = crew

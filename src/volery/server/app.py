@@ -13,13 +13,13 @@ from starlette.routing import Mount, Route, WebSocketRoute
 
 from volery.bridges.origins import Origins
 from volery.server.auth import Tokens
-from volery.server.auth_middleware import Guard
+from volery.server.auth_middleware import AuthMiddleware
 from volery.server.page import PageFiles, index
 from volery.server.recordings import bring_recording, recording, recordings
 from volery.server.replies import RefusedError, refused
 from volery.server.rosbridge_route import serve_rosbridge
 from volery.server.scenarios import picture, scenarios
-from volery.server.server_state import Site
+from volery.server.server_state import ServerState
 from volery.server.status import status
 from volery.server.uploads.route import upload
 from volery.server.world_files import WorldFiles
@@ -27,11 +27,11 @@ from volery.server.world_route import world_glb
 
 
 def make_app(
-    site: Site, *, tokens: Tokens, origins: Origins, cookie: str, only_loopback: bool
+    site: ServerState, *, tokens: Tokens, origins: Origins, cookie: str, only_loopback: bool
 ) -> Starlette:
-    """The application; what the arguments after `site` mean, `Guard` says."""
+    """The application; what the arguments after `site` mean, `AuthMiddleware` says."""
     guard = Middleware(
-        Guard, tokens=tokens, origins=origins, cookie=cookie, only_loopback=only_loopback
+        AuthMiddleware, tokens=tokens, origins=origins, cookie=cookie, only_loopback=only_loopback
     )
     app = Starlette(
         routes=[

@@ -55,7 +55,7 @@ class _Visitor(NamedTuple):
     """To be given to the browser; None: it has one, or needs none."""
 
 
-class Guard:
+class AuthMiddleware:
     """ASGI middleware that refuses strangers; who passes has a role, in `scope["state"]`.
 
     Parameters

@@ -23,7 +23,7 @@ _NICENESS = 5
 
 
 @dataclass(frozen=True)
-class Bounds:
+class ProcessBounds:
     """What a child may take."""
 
     memory_bytes: int
@@ -37,7 +37,7 @@ class BoundedError(VoleryError):
     """A file cannot be read within the bounds, or its reader broke off."""
 
 
-def bound_this_process(bounds: Bounds) -> None:
+def bound_this_process(bounds: ProcessBounds) -> None:
     """Give up priority, and all memory and processor time beyond the bounds."""
     os.nice(_NICENESS)
     resource.setrlimit(resource.RLIMIT_AS, (bounds.memory_bytes, bounds.memory_bytes))
@@ -45,7 +45,7 @@ def bound_this_process(bounds: Bounds) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
-def run_bounded(module: str, words: Sequence[str], bounds: Bounds) -> Any:
+def run_bounded(module: str, words: Sequence[str], bounds: ProcessBounds) -> Any:
     """What `python -m MODULE WORDS` prints, from JSON.
 
     Raises `BoundedError` where it takes too long, or prints nothing: it ran out of memory.

@@ -33,7 +33,7 @@ _EXPOSURE_S = 0.3
 
 
 @dataclass(frozen=True)
-class View:
+class CardView:
     """When and from where a scenario is taken: the eye looks at the first UAV."""
 
     at_s: float = 6.0
@@ -44,26 +44,26 @@ class View:
 
 
 VIEWS = {
-    "city_flight": View(12.0, (-6.0, -1.5, 2.0), 70.0),
-    "cooperative_search": View(12.0, (-4.0, -2.5, 2.0), 65.0),
-    "coverage": View(20.0, (-7.0, -7.0, 5.0), 70.0),
-    "forest_cameras": View(10.0, (-4.0, -1.0, 1.0), 70.0),
-    "forest_procedural": View(10.0, (-3.5, -1.0, 1.2), 70.0),
-    "forest_rain": View(10.0, (-3.0, -1.0, 0.6), 70.0),
-    "forest_search": View(11.0, (-2.5, 2.2, 0.9), 70.0),
-    "forest_survey": View(10.0, (-3.0, 1.2, 0.8), 70.0),
-    "grid_map": View(14.0, (-15.0, -11.0, 12.0), 65.0),
-    "hover": View(5.0, (-1.6, -1.0, 0.45)),
-    "longleaf": View(10.0, (-3.5, 1.2, 1.0), 70.0),
-    "obstacle_field": View(10.0, (-4.0, -2.0, 1.6), 70.0),
-    "plug_in": View(10.0, (-6.0, -5.0, 4.0), 70.0),
-    "swarm_100": View(8.0, (-2.2, -2.2, 0.9), 70.0),
+    "city_flight": CardView(12.0, (-6.0, -1.5, 2.0), 70.0),
+    "cooperative_search": CardView(12.0, (-4.0, -2.5, 2.0), 65.0),
+    "coverage": CardView(20.0, (-7.0, -7.0, 5.0), 70.0),
+    "forest_cameras": CardView(10.0, (-4.0, -1.0, 1.0), 70.0),
+    "forest_procedural": CardView(10.0, (-3.5, -1.0, 1.2), 70.0),
+    "forest_rain": CardView(10.0, (-3.0, -1.0, 0.6), 70.0),
+    "forest_search": CardView(11.0, (-2.5, 2.2, 0.9), 70.0),
+    "forest_survey": CardView(10.0, (-3.0, 1.2, 0.8), 70.0),
+    "grid_map": CardView(14.0, (-15.0, -11.0, 12.0), 65.0),
+    "hover": CardView(5.0, (-1.6, -1.0, 0.45)),
+    "longleaf": CardView(10.0, (-3.5, 1.2, 1.0), 70.0),
+    "obstacle_field": CardView(10.0, (-4.0, -2.0, 1.6), 70.0),
+    "plug_in": CardView(10.0, (-6.0, -5.0, 4.0), 70.0),
+    "swarm_100": CardView(8.0, (-2.2, -2.2, 0.9), 70.0),
 }
 
 
 def draw(name: str) -> bytes:
     """The card of a scenario that ships, as a JPEG file."""
-    view = VIEWS.get(name, View())
+    view = VIEWS.get(name, CardView())
     with Simulation(_with_photographer(load_scenario(name), view)) as simulation:
         simulation.run(view.at_s)
         eye = simulation.uavs["uav1"].position_map + view.eye_m
@@ -75,7 +75,7 @@ def draw(name: str) -> bytes:
     return _jpeg(taken[-1].message)
 
 
-def _with_photographer(scenario: Scenario, view: View) -> Scenario:
+def _with_photographer(scenario: Scenario, view: CardView) -> Scenario:
     """The scenario with one UAV more, whose camera looks against `eye_m`."""
     x, y, z = (-side for side in view.eye_m)
     pitch_deg = -math.degrees(math.atan2(z, math.hypot(x, y)))

@@ -15,9 +15,14 @@ from pathlib import Path
 from typing import Any
 
 from volery.core.errors import VoleryError
-from volery.server.bounded_process import BoundedError, Bounds, bound_this_process, run_bounded
+from volery.server.bounded_process import (
+    BoundedError,
+    ProcessBounds,
+    bound_this_process,
+    run_bounded,
+)
 
-BOUNDS = Bounds(memory_bytes=3 << 30, cpu_s=60, wall_s=240.0)
+BOUNDS = ProcessBounds(memory_bytes=3 << 30, cpu_s=60, wall_s=240.0)
 """A chunk of the greatest size takes 1 GB; numpy and the codecs reserve another one."""
 _FILES_AT_ONCE = 200
 """In one process."""

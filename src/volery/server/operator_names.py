@@ -6,7 +6,7 @@ from volery.core.errors import BridgeError
 from volery.runtime.vehicles.control_authority import MOST_CHARACTERS, operator_key, operator_name
 
 
-class CrewList:
+class OperatorNames:
     """Names that are in use, however they are spelled; its methods belong to the server's thread.
 
     See `operator_name`: `Anna`, `anna` and `Anna ` are one name.

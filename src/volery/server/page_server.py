@@ -25,12 +25,12 @@ from volery.core.listener import Listener, Opening, open_listener
 from volery.core.network_access import LOOPBACK
 from volery.core.rare_log import RepeatFilter
 from volery.core.waiting_room import look_at_http
-from volery.scenario.catalog import Shelf
+from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.schema import Scenario
 from volery.server.app import make_app
 from volery.server.auth import check_rights
 from volery.server.http_protocol import HEAD_TIMEOUT_S, http_protocol
-from volery.server.server_state import Site, Situation, State, World
+from volery.server.server_state import ServerActivity, ServerSituation, ServerState, World
 from volery.server.settings import PageSettings
 from volery.server.websocket_protocol import PageWebSocket
 
@@ -49,9 +49,9 @@ class PageServer:
     shelf: the scenarios of the cards; those that ship and the uploads unless it is given.
     """
 
-    def __init__(self, settings: PageSettings, shelf: Shelf | None = None) -> None:
+    def __init__(self, settings: PageSettings, shelf: ScenarioCatalog | None = None) -> None:
         self._settings = settings
-        self._site = Site(settings.recordings, shelf or Shelf(settings.uploads))
+        self._site = ServerState(settings.recordings, shelf or ScenarioCatalog(settings.uploads))
         self._thread = LoopThread("volery-page")
         self._server: uvicorn.Server | None = None
         self._socket: Listener | None = None
@@ -112,7 +112,9 @@ class PageServer:
 
     def building(self, scenario: str, description: str = "", message: str = "") -> None:
         """Tell that a scenario is being built; `message`: what went wrong before."""
-        self._leave(Situation(State.BUILDING, scenario, description.strip(), message))
+        self._leave(
+            ServerSituation(ServerActivity.BUILDING, scenario, description.strip(), message)
+        )
 
     @contextmanager
     def showing(self, world: World, message: str = "") -> Iterator[None]:
@@ -123,20 +125,24 @@ class PageServer:
         scenario: Scenario | None = getattr(world, "scenario", None)
         name: str | None = getattr(world, "name", None) if scenario is None else scenario.name
         if name is None:
-            told = Situation(State.FAILED if message else State.LOBBY, message=message)
+            told = ServerSituation(
+                ServerActivity.FAILED if message else ServerActivity.LOBBY, message=message
+            )
         else:
             what = "A recorded log." if scenario is None else scenario.description.strip()
-            told = Situation(State.FLYING, name, what, message)
+            told = ServerSituation(ServerActivity.FLYING, name, what, message)
         self._call(self._site.join(world, told))
         try:
             yield
         finally:
-            self._leave(Situation(State.BUILDING, told.scenario, told.description, message))
+            self._leave(
+                ServerSituation(ServerActivity.BUILDING, told.scenario, told.description, message)
+            )
 
     def stop(self) -> None:
         """Let everybody go and end the thread; a second time nothing happens."""
         if self._thread.running:
-            self._leave(Situation(State.LOBBY, message="the server ends"))
+            self._leave(ServerSituation(ServerActivity.LOBBY, message="the server ends"))
             if self._server is not None:
                 self._server.should_exit = True
             self._call(self._end())
@@ -171,7 +177,7 @@ class PageServer:
         if self._serving is not None:
             await asyncio.gather(self._serving, return_exceptions=True)
 
-    def _leave(self, situation: Situation) -> None:
+    def _leave(self, situation: ServerSituation) -> None:
         self._call(self._site.leave(situation))
 
     def _call(self, work: Coroutine[Any, Any, Any]) -> None:

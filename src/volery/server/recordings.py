@@ -18,7 +18,7 @@ from volery.core.errors import RecordingError
 from volery.server.log_check import look_into
 from volery.server.replies import RefusedError
 from volery.server.request_bodies import check_pilot, save_body
-from volery.server.server_state import Site
+from volery.server.server_state import ServerState
 
 MOST_BYTES = 2_000_000_000
 """Of a log that somebody brings."""
@@ -32,14 +32,14 @@ _MOST_KNOWN = 10_000
 
 async def recordings(request: Request) -> Response:
     """All logs of the folder, the newest first."""
-    site: Site = request.app.state.site
+    site: ServerState = request.app.state.site
     told = [] if site.recordings is None else await asyncio.to_thread(_listed, site.recordings)
     return JSONResponse(told, headers={"Cache-Control": "no-store"})
 
 
 async def recording(request: Request) -> Response:
     """One log, to keep."""
-    site: Site = request.app.state.site
+    site: ServerState = request.app.state.site
     name: str = request.path_params["name"]
     found = None if site.recordings is None else site.recordings / name
     if found is None or not _NAME.match(name) or found.is_symlink() or not found.is_file():
@@ -50,7 +50,7 @@ async def recording(request: Request) -> Response:
 async def bring_recording(request: Request) -> Response:
     """Take a log, and look whether it is one."""
     check_pilot(request)
-    site: Site = request.app.state.site
+    site: ServerState = request.app.state.site
     folder = site.recordings
     if folder is None:
         raise RefusedError(409, "this server keeps no recordings; start it with --recordings")

@@ -10,13 +10,13 @@ from contextlib import contextmanager
 from starlette.types import Message
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from volery.bridges.rosbridge.access_policy import Gate
+from volery.bridges.rosbridge.access_policy import AccessPolicy
 from volery.bridges.rosbridge.protocol import RosbridgePeer
 from volery.bridges.rosbridge.websocket_session import SERVICE_RESTART, Bell, converse, post_to
 from volery.bridges.rosbridge.wire import CBOR_PROTOCOL, Frame
-from volery.server.access_policy import PilotGate, ViewerGate
+from volery.server.access_policy import OperatorPolicy, ViewerPolicy
 from volery.server.auth import Role
-from volery.server.server_state import Client, JoinedWorld, Site
+from volery.server.server_state import Client, JoinedWorld, ServerState
 
 _log = logging.getLogger(__name__)
 
@@ -52,7 +52,7 @@ class _Channel:
 
 async def serve_rosbridge(websocket: WebSocket) -> None:
     """Serve one client until it leaves or its world is gone."""
-    site: Site = websocket.app.state.site
+    site: ServerState = websocket.app.state.site
     spoken = CBOR_PROTOCOL if CBOR_PROTOCOL in websocket.scope["subprotocols"] else None
     await websocket.accept(spoken)
     if site.world is None:
@@ -68,16 +68,20 @@ async def serve_rosbridge(websocket: WebSocket) -> None:
 
 
 @contextmanager
-def _gate_of(websocket: WebSocket, site: Site, world: JoinedWorld) -> Iterator[Gate | None]:
+def _gate_of(
+    websocket: WebSocket, site: ServerState, world: JoinedWorld
+) -> Iterator[AccessPolicy | None]:
     """What the client may do, as long as it is there; a pilot who leaves lets go of his UAVs."""
     if websocket.state.role is not Role.PILOT:
-        yield ViewerGate()
+        yield ViewerPolicy()
         return
     pilots = world.pilots
     if pilots is None:
         yield None
         return
-    gate = PilotGate(site.crew.sign_in(websocket.query_params.get("pilot", "")), site.crew, pilots)
+    gate = OperatorPolicy(
+        site.crew.sign_in(websocket.query_params.get("pilot", "")), site.crew, pilots
+    )
     try:
         yield gate
     finally:
@@ -86,7 +90,7 @@ def _gate_of(websocket: WebSocket, site: Site, world: JoinedWorld) -> Iterator[G
 
 
 async def _serve(
-    site: Site, world: JoinedWorld, channel: _Channel, name: str, gate: Gate | None
+    site: ServerState, world: JoinedWorld, channel: _Channel, name: str, gate: AccessPolicy | None
 ) -> None:
     """Hold one conversation."""
     loop = asyncio.get_running_loop()

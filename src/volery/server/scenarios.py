@@ -12,12 +12,12 @@ from starlette.responses import FileResponse, JSONResponse, Response
 from volery.core.errors import VoleryError
 from volery.runtime.build.world_asset import kind_of
 from volery.scenario import library
-from volery.scenario.catalog import Shelf
+from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.load import load_scenario
 from volery.scenario.schema import Scenario
 from volery.server.cards import CARDS
 from volery.server.replies import RefusedError
-from volery.server.server_state import Site
+from volery.server.server_state import ServerState
 
 _DAY_S = 86_400
 Card = dict[str, Any]
@@ -25,7 +25,7 @@ Card = dict[str, Any]
 
 async def scenarios(request: Request) -> Response:
     """`./api/scenarios`: a card for each, those that ship first."""
-    site: Site = request.app.state.site
+    site: ServerState = request.app.state.site
     told = await run_in_threadpool(cards_of, site.shelf)
     return JSONResponse(told, headers={"Cache-Control": "no-store"})
 
@@ -39,7 +39,7 @@ async def picture(request: Request) -> Response:
     return FileResponse(CARDS / f"{name}.jpg", headers=kept)
 
 
-def cards_of(shelf: Shelf) -> list[Card]:
+def cards_of(shelf: ScenarioCatalog) -> list[Card]:
     """Cards of all scenarios; one that cannot be read any more has none."""
     cards = [_shipped(name) for name in library.names()]
     cards += [_card(given, uploaded=False) for given in shelf.given()]

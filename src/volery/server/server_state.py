@@ -13,25 +13,25 @@ from pathlib import Path
 from typing import Protocol
 
 from volery.bridges.rosbridge.bulk_turns import BulkTurns
-from volery.bridges.rosbridge.message_encoder import Forms
-from volery.bridges.rosbridge.protocol import Shared
+from volery.bridges.rosbridge.message_encoder import MessageEncoder
+from volery.bridges.rosbridge.protocol import ServerContext
 from volery.bridges.rosbridge.rosapi import RosApi
 from volery.bridges.rosbridge.tf_republisher import TfRepublisher
-from volery.bridges.rosbridge.websocket_session import SERVICE_RESTART, Channel
+from volery.bridges.rosbridge.websocket_session import SERVICE_RESTART, WebSocketSession
 from volery.graph.graph import Graph
 from volery.graph.session import Gateway
 from volery.runtime.build.geometry import Geometry
 from volery.runtime.end_of_run import EndOfRun
-from volery.runtime.vehicles.control_authority import Pilots
-from volery.scenario.catalog import Shelf
+from volery.runtime.vehicles.control_authority import ControlAuthority
+from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.schema import Scenario
-from volery.server.operator_names import CrewList
+from volery.server.operator_names import OperatorNames
 
 _FAREWELL_S = 1.0
 """Time for a client to take the news that its world is gone."""
 
 
-class State(StrEnum):
+class ServerActivity(StrEnum):
     """What goes on."""
 
     BUILDING = "building"
@@ -44,10 +44,10 @@ class State(StrEnum):
 
 
 @dataclass(frozen=True)
-class Situation:
+class ServerSituation:
     """The present state, in words."""
 
-    state: State = State.BUILDING
+    state: ServerActivity = ServerActivity.BUILDING
     scenario: str | None = None
     description: str = ""
     message: str = ""
@@ -75,8 +75,8 @@ class JoinedWorld:
         graph = world.graph
         self.gateway = world.gateway
         self.scenario: Scenario | None = getattr(world, "scenario", None)
-        self.pilots: Pilots | None = getattr(world, "pilots", None)
-        self.shared = Shared(Forms("ros2"), graph.now_ns)
+        self.pilots: ControlAuthority | None = getattr(world, "pilots", None)
+        self.shared = ServerContext(MessageEncoder("ros2"), graph.now_ns)
         self.bulk = BulkTurns()
         self._world = world
         self._rosapi = RosApi(world.gateway, "ros2", graph.now_ns)
@@ -106,7 +106,7 @@ class JoinedWorld:
 class Client:
     """One rosbridge client."""
 
-    channel: Channel
+    channel: WebSocketSession
     conversation: asyncio.Task[Exception | None]
 
     async def dismiss(self, reason: str) -> None:
@@ -119,23 +119,23 @@ class Client:
 
 
 @dataclass(eq=False)
-class Site:
+class ServerState:
     """What all requests share. Written to in the server's thread only."""
 
     recordings: Path | None = None
     """Folder of logs; None: there is none."""
-    shelf: Shelf = field(default_factory=Shelf)
+    shelf: ScenarioCatalog = field(default_factory=ScenarioCatalog)
     """Scenarios that can be loaded; its folder is that of uploads."""
-    situation: Situation = field(default_factory=Situation)
+    situation: ServerSituation = field(default_factory=ServerSituation)
     world: JoinedWorld | None = None
     clients: set[Client] = field(default_factory=set)
-    crew: CrewList = field(default_factory=CrewList)
+    crew: OperatorNames = field(default_factory=OperatorNames)
 
-    async def join(self, world: World, situation: Situation) -> None:
+    async def join(self, world: World, situation: ServerSituation) -> None:
         """Let clients into a world."""
         self.world, self.situation = JoinedWorld(world), situation
 
-    async def leave(self, situation: Situation) -> None:
+    async def leave(self, situation: ServerSituation) -> None:
         """Send everybody out of the present world."""
         world, self.world, self.situation = self.world, None, situation
         farewell = situation.message or "the world changes"

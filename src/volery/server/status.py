@@ -9,17 +9,17 @@ from starlette.responses import JSONResponse, Response
 
 from volery import __version__
 from volery.server.auth import Role
-from volery.server.server_state import Site, State
+from volery.server.server_state import ServerActivity, ServerState
 
 
 async def status(request: Request) -> Response:
     """State, scenario and world; who has yet to show a token learns that and no more."""
-    site: Site = request.app.state.site
+    site: ServerState = request.app.state.site
     role: Role | None = request.state.role
     return JSONResponse(_told(site, role), headers={"Cache-Control": "no-store"})
 
 
-def _told(site: Site, role: Role | None) -> dict[str, Any]:
+def _told(site: ServerState, role: Role | None) -> dict[str, Any]:
     told: dict[str, Any] = {"version": __version__, "role": role, "token_needed": role is None}
     if role is None:
         nothing = {"state": None, "scenario": None, "description": "", "message": "", "world": None}
@@ -27,7 +27,7 @@ def _told(site: Site, role: Role | None) -> dict[str, Any]:
     now, world = site.situation, site.world
     geometry = None if world is None else world.geometry
     return {
-        "state": State.ENDED if world is not None and world.has_ended else now.state,
+        "state": ServerActivity.ENDED if world is not None and world.has_ended else now.state,
         "scenario": now.scenario,
         "description": now.description,
         "message": now.message,

@@ -6,7 +6,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from volery.server.replies import RefusedError
-from volery.server.server_state import Site
+from volery.server.server_state import ServerState
 from volery.server.world_files import WorldFiles
 from volery.world.trees.model import DetailLevel
 
@@ -17,7 +17,7 @@ _TYPE = "model/gltf-binary"
 
 async def world_glb(request: Request) -> Response:
     """The geometry, or 304 where the browser has it; `?detail=` is that of the trees."""
-    site: Site = request.app.state.site
+    site: ServerState = request.app.state.site
     files: WorldFiles = request.app.state.world_files
     detail = _detail_of(request.query_params.get("detail", DetailLevel.SENSING))
     scenario = None if site.world is None else site.world.scenario

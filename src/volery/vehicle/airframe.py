@@ -58,7 +58,7 @@ class Body(Table):
     """Sphere about the origin that holds the whole vehicle, rotor discs included."""
 
 
-class RotorPlace(Table):
+class RotorGeometry(Table):
     """Where a rotor sits and how it turns, seen from above."""
 
     position_m: Vector
@@ -78,7 +78,7 @@ class Rotors(Table):
     fall_time_s: Positive
     max_speed_rad_s: Positive
     radius_m: Positive
-    places: Annotated[tuple[RotorPlace, ...], Field(min_length=4, max_length=MAX_ROTORS)]
+    places: Annotated[tuple[RotorGeometry, ...], Field(min_length=4, max_length=MAX_ROTORS)]
 
 
 class Ground(Table):

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.vehicle.airframe import Airframe, RotorPlace
+from volery.vehicle.airframe import Airframe, RotorGeometry
 from volery.world.materials import Material
 from volery.world.mesh import Mesh
 from volery.world.rotor_kernels import DISC_SIDES
@@ -52,7 +52,7 @@ def _box(center: Array, size: Array, yaw: float) -> tuple[Array, NDArray[np.uint
     return turned + center, _BOX_TRIANGLES
 
 
-def _arm(place: RotorPlace) -> tuple[Array, NDArray[np.uint32]]:
+def _arm(place: RotorGeometry) -> tuple[Array, NDArray[np.uint32]]:
     """A bar from the body's axis to below the rotor, at half the rotor's height."""
     x, y, z = place.position_m
     length = math.hypot(x, y)
@@ -60,7 +60,7 @@ def _arm(place: RotorPlace) -> tuple[Array, NDArray[np.uint32]]:
     return _box(np.array([x / 2.0, y / 2.0, z / 2.0]), size, math.atan2(y, x))
 
 
-def _turning(place: RotorPlace, radius: float) -> Array:
+def _turning(place: RotorGeometry, radius: float) -> Array:
     """Row (10,) of `BodyShape.rotors`."""
     axis = np.array(place.axis)
     side = np.cross(axis, [1.0, 0.0, 0.0] if abs(axis[0]) < 0.9 else [0.0, 1.0, 0.0])

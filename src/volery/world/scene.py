@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from volery.core.workers import Workers
-from volery.world.actors.moving import MovingThings
+from volery.world.actors.moving import MovingActors
 from volery.world.embree_backend import EmbreeBackend
 from volery.world.ground_cover import BARE_GROUND, GroundCover
 from volery.world.moving_bodies import NO_ROWS, body_rows, body_table, with_blades
@@ -76,7 +76,7 @@ class Scene:
         self.solids = tuple(solids)
         self._content = collect(terrain, forest, detail, self.solids, cover)
         self.backend = EmbreeBackend(self._content)
-        self.things: MovingThings | None = None
+        self.things: MovingActors | None = None
         """What moves by itself and is seen by all."""
         self._uav_rows, self._thing_rows, self._crew = NO_ROWS, NO_ROWS, 1
         self._bodies = body_table(NO_ROWS, NO_ROWS, 1)
@@ -166,7 +166,7 @@ class Scene:
         self._crew = max(len(index) // copies, 1)
         self._bodies = body_table(self._uav_rows, self._thing_rows, self._crew)
 
-    def set_things(self, things: MovingThings) -> None:
+    def set_things(self, things: MovingActors) -> None:
         """Let `things` be seen by all; `move_things` places them."""
         scenes = self.backend.shape_scenes(things.shapes)
         self.things = things

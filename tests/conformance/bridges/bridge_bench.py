@@ -1,6 +1,7 @@
-"""What the cases of the doors see: our side, a door, and plain clients at its other end.
+"""What the cases of the bridges see: our side, a bridge, and plain clients at its other end.
 
-A case is written once, in terms of `Bench` and `Client`. What a door's protocol cannot carry is in
+A case is written once, in terms of `Bench` and `Client`. What a bridge's protocol cannot carry is
+in
 `Bench.cannot`, and the cases that need it are skipped with that reason.
 """
 
@@ -18,7 +19,7 @@ import pytest
 from live_graph import LiveGraph
 from ros_tcp_client import until
 
-from volery.bridges.bridge_host import Doors
+from volery.bridges.bridge_host import BridgeHost
 from volery.graph.messages import String, message_type
 from volery.graph.service_reply import ServiceReply
 
@@ -26,7 +27,7 @@ STRING = "std_msgs/msg/String"
 IMAGE = "sensor_msgs/msg/Image"
 TRIGGER = "std_srvs/srv/Trigger"
 LIMIT_BYTES = 12 << 20
-"""Of one message, where a door can be told."""
+"""Of one message, where a bridge can be told."""
 PATIENCE_S = 60.0
 _TCP_REPAIR = 19
 
@@ -38,7 +39,7 @@ class Refused(Exception):
 
 
 class Client:
-    """A plain program at the other end of a door; adapters say how each thing is done.
+    """A plain program at the other end of a bridge; adapters say how each thing is done.
 
     What comes is sorted into `messages` and `errors` by a thread of the adapter's; `next` and
     `error` wait for it. Services that were offered answer `their_answer` by themselves,
@@ -114,11 +115,11 @@ class Client:
 
 
 class Ours:
-    """Our side of a door: a graph with a thread, as a simulation has it."""
+    """Our side of a bridge: a graph with a thread, as a simulation has it."""
 
     def __init__(self):
         self.live = LiveGraph()
-        self.doors = Doors(self.live.gateway)
+        self.bridges = BridgeHost(self.live.gateway)
 
     def publisher(self, topic, msgtype=STRING, *, latched=False):
         """A function that publishes."""
@@ -126,7 +127,7 @@ class Ours:
         return lambda message: self.live.do(lambda: made.publish(message))
 
     def burst(self, topic):
-        """A function that publishes many texts, without letting doors read in between."""
+        """A function that publishes many texts, without letting bridges read in between."""
         made = self.live.graph.advertise(topic, STRING)
 
         def publish(texts):
@@ -175,12 +176,12 @@ class Ours:
         return len(self.live.gateway.sessions()), topics, set(self.live.graph.services())
 
     def close(self):
-        self.doors.close()
+        self.bridges.close()
         self.live.close()
 
 
 class Bench:
-    """A door that is open, and the way to its other end."""
+    """A bridge that is open, and the way to its other end."""
 
     cannot: Mapping[str, str] = MappingProxyType({})
     topics = 2000
@@ -219,7 +220,7 @@ class Bench:
         return clients
 
     def open_where_taken(self, port):
-        """Open the door at a port that is in use."""
+        """Open the bridge at a port that is in use."""
         raise NotImplementedError
 
     def message(self, text):

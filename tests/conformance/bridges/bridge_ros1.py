@@ -1,4 +1,4 @@
-"""Native ROS 1: our door as a node of rospy's, and plain nodes without any ROS code around it."""
+"""Native ROS 1: our bridge as a node of rospy's, and plain nodes without any ROS code around it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from plain_tcpros import WRONG_SUM, PlainNode
 from ros1_bench import shared_master
 from ros_tcp_client import until
 
-from volery.bridges.ros1.bridge import Ros1Door
+from volery.bridges.ros1.bridge import Ros1Bridge
 from volery.bridges.ros1.environment import rospy_is_installed
 
 _numbers = itertools.count(1)
@@ -48,9 +48,9 @@ class NodeClient(Client):
         self.node.publish(topic, self._form.image(size))
 
     def _is_connected(self, topic):
-        """Whether our door has us among the readers of a topic, as it tells everyone who asks."""
-        with ServerProxy(self.node.master.lookupNode(self.node.name, "/volery")[2]) as door:
-            found = door.getBusInfo(self.node.name)[2]
+        """Whether our bridge has us among the readers of a topic, as it tells everyone who asks."""
+        with ServerProxy(self.node.master.lookupNode(self.node.name, "/volery")[2]) as bridge:
+            found = bridge.getBusInfo(self.node.name)[2]
         return any(row[1:5] == [self.node.name, "o", "TCPROS", topic] for row in found)
 
     def subscribe(self, topic, msgtype="std_msgs/msg/String", *, md5=None):
@@ -93,7 +93,7 @@ class NodeClient(Client):
 
 
 class Ros1Bench(Bench):
-    """Our door to a master of the tests' own."""
+    """Our bridge to a master of the tests' own."""
 
     cannot = MappingProxyType(
         {
@@ -101,7 +101,7 @@ class Ros1Bench(Bench):
             "reliability": "in TCPROS publishers decide how messages wait",
             "limits": "TCPROS knows none",
             "listening": "nodes take free ports",
-            "leaving": "the door stands for all nodes, those that are gone too",
+            "leaving": "the bridge stands for all nodes, those that are gone too",
             "errors": "TCPROS has no way to tell a publisher what was wrong",
         }
     )
@@ -115,11 +115,11 @@ class Ros1Bench(Bench):
             self.ours.close()
             pytest.skip("ROS 1 is not installed: see .ci/install_ros1")
         self._master = shared_master()
-        self.door = Ros1Door(remote_services={self.remote_service: TRIGGER})
-        self.ours.doors.open(self.door)
+        self.bridge = Ros1Bridge(remote_services={self.remote_service: TRIGGER})
+        self.ours.bridges.open(self.bridge)
 
     def subscriptions(self, clients):
-        """The door subscribes once for all."""
+        """The bridge subscribes once for all."""
         return 1
 
     def _connect(self, reading):

@@ -1,4 +1,4 @@
-"""Native ROS 2: our door, and plain DDS programs in processes of their own."""
+"""Native ROS 2: our bridge, and plain DDS programs in processes of their own."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from plain_peers import take_peer
 from ros2_bench import DOMAIN
 from ros_tcp_client import until
 
-from volery.bridges.ros2.bridge import Ros2Door
+from volery.bridges.ros2.bridge import Ros2Bridge
 from volery.bridges.ros2.dds import library
-from volery.bridges.ros2.environment import Ros2Terms
+from volery.bridges.ros2.environment import Ros2Environment
 
 LATCHED = ("/map", "/plan")
 _BASE_PORT, _PORTS_A_DOMAIN, _UNICAST = 7400, 250, 10  # RTPS 2.5, 9.6.2.3
@@ -105,7 +105,7 @@ class PeerClient(Client):
         self._peer.kill()
         topics = tuple(self._kinds)
         self._end()
-        # Until its lease is over the door takes it for a listener, and who comes back for heard.
+        # Until its lease is over the bridge takes it for a listener, and who comes back for heard.
         until(lambda: not any(map(self._bench.is_overheard, topics)))
 
     def close(self):
@@ -120,7 +120,7 @@ class PeerClient(Client):
 
 
 class Ros2Bench(Bench):
-    """Our door in a domain of the test run's own."""
+    """Our bridge in a domain of the test run's own."""
 
     cannot = MappingProxyType(
         {
@@ -128,7 +128,7 @@ class Ros2Bench(Bench):
             "reliability": "publishers keep the last messages, so that nobody can hold them up",
             "limits": "DDS knows none",
             "listening": "participants take free ports",
-            "leaving": "the door stands for all nodes, those that are gone too",
+            "leaving": "the bridge stands for all nodes, those that are gone too",
             "errors": "DDS has no way to tell a publisher what was wrong",
         }
     )
@@ -137,32 +137,32 @@ class Ros2Bench(Bench):
     def __init__(self):
         super().__init__()
         self.readers = Counter()
-        self.door = Ros2Door(
-            Ros2Terms(domain_id=DOMAIN),
+        self.bridge = Ros2Bridge(
+            Ros2Environment(domain_id=DOMAIN),
             remote_services={self.remote_service: TRIGGER},
             reliable=("/image_out",),
         )
-        self.ours.doors.open(self.door)
+        self.ours.bridges.open(self.bridge)
 
     def subscriptions(self, clients):
-        """The door subscribes once for all."""
+        """The bridge subscribes once for all."""
         return 1
 
     def is_heard(self, topic):
-        """Whether a subscription has reached the graph, and the door's writer each reader."""
+        """Whether a subscription has reached the graph, and the bridge's writer each reader."""
         known = any(t.name == topic and t.subscribers for t in self.ours.live.graph.topics())
         return known and self._subscribers(topic) >= self.readers[topic]
 
     def is_overheard(self, topic):
-        """Whether the door's writer has readers that are none."""
+        """Whether the bridge's writer has readers that are none."""
         return self._subscribers(topic) > self.readers[topic]
 
     def is_offered(self, service):
-        """Whether the door has found a server."""
-        return self.door._shared.services._callers[service].ready
+        """Whether the bridge has found a server."""
+        return self.bridge._shared.services._callers[service].ready
 
     def _subscribers(self, topic):
-        outlet = self.door._shared.topics._outlets.get(topic)
+        outlet = self.bridge._shared.topics._outlets.get(topic)
         return 0 if outlet is None else library.subscriptions(outlet._writer._writer)
 
     def _connect(self, reading):

@@ -212,8 +212,8 @@ class EndpointBench(Bench):
     def __init__(self, generation):
         super().__init__()
         self.form = Form(generation)
-        self.door = self._make(0)
-        self.ours.doors.open(self.door)
+        self.bridge = self._make(0)
+        self.ours.bridges.open(self.bridge)
 
     def _make(self, port):
         return RosTcpEndpoint(
@@ -221,10 +221,10 @@ class EndpointBench(Bench):
         )
 
     def _connect(self, reading):
-        return PlainConnector(self.door.port, self.form, reading)
+        return PlainConnector(self.bridge.port, self.form, reading)
 
     def open_where_taken(self, port):
-        self.ours.doors.open(self._make(port))
+        self.ours.bridges.open(self._make(port))
 
 
 class PlainEndpoint(RosTcpPartner):
@@ -311,7 +311,7 @@ class ConnectorBench(Bench):
             port=listener.getsockname()[1], subscribe=["/in*", "/image_in"], publish=["/*out*"]
         )
         self._connectors[listener] = connector
-        self.ours.doors.open(connector)
+        self.ours.bridges.open(connector)
         return listener
 
     def error_of(self, client):

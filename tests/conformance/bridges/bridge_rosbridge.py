@@ -180,16 +180,16 @@ class ServerBench(Bench):
     def __init__(self, compression):
         super().__init__()
         self._compression = compression
-        self.door = RosbridgeServer(port=0, max_message_bytes=LIMIT_BYTES)
-        self.ours.doors.open(self.door)
+        self.bridge = RosbridgeServer(port=0, max_message_bytes=LIMIT_BYTES)
+        self.ours.bridges.open(self.bridge)
 
     def _connect(self, reading):
-        url = f"ws://127.0.0.1:{self.door.port}"
+        url = f"ws://127.0.0.1:{self.bridge.port}"
         options = {"max_size": None, "compression": None, "close_timeout": 0.1}
         return PlainClient(connect(url, **options).__enter__(), self._compression, reading)
 
     def open_where_taken(self, port):
-        self.ours.doors.open(RosbridgeServer(port=port))
+        self.ours.bridges.open(RosbridgeServer(port=port))
 
 
 class Program:

@@ -141,24 +141,24 @@ class SensorLinkBench(Bench):
 
     def __init__(self):
         super().__init__()
-        self.door = SensorLink(port=0, image_port=0)
-        self.ours.doors.open(self.door)
+        self.bridge = SensorLink(port=0, image_port=0)
+        self.ours.bridges.open(self.bridge)
         self._ranges = self.ours.live.graph.advertise(self.topic_out, m.Range)
         self._images = self.ours.live.graph.advertise(self.image_out, IMAGE)
 
     def subscriptions(self, clients):
-        """The door subscribes once for all."""
+        """The bridge subscribes once for all."""
         return 1
 
     def _connect(self, reading):
-        client = LinkClient(self.door.port, self.door.image_port, reading)
+        client = LinkClient(self.bridge.port, self.bridge.image_port, reading)
         places = {f"127.0.0.1:{s.getsockname()[1]}" for s in (client.sock, client.images)}
-        until(lambda: places <= {info.name.split()[-1] for info in self.door.clients})
+        until(lambda: places <= {info.name.split()[-1] for info in self.bridge.clients})
         until(lambda: self._ranges.wanted and self._images.wanted)
         return client
 
     def open_where_taken(self, port):
-        self.ours.doors.open(SensorLink(port=port, image_port=0))
+        self.ours.bridges.open(SensorLink(port=port, image_port=0))
 
     def message(self, text):
         return m.Range(m.header(5, "uav1/range"), 0, 0.5, 0.125, 8.0, float(text), 0.0)

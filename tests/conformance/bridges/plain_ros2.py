@@ -1,4 +1,4 @@
-"""A plain DDS program that speaks as a ROS 2 node does. It shares no code with the door.
+"""A plain DDS program that speaks as a ROS 2 node does. It shares no code with the bridge.
 
 It runs as a process of its own and does what comes as lines of JSON on stdin; what it hears goes to
 stdout. Its types are written by hand in the package's IDL, their bytes come from the tests.

@@ -1,4 +1,4 @@
-"""Services over every door."""
+"""Services over every bridge."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Topics over every door."""
+"""Topics over every bridge."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from volery.graph import messages as m
 TEXTS = ["", "Grüße, 無人機 🚁", "a\0b", "\u202e rtl \u0301\U0010ffff", "x" * 70_000]
 LARGE = 8 << 20
 BURST = 5000
-"""Messages at once, between two breaths of a door."""
+"""Messages at once, between two breaths of a bridge."""
 
 
 def image(size):

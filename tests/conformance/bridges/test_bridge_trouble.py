@@ -57,7 +57,7 @@ class Served:
 
 @pytest.fixture
 def others(bench, client):
-    """Somebody else, or the client itself where a door has one partner only."""
+    """Somebody else, or the client itself where a bridge has one partner only."""
     return Served(bench, bench.another(client))
 
 
@@ -259,7 +259,7 @@ def test_strangers_who_speak_another_protocol_harm_nobody(bench, others):
         bytes(5),
         b"\xff" * 900,
     ):
-        strangers.append(socket.create_connection(("127.0.0.1", bench.door.port)))
+        strangers.append(socket.create_connection(("127.0.0.1", bench.bridge.port)))
         strangers[-1].sendall(words)
     others.check()
     for stranger in strangers:
@@ -270,7 +270,7 @@ def test_strangers_who_speak_another_protocol_harm_nobody(bench, others):
 @pytest.mark.needs("listening")
 @pytest.mark.parametrize("words", [b"POST / HTTP/1.1\r\nHost: x\r\n\r\n", b"\x16\x03\x01\x02\0"])
 def test_web_pages_and_tls_are_sent_away(bench, others, words):
-    stranger = socket.create_connection(("127.0.0.1", bench.door.port), PATIENCE_S)
+    stranger = socket.create_connection(("127.0.0.1", bench.bridge.port), PATIENCE_S)
     with stranger, contextlib.suppress(ConnectionError):
         for byte in words:
             stranger.sendall(bytes((byte,)))
@@ -284,7 +284,7 @@ def test_web_pages_and_tls_are_sent_away(bench, others, words):
 @pytest.mark.needs("listening", "others")
 def test_half_open_connections_keep_nobody_out(bench, others):
     """More than may be unproven at once; those that are there already notice nothing."""
-    idle = [socket.create_connection(("127.0.0.1", bench.door.port)) for _ in range(100)]
+    idle = [socket.create_connection(("127.0.0.1", bench.bridge.port)) for _ in range(100)]
     again = Served(bench, bench.connect())
     again.check()
     others.check()

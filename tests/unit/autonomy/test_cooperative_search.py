@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from volery.autonomy.search.calls import JOIN
 from volery.autonomy.search.cooperative_search import CooperativeSearch
 from volery.autonomy.search.search_positions import Area, check_room, places_around, random_waypoint
-from volery.autonomy.search.teammates import Phase
+from volery.autonomy.search.teammates import SearchPhase
 from volery.core import rng
 from volery.core.errors import GraphError
 from volery.graph.codecs.zero import zero_message
@@ -197,7 +197,7 @@ class Bodies:
 
 def searching(**parameters):
     bodies = Bodies(**parameters)
-    bodies.run_until(bodies.all_in(Phase.SEARCH))
+    bodies.run_until(bodies.all_in(SearchPhase.SEARCH))
     return bodies
 
 
@@ -209,9 +209,9 @@ def test_one_finds_all_come_and_land_where_they_took_off():
         bodies.graph.subscribe(
             f"/{name}/search/found", lambda p: found.append(p.message.point), PointStamped
         )
-    bodies.run_until(bodies.all_in(Phase.HOLD))
+    bodies.run_until(bodies.all_in(SearchPhase.HOLD))
     places = np.array([bodies.place[name] for name in TEAM])
-    bodies.run_until(bodies.all_in(Phase.DONE))
+    bodies.run_until(bodies.all_in(SearchPhase.DONE))
     assert np.linalg.norm([found[0].x - 25.0, found[0].y - 15.0]) < 0.3
     away = np.linalg.norm(places[:, :2] - OBJECT, axis=1)
     assert (away > 2.0).all()
@@ -228,18 +228,18 @@ def test_one_finds_all_come_and_land_where_they_took_off():
 
 def test_nobody_leaves_its_column_while_another_climbs_or_sinks():
     bodies = Bodies()
-    bodies.run_until(bodies.all_in(Phase.DONE))
+    bodies.run_until(bodies.all_in(SearchPhase.DONE))
     for now in zip(*bodies.phases.values(), strict=True):
-        under_way = {Phase.SEARCH, Phase.LOOK, Phase.COME, Phase.HOLD}
-        assert not (Phase.CLIMB in now and under_way & set(now))
-        assert not (Phase.LAND in now and (under_way | {Phase.HOME}) & set(now))
+        under_way = {SearchPhase.SEARCH, SearchPhase.LOOK, SearchPhase.COME, SearchPhase.HOLD}
+        assert not (SearchPhase.CLIMB in now and under_way & set(now))
+        assert not (SearchPhase.LAND in now and (under_way | {SearchPhase.HOME}) & set(now))
 
 
 def test_the_earlier_of_two_finds_counts_whatever_comes_first():
     bodies = searching()
     bodies.sees.clear()
     assert bodies.call("uav1", "uav2", 100).accepted
-    assert bodies.nodes["uav1"].phase is Phase.COME
+    assert bodies.nodes["uav1"].phase is SearchPhase.COME
     later = bodies.call("uav1", "uav3", 101)
     assert not later.accepted
     assert "uav2" in later.message
@@ -260,29 +260,29 @@ def test_a_second_call_of_the_same_find_changes_nothing():
     bodies = searching()
     bodies.sees.clear()
     assert bodies.call("uav1", "uav2", 100).accepted
-    bodies.run_until(lambda: bodies.nodes["uav1"].phase is Phase.HOLD)
+    bodies.run_until(lambda: bodies.nodes["uav1"].phase is SearchPhase.HOLD)
     assert bodies.call("uav1", "uav2", 100).accepted
-    assert bodies.nodes["uav1"].phase is Phase.HOLD
+    assert bodies.nodes["uav1"].phase is SearchPhase.HOLD
 
 
 def test_two_that_find_it_at_once_agree():
     bodies = searching()
     for name in ("uav1", "uav3"):
         bodies.place[name][:2] = OBJECT + 1.0
-    bodies.run_until(bodies.all_in(Phase.HOLD))
+    bodies.run_until(bodies.all_in(SearchPhase.HOLD))
     assert {node.claim.key for node in bodies.nodes.values()} == {bodies.nodes["uav1"].claim.key}
     assert bodies.nodes["uav3"].claim.finder == "uav1"
 
 
 def test_a_call_while_it_climbs_is_followed_afterwards():
     bodies = Bodies()
-    bodies.run_until(lambda: bodies.nodes["uav1"].phase is Phase.CLIMB)
+    bodies.run_until(lambda: bodies.nodes["uav1"].phase is SearchPhase.CLIMB)
     bodies.sees.clear()
     assert bodies.call("uav1", "uav2", 100).accepted
-    assert bodies.nodes["uav1"].phase is Phase.CLIMB
-    bodies.run_until(lambda: bodies.nodes["uav1"].phase is Phase.COME)
+    assert bodies.nodes["uav1"].phase is SearchPhase.CLIMB
+    bodies.run_until(lambda: bodies.nodes["uav1"].phase is SearchPhase.COME)
     phases = list(dict.fromkeys(bodies.phases["uav1"]))
-    assert phases[:3] == [Phase.READY, Phase.CLIMB, Phase.ALOFT]
+    assert phases[:3] == [SearchPhase.READY, SearchPhase.CLIMB, SearchPhase.ALOFT]
 
 
 @pytest.mark.parametrize(
@@ -300,33 +300,35 @@ def test_calls_that_are_refused(finder, place, reason):
     answer = bodies.call("uav1", finder, 5, place)
     assert not answer.accepted
     assert reason in answer.message
-    assert bodies.nodes["uav1"].phase is Phase.SEARCH
+    assert bodies.nodes["uav1"].phase is SearchPhase.SEARCH
 
 
 def test_who_is_down_refuses_and_is_not_waited_for():
     bodies = searching()
     bodies.crash("uav3")
-    bodies.run_until(lambda: bodies.nodes["uav3"].phase is Phase.DOWN)
+    bodies.run_until(lambda: bodies.nodes["uav3"].phase is SearchPhase.DOWN)
     assert "down" in bodies.call("uav3", "uav1").message
     others = [bodies.nodes["uav1"], bodies.nodes["uav2"]]
-    bodies.run_until(lambda: all(node.phase is Phase.DONE for node in others))
-    assert all(Phase.HOLD in bodies.phases[name] for name in ("uav1", "uav2"))
+    bodies.run_until(lambda: all(node.phase is SearchPhase.DONE for node in others))
+    assert all(SearchPhase.HOLD in bodies.phases[name] for name in ("uav1", "uav2"))
 
 
 def test_an_absent_teammate_is_waited_for_on_the_ground_and_called_in_vain():
     bodies = Bodies(starts=["uav1", "uav2"])
     bodies.run(2.5)
-    assert bodies.all_in(Phase.READY)()
-    bodies.run_until(bodies.all_in(Phase.DONE))
-    assert all(Phase.HOLD in phases for name, phases in bodies.phases.items() if name != "uav3")
+    assert bodies.all_in(SearchPhase.READY)()
+    bodies.run_until(bodies.all_in(SearchPhase.DONE))
+    assert all(
+        SearchPhase.HOLD in phases for name, phases in bodies.phases.items() if name != "uav3"
+    )
 
 
 def test_who_comes_late_stays_on_the_ground():
     bodies = Bodies(starts=["uav1", "uav2"])
-    bodies.run_until(lambda: bodies.nodes["uav1"].phase is Phase.SEARCH)
+    bodies.run_until(lambda: bodies.nodes["uav1"].phase is SearchPhase.SEARCH)
     bodies.start("uav3")
     bodies.run(3.0)
-    assert bodies.nodes["uav3"].phase is Phase.LATE
+    assert bodies.nodes["uav3"].phase is SearchPhase.LATE
     assert bodies.place["uav3"][2] == 0.0
 
 
@@ -336,17 +338,17 @@ def test_a_service_that_never_answers_is_called_again_and_given_up():
     asked = []
     bodies.graph.withdraw("/uav3/search/come")
     bodies.graph.offer_async("/uav3/search/come", JOIN, lambda q, _: asked.append(q.finder))
-    bodies.run_until(lambda: bodies.nodes["uav1"].phase is Phase.HOME)
+    bodies.run_until(lambda: bodies.nodes["uav1"].phase is SearchPhase.HOME)
     assert asked == ["uav1"] * 20
-    assert bodies.nodes["uav2"].phase is Phase.HOME
-    bodies.run_until(bodies.all_in(Phase.DONE))
+    assert bodies.nodes["uav2"].phase is SearchPhase.HOME
+    bodies.run_until(bodies.all_in(SearchPhase.DONE))
 
 
 def test_a_false_alarm_ends():
     bodies = searching()
-    bodies.run_until(lambda: Phase.LOOK in {node.phase for node in bodies.nodes.values()})
+    bodies.run_until(lambda: SearchPhase.LOOK in {node.phase for node in bodies.nodes.values()})
     bodies.sees.clear()
-    bodies.run_until(bodies.all_in(Phase.SEARCH), 20.0)
+    bodies.run_until(bodies.all_in(SearchPhase.SEARCH), 20.0)
     assert all(node.claim is None for node in bodies.nodes.values())
 
 
@@ -354,14 +356,14 @@ def test_what_lies_outside_the_area_is_not_found():
     bodies = Bodies()
     bodies.object = np.array([25.0, 41.0])
     bodies.run(100.0)
-    assert bodies.all_in(Phase.SEARCH)()
+    assert bodies.all_in(SearchPhase.SEARCH)()
 
 
 def test_finish_at_one_ends_it_for_all():
     bodies = searching()
     bodies.sees.clear()
     assert bodies.graph.call("/uav2/search/finish").success
-    bodies.run_until(bodies.all_in(Phase.DONE), 60.0)
+    bodies.run_until(bodies.all_in(SearchPhase.DONE), 60.0)
     assert "no part" in bodies.call("uav1", "uav2").message
 
 
@@ -371,7 +373,7 @@ def test_who_cannot_be_told_sees_the_others_go_home():
     for name in ("uav1", "uav3"):
         bodies.graph.withdraw(f"/{name}/search/finish")
     bodies.graph.call("/uav2/search/finish")
-    bodies.run_until(bodies.all_in(Phase.DONE), 60.0)
+    bodies.run_until(bodies.all_in(SearchPhase.DONE), 60.0)
 
 
 def test_finish_before_the_take_off_keeps_all_on_the_ground():
@@ -379,27 +381,27 @@ def test_finish_before_the_take_off_keeps_all_on_the_ground():
     bodies.run(0.5)
     bodies.graph.call("/uav2/search/finish")
     bodies.run(0.2)
-    assert bodies.all_in(Phase.DONE)()
+    assert bodies.all_in(SearchPhase.DONE)()
 
 
 def test_a_climb_that_fails_is_given_up():
     bodies = Bodies()
     bodies.rotors_turn = False
-    bodies.run_until(bodies.all_in(Phase.DOWN), 60.0)
+    bodies.run_until(bodies.all_in(SearchPhase.DOWN), 60.0)
 
 
 def test_finish_while_they_climb_brings_them_down_again():
     bodies = Bodies()
-    bodies.run_until(bodies.all_in(Phase.CLIMB))
+    bodies.run_until(bodies.all_in(SearchPhase.CLIMB))
     bodies.graph.call("/uav1/search/finish")
-    bodies.run_until(bodies.all_in(Phase.DONE), 60.0)
-    assert not any(Phase.SEARCH in phases for phases in bodies.phases.values())
+    bodies.run_until(bodies.all_in(SearchPhase.DONE), 60.0)
+    assert not any(SearchPhase.SEARCH in phases for phases in bodies.phases.values())
 
 
 def test_a_vain_search_ends_in_time():
     bodies = Bodies(search_s=5.0)
     bodies.sees.clear()
-    bodies.run_until(bodies.all_in(Phase.DONE), 90.0)
+    bodies.run_until(bodies.all_in(SearchPhase.DONE), 90.0)
 
 
 def test_without_pictures_it_stops():
@@ -415,7 +417,7 @@ def test_without_pictures_it_stops():
 
 def test_a_kept_state_is_gone_back_to():
     bodies = searching()
-    bodies.run_until(lambda: any(n.phase is Phase.COME for n in bodies.nodes.values()))
+    bodies.run_until(lambda: any(n.phase is SearchPhase.COME for n in bodies.nodes.values()))
     kept = copy.deepcopy([node.get_state() for node in bodies.nodes.values()])
     graph, places = bodies.graph.get_state(), copy.deepcopy((bodies.place, bodies.velocity))
     now_ns = bodies.now_ns

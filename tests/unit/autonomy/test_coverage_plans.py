@@ -5,13 +5,13 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
-from volery.autonomy.coverage.cells import FAR, MOST_CELLS, Cells
+from volery.autonomy.coverage.cells import FAR, MOST_CELLS, CoverageCells
 from volery.autonomy.coverage.components import level_shares
-from volery.autonomy.coverage.field import Field
-from volery.autonomy.coverage.flight import Flight, Phase
+from volery.autonomy.coverage.field import CoverageField
+from volery.autonomy.coverage.flight import CoverageFlight, CoveragePhase
 from volery.autonomy.coverage.plan import UNREACHABLE, plan_coverage
-from volery.autonomy.coverage.spanning_tree import Tour
-from volery.autonomy.coverage.waypoints import Heights, Waypoints, route_waypoints
+from volery.autonomy.coverage.spanning_tree import CoverageTour
+from volery.autonomy.coverage.waypoints import HeightProfile, WaypointProgress, route_waypoints
 from volery.bench.coverage import CASES
 from volery.core.errors import PlanError
 from volery.graph.codecs.zero import zero_message
@@ -44,7 +44,7 @@ def test_starts_side_by_side_get_equal_areas():
 
 def test_distances_are_those_of_an_independent_solver():
     free = np.random.default_rng(7).random((20, 25)) > 0.3
-    cells = Cells.of(free)
+    cells = CoverageCells.of(free)
     found = cells.distances([0])
     ends, lengths = [], []
     for k, (row, column) in enumerate(cells.places()):
@@ -66,7 +66,7 @@ def test_distances_are_those_of_an_independent_solver():
 def test_a_way_goes_around_what_is_blocked():
     free = np.ones((5, 5), bool)
     free[1:, 2] = False
-    cells = Cells.of(free)
+    cells = CoverageCells.of(free)
     way = cells.places()[cells.way(cells.number(4, 0), cells.number(4, 4))]
     assert way[0].tolist() == [4, 0]
     assert way[-1].tolist() == [4, 4]
@@ -155,7 +155,7 @@ def map_message(free, cell_m=2.0, origin=(0.0, 0.0), yaw=0.0):
 
 def test_a_turned_field_knows_its_cells():
     free = np.ones((3, 5), bool)
-    field = Field.from_message(map_message(free, 2.0, (10.0, -4.0), 0.5))
+    field = CoverageField.from_message(map_message(free, 2.0, (10.0, -4.0), 0.5))
     cells = np.argwhere(free)
     np.testing.assert_array_equal(field.cells_at(field.centres(cells)), cells)
     np.testing.assert_allclose(
@@ -168,7 +168,9 @@ def test_a_turned_field_knows_its_cells():
 def test_unknown_and_occupied_cells_are_not_free():
     message = map_message(np.ones((1, 4), bool))
     message.data = np.array([0, 49, 50, -1], np.int8)
-    np.testing.assert_array_equal(Field.from_message(message).free, [[True, True, False, False]])
+    np.testing.assert_array_equal(
+        CoverageField.from_message(message).free, [[True, True, False, False]]
+    )
 
 
 @pytest.mark.parametrize("fault", ["size", "resolution", "origin"])
@@ -181,18 +183,18 @@ def test_maps_that_are_none_are_refused(fault):
     else:
         message.info.origin.position.x = np.nan
     with pytest.raises(PlanError):
-        Field.from_message(message)
+        CoverageField.from_message(message)
 
 
 def test_transits_are_flown_apart_and_around_what_is_blocked():
     free = np.ones((5, 5), bool)
     free[1:, 2] = False
-    field = Field(free, 2.0, (0.0, 0.0))
-    tour = Tour(np.array([[8, 8], [8, 9], [9, 9], [9, 8]], np.int32), 4)
+    field = CoverageField(free, 2.0, (0.0, 0.0))
+    tour = CoverageTour(np.array([[8, 8], [8, 9], [9, 9], [9, 8]], np.int32), 4)
     home = np.array([1.0, 9.0, 0.0])
     for uav in (0, 1):
         way = route_waypoints(
-            field, Cells.of(free), Heights(2.0, 1.5, 0.0), uav, home, home, [tour]
+            field, CoverageCells.of(free), HeightProfile(2.0, 1.5, 0.0), uav, home, home, [tour]
         )
         transit = way.places[~way.covering][:-1]
         np.testing.assert_allclose(transit[:, 2], 2.0 + 1.5 * (uav + 1))
@@ -202,9 +204,9 @@ def test_transits_are_flown_apart_and_around_what_is_blocked():
 
 
 def test_a_uav_that_gets_nowhere_is_lost():
-    flight = Flight("uav1", phase=Phase.COVER)
+    flight = CoverageFlight("uav1", phase=CoveragePhase.COVER)
     flight.moved(np.zeros(3), 0.0, 0)
-    flight.send(Waypoints(np.array([[10.0, 0, 0], [20.0, 0, 0]]), np.array([True, True])), 0)
+    flight.send(WaypointProgress(np.array([[10.0, 0, 0], [20.0, 0, 0]]), np.array([True, True])), 0)
     for second in range(1, 8):
         now = second * 1_000_000_000
         flight.moved(np.array([float(min(second, 3)), 0.0, 0.0]), 0.0, now)

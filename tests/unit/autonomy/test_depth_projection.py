@@ -11,7 +11,7 @@ from volery.autonomy.perception.depth_projection import (
     mean_depth,
     region_of,
 )
-from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.scan_points import OdometrySample
 from volery.core import rotations
 from volery.core.errors import GraphError
 from volery.graph.codecs.zero import zero_message
@@ -36,7 +36,7 @@ def info():
 
 def pose(rpy=(0.0, 0.0, 0.0), position=(0.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0), time_ns=0):
     place, speed = np.array(position), np.array(velocity)
-    return Pose(time_ns, place, rotations.from_rpy(*rpy), speed, np.zeros(3))
+    return OdometrySample(time_ns, place, rotations.from_rpy(*rpy), speed, np.zeros(3))
 
 
 def test_pixels_become_points_where_the_camera_looks():

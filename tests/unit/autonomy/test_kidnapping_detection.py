@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from volery.autonomy.slam.kidnapping_detection import Sight
+from volery.autonomy.slam.kidnapping_detection import KidnappingDetector
 
 RATE_HZ = 20
 PERIOD_NS = 1_000_000_000 // RATE_HZ
@@ -38,7 +38,7 @@ class Flight:
     """One that believes to fly along x at 2.5 m/s."""
 
     def __init__(self, trunks):
-        self.trunks, self.sight = trunks, Sight()
+        self.trunks, self.sight = trunks, KidnappingDetector()
         self.time_ns, self.moved = 0, np.zeros(2)
 
     def fly(self, seconds, seen=None):

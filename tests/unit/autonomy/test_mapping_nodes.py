@@ -12,7 +12,7 @@ from volery.autonomy.mapping.merging_node import MapMerging
 from volery.autonomy.mapping.messages import octomap_message
 from volery.autonomy.mapping.octomap_stream import decode_binary
 from volery.autonomy.perception.motion_history import MotionHistory, NodHistory
-from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.perception.scan_rays import Beams, RayMaker
 from volery.core import rotations
 from volery.core.errors import GraphError, NodeError
@@ -73,7 +73,11 @@ def test_each_beam_is_cast_from_where_it_was():
     for k in range(6):
         t = 0.02 * k
         q = rotations.from_rpy(0.1, -0.2, turn * t)
-        motion.add(Pose(round(t * S), np.array([speed * t, 0.0, 1.0]), q, np.zeros(3), np.zeros(3)))
+        motion.add(
+            OdometrySample(
+                round(t * S), np.array([speed * t, 0.0, 1.0]), q, np.zeros(3), np.zeros(3)
+            )
+        )
     ranges = np.full(101, 5.0)
     made = RayMaker([0.1, 0.0, -0.08], Beams()).rays(
         scan(11 * MS, ranges, -1.0, 1.0, 0.05), motion, None
@@ -92,7 +96,9 @@ def test_each_beam_is_cast_from_where_it_was():
 def test_a_nodding_mount_looks_down_where_its_angle_is_positive():
     motion, nods = MotionHistory(), NodHistory()
     for k in range(4):
-        motion.add(Pose(k * 20 * MS, np.zeros(3), rotations.IDENTITY, np.zeros(3), np.zeros(3)))
+        motion.add(
+            OdometrySample(k * 20 * MS, np.zeros(3), rotations.IDENTITY, np.zeros(3), np.zeros(3))
+        )
         nods.add(k * 20 * MS, 0.5 + 0.1 * k, 5.0)
     maker = RayMaker([0.0, 0.0, 0.0], Beams())
     made = maker.rays(scan(0, np.full(3, 2.0), 0.0, 0.0, 0.04), motion, nods)
@@ -104,7 +110,9 @@ def test_a_nodding_mount_looks_down_where_its_angle_is_positive():
 def test_ranges_that_are_none():
     motion = MotionHistory()
     for k in range(3):
-        motion.add(Pose(k * 20 * MS, np.zeros(3), rotations.IDENTITY, np.zeros(3), np.zeros(3)))
+        motion.add(
+            OdometrySample(k * 20 * MS, np.zeros(3), rotations.IDENTITY, np.zeros(3), np.zeros(3))
+        )
     ranges = [np.nan, -np.inf, 0.1, 3.0, np.inf, 20.0, 0.0, -1.0]
     made = RayMaker([0.0] * 3, Beams()).rays(scan(0, ranges), motion, None)
     np.testing.assert_array_equal(made.hits, [True, False, False])
@@ -116,7 +124,9 @@ def test_motion_that_cannot_be_used_is_left_out():
     motion = MotionHistory()
 
     def pose(t, x):
-        return Pose(t, np.array([x, 0.0, 0.0]), rotations.IDENTITY, np.zeros(3), np.zeros(3))
+        return OdometrySample(
+            t, np.array([x, 0.0, 0.0]), rotations.IDENTITY, np.zeros(3), np.zeros(3)
+        )
 
     assert motion.at(0) is None
     assert motion.add(pose(S, 1.0))

@@ -8,7 +8,7 @@ from node_bench import NodeBench
 from volery.autonomy.avoidance.gap_following import GapFollowing
 from volery.autonomy.mapping.mapping_node import Mapping
 from volery.autonomy.mapping.merging_node import MapMerging
-from volery.autonomy.planning.exploration_node import Exploring
+from volery.autonomy.planning.exploration_node import Exploration
 from volery.autonomy.planning.global_planner import GlobalPlanner
 from volery.autonomy.planning.local_planner import LocalPlanner
 from volery.autonomy.planning.trajectory_follower import TrajectoryFollower
@@ -50,7 +50,7 @@ def test_lists_of_another_length_or_not_finite_are_refused(node, name, value):
         (LocalPlanner, "scan_rate_hz separation_m period_s"),
         (GapFollowing, "height_m speed_m_s safe_radius_m deceleration_m_s2"),
         (GlobalPlanner, "height_m radius_m iterations cell_m"),
-        (Exploring, "view_m cell_m"),
+        (Exploration, "view_m cell_m"),
         (TrajectoryFollower, "gain lead_s"),
         (Mapping, "resolution_m reach_m every scan_rate_hz extent_m max_nodes half_height_m"),
         (Mapping, "grid_cell_m voxels_period_s grid_period_s"),

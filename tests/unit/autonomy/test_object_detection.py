@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.search.colour_blob import ColourRange, colour_mask, largest_blob, pixels_of
 from volery.autonomy.search.ground_view import GroundView, Intrinsics, pose_at
 from volery.core import rotations
@@ -107,7 +107,7 @@ def seen_at(pose, place):
 @given(metre, metre, st.floats(4.0, 40.0), angle, angle, st.floats(-3.0, 3.0), angle, angle)
 def test_a_place_on_the_ground_is_found_from_its_pixel(x, y, z, roll, pitch, yaw, dx, dy):
     attitude = rotations.from_rpy(roll, pitch, yaw)
-    pose = Pose(0, np.array([x, y, z]), attitude, np.zeros(3), np.zeros(3))
+    pose = OdometrySample(0, np.array([x, y, z]), attitude, np.zeros(3), np.zeros(3))
     place = np.array([x + dx * z, y + dy * z, 0.5])
     view = GroundView(LENS, MOUNT, MOUNT_RPY_DEG)
     u, v = seen_at(pose, place)
@@ -120,7 +120,7 @@ def test_a_place_on_the_ground_is_found_from_its_pixel(x, y, z, roll, pitch, yaw
 def test_the_error_by_height_is_as_stated(off_axis, height):
     """A part dz above the plane is placed dz tan(angle) too far."""
     eye = np.array([0.0, 0.0, 10.0])
-    pose = Pose(0, eye, np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(3), np.zeros(3))
+    pose = OdometrySample(0, eye, np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(3), np.zeros(3))
     view = GroundView(LENS, [0.0, 0.0, 0.0], [0.0, 90.0, 0.0])
     part = np.array([(10.0 - height) * np.tan(off_axis), 0.0, height])
     u, v, _ = view.disc_of(part, 0.1, pose)
@@ -130,7 +130,9 @@ def test_the_error_by_height_is_as_stated(off_axis, height):
 
 def test_flat_rays_and_eyes_below_the_plane_find_nothing():
     view = GroundView(LENS, [0.0, 0.0, 0.0], [0.0, 0.0, 0.0])  # looks at the horizon
-    level = Pose(0, np.array([0.0, 0.0, 9.0]), np.array([0, 0, 0, 1.0]), np.zeros(3), np.zeros(3))
+    level = OdometrySample(
+        0, np.array([0.0, 0.0, 9.0]), np.array([0, 0, 0, 1.0]), np.zeros(3), np.zeros(3)
+    )
     assert view.place_of(160.0, 118.0, level, 0.0) is None
     assert view.place_of(160.0, 140.0, level, 0.0) is None
     assert view.place_of(160.0, 239.0, level, 0.0) is not None
@@ -139,7 +141,7 @@ def test_flat_rays_and_eyes_below_the_plane_find_nothing():
 
 
 def test_a_pose_is_carried_on_to_the_picture():
-    turning = Pose(
+    turning = OdometrySample(
         0,
         np.array([1.0, 2.0, 3.0]),
         np.array([0.0, 0.0, 0.0, 1.0]),

@@ -16,8 +16,8 @@ from volery.autonomy.mapping.octomap_stream import (
     decode_full,
 )
 from volery.autonomy.mapping.octree import Octree, new_tree
-from volery.autonomy.mapping.projected_grid import UNKNOWN, LevelGrid, Slab, occupancy
-from volery.autonomy.perception.motion_history import Placement
+from volery.autonomy.mapping.projected_grid import UNKNOWN, HeightSlab, ProjectedGrid, occupancy
+from volery.autonomy.perception.motion_history import Pose
 from volery.autonomy.perception.scan_rays import Rays
 from volery.core import rotations
 from volery.core.errors import DataFileError, PlanError
@@ -224,7 +224,7 @@ def test_equal_cells_are_joined():
 def test_maps_are_moved_and_the_majority_counts():
     wall = {(5, y, 0): True for y in range(4)} | {(4, y, 0): False for y in range(4)}
     shifted = {(x - 10, y, z): occupied for (x, y, z), occupied in wall.items()}
-    beside = Placement(np.array([2.0, 0.0, 0.0]), rotations.IDENTITY)
+    beside = Pose(np.array([2.0, 0.0, 0.0]), rotations.IDENTITY)
     wrong = dict.fromkeys(wall, True)
     data = merged(
         [
@@ -240,7 +240,7 @@ def test_maps_are_moved_and_the_majority_counts():
 
 def test_a_turned_map_has_no_holes():
     block = {(x, y, z): True for x in range(12) for y in range(12) for z in range(4)}
-    turn = Placement(np.array([0.03, -0.05, 0.0]), rotations.from_rpy(0.0, 0.0, 0.5))
+    turn = Pose(np.array([0.03, -0.05, 0.0]), rotations.from_rpy(0.0, 0.0, 0.5))
     cells = plain_decode(merged([PlacedMap(voxels_of_cells(block), turn)], 0.2, 1000))
     back = rotations.from_rpy(0.0, 0.0, -0.5)
     for x, y, z in np.ndindex(30, 30, 4):
@@ -254,7 +254,7 @@ def test_what_is_too_large_to_merge_is_refused():
     cells = {(x, 0, 0): True for x in range(20)}
     with pytest.raises(PlanError, match="at most 10 are merged"):
         merged([PlacedMap(voxels_of_cells(cells))], 0.2, 10)
-    far = Placement(np.array([1e6, 0.0, 0.0]), rotations.IDENTITY)
+    far = Pose(np.array([1e6, 0.0, 0.0]), rotations.IDENTITY)
     with pytest.raises(PlanError, match="beyond"):
         merged([PlacedMap(voxels_of_cells(cells), far)], 0.2, 100)
     assert merged([], 0.2, 10).size == 0
@@ -262,11 +262,11 @@ def test_what_is_too_large_to_merge_is_refused():
 
 # ------------------------------------------------------------------------------------------ grid
 
-FLAT = Slab(0.0, np.zeros(2), 0.6)
+FLAT = HeightSlab(0.0, np.zeros(2), 0.6)
 
 
 def test_the_grid_shows_walls_and_what_is_free_before_them():
-    grid = LevelGrid(0.4, 40.0)
+    grid = ProjectedGrid(0.4, 40.0)
     grid.begin_at(np.array([0.1, 0.1]))
     angles = np.linspace(-0.5, 0.5, 200)
     ends = np.stack([np.full(200, 5.0), 5.0 * np.tan(angles), np.zeros(200)], -1)
@@ -282,7 +282,7 @@ def test_the_grid_shows_walls_and_what_is_free_before_them():
 
 
 def test_a_thin_trunk_stays_among_rays_that_pass_it():
-    grid = LevelGrid(0.4, 40.0)
+    grid = ProjectedGrid(0.4, 40.0)
     grid.begin_at(np.zeros(2))
     ends = np.stack([np.full(41, 8.0), np.linspace(-1.0, 1.0, 41), np.zeros(41)], -1)
     ends[20, 0] = 4.1  # one beam of 41 meets it
@@ -296,7 +296,7 @@ def test_a_thin_trunk_stays_among_rays_that_pass_it():
 
 
 def test_what_is_off_the_slab_or_the_grid_is_left_out():
-    grid = LevelGrid(0.4, 20.0)
+    grid = ProjectedGrid(0.4, 20.0)
     grid.begin_at(np.zeros(2))
     grid.add(rays_to([[4.0, 0.0, 3.0], [0.0, 30.0, 0.0]]), FLAT)
     assert not (grid.score > 0).any()

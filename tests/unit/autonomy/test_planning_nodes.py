@@ -12,11 +12,11 @@ from volery.autonomy.mapping.merging import PlacedMap, merged
 from volery.autonomy.mapping.messages import grid_values_message, octomap_message
 from volery.autonomy.mapping.octomap_stream import Voxels
 from volery.autonomy.perception.map_frame import MapFrame
-from volery.autonomy.planning.exploration_node import POLYGON, Exploring
+from volery.autonomy.planning.exploration_node import POLYGON, Exploration
 from volery.autonomy.planning.global_planner import GlobalPlanner
 from volery.autonomy.planning.local_planner import LocalPlanner
 from volery.autonomy.planning.neighbours import Neighbours
-from volery.autonomy.planning.primitives import Path, State
+from volery.autonomy.planning.primitives import PrimitivePath, PrimitiveState
 from volery.autonomy.planning.trajectory_follower import TrajectoryFollower
 from volery.autonomy.planning.trajectory_messages import samples_of, trajectory_message
 from volery.graph.codecs.zero import zero_message
@@ -194,8 +194,10 @@ def test_reports_that_are_late_repeated_or_no_numbers_move_no_teammate():
 
 
 def plan_message(begins_ns, velocity=(1.0, 0.0, 0.0), frame="uav1/odom"):
-    start = State(np.array([0.0, 0.0, HEIGHT]), np.array(velocity), np.zeros(3))
-    return trajectory_message(Path(start, np.array(velocity), 0.5, 1.0, 1.0), 0.3, frame, begins_ns)
+    start = PrimitiveState(np.array([0.0, 0.0, HEIGHT]), np.array(velocity), np.zeros(3))
+    return trajectory_message(
+        PrimitivePath(start, np.array(velocity), 0.5, 1.0, 1.0), 0.3, frame, begins_ns
+    )
 
 
 def follower():
@@ -205,8 +207,8 @@ def follower():
 
 
 def test_samples_are_the_plan():
-    start = State(np.zeros(3), np.array([1.0, 0.5, 0.0]), np.zeros(3))
-    plan = Path(start, np.array([2.0, 0.0, 0.3]), 0.9, 0.6, 1.3)
+    start = PrimitiveState(np.zeros(3), np.array([1.0, 0.5, 0.0]), np.zeros(3))
+    plan = PrimitivePath(start, np.array([2.0, 0.0, 0.3]), 0.9, 0.6, 1.3)
     samples = samples_of(trajectory_message(plan, -2.5, "uav1/odom", S))
     assert samples.yaw == pytest.approx(-2.5)
     for t in np.linspace(0.0, 4.0, 41):
@@ -334,7 +336,7 @@ def polygon(*corners, frame="map"):
 
 def exploring():
     bench = NodeBench()
-    bench.start(Exploring, odometry="odom", corrected=False, view_m=8.0)
+    bench.start(Exploration, odometry="odom", corrected=False, view_m=8.0)
     goals, status = bench.listen("/uav1/planning/goal"), bench.listen("/uav1/exploration/status")
     grid = grid_values_message(np.zeros((100, 150), np.int8), 0.4, (-5.0, -5.0, 0.0), "map", 0)
     bench.send("/uav1/projected_map", grid)
@@ -395,7 +397,9 @@ def test_a_uav_that_gets_nowhere_is_blocked_in_the_end():
     assert "cannot be reached" in state["reason"]
 
 
-@pytest.mark.parametrize("node_class", [LocalPlanner, GlobalPlanner, Exploring, TrajectoryFollower])
+@pytest.mark.parametrize(
+    "node_class", [LocalPlanner, GlobalPlanner, Exploration, TrajectoryFollower]
+)
 def test_states_go_back(node_class):
     """A twin that takes over a state says from then on what the first one says."""
     said = []

@@ -9,16 +9,28 @@ from hypothesis import strategies as st
 
 from volery.autonomy.perception.scan_rays import Rays
 from volery.autonomy.planning.clearance import clearance_of
-from volery.autonomy.planning.cost_to_go import Prices, cost_to_go
+from volery.autonomy.planning.cost_to_go import CellCosts, cost_to_go
 from volery.autonomy.planning.distances import squared_distances
 from volery.autonomy.planning.local_grid import UNKNOWN, LocalGrid
-from volery.autonomy.planning.path_lookahead import WayAhead
+from volery.autonomy.planning.path_lookahead import PathLookahead
 from volery.autonomy.planning.primitive_selection import judge
-from volery.autonomy.planning.primitives import Limits, Path, State, braking, changed, fan
-from volery.autonomy.planning.receding_horizon import Doing, LocalPlanning, Policy, Sight
+from volery.autonomy.planning.primitives import (
+    MotionLimits,
+    PrimitivePath,
+    PrimitiveState,
+    braking,
+    changed,
+    fan,
+)
+from volery.autonomy.planning.receding_horizon import (
+    Observations,
+    PlannerSettings,
+    PlannerState,
+    RecedingHorizonPlanner,
+)
 from volery.autonomy.planning.surface import Surface
 
-LIMITS = Limits(3.0, 2.5, 1.5, 1.5, 1.4)
+LIMITS = MotionLimits(3.0, 2.5, 1.5, 1.5, 1.4)
 CELL = 0.25
 LEVEL = Surface(0.0, np.zeros(2))
 OFFSETS = np.array([0.0, 0.75, -0.75])
@@ -52,7 +64,7 @@ def window(occupied=nothing, known=everywhere, shape=(96, 96, 24)):
 
 def sight(*world, planes=()):
     scores, low = window(*world)
-    return Sight(clearance_of(scores, low, CELL, 3), LEVEL, list(planes))
+    return Observations(clearance_of(scores, low, CELL, 3), LEVEL, list(planes))
 
 
 # ------------------------------------------------------------------------------------ primitives
@@ -60,7 +72,7 @@ def sight(*world, planes=()):
 
 @given(vectors, vectors, vectors, st.floats(0.3, 3.0))
 def test_a_change_of_velocity_begins_and_ends_as_told(velocity, acceleration, wanted, seconds):
-    start = State(np.zeros(3), velocity, acceleration)
+    start = PrimitiveState(np.zeros(3), velocity, acceleration)
     first, last = changed(start, wanted, seconds, 0.0), changed(start, wanted, seconds, seconds)
     np.testing.assert_allclose(first.velocity, velocity, atol=1e-9)
     np.testing.assert_allclose(first.acceleration, acceleration, atol=1e-9)
@@ -79,7 +91,7 @@ def test_a_change_of_velocity_begins_and_ends_as_told(velocity, acceleration, wa
 
 @given(vectors)
 def test_braking_from_steady_flight_keeps_the_limits_and_ends_at_rest(velocity):
-    path = braking(State(np.zeros(3), velocity, np.zeros(3)), LIMITS)
+    path = braking(PrimitiveState(np.zeros(3), velocity, np.zeros(3)), LIMITS)
     times = np.linspace(0.0, path.duration_s, 60)
     bends = np.array([path.at(t).acceleration for t in times])
     assert np.hypot(bends[:, 0], bends[:, 1]).max() <= LIMITS.acceleration * 1.001
@@ -90,8 +102,8 @@ def test_braking_from_steady_flight_keeps_the_limits_and_ends_at_rest(velocity):
 
 
 def test_paths_are_smooth_where_their_parts_meet():
-    path = Path(
-        State(np.zeros(3), np.array([1.0, 0, 0]), np.zeros(3)),
+    path = PrimitivePath(
+        PrimitiveState(np.zeros(3), np.array([1.0, 0, 0]), np.zeros(3)),
         np.array([2.0, 1, 0.5]),
         0.8,
         0.7,
@@ -173,7 +185,7 @@ def test_rays_visit_the_cells_of_fine_sampling(end, start, dx, dy):
 def test_the_guidance_goes_around_a_wall_and_knows_what_is_out_of_reach():
     wall = lambda x, y: (abs(x - 3.0) < 0.3) & (y > -5.0)  # noqa: E731
     costs = cost_to_go(
-        sight(wall).clearance, LEVEL, OFFSETS, np.array([7.0, 0.0]), Prices(0.6, 1.6)
+        sight(wall).clearance, LEVEL, OFFSETS, np.array([7.0, 0.0]), CellCosts(0.6, 1.6)
     )
     assert costs.at(np.zeros(2)) > math.hypot(3.0, 5.0) + math.hypot(4.0, 5.0)
     assert costs.at(np.array([6.0, 0.0])) < 4.0
@@ -187,7 +199,7 @@ def test_the_guidance_goes_around_a_wall_and_knows_what_is_out_of_reach():
     assert np.hypot(*(here - [7.0, 0.0])) < 3.0
     closed = lambda x, y: abs(np.maximum(abs(x - 7.0), abs(y)) - 2.3) < 0.3  # noqa: E731
     costs = cost_to_go(
-        sight(closed).clearance, LEVEL, OFFSETS, np.array([7.0, 0.0]), Prices(0.6, 1.6)
+        sight(closed).clearance, LEVEL, OFFSETS, np.array([7.0, 0.0]), CellCosts(0.6, 1.6)
     )
     assert costs.at(np.array([6.5, 0.0])) < 2.0
 
@@ -195,8 +207,8 @@ def test_the_guidance_goes_around_a_wall_and_knows_what_is_out_of_reach():
 def test_candidates_are_judged_as_plain_sampling_would():
     trunk = lambda x, y: np.hypot(x - 3.0, y - 0.5) < 0.3  # noqa: E731
     seen = sight(trunk, lambda x, y: x < 5.0)
-    costs = cost_to_go(seen.clearance, LEVEL, OFFSETS, np.array([8.0, 0.0]), Prices(0.6, 1.6))
-    start = State(np.zeros(3), np.array([1.0, 0.5, 0.0]), np.array([0.3, -0.2, 0.1]))
+    costs = cost_to_go(seen.clearance, LEVEL, OFFSETS, np.array([8.0, 0.0]), CellCosts(0.6, 1.6))
+    start = PrimitiveState(np.zeros(3), np.array([1.0, 0.5, 0.0]), np.array([0.3, -0.2, 0.1]))
     directions, speeds = np.linspace(-3.0, 3.0, 9), np.array([0.5, 1.5, 3.0])
     candidates = fan(start, directions, speeds, OFFSETS, np.zeros((9, 3, 3)), LIMITS)
     verdicts = judge(candidates, seen.clearance, costs, 1.6, 3.0)
@@ -216,8 +228,8 @@ def test_candidates_are_judged_as_plain_sampling_would():
 
 def fly(world, goal, seconds, planning=None, start=(0.0, 0.0, 0.0)):
     """Fly plans perfectly in a world that is all in sight; states every 0.1 s."""
-    planning = planning or LocalPlanning(Policy(LIMITS))
-    now, state = 0, State(np.array(start), np.zeros(3), np.zeros(3))
+    planning = planning or RecedingHorizonPlanner(PlannerSettings(LIMITS))
+    now, state = 0, PrimitiveState(np.array(start), np.zeros(3), np.zeros(3))
     track, seen = [state], sight(*world)
     for _ in range(round(seconds / 0.2)):
         then = now + 100_000_000
@@ -247,7 +259,7 @@ def test_it_stops_before_what_is_not_known():
     _, track = fly(world, (10.0, 0.0), 6.0)
     assert 2.0 < track[-1].position[0] < 4.0
     assert np.linalg.norm(track[-1].velocity) < 0.3
-    bold = LocalPlanning(Policy(LIMITS, unknown_stops=False))
+    bold = RecedingHorizonPlanner(PlannerSettings(LIMITS, unknown_stops=False))
     _, track = fly(world, (10.0, 0.0), 4.0, bold)
     assert track[-1].position[0] > 4.0
 
@@ -265,7 +277,7 @@ def test_whenever_plans_cease_it_comes_to_rest_in_known_free_space(seed):
     seen = sight(*world).clearance
     times = planning.began_ns + (np.arange(0.0, 8.0, 0.05) * 1e9).astype(np.int64)
     places = np.array([planning.state_at(int(t)).position for t in times])
-    least = Policy(LIMITS).radius_m
+    least = PlannerSettings(LIMITS).radius_m
     assert seen.at(places).min() >= min(least, float(seen.at(places[:1])[0]))
     assert (np.hypot(*places[:, :2].T) < hidden + CELL).all()
     np.testing.assert_allclose(planning.state_at(int(times[-1])).velocity, 0.0, atol=1e-6)
@@ -288,31 +300,31 @@ def test_shut_in_it_stays_and_says_so():
     world = (lambda x, y: abs(np.hypot(x, y) - 1.3) < 0.3,)
     planning, track = fly(world, (8.0, 0.0), 3.0)
     assert np.linalg.norm(track[-1].position) < 0.6
-    assert planning.doing in (Doing.BLOCKED, Doing.TURNING)
+    assert planning.doing in (PlannerState.BLOCKED, PlannerState.TURNING)
 
 
 def test_far_from_its_plan_it_begins_anew_from_where_it_is():
     planning, _ = fly((nothing,), (9.0, 0.0), 2.0)
-    pushed = State(np.array([0.0, 5.0, 0.0]), np.array([0.0, 1.0, 0.0]), np.zeros(3))
+    pushed = PrimitiveState(np.array([0.0, 5.0, 0.0]), np.array([0.0, 1.0, 0.0]), np.zeros(3))
     begin = planning.start(pushed, 0.0, 2_000_000_000, 2_100_000_000)
     np.testing.assert_allclose(begin.position, [0.0, 5.1, 0.0], atol=0.02)
 
 
 def test_state_goes_back():
     planning, _ = fly((nothing,), (9.0, 0.0), 1.0)
-    other = LocalPlanning(planning.policy)
+    other = RecedingHorizonPlanner(planning.policy)
     other.set_state(planning.get_state())
     for a, b in zip(planning.state_at(1_300_000_000), other.state_at(1_300_000_000), strict=True):
         np.testing.assert_array_equal(a, b)
 
 
 def test_the_carrot_goes_ahead_along_the_way_and_not_back():
-    way = WayAhead(np.array([[0.0, 0, 0], [10.0, 0, 0], [10.0, 10, 0]]))
+    way = PathLookahead(np.array([[0.0, 0, 0], [10.0, 0, 0], [10.0, 10, 0]]))
     np.testing.assert_allclose(way.carrot(np.array([2.0, 1.0]), 9.0), [10.0, 1.0], atol=0.3)
     assert way.left_m(np.array([2.0, 0.0])) == pytest.approx(18.0, abs=0.3)
     way.carrot(np.array([9.0, 6.0]), 3.0)
     np.testing.assert_allclose(way.carrot(np.array([9.0, 6.0]), 9.0), [10.0, 10.0], atol=0.3)
     np.testing.assert_allclose(way.carrot(np.array([2.0, 0.0]), 0.0)[0], 10.0)
-    one = WayAhead(np.array([[3.0, 4.0, 0.0]]))
+    one = PathLookahead(np.array([[3.0, 4.0, 0.0]]))
     np.testing.assert_allclose(one.carrot(np.zeros(2), 9.0), [3.0, 4.0])
     assert one.left_m(np.zeros(2)) == pytest.approx(5.0)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from volery.autonomy.slam.keyframe_graph import Way
+from volery.autonomy.slam.keyframe_graph import KeyframeGraph
 from volery.autonomy.slam.keyframes import Keyframe
-from volery.autonomy.slam.loop_closure import Closure
-from volery.autonomy.slam.pose_graph import Edge
-from volery.autonomy.slam.relocalization import Guess, chosen
-from volery.autonomy.slam.settings import Matching
+from volery.autonomy.slam.loop_closure import LoopClosure
+from volery.autonomy.slam.pose_graph import PoseGraphEdge
+from volery.autonomy.slam.relocalization import PlaceHypothesis, chosen
+from volery.autonomy.slam.settings import ScanMatching
 from volery.autonomy.slam.tracker import Tracker
 
 S = 1_000_000_000
@@ -37,8 +37,8 @@ class Guesser:
     def find(self, _frames, _poses, newest, older, _reach):
         if older not in self.steps:
             return None
-        edge = Edge(older, newest, np.array(self.steps[older]), np.ones(4), True)
-        return Closure(edge, 0.2, 100.0, self.margin)
+        edge = PoseGraphEdge(older, newest, np.array(self.steps[older]), np.ones(4), True)
+        return LoopClosure(edge, 0.2, 100.0, self.margin)
 
 
 def keyframe(number, session=0):
@@ -48,7 +48,7 @@ def keyframe(number, session=0):
 
 def flown(count):
     """A way of so many keyframes, and what finds places in it again."""
-    way = Way(Matching(), np.zeros(4), has_loops=False)
+    way = KeyframeGraph(ScanMatching(), np.zeros(4), has_loops=False)
     way.frames = [keyframe(k) for k in range(count)]
     way.poses = [np.zeros(4) for _ in range(count)]
     way._closer = Closer()
@@ -97,8 +97,8 @@ def test_keyframes_of_a_session_that_was_never_placed_are_not_tried():
 
 def guess(older, x, margin, newer=26):
     """A guess that the keyframe `newer` lies at (x, 0, 0)."""
-    edge = Edge(older, newer, np.array([x - 7.0 * older, 0.0, 0.0, 0.0]), np.ones(4), True)
-    return Guess(edge, margin, np.array([x, 0.0, 0.0, 0.0]))
+    edge = PoseGraphEdge(older, newer, np.array([x - 7.0 * older, 0.0, 0.0, 0.0]), np.ones(4), True)
+    return PlaceHypothesis(edge, margin, np.array([x, 0.0, 0.0, 0.0]))
 
 
 @pytest.mark.parametrize(

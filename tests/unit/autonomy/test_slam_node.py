@@ -20,7 +20,7 @@ from slam_bench import (
     yaw_of,
 )  # fmt: skip
 
-from volery.autonomy.slam.health import Health
+from volery.autonomy.slam.health import SlamHealth
 from volery.autonomy.slam.match import Match
 from volery.autonomy.slam.slam_node import Slam
 from volery.core.errors import NodeError
@@ -329,7 +329,7 @@ def test_new_maps_in_flight_leave_the_velocity_right(flown):
 def test_much_that_is_new_is_no_loss_and_nothing_as_it_was_is_one(flown, share, lost):
     """0.6 of the returns are usually met; `share` of them for two seconds."""
     told = Listening().hear([row for row in flown if row[0] <= 7 * S])
-    tracker, health = told.node._tracker, Health(("IMU",), told.bench.now_ns)
+    tracker, health = told.node._tracker, SlamHealth(("IMU",), told.bench.now_ns)
     found = []
     for _ in range(5):
         tracker._imu = (tracker.time_ns + S // 2, *tracker._imu[1:])

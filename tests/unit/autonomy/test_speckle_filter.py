@@ -4,7 +4,7 @@ import copy
 
 import numpy as np
 
-from volery.autonomy.perception.speckle_filter import LoneReturns
+from volery.autonomy.perception.speckle_filter import SpeckleFilter
 from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import LaserScan
 
@@ -31,11 +31,11 @@ def empty(beams=40, **returns):
 def test_a_single_drop_is_left_out_and_a_wall_stays():
     ranges = np.where(np.arange(40) < 20, 5.0 + 0.05 * np.arange(40), INF)
     ranges[10], ranges[30] = 3.0, 4.0
-    assert kept(LoneReturns(), ranges) == [k for k in range(20) if k != 10]
+    assert kept(SpeckleFilter(), ranges) == [k for k in range(20) if k != 10]
 
 
 def test_a_thin_thing_is_confirmed_by_the_next_scan():
-    echoes = LoneReturns()
+    echoes = SpeckleFilter()
     assert kept(echoes, empty(b10=6.0)) == []
     assert kept(echoes, empty(b12=6.1)) == [12]  # turned by two beams, nearer by 10 cm
     assert kept(echoes, empty(b15=6.0)) == []  # too far aside
@@ -46,17 +46,17 @@ def test_a_thin_thing_is_confirmed_by_the_next_scan():
 
 def test_close_by_more_is_needed():
     """Two drops near each other are no twig; three beams, or the same again, are."""
-    assert kept(LoneReturns(), empty(b10=1.0, b11=1.05)) == []
-    echoes = LoneReturns()
+    assert kept(SpeckleFilter(), empty(b10=1.0, b11=1.05)) == []
+    echoes = SpeckleFilter()
     twig = empty(b10=1.0, b11=1.02)
     assert kept(echoes, twig) == []
     assert kept(echoes, twig) == [10, 11]
-    assert kept(LoneReturns(), empty(b10=1.0, b11=1.0, b12=1.0, b13=1.0)) == [11, 12]
+    assert kept(SpeckleFilter(), empty(b10=1.0, b11=1.0, b12=1.0, b13=1.0)) == [11, 12]
 
 
 def test_rows_do_not_wrap_around_and_lengths_may_change():
-    assert kept(LoneReturns(), empty(b0=5.0, b39=5.0)) == []
-    echoes = LoneReturns()
+    assert kept(SpeckleFilter(), empty(b0=5.0, b39=5.0)) == []
+    echoes = SpeckleFilter()
     assert kept(echoes, empty(b5=5.0)) == []
     assert kept(echoes, empty(50, b5=5.0)) == []
     assert kept(echoes, []) == []
@@ -65,7 +65,7 @@ def test_rows_do_not_wrap_around_and_lengths_may_change():
 def test_nan_stays_nothing_and_the_message_untouched():
     ranges = np.array([np.nan, 5.0, 5.0, np.nan, -INF, INF], np.float32)
     scan = scan_of(ranges)
-    found = LoneReturns().left_out(scan).ranges
+    found = SpeckleFilter().left_out(scan).ranges
     assert found.tolist() == [INF, 5.0, 5.0, INF, INF, INF]
     np.testing.assert_array_equal(scan.ranges, ranges)
     assert isinstance(scan, LaserScan)
@@ -77,7 +77,7 @@ def test_scarce_particles_hardly_pass_and_a_copy_goes_on_alike():
     scans = [
         np.where(rng.random(1081) < 0.01, rng.uniform(2.0, 12.0, 1081), INF) for _ in range(200)
     ]
-    echoes = LoneReturns()
+    echoes = SpeckleFilter()
     passed = [len(kept(echoes, ranges)) for ranges in scans[:100]]
     twin = copy.deepcopy(echoes)
     rest = [kept(echoes, ranges) for ranges in scans[100:]]

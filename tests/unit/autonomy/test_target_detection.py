@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from team_bench import Clockwork, S
 
-from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.search.ground_view import GroundView, Intrinsics
-from volery.autonomy.team.observations import Doubt, Tracks, sighting_of
+from volery.autonomy.team.observations import PositionUncertainty, Tracks, sighting_of
 from volery.autonomy.team.target_detection import TargetDetection
 from volery.core import rotations
 from volery.graph.codecs.zero import zero_message
@@ -28,10 +28,10 @@ from volery.graph.messages import (
     Vector3,
     header,
 )
-from volery.graph.messages import Pose as PoseMessage
+from volery.graph.messages import OdometrySample as PoseMessage
 from volery.graph.nodes.node import Context
 
-EXACT = Doubt(0.03, 0.0, 0.0)
+EXACT = PositionUncertainty(0.03, 0.0, 0.0)
 
 
 def test_a_ray_is_surer_across_than_along() -> None:
@@ -42,7 +42,9 @@ def test_a_ray_is_surer_across_than_along() -> None:
     moved = h / math.tan(a - 1e-6) - r
     assert math.sqrt(seen.covariance[1, 1]) == pytest.approx(moved / 1e-6 * 0.03, rel=1e-4)
     assert math.sqrt(seen.covariance[0, 0]) == pytest.approx(8.0 * 0.03)
-    sloped = sighting_of(0, np.array([0.0, 0.0, 3.0]), np.array([0.0, 8.0, 0.5]), Doubt(0.0, 0.1))
+    sloped = sighting_of(
+        0, np.array([0.0, 0.0, 3.0]), np.array([0.0, 8.0, 0.5]), PositionUncertainty(0.0, 0.1)
+    )
     assert math.sqrt(sloped.covariance[1, 1]) == pytest.approx(
         math.hypot(0.1 * 8.0 * 8.0 / 2.5, 0.2)
     )
@@ -143,7 +145,7 @@ class Onlooker:
         self.say("range", below)
         picture = np.full((120, 160, 3), (60, 90, 50), np.uint8)
         view = GroundView(K, MOUNT["mount_m"], MOUNT["mount_rpy_deg"])
-        still_pose = Pose(now, place, attitude, np.zeros(3), np.zeros(3))
+        still_pose = OdometrySample(now, place, attitude, np.zeros(3), np.zeros(3))
         disc = view.disc_of(thing, 0.5, still_pose)
         if disc is not None:
             v, u = np.mgrid[:120, :160]

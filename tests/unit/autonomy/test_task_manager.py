@@ -15,10 +15,10 @@ from team_bench import AREA, TeamBench
 
 from volery.autonomy.perception.map_frame import UNKNOWN_PLACE
 from volery.autonomy.search.search_positions import Area
-from volery.autonomy.team.assignment import Claim, Worker, assign, must_yield
+from volery.autonomy.team.assignment import SectorClaim, Worker, assign, must_yield
 from volery.autonomy.team.mission_messages import goal_at
 from volery.autonomy.team.sectors import Coverage, Sectors, from_bits, to_bits
-from volery.autonomy.team.target_list import Find, TargetList
+from volery.autonomy.team.target_list import Detection, TargetList
 from volery.core.errors import GraphError
 from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import String, TFMessage, header, message_type
@@ -88,14 +88,14 @@ def test_sectors_of_others_and_those_given_up_are_left() -> None:
 
 def test_the_earlier_claim_counts_and_then_the_name() -> None:
     others = {"uav1": worker(0, 0, 4, 100), "uav3": worker(0, 0, 4, 90)}
-    assert must_yield(Claim(95, "uav2"), 4, others)
-    assert not must_yield(Claim(90, "uav2"), 4, others)
-    assert must_yield(Claim(100, "uav2"), 4, {"uav1": worker(0, 0, 4, 100)})
-    assert not must_yield(Claim(100, "uav2"), 5, others)
+    assert must_yield(SectorClaim(95, "uav2"), 4, others)
+    assert not must_yield(SectorClaim(90, "uav2"), 4, others)
+    assert must_yield(SectorClaim(100, "uav2"), 4, {"uav1": worker(0, 0, 4, 100)})
+    assert not must_yield(SectorClaim(100, "uav2"), 5, others)
 
 
-def find(finder: str, number: int, x: float, stamp: int = 1, variance: float = 1.0) -> Find:
-    return Find(finder, number, stamp, (x, 0.0, 0.5), (variance, 0.0, 0.0, variance), 5)
+def find(finder: str, number: int, x: float, stamp: int = 1, variance: float = 1.0) -> Detection:
+    return Detection(finder, number, stamp, (x, 0.0, 0.5), (variance, 0.0, 0.0, variance), 5)
 
 
 def test_finds_of_one_thing_are_one_target() -> None:
@@ -107,7 +107,7 @@ def test_finds_of_one_thing_are_one_target() -> None:
     assert first.covariance[0] == pytest.approx(0.505)
     assert (first.finder, first.sightings, first.stamp_ns) == ("uav1", 10, 2)
     assert second.place[0] == 40.0
-    told = [Find.from_message(message) for message in found.to_tell(0)]
+    told = [Detection.from_message(message) for message in found.to_tell(0)]
     assert sorted(told) == sorted(found.finds.values())
 
 

@@ -6,13 +6,13 @@ import threading
 import numpy as np
 import pytest
 
-from volery.autonomy.planning.global_path import Search, plan_way
+from volery.autonomy.planning.global_path import PathSearch, plan_way
 from volery.autonomy.planning.search_area import SearchArea
 from volery.autonomy.planning.viewpoints import next_viewpoint
-from volery.autonomy.planning.voxel_space import Solid, VoxelSpace
+from volery.autonomy.planning.voxel_space import SolidVoxels, VoxelSpace
 from volery.core.errors import PlanError
 
-SEARCH = Search(radius_m=0.8, heights_m=(2.0, 4.0))
+SEARCH = PathSearch(radius_m=0.8, heights_m=(2.0, 4.0))
 
 
 def ground(x, y):
@@ -29,7 +29,7 @@ def solid(obstacles, reach=30.0):
         things[:, 2] += ground(things[:, 0], things[:, 1])
         middles.append(things)
     middle = np.concatenate(middles)
-    return Solid(middle, np.full(len(middle), 0.2))
+    return SolidVoxels(middle, np.full(len(middle), 0.2))
 
 
 WALL = ((-0.3, -20.0, 0.0), (0.3, 4.0, 6.0))

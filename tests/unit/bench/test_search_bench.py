@@ -20,13 +20,13 @@ def test_figures_leave_the_first_calls_out():
     )
 
 
-def test_calls_over_a_door_are_timed_in_both_processes(monkeypatch):
+def test_calls_over_a_bridge_are_timed_in_both_processes(monkeypatch):
     monkeypatch.setattr(search, "_START_S", 0.5)
     monkeypatch.setattr(search, "_CALLS", 10)
-    door = RosTcpEndpoint(port=0)
-    with search.flying() as doors:
-        doors.open(door)
-        took = search.exchange("ros_tcp", door.port)
+    bridge = RosTcpEndpoint(port=0)
+    with search.flying() as bridges:
+        bridges.open(bridge)
+        took = search.exchange("ros_tcp", bridge.port)
     assert len(took) == 30
     assert all(0 < one_way < round_trip for one_way, round_trip in took)
     assert statistics.median(round_trip for _, round_trip in took) < 1e9

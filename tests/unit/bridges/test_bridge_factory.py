@@ -156,7 +156,7 @@ def test_another_package_adds_a_bridge(package):
 
 def test_the_command_line_opens_it(package):
     package(group(beacon="beacon_bridge:KIND"))
-    words = ["run", "hover", "--seconds", "0.1", "--speed", "max", "--door", "beacon"]
+    words = ["run", "hover", "--seconds", "0.1", "--speed", "max", "--bridge", "beacon"]
     result = CliRunner().invoke(app, words)
     assert result.exit_code == 0, result.output
     assert "open    beacon 127.0.0.1:9999" in result.output

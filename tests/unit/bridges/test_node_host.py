@@ -7,7 +7,7 @@ import time
 import pytest
 from live_graph import LiveGraph
 
-from volery.bridges.nodes.deferred_connection import LateLink
+from volery.bridges.nodes.deferred_connection import DeferredConnection
 from volery.bridges.nodes.host import NodeHost
 from volery.core.errors import GraphError, NodeError
 from volery.graph.messages import Clock, String, Time, message_type
@@ -99,7 +99,7 @@ def test_nodes_that_are_there_before_their_graph(world):
         opened.append(world.gateway.open("node"))
         return opened[-1]
 
-    late = LateLink("node", open_link)
+    late = DeferredConnection("node", open_link)
     host = NodeHost(late)
     node = Parrot(context=host.context(), namespace="/uav1", parameter_overrides={"word": "hi"})
     lost = node.create_publisher(String, "lost", 10)
@@ -139,7 +139,7 @@ def test_who_calls_a_service_at_its_start_has_the_graph_joined(world):
             super().__init__(**options)
             self.answer = self.ask.call()
 
-    late = LateLink("node", lambda: world.gateway.open("node"))
+    late = DeferredConnection("node", lambda: world.gateway.open("node"))
     assert Asking(context=NodeHost(late).context(), namespace="/uav1").answer.message == "there"
     late.close()
 

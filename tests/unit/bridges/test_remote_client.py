@@ -6,7 +6,7 @@ import threading
 import pytest
 from ros_tcp_client import Loop, until
 
-from volery.bridges.bridge_host import Doors
+from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.ros_tcp.client import RosTcpClient
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.bridges.rosbridge.client import RosbridgeClient
@@ -35,7 +35,7 @@ def way(request):
 @pytest.fixture
 def loop():
     loop = Loop()
-    with Doors(loop.gateway) as loop.doors:
+    with BridgeHost(loop.gateway) as loop.bridges:
         yield loop
     loop.close()
 
@@ -44,7 +44,7 @@ def loop():
 def client(loop, way):
     serve, join = WAYS[way]
     server = serve(port=0)
-    loop.doors.open(server)
+    loop.bridges.open(server)
     client = join(server.port, name="planner")
     yield client
     client.close()

@@ -10,7 +10,7 @@ import pytest
 from volery.bridges.ros1 import environment as ros1_environment
 from volery.bridges.ros1.master import Ros1Master
 from volery.bridges.ros1.node import _check_master
-from volery.bridges.shared_names import Sharing
+from volery.bridges.shared_names import SharedNames
 from volery.core.errors import BridgeError, UnreachableError
 
 
@@ -55,7 +55,7 @@ def test_a_master_may_come_later():
 
 
 def test_which_topics_are_taken_from_ros1():
-    sharing = Sharing(("/uav*", "/clock", "/rosout"), ("*/cmd_vel",))
+    sharing = SharedNames(("/uav*", "/clock", "/rosout"), ("*/cmd_vel",))
     assert sharing.has("/uav1/odom")
     assert not sharing.has("/rosout")
     assert not sharing.has("/private")

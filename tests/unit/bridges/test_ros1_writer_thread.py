@@ -9,7 +9,7 @@ import threading
 
 import pytest
 
-from volery.bridges.ros1.writer_thread import Pump, Reader
+from volery.bridges.ros1.writer_thread import Reader, Ros1WriterThread
 
 
 class Connection:
@@ -114,7 +114,7 @@ def test_who_has_gone_is_given_up(pair, selector):
 
 def test_what_still_waits_goes_with_the_pump(pair):
     ours, _ = pair
-    pump = Pump()
+    pump = Ros1WriterThread()
     reader = pump.reader(Connection(ours))
     reader.send(b"x" * 1_000_000)
     pump.close()
@@ -132,7 +132,7 @@ def test_one_that_breaks_leaves_the_others_alone():
                 raise ValueError("oh")
             self.served.set()
 
-    pump, whole = Pump(), Topic("/whole")
+    pump, whole = Ros1WriterThread(), Topic("/whole")
     pump.waker(Topic("/broken"))()
     pump.waker(whole)()
     assert whole.served.wait(60.0)

@@ -1,4 +1,4 @@
-"""The ROS 2 door seen by another participant: nodes, parameters, actions, and what goes wrong."""
+"""The ROS 2 bridge seen by another participant: nodes, parameters, actions, and what goes wrong."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from live_graph import NOW_NS, LiveGraph
 from ros2_bench import DOMAIN, Other
 from ros_tcp_client import until
 
-from volery.bridges.bridge_host import Doors
-from volery.bridges.ros2.bridge import Ros2Door
+from volery.bridges.bridge_host import BridgeHost
+from volery.bridges.ros2.bridge import Ros2Bridge
 from volery.bridges.ros2.client import Ros2Client
 from volery.bridges.ros2.dds import library
 from volery.bridges.ros2.dds.discovery_info import TYPE as RECORD
@@ -25,10 +25,10 @@ from volery.bridges.ros2.dds.discovery_info import record_message
 from volery.bridges.ros2.dds.idl_types import message_struct, request_struct
 from volery.bridges.ros2.dds.qos import qos_of
 from volery.bridges.ros2.dds.service_peers import why_foreign
-from volery.bridges.ros2.environment import Ros2Terms, join_ros2
+from volery.bridges.ros2.environment import Ros2Environment, join_ros2
 from volery.bridges.ros2.middleware import Profile, ServiceSpec
 from volery.bridges.ros2.names import NodeName
-from volery.bridges.rosbridge.rosapi_bridge import WithRosApi
+from volery.bridges.rosbridge.rosapi_bridge import RosApiBridge
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.codecs.cdr import decode_cdr, encode_cdr
 from volery.graph.codecs.zero import zero_message
@@ -53,7 +53,7 @@ NODE = "/uav1/gap_following"
 
 
 class World(LiveGraph):
-    """A graph with all that a simulation has, and a door."""
+    """A graph with all that a simulation has, and a bridge."""
 
     def __init__(self):
         super().__init__()
@@ -66,15 +66,15 @@ class World(LiveGraph):
         self.graph.actions.offer("/simulate_steps", STEPS, self.goals.append)
         self.graph.offer("/broken", TRIGGER, self.break_down)
         self.do(lambda: self.graph.subscribe("/uav1/cmd_vel", self.commands.append, Twist))
-        self.doors = Doors(self.gateway)
-        self.door = Ros2Door(Ros2Terms(domain_id=DOMAIN))
-        self.doors.open(WithRosApi(self.door))
+        self.bridges = BridgeHost(self.gateway)
+        self.bridge = Ros2Bridge(Ros2Environment(domain_id=DOMAIN))
+        self.bridges.open(RosApiBridge(self.bridge))
 
     def break_down(self, _request):
         raise GraphError("no such luck")
 
     def close(self):
-        self.doors.close()
+        self.bridges.close()
         super().close()
 
 
@@ -136,11 +136,11 @@ def test_messages_are_made_into_bytes_only_while_somebody_listens(world, other):
     assert heard.get(timeout=60.0).data == "hello"
 
 
-def test_bytes_are_made_once_for_all_doors(world, other, monkeypatch):
-    second = Ros2Door(Ros2Terms(domain_id=DOMAIN + 1), "/twin")
-    doors = Doors(world.gateway)
-    doors.open(second)
-    there = Other(Ros2Terms(domain_id=DOMAIN + 1))
+def test_bytes_are_made_once_for_all_bridges(world, other, monkeypatch):
+    second = Ros2Bridge(Ros2Environment(domain_id=DOMAIN + 1), "/twin")
+    bridges = BridgeHost(world.gateway)
+    bridges.open(second)
+    there = Other(Ros2Environment(domain_id=DOMAIN + 1))
     try:
         image = world.graph.advertise("/once", STRING)
         heard = [one.hear("/once", STRING) for one in (other, there)]
@@ -153,7 +153,7 @@ def test_bytes_are_made_once_for_all_doors(world, other, monkeypatch):
         assert len([1 for message, _ in made if getattr(message, "data", "") == "once"]) == 1
     finally:
         there.close()
-        doors.close()
+        bridges.close()
 
 
 def test_best_effort_publishers_are_heard_too(world, other):
@@ -176,7 +176,7 @@ def test_foreign_types_and_other_definitions_are_warned_of(world, other, caplog)
     wrong, _ = other.speak("/uav1/cmd_vel", STRING)
     until(lambda: "publisher of std_msgs/msg/String is not heard" in caplog.text)
     wrong.close()
-    topics = world.door._shared.topics
+    topics = world.bridge._shared.topics
     fake = next(p for p in other.participant.publishers() if p.topic == "/chatter")
     topic = {t.name: t for t in world.graph.topics()}["/chatter"]
     topics._look_at(topic, [fake._replace(type_hash="RIHS01_00")])
@@ -192,7 +192,7 @@ def test_names_that_ros2_does_not_allow_stay_inside(world, other):
 
 
 def test_other_domains_are_not_heard(world):
-    stranger = Other(Ros2Terms(domain_id=DOMAIN + 2))
+    stranger = Other(Ros2Environment(domain_id=DOMAIN + 2))
     _, publish = stranger.speak("/uav1/cmd_vel", "geometry_msgs/msg/Twist")
     before = len(world.commands)
     for _ in range(20):
@@ -205,7 +205,7 @@ def test_other_domains_are_not_heard(world):
 
 def test_one_domain_has_one_configuration_in_a_process(world):
     with pytest.raises(BridgeError, match="other interfaces"):
-        join_ros2(Ros2Terms(domain_id=DOMAIN, interfaces=("eth0",)))
+        join_ros2(Ros2Environment(domain_id=DOMAIN, interfaces=("eth0",)))
 
 
 def test_sockets_hear_this_machine_alone(world):
@@ -239,7 +239,7 @@ def test_interfaces_that_there_are_not_are_told():
     with pytest.raises(
         BridgeError, match="there is no network interface 'no_such_interface'; there are "
     ):
-        join_ros2(Ros2Terms(domain_id=DOMAIN + 3, interfaces=("no_such_interface",)))
+        join_ros2(Ros2Environment(domain_id=DOMAIN + 3, interfaces=("no_such_interface",)))
 
 
 def test_failures_are_told_where_there_is_room(world, other):
@@ -411,11 +411,11 @@ def test_who_does_not_fit_is_left_out_and_the_rest_goes_on(world, other, caplog)
     assert "/odd" in caplog.text
 
 
-def test_a_door_without_a_name_of_ros2_does_not_open(world):
-    doors = Doors(world.gateway)
+def test_a_bridge_without_a_name_of_ros2_does_not_open(world):
+    bridges = BridgeHost(world.gateway)
     with pytest.raises(BridgeError, match="does not allow"):
-        doors.open(Ros2Door(Ros2Terms(domain_id=DOMAIN), "/my-node"))
-    doors.close()
+        bridges.open(Ros2Bridge(Ros2Environment(domain_id=DOMAIN), "/my-node"))
+    bridges.close()
 
 
 def test_a_client_of_another_type_is_told_of(world, other, caplog):
@@ -426,19 +426,19 @@ def test_a_client_of_another_type_is_told_of(world, other, caplog):
 
 
 def test_a_domain_is_joined_once_as_one_node(world):
-    doors = Doors(world.gateway)
+    bridges = BridgeHost(world.gateway)
     with pytest.raises(BridgeError, match=rf"domain {DOMAIN} is joined already over dds"):
-        doors.open(Ros2Door(Ros2Terms(domain_id=DOMAIN)))
-    doors.open(Ros2Door(Ros2Terms(domain_id=DOMAIN + 4)))
-    doors.close()
-    doors = Doors(world.gateway)
-    doors.open(Ros2Door(Ros2Terms(domain_id=DOMAIN + 4)))  # free again
-    doors.close()
+        bridges.open(Ros2Bridge(Ros2Environment(domain_id=DOMAIN)))
+    bridges.open(Ros2Bridge(Ros2Environment(domain_id=DOMAIN + 4)))
+    bridges.close()
+    bridges = BridgeHost(world.gateway)
+    bridges.open(Ros2Bridge(Ros2Environment(domain_id=DOMAIN + 4)))  # free again
+    bridges.close()
 
 
 def test_nothing_is_written_into_the_present_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    participant = join_ros2(Ros2Terms(domain_id=DOMAIN + 4))
+    participant = join_ros2(Ros2Environment(domain_id=DOMAIN + 4))
     participant.close()
     assert list(tmp_path.iterdir()) == []
 
@@ -446,12 +446,12 @@ def test_nothing_is_written_into_the_present_folder(tmp_path, monkeypatch):
 def test_everything_is_given_back():
     made = LiveGraph()
     message_type(f"{TRIGGER}_Request")
-    doors = Doors(made.gateway)
-    doors.open(Ros2Door(Ros2Terms(domain_id=DOMAIN + 4)))
-    watcher = Other(Ros2Terms(domain_id=DOMAIN + 4))
+    bridges = BridgeHost(made.gateway)
+    bridges.open(Ros2Bridge(Ros2Environment(domain_id=DOMAIN + 4)))
+    watcher = Other(Ros2Environment(domain_id=DOMAIN + 4))
     made.graph.advertise("/x", STRING)
     until(watcher.participant.publishers)
-    doors.close()
+    bridges.close()
     until(lambda: not watcher.participant.publishers())
     assert made.gateway.sessions() == []
     watcher.close()
@@ -490,7 +490,7 @@ def test_clients_and_servers_of_another_kind_are_told_and_not_misread(world, oth
 
     server = DataReader(inner, Topic(inner, "rq/foreignRequest", request), qos=quality)
     answers = DataWriter(inner, Topic(inner, "rr/foreignReply", response), qos=quality)
-    link = Ros2Client(Ros2Terms(domain_id=DOMAIN), "/asker")
+    link = Ros2Client(Ros2Environment(domain_id=DOMAIN), "/asker")
     with pytest.raises(GraphError, match="its server is of Cyclone DDS and lacks 'serviceid="):
         call_and_wait(link, "/foreign", None, 15.0)
     link.close()

@@ -9,11 +9,11 @@ from live_graph import LiveGraph
 from ros2_bench import DOMAIN, Other
 from ros_tcp_client import until
 
-from volery.bridges.bridge_host import Doors
+from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.nodes.host import NodeHost
-from volery.bridges.ros2.bridge import Ros2Door
+from volery.bridges.ros2.bridge import Ros2Bridge
 from volery.bridges.ros2.client import Ros2Client
-from volery.bridges.ros2.environment import Ros2Terms
+from volery.bridges.ros2.environment import Ros2Environment
 from volery.cli.topics import list_topics
 from volery.core.errors import GraphError
 from volery.graph.connection import call_and_wait
@@ -24,7 +24,7 @@ from volery.graph.parameter_values import parameter_message, plain_of
 TRIGGER = "std_srvs/srv/Trigger"
 STRING = "std_msgs/msg/String"
 Triggered = message_type(f"{TRIGGER}_Response")
-TERMS = Ros2Terms(domain_id=DOMAIN + 5)
+TERMS = Ros2Environment(domain_id=DOMAIN + 5)
 
 
 class Parrot(Node):
@@ -44,7 +44,7 @@ class Parrot(Node):
 
 
 class Simulated(LiveGraph):
-    """A graph with a clock behind the door."""
+    """A graph with a clock behind the bridge."""
 
     def __init__(self):
         super().__init__()
@@ -53,15 +53,15 @@ class Simulated(LiveGraph):
         self.said = []
         self.do(lambda: self.graph.subscribe("/uav1/said", self.said.append, STRING))
         self.graph.offer("/ours", TRIGGER, lambda _q: Triggered(True, "ours"))
-        self.doors = Doors(self.gateway)
-        self.doors.open(Ros2Door(TERMS))
+        self.bridges = BridgeHost(self.gateway)
+        self.bridges.open(Ros2Bridge(TERMS))
 
     def tick(self, time_ns):
         stamp = Time(time_ns // 10**9, time_ns % 10**9)
         self.do(lambda: self.clock.publish(Clock(stamp)))
 
     def close(self):
-        self.doors.close()
+        self.bridges.close()
         super().close()
 
 
@@ -103,7 +103,7 @@ def counts(simulated):
 
 
 def test_a_node_of_ours_is_a_ros2_node(simulated, node):
-    until(lambda: counts(simulated)["/uav1/heard"][1] == 1)  # the door hears that it listens
+    until(lambda: counts(simulated)["/uav1/heard"][1] == 1)  # the bridge hears that it listens
     until(lambda: counts(simulated)["/clock"][1] == 1)
 
     def clock_is_heard():

@@ -20,7 +20,7 @@ from ros_tcp_client import until
 from volery.bridges.ros2.dds import library
 from volery.bridges.ros2.dds.domain import join_domain, leave_domain
 from volery.bridges.ros2.dds.endpoint_info import (
-    Terms,
+    EndpointQos,
     announcements,
     matched_reader,
     matched_writer,
@@ -40,7 +40,7 @@ class Pair(NamedTuple):
 
     writer: DataWriter
     reader: DataReader
-    terms: Terms
+    terms: EndpointQos
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def pairs():
     here, there = join_domain(DOMAIN, ()), join_domain(DOMAIN, ())
     struct, made = message_struct(STRING), []
     for number in range(4):
-        terms = Terms(
+        terms = EndpointQos(
             Profile(reliable=number % 2 == 0, latched=number >= 2),
             b"" if number == 3 else f"clientid={number};".encode() * (number + 1),
         )
@@ -109,7 +109,10 @@ def test_threads_that_read_at_once_get_each_their_own(pairs, hasty):
 
 @pytest.mark.parametrize("function", ["_user_data", "_reliability", "_durability"])
 def test_a_reading_in_the_midst_of_another_changes_nothing(monkeypatch, function):
-    ours, others = Terms(Profile(latched=True), b"typehash=RIHS01_1;"), Terms(Profile(False), b"")
+    ours, others = (
+        EndpointQos(Profile(latched=True), b"typehash=RIHS01_1;"),
+        EndpointQos(Profile(False), b""),
+    )
     here, there = (_CQos.qos_to_cqos(qos_of(*terms)) for terms in (ours, others))
     original, seen = getattr(library, function), []
 

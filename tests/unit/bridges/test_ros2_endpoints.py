@@ -8,7 +8,7 @@ import pytest
 from ros2_bench import DOMAIN, Other
 from ros_tcp_client import until
 
-from volery.bridges.ros2.environment import Ros2Terms
+from volery.bridges.ros2.environment import Ros2Environment
 from volery.bridges.ros2.middleware import ServiceSpec
 from volery.graph.messages import String
 
@@ -19,7 +19,7 @@ TRIGGER = "std_srvs/srv/Trigger"
 @pytest.fixture
 def two():
     """Two participants."""
-    made = [Other(Ros2Terms(domain_id=DOMAIN)) for _ in range(2)]
+    made = [Other(Ros2Environment(domain_id=DOMAIN)) for _ in range(2)]
     yield made
     for one in made:
         one.close()

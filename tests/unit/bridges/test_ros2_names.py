@@ -157,7 +157,7 @@ def test_the_domain_is_that_of_the_environment(monkeypatch):
 def test_what_to_install_is_said(monkeypatch, middleware):
     monkeypatch.setattr(importlib.util, "find_spec", lambda _name: None)
     with pytest.raises(BridgeError, match=r'pip install "volery\[ros2\]"'):
-        environment.join_ros2(environment.Ros2Terms(middleware))
+        environment.join_ros2(environment.Ros2Environment(middleware))
 
 
 def test_nothing_leaves_the_machine_unless_interfaces_are_named():
@@ -169,14 +169,14 @@ def test_nothing_leaves_the_machine_unless_interfaces_are_named():
     assert 'address="192.168.1.7"' in there
     assert "127.0.0.1" not in there
     with pytest.raises(BridgeError, match="no network interface"):
-        environment.join_ros2(environment.Ros2Terms("dds", 7, ('"/><x',)))
+        environment.join_ros2(environment.Ros2Environment("dds", 7, ('"/><x',)))
 
 
-def test_doors_by_name(monkeypatch):
-    assert make_bridge("ros2=7", BridgeOptions()).door._terms.domain_id == 7
-    named = make_bridge("ros2", BridgeOptions(domain_id=9, interfaces=("eth0",))).door._terms
+def test_bridges_by_name(monkeypatch):
+    assert make_bridge("ros2=7", BridgeOptions()).bridge._terms.domain_id == 7
+    named = make_bridge("ros2", BridgeOptions(domain_id=9, interfaces=("eth0",))).bridge._terms
     assert named == ("dds", 9, ("eth0",), "")
     with pytest.raises(BridgeError, match="--ros2-interface"):
         make_bridge("ros2=10.0.0.1:7", BridgeOptions())
-    zenoh = make_bridge("ros2-zenoh=10.0.0.7:7447", BridgeOptions(domain_id=3)).door._terms
+    zenoh = make_bridge("ros2-zenoh=10.0.0.7:7447", BridgeOptions(domain_id=3)).bridge._terms
     assert zenoh == ("zenoh", 3, (), "10.0.0.7:7447")

@@ -1,4 +1,4 @@
-"""What plain DDS programs do to the ROS 2 door that stand still, vanish or talk nonsense."""
+"""What plain DDS programs do to the ROS 2 bridge that stand still, vanish or talk nonsense."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from plain_peers import take_peer
 from ros2_bench import DOMAIN
 from ros_tcp_client import until
 
-from volery.bridges.bridge_host import Doors
-from volery.bridges.ros2.bridge import Ros2Door
-from volery.bridges.ros2.environment import Ros2Terms
+from volery.bridges.bridge_host import BridgeHost
+from volery.bridges.ros2.bridge import Ros2Bridge
+from volery.bridges.ros2.environment import Ros2Environment
 from volery.graph.codecs.cdr import encode_cdr
 from volery.graph.messages import String, header, message_type
 
@@ -30,7 +30,7 @@ SOON_S = 15.0
 
 
 class World(LiveGraph):
-    """A graph with a door, and a plain peer that proves that all goes on."""
+    """A graph with a bridge, and a plain peer that proves that all goes on."""
 
     def __init__(self):
         super().__init__()
@@ -39,8 +39,8 @@ class World(LiveGraph):
         self.pictures = self.graph.advertise("/pictures", IMAGE)
         self.atlas = self.graph.advertise("/atlas", IMAGE, latched=True)
         self.do(lambda: self.graph.subscribe("/in", self.note, STRING))
-        self.doors = Doors(self.gateway)
-        self.doors.open(Ros2Door(Ros2Terms(domain_id=DOMAIN), reliable=("/pictures",)))
+        self.bridges = BridgeHost(self.gateway)
+        self.bridges.open(Ros2Bridge(Ros2Environment(domain_id=DOMAIN), reliable=("/pictures",)))
         self.witness = take_peer(self.heard.put)
         self.hear(self.witness, "/chatter", STRING)
         assert self.witness.do("advertise", topic="/in", type=STRING, latched=False, wait=True)
@@ -49,7 +49,7 @@ class World(LiveGraph):
         self.seen.append(published.message.data)
 
     def hear(self, peer, topic, msgtype, *, latched=False):
-        """Have a peer subscribe reliably, and wait for the door to know."""
+        """Have a peer subscribe reliably, and wait for the bridge to know."""
         found = {t.name: t for t in self.graph.topics()}[topic]
         peer.do("subscribe", topic=topic, type=msgtype, reliable=True, latched=latched)
         until(lambda: {t.name: t for t in self.graph.topics()}[topic].subscribers)
@@ -70,7 +70,7 @@ class World(LiveGraph):
 
     def close(self):
         self.witness.give_back()
-        self.doors.close()
+        self.bridges.close()
         super().close()
 
 

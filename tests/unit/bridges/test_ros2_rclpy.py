@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from volery.bridges.ros2.environment import Ros2Terms, join_ros2
+from volery.bridges.ros2.environment import Ros2Environment, join_ros2
 from volery.bridges.ros2.middleware import Profile, RemotePublisher
 from volery.bridges.ros2.rcl import types
 from volery.bridges.ros2.rcl.qos import remote_publisher
@@ -101,15 +101,15 @@ def test_publishers_of_others_are_told_of():
 @pytest.mark.skipif(importlib.util.find_spec("rclpy") is not None, reason="a ROS 2 is sourced")
 def test_without_a_sourced_ros2_that_is_said():
     with pytest.raises(BridgeError, match="source a ROS 2"):
-        join_ros2(Ros2Terms("rclpy"))
+        join_ros2(Ros2Environment("rclpy"))
     with pytest.raises(BridgeError, match="source a ROS 2"):
         open_link("rclpy://7", "x")
 
 
 def test_ways_into_a_ros2_graph():
-    assert _ros2_terms("rclpy") == Ros2Terms("rclpy")
-    assert _ros2_terms("rclpy://7") == Ros2Terms("rclpy", 7)
-    assert _ros2_terms("ros2://7?interface=lo") == Ros2Terms("dds", 7, ("lo",))
+    assert _ros2_terms("rclpy") == Ros2Environment("rclpy")
+    assert _ros2_terms("rclpy://7") == Ros2Environment("rclpy", 7)
+    assert _ros2_terms("ros2://7?interface=lo") == Ros2Environment("dds", 7, ("lo",))
     for wrong, why in (
         ("rclpy://x", "a domain is a number from 0 to 232, not 'x'"),
         ("rclpy://7?interface=lo", "interface"),

@@ -11,7 +11,7 @@ from ruamel.yaml import YAML
 
 from volery.bridges.ros2.middleware import Profile
 from volery.bridges.ros2.profiles import profile_of
-from volery.bridges.shared_names import COMMANDS, Sharing
+from volery.bridges.shared_names import COMMANDS, SharedNames
 from volery.runtime import Simulation
 from volery.scenario.load import load_scenario
 
@@ -115,7 +115,7 @@ def test_goals_of_rviz_are_taken(rviz, flown):
     (tool,) = [t for t in rviz["Visualization Manager"]["Tools"] if "Topic" in t]
     name = tool["Topic"]["Value"]
     assert flown.listened[name] == "geometry_msgs/msg/PoseStamped"
-    assert Sharing(("*",), COMMANDS).takes(name, 1, 1)
+    assert SharedNames(("*",), COMMANDS).takes(name, 1, 1)
     asked(tool["Topic"])
 
 

@@ -17,9 +17,9 @@ from live_graph import LiveGraph
 from ros2_bench import DOMAIN, Other
 from ros_tcp_client import until
 
-from volery.bridges.bridge_host import Doors
-from volery.bridges.ros2.bridge import Ros2Door
-from volery.bridges.ros2.environment import Ros2Terms
+from volery.bridges.bridge_host import BridgeHost
+from volery.bridges.ros2.bridge import Ros2Bridge
+from volery.bridges.ros2.environment import Ros2Environment
 from volery.bridges.ros2.middleware import Profile, ServiceSpec, TopicSpec
 from volery.bridges.ros2.names import NodeName
 from volery.bridges.ros2.zenoh import session as zenoh_session
@@ -143,17 +143,19 @@ def router():
 @pytest.fixture(scope="module")
 def world(router):
     live = LiveGraph()
-    doors = Doors(live.gateway)
-    door = Ros2Door(Ros2Terms("zenoh", DOMAIN, router=router), remote_services={"/theirs": TRIGGER})
-    doors.open(door)
+    bridges = BridgeHost(live.gateway)
+    bridge = Ros2Bridge(
+        Ros2Environment("zenoh", DOMAIN, router=router), remote_services={"/theirs": TRIGGER}
+    )
+    bridges.open(bridge)
     yield live
-    doors.close()
+    bridges.close()
     live.close()
 
 
 @pytest.fixture(scope="module")
 def other(world, router):
-    made = Other(Ros2Terms("zenoh", DOMAIN, router=router))
+    made = Other(Ros2Environment("zenoh", DOMAIN, router=router))
     yield made
     made.close()
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from volery.bridges.ros_tcp import wire as ros_tcp
-from volery.bridges.ros_tcp.wire import Frame, FrameParser
+from volery.bridges.ros_tcp.wire import RosTcpFrame, RosTcpFrameParser
 from volery.core.errors import BridgeError
 
 
@@ -44,7 +44,7 @@ GOLDEN = [
 def test_golden_bytes(destination, payload, text):
     data = bytes.fromhex(text)
     assert ros_tcp.frame(destination, payload) == data == slow_frame(destination, payload)
-    assert as_bytes(FrameParser().feed(data)) == [(destination, payload)]
+    assert as_bytes(RosTcpFrameParser().feed(data)) == [(destination, payload)]
 
 
 def test_the_handshake_as_unitys_endpoint_writes_it():
@@ -73,20 +73,20 @@ def test_the_handshake_as_unitys_endpoint_writes_it():
 def test_commands(name, fields, nul):
     data = ros_tcp.command(name, nul=nul, **fields)
     assert data == slow_frame(f"__{name}", json.dumps(fields).encode() + b"\0" * nul)
-    (frame,) = FrameParser().feed(data)
+    (frame,) = RosTcpFrameParser().feed(data)
     assert ros_tcp.read_fields(frame.payload) == fields
 
 
 def test_keepalives_are_counted_and_skipped():
-    parser = FrameParser()
+    parser = RosTcpFrameParser()
     data = bytes(8) + slow_frame("/a", b"x") + bytes(16)
     assert as_bytes(parser.feed(data)) == [("/a", b"x")]
     assert parser.keepalives == 3
 
 
 def test_a_nul_behind_a_destination_is_none_of_it():
-    (frame,) = FrameParser().feed(slow_frame("/a\0", b""))
-    assert frame == Frame("/a", b"")
+    (frame,) = RosTcpFrameParser().feed(slow_frame("/a\0", b""))
+    assert frame == RosTcpFrame("/a", b"")
 
 
 @pytest.mark.parametrize(
@@ -140,7 +140,7 @@ frames = st.lists(
 @given(frames, st.lists(st.integers(1, 70_000), min_size=1, max_size=20))
 def test_frames_come_whole_wherever_the_stream_is_cut(wanted, cuts):
     data = b"".join(ros_tcp.frame(*frame) for frame in wanted)
-    parser, found, k = FrameParser(), [], 0
+    parser, found, k = RosTcpFrameParser(), [], 0
     while data:
         piece, data = data[: cuts[k % len(cuts)]], data[cuts[k % len(cuts)] :]
         found += parser.feed(piece)
@@ -153,7 +153,7 @@ def test_frames_come_whole_wherever_the_stream_is_cut(wanted, cuts):
 def test_frames_come_whole_byte_by_byte(wanted):
     wanted = [(name, payload[:3000]) for name, payload in wanted if name]
     data = b"".join(ros_tcp.frame(*frame) for frame in wanted)
-    parser, found = FrameParser(), []
+    parser, found = RosTcpFrameParser(), []
     for k in range(len(data)):
         found += parser.feed(data[k : k + 1])
     assert as_bytes(found) == wanted
@@ -162,7 +162,7 @@ def test_frames_come_whole_byte_by_byte(wanted):
 @settings(max_examples=300)
 @given(st.lists(st.binary(max_size=400), max_size=20))
 def test_noise_is_frames_or_an_error(pieces):
-    parser = FrameParser(most_payload=1000, most_destination=100)
+    parser = RosTcpFrameParser(most_payload=1000, most_destination=100)
     with contextlib.suppress(BridgeError):
         for piece in pieces:
             for frame in parser.feed(piece):
@@ -171,7 +171,7 @@ def test_noise_is_frames_or_an_error(pieces):
 
 
 def test_frames_handed_out_are_not_written_to_again():
-    parser = FrameParser()
+    parser = RosTcpFrameParser()
     first = parser.feed(slow_frame("/a", b"x" * 100))
     large = parser.feed(ros_tcp.frame("/b", b"y" * 100_000))
     for _ in range(3):
@@ -191,18 +191,18 @@ def test_frames_handed_out_are_not_written_to_again():
 )
 def test_frames_over_the_limits_are_refused(data, words):
     with pytest.raises(BridgeError, match=words):
-        FrameParser().feed(data)
+        RosTcpFrameParser().feed(data)
 
 
 def test_frames_at_the_limits_pass():
-    parser = FrameParser(most_payload=100_000)
+    parser = RosTcpFrameParser(most_payload=100_000)
     (frame,) = parser.feed(ros_tcp.frame("d" * 4096, bytes(100_000)))
     assert (len(frame.destination), len(frame.payload)) == (4096, 100_000)
 
 
 def test_claims_cost_no_memory():
     """A hundred peers announce 64 MiB each and send nothing of it."""
-    parsers = [FrameParser() for _ in range(100)]
+    parsers = [RosTcpFrameParser() for _ in range(100)]
     before = resident_bytes()
     for parser in parsers:
         parser.feed(slow_number(2) + b"/a" + slow_number(64 << 20) + bytes(20))
@@ -217,7 +217,7 @@ def resident_bytes():
 def test_work_is_linear_in_bytes():
     def cut_in_pieces(size):
         data = memoryview(ros_tcp.frame("/a", bytes(size)))
-        parser, start = FrameParser(), time.process_time()
+        parser, start = RosTcpFrameParser(), time.process_time()
         for k in range(0, len(data), 1024):
             parser.feed(data[k : k + 1024])
         return time.process_time() - start

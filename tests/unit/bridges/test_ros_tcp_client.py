@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from ros_tcp_client import Loop, frame, ros1_string, until
 
-from volery.bridges.bridge_host import Doors
+from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.ros_tcp import wire
 from volery.bridges.ros_tcp.client import RosTcpClient
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
-from volery.bridges.rosbridge.rosapi_bridge import WithRosApi
+from volery.bridges.rosbridge.rosapi_bridge import RosApiBridge
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.connection import TellsTopics, call_and_wait
 from volery.graph.messages import Header, String, Time, message_type
@@ -34,7 +34,7 @@ EmptyRequest = message_type(f"{EMPTY}_Request")
 @pytest.fixture
 def loop():
     loop = Loop()
-    with Doors(loop.gateway) as loop.doors:
+    with BridgeHost(loop.gateway) as loop.bridges:
         yield loop
     loop.close()
 
@@ -42,7 +42,7 @@ def loop():
 @pytest.fixture(params=["ros1", "ros2"])
 def endpoint(loop, request):
     endpoint = RosTcpEndpoint(port=0, generation=request.param)
-    loop.doors.open(endpoint)
+    loop.bridges.open(endpoint)
     return endpoint
 
 
@@ -208,9 +208,9 @@ def test_who_calls_is_told_why_it_failed(loop, client, srvtype, service):
 
 
 def test_without_a_request_rosapi_tells_the_type(loop, connect):
-    door = WithRosApi(RosTcpEndpoint(port=0))
-    loop.doors.open(door)
-    client = connect(door.door.port)
+    bridge = RosApiBridge(RosTcpEndpoint(port=0))
+    loop.bridges.open(bridge)
+    client = connect(bridge.bridge.port)
     loop.graph.offer("/do", TRIGGER, lambda _q: Response(True, "done"))
     assert call(client, "/do") == Response(True, "done")
     with pytest.raises(GraphError, match="nobody offers service '/none'"):
@@ -245,7 +245,7 @@ def test_services_are_offered(loop, client):
 
 def test_it_comes_back_and_asks_for_everything_again(loop, connect):
     first = RosTcpEndpoint(port=0)
-    loop.doors.open(first)
+    loop.bridges.open(first)
     client = connect(first.port)
     client.advertise("/in", STRING)
     mailbox = client.subscribe("/out", STRING, wake=lambda: None)
@@ -254,14 +254,14 @@ def test_it_comes_back_and_asks_for_everything_again(loop, connect):
     outcome = queue.Queue()
     client.call("/waits", Request(), ServiceReply(outcome.put, outcome.put))
     until(lambda: "/do" in loop.graph.services())
-    loop.doors.call(first.stop())
+    loop.bridges.call(first.stop())
     assert "is broken" in str(outcome.get(timeout=60.0))
     until(lambda: not client.connected)
     client.publish("/in", String("lost"))
     assert client.dropped == 1
     with pytest.raises(GraphError, match="no connection"):
         call(client, "/do", Request())
-    loop.doors.open(RosTcpEndpoint(port=first.port))
+    loop.bridges.open(RosTcpEndpoint(port=first.port))
     client.wait_until_connected(10.0)
     assert client.connections == 2
     seen = collect(loop, "/in")

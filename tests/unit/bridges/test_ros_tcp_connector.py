@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from ros_tcp_client import Loop, cdr_string, frame, ros1_string, until
 
-from volery.bridges.bridge_host import Doors
+from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.ros_tcp.connect import dial
 from volery.bridges.ros_tcp.connector import RosTcpConnector
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
@@ -29,9 +29,9 @@ Response = message_type(f"{TRIGGER}_Response")
 
 @pytest.fixture
 def here():
-    """The simulation's graph, with its doors."""
+    """The simulation's graph, with its bridges."""
     loop = Loop()
-    with Doors(loop.gateway) as loop.doors:
+    with BridgeHost(loop.gateway) as loop.bridges:
         yield loop
     loop.close()
 
@@ -40,16 +40,16 @@ def here():
 def there():
     """Somebody else's graph, with an endpoint."""
     loop = Loop()
-    with Doors(loop.gateway) as loop.doors:
+    with BridgeHost(loop.gateway) as loop.bridges:
         yield loop
     loop.close()
 
 
 def join(here, there, generation="ros1", **options):
     endpoint = RosTcpEndpoint(port=0, generation=generation)
-    there.doors.open(endpoint)
+    there.bridges.open(endpoint)
     connector = RosTcpConnector(port=endpoint.port, **options)
-    here.doors.open(connector)
+    here.bridges.open(connector)
     until(lambda: connector.state == generation)
     return endpoint, connector
 
@@ -160,10 +160,10 @@ def test_it_connects_again_and_registers_again(here, there):
     out = here.graph.advertise("/uav1/status", STRING)
     endpoint, connector = join(here, there)
     until(lambda: "/uav1/status" in topics(there))
-    there.doors.call(endpoint.stop())
+    there.bridges.call(endpoint.stop())
     until(lambda: connector.state == "not connected")
     assert not here.gateway.sessions()
-    there.doors.open(RosTcpEndpoint(port=endpoint.port))
+    there.bridges.open(RosTcpEndpoint(port=endpoint.port))
     until(lambda: connector.state == "ros1")
     seen = collect(there, "/uav1/status")
     until(lambda: topics(there)["/uav1/status"].publishers == 1)
@@ -176,11 +176,11 @@ def test_it_may_start_before_the_endpoint(here, there):
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
     connector = RosTcpConnector(port=port)
-    here.doors.open(connector)
+    here.bridges.open(connector)
     until(lambda: connector.notes)
     assert "cannot connect" in connector.notes[0]
     assert "not connected" in connector.name
-    there.doors.open(RosTcpEndpoint(port=port))
+    there.bridges.open(RosTcpEndpoint(port=port))
     until(lambda: connector.state == "ros1")
 
 
@@ -189,27 +189,27 @@ def test_connections_are_reported(here, there):
         port = server.getsockname()[1]
     reports = []
     connector = RosTcpConnector(port=port, report=reports.append)
-    here.doors.open(connector)
+    here.bridges.open(connector)
     target = f"ROS-TCP to 127.0.0.1:{port}"
     assert len(reports) == 1
     assert reports[0].startswith(f"{target}: cannot connect: ")
     assert reports[0].endswith("; it connects when an endpoint is there")
     endpoint = RosTcpEndpoint(port=port, generation="ros2")
-    there.doors.open(endpoint)
+    there.bridges.open(endpoint)
     until(lambda: len(reports) == 2)
     assert reports[1] == f"{target}: connected, messages of ROS 2"
-    there.doors.call(endpoint.stop())
+    there.bridges.call(endpoint.stop())
     until(lambda: len(reports) >= 3)
     assert "the connection has ended" in reports[2]
-    there.doors.open(RosTcpEndpoint(port=port))
+    there.bridges.open(RosTcpEndpoint(port=port))
     until(lambda: reports[-1] == f"{target}: connected again, messages of ROS 1")
 
 
 def test_opening_waits_for_an_endpoint_that_is_there(here, there):
     endpoint = RosTcpEndpoint(port=0)
-    there.doors.open(endpoint)
+    there.bridges.open(endpoint)
     connector = RosTcpConnector(port=endpoint.port)
-    here.doors.open(connector)
+    here.bridges.open(connector)
     assert connector.name == f"ROS-TCP to 127.0.0.1:{endpoint.port} (ros1)"
 
 
@@ -277,7 +277,7 @@ def meet(here):
         endpoint = PlainEndpoint(*greeting)
         endpoints.append(endpoint)
         connector = RosTcpConnector(port=endpoint.port, **options)
-        here.doors.open(connector)
+        here.bridges.open(connector)
         return endpoint, connector
 
     yield meet

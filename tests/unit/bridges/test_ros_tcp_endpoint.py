@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from ros_tcp_client import Client, Loop, cdr_string, frame, ros1_string, until
 
-from volery.bridges.bridge_host import Doors
+from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.messages import String, message_type
@@ -34,17 +34,17 @@ def loop():
 
 
 @pytest.fixture
-def doors(loop):
-    with Doors(loop.gateway) as doors:
-        yield doors
+def bridges(loop):
+    with BridgeHost(loop.gateway) as bridges:
+        yield bridges
 
 
 @pytest.fixture
-def serve(doors):
+def serve(bridges):
     def serve(**options):
-        door = RosTcpEndpoint(**{"port": 0, **options})
-        doors.open(door)
-        return door
+        bridge = RosTcpEndpoint(**{"port": 0, **options})
+        bridges.open(bridge)
+        return bridge
 
     return serve
 
@@ -551,15 +551,15 @@ def test_only_known_generations():
 
 
 def test_closing_lets_everybody_go(loop):
-    door = RosTcpEndpoint(port=0)
-    with Doors(loop.gateway) as doors:
-        doors.open(door)
-        client = Client(door.port)
+    bridge = RosTcpEndpoint(port=0)
+    with BridgeHost(loop.gateway) as bridges:
+        bridges.open(bridge)
+        client = Client(bridge.port)
         client.next()
     assert client.ended.wait(60.0)
     assert not loop.gateway.sessions()
     with pytest.raises(ConnectionRefusedError):
-        socket.create_connection(("127.0.0.1", door.port), 1.0)
+        socket.create_connection(("127.0.0.1", bridge.port), 1.0)
     client.close()
 
 

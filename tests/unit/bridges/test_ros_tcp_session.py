@@ -15,7 +15,7 @@ from ros_tcp_client import cdr_string, frame, ros1_string
 from volery.bridges.ros_tcp.payloads import payloads_of
 from volery.bridges.ros_tcp.session import EndpointSession
 from volery.bridges.ros_tcp.unity import Selection, UnitySession
-from volery.bridges.ros_tcp.wire import FrameParser
+from volery.bridges.ros_tcp.wire import RosTcpFrameParser
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.messages import Published, String, message_type
 from volery.graph.service_reply import ServiceReply
@@ -46,7 +46,7 @@ class Bench(HandGraph):
 
 def drain(session):
     """Frames that the session would send."""
-    parser, found = FrameParser(), []
+    parser, found = RosTcpFrameParser(), []
     while parts := session.outbox.gather():
         for part in parts:
             found += parser.feed(part)
@@ -98,7 +98,7 @@ steps = st.lists(
 
 def play(bench, session, script):
     """Feed a session; returns replies that were neither answered nor failed while it lived."""
-    parser, calls = FrameParser(), []
+    parser, calls = RosTcpFrameParser(), []
     for step in script:
         if step == "work":
             bench.work_off()
@@ -157,7 +157,7 @@ def test_no_endpoint_breaks_the_connector(generation, script):
 def test_a_message_that_cannot_be_said_is_told_once():
     bench = Bench()
     session = EndpointSession(bench.gateway, "c", "ros1", 10, lambda: None)
-    for one in FrameParser().feed(
+    for one in RosTcpFrameParser().feed(
         frame("__subscribe", b'{"topic": "/out", "message_name": "std_msgs/String"}')
     ):
         session.take(one)
@@ -171,7 +171,7 @@ def test_a_message_that_cannot_be_said_is_told_once():
 
 def subscribe(session, topic, **more):
     fields = {"topic": topic, "message_name": "std_msgs/String", **more}
-    for one in FrameParser().feed(frame("__subscribe", json.dumps(fields).encode())):
+    for one in RosTcpFrameParser().feed(frame("__subscribe", json.dumps(fields).encode())):
         session.take(one)
 
 

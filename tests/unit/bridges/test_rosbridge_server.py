@@ -18,7 +18,7 @@ from rosbridge_bench import SET_BOOL, STEPS, STRING, TRIGGER, FakeSimulation, tr
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from volery.bridges.bridge_host import Doors
+from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.origins import Origins
 from volery.bridges.rosbridge.client import RosbridgeClient
 from volery.bridges.rosbridge.server import RosbridgeServer
@@ -37,15 +37,15 @@ def simulation():
 
 
 @pytest.fixture
-def doors(simulation):
-    with Doors(simulation.gateway) as doors:
-        yield doors
+def bridges(simulation):
+    with BridgeHost(simulation.gateway) as bridges:
+        yield bridges
 
 
 @pytest.fixture
-def server(doors):
+def server(bridges):
     server = RosbridgeServer(port=0)
-    doors.open(server)
+    bridges.open(server)
     return server
 
 
@@ -107,10 +107,10 @@ def test_topics_both_ways(simulation, server):
 
 
 @pytest.mark.parametrize("path", ["", "/", "/rosbridge", "/some/where/else?x=1"])
-def test_two_doors_serve_one_graph_at_any_path(simulation, doors, server, path):
+def test_two_bridges_serve_one_graph_at_any_path(simulation, bridges, server, path):
     """Standard clients connect to :9090, the ancestors' to :8080/rosbridge."""
     other = RosbridgeServer(port=0)
-    doors.open(other)
+    bridges.open(other)
     seen = []
     simulation.graph.subscribe("/in", seen.append, STRING)
     with Plain(server, path=path) as first, Plain(other, path=path) as second:
@@ -230,9 +230,9 @@ def test_who_leaves_is_forgotten(simulation, server):
         ({"Origin": "null"}, False),
     ],
 )
-def test_whose_pages_are_let_in(doors, headers, welcome):
+def test_whose_pages_are_let_in(bridges, headers, welcome):
     server = RosbridgeServer(port=0, origins=["https://listed.example"])
-    doors.open(server)
+    bridges.open(server)
     if welcome:
         with connect(url_of(server), additional_headers=headers):
             return
@@ -257,9 +257,9 @@ def test_pages_from_where_they_connect_to(origin, host, token, welcome):
     assert Origins(token_needed=token is not None).let_in(origin, host) is welcome
 
 
-def test_the_token(doors):
+def test_the_token(bridges):
     server = RosbridgeServer(port=0, token="secret")
-    doors.open(server)
+    bridges.open(server)
     with connect(f"{url_of(server)}/?token=secret") as socket:
         socket.send('{"op": "bogus"}')
         assert "unknown operation" in socket.recv(60.0)
@@ -276,22 +276,22 @@ def test_the_token(doors):
         pass
 
 
-def test_one_path_only(doors):
+def test_one_path_only(bridges):
     server = RosbridgeServer(port=0, path="/rosbridge")
-    doors.open(server)
+    bridges.open(server)
     with connect(f"{url_of(server)}/rosbridge"):
         pass
     with pytest.raises(InvalidStatus, match="404"), connect(f"{url_of(server)}/else"):
         pass
 
 
-def test_doors_that_cannot_open(doors, server):
+def test_bridges_that_cannot_open(bridges, server):
     with pytest.raises(BridgeError, match=f"{server.port}.*choose another"):
-        doors.open(RosbridgeServer(port=server.port))
+        bridges.open(RosbridgeServer(port=server.port))
     with pytest.raises(BridgeError, match="other machines"):
-        doors.open(RosbridgeServer("0.0.0.0", 0, token="secret"))
+        bridges.open(RosbridgeServer("0.0.0.0", 0, token="secret"))
     with pytest.raises(BridgeError, match="token"):
-        doors.open(RosbridgeServer("0.0.0.0", 0, anywhere=True))
+        bridges.open(RosbridgeServer("0.0.0.0", 0, anywhere=True))
 
 
 def test_broken_frames_end_nobody(server):
@@ -372,21 +372,21 @@ def test_its_services(simulation, client):
     until(lambda: not simulation.graph.has_service("/mine"))
 
 
-def test_it_comes_back_and_announces_everything_again(simulation, doors):
+def test_it_comes_back_and_announces_everything_again(simulation, bridges):
     first = RosbridgeServer(port=0)
-    doors.open(first)
+    bridges.open(first)
     client = RosbridgeClient(url_of(first), name="node")
     try:
         client.advertise("/in", STRING)
         mailbox = client.subscribe("/out", STRING, wake=lambda: None)
         client.offer("/mine", TRIGGER, lambda _r, reply: reply.answer(trigger_response(True, "x")))
         until(lambda: simulation.graph.has_service("/mine"))
-        doors.call(first.stop())
+        bridges.call(first.stop())
         until(lambda: not client.connected)
         client.publish("/in", m.String("lost"))
         assert client.dropped == 1
         assert "no connection" in str(ask(client, "/mine"))
-        doors.open(RosbridgeServer(port=first.port))
+        bridges.open(RosbridgeServer(port=first.port))
         client.wait_until_connected(20)
         assert client.connections == 2
         until(lambda: simulation.graph.has_service("/mine"))
@@ -491,10 +491,10 @@ def _ask_rosapi(roslibpy, ros):
     parameter.delete()
 
 
-def test_roslibpy_as_a_ros1_client(simulation, doors):
+def test_roslibpy_as_a_ros1_client(simulation, bridges):
     roslibpy = pytest.importorskip("roslibpy")
     server, got = RosbridgeServer(port=0, generation="ros1"), []
-    doors.open(server)
+    bridges.open(server)
     simulation.publish("/stamp", m.header(3_000_000_004, "map"), latched=True)
     ros = roslibpy.Ros("127.0.0.1", server.port)
     ros.run(timeout=60.0)

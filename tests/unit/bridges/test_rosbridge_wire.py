@@ -18,7 +18,7 @@ from PIL import Image
 
 from volery.bridges.rosbridge.cbor_codec import decode_cbor, encode_cbor
 from volery.bridges.rosbridge.fragments import MOST_FRAGMENTS, MOST_OPEN, Assembly, split
-from volery.bridges.rosbridge.message_encoder import Forms
+from volery.bridges.rosbridge.message_encoder import MessageEncoder
 from volery.bridges.rosbridge.wire import decode_frame, decode_png, encode_json, encode_png
 from volery.core.errors import BridgeError
 from volery.graph import messages as m
@@ -223,7 +223,7 @@ def scan():
 
 
 def test_a_scan_in_all_forms():
-    forms, published = Forms(), scan()
+    forms, published = MessageEncoder(), scan()
     text = json.loads(forms.frame(published, "none", "/scan"))
     assert text["topic"] == "/scan"
     assert text["msg"]["ranges"] == [1.5, None, None]
@@ -238,7 +238,7 @@ def test_a_scan_in_all_forms():
 
 
 def test_a_scan_for_ros1_clients():
-    forms, published = Forms("ros1"), scan()
+    forms, published = MessageEncoder("ros1"), scan()
     text = json.loads(forms.frame(published, "none", "scan"))
     stamp = {"secs": 3, "nsecs": 4}
     assert text["msg"]["header"] == {"seq": 0, "stamp": stamp, "frame_id": "laser"}
@@ -247,7 +247,7 @@ def test_a_scan_for_ros1_clients():
 
 
 def test_a_message_is_encoded_once_for_all():
-    forms, published = Forms(), scan()
+    forms, published = MessageEncoder(), scan()
     assert forms.frame(published, "cbor", "/scan") is forms.frame(published, "cbor", "/scan")
     for _ in range(200):
         forms.frame(scan(), "cbor", "/scan")
@@ -260,7 +260,7 @@ def test_bytes_in_json_are_base64():
     data = np.arange(250, dtype=np.uint8)
     cloud = m.PointCloud2(header, 1, 250, fields, False, 1, 250, data, True)
     published = m.Published("/cloud", "sensor_msgs/msg/PointCloud2", 1, cloud)
-    found = json.loads(Forms().frame(published, "none", "/cloud"))["msg"]
+    found = json.loads(MessageEncoder().frame(published, "none", "/cloud"))["msg"]
     assert base64.b64decode(found["data"]) == data.tobytes()
     assert (found["fields"][0]["name"], found["is_dense"]) == ("x", True)
-    assert found == Forms().plain(cloud, published.msgtype)
+    assert found == MessageEncoder().plain(cloud, published.msgtype)

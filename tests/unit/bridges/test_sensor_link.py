@@ -15,9 +15,9 @@ from volery.bridges.sensor_link.wire import (
     HEAD_BYTES,
     OTHER_LIMIT_BYTES,
     SYNC,
-    Frame,
-    FrameParser,
-    Kind,
+    SensorLinkFrame,
+    SensorLinkKind,
+    SensorLinkParser,
     encode_frame,
     encode_head,
 )
@@ -45,8 +45,8 @@ def slow_frame(kind: int, uav: int, sequence: int, stamp_ns: int, payload: bytes
     return bytes([0xAA, 0x56, 0x4C, 0x59]) + body + slow_crc(body).to_bytes(2, "little")
 
 
-def parse(data: bytes) -> tuple[list[Frame], FrameParser]:
-    parser = FrameParser()
+def parse(data: bytes) -> tuple[list[SensorLinkFrame], SensorLinkParser]:
+    parser = SensorLinkParser()
     return parser.feed(data) + parser.finish(), parser
 
 
@@ -55,7 +55,7 @@ def test_the_crc_is_the_one_stated() -> None:
 
 
 def test_golden_frame() -> None:
-    frame = encode_frame(Kind.NOTICE, 3, 0x01020304, 1_500_000_000, b"hello")
+    frame = encode_frame(SensorLinkKind.NOTICE, 3, 0x01020304, 1_500_000_000, b"hello")
     assert frame == bytes.fromhex(
         "aa564c59"  # sync word
         "01"  # version
@@ -78,7 +78,7 @@ def test_the_page_shows_that_frame() -> None:
 
 
 frames = st.builds(
-    Frame,
+    SensorLinkFrame,
     st.integers(0, 255),
     st.integers(0, 65535),
     st.integers(0, 2**32 - 1),
@@ -87,12 +87,12 @@ frames = st.builds(
 )
 
 
-def encoded(frame: Frame) -> bytes:
+def encoded(frame: SensorLinkFrame) -> bytes:
     return encode_frame(frame.kind, frame.uav, frame.sequence, frame.stamp_ns, frame.payload)
 
 
 @given(frames)
-def test_frames_equal_those_of_the_slow_encoder_and_come_back(frame: Frame) -> None:
+def test_frames_equal_those_of_the_slow_encoder_and_come_back(frame: SensorLinkFrame) -> None:
     data = encoded(frame)
     assert data == slow_frame(frame.kind, frame.uav, frame.sequence, frame.stamp_ns, frame.payload)
     found, parser = parse(data)
@@ -103,7 +103,7 @@ def test_frames_equal_those_of_the_slow_encoder_and_come_back(frame: Frame) -> N
 @given(st.lists(frames, max_size=8), st.data())
 def test_however_a_stream_is_cut_the_frames_are_the_same(sent, data) -> None:
     stream = b"".join(map(encoded, sent))
-    parser, found = FrameParser(), []
+    parser, found = SensorLinkParser(), []
     while stream:
         cut = data.draw(st.integers(1, len(stream)))
         found += parser.feed(stream[:cut])
@@ -148,8 +148,8 @@ def test_undamaged_frames_are_found_behind_damaged_ones(sent, data) -> None:
 
 
 def test_every_single_bit_flipped_is_noticed() -> None:
-    first = encode_frame(Kind.SONAR, 1, 7, 25_000_000, bytes(range(20)))
-    second = Frame(Kind.IMU, 2, 8, 26_000_000, b"whole")
+    first = encode_frame(SensorLinkKind.SONAR, 1, 7, 25_000_000, bytes(range(20)))
+    second = SensorLinkFrame(SensorLinkKind.IMU, 2, 8, 26_000_000, b"whole")
     for bit in range(8 * len(first)):
         broken = bytearray(first)
         broken[bit // 8] ^= 1 << bit % 8
@@ -157,24 +157,24 @@ def test_every_single_bit_flipped_is_noticed() -> None:
 
 
 def test_a_damaged_length_keeps_nobody_waiting() -> None:
-    broken = bytearray(encode_frame(Kind.SONAR, 1, 7, 0, b"x"))
+    broken = bytearray(encode_frame(SensorLinkKind.SONAR, 1, 7, 0, b"x"))
     broken[10] |= 0x0F  # almost a megabyte
-    parser = FrameParser()
-    whole = Frame(Kind.SONAR, 1, 8, 0, b"y")
+    parser = SensorLinkParser()
+    whole = SensorLinkFrame(SensorLinkKind.SONAR, 1, 8, 0, b"y")
     assert parser.feed(bytes(broken) + encoded(whole)) == [whole]
     assert parser.corrupt == 1
 
 
 def test_a_frame_cut_short_is_given_up_when_the_next_ones_fill_it() -> None:
-    cut = encode_frame(Kind.SONAR, 1, 7, 0, bytes(100))[:50]
-    whole = [Frame(Kind.SONAR, 1, k, 0, bytes(50)) for k in range(3)]
-    parser = FrameParser()
+    cut = encode_frame(SensorLinkKind.SONAR, 1, 7, 0, bytes(100))[:50]
+    whole = [SensorLinkFrame(SensorLinkKind.SONAR, 1, k, 0, bytes(50)) for k in range(3)]
+    parser = SensorLinkParser()
     assert parser.feed(cut + b"".join(map(encoded, whole))) == whole
     assert parser.corrupt == 1
 
 
 def test_frames_of_another_version_are_dropped_and_told() -> None:
-    frame = bytearray(encode_frame(Kind.SONAR, 1, 7, 0, b"x"))
+    frame = bytearray(encode_frame(SensorLinkKind.SONAR, 1, 7, 0, b"x"))
     frame[4] = 9
     frame[24:26] = slow_crc(frame[4:24]).to_bytes(2, "little")
     found, parser = parse(bytes(frame))
@@ -184,23 +184,23 @@ def test_frames_of_another_version_are_dropped_and_told() -> None:
 
 def test_what_is_too_long_is_refused_on_both_sides() -> None:
     with pytest.raises(BridgeError, match="limit"):
-        encode_head(Kind.IMU, 1, 0, 0, OTHER_LIMIT_BYTES + 1)
-    parser = FrameParser(limit_bytes=10)
-    assert parser.feed(encode_frame(Kind.IMU, 1, 0, 0, bytes(11))) == []
+        encode_head(SensorLinkKind.IMU, 1, 0, 0, OTHER_LIMIT_BYTES + 1)
+    parser = SensorLinkParser(limit_bytes=10)
+    assert parser.feed(encode_frame(SensorLinkKind.IMU, 1, 0, 0, bytes(11))) == []
     assert parser.corrupt == 1
 
 
 @pytest.mark.parametrize(("uav", "stamp_ns"), [(65536, 0), (-1, 0), (1, 1 << 63)])
 def test_numbers_that_have_no_room(uav: int, stamp_ns: int) -> None:
     with pytest.raises(BridgeError, match="UAV"):
-        encode_frame(Kind.IMU, uav, 0, stamp_ns, b"")
+        encode_frame(SensorLinkKind.IMU, uav, 0, stamp_ns, b"")
 
 
 def test_forged_heads_inside_of_each_other_cost_no_more_than_linear_time() -> None:
     """Each of 38,000 heads claims the rest of a megabyte, and none of the claims is true."""
     heads, size = [], 1_000_000
     for start in range(0, size, HEAD_BYTES):
-        heads.append(encode_head(Kind.IMU, 1, 0, 0, max(size - start - 28, 0)))
+        heads.append(encode_head(SensorLinkKind.IMU, 1, 0, 0, max(size - start - 28, 0)))
     stream = b"".join(heads)
     began = time.process_time()
     _, parser = parse(stream)
@@ -209,7 +209,7 @@ def test_forged_heads_inside_of_each_other_cost_no_more_than_linear_time() -> No
 
 
 def test_memory_is_bounded_by_one_frame() -> None:
-    parser = FrameParser()
+    parser = SensorLinkParser()
     noise = bytes(100_000)
     for _ in range(100):
         parser.feed(noise)
@@ -218,8 +218,8 @@ def test_memory_is_bounded_by_one_frame() -> None:
 
 
 def test_many_small_pieces_of_a_big_frame_take_linear_time() -> None:
-    frame = encode_frame(Kind.IMAGE, 1, 0, 0, bytes(20_000_000))
-    parser, found = FrameParser(), []
+    frame = encode_frame(SensorLinkKind.IMAGE, 1, 0, 0, bytes(20_000_000))
+    parser, found = SensorLinkParser(), []
     began = time.process_time()
     for start in range(0, len(frame), 4096):
         found += parser.feed(frame[start : start + 4096])

@@ -17,7 +17,7 @@ from volery.bridges.sensor_link.payloads import (
     encode_payload,
     stamp_of,
 )
-from volery.bridges.sensor_link.wire import Kind
+from volery.bridges.sensor_link.wire import SensorLinkKind
 from volery.core.errors import BridgeError
 from volery.graph import messages as m
 from volery.graph.codecs.cdr import encode_cdr
@@ -69,13 +69,13 @@ def pose_stamped():
 
 
 SENSORS = {
-    Kind.LASER_SCAN: scan,
-    Kind.POSE: odometry,
-    Kind.IMU: imu,
-    Kind.SONAR: sonar,
-    Kind.IMAGE: image,
+    SensorLinkKind.LASER_SCAN: scan,
+    SensorLinkKind.POSE: odometry,
+    SensorLinkKind.IMU: imu,
+    SensorLinkKind.SONAR: sonar,
+    SensorLinkKind.IMAGE: image,
 }
-ALL = {**SENSORS, Kind.POSE_COMMAND: pose_stamped, Kind.GOAL_POSE: pose_stamped}
+ALL = {**SENSORS, SensorLinkKind.POSE_COMMAND: pose_stamped, SensorLinkKind.GOAL_POSE: pose_stamped}
 
 
 @pytest.mark.parametrize("kind", ALL)
@@ -97,22 +97,22 @@ def texts(*all_of_them):
 
 
 GOLDEN = {
-    Kind.LASER_SCAN: golden("7f", -2.35, 2.35, 0.0043, 1.7e-5, 0.025, 0.1, 30.0)
+    SensorLinkKind.LASER_SCAN: golden("7f", -2.35, 2.35, 0.0043, 1.7e-5, 0.025, 0.1, 30.0)
     + bytes.fromhex("04000000 04000000 0000c03f 0000807f 000080ff 0000c07f")
     + bytes.fromhex("00000000 0000803f 00000040 00004040")
     + texts("n", "uav1/base_link"),
-    Kind.POSE: golden("13d", 1, 2, 3, 0, 0, 0.6, 0.8, 0.1, -0.2, 9.81, 0.1, -0.2, 9.81)
+    SensorLinkKind.POSE: golden("13d", 1, 2, 3, 0, 0, 0.6, 0.8, 0.1, -0.2, 9.81, 0.1, -0.2, 9.81)
     + golden("12d", 0, 1, 2, 3, 4, 5, 0, 1, 2, 3, 4, 5)
     + texts("n", "map", "uav1/base_link"),
-    Kind.IMU: golden("10d", 0, 0, 0.6, 0.8, 0.1, -0.2, 9.81, 0.1, -0.2, 9.81)
+    SensorLinkKind.IMU: golden("10d", 0, 0, 0.6, 0.8, 0.1, -0.2, 9.81, 0.1, -0.2, 9.81)
     + golden("9d", -1, 0, 0, 0.1, 0.2, 0.3, 0.2, 0.4, 0.6)
     + texts("n", "uav1/base_link"),
-    Kind.SONAR: bytes.fromhex("00 0000003f 0000003e 00000041 0000807f 0000803e")
+    SensorLinkKind.SONAR: bytes.fromhex("00 0000003f 0000003e 00000041 0000807f 0000803e")
     + texts("n", "uav1/base_link"),
-    Kind.IMAGE: bytes.fromhex("02000000 03000000 09000000 00 12000000")
+    SensorLinkKind.IMAGE: bytes.fromhex("02000000 03000000 09000000 00 12000000")
     + bytes(range(18))
     + texts("rgb8", "n", "uav1/base_link"),
-    Kind.GOAL_POSE: golden("7d", 1, 2, 3, 0, 0, 0.6, 0.8) + texts("map"),
+    SensorLinkKind.GOAL_POSE: golden("7d", 1, 2, 3, 0, 0, 0.6, 0.8) + texts("map"),
 }
 
 
@@ -140,8 +140,8 @@ def test_random_payloads_are_decoded_or_refused(kind, payload, stamp_ns):
 
 
 def test_arrays_are_read_only_and_aligned():
-    payload = encode_payload(Kind.LASER_SCAN, scan(), "x")
-    _, found = decode_payload(Kind.LASER_SCAN, payload, 0)
+    payload = encode_payload(SensorLinkKind.LASER_SCAN, scan(), "x")
+    _, found = decode_payload(SensorLinkKind.LASER_SCAN, payload, 0)
     assert found.ranges.flags.aligned
     assert not found.ranges.flags.writeable
 
@@ -149,9 +149,9 @@ def test_arrays_are_read_only_and_aligned():
 @pytest.mark.parametrize(
     ("kind", "message", "name", "words"),
     [
-        (Kind.IMU, scan(), "x", "IMU"),
-        (Kind.SONAR, sonar(), "n" * 256, "255"),
-        (Kind.SONAR, m.Range(header(), 300, 0.5, 0.1, 8.0, 1.0, 0.0), "x", "SONAR"),
+        (SensorLinkKind.IMU, scan(), "x", "IMU"),
+        (SensorLinkKind.SONAR, sonar(), "n" * 256, "255"),
+        (SensorLinkKind.SONAR, m.Range(header(), 300, 0.5, 0.1, 8.0, 1.0, 0.0), "x", "SONAR"),
     ],
 )
 def test_what_has_no_payload(kind, message, name, words):
@@ -163,7 +163,7 @@ def test_what_has_no_payload(kind, message, name, words):
 def test_poses_must_be_finite(value):
     pose = m.PoseStamped(header("map"), m.Pose(m.Point(value, 0.0, 0.0), TURN))
     with pytest.raises(BridgeError, match="finite"):
-        decode_payload(Kind.GOAL_POSE, encode_payload(Kind.GOAL_POSE, pose), 0)
+        decode_payload(SensorLinkKind.GOAL_POSE, encode_payload(SensorLinkKind.GOAL_POSE, pose), 0)
 
 
 def test_notices_are_text_whatever_they_are():

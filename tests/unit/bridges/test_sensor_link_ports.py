@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from ros_tcp_client import Loop, until
 
-from volery.bridges.bridge_host import Doors
+from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.sensor_link.client import SensorLinkClient
 from volery.bridges.sensor_link.payloads import (
     decode_notice,
@@ -17,7 +17,7 @@ from volery.bridges.sensor_link.payloads import (
     encode_payload,
 )
 from volery.bridges.sensor_link.server import SensorLink
-from volery.bridges.sensor_link.wire import FrameParser, Kind, encode_frame
+from volery.bridges.sensor_link.wire import SensorLinkKind, SensorLinkParser, encode_frame
 from volery.core.errors import BridgeError
 from volery.graph import messages as m
 from volery.graph.codecs.cdr import encode_cdr
@@ -36,15 +36,15 @@ def loop():
 
 
 @pytest.fixture
-def doors(loop):
-    with Doors(loop.gateway) as doors:
-        yield doors
+def bridges(loop):
+    with BridgeHost(loop.gateway) as bridges:
+        yield bridges
 
 
 @pytest.fixture
-def link(doors):
+def link(bridges):
     link = SensorLink(port=0, image_port=0)
-    doors.open(link)
+    bridges.open(link)
     return link
 
 
@@ -57,7 +57,7 @@ class Plain:
             self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
         self.socket.settimeout(10.0)
         self.socket.connect(("127.0.0.1", port))
-        self.parser = FrameParser()
+        self.parser = SensorLinkParser()
         self.frames = []
 
     def next(self):
@@ -130,7 +130,7 @@ def test_every_client_gets_what_the_sensors_measure(loop, link, connect):
     for client in clients:
         for k in range(5):
             frame = client.next()
-            assert (frame.kind, frame.uav, frame.sequence) == (Kind.SONAR, 12, k)
+            assert (frame.kind, frame.uav, frame.sequence) == (SensorLinkKind.SONAR, 12, k)
             name, message = decode_payload(frame.kind, frame.payload, frame.stamp_ns)
             assert name == "range"
             assert encode_cdr(message, "sensor_msgs/msg/Range") == encode_cdr(
@@ -154,8 +154,8 @@ def test_poses_go_in(loop, link, connect):
     loop.graph.advertise("/uav2/odom", m.Odometry)
     commands, goals = collect(loop, "/uav2/pose_command"), collect(loop, "/uav2/goal_pose")
     client = connect(link.port)
-    client.send(Kind.POSE_COMMAND, 2, pose(4.0))
-    client.send(Kind.GOAL_POSE, 2, pose(5.0, w=0.0))
+    client.send(SensorLinkKind.POSE_COMMAND, 2, pose(4.0))
+    client.send(SensorLinkKind.GOAL_POSE, 2, pose(5.0, w=0.0))
     until(lambda: commands and goals)
     assert commands[0].message.pose.position.x == 4.0
     assert goals[0].message.pose.position.x == 5.0
@@ -165,12 +165,12 @@ def test_poses_go_in(loop, link, connect):
 @pytest.mark.parametrize(
     ("kind", "uav", "message", "words"),
     [
-        (Kind.POSE_COMMAND, 9, pose(), "no UAV 9"),
-        (Kind.POSE_COMMAND, 2, pose(w=0.5), "length 1"),
-        (Kind.POSE_COMMAND, 2, pose(w=0.0), "length 1"),
-        (Kind.POSE_COMMAND, 2, pose(float("nan")), "finite"),
-        (Kind.POSE_COMMAND, 2, pose(frame="odom"), "'map'"),
-        (Kind.SONAR, 2, sonar(), "not taken here"),
+        (SensorLinkKind.POSE_COMMAND, 9, pose(), "no UAV 9"),
+        (SensorLinkKind.POSE_COMMAND, 2, pose(w=0.5), "length 1"),
+        (SensorLinkKind.POSE_COMMAND, 2, pose(w=0.0), "length 1"),
+        (SensorLinkKind.POSE_COMMAND, 2, pose(float("nan")), "finite"),
+        (SensorLinkKind.POSE_COMMAND, 2, pose(frame="odom"), "'map'"),
+        (SensorLinkKind.SONAR, 2, sonar(), "not taken here"),
     ],
 )
 def test_what_cannot_be_done_is_told(loop, link, connect, kind, uav, message, words):
@@ -178,7 +178,7 @@ def test_what_cannot_be_done_is_told(loop, link, connect, kind, uav, message, wo
     client = connect(link.port)
     client.send(kind, uav, message, sequence=77)
     frame = client.next()
-    assert frame.kind == Kind.NOTICE
+    assert frame.kind == SensorLinkKind.NOTICE
     assert words in decode_notice(frame.payload)
     assert "77" in decode_notice(frame.payload)
 
@@ -187,7 +187,9 @@ def test_damage_is_counted_and_what_follows_is_taken(loop, link, connect):
     loop.graph.advertise("/uav2/odom", m.Odometry)
     seen = collect(loop, "/uav2/pose_command")
     client = connect(link.port)
-    whole = encode_frame(Kind.POSE_COMMAND, 2, 0, 0, encode_payload(Kind.POSE_COMMAND, pose()))
+    whole = encode_frame(
+        SensorLinkKind.POSE_COMMAND, 2, 0, 0, encode_payload(SensorLinkKind.POSE_COMMAND, pose())
+    )
     broken = bytearray(whole)
     broken[40] ^= 4
     client.socket.sendall(b"\x00\xaaV" + bytes(broken) + whole)
@@ -198,7 +200,7 @@ def test_damage_is_counted_and_what_follows_is_taken(loop, link, connect):
 
 def test_who_speaks_another_version_is_told_once(link, connect):
     client = connect(link.port)
-    frame = bytearray(encode_frame(Kind.POSE_COMMAND, 2, 0, 0, b""))
+    frame = bytearray(encode_frame(SensorLinkKind.POSE_COMMAND, 2, 0, 0, b""))
     frame[4] = 2
     from test_sensor_link import slow_crc
 
@@ -213,10 +215,10 @@ def test_who_sends_too_much_is_told_once_and_may_go_on(loop, link, connect):
     loop.graph.advertise("/uav2/odom", m.Odometry)
     commands = collect(loop, "/uav2/pose_command")
     client = connect(link.port)
-    client.socket.sendall(encode_frame(Kind.POSE_COMMAND, 2, 0, 0, bytes(5000)) * 3)
+    client.socket.sendall(encode_frame(SensorLinkKind.POSE_COMMAND, 2, 0, 0, bytes(5000)) * 3)
     notice = decode_notice(client.next().payload)
     assert notice == "a payload of type 128 with 5000 bytes is over 4096 bytes"
-    client.send(Kind.POSE_COMMAND, 2, pose(4.0))
+    client.send(SensorLinkKind.POSE_COMMAND, 2, pose(4.0))
     until(lambda: commands)
     assert link.clients[0].waiting == 0
 
@@ -247,7 +249,7 @@ def test_images_have_a_port_of_their_own(loop, link, connect):
     wanted(loop, laser)
     loop.publish(camera, image(3))
     loop.publish(laser, scan(4))
-    assert sensors.next().kind == Kind.LASER_SCAN
+    assert sensors.next().kind == SensorLinkKind.LASER_SCAN
     frame = images.next()
     name, found = decode_payload(frame.kind, frame.payload, frame.stamp_ns)
     assert name == "camera/image_raw"
@@ -280,9 +282,9 @@ def test_pictures_that_nobody_reads_delay_no_scan(loop, link, connect):
     assert len(numbers) < 60
 
 
-def test_images_at_a_rate_of_their_own(loop, doors, connect):
+def test_images_at_a_rate_of_their_own(loop, bridges, connect):
     link = SensorLink(port=0, image_port=0, image_rate_hz=10.0)
-    doors.open(link)
+    bridges.open(link)
     clock = [0]
     loop.graph._now_ns = lambda: clock[0]
     camera = loop.graph.advertise("/uav1/camera/image_raw", Image)
@@ -300,11 +302,11 @@ def test_images_at_a_rate_of_their_own(loop, doors, connect):
     assert len(stamps) == 8  # 0.63 s hold seven, and the last
 
 
-def test_a_port_in_use(link, doors):
+def test_a_port_in_use(link, bridges):
     with pytest.raises(BridgeError, match=r"in use.*choose another"):
-        doors.open(SensorLink(port=link.port, image_port=0))
+        bridges.open(SensorLink(port=link.port, image_port=0))
     with pytest.raises(BridgeError, match="in use"):
-        doors.open(SensorLink(port=0, image_port=link.image_port))
+        bridges.open(SensorLink(port=0, image_port=link.image_port))
 
 
 @pytest.mark.parametrize(
@@ -319,10 +321,10 @@ def test_what_cannot_be_opened(options, words):
         SensorLink(**options)
 
 
-def test_closing_lets_all_go(loop, link, doors, connect):
+def test_closing_lets_all_go(loop, link, bridges, connect):
     clients = [connect(link.port), connect(link.image_port)]
     until(lambda: len(link.clients) == 2)
-    doors.close()
+    bridges.close()
     for client in clients:
         with pytest.raises((AssertionError, ConnectionError)):
             client.next()
@@ -340,10 +342,10 @@ def ros():
 
 
 def joined(ros, link):
-    doors = Doors(ros.gateway)
+    bridges = BridgeHost(ros.gateway)
     client = SensorLinkClient(port=link.port, image_port=link.image_port)
-    doors.open(client)
-    return doors, client
+    bridges.open(client)
+    return bridges, client
 
 
 def subscribed(gateway):
@@ -357,8 +359,8 @@ def test_two_graphs_joined(loop, link, ros):
     scans = collect(ros, "/uav1/laser/horizontal/scan", m.LaserScan)
     images = collect(ros, "/uav1/camera/image_raw", Image)
     goals = collect(loop, "/uav1/goal_pose")
-    doors, client = joined(ros, link)
-    with doors:
+    bridges, client = joined(ros, link)
+    with bridges:
         wanted(loop, laser)
         wanted(loop, camera)
         for k in range(10):
@@ -382,13 +384,13 @@ def test_a_flight_seen_from_the_ros_side(ros):
     """What comes over the link is what the simulation publishes, byte for byte."""
     sent, heard = {}, []
     scenario = load_scenario("hover")
-    with Simulation(scenario, threads=1) as simulation, Doors(simulation.gateway) as doors:
+    with Simulation(scenario, threads=1) as simulation, BridgeHost(simulation.gateway) as bridges:
         link = SensorLink(port=0, image_port=0)
-        doors.open(link)
+        bridges.open(link)
         ros.do(lambda: ros.graph.subscribe_all(heard.append))
-        ros_doors, client = joined(ros, link)
+        ros_bridges, client = joined(ros, link)
         simulation.graph.subscribe_all(lambda p: sent.setdefault((p.topic, p.cdr)))
-        with ros_doors:
+        with ros_bridges:
             until(lambda: "/uav1/imu" in subscribed(simulation.gateway))
             simulation.run(1.0)
             until(lambda: {p.topic for p in heard} >= {"/uav1/imu", "/uav1/odom"})
@@ -397,21 +399,21 @@ def test_a_flight_seen_from_the_ros_side(ros):
     assert all((published.topic, published.cdr) in sent for published in heard)
 
 
-def test_the_ros_side_joins_again(loop, link, doors, ros):
+def test_the_ros_side_joins_again(loop, link, bridges, ros):
     publisher = loop.graph.advertise("/uav1/range", m.Range)
     seen = collect(ros, "/uav1/range", m.Range)
-    ros_doors, _ = joined(ros, link)
-    with ros_doors:
+    ros_bridges, _ = joined(ros, link)
+    with ros_bridges:
         wanted(loop, publisher)
-        doors.call(link.stop())
+        bridges.call(link.stop())
         until(lambda: not publisher.wanted)
         again = SensorLink(port=link.port, image_port=link.image_port)
-        doors.open(again)
+        bridges.open(again)
         wanted(loop, publisher)
         loop.publish(publisher, sonar(1))
         until(lambda: seen)
 
 
 def test_nobody_listens(ros):
-    with Doors(ros.gateway) as doors, pytest.raises(BridgeError, match="nobody listens"):
-        doors.open(SensorLinkClient(port=1))
+    with BridgeHost(ros.gateway) as bridges, pytest.raises(BridgeError, match="nobody listens"):
+        bridges.open(SensorLinkClient(port=1))

@@ -1,4 +1,4 @@
-"""Doors that do not go together, and options that nothing heeds."""
+"""Bridges that do not go together, and options that nothing heeds."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from volery.cli.app import app
-from volery.cli.bridge_checks import check_autopilots, check_doors, token_gaps
+from volery.cli.bridge_checks import check_autopilots, check_bridges, token_gaps
 from volery.cli.flight import RunOptions
 from volery.core.errors import BridgeError
 from volery.mavlink.scenario_setup import with_autopilots
@@ -14,28 +14,28 @@ from volery.scenario.load import load_scenario
 
 
 @pytest.mark.parametrize(
-    ("doors", "more", "text"),
+    ("bridges", "more", "text"),
     [
-        (("mavlink", "px4"), {}, "--door mavlink and --door px4 would give each UAV two"),
-        (("ardupilot=9100", "mavlink-tcp"), {}, "--door mavlink-tcp and --door ardupilot"),
+        (("mavlink", "px4"), {}, "--bridge mavlink and --bridge px4 would give each UAV two"),
+        (("ardupilot=9100", "mavlink-tcp"), {}, "--bridge mavlink-tcp and --bridge ardupilot"),
         (("mavlink", "px4-serial=/dev/ttyACM0"), {}, "two autopilots"),
         (("px4", "ardupilot"), {}, "px4 serves all of them"),
         (("px4", "px4=4600"), {}, "px4 serves all of them"),
         (("rosbridge",), {"mavlink_key": Path("no_such_file")}, "--mavlink-key signs MAVLink"),
-        (("rosbridge",), {"domain_id": 4}, "--domain-id 4: no door to ROS 2 is open"),
+        (("rosbridge",), {"domain_id": 4}, "--domain-id 4: no bridge to ROS 2 is open"),
         (("mavlink",), {"drop_silent": True}, "--drop-silent are about autopilots outside"),
         (("mavlink",), {"autopilot_timeout_s": 3.0}, "--autopilot-timeout and"),
         (("ros2=7",), {"domain_id": 4}, "--domain-id 4: ros2=7 has its own"),
         (("ros2-zenoh",), {"interfaces": ("eth0",)}, "--ros2-interface is for ROS 2 over DDS"),
     ],
 )
-def test_what_does_not_go_together(doors, more, text):
+def test_what_does_not_go_together(bridges, more, text):
     with pytest.raises(BridgeError, match=text):
-        check_doors(RunOptions("hover", doors=doors, **more))
+        check_bridges(RunOptions("hover", bridges=bridges, **more))
 
 
 @pytest.mark.parametrize(
-    ("doors", "more"),
+    ("bridges", "more"),
     [
         ((), {}),
         (("mavlink", "mavlink-tcp", "mavlink=14600", "ros2"), {"mavlink_key": Path("k")}),
@@ -44,16 +44,16 @@ def test_what_does_not_go_together(doors, more, text):
         (("ros2-zenoh=host:7447",), {"domain_id": 4}),
     ],
 )
-def test_what_goes_together(doors, more):
-    check_doors(RunOptions("hover", doors=doors, **more))
+def test_what_goes_together(bridges, more):
+    check_bridges(RunOptions("hover", bridges=bridges, **more))
 
 
 @pytest.mark.parametrize(
-    ("door", "remedy"),
+    ("bridge", "remedy"),
     [
-        ("ros-tcp", "--door rosbridge, which asks for it"),
+        ("ros-tcp", "--bridge rosbridge, which asks for it"),
         ("ros-tcp-2=10001", "SSH tunnel"),
-        ("sensor-link", "--door rosbridge"),
+        ("sensor-link", "--bridge rosbridge"),
         ("ros1", "SSH tunnel"),
         ("ros2", "SROS 2"),
         ("mavlink", "--mavlink-key"),
@@ -61,32 +61,32 @@ def test_what_goes_together(doors, more):
         ("px4", "SSH tunnel"),
     ],
 )
-def test_bridges_that_cannot_ask_for_the_token_are_named(door, remedy):
-    (gap,) = token_gaps(RunOptions("hover", doors=("rosbridge", door), token="secret"))
-    assert gap.startswith(f"--door {door}: this bridge cannot ask for the --token")
+def test_bridges_that_cannot_ask_for_the_token_are_named(bridge, remedy):
+    (gap,) = token_gaps(RunOptions("hover", bridges=("rosbridge", bridge), token="secret"))
+    assert gap.startswith(f"--bridge {bridge}: its protocol carries no token")
     assert remedy in gap
-    assert token_gaps(RunOptions("hover", doors=(door,))) == []
+    assert token_gaps(RunOptions("hover", bridges=(bridge,))) == []
 
 
 def test_signed_mavlink_needs_no_token():
-    options = RunOptions("hover", doors=("mavlink",), token="secret", mavlink_key=Path("key"))
+    options = RunOptions("hover", bridges=("mavlink",), token="secret", mavlink_key=Path("key"))
     assert token_gaps(options) == []
-    assert token_gaps(RunOptions("hover", doors=("rosbridge", "comms"), token="secret")) == []
+    assert token_gaps(RunOptions("hover", bridges=("rosbridge", "comms"), token="secret")) == []
 
 
 def test_a_scenario_with_autopilots_is_not_flown_by_others_too():
     scenario = with_autopilots(load_scenario("hover"))
-    check_autopilots(scenario, RunOptions("hover", doors=("mavlink",)))
+    check_autopilots(scenario, RunOptions("hover", bridges=("mavlink",)))
     with pytest.raises(BridgeError, match="has an autopilot of its own"):
-        check_autopilots(scenario, RunOptions("hover", doors=("px4",)))
+        check_autopilots(scenario, RunOptions("hover", bridges=("px4",)))
 
 
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        (["--door", "ros2", "--middleware", "zenoh"], "--middleware zenoh is of --ros2"),
-        (["--domain-id", "4"], "no door to ROS 2 is open"),
-        (["--door", "mavlink", "--door", "px4"], "two autopilots"),
+        (["--bridge", "ros2", "--middleware", "zenoh"], "--middleware zenoh is of --ros2"),
+        (["--domain-id", "4"], "no bridge to ROS 2 is open"),
+        (["--bridge", "mavlink", "--bridge", "px4"], "two autopilots"),
     ],
 )
 def test_the_command_line_says_so_at_once(words, text):

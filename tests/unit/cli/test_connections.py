@@ -36,12 +36,12 @@ def test_a_graph_that_goes_and_comes_is_told_once_each(capsys) -> None:
         connected = True
 
     line = Line()
-    told = connections.LinkTold(line, "x://y")
+    told = connections.ConnectionOptions(line, "x://y")
     for connected in (True, False, False, True, True):
         line.connected = connected
         assert told() is False
     assert capsys.readouterr().err == (
         "the graph at x://y is gone; waiting for it\nthe graph at x://y is there again\n"
     )
-    assert connections.LinkTold(object(), "ros2")() is False  # of which no server tells
+    assert connections.ConnectionOptions(object(), "ros2")() is False  # of which no server tells
     assert capsys.readouterr().err == ""

@@ -15,7 +15,7 @@ GAPS = "gap_following"
         (["no_such_module:Node"], "cannot be imported"),
         (["volery.autonomy.avoidance.gap_following:Nobody"], "has no class 'Nobody'"),
         (
-            ["volery.autonomy.avoidance.gap_following:Phase"],
+            ["volery.autonomy.avoidance.gap_following:GapFollowingPhase"],
             "is no subclass of volery.graph.nodes.node.Node",
         ),
         ([GAPS, "--lock-step", "0"], "lock-step"),

@@ -33,7 +33,7 @@ def page_of(monkeypatch):
         (["hover", "--page"], "", 1.0),
         (["--page", "hover"], "", 1.0),
         (["hover", "--page=127.0.0.1:8081", "--speed", "2"], "127.0.0.1:8081", 2.0),
-        (["hover", "--page", "--door", "rosbridge"], "", 1.0),
+        (["hover", "--page", "--bridge", "rosbridge"], "", 1.0),
     ],
 )
 def test_the_option_and_its_value_that_may_be_left_away(page_of, words, page, speed):
@@ -42,22 +42,22 @@ def test_the_option_and_its_value_that_may_be_left_away(page_of, words, page, sp
 
 
 @pytest.mark.parametrize(
-    ("words", "doors", "domain", "interfaces"),
+    ("words", "bridges", "domain", "interfaces"),
     [
         (["--ros2"], ("ros2",), None, ()),
         (["--ros2", "--domain-id", "7"], ("ros2",), 7, ()),
         (["--ros2", "--middleware", "zenoh"], ("ros2-zenoh",), None, ()),
         (
-            ["--door", "ros1", "--ros2", "--ros2-interface", "eth0"],
+            ["--bridge", "ros1", "--ros2", "--ros2-interface", "eth0"],
             ("ros1", "ros2"),
             None,
             ("eth0",),
         ),
     ],
 )
-def test_ros2_is_a_door_with_options_of_its_own(page_of, words, doors, domain, interfaces):
+def test_ros2_is_a_bridge_with_options_of_its_own(page_of, words, bridges, domain, interfaces):
     options = page_of("hover", *words)
-    assert (options.doors, options.domain_id, options.interfaces) == (doors, domain, interfaces)
+    assert (options.bridges, options.domain_id, options.interfaces) == (bridges, domain, interfaces)
     assert options.speed == 1.0
 
 

@@ -11,9 +11,9 @@ from typer.testing import CliRunner
 from volery.autonomy.perception.static_transforms import LEVEL
 from volery.cli.app import app
 from volery.cli.slam import _advise
-from volery.runtime.replay.slam.offline_slam import Outcome, SlamRun
-from volery.runtime.replay.slam.topic_selection import Channels
-from volery.runtime.replay.slam.trajectory import Trajectory
+from volery.runtime.replay.slam.offline_slam import OfflineSlam, SlamResult
+from volery.runtime.replay.slam.topic_selection import TopicSelection
+from volery.runtime.replay.slam.trajectory import EstimatedTrajectory
 
 CORNERS = [(0.0, 0.0), (16.0, 0.0)]
 FILES = ("map.pgm", "map.png", "map.yaml", "path.tum", "summary.json")
@@ -157,7 +157,7 @@ def test_a_folder_that_cannot_be_written_to_is_told_before_the_work(text, monkey
     def work(*_):
         raise AssertionError("it maps already")
 
-    monkeypatch.setattr(SlamRun, "run", work)
+    monkeypatch.setattr(OfflineSlam, "run", work)
     layout = ("--layout", text / "layout.toml")
     result = slam(text / "scans.txt", *layout, "--out", "/proc/nowhere/out")
     assert result.exit_code == 2
@@ -194,10 +194,10 @@ def test_a_uav_that_is_not_in_the_log_is_told(text, tmp_path):
 
 
 def test_an_imu_that_was_not_used_is_advised_where_the_plane_does_not_do(capsys):
-    channels = Channels("uav1", {}, has_imu=False)
+    channels = TopicSelection("uav1", {}, has_imu=False)
     empty = np.zeros(0, np.int64)
-    way = Trajectory(empty, empty, np.zeros((0, 3)), np.zeros((0, 4)))
-    outcome = Outcome(channels, way, [], lambda _: LEVEL, 9, 9.0, 0.1, {})
+    way = EstimatedTrajectory(empty, empty, np.zeros((0, 3)), np.zeros((0, 4)))
+    outcome = SlamResult(channels, way, [], lambda _: LEVEL, 9, 9.0, 0.1, {})
     topics = {"/uav1/imu": "sensor_msgs/msg/Imu"}
     outcome.states.update(tracking=6.0, degraded=3.0)
     _advise(outcome, {})

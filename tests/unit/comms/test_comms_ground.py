@@ -14,7 +14,7 @@ import pytest
 from live_graph import LiveGraph
 
 from volery.bench.comms import served
-from volery.bridges.bridge_host import Doors
+from volery.bridges.bridge_host import BridgeHost
 from volery.cli.gcs import parse_server
 from volery.comms.addresses import ALL, ALL_GROUND, FIRST_GROUND, Identity, batch_address, is_meant
 from volery.comms.control_payloads import Reason, Refusal
@@ -31,11 +31,11 @@ from volery.comms.payloads import (
     decode_named,
     encode_named,
 )
-from volery.comms.protocol import Frame, Kind
+from volery.comms.protocol import StationFrame, StationFrameKind
 from volery.comms.server.tcp import CommsServer
 from volery.comms.station.address_parsing import address_of
-from volery.comms.station.ground_station import Ground
-from volery.comms.station.station_bridge import UavStations
+from volery.comms.station.ground_station import GroundStation
+from volery.comms.station.station_bridge import StationBridge
 from volery.comms.station.tcp import Station
 from volery.core.errors import CommsError
 from volery.graph.codecs.zero import zero_message
@@ -55,16 +55,16 @@ def state(name="uav1", mode="HOLD", battery=0.5):
 
 def frame(name, msgtype, message, source=0, time_ns=0):
     payload = encode_named(name, msgtype, message)
-    return Frame(Kind.SENSING, source, FIRST_GROUND, 1, 1, time_ns, payload)
+    return StationFrame(StationFrameKind.SENSING, source, FIRST_GROUND, 1, 1, time_ns, payload)
 
 
 class Desk:
     def __init__(self):
         self.sent = []
-        self.ground = Ground(self.send)
+        self.ground = GroundStation(self.send)
 
     def send(self, kind, address, payload):
-        assert kind is Kind.COMMAND
+        assert kind is StationFrameKind.COMMAND
         self.sent.append((address, decode_named(payload)))
         return len(self.sent)
 
@@ -144,7 +144,7 @@ def test_states_replies_and_refusals_are_shown() -> None:
     desk.ground.command("hold 9")
     refused = desk.ground.refused(Refusal(Reason.UNKNOWN, 1, "no station 9"))
     assert refused == "refused: hold to 9: no station 9"
-    broken = Frame(Kind.SENSING, 5, 0, 1, 1, 0, b"\x05stat")
+    broken = StationFrame(StationFrameKind.SENSING, 5, 0, 1, 1, 0, b"\x05stat")
     assert "not a message" in desk.ground.take(broken, 0)
 
 
@@ -224,7 +224,7 @@ def test_what_a_server_has_kept_is_as_old_as_it_is(clock_s: int) -> None:
 
 def test_commands_without_a_server_are_queued_and_named_at_the_end() -> None:
     joined, asked = [True, False], iter((7, 8))
-    ground = Ground(lambda *_: next(asked), is_joined=lambda: joined.pop(0))
+    ground = GroundStation(lambda *_: next(asked), is_joined=lambda: joined.pop(0))
     assert ground.command("hold 0").startswith("sent: hold to 0")
     said = ground.command("land 1")
     assert said.startswith("queued: land to 1")
@@ -278,8 +278,8 @@ def test_gcs_says_that_the_server_is_gone_and_back_and_what_did_not_come() -> No
 def test_a_script_waits_for_the_first_states(graph) -> None:
     vehicles = graph.do(lambda: graph.graph.advertise("/volery/vehicles", States))
     both = States(Header(Time(0, 0), "map"), [state("uav1"), state("uav2")])
-    with served() as (_, port), Doors(graph.gateway) as doors, Gcs(port) as gcs:
-        doors.open(UavStations(port=port))
+    with served() as (_, port), BridgeHost(graph.gateway) as bridges, Gcs(port) as gcs:
+        bridges.open(StationBridge(port=port))
         gcs.tell("list\nquit")
         gcs.says("joined as ground station")
         for _ in range(5):
@@ -329,8 +329,8 @@ def test_uavs_of_a_graph_are_commanded_by_lines_of_another_process(graph) -> Non
         message = States(Header(Time(0, 0), "map"), [state("uav1"), state("uav2")])
         graph.do(lambda: vehicles.publish(message))
 
-    with served() as (_, port), Doors(graph.gateway) as doors:
-        doors.open(UavStations(port=port))
+    with served() as (_, port), BridgeHost(graph.gateway) as bridges:
+        bridges.open(StationBridge(port=port))
         command = [sys.executable, "-m", "volery.cli.app", "gcs", "--server", f"127.0.0.1:{port}"]
         gcs = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1
@@ -394,7 +394,7 @@ def test_a_mission_takes_what_would_go_against_it(graph) -> None:
 
     async def command() -> None:
         station = Station(Identity.ground(0), lambda f: told.append(ground.take(f, 0)), port=port)
-        ground = Ground(station.send)
+        ground = GroundStation(station.send)
         await station.start()
 
         async def until(true) -> None:
@@ -415,8 +415,8 @@ def test_a_mission_takes_what_would_go_against_it(graph) -> None:
             )
         await station.stop()
 
-    with served() as (_, port), Doors(graph.gateway) as doors:
-        doors.open(UavStations(port=port))
+    with served() as (_, port), BridgeHost(graph.gateway) as bridges:
+        bridges.open(StationBridge(port=port))
         asyncio.run(command())
     mission = "/uav1/task_manager"
     assert asked == [

@@ -37,9 +37,9 @@ from volery.comms.control_payloads import (
 from volery.comms.protocol import (
     PAYLOAD_LIMIT_BYTES,
     SYNC,
-    Frame,
-    FrameParser,
-    Kind,
+    StationFrame,
+    StationFrameKind,
+    StationFrameParser,
     encode_frame,
 )
 from volery.core.errors import CommsError
@@ -56,7 +56,7 @@ def slow_crc(data: bytes) -> int:
     return crc
 
 
-def slow_frame(frame: Frame, version: int = 1) -> bytes:
+def slow_frame(frame: StationFrame, version: int = 1) -> bytes:
     """A frame put together field by field."""
     head = bytes([version, frame.kind])
     fields = (
@@ -73,11 +73,11 @@ def slow_frame(frame: Frame, version: int = 1) -> bytes:
     return b"\xaa\x56\x43\x4d" + body + slow_crc(body).to_bytes(2, "little")
 
 
-def encoded(frame: Frame) -> bytes:
+def encoded(frame: StationFrame) -> bytes:
     return encode_frame(*frame[:-1])
 
 
-def plain(found: list[Frame]) -> list[Frame]:
+def plain(found: list[StationFrame]) -> list[StationFrame]:
     return [frame._replace(data=b"") for frame in found]
 
 
@@ -90,11 +90,11 @@ frames = st.tuples(
     u32,
     st.integers(-(2**63), 2**63 - 1),
     st.binary(max_size=80) | st.just(SYNC * 3),
-).map(lambda fields: Frame(*fields))
+).map(lambda fields: StationFrame(*fields))
 
 
 def test_golden_frame() -> None:
-    frame = Frame(Kind.COMMAND, 5, 6, 0x0A0B0C0D, 2, 1_500_000_000, b"hello")
+    frame = StationFrame(StationFrameKind.COMMAND, 5, 6, 0x0A0B0C0D, 2, 1_500_000_000, b"hello")
     data = encoded(frame)
     assert data[:4].hex() == "aa56434d"
     assert data[4:28].hex() == "01100500060005000d0c0b0a02000000002f685900000000"
@@ -106,17 +106,17 @@ def test_golden_frame() -> None:
 
 
 @given(frames)
-def test_frames_equal_those_of_the_slow_encoder_and_come_back(frame: Frame) -> None:
+def test_frames_equal_those_of_the_slow_encoder_and_come_back(frame: StationFrame) -> None:
     data = encoded(frame)
     assert data == slow_frame(frame)
-    (found,) = FrameParser().feed(data)
+    (found,) = StationFrameParser().feed(data)
     assert found == frame._replace(data=data)
 
 
 @given(st.lists(frames, max_size=8), st.data())
 def test_however_a_stream_is_cut_the_frames_are_the_same(sent, data) -> None:
     stream = b"".join(map(encoded, sent))
-    parser, found = FrameParser(), []
+    parser, found = StationFrameParser(), []
     while stream:
         cut = data.draw(st.integers(1, len(stream)))
         found += parser.feed(stream[:cut])
@@ -130,19 +130,19 @@ def test_undamaged_frames_are_found_behind_a_damaged_one(sent, noise, data) -> N
     broken = bytearray(encoded(sent[0]))
     bit = data.draw(st.integers(0, 8 * len(broken) - 1))
     broken[bit // 8] ^= 1 << bit % 8
-    parser = FrameParser()
+    parser = StationFrameParser()
     found = parser.feed(noise + bytes(broken) + b"".join(map(encoded, sent[1:]))) + parser.finish()
     assert plain(found) == sent[1:]
 
 
 def test_flaws_are_told_apart() -> None:
-    frame = Frame(Kind.SENSING, 1, 2, 3, 4, 5, bytes(range(20)))
+    frame = StationFrame(StationFrameKind.SENSING, 1, 2, 3, 4, 5, bytes(range(20)))
     whole = encoded(frame)
     head, body = bytearray(whole), bytearray(whole)
     head[8] ^= 1
     body[35] ^= 1
-    long = Frame(Kind.SENSING, 1, 2, 3, 4, 5, bytes(PAYLOAD_LIMIT_BYTES + 1))
-    parser = FrameParser()
+    long = StationFrame(StationFrameKind.SENSING, 1, 2, 3, 4, 5, bytes(PAYLOAD_LIMIT_BYTES + 1))
+    parser = StationFrameParser()
     stream = b"".join((head, body, slow_frame(frame, 2), slow_frame(long), whole, whole[:-1]))
     found = parser.feed(stream) + parser.finish()
     assert plain(found) == [frame]
@@ -158,9 +158,9 @@ def test_flaws_are_told_apart() -> None:
 
 def test_what_does_not_fit_is_refused() -> None:
     with pytest.raises(CommsError, match="limit"):
-        encode_frame(Kind.COMMAND, 1, 2, payload=bytes(PAYLOAD_LIMIT_BYTES + 1))
+        encode_frame(StationFrameKind.COMMAND, 1, 2, payload=bytes(PAYLOAD_LIMIT_BYTES + 1))
     with pytest.raises(CommsError, match="70000"):
-        encode_frame(Kind.COMMAND, 70_000, 2)
+        encode_frame(StationFrameKind.COMMAND, 70_000, 2)
 
 
 @given(st.text(max_size=60), st.text(max_size=60), u16, u16, u16)

@@ -14,8 +14,8 @@ from volery.comms.control_payloads import (
     encode_hello,
 )
 from volery.comms.link_model import Delivery
-from volery.comms.local_network import Exchange
-from volery.comms.protocol import FrameParser, Kind, encode_frame
+from volery.comms.local_network import LocalNetwork
+from volery.comms.protocol import StationFrameKind, StationFrameParser, encode_frame
 from volery.comms.server.router import Router
 from volery.comms.server.settings import RouterSettings
 from volery.comms.station.core import StationCore
@@ -68,7 +68,7 @@ def test_unknown_stations_are_refused_and_told() -> None:
     bench = Bench()
     one = bench.station(0)
     bench.run(LATE)
-    number = bench.send(0, 9, "?", Kind.COMMAND)
+    number = bench.send(0, 9, "?", StationFrameKind.COMMAND)
     bench.run()
     refusal = one.refusals.pop()
     assert (refusal.reason, refusal.sequence) == (Reason.UNKNOWN, number)
@@ -153,9 +153,9 @@ def test_a_message_to_many_that_one_refuses_still_comes_to_the_others() -> None:
         bench.station(address)
     bench.run(LATE)
     bench.cut(1)
-    bench.send(0, 1, "first", Kind.COMMAND)
+    bench.send(0, 1, "first", StationFrameKind.COMMAND)
     bench.run()
-    bench.send(0, ALL, "to all", Kind.COMMAND)
+    bench.send(0, ALL, "to all", StationFrameKind.COMMAND)
     bench.run(acknowledge=False)
     assert [r.reason for r in bench.cores[0].refusals] == [Reason.FULL]
     bench.cut(2)
@@ -172,7 +172,7 @@ def test_the_newest_of_two_with_one_identity_wins() -> None:
     old = bench.station(0)
     old_connection = bench.connections.pop(0)
     bench.station(0, session=2)
-    reply = FrameParser().feed(bench.router.take(old_connection, bench.now))
+    reply = StationFrameParser().feed(bench.router.take(old_connection, bench.now))
     assert decode_refusal(reply[-1].payload).reason is Reason.REPLACED
     assert bench.router.closing(old_connection)
     old.feed(reply[-1].data, bench.now)
@@ -204,7 +204,7 @@ def test_measurements_give_way_and_commands_are_refused() -> None:
     bench.cut(1)
     for k in range(6):
         bench.send(0, 1, f"s{k}")
-        bench.send(0, 1, f"c{k}", Kind.COMMAND)
+        bench.send(0, 1, f"c{k}", StationFrameKind.COMMAND)
     bench.run()
     assert [r.reason for r in one.refusals] == [Reason.FULL] * 2
     bench.connect(1)
@@ -261,7 +261,7 @@ def test_floods_are_cut_off_by_rate() -> None:
     one, _ = bench.station(0), bench.station(1)
     for k in range(30):
         bench.send(0, 1, str(k))
-    bench.send(0, 1, "command", Kind.COMMAND)
+    bench.send(0, 1, "command", StationFrameKind.COMMAND)
     bench.run()
     assert len(bench.got[1]) == 20
     assert bench.router.statistics.flooded == 10
@@ -277,7 +277,7 @@ def test_old_messages_expire() -> None:
     one, _ = bench.station(0), bench.station(1)
     bench.cut(1)
     bench.send(0, 1, "s")
-    bench.send(0, 1, "c", Kind.COMMAND)
+    bench.send(0, 1, "c", StationFrameKind.COMMAND)
     bench.run(12 * S)
     assert [r.reason for r in one.refusals] == [Reason.EXPIRED]
     assert bench.router.statistics.expired == 2
@@ -293,9 +293,9 @@ def test_sensing_for_many_does_not_wait_for_who_is_long_away() -> None:
     bench.run(10 * S)
     bench.cut(1)
     for text, to, kind in (
-        ("early", ALL, Kind.SENSING),
-        ("mine", 1, Kind.SENSING),
-        ("go", ALL, Kind.COMMAND),
+        ("early", ALL, StationFrameKind.SENSING),
+        ("mine", 1, StationFrameKind.SENSING),
+        ("go", ALL, StationFrameKind.COMMAND),
     ):
         bench.send(0, to, text, kind)
     bench.run(6 * S)
@@ -373,20 +373,24 @@ HELLO = encode_hello(Hello(0, 0, 4, "", ""))
 @pytest.mark.parametrize(
     ("frame", "reason"),
     [
-        (encode_frame(Kind.PING, 0, SERVER), Reason.PROTOCOL),
-        (encode_frame(Kind.HELLO, 0, SERVER, payload=b"\xff"), Reason.PROTOCOL),
-        (encode_frame(Kind.HELLO, 1, SERVER, payload=HELLO), Reason.IDENTITY),
+        (encode_frame(StationFrameKind.PING, 0, SERVER), Reason.PROTOCOL),
+        (encode_frame(StationFrameKind.HELLO, 0, SERVER, payload=b"\xff"), Reason.PROTOCOL),
+        (encode_frame(StationFrameKind.HELLO, 1, SERVER, payload=HELLO), Reason.IDENTITY),
         (
-            encode_frame(Kind.HELLO, 0, SERVER, payload=encode_hello(Hello(0, 7, 4, "", ""))),
+            encode_frame(
+                StationFrameKind.HELLO, 0, SERVER, payload=encode_hello(Hello(0, 7, 4, "", ""))
+            ),
             Reason.IDENTITY,
         ),
         (
-            encode_frame(Kind.HELLO, 0, SERVER, payload=encode_hello(Hello(0, 0, 3, "", ""))),
+            encode_frame(
+                StationFrameKind.HELLO, 0, SERVER, payload=encode_hello(Hello(0, 0, 3, "", ""))
+            ),
             Reason.BATCH_SIZE,
         ),
         (
-            encode_frame(Kind.HELLO, 0, SERVER, payload=HELLO)
-            + encode_frame(Kind.SENSING, 1, 2, 0, 1),
+            encode_frame(StationFrameKind.HELLO, 0, SERVER, payload=HELLO)
+            + encode_frame(StationFrameKind.SENSING, 1, 2, 0, 1),
             Reason.PROTOCOL,
         ),
     ],
@@ -395,7 +399,7 @@ def test_who_breaks_the_protocol_is_told_and_let_go(frame: bytes, reason: Reason
     router = Router(RouterSettings(), 0, 1)
     connection = router.connect(0)
     router.receive(connection, frame, 0)
-    answer = FrameParser().feed(router.take(connection, 0))
+    answer = StationFrameParser().feed(router.take(connection, 0))
     assert decode_refusal(answer[-1].payload).reason is reason
     assert router.closing(connection)
     assert router.statistics.refused == {reason: 1}
@@ -403,11 +407,13 @@ def test_who_breaks_the_protocol_is_told_and_let_go(frame: bytes, reason: Reason
 
 def test_tokens() -> None:
     router = Router(RouterSettings(token="öffne"), 0, 1)
-    for token, kind in (("falsch", Kind.REFUSAL), ("öffne", Kind.WELCOME)):
+    for token, kind in (("falsch", StationFrameKind.REFUSAL), ("öffne", StationFrameKind.WELCOME)):
         connection = router.connect(0)
         hello = encode_hello(Hello(0, 0, 4, "", token))
-        router.receive(connection, encode_frame(Kind.HELLO, 0, SERVER, payload=hello), 0)
-        (answer,) = FrameParser().feed(router.take(connection, 0))
+        router.receive(
+            connection, encode_frame(StationFrameKind.HELLO, 0, SERVER, payload=hello), 0
+        )
+        (answer,) = StationFrameParser().feed(router.take(connection, 0))
         assert answer.kind == kind
     assert decode_welcome(answer.payload).boot == 1
 
@@ -415,7 +421,7 @@ def test_tokens() -> None:
 def test_corrupt_and_half_frames_are_counted_and_too_many_end_the_connection() -> None:
     bench = Bench(RouterSettings(most_corrupt=3))
     bench.station(0), bench.station(1)
-    whole = encode_frame(Kind.SENSING, 0, 1, 1, 1, 0, b"whole")
+    whole = encode_frame(StationFrameKind.SENSING, 0, 1, 1, 1, 0, b"whole")
     broken = bytearray(whole)
     broken[-1] ^= 1
     connection = bench.connections[0]
@@ -438,10 +444,10 @@ def test_a_link_may_lose_and_delay_but_never_reorders() -> None:
         number = int(frame.payload)
         return Delivery(lost=number % 3 == 2, delay_ns=(10 - number) * 10 * MS)
 
-    exchange = Exchange(link=link)
+    exchange = LocalNetwork(link=link)
     one, two = exchange.join(Identity(0, 0)), exchange.join(Identity(0, 1))
     for k in range(6):
-        one.send(Kind.SENSING, two.address, str(k).encode(), 0)
+        one.send(StationFrameKind.SENSING, two.address, str(k).encode(), 0)
     times = {}
     for step in range(1, 30):
         for address, frame in exchange.advance(step * 10 * MS):
@@ -462,14 +468,14 @@ def test_there_is_room_for_so_many_connections() -> None:
 def test_a_station_holds_only_so_much() -> None:
     core = StationCore(Identity(0, 0), 1)
     for k in range(1024):
-        core.send(Kind.COMMAND if k % 2 else Kind.SENSING, 1, b"", k)
+        core.send(StationFrameKind.COMMAND if k % 2 else StationFrameKind.SENSING, 1, b"", k)
     with pytest.raises(CommsError, match="1024"):
-        core.send(Kind.COMMAND, 1, b"", 0)
+        core.send(StationFrameKind.COMMAND, 1, b"", 0)
     for _ in range(512):
-        core.send(Kind.SENSING, 1, b"", 0)
+        core.send(StationFrameKind.SENSING, 1, b"", 0)
     assert core.unsettled == 1024
     assert core.dropped == 512
-    core.send(Kind.COMMAND, 2, b"", 0)
+    core.send(StationFrameKind.COMMAND, 2, b"", 0)
 
 
 def test_impossible_settings() -> None:

@@ -10,7 +10,7 @@ import pytest
 from volery.bench.comms import Traffic, served
 from volery.comms.addresses import ALL, Identity
 from volery.comms.control_payloads import Hello, Reason, encode_hello
-from volery.comms.protocol import Kind, encode_frame
+from volery.comms.protocol import StationFrameKind, encode_frame
 from volery.comms.server.settings import RouterSettings
 from volery.comms.server.tcp import CommsServer
 from volery.comms.station.tcp import Station
@@ -55,7 +55,7 @@ def test_messages_of_both_kinds_come_in_order() -> None:
         got: list[bytes] = []
         one, two = await joined(server, 0), await joined(server, 5, got)
         for k in range(300):
-            kind = Kind.COMMAND if k % 3 else Kind.SENSING
+            kind = StationFrameKind.COMMAND if k % 3 else StationFrameKind.SENSING
             one.send(kind, ALL if k % 2 else 5, str(k).encode())
         await asyncio.wait_for(one.until_settled(), 10.0)
         assert got == [str(k).encode() for k in range(300)]
@@ -76,11 +76,11 @@ def test_a_station_that_does_not_read_delays_nobody() -> None:
             stuck.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
             stuck.connect(("127.0.0.1", server.port))
             hello = encode_hello(Hello(0, 2, 4, "stuck", ""))
-            stuck.sendall(encode_frame(Kind.HELLO, 2, 0, payload=hello))
+            stuck.sendall(encode_frame(StationFrameKind.HELLO, 2, 0, payload=hello))
             await until(lambda: server.statistics.present == 3)
             for _ in range(100):
-                one.send(Kind.SENSING, 2, bytes(10_000))
-                one.send(Kind.SENSING, 1, b"x")
+                one.send(StationFrameKind.SENSING, 2, bytes(10_000))
+                one.send(StationFrameKind.SENSING, 1, b"x")
             await until(lambda: len(got) == 100)
             assert server.statistics.waiting >= 100
         for station in (one, reader):
@@ -106,14 +106,16 @@ def test_noise_and_half_frames_harm_nobody() -> None:
     async def test(server) -> None:
         got: list[bytes] = []
         one, two = await joined(server, 0), await joined(server, 1, got)
-        hello = encode_frame(Kind.HELLO, 2, 0, payload=encode_hello(Hello(0, 2, 4, "", "")))
+        hello = encode_frame(
+            StationFrameKind.HELLO, 2, 0, payload=encode_hello(Hello(0, 2, 4, "", ""))
+        )
         for data in (b"no frame at all\r\n\r\n" * 10, hello[:-3], hello[:-1] + b"?" + hello):
             with socket.create_connection(("127.0.0.1", server.port)) as noisy:
                 noisy.sendall(data)
         await until(lambda: server.statistics.noise_bytes > 180)
         await until(lambda: server.statistics.connections == 2)
         assert server.statistics.corrupt.keys() <= {Flaw.BODY, Flaw.CUT}
-        one.send(Kind.COMMAND, 1, b"still here")
+        one.send(StationFrameKind.COMMAND, 1, b"still here")
         await until(lambda: got == [b"still here"])
         await one.stop()
         await two.stop()

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from volery.comms.addresses import ALL
-from volery.comms.protocol import Frame, FrameParser, Kind, encode_frame
-from volery.comms.radio.channel import RadioLink
+from volery.comms.protocol import StationFrame, StationFrameKind, StationFrameParser, encode_frame
+from volery.comms.radio.channel import RadioChannel
 from volery.comms.radio.path_loss import (
     Paths,
     distance_loss_db,
@@ -23,18 +23,18 @@ from volery.scenario.radio import Radio
 S = 1_000_000_000
 
 
-def frame_of(number: int, *, source: int = 0, to: int = ALL, size: int = 100) -> Frame:
-    data = encode_frame(Kind.SENSING, source, to, 1, number, 0, bytes(size))
-    return next(iter(FrameParser().feed(data)))
+def frame_of(number: int, *, source: int = 0, to: int = ALL, size: int = 100) -> StationFrame:
+    data = encode_frame(StationFrameKind.SENSING, source, to, 1, number, 0, bytes(size))
+    return next(iter(StationFrameParser().feed(data)))
 
 
 def link_of(
     radio: Radio, places: dict[int, tuple[float, ...]], foliage_m: float = 0.0
-) -> RadioLink:
+) -> RadioChannel:
     def looks(starts: np.ndarray, _ends: np.ndarray) -> Paths:
         return Paths.clear(len(starts))._replace(foliage_m=np.full(len(starts), foliage_m))
 
-    return RadioLink(radio, 1, lambda: {a: np.array(p) for a, p in places.items()}, looks)
+    return RadioChannel(radio, 1, lambda: {a: np.array(p) for a, p in places.items()}, looks)
 
 
 def test_free_space_is_that_of_friis() -> None:

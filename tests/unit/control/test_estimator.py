@@ -10,7 +10,7 @@ from volery.control.estimator.errors import (
     twist_covariance,
 )
 from volery.control.estimator.estimator import Estimate, Estimator
-from volery.control.estimator.records import Aid
+from volery.control.estimator.records import AidingSource
 from volery.control.estimator.settings import EstimatorSettings, Mounting, StartSigmas
 from volery.core import rotations
 from volery.core.errors import EstimatorError
@@ -136,10 +136,10 @@ def test_late_and_absent_measurements():
     estimator.fuse_range(rows, 92 * STEP, [np.inf, 1.0], 0.01, -1.0)
     estimator.fuse_pressure_height(rows, 92 * STEP, [0.0, 0.0], np.array([np.inf, np.nan]))
     hover(estimator, rows, 101, 140, gnss=False)
-    assert estimator.gate(Aid.PRESSURE_HEIGHT).accepted.tolist() == [0, 0]
+    assert estimator.gate(AidingSource.PRESSURE_HEIGHT).accepted.tolist() == [0, 0]
     assert np.isfinite(estimator.covariance(rows)).all()
-    assert estimator.gate(Aid.GNSS_POSITION).accepted.tolist() == [2, 0]
-    assert estimator.gate(Aid.RANGE_TO_GROUND).accepted.tolist() == [0, 1]
+    assert estimator.gate(AidingSource.GNSS_POSITION).accepted.tolist() == [2, 0]
+    assert estimator.gate(AidingSource.RANGE_TO_GROUND).accepted.tolist() == [0, 1]
     assert np.isfinite(estimator.state.position_map).all()
 
 
@@ -149,7 +149,7 @@ def test_an_outlier_is_rejected_and_a_lasting_one_believed():
     hover(estimator, rows, 0, 800)
     before = estimator.state.position_map.copy()
     hover(estimator, rows, 801, 2000, offset=(30.0, 0.0, 0.0))
-    gate = estimator.gate(Aid.GNSS_POSITION)
+    gate = estimator.gate(AidingSource.GNSS_POSITION)
     assert gate.rejected[0] == 30
     assert gate.innovation[0] > 32
     np.testing.assert_allclose(estimator.state.position_map, before, atol=2.0)
@@ -198,7 +198,7 @@ def test_a_slam_that_found_itself_elsewhere_is_believed_when_it_insists():
     estimator, place, yaw = still(1, velocity=[[0.5, 0.0, 0.0]]), (4.0, -3.0, 0.0), 0.6
     hover_by_poses(estimator, 0, 1, place=(0.0, 0.0, 0.0))
     hover_by_poses(estimator, 2, 200, place=place, yaw=yaw)  # not for a second yet
-    gate = estimator.gate(Aid.POSE_POSITION)
+    gate = estimator.gate(AidingSource.POSE_POSITION)
     assert gate.rejected[0] == 8
     assert np.linalg.norm(estimator.state.position_map[0]) < 0.6
     hover_by_poses(estimator, 201, 275, place=place, yaw=yaw)
@@ -231,7 +231,7 @@ def test_a_range_of_a_box_below_is_not_the_ground():
             box = 100 <= k < 140
             estimator.fuse_range([0], k * STEP, [2.0 if box else 3.0], 1e-4, 0.0)
         estimator.predict([0], k * STEP, np.zeros((1, 3)), [[0, 0, G]])
-    assert estimator.gate(Aid.RANGE_TO_GROUND).rejected[0] == 2
+    assert estimator.gate(AidingSource.RANGE_TO_GROUND).rejected[0] == 2
     assert estimator.state.position_map[0, 2] == pytest.approx(3.0, abs=0.05)
 
 

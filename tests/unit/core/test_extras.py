@@ -53,9 +53,9 @@ def answers_of_loops():
 
 
 def ros2(middleware):
-    from volery.bridges.ros2.environment import Ros2Terms, join_ros2
+    from volery.bridges.ros2.environment import Ros2Environment, join_ros2
 
-    return lambda: join_ros2(Ros2Terms(middleware))
+    return lambda: join_ros2(Ros2Environment(middleware))
 
 
 def browser():

@@ -6,7 +6,7 @@ import pytest
 
 from volery.core.errors import CommandError
 from volery.engine.call_budget import MAX_FRACTION, CallBudget
-from volery.engine.command_queue import Inbox
+from volery.engine.command_queue import CommandQueue
 
 
 class Clock:
@@ -22,7 +22,7 @@ class Bench:
 
     def __init__(self):
         self.wall, self.cpu = Clock(), Clock()
-        self.inbox = Inbox(cpu_s=self.cpu, now_s=self.wall)
+        self.inbox = CommandQueue(cpu_s=self.cpu, now_s=self.wall)
         self.done = []
 
     def post(self, queue, name, cost_s=0.0):

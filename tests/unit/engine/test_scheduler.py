@@ -1,7 +1,7 @@
 """Firings: at the right step, in a fixed order, without drift."""
 
 from volery.core.clock import Schedule
-from volery.engine.scheduler import Agenda
+from volery.engine.scheduler import Scheduler
 
 MS = 1_000_000
 
@@ -14,7 +14,7 @@ def run(agenda, steps):
 
 
 def test_rates_and_phases():
-    agenda = Agenda(MS)
+    agenda = Scheduler(MS)
     agenda.add("a", Schedule.from_hz(200.0))
     agenda.add("b", Schedule.from_hz(100.0, 3 * MS))
     log = run(agenda, 10)
@@ -22,7 +22,7 @@ def test_rates_and_phases():
 
 
 def test_an_instant_between_steps_fires_at_the_next_step():
-    agenda = Agenda(MS)
+    agenda = Scheduler(MS)
     agenda.add("camera", Schedule.from_hz(30.0))
     steps = [step for step, _, _ in run(agenda, 1000)]
     assert steps[:4] == [0, 34, 67, 100]
@@ -30,7 +30,7 @@ def test_an_instant_between_steps_fires_at_the_next_step():
 
 
 def test_lag_delays_the_firing_but_not_the_instant():
-    agenda = Agenda(MS)
+    agenda = Scheduler(MS)
     agenda.add("lidar", Schedule.from_hz(40.0), lag_ns=18_750_000)
     first, second = (agenda.pop_due(19), agenda.pop_due(44))
     assert [d.instant_ns for d in first + second] == [0, 25 * MS]
@@ -38,7 +38,7 @@ def test_lag_delays_the_firing_but_not_the_instant():
 
 
 def test_simultaneous_firings_keep_the_order_of_addition():
-    agenda = Agenda(MS)
+    agenda = Scheduler(MS)
     for name in "zyx":
         agenda.add(name, Schedule.from_hz(100.0))
     assert [d.what for d in agenda.pop_due(0)] == ["z", "y", "x"]
@@ -46,7 +46,7 @@ def test_simultaneous_firings_keep_the_order_of_addition():
 
 
 def test_an_entry_added_late_does_not_fire_for_the_past():
-    agenda = Agenda(MS)
+    agenda = Scheduler(MS)
     agenda.add("timer", Schedule.from_hz(100.0), after_step=25)
     assert agenda.next_step() == 30
-    assert Agenda(MS).next_step() is None
+    assert Scheduler(MS).next_step() is None

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from volery.core.errors import DivergenceError
-from volery.runtime.vectorized_simulation import Copies
+from volery.runtime.vectorized_simulation import VectorizedSimulation
 from volery.scenario.load import parse_scenario
 
 
@@ -82,7 +82,7 @@ def test_a_spawned_uav_is_looked_at(flying):
 
 
 def test_vectorized_simulations_name_the_copy(flat_data):
-    with Copies(parse_scenario(flat_data), 5, threads=2) as copies:
+    with VectorizedSimulation(parse_scenario(flat_data), 5, threads=2) as copies:
         copies.run(0.1)
         copies._blocks[1].fleet.state.velocity_map[1] = math.nan
         with pytest.raises(DivergenceError, match="uav1 of copy 3") as caught:

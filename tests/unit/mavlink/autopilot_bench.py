@@ -1,4 +1,4 @@
-"""What the tests of doors for real autopilots begin with."""
+"""What the tests of bridges for real autopilots begin with."""
 
 import socket
 

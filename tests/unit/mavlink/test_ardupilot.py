@@ -1,4 +1,4 @@
-"""The door for real ArduPilots against a strict stand-in, and its frames by themselves."""
+"""The bridge for real ArduPilots against a strict stand-in, and its frames by themselves."""
 
 import json
 import logging
@@ -12,10 +12,10 @@ import pytest
 from ardupilot_stand_in import ArdupilotStandIn, read
 from autopilot_bench import free_port, irises
 
-from volery.bridges.bridge_host import Doors
+from volery.bridges.bridge_host import BridgeHost
 from volery.core.errors import BridgeError, PartnerError
 from volery.graph.rotor_layout import RotorPosition
-from volery.mavlink.hil.ardupilot_bridge import ArdupilotDoor
+from volery.mavlink.hil.ardupilot_bridge import ArdupilotBridge
 from volery.mavlink.hil.ardupilot_json import (
     STATE_HZ,
     State,
@@ -24,7 +24,7 @@ from volery.mavlink.hil.ardupilot_json import (
     shares,
     state_line,
 )
-from volery.mavlink.hil.lock_step import PATIENCE, Patience
+from volery.mavlink.hil.lock_step import PATIENCE, TimeoutPolicy
 from volery.mavlink.scenario_setup import with_ardupilot
 from volery.runtime import Simulation
 from volery.scenario.load import parse_scenario
@@ -48,30 +48,30 @@ def scenario(count):
 
 @pytest.fixture
 def opened():
-    """A simulation of `count` UAVs and its door."""
+    """A simulation of `count` UAVs and its bridge."""
     closing = []
 
     def open_one(count=1, patience=PATIENCE):
         simulation = Simulation(scenario(count), threads=1)
-        doors = Doors(simulation.gateway)
-        closing.extend([doors, simulation])
-        door = ArdupilotDoor(port=free_port(socket.SOCK_DGRAM), patience=patience)
-        doors.open(door)
+        bridges = BridgeHost(simulation.gateway)
+        closing.extend([bridges, simulation])
+        bridge = ArdupilotBridge(port=free_port(socket.SOCK_DGRAM), patience=patience)
+        bridges.open(bridge)
         simulation.take_in()
-        return simulation, door
+        return simulation, bridge
 
     yield open_one
     for one in closing:
         one.close()
 
 
-def meet(simulation, door, count):
+def meet(simulation, bridge, count):
     """Run until that many have spoken."""
     end = time.monotonic() + 60.0
-    while len(door.connected) < count and time.monotonic() < end:
+    while len(bridge.connected) < count and time.monotonic() < end:
         time.sleep(0.01)
         simulation.take_in()
-    assert len(door.connected) == count
+    assert len(bridge.connected) == count
 
 
 def finish(*pilots):
@@ -83,10 +83,10 @@ def finish(*pilots):
 
 @pytest.mark.parametrize("magic", [18458, 29569])
 def test_a_vehicle_flies_in_lock_step(opened, magic):
-    simulation, door = opened()
-    pilot = ArdupilotStandIn(door._port, 960, pwm=CLIMB, arm_at=80, magic=magic)
+    simulation, bridge = opened()
+    pilot = ArdupilotStandIn(bridge._port, 960, pwm=CLIMB, arm_at=80, magic=magic)
     pilot.start()
-    meet(simulation, door, 1)
+    meet(simulation, bridge, 1)
     simulation.run(1.2)
     finish(pilot)
     resting, climbing = pilot.states[40], pilot.states[-1]
@@ -97,11 +97,11 @@ def test_a_vehicle_flies_in_lock_step(opened, magic):
 
 
 def test_several_have_ports_of_their_own(opened):
-    simulation, door = opened(count=2)
-    pilots = [ArdupilotStandIn(door._port + 10 * k, 160, pwm=1000 + k) for k in range(2)]
+    simulation, bridge = opened(count=2)
+    pilots = [ArdupilotStandIn(bridge._port + 10 * k, 160, pwm=1000 + k) for k in range(2)]
     for pilot in pilots:
         pilot.start()
-    meet(simulation, door, 2)
+    meet(simulation, bridge, 2)
     simulation.run(0.2)
     finish(*pilots)
     places = [pilot.states[0]["", "position"] for pilot in pilots]
@@ -109,12 +109,12 @@ def test_several_have_ports_of_their_own(opened):
 
 
 def test_one_that_was_restarted_is_met_anew(opened):
-    simulation, door = opened()
+    simulation, bridge = opened()
     for first in (5, 0):
-        pilot = ArdupilotStandIn(door._port, 80, first=first)
+        pilot = ArdupilotStandIn(bridge._port, 80, first=first)
         pilot.start()
         end = time.monotonic() + 60.0
-        while door._seats[0]._number != first and time.monotonic() < end:
+        while bridge._seats[0]._number != first and time.monotonic() < end:
             time.sleep(0.01)
         simulation.run(0.1)
         finish(pilot)
@@ -122,10 +122,10 @@ def test_one_that_was_restarted_is_met_anew(opened):
 
 
 def test_it_flies_on_after_a_reset(opened):
-    simulation, door = opened()
-    pilot = ArdupilotStandIn(door._port, 160, pwm=CLIMB, may_jump=True)
+    simulation, bridge = opened()
+    pilot = ArdupilotStandIn(bridge._port, 160, pwm=CLIMB, may_jump=True)
     pilot.start()
-    meet(simulation, door, 1)
+    meet(simulation, bridge, 1)
     simulation.run(0.1)
     simulation.reset()
     simulation.run(0.1)
@@ -134,27 +134,27 @@ def test_it_flies_on_after_a_reset(opened):
 
 
 def test_who_is_silent_ends_the_run_or_is_given_up(opened, caplog):
-    simulation, door = opened(patience=Patience(0.3))
-    pilot = ArdupilotStandIn(door._port, 5)
+    simulation, bridge = opened(patience=TimeoutPolicy(0.3))
+    pilot = ArdupilotStandIn(bridge._port, 5)
     pilot.start()
-    meet(simulation, door, 1)
+    meet(simulation, bridge, 1)
     with pytest.raises(PartnerError, match=r"'ardupilot_of_uav1' did not answer within 0\.3 s"):
         simulation.run(1.0)
-    simulation, door = opened(patience=Patience(0.3, drops=True))
-    pilot = ArdupilotStandIn(door._port, 5, pwm=CLIMB)
+    simulation, bridge = opened(patience=TimeoutPolicy(0.3, drops=True))
+    pilot = ArdupilotStandIn(bridge._port, 5, pwm=CLIMB)
     pilot.start()
-    meet(simulation, door, 1)
+    meet(simulation, bridge, 1)
     with caplog.at_level(logging.WARNING, logger="volery.mavlink"):
         simulation.run(0.5)
     assert "uav1: its autopilot has been silent for 0.3 s; it is not waited for" in caplog.messages
-    assert door.connected == ()
+    assert bridge.connected == ()
 
 
 def test_what_was_lost_is_said_again(opened):
-    simulation, door = opened()
-    pilot = ArdupilotStandIn(door._port, 1)
+    simulation, bridge = opened()
+    pilot = ArdupilotStandIn(bridge._port, 1)
     pilot.send(0)
-    meet(simulation, door, 1)
+    meet(simulation, bridge, 1)
     run = threading.Thread(target=simulation.run, args=(0.0022,))
     run.start()
     first = pilot.link.recv(65000)
@@ -167,8 +167,8 @@ def test_what_was_lost_is_said_again(opened):
 
 
 def test_noise_and_a_second_one_are_told_of_and_passed_over(opened, caplog):
-    simulation, door = opened()
-    pilot = ArdupilotStandIn(door._port, 160, pwm=CLIMB)
+    simulation, bridge = opened()
+    pilot = ArdupilotStandIn(bridge._port, 160, pwm=CLIMB)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         for data in (
             b"",
@@ -176,12 +176,12 @@ def test_noise_and_a_second_one_are_told_of_and_passed_over(opened, caplog):
             b"\x1a\x48" * 21,
             struct.pack("<HHI16H", 18459, 1, 0, *[0] * 16),
         ):
-            other.sendto(data, ("127.0.0.1", door._port))
+            other.sendto(data, ("127.0.0.1", bridge._port))
         pilot.start()
-        meet(simulation, door, 1)
+        meet(simulation, bridge, 1)
         for number in (10_000, 0):  # one that flies elsewhere, and one that was just started
             frame = struct.pack("<HHI16H", 18458, 400, number, *[1000] * 16)
-            other.sendto(frame, ("127.0.0.1", door._port))
+            other.sendto(frame, ("127.0.0.1", bridge._port))
         simulation.run(0.2)
     finish(pilot)
     assert caplog.messages == [
@@ -191,10 +191,10 @@ def test_noise_and_a_second_one_are_told_of_and_passed_over(opened, caplog):
 
 
 def test_a_frame_that_comes_late_begins_nothing_anew(opened):
-    simulation, door = opened()
-    pilot = ArdupilotStandIn(door._port, 1)
+    simulation, bridge = opened()
+    pilot = ArdupilotStandIn(bridge._port, 1)
     pilot.send(1000)
-    meet(simulation, door, 1)
+    meet(simulation, bridge, 1)
     run = threading.Thread(target=simulation.run, args=(0.0047,))
     run.start()
     times = []
@@ -274,9 +274,9 @@ def test_a_port_that_is_taken_is_told():
         other.bind(("127.0.0.1", 0))
         port = other.getsockname()[1]
         simulation = Simulation(scenario(1), threads=1)
-        with simulation, Doors(simulation.gateway) as doors:
+        with simulation, BridgeHost(simulation.gateway) as bridges:
             with pytest.raises(BridgeError) as told:
-                doors.open(ArdupilotDoor(port=port))
+                bridges.open(ArdupilotBridge(port=port))
             assert str(told.value) == (
                 f"uav1: cannot listen on UDP 127.0.0.1:{port}: the port is taken"
             )

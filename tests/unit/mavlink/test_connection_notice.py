@@ -7,11 +7,11 @@ import pytest
 from autopilot_bench import free_port, irises
 from px4_stand_in import Terminal, connect
 
-from volery.bridges.bridge_host import Doors
-from volery.mavlink.hil.ardupilot_bridge import ArdupilotDoor
+from volery.bridges.bridge_host import BridgeHost
+from volery.mavlink.hil.ardupilot_bridge import ArdupilotBridge
 from volery.mavlink.hil.connection_notice import notice
-from volery.mavlink.hil.px4_bridge import Px4Door, how_to_start
-from volery.mavlink.hil.px4_serial_bridge import Px4Serial
+from volery.mavlink.hil.px4_bridge import Px4Bridge, how_to_start
+from volery.mavlink.hil.px4_serial_bridge import Px4SerialBridge
 from volery.mavlink.scenario_setup import with_ardupilot, with_px4
 from volery.runtime import Simulation
 
@@ -20,14 +20,14 @@ SOON_S = 0.3
 
 @pytest.fixture
 def opened():
-    """A simulation with a door open."""
+    """A simulation with a bridge open."""
     closing = []
 
-    def open_one(scenario, door):
+    def open_one(scenario, bridge):
         simulation = Simulation(scenario, threads=1)
-        doors = Doors(simulation.gateway)
-        closing.extend([doors, simulation])
-        doors.open(door)
+        bridges = BridgeHost(simulation.gateway)
+        closing.extend([bridges, simulation])
+        bridges.open(bridge)
         return simulation
 
     yield open_one
@@ -43,7 +43,7 @@ def heard(caplog, simulation, seconds=3.0 * SOON_S):
 
 def test_missing_px4s_are_told_of_once_while_time_goes_on(opened, caplog):
     port = free_port()
-    simulation = opened(with_px4(irises(2)), Px4Door(port=port, notice_s=SOON_S))
+    simulation = opened(with_px4(irises(2)), Px4Bridge(port=port, notice_s=SOON_S))
     assert heard(caplog, simulation) == [
         f"no PX4 yet for uav1 (127.0.0.1:{port}), uav2 (127.0.0.1:{port + 1}): they stand still "
         "until one comes; PX4's instances connect to ports 4560 and following"
@@ -52,14 +52,14 @@ def test_missing_px4s_are_told_of_once_while_time_goes_on(opened, caplog):
 
 
 def test_only_those_are_told_of_that_are_missing(opened, caplog):
-    door = Px4Door(port=free_port(), notice_s=4.0 * SOON_S)
-    simulation = opened(with_px4(irises(2)), door)
-    with connect(door._port):
+    bridge = Px4Bridge(port=free_port(), notice_s=4.0 * SOON_S)
+    simulation = opened(with_px4(irises(2)), bridge)
+    with connect(bridge._port):
         end = time.monotonic() + 60.0
-        while not door.connected and time.monotonic() < end:
+        while not bridge.connected and time.monotonic() < end:
             time.sleep(0.01)
         (told,) = heard(caplog, simulation, 6.0 * SOON_S)
-    assert f"uav2 (127.0.0.1:{door._port + 1}): it stands still" in told
+    assert f"uav2 (127.0.0.1:{bridge._port + 1}): it stands still" in told
     assert "uav1" not in told
 
 
@@ -69,14 +69,17 @@ def test_the_hint_names_instances_that_connect_there(port, more):
     assert told == f"start with: volery px4 --px4-dir PX4-Autopilot --count 3{more}"
 
 
-def test_nothing_is_said_by_a_door_that_closes_before_or_is_not_to(opened, caplog):
-    for door in (Px4Door(port=free_port(), notice_s=None), Px4Door(port=free_port(), notice_s=9.9)):
-        assert heard(caplog, opened(with_px4(irises()), door), 0.1) == []
+def test_nothing_is_said_by_a_bridge_that_closes_before_or_is_not_to(opened, caplog):
+    for bridge in (
+        Px4Bridge(port=free_port(), notice_s=None),
+        Px4Bridge(port=free_port(), notice_s=9.9),
+    ):
+        assert heard(caplog, opened(with_px4(irises()), bridge), 0.1) == []
 
 
 def test_missing_ardupilots_are_told_of(opened, caplog):
     port = free_port(socket.SOCK_DGRAM)
-    simulation = opened(with_ardupilot(irises()), ArdupilotDoor(port=port, notice_s=SOON_S))
+    simulation = opened(with_ardupilot(irises()), ArdupilotBridge(port=port, notice_s=SOON_S))
     (told,) = heard(caplog, simulation)
     assert told.startswith(f"no ArduPilot yet for uav1 (UDP 127.0.0.1:{port}): it stands still")
     assert "start with: arducopter --model JSON" in told
@@ -84,7 +87,7 @@ def test_missing_ardupilots_are_told_of(opened, caplog):
 
 def test_a_silent_serial_line_is_told_of(opened, caplog):
     terminal = Terminal()
-    simulation = opened(with_px4(irises()), Px4Serial(terminal.path, notice_s=SOON_S))
+    simulation = opened(with_px4(irises()), Px4SerialBridge(terminal.path, notice_s=SOON_S))
     (told,) = heard(caplog, simulation)
     assert told.startswith(f"no PX4 yet for uav1 ({terminal.path} at 921600 baud): it stands")
     assert "SYS_HITL = 1" in told

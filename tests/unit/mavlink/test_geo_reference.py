@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from volery.core.geodesy import LocalFrame
-from volery.mavlink.autopilot.geo_reference import Earth
+from volery.mavlink.autopilot.geo_reference import GeoReference
 
 ORIGINS = [
     (47.397742, 8.545594, 488.0),
@@ -18,7 +18,7 @@ ORIGINS = [
 
 @pytest.mark.parametrize("origin", ORIGINS)
 def test_it_agrees_with_the_geodesy_of_all_rooms(origin):
-    earth, frame = Earth(*origin), LocalFrame.from_degrees(*origin)
+    earth, frame = GeoReference(*origin), LocalFrame.from_degrees(*origin)
     places = np.random.default_rng(8).uniform(-20_000.0, 20_000.0, (200, 3)) * [1.0, 1.0, 0.05]
     for place, wanted in zip(places, frame.geodetic_from_enu(places), strict=True):
         latitude, longitude, altitude = earth.geodetic(tuple(place.tolist()))

@@ -9,8 +9,8 @@ import pytest
 from flying_bench import scenario
 
 from volery.bridges.bridge_factory import BridgeOptions, make_bridge
-from volery.bridges.bridge_host import Doors
-from volery.cli.bridges import open_doors
+from volery.bridges.bridge_host import BridgeHost
+from volery.cli.bridges import open_bridges
 from volery.cli.flight import RunOptions
 from volery.core.errors import BridgeError
 from volery.mavlink.links.serial_bridge import MavlinkSerial
@@ -25,11 +25,11 @@ BASE = 24540
 
 
 class Running:
-    """A simulation that runs in real time in a thread of its own, and its doors."""
+    """A simulation that runs in real time in a thread of its own, and its bridges."""
 
     def __init__(self, simulation):
         self.simulation = simulation
-        self.doors = Doors(simulation.gateway)
+        self.bridges = BridgeHost(simulation.gateway)
         self._thread = threading.Thread(target=lambda: simulation.run(600.0, speed=1.0))
 
     def __enter__(self):
@@ -41,14 +41,14 @@ class Running:
         self.simulation.resume()
         self.simulation.quit()
         self._thread.join()
-        self.doors.close()
+        self.bridges.close()
         self.simulation.close()
 
 
 @pytest.fixture(scope="module")
 def running():
     with Running(Simulation(scenario(count=2), threads=1)) as running:
-        running.doors.open(MavlinkUdp(port=BASE))
+        running.bridges.open(MavlinkUdp(port=BASE))
         yield running
 
 
@@ -104,18 +104,18 @@ def test_heartbeats_go_on_while_the_simulation_stands_still(running, client):
 
 def test_a_port_that_is_taken_is_told(running):
     other = Simulation(scenario(), threads=1)
-    with other, Doors(other.gateway) as doors, pytest.raises(BridgeError) as told:
-        doors.open(MavlinkUdp(port=BASE))
+    with other, BridgeHost(other.gateway) as bridges, pytest.raises(BridgeError) as told:
+        bridges.open(MavlinkUdp(port=BASE))
     assert str(told.value) == f"uav1: cannot listen on UDP port {BASE + 40}: the port is taken"
     with pytest.raises(BridgeError, match="other machines"):
-        running.doors.open(make_bridge("mavlink=0.0.0.0:14540", BridgeOptions()))
+        running.bridges.open(make_bridge("mavlink=0.0.0.0:14540", BridgeOptions()))
 
 
 def test_tcp_carries_all_vehicles_on_each_connection(running):
-    door = MavlinkTcp(port=0)
-    running.doors.open(door)
+    bridge = MavlinkTcp(port=0)
+    running.bridges.open(bridge)
     first, second = (
-        mavutil.mavlink_connection(f"tcp:127.0.0.1:{door.port}", source_system=s)
+        mavutil.mavlink_connection(f"tcp:127.0.0.1:{bridge.port}", source_system=s)
         for s in (250, 251)
     )
     try:
@@ -136,7 +136,7 @@ def test_tcp_carries_all_vehicles_on_each_connection(running):
 def test_a_serial_line_carries_them_too(running):
     ours, theirs = os.openpty()
     path = os.ttyname(theirs)
-    running.doors.open(MavlinkSerial(path, 57600))
+    running.bridges.open(MavlinkSerial(path, 57600))
     station = mavutil.mavlink.MAVLink(None, 249, 190)
     station.robust_parsing = True
     heard, asked = set(), False
@@ -164,11 +164,13 @@ def test_noise_on_the_socket_disturbs_nobody(running, client):
 def test_names_of_the_command_line():
     simulation = Simulation(scenario(), threads=1)
     with simulation:
-        options = RunOptions("flat", doors=(f"mavlink={BASE + 200}", "mavlink-tcp=0"))
-        with open_doors(simulation, options):
+        options = RunOptions("flat", bridges=(f"mavlink={BASE + 200}", "mavlink-tcp=0"))
+        with open_bridges(simulation, options):
             simulation.run(0.1)
         with (
             pytest.raises(BridgeError, match="no serial line"),
-            open_doors(simulation, RunOptions("flat", doors=("mavlink-serial=/dev/null:57600",))),
+            open_bridges(
+                simulation, RunOptions("flat", bridges=("mavlink-serial=/dev/null:57600",))
+            ),
         ):
             pass

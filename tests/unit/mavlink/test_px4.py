@@ -11,14 +11,14 @@ import pytest
 from autopilot_bench import free_port, irises
 from px4_stand_in import StandIn, Terminal
 
-from volery.bridges.bridge_host import Doors
+from volery.bridges.bridge_host import BridgeHost
 from volery.core.errors import BridgeError, PartnerError
 from volery.mavlink.codec import Codec, dialect
-from volery.mavlink.hil.lock_step import PATIENCE, Patience
+from volery.mavlink.hil.lock_step import PATIENCE, TimeoutPolicy
 from volery.mavlink.hil.protocol import HilLink
-from volery.mavlink.hil.px4_bridge import Px4Door, _Connection
-from volery.mavlink.hil.px4_serial_bridge import Px4Serial
-from volery.mavlink.hil.session import HilSeat
+from volery.mavlink.hil.px4_bridge import Px4Bridge, _Connection
+from volery.mavlink.hil.px4_serial_bridge import Px4SerialBridge
+from volery.mavlink.hil.session import HilSession
 from volery.mavlink.scenario_setup import with_px4
 from volery.runtime import Simulation
 from volery.scenario.load import parse_scenario
@@ -33,36 +33,36 @@ def scenario(count=1):
 
 @pytest.fixture
 def opened():
-    """A simulation of `count` UAVs, its door and the first port."""
+    """A simulation of `count` UAVs, its bridge and the first port."""
     closing = []
 
     def open_one(count=1, patience=PATIENCE):
         simulation = Simulation(scenario(count), threads=1)
-        doors = Doors(simulation.gateway)
-        closing.extend([doors, simulation])
-        door = Px4Door(port=free_port(), patience=patience)
-        doors.open(door)
+        bridges = BridgeHost(simulation.gateway)
+        closing.extend([bridges, simulation])
+        bridge = Px4Bridge(port=free_port(), patience=patience)
+        bridges.open(bridge)
         simulation.take_in()
-        return simulation, door
+        return simulation, bridge
 
     yield open_one
     for one in closing:
         one.close()
 
 
-def meet(simulation, door, count):
+def meet(simulation, bridge, count):
     """Run until all PX4s of the stand-ins are connected."""
     end = time.monotonic() + 60.0
-    while len(door.connected) < count and time.monotonic() < end:
+    while len(bridge.connected) < count and time.monotonic() < end:
         time.sleep(0.01)
         simulation.take_in()
-    assert len(door.connected) == count
+    assert len(bridge.connected) == count
 
 
 def test_a_vehicle_flies_in_lock_step(opened):
-    simulation, door = opened()
-    pilot = StandIn(door._port, 400, throttle=CLIMB, arm_at=100)
-    meet(simulation, door, 1)
+    simulation, bridge = opened()
+    pilot = StandIn(bridge._port, 400, throttle=CLIMB, arm_at=100)
+    meet(simulation, bridge, 1)
     pilot.start()
     simulation.run(2.0)
     assert pilot.done.wait(60.0)
@@ -86,10 +86,10 @@ def is_ended(connection):
 
 
 def test_who_speaks_no_mavlink_gives_way_and_who_comes_after_a_px4_is_ended(opened, caplog):
-    simulation, door = opened()
-    address = ("127.0.0.1", door._port)
+    simulation, bridge = opened()
+    address = ("127.0.0.1", bridge._port)
     with socket.create_connection(address) as stranger:
-        meet(simulation, door, 1)
+        meet(simulation, bridge, 1)
         stranger.sendall(b"hello, is this the way to the aviary?" * 5)
         end = time.monotonic() + 60.0
         while "does not speak" not in caplog.text and time.monotonic() < end:
@@ -97,20 +97,20 @@ def test_who_speaks_no_mavlink_gives_way_and_who_comes_after_a_px4_is_ended(open
         with socket.create_connection(address) as px4:
             assert is_ended(stranger)
             px4.sendall(HilLink(1).heartbeat())
-            while not door._seats[0].has_heard and time.monotonic() < end:
+            while not bridge._seats[0].has_heard and time.monotonic() < end:
                 time.sleep(0.01)
             with socket.create_connection(address) as second:
                 assert is_ended(second)
-            assert door.connected == ("uav1",)
+            assert bridge.connected == ("uav1",)
     told = [text for text in caplog.messages if "does not speak MAVLink" in text]
     assert told == ["uav1: what is connected does not speak MAVLink: no PX4?"]
     assert "uav1: its PX4 is connected already; another connection is ended" in caplog.messages
 
 
 def test_several_vehicles_share_one_clock(opened):
-    simulation, door = opened(count=2)
-    pilots = [StandIn(door._port + k, 150) for k in range(2)]
-    meet(simulation, door, 2)
+    simulation, bridge = opened(count=2)
+    pilots = [StandIn(bridge._port + k, 150) for k in range(2)]
+    meet(simulation, bridge, 2)
     for pilot in pilots:
         pilot.start()
     simulation.run(1.0)
@@ -122,9 +122,9 @@ def test_several_vehicles_share_one_clock(opened):
 
 
 def test_a_silent_one_ends_the_run_with_an_error(opened):
-    simulation, door = opened(patience=Patience(0.5))
-    pilot = StandIn(door._port, 50, falls_silent=True)
-    meet(simulation, door, 1)
+    simulation, bridge = opened(patience=TimeoutPolicy(0.5))
+    pilot = StandIn(bridge._port, 50, falls_silent=True)
+    meet(simulation, bridge, 1)
     pilot.start()
     with pytest.raises(PartnerError) as told:
         simulation.run(1.0)
@@ -136,17 +136,17 @@ def test_a_silent_one_ends_the_run_with_an_error(opened):
 
 
 def test_a_silent_one_is_given_up_where_that_is_wanted_and_may_come_back(opened, caplog):
-    simulation, door = opened(patience=Patience(0.5, drops=True))
-    pilot = StandIn(door._port, 50, throttle=CLIMB, falls_silent=True)
-    meet(simulation, door, 1)
+    simulation, bridge = opened(patience=TimeoutPolicy(0.5, drops=True))
+    pilot = StandIn(bridge._port, 50, throttle=CLIMB, falls_silent=True)
+    meet(simulation, bridge, 1)
     pilot.start()
     with caplog.at_level(logging.WARNING, logger="volery.mavlink"):
         simulation.run(1.0)
     assert simulation.time_s == pytest.approx(1.0)
     told = "uav1: its autopilot has been silent for 0.5 s; it is not waited for"
     assert told in caplog.messages
-    again = StandIn(door._port, 50)
-    meet(simulation, door, 1)
+    again = StandIn(bridge._port, 50)
+    meet(simulation, bridge, 1)
     again.start()
     simulation.run(0.5)
     assert again.done.wait(60.0)
@@ -156,9 +156,9 @@ def test_a_silent_one_is_given_up_where_that_is_wanted_and_may_come_back(opened,
 
 def test_time_goes_on_without_one_that_is_disarmed_and_says_nothing(opened, caplog):
     """As PX4 in Offboard without setpoints: it answers again when time has gone on."""
-    simulation, door = opened(patience=Patience(1.0))
-    pilot = StandIn(door._port, 50, arm_at=1000, dozes=100)
-    meet(simulation, door, 1)
+    simulation, bridge = opened(patience=TimeoutPolicy(1.0))
+    pilot = StandIn(bridge._port, 50, arm_at=1000, dozes=100)
+    meet(simulation, bridge, 1)
     pilot.start()
     simulation.run(1.0)
     assert pilot.done.wait(60.0)
@@ -170,9 +170,9 @@ def test_time_goes_on_without_one_that_is_disarmed_and_says_nothing(opened, capl
 
 
 def test_one_that_is_disarmed_and_never_answers_again_ends_the_run(opened):
-    simulation, door = opened(patience=Patience(0.5))
-    pilot = StandIn(door._port, 50, arm_at=1000, falls_silent=True)
-    meet(simulation, door, 1)
+    simulation, bridge = opened(patience=TimeoutPolicy(0.5))
+    pilot = StandIn(bridge._port, 50, arm_at=1000, falls_silent=True)
+    meet(simulation, bridge, 1)
     pilot.start()
     with pytest.raises(PartnerError, match=r"did not answer within 0\.5 s"):
         simulation.run(60.0)
@@ -182,9 +182,9 @@ def test_one_that_is_disarmed_and_never_answers_again_ends_the_run(opened):
 
 
 def test_a_reset_sends_them_away_and_a_restarted_one_flies(opened, caplog):
-    simulation, door = opened()
-    before = StandIn(door._port, 10_000, throttle=CLIMB)
-    meet(simulation, door, 1)
+    simulation, bridge = opened()
+    before = StandIn(bridge._port, 10_000, throttle=CLIMB)
+    meet(simulation, bridge, 1)
     before.start()
     simulation.run(0.5)
     simulation.reset()
@@ -193,9 +193,9 @@ def test_a_reset_sends_them_away_and_a_restarted_one_flies(opened, caplog):
     assert before.done.wait(60.0)
     assert "the simulator closed the connection" in str(before.fault)
     assert any("the simulation was reset" in message for message in caplog.messages)
-    assert door.connected == ()
-    again = StandIn(door._port, 100, throttle=CLIMB)
-    meet(simulation, door, 1)
+    assert bridge.connected == ()
+    again = StandIn(bridge._port, 100, throttle=CLIMB)
+    meet(simulation, bridge, 1)
     again.start()
     simulation.run(0.6)
     assert again.done.wait(60.0)
@@ -204,9 +204,9 @@ def test_a_reset_sends_them_away_and_a_restarted_one_flies(opened, caplog):
 
 
 def test_one_with_a_clock_of_its_own_is_not_waited_for(opened):
-    simulation, door = opened()
-    pilot = StandIn(door._port, 20, falls_silent=True, in_lock_step=False)
-    meet(simulation, door, 1)
+    simulation, bridge = opened()
+    pilot = StandIn(bridge._port, 20, falls_silent=True, in_lock_step=False)
+    meet(simulation, bridge, 1)
     pilot.start()
     simulation.run(1.0)
     assert pilot.done.wait(60.0)
@@ -217,16 +217,16 @@ def test_one_with_a_clock_of_its_own_is_not_waited_for(opened):
 def test_one_on_a_serial_line_flies_the_uav_that_is_left():
     terminals = [Terminal(), Terminal()]
     simulation = Simulation(scenario(count=2), threads=1)
-    with simulation, Doors(simulation.gateway) as doors:
-        lines = [Px4Serial(terminal.path) for terminal in terminals]
+    with simulation, BridgeHost(simulation.gateway) as bridges:
+        lines = [Px4SerialBridge(terminal.path) for terminal in terminals]
         pilots = []
         for terminal, line in zip(terminals, lines, strict=True):
-            doors.open(line)
+            bridges.open(line)
             simulation.take_in()
             pilots.append(StandIn(0, 10_000, throttle=CLIMB, arm_at=50, link=terminal))
         assert [line.uav for line in lines] == ["uav1", "uav2"]
         with pytest.raises(BridgeError, match="no UAV with an IMU is left"):
-            doors.open(Px4Serial(terminals[0].path))
+            bridges.open(Px4SerialBridge(terminals[0].path))
         for pilot in pilots:
             pilot.start()
         simulation.run(1.0)
@@ -241,11 +241,11 @@ def test_one_on_a_serial_line_flies_the_uav_that_is_left():
 
 def test_a_serial_line_that_is_too_slow_is_told():
     simulation = Simulation(scenario(), threads=1)
-    with simulation, Doors(simulation.gateway) as doors:
+    with simulation, BridgeHost(simulation.gateway) as bridges:
         with pytest.raises(BridgeError, match="57600 baud is too slow for HIL; 230400 or more"):
-            doors.open(Px4Serial("/dev/null", 57600))
+            bridges.open(Px4SerialBridge("/dev/null", 57600))
         with pytest.raises(BridgeError, match="/dev/null is no serial line"):
-            doors.open(Px4Serial("/dev/null"))
+            bridges.open(Px4SerialBridge("/dev/null"))
 
 
 def test_a_port_that_is_taken_is_told():
@@ -254,9 +254,9 @@ def test_a_port_that_is_taken_is_told():
         other.listen()
         port = other.getsockname()[1]
         simulation = Simulation(scenario(), threads=1)
-        with simulation, Doors(simulation.gateway) as doors:
+        with simulation, BridgeHost(simulation.gateway) as bridges:
             with pytest.raises(BridgeError) as told:
-                doors.open(Px4Door(port=port))
+                bridges.open(Px4Bridge(port=port))
             assert str(told.value) == (
                 f"uav1: cannot listen on 127.0.0.1:{port}: the port is taken"
             )
@@ -284,18 +284,18 @@ def test_an_imu_that_nobody_chose_is_a_calibrated_one():
 
 
 def test_in_step_the_simulation_tells_and_nobody_is_woken_for_it(opened, monkeypatch):
-    simulation, door = opened()
+    simulation, bridge = opened()
     tellers = []
-    tell = HilSeat.tell
+    tell = HilSession.tell
 
     def told(seat, time_ns, news):
         if seat.taken:
             tellers.append((threading.get_ident(), seat._link.locked))
         return tell(seat, time_ns, news)
 
-    monkeypatch.setattr(HilSeat, "tell", told)
-    pilot = StandIn(door._port, 50)
-    meet(simulation, door, 1)
+    monkeypatch.setattr(HilSession, "tell", told)
+    pilot = StandIn(bridge._port, 50)
+    meet(simulation, bridge, 1)
     pilot.start()
     simulation.run(1.0)
     assert pilot.done.wait(60.0)
@@ -307,13 +307,13 @@ def test_in_step_the_simulation_tells_and_nobody_is_woken_for_it(opened, monkeyp
 
 
 def test_what_cannot_be_said_is_told_of_and_the_run_goes_on(opened, monkeypatch, caplog):
-    simulation, door = opened()
+    simulation, bridge = opened()
 
     def refuse(_link, _time_ns, _sensed):
         raise OverflowError("infinity is no integer")
 
-    pilot = StandIn(door._port, 50)
-    meet(simulation, door, 1)
+    pilot = StandIn(bridge._port, 50)
+    meet(simulation, bridge, 1)
     monkeypatch.setattr(HilLink, "tell", refuse)
     simulation.run(0.1)
     assert simulation.time_s == pytest.approx(0.1)
@@ -323,10 +323,10 @@ def test_what_cannot_be_said_is_told_of_and_the_run_goes_on(opened, monkeypatch,
 
 
 def test_who_was_let_go_is_not_obeyed(opened):
-    simulation, door = opened()
-    pilot = StandIn(door._port, 50)
-    meet(simulation, door, 1)
-    (seat,) = door._seats
+    simulation, bridge = opened()
+    pilot = StandIn(bridge._port, 50)
+    meet(simulation, bridge, 1)
+    (seat,) = bridge._seats
     asked = []
     seat._meetings.turn_rotors = seat._meetings.go_on = lambda shares=None: asked.append(shares)
     late = _Way()

@@ -11,7 +11,7 @@ from autopilot_bench import free_port
 from volery.cli.bridges import _px4_instances
 from volery.cli.flight import RunOptions
 from volery.core.errors import BridgeError
-from volery.mavlink.hil.px4_bridge import Px4Door
+from volery.mavlink.hil.px4_bridge import Px4Bridge
 from volery.mavlink.hil.px4_processes import FIRST_PORT, Px4Instances, established_ports, find_px4
 from volery.vehicle.airframe import load_airframe
 
@@ -153,7 +153,7 @@ def test_one_that_never_connects_is_told_with_its_last_words(tmp_path, monkeypat
     options = RunOptions("hover", px4_dir=tmp_path)
     with (
         pytest.raises(BridgeError) as error,
-        _px4_instances(simulation, [Px4Door(port=free_port())], options),
+        _px4_instances(simulation, [Px4Bridge(port=free_port())], options),
     ):
         pass
     said = str(error.value)

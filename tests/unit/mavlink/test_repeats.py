@@ -86,7 +86,7 @@ def test_a_recorded_flight_is_repeated(tmp_path):
 
 
 class GatewayStation(Station):
-    """Sends as a door does: through a session, whose doings are logged."""
+    """Sends as a bridge does: through a session, whose doings are logged."""
 
     def __init__(self, simulation, session):
         self._session = session

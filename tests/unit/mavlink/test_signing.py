@@ -6,7 +6,7 @@ import threading
 import pytest
 from autopilot_bench import free_port, irises
 
-from volery.bridges.bridge_host import Doors
+from volery.bridges.bridge_host import BridgeHost
 from volery.core.errors import BridgeError
 from volery.mavlink.autopilot.dialect_extensions import available_modes
 from volery.mavlink.codec import Codec, Parser, dialect
@@ -140,14 +140,14 @@ def test_a_key_is_the_text_of_a_file(tmp_path):
 def test_a_vehicle_hears_only_who_has_the_key():
     simulation = Simulation(with_autopilots(irises(1)), threads=1)
     run = threading.Thread(target=lambda: simulation.run(60.0, speed=1.0))
-    with simulation, Doors(simulation.gateway) as doors:
-        door = MavlinkTcp(port=free_port(), key=KEY)
-        doors.open(door)
+    with simulation, BridgeHost(simulation.gateway) as bridges:
+        bridge = MavlinkTcp(port=free_port(), key=KEY)
+        bridges.open(bridge)
         simulation.be_prompt()
         run.start()
         try:
-            assert ack(door.port, None) is None
-            assert ack(door.port, KEY).get_signed()
+            assert ack(bridge.port, None) is None
+            assert ack(bridge.port, KEY).get_signed()
         finally:
             simulation.quit()
             run.join()

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from post_scans import HEIGHT_M, TRUNK, nods_message, scan_message, seen_from
 
-from volery.autonomy.mapping.vertical_structures import Columns
+from volery.autonomy.mapping.vertical_structures import VerticalStructures
 from volery.core import rotations
-from volery.report.trajectories import Way
+from volery.report.trajectories import RecordedTrajectory
 from volery.report.trunk_survey import LEVEL, NODDING, TrunkSurvey
 
 S = 1_000_000_000
 
 
-def surveyed(*, nodding: bool) -> tuple[TrunkSurvey, Way]:
+def surveyed(*, nodding: bool) -> tuple[TrunkSurvey, RecordedTrajectory]:
     """Five seconds to and fro beside the posts."""
     survey, rows = TrunkSurvey(), []
     for k in range(1, 101):
@@ -29,7 +29,7 @@ def surveyed(*, nodding: bool) -> tuple[TrunkSurvey, Way]:
             survey.add_nods(nods_message(time_ns, angle))
             ranges = seen_from(place, angle)
             survey.add_scan(NODDING, time_ns, scan_message("nodding", time_ns, ranges))
-    return survey, Way.of_rows(rows)
+    return survey, RecordedTrajectory.of_rows(rows)
 
 
 def test_a_crown_in_the_air_is_no_trunk() -> None:
@@ -47,7 +47,9 @@ def test_without_a_nodding_lidar_shapes_alone_count() -> None:
 
 def test_nothing_is_known_of_a_way_that_is_unknown() -> None:
     survey, way = surveyed(nodding=True)
-    before = Way.of_rows([(s - 100.0, *p, *a) for s, p, a in zip(*vars(way).values(), strict=True)])
+    before = RecordedTrajectory.of_rows(
+        [(s - 100.0, *p, *a) for s, p, a in zip(*vars(way).values(), strict=True)]
+    )
     assert len(survey.trunks(before).places) == 0
 
 
@@ -58,7 +60,7 @@ def test_a_rise_of_the_ground_is_no_trunk() -> None:
     height = np.arange(0.0, 3.0, 0.1)
     post = np.stack([np.full(30, 6.0), np.zeros(30), 2.0 + height], axis=1)
     bush = np.stack([np.full(5, 3.0), np.zeros(5), 1.0 + 0.1 * np.arange(5)], axis=1)
-    columns = Columns(np.concatenate([ground, post, bush]))
+    columns = VerticalStructures(np.concatenate([ground, post, bush]))
     assert columns.ground_m(np.array([6.0, 0.0])) == pytest.approx(2.0, abs=0.5)
     assert columns.stands(np.array([6.0, 0.0, 4.5]))
     assert not columns.stands(np.array([9.0, 0.0, 3.0]))

@@ -1,4 +1,4 @@
-"""Asking services of a simulation, as doors do, with plain data for requests."""
+"""Asking services of a simulation, as bridges do, with plain data for requests."""
 
 from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import message_type, typestore

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from volery.bridges.logs.log_writer import open_log
-from volery.bridges.logs.recorded_flight import Origin, read_flight
+from volery.bridges.logs.recorded_flight import RecordedScenario, read_flight
 from volery.bridges.logs.recording import Recorder
 from volery.core.errors import RecordingError
 from volery.graph.codecs.zero import zero_message
@@ -17,7 +17,7 @@ from volery.graph.messages import String, Twist, Vector3, message_type
 from volery.graph.service_reply import ServiceReply
 from volery.graph.session import ClientCommand
 from volery.runtime.replay import command_log
-from volery.runtime.replay.command_effects import Weight, weight_of
+from volery.runtime.replay.command_effects import CommandEffect, weight_of
 from volery.runtime.replay.scenario_record import origin_of_scenario, scenario_of
 from volery.scenario import library
 from volery.scenario.load import load_scenario
@@ -90,16 +90,16 @@ def test_what_only_paces_is_no_turn(flying, heard):
 @pytest.mark.parametrize(
     ("kind", "srvtype", "weight"),
     [
-        ("call", f"{STANDARD}/GetEntities", Weight.ASKS),
-        ("call", f"{OURS}/GetWeather", Weight.ASKS),
-        ("call", "rosapi_msgs/srv/Topics", Weight.ASKS),
-        ("call", "rosapi_msgs/srv/SetParam", Weight.CHANGES),
-        ("call", f"{STANDARD}/StepSimulation", Weight.PACES),
-        ("call", f"{STANDARD}/SpawnEntity", Weight.CHANGES),
-        ("call", "nobody_knows/srv/GetLost", Weight.CHANGES),
-        ("call", f"{STANDARD}/SetSimulationState", Weight.CHANGES),  # of zeros: stopped
-        ("publish", "std_msgs/msg/String", Weight.CHANGES),
-        ("advertise", "std_msgs/msg/String", Weight.PACES),
+        ("call", f"{STANDARD}/GetEntities", CommandEffect.ASKS),
+        ("call", f"{OURS}/GetWeather", CommandEffect.ASKS),
+        ("call", "rosapi_msgs/srv/Topics", CommandEffect.ASKS),
+        ("call", "rosapi_msgs/srv/SetParam", CommandEffect.CHANGES),
+        ("call", f"{STANDARD}/StepSimulation", CommandEffect.PACES),
+        ("call", f"{STANDARD}/SpawnEntity", CommandEffect.CHANGES),
+        ("call", "nobody_knows/srv/GetLost", CommandEffect.CHANGES),
+        ("call", f"{STANDARD}/SetSimulationState", CommandEffect.CHANGES),  # of zeros: stopped
+        ("publish", "std_msgs/msg/String", CommandEffect.CHANGES),
+        ("advertise", "std_msgs/msg/String", CommandEffect.PACES),
     ],
 )
 def test_how_much_hangs_on_a_command(kind, srvtype, weight):
@@ -202,7 +202,7 @@ def test_what_is_kept_beyond_its_bound_holds_no_content(flying, monkeypatch):
 @pytest.mark.parametrize("name", library.names())
 def test_a_scenario_comes_back_from_its_log(name):
     scenario = load_scenario(name)
-    again = scenario_of(Origin.from_json(origin_of_scenario(scenario).to_json()))
+    again = scenario_of(RecordedScenario.from_json(origin_of_scenario(scenario).to_json()))
     assert again.model_dump() == scenario.model_dump()
     assert again.access.is_confined
 
@@ -210,4 +210,4 @@ def test_a_scenario_comes_back_from_its_log(name):
 @pytest.mark.parametrize("text", ["", "[]", '{"name": "x"}', "null"])
 def test_what_tells_of_no_scenario(text):
     with pytest.raises(RecordingError, match="no scenario"):
-        Origin.from_json(text)
+        RecordedScenario.from_json(text)

@@ -3,12 +3,12 @@
 import pytest
 
 from volery.core.errors import CommandError
-from volery.runtime.vehicles.control_authority import Pilots
+from volery.runtime.vehicles.control_authority import ControlAuthority
 
 
 @pytest.fixture
 def pilots():
-    return Pilots(lambda: ("uav1", "uav2"))
+    return ControlAuthority(lambda: ("uav1", "uav2"))
 
 
 def test_taking_releasing_and_handing_over(pilots):

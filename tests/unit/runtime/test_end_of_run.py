@@ -7,10 +7,10 @@ from service_calls import ask, code_of, request_of
 
 from volery.core.errors import GraphError
 from volery.graph.service_reply import ServiceReply
-from volery.runtime.services.simulation_state import State
+from volery.runtime.services.simulation_state import RunState
 
 STANDARD_REFUSALS = (
-    ("/set_simulation_state", {"state": {"state": int(State.PLAYING)}}),
+    ("/set_simulation_state", {"state": {"state": int(RunState.PLAYING)}}),
     ("/step_simulation", {"steps": 5}),
 )
 
@@ -79,7 +79,7 @@ def test_commands_without_effect_are_refused(ended, service, fields):
 
 def test_what_only_asks_is_answered(ended):
     (state,) = Client(ended).at_end(("/get_simulation_state", {}))
-    assert state.state.state == State.PAUSED
+    assert state.state.state == RunState.PAUSED
 
 
 def test_the_status_says_so(ended):

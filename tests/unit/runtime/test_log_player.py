@@ -15,7 +15,7 @@ from volery.graph import messages as m
 from volery.graph.codecs.zero import zero_message
 from volery.graph.service_reply import ServiceReply
 from volery.runtime import Simulation
-from volery.runtime.replay.log_player import Player
+from volery.runtime.replay.log_player import LogPlayer
 from volery.scenario.load import load_scenario
 
 FORMATS = [".mcap", ".bag"]
@@ -85,7 +85,7 @@ def play_out(player):
 def test_what_is_played_is_what_was_recorded(flights, suffix):
     """Every topic, time and byte, in the order of the log."""
     heard = []
-    with Player(flights[suffix], speed=None) as player:
+    with LogPlayer(flights[suffix], speed=None) as player:
         player.graph.subscribe_all(heard.append)
         play_out(player)
         assert player.paused
@@ -105,7 +105,7 @@ def test_what_is_played_is_what_was_recorded(flights, suffix):
 def test_anywhere_what_was_the_case_is_shown(flights, suffix):
     walked = list(LogWalk(flights[suffix]))
     decoder = LogDecoder()
-    with Player(flights[suffix], paused=True) as player:
+    with LogPlayer(flights[suffix], paused=True) as player:
         visitor = Visitor(player)
         odom, weather = visitor.listen("/uav1/odom"), visitor.listen("/weather")
         static = visitor.listen("/tf_static")
@@ -129,7 +129,7 @@ def test_anywhere_what_was_the_case_is_shown(flights, suffix):
 
 def test_what_follows_a_leap_is_the_rest_of_the_log(flight):
     heard = []
-    with Player(flight, speed=None) as player:
+    with LogPlayer(flight, speed=None) as player:
         player.graph.subscribe("/uav1/odom", heard.append, m.Odometry)
         player.wait(0.0)
         play_out(player)
@@ -155,7 +155,7 @@ def test_only_what_is_listened_to_is_decoded(flight, monkeypatch):
         return decode(self, record)
 
     monkeypatch.setattr(LogDecoder, "decode", watched)
-    with Player(flight, speed=None) as player:
+    with LogPlayer(flight, speed=None) as player:
         visitor = Visitor(player)
         mailbox = visitor.listen("/uav1/imu")
         play_out(player)
@@ -166,7 +166,7 @@ def test_only_what_is_listened_to_is_decoded(flight, monkeypatch):
 def test_it_keeps_the_time_that_is_asked_for(flight, monkeypatch):
     wall = FakeWallClock()
     monkeypatch.setattr("volery.runtime.replay.log_player.time", wall.time)
-    with Player(flight, speed=4.0) as player:
+    with LogPlayer(flight, speed=4.0) as player:
         monkeypatch.setattr(player._inbox, "wait", wall.wait)
         visitor = Visitor(player)
         clock, state = visitor.listen("/clock"), visitor.listen("/volery/player/state")
@@ -188,7 +188,7 @@ def test_it_keeps_the_time_that_is_asked_for(flight, monkeypatch):
 
 
 def test_services_steer_it(flight):
-    with Player(flight, paused=True) as player:
+    with LogPlayer(flight, paused=True) as player:
         visitor = Visitor(player)
         assert player.state == STOPPED
         assert visitor.put(PLAYING) == 1
@@ -218,7 +218,7 @@ def test_services_steer_it(flight):
 
 
 def test_it_tells_what_it_plays(flight):
-    with Player(flight, paused=True) as player:
+    with LogPlayer(flight, paused=True) as player:
         visitor = Visitor(player)
         info = visitor.ours("player/info", "PlayerInfo")
         assert info.success
@@ -235,7 +235,7 @@ def test_it_tells_what_it_plays(flight):
 def test_round_and_round(tmp_path):
     path = strings(tmp_path / "x.mcap", [0, 10, 20, 30])
     heard = []
-    with Player(path, speed=None, loop=True) as player:
+    with LogPlayer(path, speed=None, loop=True) as player:
         player.graph.subscribe("/a", heard.append, m.String)
         for _ in range(12):
             player.wait(0.0)
@@ -264,7 +264,7 @@ def test_a_flight_that_was_reset_is_one_line(tmp_path):
     """The clock is the log's own, the position goes on."""
     path = strings(tmp_path / "x.mcap", [0, 1000, 2000, 0, 500, 1000])
     heard = []
-    with Player(path, paused=True) as player:
+    with LogPlayer(path, paused=True) as player:
         player.graph.subscribe("/a", heard.append, m.String)
         player.wait(0.0)
         assert (player.start_s, player.end_s) == (0.0, 3.0)
@@ -279,7 +279,7 @@ def test_a_flight_that_was_reset_is_one_line(tmp_path):
 def test_logs_that_were_cut_off_are_played_as_far_as_they_go(tmp_path, suffix):
     path = strings(tmp_path / f"x{suffix}", [0, 10, 20], end=False)
     heard = []
-    with Player(path, speed=None) as player:
+    with LogPlayer(path, speed=None) as player:
         player.graph.subscribe("/a", heard.append, m.String)
         play_out(player)
         assert "index" in player.describe()["trouble"]
@@ -290,14 +290,14 @@ def test_logs_that_were_cut_off_are_played_as_far_as_they_go(tmp_path, suffix):
 def test_what_cannot_be_played(tmp_path):
     path = tmp_path / "x.mcap"
     with pytest.raises(RecordingError, match="cannot read"):
-        Player(path)
+        LogPlayer(path)
     open_log(path).close()
     with pytest.raises(RecordingError, match="no readable message"):
-        Player(path)
+        LogPlayer(path)
     path.write_bytes(b"nonsense in a file")
     with pytest.raises(RecordingError, match="neither"):
-        Player(path)
+        LogPlayer(path)
     path.unlink()
     strings(path, [0, 10])
     with pytest.raises(CommandError, match="speed"):
-        Player(path, speed=-1.0)
+        LogPlayer(path, speed=-1.0)

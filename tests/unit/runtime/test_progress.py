@@ -3,12 +3,12 @@
 import pytest
 
 from volery.engine.pacing import Pacer
-from volery.runtime.monitoring.progress import ProgressTeller
+from volery.runtime.monitoring.progress import ProgressPublisher
 
 
 def test_what_was_flown_before_a_reset_counts_for_the_factor():
     told = []
-    teller = ProgressTeller(told.append, 60.0, Pacer())
+    teller = ProgressPublisher(told.append, 60.0, Pacer())
     for time_s in (2.0, 5.0, 1.0, 0.5, 3.0):  # set back from 5 s and from 1 s
         teller.tell(time_s, last=True)
     last = told[-1]

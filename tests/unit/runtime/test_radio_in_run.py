@@ -11,7 +11,7 @@ from volery.core.errors import CommandError, ScenarioError
 from volery.graph.messages import String
 from volery.graph.nodes.node import Node
 from volery.runtime import Simulation
-from volery.runtime.build.line_of_sight import RadioSight
+from volery.runtime.build.line_of_sight import LineOfSight
 from volery.scenario.load import parse_scenario
 
 TOPICS = [{"name": "hello", "type": "std_msgs/msg/String"}]
@@ -180,7 +180,7 @@ def test_what_stands_between() -> None:
     with Simulation(scenario) as simulation:
         forest = simulation.forest
         assert forest is not None
-        sight = RadioSight(simulation.scene, forest)
+        sight = LineOfSight(simulation.scene, forest)
         tree = int(np.argmax(forest.height_m))
         x, y, _ = forest.position_map[tree]
         crown = 0.65 * forest.height_m[tree]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from volery.core.errors import CommandError
-from volery.runtime import Copies, Simulation
+from volery.runtime import Simulation, VectorizedSimulation
 from volery.scenario.load import parse_scenario
 
 DATA = {
@@ -67,7 +67,7 @@ def test_where_the_seed_grows_the_world_other_seeds_are_refused_with_what_to_do(
 
 
 def test_copies_fix_the_world_that_they_share(forest):
-    with Copies(forest, 2) as copies:
+    with VectorizedSimulation(forest, 2) as copies:
         assert copies.scenario.world.seed == 1
         copies.run(copies.common_period_s)
         copies.reset([1], seeds=[7])

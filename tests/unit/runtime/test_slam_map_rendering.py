@@ -11,14 +11,14 @@ from volery.autonomy.mapping.log_odds import OCCUPIED
 from volery.autonomy.perception.static_transforms import LEVEL
 from volery.core import rotations
 from volery.runtime.replay.slam.map_rendering import draw_map
-from volery.runtime.replay.slam.offline_slam import Outcome
-from volery.runtime.replay.slam.topic_selection import Channels
-from volery.runtime.replay.slam.trajectory import Trajectory
+from volery.runtime.replay.slam.offline_slam import SlamResult
+from volery.runtime.replay.slam.topic_selection import TopicSelection
+from volery.runtime.replay.slam.trajectory import EstimatedTrajectory
 
 S = 1_000_000_000
 
 
-def flown() -> Outcome:
+def flown() -> SlamResult:
     """Five seconds beside a trunk and a crown, towards a slope that the level scan meets."""
     times = np.arange(1, 101) * (S // 20)
     places = np.stack([np.zeros(100), 0.5 * np.sin(0.1 * np.arange(100)), np.full(100, HEIGHT_M)])
@@ -28,16 +28,16 @@ def flown() -> Outcome:
         when = int(times[k])
         level.append((k, scan_message("level", when, seen_from(place, 0.0))))
         nodding.append((k, scan_message("laser_nodding", when, seen_from(place, angle))))
-    return Outcome(
-        Channels("uav1", {}, True),
-        Trajectory(times, times, places.T, np.tile(rotations.IDENTITY, (100, 1))),
+    return SlamResult(
+        TopicSelection("uav1", {}, True),
+        EstimatedTrajectory(times, times, places.T, np.tile(rotations.IDENTITY, (100, 1))),
         [scan for scan in level if scan[0] % 10 == 0],
         lambda _: LEVEL,
         100, 5.0, 0.1, {}, nodding=nodding, nods=np.stack([times / S, angles], 1),
     )  # fmt: skip
 
 
-def occupied(outcome: Outcome) -> np.ndarray:
+def occupied(outcome: SlamResult) -> np.ndarray:
     """Middles (N, 2) of what the map takes for obstacles."""
     grid = draw_map(outcome, 0.1, 40.0)
     rows, columns = np.nonzero(grid.occupancy() == OCCUPIED)

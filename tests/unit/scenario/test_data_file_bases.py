@@ -2,7 +2,7 @@ import pytest
 
 from volery.core.errors import DataFileError
 from volery.runtime.build.fleet import add_bodies
-from volery.runtime.build.placement import Start
+from volery.runtime.build.placement import StartPose
 from volery.sensors.imu import load_imu_model
 from volery.sensors.lidar_model import load_lidar
 from volery.vehicle.airframe import load_airframe
@@ -84,7 +84,7 @@ def test_airframes_of_one_name_keep_their_own_bodies(write):
 
     scene = Scene()
     starts = [
-        Start(f"uav{k}", "t", airframe, (0, 0, 0), (0, 0, 0, 1), True, False)
+        StartPose(f"uav{k}", "t", airframe, (0, 0, 0), (0, 0, 0, 1), True, False)
         for k, airframe in enumerate((load_airframe("f450"), big, load_airframe("f450")))
     ]
     add_bodies(scene, starts)

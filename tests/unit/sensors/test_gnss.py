@@ -10,7 +10,7 @@ from volery.core import rotations
 from volery.core.errors import CommandError, DataFileError, ScenarioError
 from volery.scenario.load import parse_scenario
 from volery.sensors.gnss import load_gnss_model
-from volery.sensors.gnss_denial import Denial, Prism
+from volery.sensors.gnss_denial import GnssDenial, Prism
 
 PERIOD = NS // 5
 
@@ -136,7 +136,7 @@ def test_polygons_and_heights():
 
 def test_a_uav_that_enters_an_area_loses_its_fix_and_regains_it_later():
     area = Prism(np.array([[0, 0], [20, 0], [20, 20], [0, 20]], float), 0.0, 30.0)
-    bank, fleet = gnss_bank(denial=Denial(prisms=(area,)), reacquisition_s=1.0), fleet_of()
+    bank, fleet = gnss_bank(denial=GnssDenial(prisms=(area,)), reacquisition_s=1.0), fleet_of()
     had = {}
     for k in range(25):
         put(fleet, [-5.0 if k < 5 or k >= 10 else 5.0, 10.0, 10.0])

@@ -3,9 +3,9 @@
 import pytest
 
 from volery.core.errors import BridgeError
-from volery.runtime.vehicles.control_authority import Pilots
-from volery.server.access_policy import PilotGate, ViewerGate
-from volery.server.operator_names import CrewList
+from volery.runtime.vehicles.control_authority import ControlAuthority
+from volery.server.access_policy import OperatorPolicy, ViewerPolicy
+from volery.server.operator_names import OperatorNames
 from volery.server.read_only import READ_ONLY_SERVICES
 
 
@@ -24,7 +24,7 @@ def call(service, **args):
     ],
 )
 def test_a_viewer_looks_on(operation):
-    assert ViewerGate().check(operation)
+    assert ViewerPolicy().check(operation)
 
 
 @pytest.mark.parametrize(
@@ -46,7 +46,7 @@ def test_a_viewer_looks_on(operation):
 )
 def test_a_viewer_changes_nothing(operation):
     with pytest.raises(BridgeError, match="a viewer may not"):
-        ViewerGate().check(operation)
+        ViewerPolicy().check(operation)
 
 
 def test_services_that_change_nothing_say_so_by_their_names():
@@ -62,10 +62,10 @@ class Two:
     """Two pilots at one simulation of two UAVs."""
 
     def __init__(self):
-        self.pilots, crew = Pilots(lambda: ("uav1", "uav2")), CrewList()
+        self.pilots, crew = ControlAuthority(lambda: ("uav1", "uav2")), OperatorNames()
         self.now_s = 0.0
-        self.anna = PilotGate(crew.sign_in("Anna"), crew, self.pilots, lambda: self.now_s)
-        self.ben = PilotGate(crew.sign_in("Ben"), crew, self.pilots, lambda: self.now_s)
+        self.anna = OperatorPolicy(crew.sign_in("Anna"), crew, self.pilots, lambda: self.now_s)
+        self.ben = OperatorPolicy(crew.sign_in("Ben"), crew, self.pilots, lambda: self.now_s)
         self.pilots.take("uav1", "Anna")
 
 
@@ -150,7 +150,7 @@ def test_a_pilot_may_take_another_name_with_the_first_uav():
 
 
 def test_names_are_ones_own():
-    crew = CrewList()
+    crew = OperatorNames()
     assert [crew.sign_in("Anna"), crew.sign_in("Anna")] == ["Anna", "Anna 2"]
     assert [crew.sign_in(), crew.sign_in("\n")] == ["pilot 1", "pilot 2"]
     crew.sign_out("Anna")

@@ -17,7 +17,7 @@ from websockets.exceptions import ConnectionClosed
 from volery.cli import pages
 from volery.core.errors import BridgeError
 from volery.graph.codecs.zero import zero_message
-from volery.runtime.idle_server import Lobby
+from volery.runtime.idle_server import IdleServer
 from volery.server import page
 from volery.server.page_server import PageServer
 from volery.server.read_only import READ_ONLY_SERVICES
@@ -42,7 +42,7 @@ def test_status_tells_what_flies(server, flight):
 
 
 def test_states_between_worlds():
-    lobby = Lobby(lambda _name: None)
+    lobby = IdleServer(lambda _name: None)
     with serving() as server:
         assert ask(server, "/api/status").json["state"] == "building"
         server.building("longleaf", "Pines.", "hover: no place")

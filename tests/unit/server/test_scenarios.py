@@ -7,7 +7,7 @@ from page_bench import ask, serving
 from PIL import Image
 
 from volery.scenario import library
-from volery.scenario.catalog import Shelf
+from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.load import load_scenario, parse_scenario
 from volery.server.card_renderer import HEIGHT, VIEWS, WIDTH
 from volery.server.cards import CARDS
@@ -30,7 +30,7 @@ def test_views_are_of_scenarios_that_ship():
 
 
 def test_cards_tell_what_the_scenarios_say():
-    cards = {card["name"]: card for card in cards_of(Shelf())}
+    cards = {card["name"]: card for card in cards_of(ScenarioCatalog())}
     assert list(cards) == library.names()
     city, survey, hover = cards["city_flight"], cards["forest_survey"], cards["hover"]
     assert (city["world"], city["uavs"], city["duration_s"]) == ("city", 3, 120.0)
@@ -59,7 +59,7 @@ def test_uploaded_scenarios_stand_behind_and_broken_ones_not_at_all(tmp_path):
     (tmp_path / "hover" / "scenario.toml").write_text("name = 4")  # cannot hide the one that ships
     (tmp_path / ".upload_x").mkdir()
     (tmp_path / ".upload_x" / "scenario.toml").write_text(hover)  # is being checked
-    shelf = Shelf(tmp_path)
+    shelf = ScenarioCatalog(tmp_path)
     assert shelf.added() == ("broken", "mine")
     last = cards_of(shelf)[-1]
     assert (last["name"], last["uploaded"], last["picture"]) == ("mine", True, None)
@@ -68,11 +68,11 @@ def test_uploaded_scenarios_stand_behind_and_broken_ones_not_at_all(tmp_path):
 
 def test_a_scenario_of_the_command_line_can_be_chosen_again(tmp_path, flat_data):
     mine = parse_scenario({**flat_data, "name": "mine"})
-    shelf = Shelf(tmp_path, given=mine)
+    shelf = ScenarioCatalog(tmp_path, given=mine)
     assert shelf.load("mine") is mine
     assert "mine" in shelf.names()
     assert [card["name"] for card in cards_of(shelf)] == [*library.names(), "mine"]
     # It hides none of the others.
-    hidden = Shelf(tmp_path, given=parse_scenario({**flat_data, "name": "hover"}))
+    hidden = ScenarioCatalog(tmp_path, given=parse_scenario({**flat_data, "name": "hover"}))
     assert hidden.load("hover") == load_scenario("hover")
     assert len(cards_of(hidden)) == len(library.names())

@@ -10,7 +10,7 @@ from PIL import Image
 
 from volery.core.errors import VoleryError
 from volery.runtime.build.worlds import build_forest, build_solids, build_terrain
-from volery.scenario.catalog import Shelf
+from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.load import load_scenario
 from volery.server.uploads import kinds, scenario_builder
 from volery.server.uploads.kinds import KINDS
@@ -44,7 +44,7 @@ def checked(tmp_path):
         path = tmp_path / f"{kind}{suffix}"
         path.write_bytes(content)
         check(kind, path, name, f"my yard{suffix}")
-        return load_scenario(tmp_path / Shelf.FILE)
+        return load_scenario(tmp_path / ScenarioCatalog.FILE)
 
     return run
 
@@ -131,7 +131,7 @@ def test_descriptions_hold_no_toml(checked, tmp_path):
     path.write_bytes(INVENTORY)
     evil = '"\nname = "other"\n\x00\U0001f600.csv'
     check("forest", path, "yard", evil)
-    assert load_scenario(tmp_path / Shelf.FILE).name == "yard"
+    assert load_scenario(tmp_path / ScenarioCatalog.FILE).name == "yard"
 
 
 @pytest.mark.parametrize(
@@ -147,7 +147,7 @@ def test_descriptions_hold_no_toml(checked, tmp_path):
     ],
 )
 def test_names_are_ours(called, name, tmp_path):
-    assert name_for(called, Shelf(tmp_path)) == name
+    assert name_for(called, ScenarioCatalog(tmp_path)) == name
 
 
 OWN = """# my flight

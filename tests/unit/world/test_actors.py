@@ -10,7 +10,7 @@ from plain_scene import PlainScene
 
 from volery.core import rotations
 from volery.core.errors import CommandError
-from volery.world.actors import SHAPES, MovingThings, Thing
+from volery.world.actors import SHAPES, MovingActor, MovingActors
 from volery.world.actors.motions import CircleMotion, GivenMotion, WaypointMotion
 from volery.world.materials import Material
 from volery.world.scene import Scene, Solid
@@ -129,10 +129,10 @@ def test_what_was_said_is_known_of_the_past():
 def two_things():
     shapes = {name: SHAPES[name]() for name in SHAPES}
     walk = WaypointMotion([[5.0, -3.0, 0.0], [5.0, 3.0, 0.0]], 1.5, "back")
-    return MovingThings(
+    return MovingActors(
         [
-            Thing("anna", "person", shapes["person"], walk),
-            Thing("van", "car", shapes["car"], GivenMotion([-8, 0, 0, 0, 0, 0, 1])),
+            MovingActor("anna", "person", shapes["person"], walk),
+            MovingActor("van", "car", shapes["car"], GivenMotion([-8, 0, 0, 0, 0, 0, 1])),
         ]
     )
 

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.avoidance.depth_course import DepthCourse
-from volery.autonomy.avoidance.gap_steering import Caution, GapSteering
+from volery.autonomy.avoidance.gap_steering import GapSteering, SpeedLimits
 from volery.autonomy.avoidance.obstacle_memory import ObstacleMemory
 from volery.autonomy.perception.depth_projection import DepthProjector
-from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.scan_points import OdometrySample
 from volery.graph.messages import CameraInfo, Image
 
 Array = NDArray[np.float64]
@@ -56,11 +56,11 @@ class DepthAvoidance(DepthCourse):
         radius = float(self.declare_parameter("safe_radius_m", 0.9).value)
         deceleration = float(self.declare_parameter("deceleration_m_s2", 1.5).value)
         view = math.radians(self.declare_parameter("view_deg", 70.0).value)
-        self._steering = GapSteering(Caution(radius, deceleration, view / 2.0, _ASIDE_M_S))
+        self._steering = GapSteering(SpeedLimits(radius, deceleration, view / 2.0, _ASIDE_M_S))
         self._obstacles = ObstacleMemory(keep_s=20.0)
         self._projector = DepthProjector(self.mount)
 
-    def look(self, image: Image, info: CameraInfo, pose: Pose) -> None:
+    def look(self, image: Image, info: CameraInfo, pose: OdometrySample) -> None:
         """Remember what the picture shows at the height of flight."""
         points = self._projector.points(image, info, pose)
         height = points[:, 2]
@@ -68,7 +68,7 @@ class DepthAvoidance(DepthCourse):
         above_ground = height > self.ground_height + _LEAST_HEIGHT_M
         self._obstacles.add(points[in_the_way & above_ground], self.now_ns)
 
-    def steer(self, pose: Pose) -> tuple[Array, float]:
+    def steer(self, pose: OdometrySample) -> tuple[Array, float]:
         """Through the best gap."""
         goal = self.to_goal(pose)
         return self._steering.steer(pose, goal, self._obstacles, self.now_ns, self.speed)

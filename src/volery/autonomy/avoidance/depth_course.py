@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.perception.list_parameters import declare_numbers
-from volery.autonomy.perception.scan_points import Pose
-from volery.core.saved_state import keep, put_back
+from volery.autonomy.perception.scan_points import OdometrySample
+from volery.core.saved_state import restore_attributes, save_attributes
 from volery.graph.messages import CameraInfo, Image, Odometry, String, Twist, Vector3
 from volery.graph.nodes.node import Node
 
@@ -24,7 +24,7 @@ _BLIND_AFTER_S = 0.5
 _STATE = ("phase", "pose", "_home", "_course", "_image_ns", "_info")
 
 
-class Phase(StrEnum):
+class DepthCoursePhase(StrEnum):
     """Where in its course the node is."""
 
     START = "start"
@@ -59,8 +59,8 @@ class DepthCourse(Node):
         camera = self.declare_parameter("camera", "camera").value
         self.mount = declare_numbers(self, "mount", [0.0, 0.0, 0.0], "[x, y, z]")
 
-        self.phase = Phase.START
-        self.pose: Pose | None = None
+        self.phase = DepthCoursePhase.START
+        self.pose: OdometrySample | None = None
         self._home = np.zeros(3)
         self._course = 0.0
         self._image_ns: int | None = None
@@ -76,11 +76,11 @@ class DepthCourse(Node):
         self.create_timer(_PERIOD_S, self._on_timer)
 
     @abstractmethod
-    def look(self, image: Image, info: CameraInfo, pose: Pose) -> None:
+    def look(self, image: Image, info: CameraInfo, pose: OdometrySample) -> None:
         """Take in a depth picture."""
 
     @abstractmethod
-    def steer(self, pose: Pose) -> tuple[Array, float]:
+    def steer(self, pose: OdometrySample) -> tuple[Array, float]:
         """Velocity (2,) m/s in the odometry frame and yaw rate, rad/s, while flying the course."""
 
     @property
@@ -90,11 +90,11 @@ class DepthCourse(Node):
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        return keep(self, (*_STATE, *self.STATE))
+        return save_attributes(self, (*_STATE, *self.STATE))
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
-        put_back(self, state)
+        restore_attributes(self, state)
 
     # --------------------------------------------------------------------------------- the course
 
@@ -113,12 +113,12 @@ class DepthCourse(Node):
         """Heading of the course, rad in the odometry frame."""
         return self._course
 
-    def to_goal(self, pose: Pose) -> Array:
+    def to_goal(self, pose: OdometrySample) -> Array:
         """The end of the course, (2,) m from the UAV, odometry frame."""
         end = self._home[:2] + self._distance * self._ahead
         return np.asarray(end - pose.position[:2])
 
-    def aside(self, pose: Pose) -> float:
+    def aside(self, pose: OdometrySample) -> float:
         """How far to the left of the course the UAV is, m."""
         offset = pose.position[:2] - self._home[:2]
         return float(self._ahead[0] * offset[1] - self._ahead[1] * offset[0])
@@ -130,7 +130,7 @@ class DepthCourse(Node):
     # -------------------------------------------------------------------------------- what it does
 
     def _on_odometry(self, message: Odometry) -> None:
-        self.pose = Pose.from_odometry(message)
+        self.pose = OdometrySample.from_odometry(message)
 
     def _on_info(self, message: CameraInfo) -> None:
         self._info = message
@@ -144,23 +144,25 @@ class DepthCourse(Node):
         pose = self.pose
         if pose is None:
             return
-        if self.phase is Phase.START:
+        if self.phase is DepthCoursePhase.START:
             if self._take_off.service_is_ready() and self._take_off.call().success:
                 self._home, self._course = pose.position.copy(), pose.yaw
-                self.phase = Phase.CLIMB
-        elif self.phase is Phase.CLIMB:
+                self.phase = DepthCoursePhase.CLIMB
+        elif self.phase is DepthCoursePhase.CLIMB:
             climbed = float(pose.position[2] - self._home[2])
             if climbed > 1.0 and (abs(pose.velocity[2]) < 0.1 or climbed > self._height - 0.3):
-                self.phase = Phase.FLY
-        elif self.phase is Phase.FLY:
+                self.phase = DepthCoursePhase.FLY
+        elif self.phase is DepthCoursePhase.FLY:
             self._fly(pose)
         if self._status.wanted:
-            self._status.publish(String(self.doing if self.phase is Phase.FLY else str(self.phase)))
+            self._status.publish(
+                String(self.doing if self.phase is DepthCoursePhase.FLY else str(self.phase))
+            )
 
-    def _fly(self, pose: Pose) -> None:
+    def _fly(self, pose: OdometrySample) -> None:
         if float(self.to_goal(pose) @ self._ahead) < 0.0:
             if self._land.call().success:
-                self.phase = Phase.LAND
+                self.phase = DepthCoursePhase.LAND
             return
         sees = self._image_ns is not None and self.now_ns - self._image_ns < _BLIND_AFTER_S * 1e9
         velocity, yaw_rate = self.steer(pose) if sees else (np.zeros(2), 0.0)

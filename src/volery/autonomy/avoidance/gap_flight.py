@@ -17,14 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.avoidance.gap_steering import Caution, GapSteering
+from volery.autonomy.avoidance.gap_steering import GapSteering, SpeedLimits
 from volery.autonomy.avoidance.obstacle_memory import ObstacleMemory
 from volery.autonomy.perception.ground_plane import GroundPlane
 from volery.autonomy.perception.list_parameters import declare_mount
-from volery.autonomy.perception.scan_points import Pose, ScanProjector
-from volery.autonomy.perception.speckle_filter import LoneReturns
+from volery.autonomy.perception.scan_points import OdometrySample, ScanProjector
+from volery.autonomy.perception.speckle_filter import SpeckleFilter
 from volery.core import rotations
-from volery.core.saved_state import keep, put_back
+from volery.core.saved_state import restore_attributes, save_attributes
 from volery.graph.messages import JointState, LaserScan, Odometry, Range, Twist, Vector3
 from volery.graph.nodes.node import Node
 
@@ -77,16 +77,16 @@ class GapFlight(Node):
         self._speed_m_s = self.declare_parameter("speed_m_s", 3.0, least=0.1, read_only=False)
         radius = float(self.declare_parameter("safe_radius_m", 1.1, least=0.05).value)
         deceleration = float(self.declare_parameter("deceleration_m_s2", 2.0, least=0.1).value)
-        self._steering = GapSteering(Caution(radius, deceleration))
+        self._steering = GapSteering(SpeedLimits(radius, deceleration))
         self._level = ScanProjector(declare_mount(self, "level"))
         self._nodding = ScanProjector(declare_mount(self, "nodding"))
-        self._pose: Pose | None = None
+        self._pose: OdometrySample | None = None
         self._joint: tuple[int, float, float] | None = None
         self._range: tuple[int, float] | None = None
         self._ground = GroundPlane()
         self._obstacles = ObstacleMemory()
         self._low_obstacles = ObstacleMemory(half_width_m=10.0, looks_needed=3)
-        self._level_filter, self._nodding_filter = LoneReturns(), LoneReturns()
+        self._level_filter, self._nodding_filter = SpeckleFilter(), SpeckleFilter()
 
         self.create_subscription(Odometry, odometry, self._on_odometry, 5)
         self.create_subscription(LaserScan, "laser/horizontal/scan", self._on_level_scan, 5)
@@ -97,11 +97,11 @@ class GapFlight(Node):
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        return keep(self, self.STATE)
+        return save_attributes(self, self.STATE)
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
-        put_back(self, state)
+        restore_attributes(self, state)
 
     @property
     def _height(self) -> float:
@@ -110,7 +110,7 @@ class GapFlight(Node):
     # ------------------------------------------------------------------------------ what it sees
 
     def _on_odometry(self, message: Odometry) -> None:
-        self._pose = Pose.from_odometry(message)
+        self._pose = OdometrySample.from_odometry(message)
 
     def _on_joint(self, message: JointState) -> None:
         if message.name[0] != "laser_nodding":
@@ -144,17 +144,17 @@ class GapFlight(Node):
 
     # ------------------------------------------------------------------------------ what it does
 
-    def _go_towards(self, pose: Pose, to_goal: Array) -> None:
+    def _go_towards(self, pose: OdometrySample, to_goal: Array) -> None:
         now, top_speed = self.get_clock().now_ns(), float(self._speed_m_s.value)
         velocity, yaw_rate = self._steering.steer(pose, to_goal, self._obstacles, now, top_speed)
         self._publish(pose, velocity, yaw_rate)
 
     # -------------------------------------------------------------------------------- vertically
 
-    def _refit_ground(self, pose: Pose) -> None:
+    def _refit_ground(self, pose: OdometrySample) -> None:
         self._ground.fit(pose.position, self._ground_below(pose), self.get_clock().now_ns())
 
-    def _ground_below(self, pose: Pose) -> float | None:
+    def _ground_below(self, pose: OdometrySample) -> float | None:
         if self._range is None:
             return None
         time_ns, distance = self._range
@@ -162,7 +162,7 @@ class GapFlight(Node):
             return None
         return float(pose.position[2]) - distance
 
-    def _publish(self, pose: Pose, velocity: Array, yaw_rate: float) -> None:
+    def _publish(self, pose: OdometrySample, velocity: Array, yaw_rate: float) -> None:
         """Command a level velocity (odometry frame) together with the climb that holds height."""
         above = float(pose.position[2]) - float(self._ground.height_at(pose.position[:2]))
         climb = 1.2 * (self._height - above) + float(velocity @ self._ground.slope)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from volery.autonomy.avoidance.gap_flight import GapFlight
 from volery.autonomy.perception.list_parameters import declare_points
-from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.scan_points import OdometrySample
 from volery.graph.messages import String
 
 Array = NDArray[np.float64]
@@ -20,7 +20,7 @@ _PERIOD_S = 0.05
 _LEAST_CLIMB_M = 1.0
 
 
-class Phase(StrEnum):
+class GapFollowingPhase(StrEnum):
     """Where in its mission the node is."""
 
     START = "start"
@@ -47,7 +47,7 @@ class GapFollowing(GapFlight):
         super().__init__("gap_following", **options)
         route = declare_points(self, "route", [[50.0, 0.0]])
         self._route = [np.array(point, dtype=np.float64) for point in route]
-        self._phase = Phase.START
+        self._phase = GapFollowingPhase.START
         self._home = np.zeros(3)
         self._next_waypoint = 0
         self._settle_at: Array | None = None
@@ -60,31 +60,31 @@ class GapFollowing(GapFlight):
         if self._pose is None:
             return
         step = {
-            Phase.START: self._start,
-            Phase.CLIMB: self._climb,
-            Phase.FLY: self._fly,
-            Phase.SETTLE: self._settle,
-            Phase.LAND: self._wait,
+            GapFollowingPhase.START: self._start,
+            GapFollowingPhase.CLIMB: self._climb,
+            GapFollowingPhase.FLY: self._fly,
+            GapFollowingPhase.SETTLE: self._settle,
+            GapFollowingPhase.LAND: self._wait,
         }[self._phase]
         step(self._pose)
         if self._status.wanted:
             self._status.publish(String(str(self._phase)))
 
-    def _start(self, pose: Pose) -> None:
+    def _start(self, pose: OdometrySample) -> None:
         if self._take_off.service_is_ready() and self._take_off.call().success:
             self._home = pose.position.copy()
             self._ground.height = float(pose.position[2])
             self._ground.anchor = pose.position[:2].copy()
-            self._phase = Phase.CLIMB
+            self._phase = GapFollowingPhase.CLIMB
 
-    def _climb(self, pose: Pose) -> None:
+    def _climb(self, pose: OdometrySample) -> None:
         self._refit_ground(pose)
         climbed = float(pose.position[2] - self._home[2])
         has_stopped = climbed > _LEAST_CLIMB_M and abs(pose.velocity[2]) < 0.1
         if has_stopped or climbed > self._height - 0.5:
-            self._phase = Phase.FLY
+            self._phase = GapFollowingPhase.FLY
 
-    def _fly(self, pose: Pose) -> None:
+    def _fly(self, pose: OdometrySample) -> None:
         self._refit_ground(pose)
         to_goal = self._home[:2] + self._route[self._next_waypoint] - pose.position[:2]
         distance, now = float(np.hypot(*to_goal)), self.get_clock().now_ns()
@@ -92,12 +92,12 @@ class GapFollowing(GapFlight):
             self._next_waypoint += 1
             self._steering.begin_leg(now)
             if self._next_waypoint == len(self._route):
-                self._phase = Phase.SETTLE
+                self._phase = GapFollowingPhase.SETTLE
                 self._settle_at = self._landing_place(pose)
             return
         self._go_towards(pose, to_goal)
 
-    def _settle(self, pose: Pose) -> None:
+    def _settle(self, pose: OdometrySample) -> None:
         """Move to a place without low growth, then land there."""
         self._refit_ground(pose)
         assert self._settle_at is not None
@@ -105,14 +105,14 @@ class GapFollowing(GapFlight):
         distance = float(np.hypot(*to_place))
         if distance < 0.6 or self._steering.is_stuck(distance, self.get_clock().now_ns()):
             if self._land.call().success:
-                self._phase = Phase.LAND
+                self._phase = GapFollowingPhase.LAND
             return
         self._go_towards(pose, to_place)
 
-    def _wait(self, pose: Pose) -> None:
+    def _wait(self, pose: OdometrySample) -> None:
         """The flight mode lands by itself."""
 
-    def _landing_place(self, pose: Pose) -> Array:
+    def _landing_place(self, pose: OdometrySample) -> Array:
         """Nearest place within 8 m that has no growth within 1 m."""
         now = self.get_clock().now_ns()
         growth = self._low_obstacles.around(pose.position[:2], now, 10.0)

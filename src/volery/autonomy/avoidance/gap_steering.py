@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from volery.autonomy.avoidance.gaps import choose_heading, free_distances, wrap
 from volery.autonomy.avoidance.obstacle_memory import ObstacleMemory
-from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.scan_points import OdometrySample
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ _DETOUR_S = 5.0
 
 
 @dataclass(frozen=True)
-class Caution:
+class SpeedLimits:
     """How a UAV keeps off obstacles."""
 
     safe_radius_m: float = 1.1
@@ -42,7 +42,7 @@ class Caution:
 class GapSteering:
     """Velocity and turn towards a goal, see `steer`; tries detours where there is no progress."""
 
-    def __init__(self, caution: Caution) -> None:
+    def __init__(self, caution: SpeedLimits) -> None:
         self._caution = caution
         self._last_heading: float | None = None
         self._progress: tuple[int, float] = (0, math.inf)
@@ -54,7 +54,12 @@ class GapSteering:
         self._progress = (now, math.inf)
 
     def steer(
-        self, pose: Pose, to_goal: Array, memory: ObstacleMemory, now: int, top_speed: float
+        self,
+        pose: OdometrySample,
+        to_goal: Array,
+        memory: ObstacleMemory,
+        now: int,
+        top_speed: float,
     ) -> tuple[Array, float]:
         """Level velocity (2,) m/s in the odometry frame, and yaw rate, rad/s.
 

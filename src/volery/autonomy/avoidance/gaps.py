@@ -58,7 +58,7 @@ def _shorten(obstacles: Array, safe_radius: float, free: Array) -> None:
 
 
 @dataclass(frozen=True)
-class Heading:
+class GapHeading:
     """A chosen direction, rad in the frame of the obstacles, and how far it is free, m."""
 
     angle: float
@@ -67,7 +67,7 @@ class Heading:
 
 def choose_heading(
     free: Array, goal_angle: float, goal_distance: float, previous_angle: float | None
-) -> Heading | None:
+) -> GapHeading | None:
     """Direction of the best gap, or None when every way is blocked.
 
     Wants gaps that are free far ahead and settles for nearer ones; within a gap it prefers what
@@ -84,7 +84,7 @@ def choose_heading(
         best = int(np.argmin(np.where(passable, cost, np.inf)))
         if off_goal[best] > 2.0 and wanted > 2.5:
             continue  # rather a near gap ahead than a far one behind
-        return Heading(float(SECTOR_ANGLES[best]), float(free[best]))
+        return GapHeading(float(SECTOR_ANGLES[best]), float(free[best]))
     return None
 
 

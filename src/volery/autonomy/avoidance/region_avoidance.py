@@ -20,7 +20,7 @@ from volery.autonomy.avoidance.depth_course import DepthCourse
 from volery.autonomy.avoidance.gaps import wrap
 from volery.autonomy.perception.depth_projection import depth_of, mean_depth, region_of
 from volery.autonomy.perception.list_parameters import declare_numbers
-from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.scan_points import OdometrySample
 from volery.core.errors import NodeError
 from volery.graph.messages import CameraInfo, Image
 
@@ -33,7 +33,7 @@ _GIVE_UP_S = 15.0
 """After so long on one side it tries the other."""
 
 
-class State(StrEnum):
+class RegionAvoidanceState(StrEnum):
     """The states of the machine."""
 
     FORWARD = "forward"
@@ -70,7 +70,7 @@ class RegionAvoidance(DepthCourse):
         self._margin_ns = round(
             1e9 * self.declare_parameter("margin_s", 1.0, least=0.0, most=1e4).value
         )
-        self._state = State.FORWARD
+        self._state = RegionAvoidanceState.FORWARD
         self._mean = 1.0
         self._sides = (1.0, 1.0)
         self._side = 1.0
@@ -82,7 +82,7 @@ class RegionAvoidance(DepthCourse):
         """The machine's state."""
         return str(self._state)
 
-    def look(self, image: Image, info: CameraInfo, pose: Pose) -> None:  # noqa: ARG002
+    def look(self, image: Image, info: CameraInfo, pose: OdometrySample) -> None:  # noqa: ARG002
         """Take the means of the region, and of the halves of the picture."""
         depth = depth_of(image)
         width, height = self._region
@@ -90,39 +90,42 @@ class RegionAvoidance(DepthCourse):
         left, right = region_of(depth, 0.5, height, -0.25), region_of(depth, 0.5, height, 0.25)
         self._sides = mean_depth(left, self._far), mean_depth(right, self._far)
 
-    def steer(self, pose: Pose) -> tuple[Array, float]:
+    def steer(self, pose: OdometrySample) -> tuple[Array, float]:
         """One turn of the machine."""
         blocked = self._mean < self._threshold
         self._change(blocked, pose)
         aside = self.aside(pose)
         ahead, left = {
-            State.FORWARD: (self.speed, 0.0),
-            State.STOPPED: (0.0, 0.0),
-            State.AVOID: (0.0, self._side * self._sidestep),
-            State.RETURN: (self.speed, -math.copysign(min(abs(aside), self._sidestep), aside)),
+            RegionAvoidanceState.FORWARD: (self.speed, 0.0),
+            RegionAvoidanceState.STOPPED: (0.0, 0.0),
+            RegionAvoidanceState.AVOID: (0.0, self._side * self._sidestep),
+            RegionAvoidanceState.RETURN: (
+                self.speed,
+                -math.copysign(min(abs(aside), self._sidestep), aside),
+            ),
         }[self._state]
         c, s = math.cos(self.course), math.sin(self.course)
         turn = float(wrap(np.array(self.course - pose.yaw)))
         return np.array([c * ahead - s * left, s * ahead + c * left]), max(-1.0, min(1.0, turn))
 
-    def _change(self, blocked: bool, pose: Pose) -> None:
+    def _change(self, blocked: bool, pose: OdometrySample) -> None:
         now = self.now_ns
-        if self._state in (State.FORWARD, State.RETURN):
+        if self._state in (RegionAvoidanceState.FORWARD, RegionAvoidanceState.RETURN):
             if blocked:
-                self._enter(State.STOPPED)
+                self._enter(RegionAvoidanceState.STOPPED)
             elif abs(self.aside(pose)) < _BACK_M:
-                self._state = State.FORWARD
-        elif self._state is State.STOPPED:
+                self._state = RegionAvoidanceState.FORWARD
+        elif self._state is RegionAvoidanceState.STOPPED:
             if float(np.hypot(*pose.velocity[:2])) < _STILL_M_S:
                 self._side = 1.0 if self._sides[0] >= self._sides[1] else -1.0
-                self._enter(State.AVOID)
+                self._enter(RegionAvoidanceState.AVOID)
         elif blocked:
             self._free_ns = now
             if now - self._since_ns > _GIVE_UP_S * 1e9:
                 self._side = -self._side
                 self._since_ns = now
         elif now - self._free_ns > self._margin_ns:
-            self._enter(State.RETURN)
+            self._enter(RegionAvoidanceState.RETURN)
 
-    def _enter(self, state: State) -> None:
+    def _enter(self, state: RegionAvoidanceState) -> None:
         self._state, self._since_ns, self._free_ns = state, self.now_ns, self.now_ns

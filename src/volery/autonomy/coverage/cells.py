@@ -20,7 +20,7 @@ Ints = NDArray[np.int32]
 Mask = NDArray[np.bool_]
 
 EAST, NORTH, WEST, SOUTH = 0, 1, 2, 3
-"""Columns of `Cells.neighbours`; then come north-east, north-west, south-west, south-east."""
+"""Columns of `CoverageCells.neighbours`; NE, NW, SW and SE follow."""
 
 MOST_MAP_CELLS = 4096 * 4096
 """Largest map, free and blocked cells together: its index takes 64 MiB. Modelling choice."""
@@ -34,7 +34,7 @@ FAR = np.float32(3.0e38)
 
 
 @dataclass(frozen=True)
-class Cells:
+class CoverageCells:
     """The n cells of a grid that count, numbered row by row.
 
     shape: rows, columns of the grid. flat: (n,) row * columns + column. index: (rows * columns,)
@@ -51,7 +51,7 @@ class Cells:
         return len(self.flat)
 
     @classmethod
-    def of(cls, mask: Mask) -> Cells:
+    def of(cls, mask: Mask) -> CoverageCells:
         """The cells where `mask` (rows, columns) is true. `PlanError` where they are too many."""
         if mask.ndim != 2 or 0 in mask.shape:
             raise PlanError(f"a map needs rows and columns, not the shape {mask.shape}")
@@ -79,14 +79,14 @@ class Cells:
         inside = 0 <= row < rows and 0 <= column < columns
         return int(self.index[row * columns + column]) if inside else -1
 
-    def part(self, numbers: Ints) -> Cells:
+    def part(self, numbers: Ints) -> CoverageCells:
         """These cells alone, numbered in this order; `numbers` must ascend."""
         place = np.full(len(self) + 1, -1, np.int32)  # the last one answers for "none": -1
         place[numbers] = np.arange(len(numbers), dtype=np.int32)
         flat = self.flat[numbers]
         index = np.full(len(self.index), -1, np.int32)
         index[flat] = place[numbers]
-        return Cells(self.shape, flat, index, place[self.neighbours[numbers]])
+        return CoverageCells(self.shape, flat, index, place[self.neighbours[numbers]])
 
     def places(self) -> NDArray[np.int64]:
         """(n, 2) row, column."""

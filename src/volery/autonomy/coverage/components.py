@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.coverage.cells import FAR, Cells, Ints, Mask
+from volery.autonomy.coverage.cells import FAR, CoverageCells, Ints, Mask
 
 
 @dataclass(frozen=True)
-class Visit:
+class CoverageVisit:
     """A part that one UAV visits as a whole: the UAV, the part, the cell that it comes to first."""
 
     uav: int
@@ -24,7 +24,7 @@ class Visit:
 
 
 @dataclass(frozen=True)
-class Shares:
+class AreaShares:
     """Who goes where.
 
     entries: (R,) the cell in which each UAV begins, -1 for one that finds no work. visits: parts
@@ -33,20 +33,20 @@ class Shares:
     """
 
     entries: Ints
-    visits: tuple[Visit, ...]
+    visits: tuple[CoverageVisit, ...]
     lost: Ints
 
 
 @dataclass(frozen=True)
-class Reach:
+class ReachableCells:
     """How far UAVs have to the cells to visit.
 
     ways: the cells through which they fly, which hold those to visit. flies_over: whether they may
     also cross, in a straight line, what is blocked.
     """
 
-    ways: Cells
-    to_visit: Cells
+    ways: CoverageCells
+    to_visit: CoverageCells
     flies_over: bool
 
     def of(self, start: int) -> NDArray[np.float32]:
@@ -60,7 +60,7 @@ class Reach:
         return along
 
 
-def share_parts(reach: Reach, starts: Ints, labels: Ints, parts: int) -> Shares:
+def share_parts(reach: ReachableCells, starts: Ints, labels: Ints, parts: int) -> AreaShares:
     """Find an entry for every UAV and a UAV for every part.
 
     starts: (R,) cells of `reach.ways`. labels: (n,) part of each cell to visit. A UAV that stands
@@ -91,8 +91,8 @@ def share_parts(reach: Reach, starts: Ints, labels: Ints, parts: int) -> Shares:
     empty = np.setdiff1d(np.arange(parts, dtype=np.int32), lived_in)
     reached = empty[uav_of[empty] >= 0]
     order = reached[np.argsort(nearest[reached], kind="stable")]
-    visits = tuple(Visit(int(uav_of[p]), int(p), int(entry_of[p])) for p in order)
-    return Shares(entries, visits, empty[uav_of[empty] < 0])
+    visits = tuple(CoverageVisit(int(uav_of[p]), int(p), int(entry_of[p])) for p in order)
+    return AreaShares(entries, visits, empty[uav_of[empty] < 0])
 
 
 def _entries(

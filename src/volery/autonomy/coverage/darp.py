@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.coverage.balance import balance
-from volery.autonomy.coverage.cells import Cells, Ints
+from volery.autonomy.coverage.cells import CoverageCells, Ints
 from volery.autonomy.coverage.growth import grow
 from volery.autonomy.coverage.joining import join_parts, walk_part
 from volery.core.compiled import inner_kernel, kernel
@@ -42,7 +42,9 @@ _NOISE = 1e-4
 """Most that one iteration's random factor differs from 1: the article's."""
 
 
-def divide(cells: Cells, starts: Ints, targets: NDArray[np.int64], *, seed: int = 1) -> Ints:
+def divide(
+    cells: CoverageCells, starts: Ints, targets: NDArray[np.int64], *, seed: int = 1
+) -> Ints:
     """(n,) the UAV of each cell, so that UAV r gets `targets[r]` connected cells around its start.
 
     `cells` must be one component, `starts` (R,) different cells of it, `targets` positive with the

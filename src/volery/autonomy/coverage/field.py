@@ -21,7 +21,7 @@ BLOCKED_FROM = 50
 
 
 @dataclass(frozen=True)
-class Field:
+class CoverageField:
     """Free cells (rows, columns), the side of a cell in m, the lower left corner (2,) m, map.
 
     The grid is turned by `yaw` rad about its corner.
@@ -33,7 +33,7 @@ class Field:
     yaw: float = 0.0
 
     @classmethod
-    def from_message(cls, message: Any) -> Field:
+    def from_message(cls, message: Any) -> CoverageField:
         """The field that a nav_msgs/OccupancyGrid means. `PlanError` for one that is none."""
         info, corner = message.info, message.info.origin.position
         data: NDArray[np.int8] = np.asarray(message.data, dtype=np.int8)
@@ -48,7 +48,7 @@ class Field:
         free = ((data >= 0) & (data < BLOCKED_FROM)).reshape(rows, columns)
         return cls(free, float(info.resolution), (float(corner.x), float(corner.y)), yaw)
 
-    def lies_like(self, other: Field) -> bool:
+    def lies_like(self, other: CoverageField) -> bool:
         """Whether cells are where they are in `other`."""
         same = (self.cell_m, self.origin_map, self.yaw) == (
             other.cell_m,

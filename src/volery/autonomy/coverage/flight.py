@@ -9,7 +9,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.coverage.waypoints import Waypoints
+from volery.autonomy.coverage.waypoints import WaypointProgress
 from volery.core.vectors import norm
 
 Array = NDArray[np.float64]
@@ -20,7 +20,7 @@ _CLIMBED_M, _STILL_M_S = 0.5, 0.2
 """A take-off has ended when the UAV is so much higher and climbs no faster. Modelling choice."""
 
 
-class Phase(StrEnum):
+class CoveragePhase(StrEnum):
     """Where in its flight a UAV is."""
 
     GROUND = "ground"
@@ -34,16 +34,16 @@ class Phase(StrEnum):
 
 
 @dataclass
-class Flight:
+class CoverageFlight:
     """State of one UAV. Times are ns of the node's clock."""
 
     name: str
-    phase: Phase = Phase.GROUND
+    phase: CoveragePhase = CoveragePhase.GROUND
     position_map: Array | None = None
     climb_m_s: float = 0.0
     heard_ns: int = 0
     home_map: Array | None = None
-    waypoints: Waypoints | None = None
+    waypoints: WaypointProgress | None = None
     following: int = 0
     """Number of the next waypoint."""
     told: int = -1
@@ -58,7 +58,7 @@ class Flight:
         if self.home_map is None:
             self.home_map = position_map.copy()
 
-    def send(self, waypoints: Waypoints, now_ns: int) -> None:
+    def send(self, waypoints: WaypointProgress, now_ns: int) -> None:
         """Follow other waypoints from now on."""
         self.waypoints, self.following, self.told = waypoints, 0, -1
         self._begin_leg(now_ns)
@@ -80,7 +80,7 @@ class Flight:
     def covers(self) -> bool:
         """Whether what it flies over now counts as covered."""
         return (
-            self.phase is Phase.COVER
+            self.phase is CoveragePhase.COVER
             and self.waypoints is not None
             and bool(self.waypoints.covering[min(self.following, len(self.waypoints.places) - 1)])
         )

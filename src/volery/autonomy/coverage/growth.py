@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.coverage.balance import balance
-from volery.autonomy.coverage.cells import Cells, Ints
+from volery.autonomy.coverage.cells import CoverageCells, Ints
 from volery.autonomy.coverage.joining import join_parts
 
 _LOOKS_A_CELL, _MOST_LOOKS = 10_000, 600_000_000
@@ -19,7 +19,7 @@ _LOOKS_A_CELL, _MOST_LOOKS = 10_000, 600_000_000
 
 
 def grow(
-    cells: Cells, starts: Ints, targets: NDArray[np.int64], distances: NDArray[np.float32]
+    cells: CoverageCells, starts: Ints, targets: NDArray[np.int64], distances: NDArray[np.float32]
 ) -> Ints:
     """(n,) the UAV of each cell; arguments as for `darp.divide`.
 
@@ -44,7 +44,9 @@ def grow(
     return owner
 
 
-def _present_targets(part: Cells, begin: Ints, targets: NDArray[np.int64]) -> NDArray[np.int64]:
+def _present_targets(
+    part: CoverageCells, begin: Ints, targets: NDArray[np.int64]
+) -> NDArray[np.int64]:
     """What each UAV should have of the cells taken in so far: its share of where it is."""
     labels, pieces = part.components()
     sizes = np.bincount(labels, minlength=pieces)

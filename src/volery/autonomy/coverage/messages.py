@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.coverage.cells import Mask
-from volery.autonomy.coverage.field import Field
-from volery.autonomy.coverage.flight import Flight
+from volery.autonomy.coverage.field import CoverageField
+from volery.autonomy.coverage.flight import CoverageFlight
 from volery.autonomy.coverage.plan import CoveragePlan
-from volery.autonomy.coverage.waypoints import Waypoints
+from volery.autonomy.coverage.waypoints import WaypointProgress
 from volery.core import rotations
 from volery.graph.messages import (
     MapMetaData,
@@ -33,19 +33,19 @@ KEEP_HEADING = Quaternion(0.0, 0.0, 0.0, 0.0)
 _LEVEL = Quaternion(0.0, 0.0, 0.0, 1.0)
 
 
-def areas_message(field: Field, owner: NDArray[np.int16], now_ns: int) -> OccupancyGrid:
+def areas_message(field: CoverageField, owner: NDArray[np.int16], now_ns: int) -> OccupancyGrid:
     """Number of the UAV of each cell from 1; 0: nobody can reach it; -1: nobody need visit it."""
     return _grid(field, owner + 1, now_ns)
 
 
-def covered_message(field: Field, covered: Mask, now_ns: int) -> OccupancyGrid:
+def covered_message(field: CoverageField, covered: Mask, now_ns: int) -> OccupancyGrid:
     """How much of each free cell is covered, in per cent; -1 for blocked ones."""
     rows, columns = field.free.shape
     quarters = covered.reshape(rows, 2, columns, 2).sum(axis=(1, 3))
     return _grid(field, np.where(field.free, 25 * quarters, -1), now_ns)
 
 
-def path_message(waypoints: Waypoints, now_ns: int) -> PathMessage:
+def path_message(waypoints: WaypointProgress, now_ns: int) -> PathMessage:
     """The waypoints of one UAV."""
     stamp = header(now_ns, "map")
     return PathMessage(
@@ -59,7 +59,7 @@ def goal_message(place: NDArray[np.float64], now_ns: int) -> PoseStamped:
 
 
 def status_message(
-    flights: Sequence[Flight], plan: CoveragePlan | None, share: float, refused: str
+    flights: Sequence[CoverageFlight], plan: CoveragePlan | None, share: float, refused: str
 ) -> String:
     """JSON: state, share covered, phase and cells of each UAV, what cannot be done and why."""
     shares = [] if plan is None else plan.shares.tolist()
@@ -75,7 +75,7 @@ def status_message(
     return String(json.dumps(told))
 
 
-def _grid(field: Field, values: NDArray[np.generic], now_ns: int) -> OccupancyGrid:
+def _grid(field: CoverageField, values: NDArray[np.generic], now_ns: int) -> OccupancyGrid:
     data = values.astype(np.int8).ravel()
     data.flags.writeable = False
     rows, columns = field.free.shape

@@ -16,10 +16,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from volery.autonomy.coverage.cells import Cells, Ints, Mask
-from volery.autonomy.coverage.components import Reach, Shares, level_shares, share_parts
+from volery.autonomy.coverage.cells import CoverageCells, Ints, Mask
+from volery.autonomy.coverage.components import (
+    AreaShares,
+    ReachableCells,
+    level_shares,
+    share_parts,
+)
 from volery.autonomy.coverage.darp import divide
-from volery.autonomy.coverage.spanning_tree import Tour, tours
+from volery.autonomy.coverage.spanning_tree import CoverageTour, tours
 from volery.core.errors import PlanError
 from volery.core.plurals import counted
 
@@ -42,7 +47,7 @@ class CoveragePlan:
     """
 
     owner: NDArray[np.int16]
-    routes: tuple[tuple[Tour, ...], ...]
+    routes: tuple[tuple[CoverageTour, ...], ...]
     spread: int
 
     @property
@@ -77,11 +82,11 @@ def plan_coverage(
         A start is blocked, outside or taken twice; nothing is free; map or fleet are too large.
 
     """
-    ways = Cells.of(np.asarray(free, np.bool_))
+    ways = CoverageCells.of(np.asarray(free, np.bool_))
     begin = _checked_starts(ways, np.asarray(starts))
-    cells = ways if to_visit is None else Cells.of(np.asarray(to_visit, np.bool_) & free)
+    cells = ways if to_visit is None else CoverageCells.of(np.asarray(to_visit, np.bool_) & free)
     labels, parts = cells.components()
-    shares = share_parts(Reach(ways, cells, flies_over), begin, labels, parts)
+    shares = share_parts(ReachableCells(ways, cells, flies_over), begin, labels, parts)
     areas = np.full(len(cells), UNREACHABLE, np.int32)
     spread = _divide_parts(cells, labels, shares, areas, seed)
     routes = _routes(cells, labels, shares, areas)
@@ -90,7 +95,7 @@ def plan_coverage(
     return CoveragePlan(owner.reshape(cells.shape), routes, spread)
 
 
-def _checked_starts(ways: Cells, starts: NDArray[np.int64]) -> Ints:
+def _checked_starts(ways: CoverageCells, starts: NDArray[np.int64]) -> Ints:
     """Numbers of the start cells."""
     if starts.ndim != 2 or starts.shape[1] != 2 or not len(starts):
         raise PlanError("starts are rows and columns of at least one UAV, an array (R, 2)")
@@ -114,7 +119,9 @@ def _checked_starts(ways: Cells, starts: NDArray[np.int64]) -> Ints:
     return numbers
 
 
-def _divide_parts(cells: Cells, labels: Ints, shares: Shares, areas: Ints, seed: int) -> int:
+def _divide_parts(
+    cells: CoverageCells, labels: Ints, shares: AreaShares, areas: Ints, seed: int
+) -> int:
     """Set `areas` (n,) to the UAV of each cell; the largest difference in a part."""
     carried = np.zeros(len(shares.entries), np.int64)
     sizes = np.bincount(labels, minlength=1)
@@ -145,8 +152,8 @@ def _divide_parts(cells: Cells, labels: Ints, shares: Shares, areas: Ints, seed:
 
 
 def _routes(
-    cells: Cells, labels: Ints, shares: Shares, areas: Ints
-) -> tuple[tuple[Tour, ...], ...]:
+    cells: CoverageCells, labels: Ints, shares: AreaShares, areas: Ints
+) -> tuple[tuple[CoverageTour, ...], ...]:
     """Tours of each UAV, that of its own part first."""
     first = [(int(u), int(shares.entries[u])) for u in np.flatnonzero(shares.entries >= 0)]
     legs: Sequence[tuple[int, int]] = first + [(v.uav, v.entry) for v in shares.visits]
@@ -158,7 +165,7 @@ def _routes(
     leg_of_key = np.full(len(known), -1, np.int32)
     leg_of_key[np.searchsorted(known, keys[entries])] = np.arange(len(legs), dtype=np.int32)
     number[:] = leg_of_key[inverse]
-    routes: list[list[Tour]] = [[] for _ in shares.entries]
+    routes: list[list[CoverageTour]] = [[] for _ in shares.entries]
     for (uav, _), tour in zip(legs, tours(cells, number, entries), strict=True):
         routes[uav].append(tour)
     return tuple(tuple(route) for route in routes)

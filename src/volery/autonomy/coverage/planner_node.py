@@ -14,19 +14,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.coverage import messages
-from volery.autonomy.coverage.cells import Cells, Mask
-from volery.autonomy.coverage.field import Field
-from volery.autonomy.coverage.flight import Flight, Phase
+from volery.autonomy.coverage.cells import CoverageCells, Mask
+from volery.autonomy.coverage.field import CoverageField
+from volery.autonomy.coverage.flight import CoverageFlight, CoveragePhase
 from volery.autonomy.coverage.plan import (
     NOT_TO_VISIT,
     UNREACHABLE,
     CoveragePlan,
     plan_coverage,
 )
-from volery.autonomy.coverage.waypoints import Heights, route_waypoints
+from volery.autonomy.coverage.waypoints import HeightProfile, route_waypoints
 from volery.core import rotations
 from volery.core.errors import PlanError
-from volery.core.saved_state import keep, put_back
+from volery.core.saved_state import restore_attributes, save_attributes
 from volery.graph.messages import (
     Float32,
     OccupancyGrid,
@@ -71,7 +71,7 @@ class CoveragePlanner(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("coverage", **options)
         names = self.declare_parameter("uavs", ["uav1"]).value
-        self._heights = Heights(
+        self._heights = HeightProfile(
             float(self.declare_parameter("height_m", 2.5).value),
             float(self.declare_parameter("layer_m", 1.5).value),
             float(self.declare_parameter("over_m", 0.0).value),
@@ -80,8 +80,8 @@ class CoveragePlanner(Node):
         self._patience_s = float(self.declare_parameter("patience_s", 10.0).value)
         self._seed = int(self.declare_parameter("seed", 1).value)
 
-        self._field: Field | None = None
-        self._flights = [Flight(name) for name in names]
+        self._field: CoverageField | None = None
+        self._flights = [CoverageFlight(name) for name in names]
         self._plan: CoveragePlan | None = None
         self._covered: Mask = np.zeros((0, 0), np.bool_)
         """Sub-cells (2 * rows, 2 * columns) that a UAV has come through."""
@@ -107,11 +107,11 @@ class CoveragePlanner(Node):
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        return keep(self, _STATE)
+        return save_attributes(self, _STATE)
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
-        put_back(self, state)
+        restore_attributes(self, state)
 
     # ------------------------------------------------------------------------------ what it hears
 
@@ -131,7 +131,7 @@ class CoveragePlanner(Node):
 
     def _on_map(self, message: OccupancyGrid) -> None:
         try:
-            found = Field.from_message(message)
+            found = CoverageField.from_message(message)
         except PlanError as error:
             self._refuse(str(error))
             return
@@ -162,7 +162,7 @@ class CoveragePlanner(Node):
     def _plan_again(self) -> None:
         """Divide what is left among those that can still fly, from wherever they are."""
         assert self._field is not None
-        able = [f for f in self._flights if f.phase is not Phase.FAILED]
+        able = [f for f in self._flights if f.phase is not CoveragePhase.FAILED]
         if not able:
             self._refuse("no UAV is left that could go on")
             return
@@ -172,7 +172,7 @@ class CoveragePlanner(Node):
         places = self._field.cells_at(np.array([f.position_map for f in able]))
         self._take_plan(able, self._field.apart(places), left)
 
-    def _take_plan(self, able: list[Flight], starts: NDArray[np.int64], left: Mask) -> None:
+    def _take_plan(self, able: list[CoverageFlight], starts: NDArray[np.int64], left: Mask) -> None:
         assert self._field is not None
         over = self._heights.over > 0.0
         free, now = self._field.free, self.get_clock().now_ns()
@@ -185,11 +185,11 @@ class CoveragePlanner(Node):
         # the last two answer for the owners -2 and -1, who are no UAVs
         owner = np.array([*numbers, NOT_TO_VISIT, UNREACHABLE], np.int16)[plan.owner]
         self._plan, self._refused = plan, ""
-        ways = Cells.of(free)
+        ways = CoverageCells.of(free)
         for number, flight, tours in zip(numbers, able, plan.routes, strict=True):
             assert flight.position_map is not None
             assert flight.home_map is not None
-            if not tours and flight.phase in (Phase.GROUND, Phase.DONE):
+            if not tours and flight.phase in (CoveragePhase.GROUND, CoveragePhase.DONE):
                 continue
             flight.send(
                 route_waypoints(
@@ -203,8 +203,8 @@ class CoveragePlanner(Node):
                 ),
                 now,
             )
-            if flight.phase is Phase.DONE:
-                flight.phase = Phase.GROUND
+            if flight.phase is CoveragePhase.DONE:
+                flight.phase = CoveragePhase.GROUND
             assert flight.waypoints is not None
             self._paths[number].publish(messages.path_message(flight.waypoints, now))
         self._areas.publish(messages.areas_message(self._field, owner, now))
@@ -230,48 +230,48 @@ class CoveragePlanner(Node):
             self._advance(number, flight, now)
         lost = [f for f in self._flights if self._is_lost(f, now)]
         for flight in lost:
-            flight.phase = Phase.FAILED
+            flight.phase = CoveragePhase.FAILED
         if lost:
             self._plan_again()
         if self._ticks % _REPEAT == 0:
             self._tell_progress()
 
-    def _advance(self, number: int, flight: Flight, now: int) -> None:
+    def _advance(self, number: int, flight: CoverageFlight, now: int) -> None:
         if flight.waypoints is None:
             return
-        if flight.phase is Phase.GROUND:
-            flight.phase = Phase.TAKE_OFF
+        if flight.phase is CoveragePhase.GROUND:
+            flight.phase = CoveragePhase.TAKE_OFF
             flight.send(flight.waypoints, now)
             self._ask_to_take_off(number, flight)
-        elif flight.phase is Phase.TAKE_OFF and flight.has_climbed:
+        elif flight.phase is CoveragePhase.TAKE_OFF and flight.has_climbed:
             self._begin(flight)
-        elif flight.phase is Phase.TAKE_OFF and self._ticks % _REPEAT == 0:
+        elif flight.phase is CoveragePhase.TAKE_OFF and self._ticks % _REPEAT == 0:
             self._ask_to_take_off(number, flight)
-        elif flight.phase is Phase.COVER:
+        elif flight.phase is CoveragePhase.COVER:
             goal = flight.goal(self._arrival_m, now)
             if goal is None:
-                flight.phase = Phase.DONE
+                flight.phase = CoveragePhase.DONE
                 self._land[number].call_async()
                 self._tell_status()
             elif flight.following != flight.told or self._ticks % _REPEAT == 0:
                 flight.told = flight.following
                 self._goals[number].publish(messages.goal_message(goal, now))
 
-    def _ask_to_take_off(self, number: int, flight: Flight) -> None:
+    def _ask_to_take_off(self, number: int, flight: CoverageFlight) -> None:
         def on_answer(answer: Future) -> None:
             refused = answer.exception() is not None or not answer.result().success
-            if refused and flight.is_level and flight.phase is Phase.TAKE_OFF:
+            if refused and flight.is_level and flight.phase is CoveragePhase.TAKE_OFF:
                 self._begin(flight)  # it is in the air already; else it will be lost in time
 
         self._take_off[number].call_async().add_done_callback(on_answer)
 
-    def _begin(self, flight: Flight) -> None:
+    def _begin(self, flight: CoverageFlight) -> None:
         assert flight.waypoints is not None
-        flight.phase = Phase.COVER
+        flight.phase = CoveragePhase.COVER
         flight.send(flight.waypoints, self.get_clock().now_ns())
 
-    def _is_lost(self, flight: Flight, now: int) -> bool:
-        flies = flight.phase in (Phase.TAKE_OFF, Phase.COVER)
+    def _is_lost(self, flight: CoverageFlight, now: int) -> bool:
+        flies = flight.phase in (CoveragePhase.TAKE_OFF, CoveragePhase.COVER)
         return flies and flight.is_lost(self._patience_s, now)
 
     # ------------------------------------------------------------------------------ what it tells

@@ -17,14 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.coverage.cells import EAST, NORTH, SOUTH, WEST, Cells, Ints
+from volery.autonomy.coverage.cells import EAST, NORTH, SOUTH, WEST, CoverageCells, Ints
 from volery.core.compiled import inner_kernel, kernel
 
 ORDERS = 4
 
 
 @dataclass(frozen=True)
-class Tour:
+class CoverageTour:
     """A closed way through every sub-cell of an area.
 
     sub_cells: (4 * cells, 2) row and column on the grid twice as fine; each is beside the one
@@ -34,9 +34,9 @@ class Tour:
     sub_cells: Ints
     turns: int
 
-    def begun_at(self, number: int) -> Tour:
+    def begun_at(self, number: int) -> CoverageTour:
         """The same tour from its sub-cell `number` on."""
-        return Tour(np.roll(self.sub_cells, -number, axis=0), self.turns)
+        return CoverageTour(np.roll(self.sub_cells, -number, axis=0), self.turns)
 
     def corners(self) -> Ints:
         """The sub-cells (K, 2) where it turns, after its first one: what a UAV must be told."""
@@ -49,13 +49,13 @@ class Tour:
         return corners
 
 
-def tours(cells: Cells, owner: Ints, starts: Ints) -> list[Tour]:
+def tours(cells: CoverageCells, owner: Ints, starts: Ints) -> list[CoverageTour]:
     """A tour of each area, from a sub-cell of its start; of the four the one with fewest turns.
 
     owner: (n,) the area of each cell, -1 for none; all areas connected. starts: (R,) a cell of
     each.
     """
-    best: list[Tour] = []
+    best: list[CoverageTour] = []
     trees = np.empty((ORDERS, len(cells)), np.uint8)
     for order in range(ORDERS):
         _span(cells.neighbours, owner, order, trees[order])
@@ -65,7 +65,7 @@ def tours(cells: Cells, owner: Ints, starts: Ints) -> list[Tour]:
         for order in range(ORDERS):
             way = np.empty((4 * sizes[r], 2), np.int32)
             turns = _walk_around(cells.flat, cells.index, trees[order], cells.shape[1], start, way)
-            found.append(Tour(way, int(turns)))
+            found.append(CoverageTour(way, int(turns)))
         best.append(min(found, key=lambda tour: tour.turns))
     return best
 

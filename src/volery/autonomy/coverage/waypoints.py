@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.coverage.cells import Cells
-from volery.autonomy.coverage.field import Field
-from volery.autonomy.coverage.spanning_tree import Tour
+from volery.autonomy.coverage.cells import CoverageCells
+from volery.autonomy.coverage.field import CoverageField
+from volery.autonomy.coverage.spanning_tree import CoverageTour
 from volery.core.errors import PlanError
 
 Array = NDArray[np.float64]
@@ -19,7 +19,7 @@ _HIGHEST = 1e4
 
 
 @dataclass(frozen=True)
-class Heights:
+class HeightProfile:
     """Heights in the map, m.
 
     cover: of the tours. layer: how much higher each UAV flies in transit than the one before it, so
@@ -43,7 +43,7 @@ class Heights:
 
 
 @dataclass(frozen=True)
-class Waypoints:
+class WaypointProgress:
     """Where a UAV goes: (K, 3) m, map, and whether it covers on the way to each, (K,)."""
 
     places: Array
@@ -51,14 +51,14 @@ class Waypoints:
 
 
 def route_waypoints(
-    field: Field,
-    ways: Cells,
-    heights: Heights,
+    field: CoverageField,
+    ways: CoverageCells,
+    heights: HeightProfile,
     uav: int,
     position_map: Array,
     home_map: Array,
-    tours: Sequence[Tour],
-) -> Waypoints:
+    tours: Sequence[CoverageTour],
+) -> WaypointProgress:
     """The waypoints of one UAV: for each tour the transit and the tour, then home to land.
 
     ways: the free cells of the field. position_map: (3,) where it is. home_map: (3,) where it
@@ -83,11 +83,16 @@ def route_waypoints(
     for points, height in _transit(field, ways, heights, uav, at, home_map[:2]):
         add(points, height, False)
     add(home_map[None, :2], heights.cover, False)
-    return Waypoints(np.vstack(places), np.array(covering))
+    return WaypointProgress(np.vstack(places), np.array(covering))
 
 
 def _transit(
-    field: Field, ways: Cells, heights: Heights, uav: int, start: Array, goal: Array
+    field: CoverageField,
+    ways: CoverageCells,
+    heights: HeightProfile,
+    uav: int,
+    start: Array,
+    goal: Array,
 ) -> list[tuple[Array, float]]:
     """Points (K, 2) and heights of the way between two areas; nothing within a cell or to the next.
 

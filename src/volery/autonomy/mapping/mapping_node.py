@@ -14,19 +14,19 @@ from numpy.typing import NDArray
 from volery.autonomy.mapping import messages
 from volery.autonomy.mapping.map_files import MapLimits, node_count, read_map, write_map
 from volery.autonomy.mapping.octree import Octree
-from volery.autonomy.mapping.projected_grid import LevelGrid, Slab
-from volery.autonomy.mapping.scan_buffer import ScanIntake
+from volery.autonomy.mapping.projected_grid import HeightSlab, ProjectedGrid
+from volery.autonomy.mapping.scan_buffer import ScanBuffer
 from volery.autonomy.perception.ground_plane import GroundPlane
 from volery.autonomy.perception.list_parameters import declare_mount
 from volery.autonomy.perception.map_frame import MAP, UNKNOWN_PLACE, MapFrame
 from volery.autonomy.perception.motion_history import MotionHistory, NodHistory
 from volery.autonomy.perception.odometry_topics import subscribe_odometry
-from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.perception.scan_rays import Beams, RayMaker, Rays
 from volery.autonomy.status import publish_status
 from volery.core.clock import NS_PER_S
 from volery.core.errors import DataFileError, NodeError
-from volery.core.saved_state import keep, put_back
+from volery.core.saved_state import restore_attributes, save_attributes
 from volery.graph.messages import (
     JointState,
     LaserScan,
@@ -101,11 +101,11 @@ class Mapping(Node):
         self._limits = MapLimits(self._resolution, extent, nodes)
         beams = Beams(reach_m=self._reach, every=every)
         self._intakes = {
-            name: ScanIntake(RayMaker(declare_mount(self, name), beams), rate)
+            name: ScanBuffer(RayMaker(declare_mount(self, name), beams), rate)
             for name in ("level", "nodding")
         }
         self._octree = Octree(self._resolution, nodes)
-        self._grid = LevelGrid(
+        self._grid = ProjectedGrid(
             float(self.declare_parameter("grid_cell_m", 0.4, least=0.01).value), extent
         )
         self._frame = MapFrame()
@@ -141,19 +141,19 @@ class Mapping(Node):
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
         parts = {name: getattr(self, name).get_state() for name in ("_octree", "_grid", "_frame")}
-        return {"parts": parts, **keep(self, _PLAIN_STATE)}
+        return {"parts": parts, **save_attributes(self, _PLAIN_STATE)}
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
         for name, part in state["parts"].items():
             getattr(self, name).set_state(part)
-        put_back(self, {name: state[name] for name in _PLAIN_STATE})
+        restore_attributes(self, {name: state[name] for name in _PLAIN_STATE})
 
     # ------------------------------------------------------------------------------ what it hears
 
     def _on_odometry(self, message: Odometry) -> None:
         self._frame.hear(message)
-        if not self._motion.add(Pose.from_odometry(message)):
+        if not self._motion.add(OdometrySample.from_odometry(message)):
             return
         for name, intake in self._intakes.items():
             for rays in intake.ready(self._motion, self._nod if name == "nodding" else None):
@@ -187,7 +187,7 @@ class Mapping(Node):
         self._slab_z = float(place[2])
         self._grid.begin_at(place)
         height = float(place[2] - slope @ place[:2])
-        self._grid.add(rays, Slab(height, slope, self._half))
+        self._grid.add(rays, HeightSlab(height, slope, self._half))
 
     def _ground_below(self, z: float) -> float | None:
         if self._range is None:

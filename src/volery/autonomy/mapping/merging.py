@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.mapping.octomap_stream import DEPTH, Voxels
-from volery.autonomy.perception.motion_history import Placement
+from volery.autonomy.perception.motion_history import Pose
 from volery.core import rotations
 from volery.core.compiled import kernel
 from volery.core.errors import PlanError
@@ -36,7 +36,7 @@ class PlacedMap(NamedTuple):
     """A map and where its frame lies in that of the merged one; None: they are the same."""
 
     voxels: Voxels
-    placement: Placement | None = None
+    placement: Pose | None = None
 
 
 def merged(maps: Sequence[PlacedMap], resolution_m: float, most_cells: int) -> Bytes:
@@ -101,7 +101,7 @@ def _cells(voxels: Voxels) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
 
 
 def _placed(
-    cells: NDArray[np.int64], placement: Placement | None, resolution_m: float
+    cells: NDArray[np.int64], placement: Pose | None, resolution_m: float
 ) -> tuple[Codes, float]:
     """Codes of cells in the merged frame, one or `_SUB`^3 of each, and the weight of each."""
     if placement is None or _is_none(placement, resolution_m):
@@ -113,7 +113,7 @@ def _placed(
     return morton_codes(np.floor(turned).astype(np.int64)), 1.0
 
 
-def _is_none(placement: Placement, resolution_m: float) -> bool:
+def _is_none(placement: Pose, resolution_m: float) -> bool:
     turn = norm(rotations.logarithm(placement.attitude))
     way = norm(placement.position) / resolution_m
     return turn < _LEVEL_RAD and way < _LEVEL_CELLS

@@ -10,10 +10,10 @@ import numpy as np
 from volery.autonomy.mapping.merging import PlacedMap, merged
 from volery.autonomy.mapping.messages import OCTOMAP, octomap_message, voxels_of
 from volery.autonomy.perception.map_frame import MAP
-from volery.autonomy.perception.motion_history import Placement
+from volery.autonomy.perception.motion_history import Pose
 from volery.autonomy.status import publish_status
 from volery.core.errors import DataFileError, PlanError
-from volery.core.saved_state import keep, put_back
+from volery.core.saved_state import restore_attributes, save_attributes
 from volery.core.vectors import norm
 from volery.graph.messages import String, TFMessage
 from volery.graph.nodes.node import Node
@@ -49,7 +49,7 @@ class MapMerging(Node):
         self._resolution = float(self.declare_parameter("resolution_m", 0.2, least=0.01).value)
         self._most = int(self.declare_parameter("max_cells", 20_000_000, least=1).value)
         self._maps: dict[str, Any] = {}
-        self._placements: dict[str, Placement] = {}
+        self._placements: dict[str, Pose] = {}
         self._changed = False
         self._told = ""
         self._reasons: dict[str, str] = {}
@@ -65,11 +65,11 @@ class MapMerging(Node):
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        return keep(self, _STATE)
+        return save_attributes(self, _STATE)
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
-        put_back(self, state)
+        restore_attributes(self, state)
 
     def _listener(self, topic: str) -> Callable[[Any], None]:
         def on_map(message: Any) -> None:
@@ -91,7 +91,7 @@ class MapMerging(Node):
             p, q = stamped.transform.translation, stamped.transform.rotation
             position, attitude = np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
             if np.isfinite(position).all() and abs(norm(attitude) - 1.0) < 0.01:
-                self._placements[stamped.child_frame_id] = Placement(position, attitude)
+                self._placements[stamped.child_frame_id] = Pose(position, attitude)
 
     def _on_timer(self) -> None:
         if self._changed:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.mapping.octomap_stream import Voxels, decode_binary, decode_full
-from volery.autonomy.mapping.projected_grid import LevelGrid, Scores, occupancy
+from volery.autonomy.mapping.projected_grid import ProjectedGrid, Scores, occupancy
 from volery.core.errors import DataFileError
 from volery.graph.messages import (
     MapMetaData,
@@ -43,7 +43,7 @@ def voxels_of(message: Any) -> Voxels:
     return decode_binary(data) if message.binary else decode_full(data)
 
 
-def grid_message(grid: LevelGrid, height: float, frame_id: str, now_ns: int) -> OccupancyGrid:
+def grid_message(grid: ProjectedGrid, height: float, frame_id: str, now_ns: int) -> OccupancyGrid:
     """The known part of a grid; one unknown cell where nothing is known."""
     box = grid.known_box()
     if box is None or grid.origin is None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from volery.autonomy.perception.scan_rays import Rays
 from volery.core.compiled import kernel
-from volery.core.saved_state import keep, put_back
+from volery.core.saved_state import restore_attributes, save_attributes
 
 Array = NDArray[np.float64]
 Scores = NDArray[np.int8]
@@ -26,7 +26,7 @@ _HIT, _MISS, _LEAST, _MOST = 3, 1, -6, 12
 (modelling choices)."""
 
 
-class Slab(NamedTuple):
+class HeightSlab(NamedTuple):
     """Heights z = height + slope . (x, y) within `half_m`."""
 
     height: float
@@ -34,7 +34,7 @@ class Slab(NamedTuple):
     half_m: float
 
 
-class LevelGrid:
+class ProjectedGrid:
     """A square grid of bounded extent around the place where it began."""
 
     def __init__(self, cell_m: float, extent_m: float) -> None:
@@ -51,11 +51,11 @@ class LevelGrid:
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        return keep(self, ("score", "_scan", "_number", "origin", "outside"))
+        return save_attributes(self, ("score", "_scan", "_number", "origin", "outside"))
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
-        put_back(self, state)
+        restore_attributes(self, state)
 
     def begin_at(self, place: Array) -> None:
         """Lie around `place` (2+,) m, if it lies nowhere yet."""
@@ -63,7 +63,7 @@ class LevelGrid:
             middle = np.floor(place[:2] / self.cell_m).astype(np.int64)
             self.origin = middle - len(self.score) // 2
 
-    def add(self, rays: Rays, slab: Slab) -> None:
+    def add(self, rays: Rays, slab: HeightSlab) -> None:
         """Take in the rays of one scan, m in the map."""
         assert self.origin is not None
         self._number += 2

@@ -17,7 +17,7 @@ _EARLY_NS = NS_PER_S // 200
 """A scan may come so much before its turn."""
 
 
-class ScanIntake:
+class ScanBuffer:
     """Takes about `rate_hz` scans a second of one LIDAR, gives their rays.
 
     `counts` tells what happened to scans: taken, repeated, unusable, dropped (their motion never

@@ -46,7 +46,7 @@ def _key(cells: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.asarray(cells[:, 0] * (1 << 32) + cells[:, 1])
 
 
-class Columns:
+class VerticalStructures:
     """Returns (N, 3) of the map, m, in a form that tells what stands upright among them."""
 
     def __init__(self, points: Array) -> None:

@@ -8,7 +8,7 @@ from volery.autonomy.mapping.log_odds import LogOddsGrid
 from volery.autonomy.mapping.merging import PlacedMap, merged
 from volery.autonomy.mapping.octomap_stream import Voxels, decode_binary, decode_full
 from volery.autonomy.mapping.octree import Octree
-from volery.autonomy.mapping.projected_grid import LevelGrid, Slab
+from volery.autonomy.mapping.projected_grid import HeightSlab, ProjectedGrid
 from volery.autonomy.perception.warmup import fixed, some_rays
 
 _REACH_M = 15.0
@@ -20,9 +20,9 @@ def growing_map() -> None:
     tree = Octree(0.2, max_nodes=1)
     tree.insert(rays, _REACH_M)
     tree.binary()
-    grid = LevelGrid(0.4, 4.0)
+    grid = ProjectedGrid(0.4, 4.0)
     grid.begin_at(np.zeros(3))
-    grid.add(rays, Slab(0.0, np.zeros(2), 0.6))
+    grid.add(rays, HeightSlab(0.0, np.zeros(2), 0.6))
 
 
 def read_maps() -> None:

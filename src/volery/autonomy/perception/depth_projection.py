@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.scan_points import OdometrySample
 from volery.core.compiled import kernel
 from volery.core.errors import GraphError
 from volery.core.rotation_kernels import rotate_vector
@@ -54,7 +54,7 @@ class DepthProjector:
         self._reach = reach_m
         self._every = keep_every
 
-    def points(self, image: Image, info: CameraInfo, pose: Pose) -> Array:
+    def points(self, image: Image, info: CameraInfo, pose: OdometrySample) -> Array:
         """What is within reach, as points (K, 3) m in the odometry frame.
 
         The pose is carried on to the picture's stamp. Lens distortion is not undone.

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.perception.motion_history import Placement
-from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.motion_history import Pose
+from volery.autonomy.perception.scan_points import OdometrySample
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
 from volery.core.rotation_kernels import moved_points
@@ -34,7 +34,7 @@ class MapFrame:
         self.odom_frame = ""
         """Name of the odometry frame; empty before it is known."""
         self._odom_ns = 0
-        self._known: dict[str, Placement] = {}
+        self._known: dict[str, Pose] = {}
         self._told_ns: dict[str, int] = {}
 
     def hear(self, message: Odometry) -> None:
@@ -50,11 +50,11 @@ class MapFrame:
             position, attitude = np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
             length = norm(attitude)
             if np.isfinite(position).all() and 0.9 < length < 1.1:
-                self._known[stamped.child_frame_id] = Placement(position, attitude / length)
+                self._known[stamped.child_frame_id] = Pose(position, attitude / length)
                 self._told_ns[stamped.child_frame_id] = stamp_of(stamped)
 
     @property
-    def map_from_odom(self) -> Placement | None:
+    def map_from_odom(self) -> Pose | None:
         """`T_map_odom`; None where it is identity."""
         return self._known.get(self.odom_frame)
 
@@ -79,13 +79,13 @@ class MapFrame:
             return points_map
         return rotations.rotate(rotations.conjugate(at.attitude), points_map - at.position)
 
-    def pose_in_map(self, message: Odometry) -> Pose:
+    def pose_in_map(self, message: Odometry) -> OdometrySample:
         """The pose that odometry tells, in the map; its frame is the one looked up from now on."""
         self.hear(message)
-        pose, at = Pose.from_odometry(message), self.map_from_odom
+        pose, at = OdometrySample.from_odometry(message), self.map_from_odom
         if at is None:
             return pose
-        return Pose(
+        return OdometrySample(
             pose.time_ns,
             self.to_map(pose.position),
             rotations.multiply(at.attitude, pose.attitude),

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.perception.stuck_sensors import is_stuck
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
@@ -22,7 +22,7 @@ _JUMP_BACK_NS = NS_PER_S // 2
 """A stamp so far before the newest one is a clock that was set back; a smaller step is disorder."""
 
 
-class Placement(NamedTuple):
+class Pose(NamedTuple):
     """Where a body is: position (3,) m, attitude (4,) x y z w."""
 
     position: Array
@@ -34,15 +34,15 @@ class MotionHistory:
 
     def __init__(self) -> None:
         self._times: list[int] = []
-        self._poses: list[Pose] = []
+        self._poses: list[OdometrySample] = []
         self.refused = 0
 
     @property
-    def newest(self) -> Pose | None:
+    def newest(self) -> OdometrySample | None:
         """The pose with the latest stamp."""
         return self._poses[-1] if self._poses else None
 
-    def add(self, pose: Pose) -> bool:
+    def add(self, pose: OdometrySample) -> bool:
         """Remember a pose; False where it cannot be used. A clock set back starts anew."""
         values = (pose.position, pose.attitude, pose.velocity, pose.omega_body)
         finite = all(np.isfinite(value).all() for value in values)
@@ -59,7 +59,7 @@ class MotionHistory:
         del self._times[:-_KEPT], self._poses[:-_KEPT]
         return True
 
-    def at(self, time_ns: int, ahead_s: float = 0.25, gap_s: float = 0.5) -> Placement | None:
+    def at(self, time_ns: int, ahead_s: float = 0.25, gap_s: float = 0.5) -> Pose | None:
         """Where it was at `time_ns`; None where nothing near is known.
 
         Between two poses at most `gap_s` apart it is interpolated, after the newest one carried on
@@ -78,15 +78,15 @@ class MotionHistory:
             return None
         share = since / between
         turned = after.attitude * (1.0 if before.attitude @ after.attitude >= 0.0 else -1.0)
-        return Placement(
+        return Pose(
             before.position + share * (after.position - before.position),
             rotations.normalize(before.attitude + share * (turned - before.attitude)),
         )
 
 
-def _carried_on(pose: Pose, seconds: float) -> Placement:
+def _carried_on(pose: OdometrySample, seconds: float) -> Pose:
     turn = rotations.exponential(pose.omega_body * seconds)
-    return Placement(
+    return Pose(
         pose.position + pose.velocity * seconds,
         rotations.normalize(rotations.multiply(pose.attitude, turn)),
     )

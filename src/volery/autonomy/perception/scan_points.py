@@ -21,7 +21,7 @@ _NEAREST_M = 0.45
 
 
 @dataclass(frozen=True)
-class Pose:
+class OdometrySample:
     """Latest odometry: position (3,), attitude (4,), velocity_odom (3,), omega_body (3,)."""
 
     time_ns: int
@@ -31,7 +31,7 @@ class Pose:
     omega_body: Array
 
     @classmethod
-    def from_odometry(cls, message: Odometry) -> Pose:
+    def from_odometry(cls, message: Odometry) -> OdometrySample:
         """Take over a message; its twist is in the body."""
         p, q = message.pose.pose.position, message.pose.pose.orientation
         v, w = message.twist.twist.linear, message.twist.twist.angular
@@ -60,7 +60,7 @@ class ScanProjector:
         self._every = keep_every
 
     def points(
-        self, scan: LaserScan, pose: Pose, joint: tuple[int, float, float] = (0, 0.0, 0.0)
+        self, scan: LaserScan, pose: OdometrySample, joint: tuple[int, float, float] = (0, 0.0, 0.0)
     ) -> Array:
         """Returns within reach as points (K, 3).
 

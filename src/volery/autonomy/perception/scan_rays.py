@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.perception.motion_history import MotionHistory, NodHistory, Placement
+from volery.autonomy.perception.motion_history import MotionHistory, NodHistory, Pose
 from volery.core.clock import ns_from_s
 from volery.core.compiled import brief_kernel, kernel
 from volery.core.rotation_kernels import rotate_vector
@@ -69,7 +69,7 @@ class RayMaker:
         return self._cast(scan, ways[0], ways[1], tilt[0], tilt[1])
 
     def _cast(
-        self, scan: LaserScan, first: Placement, last: Placement, tilt: float, last_tilt: float
+        self, scan: LaserScan, first: Pose, last: Pose, tilt: float, last_tilt: float
     ) -> Rays:
         ranges = np.asarray(scan.ranges, dtype=np.float32)
         most = len(ranges) // self._beams.every + 1

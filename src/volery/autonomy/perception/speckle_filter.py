@@ -29,7 +29,7 @@ _NEEDED, _NEEDED_CLOSE = 1, 3
 """Confirmations beyond and within `CLOSE_M`, of 9 that there can be (modelling choice)."""
 
 
-class LoneReturns:
+class SpeckleFilter:
     """Filter of the scans of one LIDAR, in their order."""
 
     def __init__(self) -> None:

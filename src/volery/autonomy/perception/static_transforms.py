@@ -27,7 +27,7 @@ class Mount(NamedTuple):
 LEVEL = Mount(np.zeros(3), rotations.IDENTITY)
 
 
-class FixedJoints:
+class StaticTransforms:
     """Joints by the frame beyond them: the frame before, and where it sits there."""
 
     def __init__(self) -> None:

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.scan_points import OdometrySample
 from volery.core.compiled import brief_kernel
 from volery.core.vectors import norm
 from volery.graph.messages import LaserScan
@@ -50,7 +50,7 @@ class RangeRepeats:
         return self._count >= _ALIKE
 
 
-def is_stuck(pose: Pose, before: Pose | None) -> bool:
+def is_stuck(pose: OdometrySample, before: OdometrySample | None) -> bool:
     """Whether odometry says that it moves, and yet that it is where it was, to the last bit."""
     return (
         before is not None

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from volery.autonomy.perception.depth_projection import DepthProjector
 from volery.autonomy.perception.ground_plane import GroundPlane
 from volery.autonomy.perception.motion_history import MotionHistory
-from volery.autonomy.perception.scan_points import Pose, ScanProjector
+from volery.autonomy.perception.scan_points import OdometrySample, ScanProjector
 from volery.autonomy.perception.scan_rays import Beams, RayMaker, Rays, has_return
-from volery.autonomy.perception.speckle_filter import LoneReturns
+from volery.autonomy.perception.speckle_filter import SpeckleFilter
 from volery.autonomy.perception.stuck_sensors import ScanRepeats
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
@@ -50,7 +50,7 @@ def ground() -> None:
 
 def scan_points() -> None:
     """The kernel that turns scans into points, lone returns left out."""
-    ScanProjector([0.0, 0.0, 0.0]).points(LoneReturns().left_out(a_scan()), a_pose(0))
+    ScanProjector([0.0, 0.0, 0.0]).points(SpeckleFilter().left_out(a_scan()), a_pose(0))
 
 
 def depth_points() -> None:
@@ -78,9 +78,9 @@ def a_scan() -> LaserScan:
     return told
 
 
-def a_pose(time_ns: int) -> Pose:
+def a_pose(time_ns: int) -> OdometrySample:
     """Level, at rest at the origin."""
-    return Pose(time_ns, np.zeros(3), rotations.IDENTITY.copy(), np.zeros(3), np.zeros(3))
+    return OdometrySample(time_ns, np.zeros(3), rotations.IDENTITY.copy(), np.zeros(3), np.zeros(3))
 
 
 def some_rays() -> Rays:

@@ -28,7 +28,7 @@ _SEED_COST = 2.0
 """Cost of a metre between such a cell and the goal."""
 
 
-class Prices(NamedTuple):
+class CellCosts(NamedTuple):
     """What a metre costs, beside the one that it always costs."""
 
     radius_m: float
@@ -68,7 +68,7 @@ class CostToGo(NamedTuple):
 
 
 def cost_to_go(
-    clearance: Clearance, surface: Surface, offsets: Array, goal: Array, prices: Prices
+    clearance: Clearance, surface: Surface, offsets: Array, goal: Array, prices: CellCosts
 ) -> CostToGo:
     """Costs of reaching `goal` (2,) m by heights of `surface` plus one of `offsets` (K,) m."""
     nx, ny, _ = clearance.square.shape

@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from volery.autonomy.mapping.messages import grid_values_message
 from volery.autonomy.perception.map_frame import MAP, MapFrame
 from volery.autonomy.perception.odometry_topics import subscribe_odometry
-from volery.autonomy.perception.scan_points import Pose as Motion
+from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.planning.search_area import SearchArea
 from volery.autonomy.planning.viewpoints import Viewpoint, next_viewpoint
 from volery.autonomy.status import publish_status
 from volery.core.clock import NS_PER_S
 from volery.core.errors import PlanError
 from volery.core.plurals import counted
-from volery.core.saved_state import keep, put_back
+from volery.core.saved_state import restore_attributes, save_attributes
 from volery.graph.messages import (
     Float32,
     OccupancyGrid,
@@ -65,7 +65,7 @@ _STATE = (
 )
 
 
-class Searching(StrEnum):
+class ExplorationState(StrEnum):
     """How far the search is."""
 
     WAITING = "waiting"
@@ -74,7 +74,7 @@ class Searching(StrEnum):
     BLOCKED = "blocked"
 
 
-class Exploring(Node):
+class Exploration(Node):
     """Takes a `search_area`, sends `planning/goal`; tells `exploration/status` and `/covered`.
 
     `search_area` is geometry_msgs/PolygonStamped in the map; another one replaces it, an empty one
@@ -103,7 +103,7 @@ class Exploring(Node):
         self._view = float(self.declare_parameter("view_m", 10.0, least=0.1).value)
         self._cell = float(self.declare_parameter("cell_m", 1.0, least=0.05).value)
         self._frame = MapFrame()
-        self._motion: Motion | None = None
+        self._motion: OdometrySample | None = None
         self._area: SearchArea | None = None
         self._grid: tuple[NDArray[np.int8], Array, float] | None = None
         """Values of the map at flight height, its lower left corner, its cells' width."""
@@ -113,7 +113,7 @@ class Exploring(Node):
         self._refused: list[Array] = []
         self._visited: list[Array] = []
         """Places that could not be reached, and those that have been looked from."""
-        self._state, self._reason = Searching.WAITING, "no area"
+        self._state, self._reason = ExplorationState.WAITING, "no area"
         self._told = ""
         self._sent = 0
         self._open()
@@ -134,18 +134,18 @@ class Exploring(Node):
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        return {"frame": self._frame.get_state(), **keep(self, _STATE)}
+        return {"frame": self._frame.get_state(), **save_attributes(self, _STATE)}
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
         self._frame.set_state(state["frame"])
-        put_back(self, {name: state[name] for name in _STATE})
+        restore_attributes(self, {name: state[name] for name in _STATE})
 
     # ------------------------------------------------------------------------------ what it hears
 
     def _on_odometry(self, message: Odometry) -> None:
         self._frame.hear(message)
-        motion = Motion.from_odometry(message)
+        motion = OdometrySample.from_odometry(message)
         if np.isfinite(motion.position).all() and np.isfinite(motion.velocity).all():
             self._motion = motion
 
@@ -154,20 +154,22 @@ class Exploring(Node):
         self._goal, self._refused, self._visited = None, [], []
         if message.header.frame_id not in ("", MAP):
             self._area = None
-            self._become(Searching.WAITING, f"areas are in 'map', not '{message.header.frame_id}'")
+            self._become(
+                ExplorationState.WAITING, f"areas are in 'map', not '{message.header.frame_id}'"
+            )
             return
         if len(corners) == 0:
             self._area = None
-            self._become(Searching.WAITING, "no area")
+            self._become(ExplorationState.WAITING, "no area")
             return
         try:
             area = SearchArea(corners, self._cell)
         except PlanError as error:
             self._area = None
-            self._become(Searching.WAITING, str(error))
+            self._become(ExplorationState.WAITING, str(error))
             return
         self._area = area
-        self._become(Searching.SEARCHING, "")
+        self._become(ExplorationState.SEARCHING, "")
 
     def _on_grid(self, message: OccupancyGrid) -> None:
         info = message.info
@@ -201,7 +203,7 @@ class Exploring(Node):
             return
         place = self._frame.to_map(self._motion.position)
         self._area.look(place, *self._grid, self._view)
-        if self._state is Searching.SEARCHING:
+        if self._state is ExplorationState.SEARCHING:
             self._search(self._area, place)
         self._covered.publish(Float32(single(self._area.share)))
         self._tell()
@@ -236,10 +238,11 @@ class Exploring(Node):
             return
         if next_viewpoint(area, place[:2], heading, self._view, self._visited) is not None:
             self._become(
-                Searching.BLOCKED, f"{counted(len(self._refused), 'place')} cannot be reached"
+                ExplorationState.BLOCKED,
+                f"{counted(len(self._refused), 'place')} cannot be reached",
             )
         else:
-            self._become(Searching.DONE, "")
+            self._become(ExplorationState.DONE, "")
         self._send(place)
 
     def _give_up(self) -> None:
@@ -254,7 +257,7 @@ class Exploring(Node):
         self._goals.publish(PoseStamped(stamp, Pose(Point(*place.tolist()), _LEVEL)))
         self._sent += 1
 
-    def _become(self, state: Searching, reason: str) -> None:
+    def _become(self, state: ExplorationState, reason: str) -> None:
         self._state, self._reason = state, reason
 
     def _tell(self) -> None:

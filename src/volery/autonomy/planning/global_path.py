@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 _OMPL = threading.Lock()
 
 
-class Search(NamedTuple):
+class PathSearch(NamedTuple):
     """How a way is searched for."""
 
     radius_m: float = 0.8
@@ -42,7 +42,7 @@ class Search(NamedTuple):
 
 
 def plan_way(
-    space: VoxelSpace, start: Array, goal: Array, height_m: float, search: Search, seed: int
+    space: VoxelSpace, start: Array, goal: Array, height_m: float, search: PathSearch, seed: int
 ) -> Array:
     """Places (K, 3) m from `start` to `goal` (3,), `height_m` above ground at the goal.
 
@@ -68,7 +68,7 @@ def plan_way(
     return places
 
 
-def _search(space: VoxelSpace, begin: Array, end: Array, search: Search, seed: int) -> Array:
+def _search(space: VoxelSpace, begin: Array, end: Array, search: PathSearch, seed: int) -> Array:
     """States (K, 3) of a way, by OMPL. The caller holds `_OMPL`."""
     try:
         from ompl import base, geometric, util

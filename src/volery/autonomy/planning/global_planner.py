@@ -13,13 +13,13 @@ from volery.autonomy.mapping.messages import OCTOMAP, voxels_of
 from volery.autonomy.perception.list_parameters import declare_numbers
 from volery.autonomy.perception.map_frame import MAP, MapFrame
 from volery.autonomy.perception.odometry_topics import subscribe_odometry
-from volery.autonomy.perception.scan_points import Pose as Motion
-from volery.autonomy.planning.global_path import Search, plan_way
-from volery.autonomy.planning.voxel_space import Solid, VoxelSpace
+from volery.autonomy.perception.scan_points import OdometrySample
+from volery.autonomy.planning.global_path import PathSearch, plan_way
+from volery.autonomy.planning.voxel_space import SolidVoxels, VoxelSpace
 from volery.autonomy.status import publish_status
 from volery.core.clock import NS_PER_S
 from volery.core.errors import DataFileError, NodeError, PlanError
-from volery.core.saved_state import keep, put_back
+from volery.core.saved_state import restore_attributes, save_attributes
 from volery.graph.messages import (
     Bool,
     Odometry,
@@ -76,7 +76,7 @@ class GlobalPlanner(Node):
         low, high = declare_numbers(self, "heights_m", [2.2, 4.2], "[least, most]")
         if not low < high:
             raise NodeError(f"heights_m is [least, most], not {[low, high]}")
-        self._search = Search(
+        self._search = PathSearch(
             radius_m=float(self.declare_parameter("radius_m", 0.8, least=0.05).value),
             heights_m=(low, high),
             iterations=int(self.declare_parameter("iterations", 4000, least=1).value),
@@ -84,7 +84,7 @@ class GlobalPlanner(Node):
         self._cell = float(self.declare_parameter("cell_m", 0.4, least=0.05).value)
         self._seed = int(self.declare_parameter("seed", 1).value)
         self._frame = MapFrame()
-        self._map: Solid | None = None
+        self._map: SolidVoxels | None = None
         """What is occupied in the newest map."""
         self._goal: Array | None = None
         self._way: Array | None = None
@@ -110,18 +110,18 @@ class GlobalPlanner(Node):
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        return {"frame": self._frame.get_state(), **keep(self, _STATE)}
+        return {"frame": self._frame.get_state(), **save_attributes(self, _STATE)}
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
         self._frame.set_state(state["frame"])
-        put_back(self, {name: state[name] for name in _STATE})
+        restore_attributes(self, {name: state[name] for name in _STATE})
 
     # ------------------------------------------------------------------------------ what it hears
 
     def _on_odometry(self, message: Odometry) -> None:
         self._frame.hear(message)
-        place = Motion.from_odometry(message).position
+        place = OdometrySample.from_odometry(message).position
         if np.isfinite(place).all():
             self._place = self._frame.to_map(place)
 
@@ -139,7 +139,7 @@ class GlobalPlanner(Node):
     def _on_map(self, message: Any) -> None:
         """Plan anew where the new map shows that the way is not clear any more."""
         try:
-            self._map = Solid.of(voxels_of(message), float(message.resolution))
+            self._map = SolidVoxels.of(voxels_of(message), float(message.resolution))
         except DataFileError as error:
             self._tell("waiting" if self._way is None else "planned", str(error), 0.0)
             return

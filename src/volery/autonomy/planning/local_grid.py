@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from volery.autonomy.perception.scan_rays import Rays
 from volery.core.compiled import kernel
-from volery.core.saved_state import keep, put_back
+from volery.core.saved_state import restore_attributes, save_attributes
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -39,11 +39,11 @@ class LocalGrid:
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        return keep(self, ("_score", "_scan", "_number", "_low"))
+        return save_attributes(self, ("_score", "_scan", "_number", "_low"))
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
-        put_back(self, state)
+        restore_attributes(self, state)
 
     def move_to(self, place: Array) -> None:
         """Lie around `place` (3,) m; cells that come in anew are not known."""

@@ -12,16 +12,21 @@ from numpy.typing import NDArray
 from volery.autonomy.perception.list_parameters import declare_mount
 from volery.autonomy.perception.map_frame import MAP, UNKNOWN_PLACE, MapFrame
 from volery.autonomy.perception.odometry_topics import subscribe_odometry
-from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.planning.neighbours import Neighbours
-from volery.autonomy.planning.path_lookahead import WayAhead
-from volery.autonomy.planning.primitives import Limits, Path, State
-from volery.autonomy.planning.receding_horizon import Doing, LocalPlanning, Policy, Sight
+from volery.autonomy.planning.path_lookahead import PathLookahead
+from volery.autonomy.planning.primitives import MotionLimits, PrimitivePath, PrimitiveState
+from volery.autonomy.planning.receding_horizon import (
+    Observations,
+    PlannerSettings,
+    PlannerState,
+    RecedingHorizonPlanner,
+)
 from volery.autonomy.planning.reciprocal_avoidance import Separation, half_planes
 from volery.autonomy.planning.surroundings import Surroundings
 from volery.autonomy.planning.trajectory_messages import trajectory_message
 from volery.core.clock import NS_PER_S, ns_from_s
-from volery.core.saved_state import keep, put_back
+from volery.core.saved_state import restore_attributes, save_attributes
 from volery.graph.messages import (
     Bool,
     JointState,
@@ -100,10 +105,10 @@ class LocalPlanner(Node):
         self._arrival_m = float(self.declare_parameter("arrival_m", 1.0, least=0.01).value)
         radius = float(self.declare_parameter("separation_m", 2.0, least=0.0).value)
         self._separation = Separation(radius_m=radius)
-        self._planning = LocalPlanning(self._policy())
+        self._planning = RecedingHorizonPlanner(self._policy())
         self._frame = MapFrame()
         self._frame_was: Any = None
-        self._way: WayAhead | None = None
+        self._way: PathLookahead | None = None
         self._way_map: Array | None = None
         """The places of the way in the map, from which `_way` is made."""
         self._neighbours = Neighbours()
@@ -134,19 +139,19 @@ class LocalPlanner(Node):
         parts = {
             name: getattr(self, name).get_state() for name in ("_sight", "_planning", "_frame")
         }
-        return {"parts": parts, **keep(self, _STATE)}
+        return {"parts": parts, **save_attributes(self, _STATE)}
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
         for name, part in state["parts"].items():
             getattr(self, name).set_state(part)
-        put_back(self, {name: state[name] for name in _STATE})
+        restore_attributes(self, {name: state[name] for name in _STATE})
 
     # ------------------------------------------------------------------------------ what it hears
 
     def _on_odometry(self, message: Odometry) -> None:
         self._frame.hear(message)
-        self._sight.motion.add(Pose.from_odometry(message))
+        self._sight.motion.add(OdometrySample.from_odometry(message))
 
     def _scan_listener(self, name: str) -> Callable[[LaserScan], None]:
         return lambda scan: self._sight.on_scan(name, scan, self.get_clock().now_ns())
@@ -183,7 +188,7 @@ class LocalPlanner(Node):
             self._tell("waiting", problems)
             return
         height = self._sight.height_above_ground(pose, now)
-        present = State(pose.position, pose.velocity, np.zeros(3))
+        present = PrimitiveState(pose.position, pose.velocity, np.zeros(3))
         self._planning.policy = self._policy()
         then = now + self._ahead_ns
         if self._paused:
@@ -204,7 +209,7 @@ class LocalPlanner(Node):
             return
         self._plan(pose, start, now, then)
 
-    def _plan(self, pose: Pose, start: State, now: int, then: int) -> None:
+    def _plan(self, pose: OdometrySample, start: PrimitiveState, now: int, then: int) -> None:
         way = self._way_here()
         assert way is not None
         carrot = way.carrot(pose.position, _CARROT_M)
@@ -213,7 +218,7 @@ class LocalPlanner(Node):
             self._tell("arrived", [])
             return
         others = self._neighbours.in_odom(self._frame)
-        sight = Sight(
+        sight = Observations(
             self._sight.clearance(pose.position),
             self._sight.surface(float(self._height.value)),
             half_planes(start.position, start.velocity, others, self._separation, now),
@@ -223,31 +228,31 @@ class LocalPlanner(Node):
         self._publish(path, self._planning.began_ns)
         self._tell(str(self._planning.doing), self._sight.warnings())
 
-    def _way_here(self) -> WayAhead | None:
+    def _way_here(self) -> PathLookahead | None:
         """The way in the odometry frame, made anew where that has been moved in the map."""
         if self._way_map is None:
             return None
         at = self._frame.map_from_odom
         if self._way is None or at is not self._frame_was:
             passed = 0.0 if self._way is None else self._way.passed_m
-            self._way = WayAhead(self._frame.to_odom(self._way_map), passed)
+            self._way = PathLookahead(self._frame.to_odom(self._way_map), passed)
             self._frame_was = at
         return self._way
 
-    def _policy(self) -> Policy:
-        limits = Limits(float(self._speed.value), self._acceleration, 1.5, 1.5, 1.4)
-        return Policy(limits, radius_m=self._radius, unknown_stops=self._unknown_stops)
+    def _policy(self) -> PlannerSettings:
+        limits = MotionLimits(float(self._speed.value), self._acceleration, 1.5, 1.5, 1.4)
+        return PlannerSettings(limits, radius_m=self._radius, unknown_stops=self._unknown_stops)
 
     # ------------------------------------------------------------------------------ what it tells
 
-    def _publish(self, path: Path, begins_ns: int) -> None:
+    def _publish(self, path: PrimitivePath, begins_ns: int) -> None:
         frame = self._frame.odom_frame
         self._trajectory.publish(trajectory_message(path, self._planning.yaw, frame, begins_ns))
 
     def _tell(self, state: str, problems: list[str]) -> None:
         way, pose = self._way, self._sight.motion.newest
         left = None if way is None or pose is None else round(way.left_m(pose.position), 1)
-        clearance = self._planning.least_m if state == Doing.FLYING else None
+        clearance = self._planning.least_m if state == PlannerState.FLYING else None
         told = {"state": state, "problems": problems, "left_m": left, "plans": self._plans}
         if clearance is not None:
             told["clearance_m"] = round(clearance, 2)

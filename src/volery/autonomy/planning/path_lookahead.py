@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-class WayAhead:
+class PathLookahead:
     """Places (K, 3) m, K > 0; what has been passed is not come back to."""
 
     def __init__(self, places: Array, passed_m: float = 0.0) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from volery.autonomy.planning.clearance import Clearance
 from volery.autonomy.planning.cost_to_go import CostToGo
 from volery.autonomy.planning.distances import Squares
-from volery.autonomy.planning.primitives import Candidates
+from volery.autonomy.planning.primitives import PrimitiveCandidates
 from volery.core.compiled import inner_kernel, kernel
 
 Array = NDArray[np.float64]
@@ -21,7 +21,7 @@ _STEP_S = 0.08
 """Primitives are looked at so often: 0.24 m at 3 m/s, a cell."""
 
 
-class Verdicts(NamedTuple):
+class PrimitiveVerdicts(NamedTuple):
     """What became of each candidate, all (C,)."""
 
     nearest_m: Array
@@ -35,11 +35,15 @@ class Verdicts(NamedTuple):
 
 
 def judge(
-    candidates: Candidates, clearance: Clearance, costs: CostToGo, soft_m: float, near: float
-) -> Verdicts:
+    candidates: PrimitiveCandidates,
+    clearance: Clearance,
+    costs: CostToGo,
+    soft_m: float,
+    near: float,
+) -> PrimitiveVerdicts:
     """Look along each candidate, to its very end at rest."""
     count = len(candidates.rise_s)
-    verdicts = Verdicts(
+    verdicts = PrimitiveVerdicts(
         np.empty(count), np.empty(count, np.bool_), np.empty(count), np.empty(count)
     )
     _judge(

@@ -21,7 +21,7 @@ _LEAST_S = 0.5
 """Shortest change of velocity: below it the attitude loop would not follow (modelling choice)."""
 
 
-class State(NamedTuple):
+class PrimitiveState(NamedTuple):
     """A motion at one time, all (3,): m, m/s, m/s^2."""
 
     position: Array
@@ -29,7 +29,7 @@ class State(NamedTuple):
     acceleration: Array
 
 
-class Limits(NamedTuple):
+class MotionLimits(NamedTuple):
     """What trajectories may ask of a vehicle."""
 
     speed: float
@@ -40,10 +40,10 @@ class Limits(NamedTuple):
     """Time until braking begins."""
 
 
-class Candidates(NamedTuple):
+class PrimitiveCandidates(NamedTuple):
     """Primitives from one state: times (C,) s and velocities (C, 3) m/s of the cruise."""
 
-    start: State
+    start: PrimitiveState
     velocity: Array
     offset: Array
     """(C,): height over the surface of flight, relative to the wanted one, m."""
@@ -52,9 +52,9 @@ class Candidates(NamedTuple):
     cruise_s: Array
     brake_s: Array
 
-    def path(self, index: int) -> Path:
+    def path(self, index: int) -> PrimitivePath:
         """One of them as a trajectory."""
-        return Path(
+        return PrimitivePath(
             self.start,
             self.velocity[index],
             float(self.rise_s[index]),
@@ -63,7 +63,7 @@ class Candidates(NamedTuple):
         )
 
 
-def change_s(dv: Array, limits: Limits) -> Array:
+def change_s(dv: Array, limits: MotionLimits) -> Array:
     """Time (C,) in which velocities may change by (C, 3)."""
     level = 1.5 * np.hypot(dv[:, 0], dv[:, 1]) / limits.acceleration
     upright = 1.5 * np.abs(dv[:, 2]) / limits.climb_acceleration
@@ -71,10 +71,10 @@ def change_s(dv: Array, limits: Limits) -> Array:
 
 
 @dataclass(frozen=True, slots=True)
-class Path:
+class PrimitivePath:
     """Speeds up from `start` in `rise_s`, flies `velocity` for `cruise_s`, brakes in `brake_s`."""
 
-    start: State
+    start: PrimitiveState
     velocity: Array
     rise_s: float
     cruise_s: float
@@ -85,27 +85,31 @@ class Path:
         """Until it is at rest."""
         return self.rise_s + self.cruise_s + self.brake_s
 
-    def at(self, time_s: float) -> State:
+    def at(self, time_s: float) -> PrimitiveState:
         """The motion after some time; at rest at the end after the end."""
         if time_s < self.rise_s:
             return changed(self.start, self.velocity, self.rise_s, max(time_s, 0.0))
         risen = changed(self.start, self.velocity, self.rise_s, self.rise_s)
         cruised = min(time_s - self.rise_s, self.cruise_s)
-        steady = State(risen.position + self.velocity * cruised, self.velocity, np.zeros(3))
+        steady = PrimitiveState(
+            risen.position + self.velocity * cruised, self.velocity, np.zeros(3)
+        )
         if time_s < self.rise_s + self.cruise_s:
             return steady
         braked = min(time_s - self.rise_s - self.cruise_s, self.brake_s)
         return changed(steady, np.zeros(3), self.brake_s, braked)
 
 
-def changed(start: State, velocity: Array, duration_s: float, time_s: float) -> State:
+def changed(
+    start: PrimitiveState, velocity: Array, duration_s: float, time_s: float
+) -> PrimitiveState:
     """`time_s` into the change of velocity that takes `duration_s`."""
     dv = velocity - start.velocity - start.acceleration * duration_s
     da = -start.acceleration
     beta = (-12.0 * dv + 6.0 * duration_s * da) / duration_s**3
     gamma = (6.0 * duration_s * dv - 2.0 * duration_s**2 * da) / duration_s**3
     t = time_s
-    return State(
+    return PrimitiveState(
         start.position
         + t * (start.velocity + t * (start.acceleration / 2 + t * (gamma / 6 + t * beta / 24))),
         start.velocity + t * (start.acceleration + t * (gamma / 2 + t * beta / 6)),
@@ -113,26 +117,26 @@ def changed(start: State, velocity: Array, duration_s: float, time_s: float) -> 
     )
 
 
-def at_rest(position: Array) -> Path:
+def at_rest(position: Array) -> PrimitivePath:
     """Staying at a place."""
-    rest = State(position.copy(), np.zeros(3), np.zeros(3))
-    return Path(rest, np.zeros(3), 0.5, 0.0, 0.5)
+    rest = PrimitiveState(position.copy(), np.zeros(3), np.zeros(3))
+    return PrimitivePath(rest, np.zeros(3), 0.5, 0.0, 0.5)
 
 
-def braking(start: State, limits: Limits) -> Path:
+def braking(start: PrimitiveState, limits: MotionLimits) -> PrimitivePath:
     """The shortest stop."""
     seconds = float(change_s(-start.velocity[None], limits)[0])
-    return Path(start, np.zeros(3), seconds, 0.0, _LEAST_S)
+    return PrimitivePath(start, np.zeros(3), seconds, 0.0, _LEAST_S)
 
 
 def fan(
-    start: State,
+    start: PrimitiveState,
     directions: Array,
     speeds: Array,
     offsets: Array,
     rises: Array,
-    limits: Limits,
-) -> Candidates:
+    limits: MotionLimits,
+) -> PrimitiveCandidates:
     """Primitives along `directions` (D,) rad at `speeds` (S,), to heights of `offsets` (O,) m.
 
     rises: (D, S, O) m/s: vertical velocity of each, positive up. The last one stops.
@@ -145,9 +149,9 @@ def fan(
     cruise = np.maximum(limits.horizon_s - rise, 0.0)
     cruise[-1] = 0.0
     brake = change_s(velocity, limits)
-    return Candidates(start, velocity, np.append(o.ravel(), 0.0), rise, cruise, brake)
+    return PrimitiveCandidates(start, velocity, np.append(o.ravel(), 0.0), rise, cruise, brake)
 
 
-def reach_of(speed: float, limits: Limits) -> float:
+def reach_of(speed: float, limits: MotionLimits) -> float:
     """Way (m) of the longest primitive at `speed`: how far must be seen ahead."""
     return speed * (limits.horizon_s + 0.75 * speed / limits.acceleration + math.sqrt(0.5))

@@ -18,13 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.planning.clearance import Clearance
-from volery.autonomy.planning.cost_to_go import CostToGo, Prices, cost_to_go
-from volery.autonomy.planning.primitive_selection import Verdicts, judge
+from volery.autonomy.planning.cost_to_go import CellCosts, CostToGo, cost_to_go
+from volery.autonomy.planning.primitive_selection import PrimitiveVerdicts, judge
 from volery.autonomy.planning.primitives import (
-    Candidates,
-    Limits,
-    Path,
-    State,
+    MotionLimits,
+    PrimitiveCandidates,
+    PrimitivePath,
+    PrimitiveState,
     at_rest,
     braking,
     fan,
@@ -32,7 +32,7 @@ from volery.autonomy.planning.primitives import (
 from volery.autonomy.planning.reciprocal_avoidance import HalfPlane, violation
 from volery.autonomy.planning.surface import Surface
 from volery.core.clock import NS_PER_S
-from volery.core.saved_state import keep, put_back
+from volery.core.saved_state import restore_attributes, save_attributes
 from volery.core.vectors import norm
 
 Array = NDArray[np.float64]
@@ -61,7 +61,7 @@ _MATTER = 0.05
 """Improvement of the cost for which it is worth not to stay."""
 
 
-class Doing(StrEnum):
+class PlannerState(StrEnum):
     """What the planner does."""
 
     HOLDING = "holding"
@@ -71,10 +71,10 @@ class Doing(StrEnum):
 
 
 @dataclass(frozen=True)
-class Policy:
+class PlannerSettings:
     """How careful plans are."""
 
-    limits: Limits
+    limits: MotionLimits
     radius_m: float = 0.6
     """Least distance to obstacles at rest ..."""
     radius_s: float = 0.1
@@ -89,7 +89,7 @@ class Policy:
     """What a metre of unknown space costs in the guidance, which hopes for a way through."""
 
 
-class Sight(NamedTuple):
+class Observations(NamedTuple):
     """What is known at the time of planning."""
 
     clearance: Clearance
@@ -97,13 +97,13 @@ class Sight(NamedTuple):
     planes: list[HalfPlane]
 
 
-class LocalPlanning:
+class RecedingHorizonPlanner:
     """The plan that is in force, and how the next one is found."""
 
-    def __init__(self, policy: Policy) -> None:
+    def __init__(self, policy: PlannerSettings) -> None:
         self.policy = policy
-        self.doing = Doing.HOLDING
-        self._path: Path | None = None
+        self.doing = PlannerState.HOLDING
+        self._path: PrimitivePath | None = None
         self._began_ns = 0
         self.yaw = 0.0
         """Where the nose shall point, rad."""
@@ -112,26 +112,28 @@ class LocalPlanning:
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        return keep(self, ("doing", "_path", "_began_ns", "yaw", "least_m"))
+        return save_attributes(self, ("doing", "_path", "_began_ns", "yaw", "least_m"))
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
-        put_back(self, state)
+        restore_attributes(self, state)
 
-    def state_at(self, time_ns: int) -> State | None:
+    def state_at(self, time_ns: int) -> PrimitiveState | None:
         """The planned motion; None before the first plan."""
         if self._path is None:
             return None
         return self._path.at((time_ns - self._began_ns) / NS_PER_S)
 
-    def start(self, present: State, yaw: float, now_ns: int, then_ns: int) -> State:
+    def start(
+        self, present: PrimitiveState, yaw: float, now_ns: int, then_ns: int
+    ) -> PrimitiveState:
         """The motion from which to plan: where the plan will be, or where the vehicle is.
 
         It begins anew, from the present motion, where the vehicle is far from its plan.
         """
         planned = self.state_at(now_ns)
         if planned is None or norm(planned.position - present.position) > _LOST_M:
-            steady = State(present.position, present.velocity, np.zeros(3))
+            steady = PrimitiveState(present.position, present.velocity, np.zeros(3))
             self._path, self._began_ns = braking(steady, self.policy.limits), now_ns
             self.yaw = yaw
         state = self.state_at(then_ns)
@@ -140,20 +142,22 @@ class LocalPlanning:
 
     def forget(self) -> None:
         """There is no plan: somebody else flies."""
-        self._path, self.doing = None, Doing.HOLDING
+        self._path, self.doing = None, PlannerState.HOLDING
 
-    def hold(self, start: State, then_ns: int) -> Path:
+    def hold(self, start: PrimitiveState, then_ns: int) -> PrimitivePath:
         """Stop, by the shortest way."""
-        self.doing = Doing.HOLDING
+        self.doing = PlannerState.HOLDING
         moves = norm(start.velocity) > 0.05
         return self._commit(
             braking(start, self.policy.limits) if moves else at_rest(start.position), then_ns
         )
 
-    def plan(self, start: State, goal: Array, sight: Sight, then_ns: int) -> Path:
+    def plan(
+        self, start: PrimitiveState, goal: Array, sight: Observations, then_ns: int
+    ) -> PrimitivePath:
         """The plan from `start` at `then_ns` towards `goal` (2,) m."""
         policy, surface = self.policy, sight.surface
-        prices = Prices(policy.radius_m, policy.soft_m, policy.near, unknown=policy.unknown_cost)
+        prices = CellCosts(policy.radius_m, policy.soft_m, policy.near, unknown=policy.unknown_cost)
         costs = cost_to_go(sight.clearance, surface, _OFFSETS, goal, prices)
         candidates = self._fan(start, surface)
         verdicts = judge(candidates, sight.clearance, costs, policy.soft_m, policy.near)
@@ -166,20 +170,20 @@ class LocalPlanning:
         if not np.isfinite(total[best]):
             best = int(np.flatnonzero(safe)[-1])  # to stay, where that is safe
         moves = bool(np.hypot(*candidates.velocity[best, :2]) > 0.0)
-        self.doing = Doing.FLYING if moves else Doing.TURNING
+        self.doing = PlannerState.FLYING if moves else PlannerState.TURNING
         stays = len(safe) - 1
         if not moves and best == stays and not np.isfinite(costs.at(start.position[:2])):
-            self.doing = Doing.BLOCKED
+            self.doing = PlannerState.BLOCKED
         self.least_m = float(verdicts.nearest_m[best])
         return self._commit(candidates.path(best), then_ns)
 
     # ------------------------------------------------------------------------------------ parts
 
-    def _commit(self, path: Path, then_ns: int) -> Path:
+    def _commit(self, path: PrimitivePath, then_ns: int) -> PrimitivePath:
         self._path, self._began_ns = path, then_ns
         return path
 
-    def _fan(self, start: State, surface: Surface) -> Candidates:
+    def _fan(self, start: PrimitiveState, surface: Surface) -> PrimitiveCandidates:
         limits = self.policy.limits
         d, s, o = np.meshgrid(_DIRECTIONS, limits.speed * _SPEEDS, _OFFSETS, indexing="ij")
         way = 0.5 * limits.horizon_s * (s[..., None] * np.stack([np.cos(d), np.sin(d)], axis=-1))
@@ -194,7 +198,11 @@ class LocalPlanning:
         return found
 
     def _safe(
-        self, start: State, candidates: Candidates, verdicts: Verdicts, clearance: Clearance
+        self,
+        start: PrimitiveState,
+        candidates: PrimitiveCandidates,
+        verdicts: PrimitiveVerdicts,
+        clearance: Clearance,
     ) -> NDArray[np.bool_]:
         """Far enough from obstacles, or no nearer than now; within limits; in known space."""
         policy = self.policy
@@ -208,7 +216,11 @@ class LocalPlanning:
         return safe
 
     def _total(
-        self, start: State, candidates: Candidates, verdicts: Verdicts, planes: list[HalfPlane]
+        self,
+        start: PrimitiveState,
+        candidates: PrimitiveCandidates,
+        verdicts: PrimitiveVerdicts,
+        planes: list[HalfPlane],
     ) -> Array:
         velocity = candidates.velocity
         change = np.hypot(*(velocity[:, :2] - start.velocity[:2]).T)
@@ -236,10 +248,12 @@ class LocalPlanning:
             total = total + _KEEP_RIGHT * np.maximum(velocity @ np.array([-y, x]), 0.0)
         return np.asarray(total)
 
-    def _last_resort(self, start: State, sight: Sight, then_ns: int) -> Path:
+    def _last_resort(
+        self, start: PrimitiveState, sight: Observations, then_ns: int
+    ) -> PrimitivePath:
         """Fly the plan in force to its end if that is still clear, else stop: hard, if need be."""
         assert self._path is not None
-        self.doing = Doing.BLOCKED
+        self.doing = PlannerState.BLOCKED
         limits, radius = self.policy.limits, self.policy.radius_m
         hard = limits._replace(acceleration=_HARD * limits.acceleration)
         since = (then_ns - self._began_ns) / NS_PER_S
@@ -256,7 +270,7 @@ class LocalPlanning:
         self._path = path
         return path
 
-    def _turn_nose(self, start: State, goal: Array, costs: CostToGo) -> None:
+    def _turn_nose(self, start: PrimitiveState, goal: Array, costs: CostToGo) -> None:
         """Towards where it flies, or shall fly."""
         if float(np.hypot(*start.velocity[:2])) > 0.7:
             self.yaw = math.atan2(start.velocity[1], start.velocity[0])
@@ -279,7 +293,7 @@ class LocalPlanning:
         return self._began_ns
 
 
-def _least(path: Path, begin_s: float, clearance: Clearance) -> float:
+def _least(path: PrimitivePath, begin_s: float, clearance: Clearance) -> float:
     """Least distance (m) to obstacles from `begin_s` to the end of a path."""
     times = np.append(np.arange(begin_s, path.duration_s, 0.1), max(path.duration_s, begin_s))
     return float(clearance.at(np.array([path.at(t).position for t in times])).min())

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from volery.autonomy.perception.ground_plane import GroundPlane
 from volery.autonomy.perception.motion_history import MotionHistory, NodHistory
-from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.perception.scan_rays import Beams, RayMaker
 from volery.autonomy.perception.stuck_sensors import RangeRepeats, ScanRepeats
 from volery.autonomy.planning.clearance import Clearance, clearance_of
 from volery.autonomy.planning.local_grid import LocalGrid
 from volery.autonomy.planning.surface import Surface
 from volery.core.clock import NS_PER_S
-from volery.core.saved_state import keep, put_back
+from volery.core.saved_state import restore_attributes, save_attributes
 from volery.graph.messages import JointState, LaserScan, Range, stamp_of
 
 Array = NDArray[np.float64]
@@ -69,12 +69,12 @@ class Surroundings:
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        return {"grid": self._grid.get_state(), **keep(self, self._PLAIN)}
+        return {"grid": self._grid.get_state(), **save_attributes(self, self._PLAIN)}
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
         self._grid.set_state(state["grid"])
-        put_back(self, {name: state[name] for name in self._PLAIN})
+        restore_attributes(self, {name: state[name] for name in self._PLAIN})
 
     def on_joint(self, message: JointState) -> None:
         """Angle of the nodding mount."""
@@ -138,7 +138,7 @@ class Surroundings:
         """What is wrong but hinders nothing: without a sonar the LIDARs tell where ground is."""
         return ["the sonar repeats itself"] if self._is_sonar_stuck else []
 
-    def height_above_ground(self, pose: Pose, now_ns: int) -> float:
+    def height_above_ground(self, pose: OdometrySample, now_ns: int) -> float:
         """m, by the sonar and by what the LIDARs see of the ground."""
         below = None
         if self._range is not None and self._is_fresh(self._range[0], now_ns):

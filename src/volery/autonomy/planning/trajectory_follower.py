@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.perception.stuck_sensors import is_stuck
-from volery.autonomy.planning.trajectory_messages import Samples, samples_of
+from volery.autonomy.planning.trajectory_messages import TrajectorySamples, samples_of
 from volery.autonomy.status import publish_status
 from volery.core.clock import NS_PER_S, ns_from_s
-from volery.core.saved_state import keep, put_back
+from volery.core.saved_state import restore_attributes, save_attributes
 from volery.core.vectors import norm
 from volery.graph.messages import (
     Bool,
@@ -61,11 +61,11 @@ class TrajectoryFollower(Node):
         self._lead_ns = ns_from_s(
             float(self.declare_parameter("lead_s", 0.25, least=0.0, most=10.0).value)
         )
-        self._pose: Pose | None = None
+        self._pose: OdometrySample | None = None
         self._heard_ns = 0
         self._frame = ""
-        self._plan: Samples | None = None
-        self._next: Samples | None = None
+        self._plan: TrajectorySamples | None = None
+        self._next: TrajectorySamples | None = None
         self._told = ""
         self._paused = False
         self._command = self.create_publisher(Twist, "cmd_vel", 1)
@@ -79,14 +79,14 @@ class TrajectoryFollower(Node):
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        return keep(self, _STATE)
+        return save_attributes(self, _STATE)
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
-        put_back(self, state)
+        restore_attributes(self, state)
 
     def _on_odometry(self, message: Odometry) -> None:
-        pose = Pose.from_odometry(message)
+        pose = OdometrySample.from_odometry(message)
         values = (pose.position, pose.attitude, pose.velocity)
         if all(np.isfinite(v).all() for v in values) and not is_stuck(pose, self._pose):
             self._pose, self._frame = pose, message.header.frame_id
@@ -122,7 +122,7 @@ class TrajectoryFollower(Node):
             return
         self._fly(self._plan, self._pose, now)
 
-    def _fly(self, plan: Samples, pose: Pose, now: int) -> None:
+    def _fly(self, plan: TrajectorySamples, pose: OdometrySample, now: int) -> None:
         age_s = min(max((now - pose.time_ns) / NS_PER_S, 0.0), _CARRIED_S)
         here = pose.position + pose.velocity * age_s
         place, _ = plan.at(now)

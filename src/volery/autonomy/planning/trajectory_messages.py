@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.planning.primitives import Path
+from volery.autonomy.planning.primitives import PrimitivePath
 from volery.core.clock import NS_PER_S, ns_from_s
 from volery.graph.messages import (
     MultiDOFJointTrajectory,
@@ -31,7 +31,7 @@ _DURATION: type[Any] = message_type("builtin_interfaces/msg/Duration")
 _NO_TURN = Vector3(0.0, 0.0, 0.0)
 
 
-class Samples(NamedTuple):
+class TrajectorySamples(NamedTuple):
     """A trajectory as samples, in one frame."""
 
     time_ns: NDArray[np.int64]
@@ -58,7 +58,7 @@ class Samples(NamedTuple):
 
 
 def trajectory_message(
-    path: Path, yaw: float, frame_id: str, begins_ns: int
+    path: PrimitivePath, yaw: float, frame_id: str, begins_ns: int
 ) -> MultiDOFJointTrajectory:
     """A plan as trajectory_msgs/MultiDOFJointTrajectory, stamped with its begin."""
     turn = Quaternion(0.0, 0.0, math.sin(0.5 * yaw), math.cos(0.5 * yaw))
@@ -79,7 +79,7 @@ def trajectory_message(
     return MultiDOFJointTrajectory(header(begins_ns, frame_id), ["base_link"], points)
 
 
-def samples_of(message: MultiDOFJointTrajectory) -> Samples | None:
+def samples_of(message: MultiDOFJointTrajectory) -> TrajectorySamples | None:
     """A message's samples; None where it has none, or numbers that are not finite."""
     points = message.points
     if not points or not all(len(p.transforms) and len(p.velocities) for p in points):
@@ -93,7 +93,7 @@ def samples_of(message: MultiDOFJointTrajectory) -> Samples | None:
     finite = np.isfinite(position).all() and np.isfinite(velocity).all() and math.isfinite(yaw)
     if not finite or (np.diff(times) <= 0).any():
         return None
-    return Samples(begin + np.array(times, np.int64), position, velocity, yaw)
+    return TrajectorySamples(begin + np.array(times, np.int64), position, velocity, yaw)
 
 
 def _vector(message: Any) -> list[float]:

@@ -31,7 +31,7 @@ _MOST_COLUMNS = 2_000_000
 _FAR_CELLS = 5
 
 
-class Solid(NamedTuple):
+class SolidVoxels(NamedTuple):
     """What is occupied in a map, m."""
 
     middle: Array
@@ -40,7 +40,7 @@ class Solid(NamedTuple):
     """(K,)."""
 
     @classmethod
-    def of(cls, voxels: Voxels, resolution_m: float) -> Solid:
+    def of(cls, voxels: Voxels, resolution_m: float) -> SolidVoxels:
         """The occupied cubes of a map."""
         side = voxels.side[voxels.occupied].astype(np.float64) * resolution_m
         corner = voxels.corner[voxels.occupied] * resolution_m
@@ -55,7 +55,9 @@ class Solid(NamedTuple):
 class VoxelSpace:
     """Distances to obstacles over the ground, up to five cells, on cells of `cell_m`."""
 
-    def __init__(self, solid: Solid, cell_m: float, around: Array, margin_m: float = 25.0) -> None:
+    def __init__(
+        self, solid: SolidVoxels, cell_m: float, around: Array, margin_m: float = 25.0
+    ) -> None:
         """`around`: (K, 2+) m; the space holds these places and `margin_m` around them.
 
         Raises PlanError where it would be too large, or nothing is known there.

@@ -7,11 +7,15 @@ import numpy as np
 from volery.autonomy.perception.warmup import fixed, some_rays
 from volery.autonomy.planning.clearance import clearance_of
 from volery.autonomy.planning.local_grid import LocalGrid
-from volery.autonomy.planning.primitives import Limits, State
-from volery.autonomy.planning.receding_horizon import LocalPlanning, Policy, Sight
+from volery.autonomy.planning.primitives import MotionLimits, PrimitiveState
+from volery.autonomy.planning.receding_horizon import (
+    Observations,
+    PlannerSettings,
+    RecedingHorizonPlanner,
+)
 from volery.autonomy.planning.search_area import SearchArea
 from volery.autonomy.planning.surface import Surface
-from volery.autonomy.planning.voxel_space import Solid, VoxelSpace
+from volery.autonomy.planning.voxel_space import SolidVoxels, VoxelSpace
 
 _SHAPE = (8, 8, 8)
 
@@ -25,7 +29,7 @@ def searched_area() -> None:
 
 def ways() -> None:
     """Kernels of the space in which ways are searched for."""
-    space = VoxelSpace(Solid(np.zeros((1, 3)), np.ones(1)), 0.4, np.zeros((1, 2)), 2.0)
+    space = VoxelSpace(SolidVoxels(np.zeros((1, 3)), np.ones(1)), 0.4, np.zeros((1, 2)), 2.0)
     space.is_free(0.0, 0.0, 1.0, 0.1)
     space.is_free_leg(0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 0.1)
 
@@ -37,7 +41,7 @@ def plans() -> None:
     grid.add(some_rays())
     grid.clear_around(here, 0.5)
     clearance = clearance_of(*grid.window(here, _SHAPE), grid.cell_m, 1)
-    planning = LocalPlanning(Policy(Limits(1.0, 1.0, 1.0, 1.0, 1.0)))
-    at_rest = State(here, np.zeros(3), np.zeros(3))
+    planning = RecedingHorizonPlanner(PlannerSettings(MotionLimits(1.0, 1.0, 1.0, 1.0, 1.0)))
+    at_rest = PrimitiveState(here, np.zeros(3), np.zeros(3))
     start = planning.start(at_rest, 0.0, 0, 0)
-    planning.plan(start, np.ones(2), Sight(clearance, Surface(0.0, np.zeros(2)), []), 0)
+    planning.plan(start, np.ones(2), Observations(clearance, Surface(0.0, np.zeros(2)), []), 0)

@@ -15,7 +15,7 @@ _PERIOD_NS, _MOST = NS_PER_S, 20
 """How often, and how many times, a teammate is called. Modelling choice."""
 
 
-class Claim(NamedTuple):
+class RescueClaim(NamedTuple):
     """Who has found something, when and where. The least one counts: earlier, then by name."""
 
     stamp_ns: int
@@ -34,7 +34,7 @@ class Claim(NamedTuple):
         )
 
     @classmethod
-    def from_request(cls, request: Any) -> Claim:
+    def from_request(cls, request: Any) -> RescueClaim:
         """What a request says."""
         stamp_ns = request.stamp.sec * NS_PER_S + request.stamp.nanosec
         place = request.place.x, request.place.y, request.place.z
@@ -42,7 +42,7 @@ class Claim(NamedTuple):
 
 
 @dataclass
-class Call:
+class RescueCall:
     """A teammate that is called. Times are ns of the node's clock."""
 
     tries: int = 0
@@ -55,17 +55,17 @@ class Call:
 
 
 @dataclass
-class Calls:
+class RescueCalls:
     """The calls for an own find; none for one of another UAV."""
 
-    to: dict[str, Call] = field(default_factory=dict)
+    to: dict[str, RescueCall] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, names: Iterable[str]) -> Calls:
+    def of(cls, names: Iterable[str]) -> RescueCalls:
         """New ones."""
-        return cls({name: Call() for name in names})
+        return cls({name: RescueCall() for name in names})
 
-    def begin_due(self, now_ns: int) -> list[tuple[str, Call]]:
+    def begin_due(self, now_ns: int) -> list[tuple[str, RescueCall]]:
         """Those to call now (again); they count as called from here on."""
         due = [
             (name, call)
@@ -87,5 +87,5 @@ class Calls:
         """Call one of them no more."""
         self.to.pop(name, None)
 
-    def _has_waited(self, call: Call, now_ns: int) -> bool:
+    def _has_waited(self, call: RescueCall, now_ns: int) -> bool:
         return call.tries == 0 or now_ns - call.asked_ns >= _PERIOD_NS

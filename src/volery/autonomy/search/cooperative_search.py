@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.perception.scan_points import Pose
-from volery.autonomy.search.calls import JOIN, Calls, Claim
+from volery.autonomy.perception.scan_points import OdometrySample
+from volery.autonomy.search.calls import JOIN, RescueCalls, RescueClaim
 from volery.autonomy.search.ground_view import Intrinsics
 from volery.autonomy.search.object_detection import place_seen
 from volery.autonomy.search.search_positions import check_room, places_around, random_waypoint
 from volery.autonomy.search.steering import is_at
 from volery.autonomy.search.team_flight import TeamFlight
-from volery.autonomy.search.teammates import CAN_COME, GOING_HOME, ON_THE_WAY, RISING, Phase
+from volery.autonomy.search.teammates import CAN_COME, GOING_HOME, ON_THE_WAY, RISING, SearchPhase
 from volery.core import rng
 from volery.core.clock import NS_PER_S
 from volery.core.vectors import norm
@@ -39,7 +39,7 @@ _LOOKS, _LOOK_S = 5, 8.0
 _REST_M_S = 0.3
 _BLIND_S = 2.0
 """Without a picture for so long it stops."""
-_SEARCHING = frozenset({Phase.SEARCH, Phase.LOOK})
+_SEARCHING = frozenset({SearchPhase.SEARCH, SearchPhase.LOOK})
 """All modelling choices."""
 
 
@@ -97,9 +97,9 @@ class CooperativeSearch(TeamFlight):
         self._key = rng.stream_key(settings.seed, f"{settings.name}/search")
         check_room(*self._spread)
 
-        self.claim: Claim | None = None
+        self.claim: RescueClaim | None = None
         """What is gone by: found by this UAV or another one."""
-        self.calls = Calls()
+        self.calls = RescueCalls()
         """Of an own find."""
         self._intrinsics: Intrinsics | None = None
         self._waypoint = 0
@@ -156,7 +156,7 @@ class CooperativeSearch(TeamFlight):
         place = place_seen(image, self._intrinsics, self.settings, self.pose, mates)
         if place is None:
             return
-        if self.phase is Phase.SEARCH:
+        if self.phase is SearchPhase.SEARCH:
             self._see(stamp_of(image), place)
         elif is_at(self.pose, self._look_from, _NEAR_M, _REST_M_S):
             self._looks.append(place)
@@ -164,39 +164,39 @@ class CooperativeSearch(TeamFlight):
     def _see(self, stamp_ns: int, place: Array) -> None:
         """Break off, stop over it and look again: from there its height matters little."""
         assert self.pose is not None
-        self.claim = Claim(stamp_ns, self.settings.name, _plain(place))
+        self.claim = RescueClaim(stamp_ns, self.settings.name, _plain(place))
         low, high = np.reshape(self._inner, (2, 2))
         self._look_from, self._looks = self.in_layer(np.clip(place[:2], low, high)), []
         way = norm(self._look_from - self.pose.position)
         self._look_s = _LOOK_S + way / self.settings.speed_m_s
-        self.enter(Phase.LOOK)
+        self.enter(SearchPhase.LOOK)
 
     # --------------------------------------------------------------------------------- what it does
 
-    def act(self, pose: Pose) -> None:
+    def act(self, pose: OdometrySample) -> None:
         """Search, look, come, hold."""
-        if self.phase in CAN_COME - {Phase.READY} and self.team_in(GOING_HOME):
+        if self.phase in CAN_COME - {SearchPhase.READY} and self.team_in(GOING_HOME):
             self._finish()
         if self._finishing and self.phase in CAN_COME - RISING:
-            self.enter(Phase.HOME)
-        if self.phase is Phase.SEARCH:
+            self.enter(SearchPhase.HOME)
+        if self.phase is SearchPhase.SEARCH:
             self._search(pose)
-        elif self.phase is Phase.LOOK:
+        elif self.phase is SearchPhase.LOOK:
             self._look()
-        elif self.phase in (Phase.COME, Phase.HOLD):
+        elif self.phase in (SearchPhase.COME, SearchPhase.HOLD):
             arrived = self.fly_to(self._own_place())
-            if arrived and self.phase is Phase.COME:
-                self.enter(Phase.HOLD)
+            if arrived and self.phase is SearchPhase.COME:
+                self.enter(SearchPhase.HOLD)
             self._call_teammates()
-            if self.phase is Phase.HOLD:
+            if self.phase is SearchPhase.HOLD:
                 self._hold()
         for name in self._to_tell:
             self.ask(self._finish_clients[name])
         self._to_tell = []
 
-    def _search(self, pose: Pose) -> None:
+    def _search(self, pose: OdometrySample) -> None:
         if self.claim is not None:  # called while it climbed
-            self.enter(Phase.COME)
+            self.enter(SearchPhase.COME)
             return
         if self._began_ns is None:
             self._began_ns = self.now_ns
@@ -217,17 +217,17 @@ class CooperativeSearch(TeamFlight):
         if len(self._looks) >= _LOOKS:
             place = np.median(self._looks, axis=0)
             self.claim = self.claim._replace(place=_plain(place))
-            self.calls = Calls.of(self.mates)
+            self.calls = RescueCalls.of(self.mates)
             stamp = header(self.claim.stamp_ns, "map")
             self._found.publish(PointStamped(stamp, Point(*self.claim.place)))
             self._begin_to_come()
         elif self.phase_s > self._look_s:
             self.claim = None
-            self.enter(Phase.SEARCH)
+            self.enter(SearchPhase.SEARCH)
 
     def _begin_to_come(self) -> None:
         self._waiting_ns = None
-        self.enter(Phase.COME)
+        self.enter(SearchPhase.COME)
 
     @property
     def _spread(self) -> tuple[int, float, Any]:
@@ -267,11 +267,11 @@ class CooperativeSearch(TeamFlight):
 
     def on_call(self, request: Any, response: Any) -> Any:
         """A teammate calls: the earlier of two finds counts, of one instant the first name's."""
-        response.message = self._why_not(Claim.from_request(request))
+        response.message = self._why_not(RescueClaim.from_request(request))
         response.accepted = not response.message
         return response
 
-    def _why_not(self, called: Claim) -> str:
+    def _why_not(self, called: RescueClaim) -> str:
         """Heed a call; or why not."""
         name = self.settings.name
         if called.finder not in self.mates:
@@ -283,8 +283,8 @@ class CooperativeSearch(TeamFlight):
         if self.claim is not None and self.claim.key < called.key:
             return f"{self.claim.finder} saw something earlier"
         if self.claim is None or self.claim.key != called.key:
-            self.claim, self.calls = called, Calls()
-            if self.phase in CAN_COME - RISING - {Phase.ALOFT}:
+            self.claim, self.calls = called, RescueCalls()
+            if self.phase in CAN_COME - RISING - {SearchPhase.ALOFT}:
                 self._begin_to_come()
         return ""
 
@@ -297,8 +297,8 @@ class CooperativeSearch(TeamFlight):
         """Go home, or stay on the ground, and tell the others to: once."""
         if not self._finishing:
             self._finishing, self._to_tell = True, list(self.mates)
-            if self.phase is Phase.READY:
-                self.enter(Phase.DONE)
+            if self.phase is SearchPhase.READY:
+                self.enter(SearchPhase.DONE)
 
 
 def _plain(place: Array) -> tuple[float, float, float]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.scan_points import OdometrySample
 from volery.core import rotations
 from volery.core.errors import GraphError
 from volery.core.vectors import norm
@@ -53,7 +53,7 @@ class GroundView:
         turn = rotations.matrix(rotations.from_rpy(*np.radians(mount_rpy_deg)))
         self._body_from_optical: Array = turn @ _BODY_FROM_OPTICAL
 
-    def place_of(self, u: float, v: float, pose: Pose, plane_z: float) -> Array | None:
+    def place_of(self, u: float, v: float, pose: OdometrySample, plane_z: float) -> Array | None:
         """(3,) where the ray of a pixel meets the plane at height `plane_z`, map frame.
 
         None where it points up, or down by less than 10 degrees. A thing whose seen part lies dz
@@ -69,7 +69,7 @@ class GroundView:
         return place if eye[2] > plane_z else None
 
     def disc_of(
-        self, place: Array, radius_m: float, pose: Pose
+        self, place: Array, radius_m: float, pose: OdometrySample
     ) -> tuple[float, float, float] | None:
         """Column, row and radius, pixels, of a ball at `place` (3,); None behind the camera."""
         body = rotations.rotate(rotations.conjugate(pose.attitude), place - pose.position)
@@ -83,8 +83,10 @@ class GroundView:
         )
 
 
-def pose_at(pose: Pose, time_ns: int) -> Pose:
+def pose_at(pose: OdometrySample, time_ns: int) -> OdometrySample:
     """A pose carried on to another time by its velocity and turn rate."""
     dt = (time_ns - pose.time_ns) * 1e-9
     turned = rotations.multiply(pose.attitude, rotations.exponential(pose.omega_body * dt))
-    return Pose(time_ns, pose.position + pose.velocity * dt, turned, pose.velocity, pose.omega_body)
+    return OdometrySample(
+        time_ns, pose.position + pose.velocity * dt, turned, pose.velocity, pose.omega_body
+    )

@@ -7,10 +7,10 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.search.colour_blob import NO_DISCS, colour_mask, largest_blob, pixels_of
 from volery.autonomy.search.ground_view import GroundView, Intrinsics, pose_at
-from volery.autonomy.search.settings import Settings
+from volery.autonomy.search.settings import SearchSettings
 from volery.graph.messages import Image, stamp_of
 
 Array = NDArray[np.float64]
@@ -20,7 +20,11 @@ _TEAMMATE_M = 0.7
 
 
 def place_seen(
-    image: Image, intrinsics: Intrinsics, settings: Settings, pose: Pose, teammates: Iterable[Array]
+    image: Image,
+    intrinsics: Intrinsics,
+    settings: SearchSettings,
+    pose: OdometrySample,
+    teammates: Iterable[Array],
 ) -> Array | None:
     """(3,) the place in the map of the largest patch of the colour, inside the area.
 

@@ -13,7 +13,7 @@ from volery.graph.nodes.node import Node
 
 
 @dataclass(frozen=True)
-class Settings:
+class SearchSettings:
     """See `cooperative_search.CooperativeSearch`."""
 
     name: str
@@ -52,7 +52,7 @@ class Settings:
         return self.altitude_m + self.rank * self.layer_m
 
     @classmethod
-    def declare(cls, node: Node) -> Settings:
+    def declare(cls, node: Node) -> SearchSettings:
         """Declare the parameters of a node and read them. `GraphError` for what makes no sense."""
 
         def number(name: str, default: float, least: float = -math.inf) -> float:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.scan_points import OdometrySample
 from volery.core.vectors import norm
 from volery.graph.messages import Twist, Vector3
 
@@ -19,7 +19,7 @@ _CLIMB_GAIN_PER_S, _CLIMB_M_S = 1.2, 1.0
 """All modelling choices: gentle enough for every airframe that ships."""
 
 
-def towards(pose: Pose, place: Array, speed_m_s: float) -> Twist:
+def towards(pose: OdometrySample, place: Array, speed_m_s: float) -> Twist:
     """Fly to `place` (3,), the heading as it is: no faster than it can brake in time."""
     offset = place - pose.position
     away = math.hypot(offset[0], offset[1])
@@ -33,7 +33,7 @@ def towards(pose: Pose, place: Array, speed_m_s: float) -> Twist:
     return Twist(linear, Vector3(0.0, 0.0, 0.0))
 
 
-def is_at(pose: Pose, place: Array, within_m: float, still_m_s: float) -> bool:
+def is_at(pose: OdometrySample, place: Array, within_m: float, still_m_s: float) -> bool:
     """Whether a UAV is at a place and no faster than `still_m_s`."""
     away = norm(place - pose.position)
     return away <= within_m and norm(pose.velocity) <= still_m_s

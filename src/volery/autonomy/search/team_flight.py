@@ -10,13 +10,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.perception.scan_points import Pose
-from volery.autonomy.search.settings import Settings
+from volery.autonomy.perception.scan_points import OdometrySample
+from volery.autonomy.search.settings import SearchSettings
 from volery.autonomy.search.steering import is_at, towards
-from volery.autonomy.search.teammates import ALOFT, GOING_HOME, RISING, UNDER_WAY, Phase, Teammate
+from volery.autonomy.search.teammates import (
+    ALOFT,
+    GOING_HOME,
+    RISING,
+    UNDER_WAY,
+    SearchPhase,
+    Teammate,
+)
 from volery.core.clock import NS_PER_S
 from volery.core.errors import GraphError
-from volery.core.saved_state import keep, put_back
+from volery.core.saved_state import restore_attributes, save_attributes
 from volery.core.vectors import norm
 from volery.graph.messages import Odometry, Point, Twist, header, message_type
 from volery.graph.nodes.node import Node
@@ -24,8 +31,8 @@ from volery.graph.nodes.service_client import Client, Future
 
 Array = NDArray[np.float64]
 
-_PHASES = frozenset(map(str, Phase))
-_STILL_UP = frozenset({Phase.CLIMB, Phase.ALOFT})
+_PHASES = frozenset(map(str, SearchPhase))
+_STILL_UP = frozenset({SearchPhase.CLIMB, SearchPhase.ALOFT})
 _PERIOD_S = 0.1
 _SETTLE_S = 1.0
 """So long it tells that it is ready before it climbs, for others to hear and wait."""
@@ -59,9 +66,9 @@ class TeamFlight(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("search", **options)
-        self.settings = Settings.declare(self)
-        self.phase = Phase.READY
-        self.pose: Pose | None = None
+        self.settings = SearchSettings.declare(self)
+        self.phase = SearchPhase.READY
+        self.pose: OdometrySample | None = None
         self.teammates = {name: Teammate() for name in self.settings.teammates}
         self._home = np.zeros(3)
         self._since_ns: int | None = None
@@ -69,12 +76,12 @@ class TeamFlight(Node):
         self._asked_ns = -1 << 62
 
         self._legs = {
-            Phase.READY: self._wait_for_team,
-            Phase.CLIMB: self._climb,
-            Phase.ALOFT: self._wait_aloft,
-            Phase.HOME: self._go_home,
-            Phase.OVER_HOME: self._wait_aloft,
-            Phase.LAND: self._sink,
+            SearchPhase.READY: self._wait_for_team,
+            SearchPhase.CLIMB: self._climb,
+            SearchPhase.ALOFT: self._wait_aloft,
+            SearchPhase.HOME: self._go_home,
+            SearchPhase.OVER_HOME: self._wait_aloft,
+            SearchPhase.LAND: self._sink,
         }
         self._state_type = message_type("volery_interfaces/msg/SearchState")
         self._command = self.create_publisher(Twist, "cmd_vel", 1)
@@ -89,13 +96,13 @@ class TeamFlight(Node):
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        return keep(self, self.STATE)
+        return save_attributes(self, self.STATE)
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
-        put_back(self, state)
+        restore_attributes(self, state)
 
-    def act(self, pose: Pose) -> None:
+    def act(self, pose: OdometrySample) -> None:
         """Do what the phase asks for between climb and landing; in a subclass."""
 
     # ------------------------------------------------------------------------------- for subclasses
@@ -110,7 +117,7 @@ class TeamFlight(Node):
         """How long the phase has lasted."""
         return 0.0 if self._since_ns is None else (self.now_ns - self._since_ns) * 1e-9
 
-    def enter(self, phase: Phase) -> None:
+    def enter(self, phase: SearchPhase) -> None:
         """Go on to another phase, and tell so."""
         self.phase, self._since_ns = phase, self.now_ns
         self._tell()
@@ -125,7 +132,7 @@ class TeamFlight(Node):
         self._command.publish(towards(self.pose, place, self.settings.speed_m_s))
         return is_at(self.pose, place, within_m, _ARRIVED_M_S)
 
-    def team_in(self, phases: frozenset[Phase]) -> bool:
+    def team_in(self, phases: frozenset[SearchPhase]) -> bool:
         """Whether a teammate that can be heard is in one of these phases."""
         now, patience = self.now_ns, self.settings.patience_s
         return any(m.phase in phases and m.is_heard(now, patience) for m in self.teammates.values())
@@ -149,14 +156,14 @@ class TeamFlight(Node):
         return f"/{uav}/search/{name}"
 
     def _on_odometry(self, message: Odometry) -> None:
-        self.pose = Pose.from_odometry(message)
+        self.pose = OdometrySample.from_odometry(message)
 
     def _listener(self, name: str) -> Any:
         def on_state(message: Any) -> None:
             mate = self.teammates[name]
             if message.phase not in _PHASES:
                 return  # of a newer search than this one
-            mate.phase = Phase(message.phase)
+            mate.phase = SearchPhase(message.phase)
             p = message.position
             mate.position, mate.heard_ns = np.array([p.x, p.y, p.z]), self.now_ns
 
@@ -176,7 +183,7 @@ class TeamFlight(Node):
             return
         if self._since_ns is None:
             self._home = pose.position.copy()
-            self.enter(Phase.READY)
+            self.enter(SearchPhase.READY)
         elif self._since_ns > self.now_ns:  # the computer's clock until the graph's was heard
             self._since_ns = self.now_ns
         if self.phase in ALOFT and pose.position[2] < self._home[2] + _FALLEN_M:
@@ -187,45 +194,45 @@ class TeamFlight(Node):
         self.act(pose)
         self._tell()
 
-    def _go_home(self, _pose: Pose) -> None:
+    def _go_home(self, _pose: OdometrySample) -> None:
         if self.fly_to(self.in_layer(self._home)):
-            self.enter(Phase.OVER_HOME)
+            self.enter(SearchPhase.OVER_HOME)
 
-    def _wait_aloft(self, _pose: Pose) -> None:
+    def _wait_aloft(self, _pose: OdometrySample) -> None:
         self.fly_to(self.in_layer(self._home))
-        if self.phase is Phase.ALOFT and not self.team_in(RISING):
-            self.enter(Phase.SEARCH)
-        elif self.phase is Phase.OVER_HOME and not self.team_in(UNDER_WAY | _STILL_UP):
-            self.enter(Phase.LAND)
+        if self.phase is SearchPhase.ALOFT and not self.team_in(RISING):
+            self.enter(SearchPhase.SEARCH)
+        elif self.phase is SearchPhase.OVER_HOME and not self.team_in(UNDER_WAY | _STILL_UP):
+            self.enter(SearchPhase.LAND)
 
-    def _wait_for_team(self, _pose: Pose) -> None:
+    def _wait_for_team(self, _pose: OdometrySample) -> None:
         if any(m.phase in UNDER_WAY | GOING_HOME for m in self.teammates.values()):
-            self.enter(Phase.LATE)
+            self.enter(SearchPhase.LATE)
             return
         heard = all(m.phase is not None for m in self.teammates.values())
         if self.phase_s >= _SETTLE_S and (heard or self.phase_s >= self.settings.gather_s):
-            self.enter(Phase.CLIMB)
+            self.enter(SearchPhase.CLIMB)
 
-    def _climb(self, pose: Pose) -> None:
+    def _climb(self, pose: OdometrySample) -> None:
         height = self.settings.layer_z - self._home[2]
         at_rest = abs(pose.velocity[2]) < _STILL_M_S
         if at_rest and abs(self.settings.layer_z - pose.position[2]) < _ARRIVED_M:
-            self.enter(Phase.ALOFT)
+            self.enter(SearchPhase.ALOFT)
         elif self.phase_s > _CLIMB_S + _CLIMB_S_PER_M * height:
             self._give_up()
         elif pose.position[2] < self._home[2] + _LANDED_M and self._may_ask():
             request = message_type("volery_interfaces/srv/TakeOffTo_Request")
             self.ask(self._take_off, request(float(height)))
 
-    def _sink(self, pose: Pose) -> None:
+    def _sink(self, pose: OdometrySample) -> None:
         if pose.position[2] < self._home[2] + _LANDED_M and (norm(pose.velocity) < _STILL_M_S):
-            self.enter(Phase.DONE)
+            self.enter(SearchPhase.DONE)
         elif self._may_ask():
             self.ask(self._land)
 
     def _give_up(self) -> None:
         """Take no further part; come down, if it is not down already."""
-        self.enter(Phase.DOWN)
+        self.enter(SearchPhase.DOWN)
         self.ask(self._land)
 
     def _may_ask(self) -> bool:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-class Phase(StrEnum):
+class SearchPhase(StrEnum):
     """Where in its search a UAV is."""
 
     READY = "ready"
@@ -39,16 +39,24 @@ class Phase(StrEnum):
     """Came when the others were flying already; stays on the ground."""
 
 
-UNDER_WAY = frozenset({Phase.SEARCH, Phase.LOOK, Phase.COME, Phase.HOLD, Phase.HOME})
+UNDER_WAY = frozenset(
+    {SearchPhase.SEARCH, SearchPhase.LOOK, SearchPhase.COME, SearchPhase.HOLD, SearchPhase.HOME}
+)
 """Between the two vertical legs: nobody climbs or sinks while a teammate is here."""
-GOING_HOME = frozenset({Phase.HOME, Phase.OVER_HOME, Phase.LAND})
+GOING_HOME = frozenset({SearchPhase.HOME, SearchPhase.OVER_HOME, SearchPhase.LAND})
 """The search is over."""
-RISING = frozenset({Phase.READY, Phase.CLIMB})
-ALOFT = UNDER_WAY | {Phase.ALOFT, Phase.OVER_HOME}
+RISING = frozenset({SearchPhase.READY, SearchPhase.CLIMB})
+ALOFT = UNDER_WAY | {SearchPhase.ALOFT, SearchPhase.OVER_HOME}
 """Flies by the node's own velocity commands."""
-CAN_COME = RISING | {Phase.ALOFT, Phase.SEARCH, Phase.LOOK, Phase.COME, Phase.HOLD}
+CAN_COME = RISING | {
+    SearchPhase.ALOFT,
+    SearchPhase.SEARCH,
+    SearchPhase.LOOK,
+    SearchPhase.COME,
+    SearchPhase.HOLD,
+}
 """A call is heeded."""
-ON_THE_WAY = RISING | {Phase.ALOFT, Phase.LOOK, Phase.COME}
+ON_THE_WAY = RISING | {SearchPhase.ALOFT, SearchPhase.LOOK, SearchPhase.COME}
 """Will be at its place, or back in the search, some time."""
 
 
@@ -56,7 +64,7 @@ ON_THE_WAY = RISING | {Phase.ALOFT, Phase.LOOK, Phase.COME}
 class Teammate:
     """What is known of another UAV. Times are ns of the node's clock."""
 
-    phase: Phase | None = None
+    phase: SearchPhase | None = None
     """None: never heard of."""
     position: Array = field(default_factory=lambda: np.zeros(3))
     heard_ns: int = 0

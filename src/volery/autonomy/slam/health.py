@@ -7,7 +7,7 @@ from typing import Any
 from volery.autonomy.slam.match import MANY, MISFIT
 from volery.autonomy.slam.tracker import Tracker
 from volery.core.clock import NS_PER_S
-from volery.core.saved_state import keep, put_back
+from volery.core.saved_state import restore_attributes, save_attributes
 
 _SILENT_NS = NS_PER_S
 _LOST_NS = NS_PER_S
@@ -17,7 +17,7 @@ _UNSURE_M = 1.0
 """Standard deviation of the place since which nobody knows where it is."""
 
 
-class Health:
+class SlamHealth:
     """Watches a tracker; `state` is starting, tracking, degraded or lost."""
 
     _STATE = ("state", "problems", "heard", "_misfit_ns", "_scarce_ns")
@@ -76,8 +76,8 @@ class Health:
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        return keep(self, self._STATE)
+        return save_attributes(self, self._STATE)
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
-        put_back(self, state)
+        restore_attributes(self, state)

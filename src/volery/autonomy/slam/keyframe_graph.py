@@ -10,21 +10,21 @@ from numpy.typing import NDArray
 
 from volery.autonomy.slam.inertial_kernels import G, Q
 from volery.autonomy.slam.keyframes import (
-    Gathering,
     Keyframe,
+    KeyframeBuilder,
     level_of,
     step_between,
     turn_of_heading,
 )
 from volery.autonomy.slam.loop_closure import LoopCloser
-from volery.autonomy.slam.pose_graph import Edge, compose, load_gtsam, optimised
-from volery.autonomy.slam.relocalization import Relocation
-from volery.autonomy.slam.settings import Matching
-from volery.autonomy.slam.sweep import Seen
+from volery.autonomy.slam.pose_graph import PoseGraphEdge, compose, load_gtsam, optimised
+from volery.autonomy.slam.relocalization import Relocalization
+from volery.autonomy.slam.settings import ScanMatching
+from volery.autonomy.slam.sweep import SweepPoints
 from volery.autonomy.slam.tracker import Tracker
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
-from volery.core.saved_state import keep, put_back
+from volery.core.saved_state import restore_attributes, save_attributes
 from volery.core.vectors import norm
 
 Array = NDArray[np.float64]
@@ -44,14 +44,14 @@ _ASTRAY = np.array([1000.0, 1000.0, 1000.0, 3.0])
 """Standard deviations of the step over which the motion was lost."""
 
 
-class Placement(NamedTuple):
+class KeyframePose(NamedTuple):
     """`map_from_odom`: position (3,) m and attitude (4,)."""
 
     position: Array
     attitude: Array
 
 
-class Way:
+class KeyframeGraph:
     """Keyframes of one vehicle and their graph; `start` (4,) is the first one's pose in the map."""
 
     _STATE = (
@@ -59,7 +59,7 @@ class Way:
         "relocation", "_gathering", "_tried", "_settling",
     )  # fmt: skip
 
-    def __init__(self, matching: Matching, start: Array, has_loops: bool = True) -> None:
+    def __init__(self, matching: ScanMatching, start: Array, has_loops: bool = True) -> None:
         if has_loops:
             load_gtsam()
         self._closer = LoopCloser(matching) if has_loops else None
@@ -69,17 +69,17 @@ class Way:
         self.frames: list[Keyframe] = []
         self.poses: list[Array] = []
         """Of the keyframes in the map, (4,) x, y, z, yaw."""
-        self.edges: list[Edge] = []
+        self.edges: list[PoseGraphEdge] = []
         self.closures = self.refused = 0
         self.session = 0
         self.is_placed = True
         """Whether it is known where in the map the present session is."""
-        self.correction = Placement(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
-        self.relocation = Relocation()
-        self._gathering = Gathering()
+        self.correction = KeyframePose(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
+        self.relocation = Relocalization()
+        self._gathering = KeyframeBuilder()
         self._tried = -1_000
 
-    def add(self, seen: Seen, tracker: Tracker) -> bool:
+    def add(self, seen: SweepPoints, tracker: Tracker) -> bool:
         """Take in a sweep; whether it has led to a new keyframe."""
         if seen.is_drawn:
             self._gathering.add(seen.points, seen.kinds)
@@ -114,7 +114,7 @@ class Way:
         self.relocation.begin(doubted, hint)
         self.session += 1
         self.is_placed = False
-        self._gathering = Gathering()
+        self._gathering = KeyframeBuilder()
 
     def pose(self, tracker: Tracker) -> tuple[Array, Array]:
         """Present position (3,) and attitude (4,) in the map."""
@@ -163,7 +163,7 @@ class Way:
         if not is_new:
             moved = norm(frame.position - self.frames[row - 1].position)
             sigmas = _PER_ROOT_M * math.sqrt(max(moved, 0.1))
-        self.edges.append(Edge(row - 1, row, step, sigmas))
+        self.edges.append(PoseGraphEdge(row - 1, row, step, sigmas))
         self.poses.append(compose(self.poses[row - 1], step))
         self._level_again(gravity)
 
@@ -211,7 +211,7 @@ class Way:
         self.poses[newest] = compose(self.poses[found.origin], found.measured)
         self.poses = optimised(self.poses, self.edges)
 
-    def _find_near(self, newest: int) -> Edge | None:
+    def _find_near(self, newest: int) -> PoseGraphEdge | None:
         """The nearest old keyframe, if it fits; at every second keyframe at most."""
         if newest - self._tried < 2 or self._closer is None:
             return None
@@ -244,15 +244,15 @@ class Way:
         turn = rotations.multiply(
             rotations.from_rpy(0.0, 0.0, float(pose[3]) - level.yaw), level.attitude
         )
-        self.correction = Placement(pose[:3] - rotations.rotate(turn, frame.position), turn)
+        self.correction = KeyframePose(pose[:3] - rotations.rotate(turn, frame.position), turn)
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        return keep(self, self._STATE)
+        return save_attributes(self, self._STATE)
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
-        put_back(self, state)
+        restore_attributes(self, state)
 
 
 def _is_since(frame: Keyframe, time_ns: int | None) -> bool:

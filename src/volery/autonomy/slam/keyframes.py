@@ -80,7 +80,7 @@ def step_between(one: Keyframe, position: Array, attitude: Array, gravity: Array
     )
 
 
-class Gathering:
+class KeyframeBuilder:
     """Returns since the last keyframe, in the odometry's frame."""
 
     def __init__(self) -> None:

@@ -66,7 +66,7 @@ class _View(NamedTuple):
     """Where any LIDAR saw something in all of it."""
 
 
-class Sight:
+class KidnappingDetector:
     """The last seconds of what stands around; `is_broken` once it was exchanged for something else.
 
     A level LIDAR's sweeps, which see the same things again and again, are judged by what all

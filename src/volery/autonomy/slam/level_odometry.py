@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from volery.autonomy.slam.inertial_kernels import G, Q
 from volery.autonomy.slam.keyframes import levelling
 from volery.core import rotations
-from volery.core.saved_state import keep, put_back
+from volery.core.saved_state import restore_attributes, save_attributes
 
 Array = NDArray[np.float64]
 
@@ -41,8 +41,8 @@ class LevelOdometry:
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        return keep(self, self._STATE)
+        return save_attributes(self, self._STATE)
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
-        put_back(self, state)
+        restore_attributes(self, state)

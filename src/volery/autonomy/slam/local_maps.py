@@ -8,7 +8,7 @@ from volery.autonomy.slam.ground_kernels import GROUND_CELLS
 from volery.autonomy.slam.upright_kernels import CELLS, LAYERS
 
 
-class Maps:
+class Submaps:
     """Both as tables that kernels fill, in the frame of the odometry."""
 
     def __init__(self) -> None:

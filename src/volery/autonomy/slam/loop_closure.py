@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.slam.keyframes import Keyframe
-from volery.autonomy.slam.local_maps import Maps
+from volery.autonomy.slam.local_maps import Submaps
 from volery.autonomy.slam.matching_kernels import UPRIGHT
-from volery.autonomy.slam.pose_graph import Edge, between
+from volery.autonomy.slam.pose_graph import PoseGraphEdge, between
 from volery.autonomy.slam.relocalization_kernels import draw, draw_maps, refine, search
-from volery.autonomy.slam.settings import Matching
+from volery.autonomy.slam.settings import ScanMatching
 
 Array = NDArray[np.float64]
 
@@ -41,10 +41,10 @@ _FLOOR = np.array([0.06, 0.06, 0.06, 0.004])
 """Least standard deviation of a closure: what the map's own errors are."""
 
 
-class Closure(NamedTuple):
+class LoopClosure(NamedTuple):
     """A place seen again, and how surely."""
 
-    edge: Edge
+    edge: PoseGraphEdge
     share: float
     met: float
     margin: float
@@ -76,9 +76,9 @@ class _Pair(NamedTuple):
 class LoopCloser:
     """Matches sets of keyframes; `poses` are theirs in the map, (4,) each."""
 
-    def __init__(self, matching: Matching) -> None:
+    def __init__(self, matching: ScanMatching) -> None:
         self._matching = matching
-        self._maps = Maps()
+        self._maps = Submaps()
         self._picture = np.zeros((_PICTURE, _PICTURE), np.uint8)
 
     def match(
@@ -88,7 +88,7 @@ class LoopCloser:
         newest: int,
         older: int,
         reach: tuple[float, float],
-    ) -> Closure | None:
+    ) -> LoopClosure | None:
         """The newest keyframe as seen from an older one; None where they do not fit.
 
         `reach`: how far the newest one may be from where it seems to be, m and rad.
@@ -111,7 +111,7 @@ class LoopCloser:
         newest: int,
         older: int,
         reach: tuple[float, float],
-    ) -> Closure | None:
+    ) -> LoopClosure | None:
         """The newest keyframe of one that is lost as seen from an older one; maybe only a guess.
 
         `reach`: how far it may be from the older one, m, and from the heading that it seems to
@@ -154,7 +154,7 @@ class LoopCloser:
 
     def _refined(
         self, pose: Array, pair: _Pair, rows: tuple[int, int], margin: float
-    ) -> Closure | None:
+    ) -> LoopClosure | None:
         maps, m = self._maps, self._matching
         draw_maps(
             np.ascontiguousarray(pair.known), pair.known_kinds, maps.upright_keys, maps.cells,
@@ -174,8 +174,8 @@ class LoopCloser:
         if told[2] < 20.0:
             sigmas[2] = 10.0  # no ground in common: the height stays open
         pose[3] = math.remainder(pose[3], math.tau)
-        edge = Edge(rows[0], rows[1], pose.copy(), sigmas, True)
-        return Closure(edge, float(told[0] / max(told[1], 1.0)), float(told[0]), margin)
+        edge = PoseGraphEdge(rows[0], rows[1], pose.copy(), sigmas, True)
+        return LoopClosure(edge, float(told[0] / max(told[1], 1.0)), float(told[0]), margin)
 
 
 def _pair(

@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 
 from volery.autonomy.perception.list_parameters import declare_numbers
 from volery.autonomy.perception.scan_rays import is_usable
-from volery.autonomy.perception.static_transforms import LEVEL, FixedJoints, Mount
+from volery.autonomy.perception.static_transforms import LEVEL, Mount, StaticTransforms
 from volery.autonomy.slam import messages
-from volery.autonomy.slam.planar.health import Watched, judged
-from volery.autonomy.slam.planar.keyframe_graph import PlanarWay
+from volery.autonomy.slam.planar.health import PlanarHealth, judged
+from volery.autonomy.slam.planar.keyframe_graph import PlanarKeyframeGraph
 from volery.autonomy.slam.planar.odometry import WheelOdometry, step_between
 from volery.autonomy.slam.planar.scans import returns
-from volery.autonomy.slam.planar.settings import PlanarSettings, Returns
-from volery.autonomy.slam.planar.tracker import Follower
+from volery.autonomy.slam.planar.settings import PlanarSettings, ReturnSettings
+from volery.autonomy.slam.planar.tracker import PlanarTracker
 from volery.autonomy.status import publish_status
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
-from volery.core.saved_state import keep, put_back
+from volery.core.saved_state import restore_attributes, save_attributes
 from volery.graph.messages import (
     LaserScan,
     Odometry,
@@ -86,7 +86,7 @@ class PlanarSlam(Node):
         if self._is_mount_told:
             turn = rotations.from_rpy(*mount[3:])
             self._mount = Mount(np.array(mount[:3]), turn)
-        kept = Returns(
+        kept = ReturnSettings(
             nearest_m=float(self.declare_parameter("nearest_m", 0.05, least=0.0).value),
             reach_m=float(self.declare_parameter("reach_m", 30.0, least=0.1).value),
         )
@@ -98,9 +98,9 @@ class PlanarSlam(Node):
         self._open()
 
     def _begin(self) -> None:
-        self._follower = Follower(self._settings)
+        self._follower = PlanarTracker(self._settings)
         first = self._start[[0, 1, 3]]
-        self._way = PlanarWay(self._settings, first, has_loops=self._has_loops)
+        self._way = PlanarKeyframeGraph(self._settings, first, has_loops=self._has_loops)
         self._odometry = WheelOdometry()
         self._before: Array | None = None
         """Pose of the odometry at the newest scan."""
@@ -110,7 +110,7 @@ class PlanarSlam(Node):
         self._refused = self._resets = 0
         self._told = ""
         self._path_ns = self._path_of = self._period_ns = 0
-        self._joints = FixedJoints()
+        self._joints = StaticTransforms()
 
     def _open(self) -> None:
         self._odom = self.create_publisher(Odometry, "slam/odom", 5)
@@ -129,7 +129,7 @@ class PlanarSlam(Node):
         """What a snapshot keeps."""
         parts = {n: getattr(self, n).get_state() for n in ("_follower", "_way", "_odometry")}
         more = {"waiting": list(self._waiting), "joints": dict(self._joints.joints)}
-        return {"parts": parts, **more, **keep(self, self._PLAIN)}
+        return {"parts": parts, **more, **save_attributes(self, self._PLAIN)}
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
@@ -137,7 +137,7 @@ class PlanarSlam(Node):
             getattr(self, name).set_state(part)
         self._waiting = list(state["waiting"])
         self._joints.joints = dict(state["joints"])
-        put_back(self, {name: state[name] for name in self._PLAIN})
+        restore_attributes(self, {name: state[name] for name in self._PLAIN})
 
     # ------------------------------------------------------------------------------ what it hears
 
@@ -229,7 +229,7 @@ class PlanarSlam(Node):
     def _tell_status(self) -> None:
         follower, way = self._follower, self._way
         state, problems = judged(
-            Watched(
+            PlanarHealth(
                 self.get_clock().now_ns(), self._heard, self._period_ns, self._odometry_heard_ns(),
                 bool(way.frames), follower.misfits, follower.is_blind, follower.is_open,
                 way.is_placed,

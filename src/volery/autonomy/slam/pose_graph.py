@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 _ROUNDS = 12
 
 
-class Edge(NamedTuple):
+class PoseGraphEdge(NamedTuple):
     """Keyframe `to` as seen from keyframe `origin`."""
 
     origin: int
@@ -53,7 +53,7 @@ def between(pose: Array, other: Array) -> Array:
     return np.array([c * dx + s * dy, c * dy - s * dx, other[2] - pose[2], turn])
 
 
-def optimised(poses: list[Array], edges: list[Edge]) -> list[Array]:
+def optimised(poses: list[Array], edges: list[PoseGraphEdge]) -> list[Array]:
     """Poses (4,) that fit the edges best; the first one stays."""
     gtsam = load_gtsam()
     graph, start = gtsam.NonlinearFactorGraph(), gtsam.Values()
@@ -77,7 +77,7 @@ def optimised(poses: list[Array], edges: list[Edge]) -> list[Array]:
     return result
 
 
-def _add(gtsam: Any, graph: Any, edge: Edge, heights: int) -> None:
+def _add(gtsam: Any, graph: Any, edge: PoseGraphEdge, heights: int) -> None:
     m, sigmas = edge.measured, edge.sigmas
     plane = gtsam.noiseModel.Diagonal.Sigmas(np.array([sigmas[0], sigmas[1], sigmas[3]]))
     height = gtsam.noiseModel.Isotropic.Sigma(1, float(sigmas[2]))

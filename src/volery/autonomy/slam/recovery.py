@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.slam.inertial_kernels import BA, BG, STATES, G, P, Q, V, move, observe
-from volery.autonomy.slam.local_maps import Maps
+from volery.autonomy.slam.local_maps import Submaps
 from volery.autonomy.slam.matching_kernels import carry_along
 from volery.autonomy.slam.recovery_kernels import find_attitude, find_place
 from volery.core import rotations
@@ -97,7 +97,7 @@ class Recovery:
         return first_ns < self.gap[1] and last_ns > self.gap[0]
 
     def find(
-        self, state: Array, covariance: Array, states: Array, maps: Maps, points: Array
+        self, state: Array, covariance: Array, states: Array, maps: Submaps, points: Array
     ) -> bool:
         """Turn and move so that returns (K, 3) of the body fit the map; whether they do.
 
@@ -133,7 +133,7 @@ class Recovery:
         return True
 
 
-def _find_place(state: Array, covariance: Array, maps: Maps, body: Array) -> bool:
+def _find_place(state: Array, covariance: Array, maps: Submaps, body: Array) -> bool:
     """Move and turn `state` to where uprights of the map are; whether that is one place."""
     spread = 3.0 * math.sqrt(float(max(covariance[0, 0], covariance[1, 1])))
     turn = 3.0 * math.sqrt(float(covariance[8, 8]))

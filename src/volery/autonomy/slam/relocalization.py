@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from volery.autonomy.slam.keyframes import Keyframe
 from volery.autonomy.slam.loop_closure import AROUND, LoopCloser
-from volery.autonomy.slam.pose_graph import Edge, between, compose
+from volery.autonomy.slam.pose_graph import PoseGraphEdge, between, compose
 
 Array = NDArray[np.float64]
 
@@ -36,23 +36,23 @@ guesses contradict each other.
 """
 
 
-class Guess(NamedTuple):
+class PlaceHypothesis(NamedTuple):
     """Where a keyframe that fits would put the present session."""
 
-    edge: Edge
+    edge: PoseGraphEdge
     margin: float
     moved: Array
     """(4,) what would move the session there."""
 
 
-class Relocation:
+class Relocalization:
     """What one that is lost has tried so far, and which keyframes nobody can be found by."""
 
     def __init__(self) -> None:
         self.doubted: set[int] = set()
         """Keyframes of which it is not sure where they are."""
         self._cursor = 0
-        self._guesses: list[Guess] = []
+        self._guesses: list[PlaceHypothesis] = []
         self._hint: Array | None = None
 
     def begin(self, doubted: set[int], hint: Array | None = None) -> None:
@@ -67,7 +67,7 @@ class Relocation:
 
     def find(
         self, closer: LoopCloser, frames: Sequence[Keyframe], poses: Sequence[Array]
-    ) -> Edge | None:
+    ) -> PoseGraphEdge | None:
         """Try some keyframes of earlier sessions, in turn, the latest of them first."""
         newest = len(frames) - 1
         session = frames[newest].session
@@ -86,16 +86,16 @@ class Relocation:
             if found is not None:
                 place = compose(poses[row], found.edge.measured)
                 moved = compose(place, between(poses[newest], np.zeros(4)))
-                self._guesses.append(Guess(found.edge, found.margin, moved))
+                self._guesses.append(PlaceHypothesis(found.edge, found.margin, moved))
         return chosen(self._guesses, newest, poses[newest], self._hint)
 
 
 def chosen(
-    guesses: Sequence[Guess], newest: int, pose: Array, hint: Array | None = None
-) -> Edge | None:
+    guesses: Sequence[PlaceHypothesis], newest: int, pose: Array, hint: Array | None = None
+) -> PoseGraphEdge | None:
     """The best guess of the newest keyframe, whose pose is (4,), if its place is beyond doubt.
 
-    `hint`: see `Relocation.begin`.
+    `hint`: see `Relocalization.begin`.
     """
     if not guesses:
         return None
@@ -116,9 +116,9 @@ def chosen(
     return max(fresh, key=lambda guess: guess.margin).edge
 
 
-def _weight(guesses: Sequence[Guess]) -> float:
+def _weight(guesses: Sequence[PlaceHypothesis]) -> float:
     """The sum of margins of those guesses whose older keyframes have no returns in common."""
-    counted: list[Guess] = []
+    counted: list[PlaceHypothesis] = []
     for guess in sorted(guesses, key=lambda guess: -guess.margin):
         if all(abs(guess.edge.origin - other.edge.origin) > 2 * AROUND for other in counted):
             counted.append(guess)

@@ -18,7 +18,7 @@ class ImuNoise:
 
 
 @dataclass(frozen=True)
-class Matching:
+class ScanMatching:
     """How returns are compared with the map (modelling choices, tried on recorded flights)."""
 
     reach_m: float = 30.0

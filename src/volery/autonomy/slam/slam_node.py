@@ -12,18 +12,18 @@ from volery.autonomy.perception.list_parameters import declare_mount, declare_nu
 from volery.autonomy.perception.motion_history import NodHistory
 from volery.autonomy.perception.scan_rays import has_return, is_usable, scan_times
 from volery.autonomy.slam import messages
-from volery.autonomy.slam.health import Health
+from volery.autonomy.slam.health import SlamHealth
 from volery.autonomy.slam.inertial_kernels import BG, G, V
-from volery.autonomy.slam.keyframe_graph import Way
+from volery.autonomy.slam.keyframe_graph import KeyframeGraph
 from volery.autonomy.slam.keyframes import levelling
 from volery.autonomy.slam.level_odometry import LevelOdometry
-from volery.autonomy.slam.settings import ImuNoise, Matching
+from volery.autonomy.slam.settings import ImuNoise, ScanMatching
 from volery.autonomy.slam.sweep import Sweep
 from volery.autonomy.slam.tracker import Tracker
 from volery.autonomy.status import publish_status
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
-from volery.core.saved_state import keep, put_back
+from volery.core.saved_state import restore_attributes, save_attributes
 from volery.graph.messages import (
     Imu,
     JointState,
@@ -95,7 +95,7 @@ class Slam(Node):
         self._start = np.array(start or [0.0] * 4)
         self._mounts = {name: np.array(declare_mount(self, name)) for name in ("level", "nodding")}
         self._imu_noise = ImuNoise(*noise) if noise else ImuNoise()
-        self._matching = Matching(
+        self._matching = ScanMatching(
             reach_m=float(self.declare_parameter("reach_m", 30.0, least=0.1).value)
         )
         self._standing = float(self.declare_parameter("standing_height_m", 0.2, least=0.0).value)
@@ -117,8 +117,10 @@ class Slam(Node):
         self._tracker = Tracker(self._start, self._imu_noise, self._matching)
         self._tracker.standing_height = self._standing
         self._level = LevelOdometry()
-        self._way = Way(self._matching, self._start, self._has_loops)
-        self._health = Health(("IMU", "level LIDAR", "nodding LIDAR"), self.get_clock().now_ns())
+        self._way = KeyframeGraph(self._matching, self._start, self._has_loops)
+        self._health = SlamHealth(
+            ("IMU", "level LIDAR", "nodding LIDAR"), self.get_clock().now_ns()
+        )
         self._nod = NodHistory()
         self._omega = np.zeros(3)
         self._taken_ns: dict[str, int] = {}
@@ -149,13 +151,13 @@ class Slam(Node):
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
         parts = {n: getattr(self, n).get_state() for n in ("_tracker", "_level", "_way", "_health")}
-        return {"parts": parts, **keep(self, self._PLAIN)}
+        return {"parts": parts, **save_attributes(self, self._PLAIN)}
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
         for name, part in state["parts"].items():
             getattr(self, name).set_state(part)
-        put_back(self, {name: state[name] for name in self._PLAIN})
+        restore_attributes(self, {name: state[name] for name in self._PLAIN})
 
     # ------------------------------------------------------------------------------ what it hears
 

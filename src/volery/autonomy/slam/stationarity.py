@@ -25,7 +25,7 @@ _STILL_GYRO, _STILL_ACCEL = 0.02, 0.25
 """Most standard deviation of readings at rest, rad/s, m/s^2: four times the ADIS16448's."""
 
 
-class Rest:
+class StationaryDetector:
     """The newest readings of the IMU, and how it turned before it first stood still."""
 
     def __init__(self) -> None:

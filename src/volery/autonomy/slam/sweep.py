@@ -49,7 +49,7 @@ class Sweep(NamedTuple):
         return points[:count]
 
 
-class Seen(NamedTuple):
+class SweepPoints(NamedTuple):
     """Returns of a sweep as the filter has taken them in."""
 
     points: Array

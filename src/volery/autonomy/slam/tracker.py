@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.slam.inertial_kernels import STATE_NUMBERS, STATES, P, Q, V, move, remember
-from volery.autonomy.slam.kidnapping_detection import Sight
-from volery.autonomy.slam.local_maps import Maps
+from volery.autonomy.slam.kidnapping_detection import KidnappingDetector
+from volery.autonomy.slam.local_maps import Submaps
 from volery.autonomy.slam.match import Match, judged
 from volery.autonomy.slam.matching_kernels import (
     UPRIGHT,
@@ -27,13 +27,18 @@ from volery.autonomy.slam.matching_kernels import (
     update,
 )
 from volery.autonomy.slam.recovery import GAP_S, Recovery
-from volery.autonomy.slam.settings import ImuNoise, Matching
-from volery.autonomy.slam.stationarity import Rest, first_covariance, first_state, hold_still
-from volery.autonomy.slam.sweep import Seen, Sweep
+from volery.autonomy.slam.settings import ImuNoise, ScanMatching
+from volery.autonomy.slam.stationarity import (
+    StationaryDetector,
+    first_covariance,
+    first_state,
+    hold_still,
+)
+from volery.autonomy.slam.sweep import Sweep, SweepPoints
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
 from volery.core.rotation_kernels import moved_points
-from volery.core.saved_state import keep, put_back
+from volery.core.saved_state import restore_attributes, save_attributes
 from volery.core.vectors import norm
 
 Array = NDArray[np.float64]
@@ -67,16 +72,16 @@ class Tracker:
     )  # fmt: skip
 
     def __init__(
-        self, start: Array, imu: ImuNoise | None = None, matching: Matching | None = None
+        self, start: Array, imu: ImuNoise | None = None, matching: ScanMatching | None = None
     ) -> None:
-        self.imu_noise, self.matching = imu or ImuNoise(), matching or Matching()
+        self.imu_noise, self.matching = imu or ImuNoise(), matching or ScanMatching()
         self.start = np.asarray(start, np.float64)
         self.state = np.zeros(STATE_NUMBERS)
         self.state[Q + 3] = 1.0
         self.covariance = np.zeros((STATES, STATES))
         self.is_ready = self.is_standing = self.has_flown = False
         self.match: dict[str, Match] = {}
-        self.sight = Sight()
+        self.sight = KidnappingDetector()
         self.standing_height = 0.2
         self.travelled_m = 0.0
         self.refused = 0
@@ -85,9 +90,9 @@ class Tracker:
         self._imu: tuple[int, Array, Array] | None = None
         self.recovery = Recovery()
         self._waiting: deque[Sweep] = deque()
-        self._maps = Maps()
+        self._maps = Submaps()
         self._inserted: dict[str, tuple[int, Array, float]] = {}
-        self._rest = Rest()
+        self._rest = StationaryDetector()
         self.settling = rotations.IDENTITY.copy()
         """How it turned on its feet from the first reading on, (4,) in its own axes."""
         self._broad = np.zeros(6)
@@ -124,7 +129,7 @@ class Tracker:
         """Standard deviation of the place in the plane, in its worse direction of x and y."""
         return math.sqrt(float(max(self.covariance[0, 0], self.covariance[1, 1])))
 
-    def add_imu(self, time_ns: int, gyro: Array, accel: Array) -> list[Seen]:
+    def add_imu(self, time_ns: int, gyro: Array, accel: Array) -> list[SweepPoints]:
         """Carry the state on to a reading (rad/s, m/s^2, body axes); what sweeps were due then."""
         if self._imu is not None and time_ns <= self._imu[0]:
             self.refused += 1
@@ -225,7 +230,7 @@ class Tracker:
 
     # ------------------------------------------------------------------------------------ sweeps
 
-    def _take_in(self, sweep: Sweep) -> Seen | None:
+    def _take_in(self, sweep: Sweep) -> SweepPoints | None:
         m = self.matching
         in_gap = self.recovery.is_in_gap(sweep.first_ns, sweep.last_ns)
         if sweep.first_ns < self._times[0] or in_gap:
@@ -233,7 +238,7 @@ class Tracker:
             return None
         points = sweep.points(m.nearest_m, m.reach_m, self._times, self._states)
         if self.is_astray:
-            self.sight = Sight()
+            self.sight = KidnappingDetector()
             if not self.recovery.find(
                 self.state, self.covariance, self._states, self._maps, points
             ):
@@ -255,7 +260,7 @@ class Tracker:
         if self.has_flown:
             standing = turned[kinds == UPRIGHT, :2]
             self.sight.take(self.time_ns, standing, self.state[:2], is_level=not sweep.nods)
-        return Seen(turned, kinds, is_drawn)
+        return SweepPoints(turned, kinds, is_drawn)
 
     def _classify(self, points: Array, kinds: NDArray[np.int8], planes: Array, known: int) -> None:
         maps = self._maps
@@ -305,8 +310,8 @@ class Tracker:
         `speed_sigma`, m/s, and `turn_sigma`, rad about each axis, are how far velocity and attitude
         may be off by now.
         """
-        self._maps = Maps()
-        self._inserted, self.match, self.sight = {}, {}, Sight()
+        self._maps = Submaps()
+        self._inserted, self.match, self.sight = {}, {}, KidnappingDetector()
         self.covariance[:3] = self.covariance[:, :3] = 0.0
         self.covariance[np.arange(3), np.arange(3)] = 1e-4
         self.covariance[np.arange(3, 6), np.arange(3, 6)] += speed_sigma**2
@@ -319,8 +324,8 @@ class Tracker:
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        return keep(self, self._STATE)
+        return save_attributes(self, self._STATE)
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
-        put_back(self, state)
+        restore_attributes(self, state)

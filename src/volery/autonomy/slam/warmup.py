@@ -8,12 +8,12 @@ from volery.autonomy.perception.warmup import fixed
 from volery.autonomy.slam import messages
 from volery.autonomy.slam.inertial_kernels import STATES
 from volery.autonomy.slam.keyframes import Keyframe
-from volery.autonomy.slam.kidnapping_detection import Sight
-from volery.autonomy.slam.local_maps import Maps
+from volery.autonomy.slam.kidnapping_detection import KidnappingDetector
+from volery.autonomy.slam.local_maps import Submaps
 from volery.autonomy.slam.loop_closure import LoopCloser
 from volery.autonomy.slam.matching_kernels import GROUND, UPRIGHT
 from volery.autonomy.slam.recovery import Recovery
-from volery.autonomy.slam.settings import GRAVITY_M_S2, Matching
+from volery.autonomy.slam.settings import GRAVITY_M_S2, ScanMatching
 from volery.autonomy.slam.sweep import Sweep
 from volery.autonomy.slam.tracker import Tracker
 from volery.core import rotations
@@ -52,21 +52,21 @@ def known_places() -> None:
         Keyframe(k, np.zeros(3), rotations.IDENTITY.copy(), 0.0, points, kinds, 0) for k in range(8)
     ]
     poses = [np.zeros(4) for _ in frames]
-    LoopCloser(Matching()).match(frames, poses, len(frames) - 1, 0, (0.4, 0.01))
+    LoopCloser(ScanMatching()).match(frames, poses, len(frames) - 1, 0, (0.4, 0.01))
 
 
 def sight() -> None:
     """Kernels that notice a displacement: half of what is seen is somewhere else."""
     before = np.column_stack([np.linspace(-20.0, 20.0, 80), np.zeros(80)])
     now = before + np.where(np.arange(80) % 2, 3.0, 0.0)[:, None] * np.array([0.0, 1.0])
-    eyes = Sight()
+    eyes = KidnappingDetector()
     for time_ns, places in ((0, before), (NS_PER_S // 4, now)):
         eyes.take(time_ns, places, np.zeros(2), is_level=True)
 
 
 def lost_motion() -> None:
     """Kernels that find attitude and place again."""
-    recovery, maps, points = Recovery(), Maps(), np.ones((1, 3))
+    recovery, maps, points = Recovery(), Submaps(), np.ones((1, 3))
     state, states = np.zeros(19), np.zeros((2, 19))
     state[9] = 1.0
     aslant = np.eye(STATES)

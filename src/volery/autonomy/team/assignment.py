@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
-class Claim(NamedTuple):
+class SectorClaim(NamedTuple):
     """Who searches a sector since when, ns; of two the lesser one counts."""
 
     since_ns: int
@@ -65,9 +65,11 @@ def assign(workers: Mapping[str, Worker], searched: Mask, centres: Array) -> dic
     return chosen
 
 
-def must_yield(mine: Claim, sector: int, others: Mapping[str, Worker]) -> bool:
+def must_yield(mine: SectorClaim, sector: int, others: Mapping[str, Worker]) -> bool:
     """Whether somebody else searches my sector by an earlier claim."""
     claims = [
-        Claim(other.since_ns, name) for name, other in others.items() if other.sector == sector
+        SectorClaim(other.since_ns, name)
+        for name, other in others.items()
+        if other.sector == sector
     ]
     return any(claim < mine for claim in claims)

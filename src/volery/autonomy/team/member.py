@@ -12,16 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.perception.map_frame import UNKNOWN_PLACE, MapFrame
-from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.perception.stuck_sensors import is_stuck
 from volery.autonomy.team.assignment import Worker
 from volery.autonomy.team.sectors import Coverage, from_bits, to_bits
-from volery.autonomy.team.settings import Settings
-from volery.autonomy.team.target_list import Find, TargetList
+from volery.autonomy.team.settings import TeamSettings
+from volery.autonomy.team.target_list import Detection, TargetList
 from volery.autonomy.team.team_state import TYPE as REPORT_TYPE
-from volery.autonomy.team.team_state import Phase, Team
+from volery.autonomy.team.team_state import MissionPhase, TeamState
 from volery.core.clock import NS_PER_S
-from volery.core.saved_state import keep, put_back
+from volery.core.saved_state import restore_attributes, save_attributes
 from volery.graph.messages import (
     BatteryState,
     Odometry,
@@ -68,9 +68,9 @@ class TeamMember(Node):
 
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
-        self.settings = settings = Settings.declare(self)
+        self.settings = settings = TeamSettings.declare(self)
         count = len(settings.sectors)
-        self.phase = Phase.WAIT
+        self.phase = MissionPhase.WAIT
         self.sector = -1
         """The one that it searches, -1: none ..."""
         self._since_ns = 0
@@ -83,10 +83,10 @@ class TeamMember(Node):
         """(S,) by anybody."""
         self._given_up = np.zeros(count, np.bool_)
         self.targets = TargetList(settings.gate_m)
-        self.team = Team(count)
+        self.team = TeamState(count)
         self.trouble = ""
         self._frame = MapFrame()
-        self._pose: Pose | None = None
+        self._pose: OdometrySample | None = None
         self._pose_ns = 0
         self._battery = math.nan
         self._heard_ns = 0
@@ -109,11 +109,11 @@ class TeamMember(Node):
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        return keep(self, self.STATE)
+        return save_attributes(self, self.STATE)
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
-        put_back(self, state)
+        restore_attributes(self, state)
 
     @property
     def now_ns(self) -> int:
@@ -150,12 +150,12 @@ class TeamMember(Node):
             return
         self._heard_ns = now
         self.searched |= from_bits(report.searched, len(self.searched))
-        if self.targets.take(map(Find.from_message, report.targets)):
+        if self.targets.take(map(Detection.from_message, report.targets)):
             self._tell_targets()
 
     def _on_finds(self, message: Any) -> None:
         known = len(self.targets.finds)
-        finds = [Find.from_message(each) for each in message.targets]
+        finds = [Detection.from_message(each) for each in message.targets]
         if self.targets.take(f._replace(finder=self.settings.name) for f in finds):
             self._tell_targets()
         if len(self.targets.finds) > known:
@@ -172,7 +172,7 @@ class TeamMember(Node):
             name
             for name, mate in self.team.mates.items()
             if now - mate.heard_ns > self.settings.patience_s * NS_PER_S
-            and mate.phase not in (Phase.DONE, Phase.DOWN)
+            and mate.phase not in (MissionPhase.DONE, MissionPhase.DOWN)
         )
         if silent:
             wrong.append(f"silent: {', '.join(silent)}")

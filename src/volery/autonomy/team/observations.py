@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.team.target_list import Find
+from volery.autonomy.team.target_list import Detection
 from volery.core.clock import NS_PER_S
 
 Array = NDArray[np.float64]
@@ -32,7 +32,7 @@ _NEAR_M = 2.0
 """So near to it a sighting belongs to a track whatever the covariances say. Modelling choice."""
 
 
-class Doubt(NamedTuple):
+class PositionUncertainty(NamedTuple):
     """What a sighting does not know."""
 
     angle_rad: float = 0.03
@@ -43,7 +43,7 @@ class Doubt(NamedTuple):
     """Of the UAV's own place."""
 
 
-class Sighting(NamedTuple):
+class Observation(NamedTuple):
     """A thing seen once."""
 
     time_ns: int
@@ -53,7 +53,7 @@ class Sighting(NamedTuple):
     """(2, 2) of x and y, m^2"""
 
 
-def sighting_of(time_ns: int, eye: Array, place: Array, doubt: Doubt) -> Sighting:
+def sighting_of(time_ns: int, eye: Array, place: Array, doubt: PositionUncertainty) -> Observation:
     """The sighting of a thing whose ray from `eye` (3,) ends at `place` (3,), below the eye."""
     offset = place[:2] - eye[:2]
     r, h = max(float(np.hypot(*offset)), 1e-3), float(eye[2] - place[2])
@@ -62,7 +62,7 @@ def sighting_of(time_ns: int, eye: Array, place: Array, doubt: Doubt) -> Sightin
     c, s = offset / r
     turn = np.array([[c, -s], [s, c]])
     own = doubt.place_m**2 * np.eye(2)
-    return Sighting(time_ns, place, turn @ np.diag([along**2, across**2]) @ turn.T + own)
+    return Observation(time_ns, place, turn @ np.diag([along**2, across**2]) @ turn.T + own)
 
 
 @dataclass
@@ -88,7 +88,7 @@ class Track:
         """(2,) m, map."""
         return np.asarray(self.covariance @ self.weighted)
 
-    def add(self, sighting: Sighting) -> None:
+    def add(self, sighting: Observation) -> None:
         """Join another sighting."""
         weight = np.linalg.inv(sighting.covariance)
         self.information = self.information + weight
@@ -97,18 +97,18 @@ class Track:
         self.count += 1
         self.last_ns = sighting.time_ns
 
-    def fits(self, sighting: Sighting) -> bool:
+    def fits(self, sighting: Observation) -> bool:
         """Whether a sighting may be of this thing."""
         off = sighting.place[:2] - self.place
         spread = np.linalg.inv(self.covariance + sighting.covariance)
         return float(off @ spread @ off) <= _GATE or float(np.hypot(*off)) <= _NEAR_M
 
-    def find(self, finder: str) -> Find:
+    def find(self, finder: str) -> Detection:
         """As others are told of it."""
         a, b, c, d = self.covariance.ravel().tolist()
         x, y = self.place.tolist()
         z = self.heights / self.count
-        return Find(finder, self.number, self.last_ns, (x, y, z), (a, b, c, d), self.count)
+        return Detection(finder, self.number, self.last_ns, (x, y, z), (a, b, c, d), self.count)
 
 
 @dataclass
@@ -126,7 +126,7 @@ class Tracks:
     forget_s: float = 20.0
     tracks: list[Track] = field(default_factory=list)
 
-    def add(self, sighting: Sighting) -> Track:
+    def add(self, sighting: Observation) -> Track:
         """Join a sighting to the thing that it fits best, or begin with a new one."""
         now = sighting.time_ns
         self.tracks = [
@@ -144,7 +144,7 @@ class Tracks:
             track.number = 1 + max(each.number for each in self.tracks)
         return track
 
-    def finds(self, finder: str) -> list[Find]:
+    def finds(self, finder: str) -> list[Detection]:
         """All that are confirmed, by number."""
         sure = sorted((t for t in self.tracks if t.number), key=lambda t: t.number)
         return [track.find(finder) for track in sure]

@@ -12,7 +12,7 @@ from volery.graph.nodes.node import Node
 
 
 @dataclass(frozen=True)
-class Settings:
+class TeamSettings:
     """See `task_manager.TaskManager`."""
 
     name: str
@@ -34,7 +34,7 @@ class Settings:
     goal_topic: str
 
     @classmethod
-    def declare(cls, node: Node) -> Settings:
+    def declare(cls, node: Node) -> TeamSettings:
         """Declare the parameters of a node and read them. `GraphError` for what makes no sense."""
 
         def number(name: str, default: float, least: float, most: float = math.inf) -> float:

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.perception.map_frame import MapFrame
-from volery.autonomy.perception.scan_points import Pose
+from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.search.colour_blob import ColourRange, colour_mask, largest_blob, pixels_of
 from volery.autonomy.search.ground_view import GroundView, Intrinsics, pose_at
-from volery.autonomy.team.observations import Doubt, Tracks, sighting_of
+from volery.autonomy.team.observations import PositionUncertainty, Tracks, sighting_of
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
-from volery.core.saved_state import keep, put_back
+from volery.core.saved_state import restore_attributes, save_attributes
 from volery.graph.messages import (
     CameraInfo,
     Image,
@@ -88,11 +88,11 @@ class TargetDetection(Node):
         self._tracks = Tracks(
             int(declare("sightings", 4).value), spread_m=float(declare("spread_m", 2.0).value)
         )
-        self._doubt = Doubt()
+        self._doubt = PositionUncertainty()
         self._frame = MapFrame()
         self._mates: dict[str, tuple[int, Array]] = {}
         """When each was heard, ns, and where it was."""
-        self._pose: Pose | None = None
+        self._pose: OdometrySample | None = None
         self._range: tuple[int, float] | None = None
         self._intrinsics: Intrinsics | None = None
 
@@ -107,11 +107,11 @@ class TargetDetection(Node):
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        return keep(self, self.STATE)
+        return save_attributes(self, self.STATE)
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
-        put_back(self, state)
+        restore_attributes(self, state)
 
     def _on_tf(self, message: TFMessage) -> None:
         self._frame.on_tf(message)
@@ -152,7 +152,7 @@ class TargetDetection(Node):
         if track.number:
             self._tell(taken)
 
-    def _teammates_in(self, view: GroundView, pose: Pose) -> Array:
+    def _teammates_in(self, view: GroundView, pose: OdometrySample) -> Array:
         """(K, 3) discs of the picture in which teammates are, who may be of the colour."""
         since = pose.time_ns - round(_MATE_S * NS_PER_S)
         near = [place for heard_ns, place in self._mates.values() if heard_ns >= since]

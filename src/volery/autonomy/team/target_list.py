@@ -20,7 +20,7 @@ _LEAST_M = 0.1
 """Standard deviation that no place is better than: maps of two UAVs differ. Modelling choice."""
 
 
-class Find(NamedTuple):
+class Detection(NamedTuple):
     """A target as one UAV knows it."""
 
     finder: str
@@ -33,7 +33,7 @@ class Find(NamedTuple):
     sightings: int
 
     @classmethod
-    def from_message(cls, message: Any) -> Find:
+    def from_message(cls, message: Any) -> Detection:
         """Of a `Target`."""
         p = message.position
         a, b, c, d = map(float, message.covariance)
@@ -73,9 +73,9 @@ class TargetList:
     """
 
     gate_m: float
-    finds: dict[tuple[str, int], Find] = field(default_factory=dict)
+    finds: dict[tuple[str, int], Detection] = field(default_factory=dict)
 
-    def take(self, finds: Iterable[Find]) -> bool:
+    def take(self, finds: Iterable[Detection]) -> bool:
         """Take finds in; whether one of them told something new."""
         changed = False
         for find in finds:
@@ -97,9 +97,9 @@ class TargetList:
         in_turn = (others[first:] + others[:first])[:_TOLD]
         return [self.finds[key].message() for key in (*newest, *in_turn)]
 
-    def targets(self) -> list[Find]:
+    def targets(self) -> list[Detection]:
         """One for each thing: its finds joined, weighted by their covariances."""
-        groups: list[list[Find]] = []
+        groups: list[list[Detection]] = []
         for key in sorted(self.finds):
             find = self.finds[key]
             for group in groups:
@@ -111,7 +111,7 @@ class TargetList:
         return [_joined(group) for group in groups]
 
 
-def _joined(group: list[Find]) -> Find:
+def _joined(group: list[Detection]) -> Detection:
     """One find of several of the same thing, under the name of the first."""
     if len(group) == 1:
         return group[0]

@@ -16,12 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from volery.autonomy.perception.scan_points import Pose
-from volery.autonomy.team.assignment import Claim, assign, must_yield
+from volery.autonomy.perception.scan_points import OdometrySample
+from volery.autonomy.team.assignment import SectorClaim, assign, must_yield
 from volery.autonomy.team.member import POSE_S, TeamMember
 from volery.autonomy.team.mission_messages import goal_at, polygon_of
 from volery.autonomy.team.sectors import Coverage
-from volery.autonomy.team.team_state import ALOFT, Phase
+from volery.autonomy.team.team_state import ALOFT, MissionPhase
 from volery.core.clock import NS_PER_S
 from volery.core.errors import GraphError
 from volery.core.vectors import norm
@@ -157,7 +157,7 @@ class TaskManager(TeamMember):
         now, state = self.now_ns, _state_in(message.data)
         if state == "searching":
             self._explores = True
-        elif self._explores and self.phase is Phase.SEARCH and state in ("done", "blocked"):
+        elif self._explores and self.phase is MissionPhase.SEARCH and state in ("done", "blocked"):
             self.searched[self.sector] = state == "done"
             self._given_up[self.sector] |= state == "blocked"
             self._drop(now)
@@ -174,7 +174,7 @@ class TaskManager(TeamMember):
     def _on_return_home(self, _request: Any, response: Any) -> Any:
         self._ordered_home = True
         now, aloft = self.now_ns, self._is_aloft()
-        waits = self.phase in (Phase.HOLD, Phase.DONE, Phase.DOWN)
+        waits = self.phase in (MissionPhase.HOLD, MissionPhase.DONE, MissionPhase.DOWN)
         if (aloft and waits) or self._lands_by_order():
             self._call(self._hold)  # ends what else is flown
             self._go_home(now)
@@ -183,7 +183,7 @@ class TaskManager(TeamMember):
     def _on_hold(self, _request: Any, response: Any) -> Any:
         if not self._is_aloft():
             return _answer(response, False, f"it is not in the air ({self.phase})")
-        self._give_way(Phase.HOLD, HELD)
+        self._give_way(MissionPhase.HOLD, HELD)
         self._call(self._hold)
         return _answer(response, True, "holds until resume, return or land")
 
@@ -191,7 +191,7 @@ class TaskManager(TeamMember):
         if not self._is_aloft():
             self._ordered_home = True
             return _answer(response, True, "stays on the ground until resume")
-        self._give_way(Phase.LAND, LANDED)
+        self._give_way(MissionPhase.LAND, LANDED)
         self._asked_ns = -1 << 62  # `land` is asked for with the next tick
         return _answer(response, True, "lands, and stays there until resume")
 
@@ -201,16 +201,21 @@ class TaskManager(TeamMember):
         self._ordered_home = False
         if self._must_go_home(self.now_ns):
             return _answer(response, False, "it must be at home: battery, time or radio")
-        if self.phase in (Phase.WAIT, Phase.RISE, Phase.SEARCH, Phase.IDLE):
+        if self.phase in (
+            MissionPhase.WAIT,
+            MissionPhase.RISE,
+            MissionPhase.SEARCH,
+            MissionPhase.IDLE,
+        ):
             return _answer(response, True, "searches already")
         if self._is_aloft():
-            if self.phase is not Phase.RETURN:
+            if self.phase is not MissionPhase.RETURN:
                 self._call(self._hold)
             self._search_or_climb(float(self._pose.position[2]))
         else:
             self._stands_m = float(self._pose.position[2])
             self._asked_ns = -1 << 62
-            self._enter(Phase.RISE)
+            self._enter(MissionPhase.RISE)
         self._order = ""
         self._set_pause(False)
         return _answer(response, True, "searches")
@@ -220,20 +225,20 @@ class TaskManager(TeamMember):
         is_low = self.now_ns - self._sonar_ns < _SONAR_S * NS_PER_S and self._sonar_m < _LOW_M
         if is_low:
             self._stands_m = height_m - self._sonar_m
-        self._enter(Phase.RISE if is_low or not self._has_risen else Phase.IDLE)
-        self._climbs = self.phase is Phase.RISE
+        self._enter(MissionPhase.RISE if is_low or not self._has_risen else MissionPhase.IDLE)
+        self._climbs = self.phase is MissionPhase.RISE
 
     def _is_aloft(self) -> bool:
         """Whether it flies, whoever had it take off."""
-        if self._pose is None or self.phase is Phase.WAIT:
+        if self._pose is None or self.phase is MissionPhase.WAIT:
             return False
-        stands = self.phase in (Phase.DONE, Phase.DOWN)
+        stands = self.phase in (MissionPhase.DONE, MissionPhase.DOWN)
         return not stands or self._pose.position[2] > self._stands_m + _ALOFT_M
 
     def _lands_by_order(self) -> bool:
-        return self.phase is Phase.LAND and bool(self._order)
+        return self.phase is MissionPhase.LAND and bool(self._order)
 
-    def _give_way(self, phase: Phase, order: str) -> None:
+    def _give_way(self, phase: MissionPhase, order: str) -> None:
         """Leave the sector to others and have planners command nothing."""
         self._order = order
         self._leave_sector(self.now_ns)
@@ -259,7 +264,7 @@ class TaskManager(TeamMember):
             self._began_ns = self._heard_ns = now
             self._home = pose.position.copy()
             self._stands_m = float(self._home[2])
-            self._enter(Phase.WAIT)
+            self._enter(MissionPhase.WAIT)
         self.trouble = self.what_is_wrong(now)
         lost_s = (now - self._pose_ns) / NS_PER_S
         if lost_s > POSE_S and self.phase in ALOFT:
@@ -269,26 +274,26 @@ class TaskManager(TeamMember):
         self.tell_team()
         self.tell_status()
 
-    def _act(self, pose: Pose, now: int) -> None:
+    def _act(self, pose: OdometrySample, now: int) -> None:
         if self.phase in ALOFT and self._has_come_down(pose, now):
-            self._give_way(Phase.DOWN, DOWN)
+            self._give_way(MissionPhase.DOWN, DOWN)
         elif self._turns_home(now):
             self._go_home(now)
-        if self.phase is Phase.WAIT:
+        if self.phase is MissionPhase.WAIT:
             if now - self._phase_ns >= self.settings.gather_s * NS_PER_S:
-                self._enter(Phase.DONE if self._ordered_home else Phase.RISE)
-        elif self.phase is Phase.RISE:
+                self._enter(MissionPhase.DONE if self._ordered_home else MissionPhase.RISE)
+        elif self.phase is MissionPhase.RISE:
             self._rise(pose, now)
-        elif self.phase is Phase.SEARCH:
+        elif self.phase is MissionPhase.SEARCH:
             self._search(now)
-        elif self.phase is Phase.IDLE:
+        elif self.phase is MissionPhase.IDLE:
             self._choose(now)
-        elif self.phase is Phase.RETURN:
+        elif self.phase is MissionPhase.RETURN:
             self._return(pose, now)
-        elif self.phase is Phase.LAND:
+        elif self.phase is MissionPhase.LAND:
             self._sink(pose)
 
-    def _has_come_down(self, pose: Pose, now: int) -> bool:
+    def _has_come_down(self, pose: OdometrySample, now: int) -> bool:
         """Whether it has stood on the ground for a while, by its sonar."""
         if self._low_ns is None or norm(pose.velocity) >= _STILL_M_S:
             return False
@@ -299,17 +304,17 @@ class TaskManager(TeamMember):
         if lost_s < _LOST_S:
             self._ask_now_and_then(self._hold)
             return
-        if self.phase is not Phase.LAND:
-            self._enter(Phase.LAND)
+        if self.phase is not MissionPhase.LAND:
+            self._enter(MissionPhase.LAND)
         self._ask_now_and_then(self._land)
 
-    def _rise(self, pose: Pose, now: int) -> None:
+    def _rise(self, pose: OdometrySample, now: int) -> None:
         climbed = pose.position[2] - self._stands_m
         if climbed > 0.8 * self.settings.altitude_m and abs(pose.velocity[2]) < _STILL_M_S:
             self._has_risen = True
-            self._enter(Phase.IDLE)
+            self._enter(MissionPhase.IDLE)
         elif now - self._phase_ns > _RISE_S * NS_PER_S:
-            self._enter(Phase.DOWN if climbed < _LANDED_M else Phase.LAND)
+            self._enter(MissionPhase.DOWN if climbed < _LANDED_M else MissionPhase.LAND)
         elif self._climbs:
             if climbed < self.settings.altitude_m - _CLIMB_END_M:
                 self._command.publish(Twist(Vector3(0.0, 0.0, _CLIMB_M_S), Vector3(0.0, 0.0, 0.0)))
@@ -333,13 +338,13 @@ class TaskManager(TeamMember):
         self._explores = False
         area = self.settings.sectors.of(sector)
         self._coverage = Coverage(area, self.settings.cell_m)
-        self._enter(Phase.SEARCH)
+        self._enter(MissionPhase.SEARCH)
         self._area.publish(polygon_of(area, float(self._home[2]), now))
 
     def _search(self, now: int) -> None:
         assert self._coverage is not None
         others = self.team.workers(now, self.settings.patience_s)
-        mine = Claim(self._since_ns, self.settings.name)
+        mine = SectorClaim(self._since_ns, self.settings.name)
         if self._coverage.share >= self.settings.enough:
             self.searched[self.sector] = True
             self._drop(now)
@@ -361,16 +366,16 @@ class TaskManager(TeamMember):
     def _drop(self, now: int) -> None:
         """Search this sector no more, and take the next one."""
         self.sector, self._coverage = -1, None
-        self._enter(Phase.IDLE)
+        self._enter(MissionPhase.IDLE)
         self._choose(now)
-        if self.phase is Phase.IDLE:
+        if self.phase is MissionPhase.IDLE:
             self._area.publish(polygon_of(None, float(self._home[2]), now))
 
     def _turns_home(self, now: int) -> bool:
         """Whether it goes home now; held by an operator, only for its battery."""
-        if self.phase is Phase.HOLD:
+        if self.phase is MissionPhase.HOLD:
             return self._battery < self.settings.low_battery
-        return self.phase in (Phase.SEARCH, Phase.IDLE) and self._must_go_home(now)
+        return self.phase in (MissionPhase.SEARCH, MissionPhase.IDLE) and self._must_go_home(now)
 
     def _must_go_home(self, now: int) -> bool:
         assert self._began_ns is not None
@@ -383,7 +388,7 @@ class TaskManager(TeamMember):
         self._nearest_m, self._news_ns = math.inf, now
         self._order = ""
         self._set_pause(False)
-        self._enter(Phase.RETURN)
+        self._enter(MissionPhase.RETURN)
         self._leave_sector(now)
         self._send_home(now)
 
@@ -396,30 +401,30 @@ class TaskManager(TeamMember):
         z = self._home[2] + self.settings.altitude_m
         self._goal.publish(goal_at(np.array([*self._home[:2], z]), now))
 
-    def _return(self, pose: Pose, now: int) -> None:
+    def _return(self, pose: OdometrySample, now: int) -> None:
         if now - self._asked_ns >= _REPEAT_S * NS_PER_S:
             self._send_home(now)  # a goal that the explorer chose before may have come since
         away = norm(pose.position[:2] - self._home[:2])
         if away < self._nearest_m - _NEARER_M:
             self._nearest_m, self._news_ns = away, now
         if away < _HOME_M or now - self._news_ns > _RETURN_STUCK_S * NS_PER_S:
-            self._enter(Phase.LAND)
+            self._enter(MissionPhase.LAND)
 
-    def _sink(self, pose: Pose) -> None:
+    def _sink(self, pose: OdometrySample) -> None:
         self._highest_m = max(self._highest_m, float(pose.position[2]))
         still = norm(pose.velocity) < _STILL_M_S
         if still and pose.position[2] < self._highest_m - _SUNK_M:
-            self._enter(Phase.DONE)
+            self._enter(MissionPhase.DONE)
         else:
             self._ask_now_and_then(self._land)
 
-    def _enter(self, phase: Phase) -> None:
+    def _enter(self, phase: MissionPhase) -> None:
         self._highest_m = -math.inf
         self._climbs = False
-        if phase in (Phase.DONE, Phase.DOWN):
+        if phase in (MissionPhase.DONE, MissionPhase.DOWN):
             self._has_risen = False
         self.phase, self._phase_ns = phase, self.now_ns
-        if phase in (Phase.DONE, Phase.DOWN) and self._pose is not None:
+        if phase in (MissionPhase.DONE, MissionPhase.DOWN) and self._pose is not None:
             self._stands_m = float(self._pose.position[2])
 
     def _ask_now_and_then(self, client: Client, request: Any | None = None) -> None:

@@ -21,7 +21,7 @@ Mask = NDArray[np.bool_]
 TYPE = "volery_interfaces/msg/TeamReport"
 
 
-class Phase(StrEnum):
+class MissionPhase(StrEnum):
     """Where in its mission a UAV is."""
 
     WAIT = "wait"
@@ -40,16 +40,16 @@ class Phase(StrEnum):
     """Came down against its will, or never came up."""
 
 
-AT_WORK = frozenset({Phase.WAIT, Phase.RISE, Phase.SEARCH, Phase.IDLE})
+AT_WORK = frozenset({MissionPhase.WAIT, MissionPhase.RISE, MissionPhase.SEARCH, MissionPhase.IDLE})
 """Searches, or will."""
-ALOFT = frozenset({Phase.SEARCH, Phase.IDLE, Phase.RETURN, Phase.HOLD})
+ALOFT = frozenset({MissionPhase.SEARCH, MissionPhase.IDLE, MissionPhase.RETURN, MissionPhase.HOLD})
 
 
 @dataclass
-class Mate:
+class TeamMate:
     """Another UAV by its newest report. Times are ns of the hearer's clock, but for `sent_ns`."""
 
-    phase: Phase
+    phase: MissionPhase
     sent_ns: int
     heard_ns: int
     worker: Worker
@@ -58,11 +58,11 @@ class Mate:
 
 
 @dataclass
-class Team:
+class TeamState:
     """The other UAVs; `sectors` is how many the area has here."""
 
     sectors: int
-    mates: dict[str, Mate] = field(default_factory=dict)
+    mates: dict[str, TeamMate] = field(default_factory=dict)
     strangers: set[str] = field(default_factory=set)
     """Who searches another area, or speaks of phases that are not known here."""
 
@@ -70,7 +70,7 @@ class Team:
         """Take a report in; False for one that is old, repeated or of another search."""
         known = self.mates.get(report.name)
         sent_ns = stamp_of(report)
-        if report.sectors != self.sectors or report.phase not in set(Phase):
+        if report.sectors != self.sectors or report.phase not in set(MissionPhase):
             self.strangers.add(report.name)
             return False
         restarted = known is not None and now_ns - known.heard_ns > 10 * NS_PER_S
@@ -87,10 +87,12 @@ class Team:
             from_bits(report.given_up, self.sectors),
         )
         place = np.array([p.x, p.y, p.z])
-        self.mates[report.name] = Mate(Phase(report.phase), sent_ns, now_ns, worker, place)
+        self.mates[report.name] = TeamMate(
+            MissionPhase(report.phase), sent_ns, now_ns, worker, place
+        )
         return True
 
-    def heard(self, now_ns: int, patience_s: float) -> Iterator[tuple[str, Mate]]:
+    def heard(self, now_ns: int, patience_s: float) -> Iterator[tuple[str, TeamMate]]:
         """Those who were heard lately, by name."""
         for name, mate in sorted(self.mates.items()):
             if 0 <= now_ns - mate.heard_ns <= patience_s * NS_PER_S:

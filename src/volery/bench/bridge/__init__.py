@@ -1,4 +1,4 @@
-"""The bench `bridge`: how long messages take through the doors, with clients in other processes."""
+"""The bench `bridge`: latencies of messages through bridges, with clients in other processes."""
 
 from volery.bench.bridge.measuring import measure
 

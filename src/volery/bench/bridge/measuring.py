@@ -23,7 +23,7 @@ from volery.bench.bridge.latency_figures import (
 )
 from volery.bench.bridge.native_ros1 import one_way_figures
 from volery.bench.registry import Measured
-from volery.bridges.bridge_host import Doors
+from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.core.errors import VoleryError
@@ -66,7 +66,7 @@ def measure() -> Measured:
         figures["stop_wall_p95_ms"] = 1e3 * float(np.percentile(took, 95))
         figures.update(end_point_figures("stop", np.reshape(took, (TRIALS, -1)).tolist()))
         try:
-            figures.update(one_way_figures(world.simulation, world.doors))
+            figures.update(one_way_figures(world.simulation, world.bridges))
         except VoleryError as error:
             failures["ros1_one_way_ratio"] = str(error)
     figures.update(stream_figures())
@@ -74,14 +74,14 @@ def measure() -> Measured:
 
 
 class World:
-    """A simulation in real time, in a thread of its own, with two doors open."""
+    """A simulation in real time, in a thread of its own, with two bridges open."""
 
-    def __init__(self, simulation: Simulation, doors: Doors) -> None:
+    def __init__(self, simulation: Simulation, bridges: BridgeHost) -> None:
         self.simulation = simulation
-        self.doors = doors
+        self.bridges = bridges
         tcp, web = RosTcpEndpoint(port=0), RosbridgeServer(port=0)
-        doors.open(tcp)
-        doors.open(web)
+        bridges.open(tcp)
+        bridges.open(web)
         self._ports = {"plain_ros_tcp": tcp.port, "plain_rosbridge": web.port}
 
     def ros_tcp(self, *words: object) -> Any:
@@ -115,22 +115,22 @@ class World:
 @contextmanager
 def running(scenario: Scenario) -> Iterator[World]:
     """Run `scenario` in real time until the block ends."""
-    with in_real_time(scenario) as (simulation, doors):
-        yield World(simulation, doors)
+    with in_real_time(scenario) as (simulation, bridges):
+        yield World(simulation, bridges)
 
 
 @contextmanager
-def in_real_time(scenario: Scenario) -> Iterator[tuple[Simulation, Doors]]:
+def in_real_time(scenario: Scenario) -> Iterator[tuple[Simulation, BridgeHost]]:
     """Run `scenario` in real time, in a thread of its own, until the block ends."""
     with Simulation(scenario) as simulation:
         simulation.step(1)  # what compiles does so before anybody measures
-        with Doors(simulation.gateway) as doors:
+        with BridgeHost(simulation.gateway) as bridges:
             simulation.be_prompt()
             over = threading.Event()
             thread = threading.Thread(target=_run, args=(simulation, over))
             thread.start()
             try:
-                yield simulation, doors
+                yield simulation, bridges
             finally:
                 over.set()
                 thread.join()

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from volery.bridges.bridge_host import Doors
-from volery.bridges.ros1.bridge import Ros1Door
+from volery.bridges.bridge_host import BridgeHost
+from volery.bridges.ros1.bridge import Ros1Bridge
 from volery.bridges.ros1.environment import rospy_is_installed
 from volery.core.errors import VoleryError
 from volery.graph.messages import Header, message_type, time_from_ns
@@ -33,7 +33,7 @@ _PEER = Path(__file__).with_name("plain_rospy.py")
 _START_TIMEOUT_S = 20.0
 
 
-def one_way_figures(simulation: Simulation, doors: Doors) -> dict[str, float]:
+def one_way_figures(simulation: Simulation, bridges: BridgeHost) -> dict[str, float]:
     """Median ms by size and way, and the geometric mean of their ratios.
 
     simulation: one that runs. `VoleryError` where ROS 1 is not installed.
@@ -41,7 +41,7 @@ def one_way_figures(simulation: Simulation, doors: Doors) -> dict[str, float]:
     if shutil.which("rosmaster") is None or not rospy_is_installed():
         raise VoleryError("ROS 1 is not installed; .ci/install_ros1 does it on Debian")
     with ros1_master(), _Program("subscribe") as subscriber, _Program("publish") as plain:
-        doors.open(Ros1Door(topics=("/one_way/*",)))
+        bridges.open(Ros1Bridge(topics=("/one_way/*",)))
         _exchange(simulation, plain)
         taken = subscriber.ask()
     return _summarize(taken)

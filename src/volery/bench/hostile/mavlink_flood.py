@@ -39,7 +39,7 @@ def frames() -> Sequence[bytes]:
 def flood(tcp_port: int, udp_port: int, ends: float) -> int:
     """Sends until a time of the monotonic clock; returns how many frames.
 
-    udp_port: of the door `mavlink=PORT`. A client that is disconnected connects again.
+    udp_port: of the bridge `mavlink=PORT`. A client that is disconnected connects again.
     """
     sent = 0
     while time.monotonic() < ends:

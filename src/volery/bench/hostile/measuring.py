@@ -1,4 +1,4 @@
-"""A simulation in real time while clients attack its doors.
+"""A simulation in real time while clients attack its bridges.
 
 The victim is `volery run hover --speed 1` with rosbridge and ROS-TCP, attackers are a process each,
 pinned to the last core of the machine, so that the figures measure the server and not that the
@@ -125,9 +125,9 @@ def _victim(*, with_mavlink: bool) -> Iterator[tuple[int, int, tuple[int, int]]]
     attacked = (_free_port(), _free_mavlink_port()) if with_mavlink else (rosbridge, ros_tcp)
     command = [sys.executable, "-P", "-m", "volery.cli.app", "run", "hover", "--speed", "1"]
     command += ["--seconds", "100000"]
-    command += ["--door", f"rosbridge={rosbridge}", "--door", f"ros-tcp={ros_tcp}"]
+    command += ["--bridge", f"rosbridge={rosbridge}", "--bridge", f"ros-tcp={ros_tcp}"]
     if with_mavlink:
-        command += ["--door", f"mavlink-tcp={attacked[0]}", "--door", f"mavlink={attacked[1]}"]
+        command += ["--bridge", f"mavlink-tcp={attacked[0]}", "--bridge", f"mavlink={attacked[1]}"]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         _wait_until_open(process, rosbridge)
@@ -169,7 +169,7 @@ def _free_port() -> int:
 
 
 def _free_mavlink_port() -> int:
-    """A PORT for the door `mavlink=PORT`: both ports of its first vehicle are free."""
+    """A PORT for the bridge `mavlink=PORT`: both ports of its first vehicle are free."""
     for port in range(ports.ONBOARD_TO + 5000, ports.ONBOARD_TO + 40_000, 97):
         with suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as onboard:
             shift = port - ports.ONBOARD_TO

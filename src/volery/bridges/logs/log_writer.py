@@ -35,7 +35,9 @@ LIBRARY = "volery"
 Compression = Literal["lz4", "zstd", "none"]
 
 
-def open_log(path: str | Path, *, overwrite: bool = False, compression: Compression = "lz4") -> Log:
+def open_log(
+    path: str | Path, *, overwrite: bool = False, compression: Compression = "lz4"
+) -> LogWriter:
     """Begin a log; the suffix decides the format.
 
     Parameters
@@ -66,7 +68,7 @@ def open_log(path: str | Path, *, overwrite: bool = False, compression: Compress
         raise RecordingError(f"{path}: cannot create the log: {error.strerror}") from None
 
 
-def _begin(kind: type[McapLog] | type[BagLog], path: Path, compression: Compression) -> Log:
+def _begin(kind: type[McapLog] | type[BagLog], path: Path, compression: Compression) -> LogWriter:
     """A new log; where its first bytes cannot be written the file is removed again."""
     try:
         return kind(path, compression)
@@ -91,7 +93,7 @@ def check_target(path: Path, *, overwrite: bool = False) -> type[McapLog] | type
         return kind
 
 
-class Log(ABC):
+class LogWriter(ABC):
     """A log being written. After the first RecordingError every further `write` repeats it."""
 
     path: Path
@@ -175,7 +177,7 @@ class Log(ABC):
     def _finish(self) -> None: ...
 
 
-class McapLog(Log):
+class McapLog(LogWriter):
     """MCAP: profile `ros2`, CDR messages, `ros2msg` schemas with every nested definition."""
 
     def __init__(self, path: Path, compression: Compression = "lz4") -> None:
@@ -234,7 +236,7 @@ class _Opened:
         return self._file
 
 
-class BagLog(Log):
+class BagLog(LogWriter):
     """ROS 1 bag, format 2.0."""
 
     def __init__(self, path: Path, compression: Compression = "lz4") -> None:

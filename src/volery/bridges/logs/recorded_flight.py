@@ -21,7 +21,7 @@ _ORIGIN_TYPE = "std_msgs/msg/String"
 
 
 @dataclass(frozen=True)
-class Origin:
+class RecordedScenario:
     """What was flown: a scenario's name and content, as plain data, its seed, Volery's version.
 
     A log says nothing of where the scenario's files lie: older logs have a `folder`, which is not
@@ -39,7 +39,7 @@ class Origin:
         return json.dumps({**fields, "content": self.content}, default=str)  # of dates
 
     @classmethod
-    def from_json(cls, text: str) -> Origin:
+    def from_json(cls, text: str) -> RecordedScenario:
         """Read it. `RecordingError` for what is none."""
         try:
             plain = json.loads(text)
@@ -50,7 +50,7 @@ class Origin:
             raise RecordingError(f"{reason}version and content is needed") from None
 
 
-class Command(NamedTuple):
+class RecordedCommand(NamedTuple):
     """A recorded command and its moment; see `engine.command_queue`."""
 
     number: int
@@ -64,20 +64,20 @@ class RecordedFlight:
     """All that is needed to repeat a flight."""
 
     path: Path
-    origin: Origin
-    commands: tuple[Command, ...]
+    origin: RecordedScenario
+    commands: tuple[RecordedCommand, ...]
     end_ns: int
     """Time of the log's last message."""
 
 
-def origin_of(log: ChunkedLog) -> Origin | None:
+def origin_of(log: ChunkedLog) -> RecordedScenario | None:
     """The scenario of a log's flight; None where it does not tell.
 
     `RecordingError` where what it tells is none.
     """
     for record in _records_of(log, ORIGIN_TOPIC):
         if record.topic.msgtype == _ORIGIN_TYPE:
-            return Origin.from_json(LogDecoder().decode(record).message.data)
+            return RecordedScenario.from_json(LogDecoder().decode(record).message.data)
     return None
 
 
@@ -103,9 +103,9 @@ def read_flight(path: Path) -> RecordedFlight:
     return RecordedFlight(path, origin, commands, last[-1].time_ns if last else 0)
 
 
-def _commands_of(log: ChunkedLog) -> tuple[Command, ...]:
+def _commands_of(log: ChunkedLog) -> tuple[RecordedCommand, ...]:
     decoder = LogDecoder()
-    commands: list[Command] = []
+    commands: list[RecordedCommand] = []
     topics = {topic.topic for topic in log.topics.values()}
     waiting: Any = None
     """The record whose content is the next message."""
@@ -137,10 +137,10 @@ def _commands_of(log: ChunkedLog) -> tuple[Command, ...]:
     return tuple(once[number] for number in sorted(once))
 
 
-def _command(message: Any, content: Any) -> Command:
+def _command(message: Any, content: Any) -> RecordedCommand:
     m = message
     taken = ClientCommand(m.client, m.kind, m.name, m.type, content, m.latched, int(m.request))
-    return Command(int(m.number), int(m.step), int(m.turn), taken)
+    return RecordedCommand(int(m.number), int(m.step), int(m.turn), taken)
 
 
 def _records_of(log: ChunkedLog, topic: str, *, following: bool = False) -> Iterator[LogRecord]:

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from volery.bridges.logs.log_writer import Log
+from volery.bridges.logs.log_writer import LogWriter
 from volery.bridges.logs.recorded_topics import recorded_topics
 from volery.core.errors import RecordingError
 from volery.graph.graph import Graph, Subscription
@@ -50,7 +50,7 @@ class Recorder:
     def __init__(
         self,
         graph: Graph,
-        log: Log,
+        log: LogWriter,
         topics: Iterable[str] = (),
         exclude: Iterable[str] = (),
     ) -> None:

@@ -25,7 +25,7 @@ from volery.bridges.topic_patterns import renamer, topic_filter
 from volery.core.clock import NS_PER_S, ns_from_s
 from volery.core.errors import GraphError, RecordingError
 from volery.graph.graph import Graph, Publisher
-from volery.graph.nodes.deferred_execution import Deferring
+from volery.graph.nodes.deferred_execution import Deferred
 
 EVERYTHING = ("/**",)
 CLOCK = ("/clock",)
@@ -115,7 +115,7 @@ class Replay:
         self._decoder = LogDecoder()
         self._publishers: dict[str, Publisher] = {}
         self._graph: Graph
-        self._timers: Deferring
+        self._timers: Deferred
         self._now_ns: Callable[[], int]
         self._started = self._stopped = False
         self._running = False
@@ -135,7 +135,7 @@ class Replay:
             dict(self._refused),
         )
 
-    def start(self, graph: Graph, timers: Deferring, now_ns: Callable[[], int]) -> None:
+    def start(self, graph: Graph, timers: Deferred, now_ns: Callable[[], int]) -> None:
         """Begin at the present time, which `now_ns` tells. `RecordingError` the second time.
 
         timers: the engine, or whoever else calls back at times of the same clock.

@@ -88,7 +88,7 @@ class WheelColumns(_Table):
     """Between the wheels."""
 
 
-class Place(_Table):
+class PositionColumns(_Table):
     """Of the scanner in the body, FLU."""
 
     position_m: Vector3 = (0.0, 0.0, 0.0)
@@ -103,7 +103,7 @@ class TextLayout(Data):
     odometry: OdometryColumns | None = None
     wheels: WheelColumns | None = None
     """In the place of `odometry`."""
-    mount: Place = Place()
+    mount: PositionColumns = PositionColumns()
     uav: Name = "uav1"
     topic: Topic = "laser/horizontal/scan"
     """Of the scans, below the UAV's name."""

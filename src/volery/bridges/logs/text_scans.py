@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.bridges.logs.log_writer import Log
-from volery.bridges.logs.text_layout import Place, TextLayout
+from volery.bridges.logs.log_writer import LogWriter
+from volery.bridges.logs.text_layout import PositionColumns, TextLayout
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
 from volery.core.errors import RecordingError
@@ -107,7 +107,7 @@ class TextScans:
             )
         return doubts
 
-    def write_to(self, log: Log) -> None:
+    def write_to(self, log: LogWriter) -> None:
         """Put all messages into a log."""
         for published in self:
             log.write(published)
@@ -229,7 +229,7 @@ def _mounting(layout: TextLayout, time_ns: int) -> TFMessage:
     return TFMessage([TransformStamped(stamped, _frame(layout), _transform(layout.mount))])
 
 
-def _transform(mount: Place) -> Transform:
+def _transform(mount: PositionColumns) -> Transform:
     q = rotations.from_rpy(*(math.radians(angle) for angle in mount.rpy_deg))
     return Transform(Vector3(*mount.position_m), Quaternion(*(float(part) for part in q)))
 

@@ -2,7 +2,7 @@
 
 So a node's own complaints, as of its parameters, come at once and not after a wait for the graph.
 
-    link = LateLink("watcher", lambda: await_link(via, "watcher"))
+    link = DeferredConnection("watcher", lambda: await_link(via, "watcher"))
     host = NodeHost(link)
     node = Watcher(context=host.context())      # what is wrong with it is told here
     link.join()                                 # here the graph is waited for
@@ -29,7 +29,7 @@ _MOST_PUBLISHED = 1000
 """The newest so many messages are kept until the graph is there (modelling choice)."""
 
 
-class LateLink:
+class DeferredConnection:
     """A `GraphConnection` that announces and publishes at `join` what came before it.
 
     open_link: joins the graph. Who calls a service before `join` has it joined then.

@@ -1,12 +1,12 @@
-"""The door to native ROS 1: the simulation joins a real roscore through rospy.
+"""The bridge to native ROS 1: the simulation joins a real roscore through rospy.
 
-    with Doors(simulation.gateway) as doors:
-        doors.open(Ros1Door())
+    with BridgeHost(simulation.gateway) as bridges:
+        bridges.open(Ros1Bridge())
         simulation.run(speed=1.0)
 
 Topics that the graph publishes appear in ROS 1 under the same names; those that it listens to are
-taken from ROS 1; its services can be called from there, and ROS 1 services named to the door from
-the graph. Without rospy the door does not open and says what to install.
+taken from ROS 1; its services can be called from there, and ROS 1 services named to the bridge from
+the graph. Without rospy the bridge does not open and says what to install.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ import threading
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from volery.bridges.ros1.graph_sync import Shared
+from volery.bridges.ros1.graph_sync import GraphSync
 from volery.bridges.ros1.node import join_ros1
-from volery.bridges.shared_names import COMMANDS, Sharing
+from volery.bridges.shared_names import COMMANDS, SharedNames
 from volery.core.errors import BridgeError
 from volery.graph.session import Gateway
 
@@ -31,7 +31,7 @@ _USE_SIM_TIME = "/use_sim_time"
 _log = logging.getLogger(__name__)
 
 
-class Ros1Door:
+class Ros1Bridge:
     """The whole simulation as one ROS 1 node; a `graph.bridge_kind.Bridge`.
 
     Parameters
@@ -72,7 +72,7 @@ class Ros1Door:
         self._remote = dict(remote_services or {})
         self._use_sim_time = use_sim_time
         self._before: Any = None
-        self._bridge: Shared | None = None
+        self._bridge: GraphSync | None = None
         self._steward: threading.Thread | None = None
         self._stopping = threading.Event()
 
@@ -93,8 +93,8 @@ class Ros1Door:
         arguments: Any = self._address
         node = join_ros1(self._node_name, **arguments)
         self.name = f"ROS 1 node {node.name} at {node.master.uri}"
-        shares = Sharing(self._patterns, self._commands)
-        self._bridge = Shared(node, gateway.open(self.name), shares)
+        shares = SharedNames(self._patterns, self._commands)
+        self._bridge = GraphSync(node, gateway.open(self.name), shares)
         self._keep_sim_time()
         self._bridge.offer_remote(self._remote)
         self._bridge.survey()
@@ -133,7 +133,7 @@ class Ros1Door:
                 if not away:
                     _log.warning("ROS master %s: %s", bridge.node.master.uri, error)
                 away = True
-            except Exception as error:  # a topic that breaks must not end the door
+            except Exception as error:  # a topic that breaks must not end the bridge
                 _log.warning("%s: %s: %s", self.name, type(error).__name__, error)
         if bridge is not None and not bridge.node.alive:
             _log.error("%s was ended by another node of its name", self.name)

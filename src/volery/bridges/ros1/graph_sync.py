@@ -10,9 +10,9 @@ from concurrent.futures import TimeoutError as FutureTimeout
 from typing import Any
 
 from volery.bridges.ros1.node import Ros1Node
-from volery.bridges.ros1.outgoing_topic import Outlet
-from volery.bridges.ros1.writer_thread import Pump
-from volery.bridges.shared_names import Sharing
+from volery.bridges.ros1.outgoing_topic import Ros1OutgoingTopic
+from volery.bridges.ros1.writer_thread import Ros1WriterThread
+from volery.bridges.shared_names import SharedNames
 from volery.core.errors import GraphError
 from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.graph import TopicInfo
@@ -24,15 +24,15 @@ _SERVICE_TIMEOUT_S = 30.0
 _log = logging.getLogger(__name__)
 
 
-class Shared:
-    """What the door shares at present; `survey` brings it up to date, in one thread at a time."""
+class GraphSync:
+    """What the bridge shares at present; `survey` brings it up to date, in one thread at a time."""
 
-    def __init__(self, node: Ros1Node, session: Session, sharing: Sharing) -> None:
+    def __init__(self, node: Ros1Node, session: Session, sharing: SharedNames) -> None:
         self.node = node
         self._session = session
         self._sharing = sharing
-        self._pump = Pump()
-        self._outlets: dict[str, Outlet] = {}
+        self._pump = Ros1WriterThread()
+        self._outlets: dict[str, Ros1OutgoingTopic] = {}
         self._inlets: dict[str, Any] = {}
         self._services: dict[str, Any] = {}
         self._remote: set[str] = set()
@@ -80,7 +80,7 @@ class Shared:
         if outlet is None:
             if publishers and self._speaks(topic):
                 names = topic.name, topic.msgtype
-                self._outlets[topic.name] = Outlet(
+                self._outlets[topic.name] = Ros1OutgoingTopic(
                     self.node, self._session, self._pump, names, latched=topic.latched
                 )
         elif not outlet.is_current:

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from volery.bridges.ros1.node import Ros1Node
-from volery.bridges.ros1.writer_thread import Pump, Reader
+from volery.bridges.ros1.writer_thread import Reader, Ros1WriterThread
 from volery.core.errors import GraphError
 from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.messages import Published
@@ -22,14 +22,20 @@ _OWN_KEPT = 1000
 _log = logging.getLogger(__name__)
 
 
-class Outlet:
+class Ros1OutgoingTopic:
     """One topic: its messages are taken and turned into bytes only while somebody subscribes.
 
     `serve` runs in the pump's thread; all else may be called by any.
     """
 
     def __init__(
-        self, node: Ros1Node, session: Session, pump: Pump, info: tuple[str, str], *, latched: bool
+        self,
+        node: Ros1Node,
+        session: Session,
+        pump: Ros1WriterThread,
+        info: tuple[str, str],
+        *,
+        latched: bool,
     ) -> None:
         self.topic, self.msgtype = info
         self.latched = latched

@@ -113,8 +113,8 @@ class Reader:
         self._connection.close()
 
 
-class Pump:
-    """Serves topics in a thread of its own, so that neither the simulation nor other doors wait."""
+class Ros1WriterThread:
+    """Serves topics in its own thread: neither the simulation nor other bridges wait."""
 
     def __init__(self) -> None:
         self._selector = selectors.EpollSelector()

@@ -13,8 +13,8 @@ from typing import Any
 from volery.bridges.ros2.middleware import Handle, Participant, Profile, ServiceSpec, TopicSpec
 from volery.bridges.ros2.names import NodeName, check_name
 from volery.bridges.ros2.services import answerer
-from volery.bridges.ros2.warning_filter import Complaints
-from volery.bridges.ros2.writer_thread import Worker
+from volery.bridges.ros2.warning_filter import WarningFilter
+from volery.bridges.ros2.writer_thread import Ros2WriterThread
 from volery.core.errors import GraphError
 from volery.graph.actions import Goal, GoalStatus
 from volery.graph.codecs.cdr import encode_cdr
@@ -60,7 +60,7 @@ class ActionServer:
         self,
         participant: Participant,
         session: Session,
-        worker: Worker,
+        worker: Ros2WriterThread,
         node: NodeName,
         action: tuple[str, str],
     ) -> None:
@@ -69,7 +69,7 @@ class ActionServer:
         self._worker = worker
         self._name, self._type = action
         self._asked: OrderedDict[bytes, _Asked] = OrderedDict()
-        self._complaints = Complaints()
+        self._complaints = WarningFilter()
         self._feedback_type = f"{self._type}_FeedbackMessage"
         prefix = f"{self._name}/_action"
         feedback = TopicSpec(node, f"{prefix}/feedback", self._feedback_type)
@@ -212,12 +212,12 @@ class ActionServers:
     """All actions of a graph; `survey` brings them up to date."""
 
     def __init__(
-        self, participant: Participant, session: Session, node: NodeName, worker: Worker
+        self, participant: Participant, session: Session, node: NodeName, worker: Ros2WriterThread
     ) -> None:
         self._parts = participant, session, worker, node
         self._session = session
         self._servers: dict[str, ActionServer] = {}
-        self._complaints = Complaints()
+        self._complaints = WarningFilter()
 
     def survey(self) -> None:
         """Offer what has appeared since, take back what has gone."""

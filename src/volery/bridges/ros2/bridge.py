@@ -1,12 +1,12 @@
-"""The door to native ROS 2: the simulation and its nodes are ordinary nodes of a ROS 2 graph.
+"""The bridge to native ROS 2: the simulation and its nodes are ordinary nodes of a ROS 2 graph.
 
-    with Doors(simulation.gateway) as doors:
-        doors.open(Ros2Door())
+    with BridgeHost(simulation.gateway) as bridges:
+        bridges.open(Ros2Bridge())
         simulation.run(speed=1.0)
 
 Topics that the graph publishes appear in ROS 2 under the same names; those that it listens to are
 taken from ROS 2; its services, actions and parameters can be used from there, and ROS 2 services
-named to the door from the graph. No ROS 2 needs to be installed.
+named to the bridge from the graph. No ROS 2 needs to be installed.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from volery.bridges.ros2.actions import ActionServers
-from volery.bridges.ros2.environment import Ros2Terms, domain_of, join_ros2
+from volery.bridges.ros2.environment import Ros2Environment, domain_of, join_ros2
 from volery.bridges.ros2.middleware import Participant
 from volery.bridges.ros2.names import NodeName, check_name
 from volery.bridges.ros2.parameters import ParameterServices
-from volery.bridges.ros2.services import Services
-from volery.bridges.ros2.topics import Topics
-from volery.bridges.ros2.writer_thread import Worker
-from volery.bridges.shared_names import COMMANDS, Sharing
+from volery.bridges.ros2.services import Ros2Services
+from volery.bridges.ros2.topics import Ros2Topics
+from volery.bridges.ros2.writer_thread import Ros2WriterThread
+from volery.bridges.shared_names import COMMANDS, SharedNames
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.messages import message_type
 from volery.graph.service_reply import ServiceReply
@@ -39,14 +39,14 @@ NODE = "/volery"
 _SET = "rosapi_msgs/srv/SetParam"
 
 _taken: set[tuple[str, int, str]] = set()
-"""Middlewares, domains and node names of the open doors of this process: two of one would take
+"""Middlewares, domains and node names of the open bridges of this process: two of one would take
 every command twice."""
 _places = threading.Lock()
 
 _log = logging.getLogger(__name__)
 
 
-class Ros2Door:
+class Ros2Bridge:
     """The whole simulation in a ROS 2 graph; a `graph.bridge_kind.Bridge`.
 
     Parameters
@@ -68,7 +68,7 @@ class Ros2Door:
 
     def __init__(
         self,
-        terms: Ros2Terms | None = None,
+        terms: Ros2Environment | None = None,
         node_name: str = NODE,
         *,
         topics: Sequence[str] = ("*",),
@@ -78,8 +78,8 @@ class Ros2Door:
     ) -> None:
         self.name = f"ROS 2 node {node_name}"
         self._node_name = node_name
-        self._terms = terms or Ros2Terms()
-        self._sharing = Sharing(tuple(topics), tuple(commands))
+        self._terms = terms or Ros2Environment()
+        self._sharing = SharedNames(tuple(topics), tuple(commands))
         self._reliable = tuple(reliable)
         self._remote = dict(remote_services or {})
         self._shared: _Shared | None = None
@@ -145,7 +145,7 @@ class Ros2Door:
         while shared is not None and not self._stopping:
             try:
                 shared.survey()
-            except Exception as error:  # a topic that breaks must not end the door
+            except Exception as error:  # a topic that breaks must not end the bridge
                 _log.warning("%s: %s: %s", self.name, type(error).__name__, error)
             breath.wait(_BREATH_S)
             self._news.wait(_SURVEY_S)
@@ -153,23 +153,25 @@ class Ros2Door:
 
 
 class _Shared:
-    """All that the door shares."""
+    """All that the bridge shares."""
 
     def __init__(
         self,
         participant: Participant,
         session: Session,
-        sharing: Sharing,
+        sharing: SharedNames,
         reliable: tuple[str, ...],
         node: NodeName,
     ) -> None:
         self._participant = participant
         self._session = session
-        self._worker = Worker()
-        self._clerk = Worker("volery-ros2-services")  # answers may wait for who asked to be found
+        self._worker = Ros2WriterThread()
+        self._clerk = Ros2WriterThread(
+            "volery-ros2-services"
+        )  # answers may wait for who asked to be found
         participant.add_node(node)
-        self.topics = Topics(participant, session, sharing, reliable, node, self._worker)
-        self.services = Services(participant, session, sharing, node, self._clerk)
+        self.topics = Ros2Topics(participant, session, sharing, reliable, node, self._worker)
+        self.services = Ros2Services(participant, session, sharing, node, self._clerk)
         self._actions = ActionServers(participant, session, node, self._clerk)
         graph = session.graph
         self._parameters = ParameterServices(
@@ -185,7 +187,7 @@ class _Shared:
         self._participant.announce()
 
     def _set(self, node: str, name: str, value: Any, done: Callable[[str], None]) -> None:
-        """Set a parameter as clients of all doors do, so that recorded flights repeat it."""
+        """Set a parameter as clients of all bridges do, so that recorded flights repeat it."""
         request = message_type(f"{_SET}_Request")(f"{node}:{name}", json.dumps(value))
         reply = ServiceReply(lambda response: done(response.reason), lambda error: done(str(error)))
         self._session.call("/rosapi/set_param", request, reply)

@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from volery.bridges.ros2.environment import Ros2Terms, join_ros2
+from volery.bridges.ros2.environment import Ros2Environment, join_ros2
 from volery.bridges.ros2.middleware import (
     Caller,
     Handle,
@@ -28,8 +28,8 @@ from volery.bridges.ros2.names import NodeName, check_name
 from volery.bridges.ros2.parameters import ParameterServices
 from volery.bridges.ros2.services import answerer, ask_server, wait_for
 from volery.bridges.ros2.subscriptions import Subscriptions
-from volery.bridges.ros2.warning_filter import Complaints
-from volery.bridges.ros2.writer_thread import Worker
+from volery.bridges.ros2.warning_filter import WarningFilter
+from volery.bridges.ros2.writer_thread import Ros2WriterThread
 from volery.core.errors import GraphError
 from volery.graph.codecs.cdr import encode_cdr
 from volery.graph.codecs.zero import zero_message
@@ -54,17 +54,17 @@ class Ros2Client:
     `BridgeError` where the graph cannot be joined.
     """
 
-    def __init__(self, terms: Ros2Terms | None = None, name: str = "/volery_node") -> None:
+    def __init__(self, terms: Ros2Environment | None = None, name: str = "/volery_node") -> None:
         check_name(name)
-        self._participant = join_ros2(terms or Ros2Terms())
+        self._participant = join_ros2(terms or Ros2Environment())
         self._joined = time.monotonic()
         self.name = f"ROS 2 node {name}"
         self._node = NodeName.of(name)
         self._named = False
         self._participant.add_node(self._node)
         self._participant.announce()
-        self._worker = Worker()
-        self._complaints = Complaints()
+        self._worker = Ros2WriterThread()
+        self._complaints = WarningFilter()
         self._lock = threading.RLock()
         self._publishers: dict[str, _Publisher] = {}
         self._subscriptions = Subscriptions(self._participant, self._node)

@@ -26,11 +26,11 @@ _MISSING = {
 }
 
 
-class Ros2Terms(NamedTuple):
+class Ros2Environment(NamedTuple):
     """Where to find the ROS 2 graph."""
 
     middleware: Kind = "dds"
-    """`rclpy`: whatever the sourced ROS 2 uses; for nodes, not for the door."""
+    """`rclpy`: whatever the sourced ROS 2 uses; for nodes, not for the bridge."""
     domain_id: int | None = None
     """None: that of the variable ROS_DOMAIN_ID."""
     interfaces: tuple[str, ...] = ()
@@ -39,7 +39,7 @@ class Ros2Terms(NamedTuple):
     """HOST:PORT of zenoh's router; empty: this machine's, at its usual port."""
 
 
-def join_ros2(terms: Ros2Terms) -> Participant:
+def join_ros2(terms: Ros2Environment) -> Participant:
     """Take part in a ROS 2 graph. `BridgeError` tells what is missing."""
     withdraw_ros_imports()
     package = _PACKAGES[terms.middleware]

@@ -1,4 +1,4 @@
-"""What the door and nodes need of a middleware: the endpoints of one participant in a ROS 2 graph.
+"""What the bridge and nodes need of a middleware: the endpoints of one ROS 2 participant.
 
 A participant is one process's part in the graph and may hold several nodes. Bytes that cross this
 line are CDR with its header, of plain messages: what a middleware adds to requests stays behind it.

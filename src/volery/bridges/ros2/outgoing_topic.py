@@ -7,7 +7,7 @@ from collections import OrderedDict
 from typing import Any
 
 from volery.bridges.ros2.middleware import Participant, TopicSpec
-from volery.bridges.ros2.writer_thread import Worker
+from volery.bridges.ros2.writer_thread import Ros2WriterThread
 from volery.graph.codecs.cdr import CODING_ERRORS
 from volery.graph.session import Session
 from volery.graph.subscription_queue import SubscriptionQueue
@@ -19,7 +19,7 @@ _OWN_KEPT = 1000
 _log = logging.getLogger(__name__)
 
 
-class Outlet:
+class Ros2OutgoingTopic:
     """One topic: its messages are taken and turned into bytes only while somebody subscribes.
 
     What is latched is always taken: ROS 2's publishers keep it for those who come later. `serve`
@@ -27,7 +27,7 @@ class Outlet:
     """
 
     def __init__(
-        self, participant: Participant, session: Session, worker: Worker, spec: TopicSpec
+        self, participant: Participant, session: Session, worker: Ros2WriterThread, spec: TopicSpec
     ) -> None:
         self.spec = spec
         self._session = session

@@ -14,8 +14,8 @@ from volery.bridges.ros2.middleware import Handle, Participant, ServiceSpec, Top
 from volery.bridges.ros2.names import NodeName, check_name
 from volery.bridges.ros2.profiles import profile_of
 from volery.bridges.ros2.services import answerer
-from volery.bridges.ros2.warning_filter import Complaints
-from volery.bridges.ros2.writer_thread import Worker
+from volery.bridges.ros2.warning_filter import WarningFilter
+from volery.bridges.ros2.writer_thread import Ros2WriterThread
 from volery.core.errors import GraphError
 from volery.graph.codecs.cdr import encode_cdr
 from volery.graph.codecs.zero import zero_message
@@ -56,7 +56,7 @@ class ParameterServices:
         parameters: Parameters,
         set_value: SetValue,
         owner: NodeName,
-        worker: Worker,
+        worker: Ros2WriterThread,
         now_ns: Callable[[], int],
     ) -> None:
         self._participant = participant
@@ -66,7 +66,7 @@ class ParameterServices:
         self._worker = worker
         self._now_ns = now_ns
         self._nodes: dict[NodeName, list[Handle]] = {}
-        self._complaints = Complaints()
+        self._complaints = WarningFilter()
         spec = TopicSpec(owner, _EVENTS, _EVENT_TYPE, profile_of(_EVENTS, "", latched=False))
         self._events = participant.writer(spec)
 

@@ -9,9 +9,9 @@ from typing import Any
 
 from volery.bridges.ros2.middleware import Answer, Caller, Handle, Participant, ServiceSpec
 from volery.bridges.ros2.names import NodeName, check_name
-from volery.bridges.ros2.warning_filter import Complaints
-from volery.bridges.ros2.writer_thread import Worker
-from volery.bridges.shared_names import Sharing
+from volery.bridges.ros2.warning_filter import WarningFilter
+from volery.bridges.ros2.writer_thread import Ros2WriterThread
+from volery.bridges.shared_names import SharedNames
 from volery.core.errors import GraphError
 from volery.graph.codecs.cdr import decode_cdr, encode_cdr
 from volery.graph.codecs.zero import zero_message
@@ -23,16 +23,16 @@ _LONGEST_WAIT_S = 10.0
 _PAUSE_S = 0.005
 
 
-class Services:
+class Ros2Services:
     """What is shared at present; `survey` brings it up to date, in one thread at a time."""
 
     def __init__(
         self,
         participant: Participant,
         session: Session,
-        sharing: Sharing,
+        sharing: SharedNames,
         node: NodeName,
-        worker: Worker,
+        worker: Ros2WriterThread,
     ) -> None:
         self._participant = participant
         self._session = session
@@ -41,7 +41,7 @@ class Services:
         self._worker = worker
         self._servers: dict[str, Handle] = {}
         self._callers: dict[str, Caller] = {}
-        self._complaints = Complaints()
+        self._complaints = WarningFilter()
 
     def survey(self) -> None:
         """Offer in ROS 2 what has appeared since, take back what has gone."""
@@ -88,10 +88,10 @@ def _is_of_ros2(name: str) -> bool:
 
 
 def answerer(
-    worker: Worker,
+    worker: Ros2WriterThread,
     srvtype: str,
     ask: Callable[[Any, ServiceReply], None],
-    complaints: Complaints,
+    complaints: WarningFilter,
 ) -> Callable[[bytes, Answer], None]:
     """A `TakeRequest` that reads requests for `ask` and writes its responses.
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from volery.bridges.ros2.middleware import DEFAULT_DEPTH, Handle, Participant, Profile, TopicSpec
 from volery.bridges.ros2.names import NodeName
-from volery.bridges.ros2.warning_filter import Complaints
+from volery.bridges.ros2.warning_filter import WarningFilter
 from volery.core.errors import GraphError
 from volery.graph.codecs.cdr import decode_cdr
 from volery.graph.messages import Published
@@ -22,7 +22,7 @@ class Subscriptions:
         self._participant = participant
         self._node = node
         self._inlets: dict[SubscriptionQueue, _Inlet] = {}
-        self._complaints = Complaints()
+        self._complaints = WarningFilter()
         self._lock = threading.RLock()
         self._closed = False
 

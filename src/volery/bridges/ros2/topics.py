@@ -7,29 +7,29 @@ from typing import Any
 
 from volery.bridges.ros2.middleware import Handle, Participant, Profile, RemotePublisher, TopicSpec
 from volery.bridges.ros2.names import NodeName, check_name
-from volery.bridges.ros2.outgoing_topic import Outlet
+from volery.bridges.ros2.outgoing_topic import Ros2OutgoingTopic
 from volery.bridges.ros2.profiles import common_profile, profile_of
 from volery.bridges.ros2.type_hashes import message_hash
-from volery.bridges.ros2.warning_filter import Complaints
-from volery.bridges.ros2.writer_thread import Worker
-from volery.bridges.shared_names import Sharing
+from volery.bridges.ros2.warning_filter import WarningFilter
+from volery.bridges.ros2.writer_thread import Ros2WriterThread
+from volery.bridges.shared_names import SharedNames
 from volery.core.errors import GraphError
 from volery.graph.codecs.cdr import decode_cdr
 from volery.graph.graph import TopicInfo
 from volery.graph.session import Session
 
 
-class Topics:
+class Ros2Topics:
     """What is shared at present; `survey` brings it up to date, in one thread at a time."""
 
     def __init__(
         self,
         participant: Participant,
         session: Session,
-        sharing: Sharing,
+        sharing: SharedNames,
         reliable: tuple[str, ...],
         node: NodeName,
-        worker: Worker,
+        worker: Ros2WriterThread,
     ) -> None:
         self._participant = participant
         self._session = session
@@ -37,9 +37,9 @@ class Topics:
         self._reliable = reliable
         self._node = node
         self._worker = worker
-        self._outlets: dict[str, Outlet] = {}
+        self._outlets: dict[str, Ros2OutgoingTopic] = {}
         self._inlets: dict[str, tuple[Profile, Handle]] = {}
-        self._complaints = Complaints()
+        self._complaints = WarningFilter()
 
     @property
     def dropped(self) -> dict[str, int]:
@@ -89,7 +89,7 @@ class Topics:
             self._worker.post(outlet.close)
             outlet = None
         if outlet is None:
-            outlet = Outlet(self._participant, self._session, self._worker, spec)
+            outlet = Ros2OutgoingTopic(self._participant, self._session, self._worker, spec)
             self._outlets[topic.name] = outlet
         outlet.adapt()
 

@@ -12,7 +12,7 @@ _MOST = 10_000
 """Things that are remembered as told; beyond, nothing more is told."""
 
 
-class Complaints:
+class WarningFilter:
     """Warnings of names that something is wrong with."""
 
     def __init__(self) -> None:

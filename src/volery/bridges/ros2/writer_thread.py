@@ -1,4 +1,4 @@
-"""The thread that writes to ROS 2, so that neither engine nor other doors wait for it."""
+"""The thread that writes to ROS 2, so that neither engine nor other bridges wait for it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _log = logging.getLogger(__name__)
 Job = Callable[[], object]
 
 
-class Worker:
+class Ros2WriterThread:
     """Does what it is given, one after the other."""
 
     def __init__(self, name: str = "volery-ros2") -> None:

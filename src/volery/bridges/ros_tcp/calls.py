@@ -12,9 +12,9 @@ from collections.abc import Callable
 from typing import Any
 
 from volery.bridges.ros_tcp import wire as ros_tcp
-from volery.bridges.ros_tcp.outbox import Outbox
+from volery.bridges.ros_tcp.outbox import RosTcpOutbox
 from volery.bridges.ros_tcp.payloads import absolute
-from volery.bridges.ros_tcp.wire import Frame
+from volery.bridges.ros_tcp.wire import RosTcpFrame
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Session
@@ -26,13 +26,15 @@ MOST_CALLS = 1000
 class Calls:
     """Calls services for one peer; `complain` is told, by any thread, which ones failed."""
 
-    def __init__(self, session: Session, outbox: Outbox, complain: Callable[[str], None]) -> None:
+    def __init__(
+        self, session: Session, outbox: RosTcpOutbox, complain: Callable[[str], None]
+    ) -> None:
         self._session = session
         self._outbox = outbox
         self._complain = complain
         self._open: set[ServiceReply] = set()
 
-    def call(self, number: int, frame: Frame, expected: str | None = None) -> None:
+    def call(self, number: int, frame: RosTcpFrame, expected: str | None = None) -> None:
         """Call the service that `frame` names, with its payload, as the peer's request `number`.
 
         expected: type that the peer takes the service for.

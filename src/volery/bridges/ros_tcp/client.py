@@ -19,13 +19,13 @@ from typing import Any
 from volery.bridges.bridge_host import wake_of
 from volery.bridges.remote_client import RemoteClient
 from volery.bridges.ros_tcp import wire as ros_tcp
-from volery.bridges.ros_tcp.client_outbox import Line
+from volery.bridges.ros_tcp.client_outbox import ClientOutbox
 from volery.bridges.ros_tcp.client_services import ClientServices
 from volery.bridges.ros_tcp.client_topics import ClientTopics
 from volery.bridges.ros_tcp.connect import FIRST_PAUSE_S, KEEPALIVE_S, LONGEST_PAUSE_S, dial
-from volery.bridges.ros_tcp.connection import Pipe
+from volery.bridges.ros_tcp.connection import RosTcpConnection
 from volery.bridges.ros_tcp.payloads import payloads_of
-from volery.bridges.ros_tcp.wire import Frame, FrameParser, Generation, number_field
+from volery.bridges.ros_tcp.wire import Generation, RosTcpFrame, RosTcpFrameParser, number_field
 from volery.core.errors import BridgeError, GraphError, reason_of
 from volery.graph.service_reply import ServiceReply
 from volery.graph.session import SessionInfo
@@ -81,11 +81,11 @@ class RosTcpClient(RemoteClient):
         self._address = (host, port)
         self._generation: Generation = generation
         self._handshake_s = handshake_s
-        self._line = Line(wake_of(self._loop, self._flush))
+        self._line = ClientOutbox(wake_of(self._loop, self._flush))
         self._topics = ClientTopics(self._line)
         self._services = ClientServices(self._line)
         self._body: tuple[str, int] | None = None
-        self._pipe: Pipe | None = None
+        self._pipe: RosTcpConnection | None = None
         self._complaints: deque[str] = deque(maxlen=MOST_COMPLAINTS)
         self._start(connect_timeout_s)
 
@@ -162,7 +162,9 @@ class RosTcpClient(RemoteClient):
 
         self._body = None
         try:
-            pipe = Pipe(sock, FrameParser(), self._line, self._take, broken, closed)
+            pipe = RosTcpConnection(
+                sock, RosTcpFrameParser(), self._line, self._take, broken, closed
+            )
         except OSError:
             sock.close()
             raise
@@ -174,7 +176,7 @@ class RosTcpClient(RemoteClient):
             pipe.close(f"{self.name} has left")
         self._why = reasons[0]
 
-    async def _attend(self, pipe: Pipe, ended: asyncio.Future[None]) -> None:
+    async def _attend(self, pipe: RosTcpConnection, ended: asyncio.Future[None]) -> None:
         """Show that we live, until the connection ends."""
         latest_s = self._loop.time() + self._handshake_s
         while not ended.done():
@@ -200,7 +202,7 @@ class RosTcpClient(RemoteClient):
 
     # ------------------------------------------------------------------------------------- input
 
-    def _take(self, frame: Frame) -> None:
+    def _take(self, frame: RosTcpFrame) -> None:
         """Do what a frame asks for. `BridgeError` for a handshake that cannot be understood."""
         body, self._body = self._body, None
         if frame.destination == "__handshake":

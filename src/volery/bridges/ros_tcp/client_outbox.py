@@ -22,7 +22,7 @@ _BATCH_BYTES = 64 << 10
 _BATCH_PARTS = 128
 
 
-class Line:
+class ClientOutbox:
     """The way out, for any thread; `wake` tells that there is something to `gather`."""
 
     def __init__(self, wake: Wake) -> None:

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from volery.bridges.ros_tcp import wire as ros_tcp
-from volery.bridges.ros_tcp.client_outbox import Line
+from volery.bridges.ros_tcp.client_outbox import ClientOutbox
 from volery.bridges.ros_tcp.payloads import absolute
-from volery.bridges.ros_tcp.wire import Frame
+from volery.bridges.ros_tcp.wire import RosTcpFrame
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.codecs.cdr import known
 from volery.graph.codecs.ros1_names import ros2_name
@@ -49,7 +49,7 @@ class _Offer:
 class ClientServices:
     """Open calls, and services on offer, also when there is no connection."""
 
-    def __init__(self, line: Line) -> None:
+    def __init__(self, line: ClientOutbox) -> None:
         self._line = line
         self._calls: dict[int, _Call] = {}
         self._numbers = itertools.count(FIRST_REQUEST)
@@ -114,7 +114,7 @@ class ClientServices:
         with self._line.lock:
             self._calls.pop(number, None)
 
-    def take_response(self, number: int, frame: Frame) -> None:
+    def take_response(self, number: int, frame: RosTcpFrame) -> None:
         """Answer a call. `BridgeError` where nobody made it."""
         with self._line.lock:
             call = self._calls.pop(number, None)
@@ -174,7 +174,7 @@ class ClientServices:
         """Names of the services on offer."""
         return tuple(self._offers)
 
-    def take_request(self, number: int, frame: Frame) -> None:
+    def take_request(self, number: int, frame: RosTcpFrame) -> None:
         """Have a request handled; a handler's mistake is the caller's answer."""
         offer = self._offers.get(absolute(frame.destination))
         name, connection = frame.destination, self._connection

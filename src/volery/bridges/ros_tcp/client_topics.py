@@ -6,8 +6,8 @@ from typing import Any
 
 from volery.bridges.remote_topics import RemoteTopics, Subscription
 from volery.bridges.ros_tcp import wire as ros_tcp
-from volery.bridges.ros_tcp.client_outbox import Line
-from volery.bridges.ros_tcp.wire import Frame
+from volery.bridges.ros_tcp.client_outbox import ClientOutbox
+from volery.bridges.ros_tcp.wire import RosTcpFrame
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.codecs.cdr import known
 from volery.graph.codecs.ros1_names import ros2_name
@@ -24,7 +24,7 @@ class ClientTopics(RemoteTopics):
     what was unsubscribed, which is passed over.
     """
 
-    def __init__(self, line: Line) -> None:
+    def __init__(self, line: ClientOutbox) -> None:
         super().__init__(line.lock, known)
         self._line = line
         self._listings: list[ServiceReply] = []
@@ -36,7 +36,7 @@ class ClientTopics(RemoteTopics):
         for reply in listings:
             reply.fail(GraphError(why))
 
-    def take(self, frame: Frame) -> None:
+    def take(self, frame: RosTcpFrame) -> None:
         """Hand a message to who wants it. `GraphError` where it is none."""
         self._deliver(
             frame.destination,

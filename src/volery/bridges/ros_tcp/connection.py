@@ -12,7 +12,7 @@ import socket
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
-from volery.bridges.ros_tcp.wire import Bytes, Frame, FrameParser
+from volery.bridges.ros_tcp.wire import Bytes, RosTcpFrame, RosTcpFrameParser
 from volery.core.errors import BridgeError
 from volery.core.network_access import tend
 from volery.core.preamble import Preamble
@@ -62,7 +62,7 @@ class Throttle(Protocol):
         """Returns for how long not to read; 0: read on."""
 
 
-class Pipe:
+class RosTcpConnection:
     """Reads frames, hands them to `take`, and sends what the outbox gathers.
 
     broken: told why nothing that follows can be read; what it puts into the outbox is still sent.
@@ -74,9 +74,9 @@ class Pipe:
     def __init__(
         self,
         sock: socket.socket,
-        parser: FrameParser,
+        parser: RosTcpFrameParser,
         outbox: Outgoing,
-        take: Callable[[Frame], None],
+        take: Callable[[RosTcpFrame], None],
         broken: Callable[[str], None],
         closed: Callable[[str], None],
         server_end: ServerEnd | None = None,
@@ -180,7 +180,7 @@ class Pipe:
             self._unproven.prove()
             self._unproven = None
 
-    def _take_all(self, frames: list[Frame], size: int) -> None:
+    def _take_all(self, frames: list[RosTcpFrame], size: int) -> None:
         if self._throttle is None:
             for frame in frames:
                 self._take(frame)

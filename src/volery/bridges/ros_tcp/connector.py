@@ -1,6 +1,6 @@
 """Connects the simulation to a ROS-TCP-Endpoint, in the place of a Unity project.
 
-    doors.open(RosTcpConnector("127.0.0.1", 10000))
+    bridges.open(RosTcpConnector("127.0.0.1", 10000))
 
 It need not be there yet: the bridge connects when it can, and again when the connection is lost. It
 reports both, and what the endpoint complains of.
@@ -19,9 +19,9 @@ from functools import partial
 from volery.bridges.bridge_host import wake_of
 from volery.bridges.ros_tcp import wire as ros_tcp
 from volery.bridges.ros_tcp.connect import FIRST_PAUSE_S, KEEPALIVE_S, LONGEST_PAUSE_S, dial
-from volery.bridges.ros_tcp.connection import Pipe
+from volery.bridges.ros_tcp.connection import RosTcpConnection
 from volery.bridges.ros_tcp.unity import Selection, UnitySession
-from volery.bridges.ros_tcp.wire import FrameParser, Generation
+from volery.bridges.ros_tcp.wire import Generation, RosTcpFrameParser
 from volery.core.errors import BridgeError
 from volery.graph.qos import DEFAULT_DEPTH
 from volery.graph.session import Gateway
@@ -39,7 +39,7 @@ _log = logging.getLogger(__name__)
 
 
 class RosTcpConnector:
-    """A door that is a client of somebody else's endpoint.
+    """A bridge that is a client of somebody else's endpoint.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ class RosTcpConnector:
             await connection.attend(self._handshake_s)
         finally:
             self._session = None
-            connection.pipe.close("the door was closed")
+            connection.pipe.close("the bridge was closed")
         note(f"the connection has ended: {connection.ended.result()}")
         self._was_lost = True
         return connection.session.generation is not None
@@ -199,7 +199,9 @@ class _Connection:
         """Holds the reason, once there is one."""
         self.session = session = open_session(wake_of(self._loop, self._flush))
         try:
-            self.pipe = Pipe(sock, FrameParser(), session.outbox, session.take, note, self._closed)
+            self.pipe = RosTcpConnection(
+                sock, RosTcpFrameParser(), session.outbox, session.take, note, self._closed
+            )
         except OSError:
             session.close()
             sock.close()

@@ -1,7 +1,7 @@
 """A ROS-TCP endpoint: the server that Unity's ROS-TCP-Connector connects to.
 
-    doors.open(RosTcpEndpoint(port=10000))                      # messages of ROS 1
-    doors.open(RosTcpEndpoint(port=10001, generation="ros2"))
+    bridges.open(RosTcpEndpoint(port=10000))                      # messages of ROS 1
+    bridges.open(RosTcpEndpoint(port=10001, generation="ros2"))
 
 Any number of clients, each with a session of its own in the graph.
 """
@@ -17,10 +17,10 @@ from functools import partial
 
 from volery.bridges.bridge_host import wake_of
 from volery.bridges.ros_tcp import wire as ros_tcp
-from volery.bridges.ros_tcp.connection import Pipe, ServerEnd
+from volery.bridges.ros_tcp.connection import RosTcpConnection, ServerEnd
 from volery.bridges.ros_tcp.payloads import payloads_of
 from volery.bridges.ros_tcp.session import FEATURES, EndpointSession
-from volery.bridges.ros_tcp.wire import MOST_PAYLOAD_BYTES, FrameParser, Generation
+from volery.bridges.ros_tcp.wire import MOST_PAYLOAD_BYTES, Generation, RosTcpFrameParser
 from volery.core.errors import BridgeError
 from volery.core.listener import Listener, Opening, open_listener
 from volery.core.network_access import check_address
@@ -38,7 +38,7 @@ _RETRY_S = 0.1
 
 
 class RosTcpEndpoint:
-    """A door that serves ROS-TCP clients.
+    """A bridge that serves ROS-TCP clients.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ class RosTcpEndpoint:
             self._listener.close()
             self._listener = None
         for client in tuple(self._clients):
-            client.pipe.close("the door was closed")
+            client.pipe.close("the bridge was closed")
 
     async def _accept(self, gateway: Gateway, listener: Listener) -> None:
         loop = asyncio.get_running_loop()
@@ -129,7 +129,7 @@ class RosTcpEndpoint:
             name = f"ros-tcp {address[0]}:{address[1]}"
             open_session = partial(EndpointSession, gateway, name, self._generation, self._depth)
             with contextlib.suppress(OSError):  # gone already
-                parser = FrameParser(self._most_payload_bytes)
+                parser = RosTcpFrameParser(self._most_payload_bytes)
                 _Client(sock, parser, open_session, self._clients, listener)
 
     async def _watch(self) -> None:
@@ -149,7 +149,7 @@ class _Client:
     def __init__(
         self,
         sock: socket.socket,
-        parser: FrameParser,
+        parser: RosTcpFrameParser,
         open_session: Callable[[Wake], EndpointSession],
         everyone: set[_Client],
         listener: Listener,
@@ -157,7 +157,7 @@ class _Client:
         self._everyone = everyone
         self._session = session = open_session(wake_of(asyncio.get_running_loop(), self._flush))
         try:
-            self.pipe = Pipe(
+            self.pipe = RosTcpConnection(
                 sock,
                 parser,
                 session.outbox,

@@ -9,7 +9,7 @@ from typing import Any
 from volery.graph.session import Session
 
 
-class Inlet:
+class IncomingQueue:
     """Publishes for a peer; while the simulation is busy the newest `depth` messages wait."""
 
     def __init__(self, session: Session, topic: str, msgtype: str, depth: int) -> None:

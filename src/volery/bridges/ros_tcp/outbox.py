@@ -41,7 +41,7 @@ class _Stream:
         return None if self.mailbox is None else self.mailbox.next_number
 
 
-class Outbox:
+class RosTcpOutbox:
     """Frames for one peer. `put` and mailboxes may be filled by any thread.
 
     wake: called, by any thread, when there is something to gather after there was nothing.

@@ -13,15 +13,15 @@ from typing import Any
 
 from volery.bridges.ros_tcp import wire as ros_tcp
 from volery.bridges.ros_tcp.calls import Calls
-from volery.bridges.ros_tcp.incoming_queue import Inlet
-from volery.bridges.ros_tcp.outbox import Outbox
+from volery.bridges.ros_tcp.incoming_queue import IncomingQueue
+from volery.bridges.ros_tcp.outbox import RosTcpOutbox
 from volery.bridges.ros_tcp.payloads import (
     absolute,
     payloads_of,
     service_type,
     topic_type,
 )
-from volery.bridges.ros_tcp.wire import Frame, Generation, number_field, text_field
+from volery.bridges.ros_tcp.wire import Generation, RosTcpFrame, number_field, text_field
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.qos import DEFAULT_DEPTH
 from volery.graph.read_budget import Reading
@@ -38,11 +38,11 @@ _FIRST_REQUEST = 1001
 FEATURES = (ros_tcp.QUEUE_SIZE, ros_tcp.REMOVE, ros_tcp.RESPONSE_ERROR)
 
 Fields = dict[str, Any]
-Body = Callable[[Frame], None]
+Body = Callable[[RosTcpFrame], None]
 
 
 class EndpointSession:
-    """One client's part in the graph. `take` and `close` belong to the door's thread."""
+    """One client's part in the graph. `take` and `close` belong to the bridge's thread."""
 
     def __init__(
         self,
@@ -55,8 +55,8 @@ class EndpointSession:
         self._payloads = payloads_of(generation, limited=True)
         self._session = gateway.open(name)
         self._depth = depth
-        self.outbox = Outbox(self._session, self._payloads, wake, self.complain)
-        self._inlets: dict[str, Inlet] = {}
+        self.outbox = RosTcpOutbox(self._session, self._payloads, wake, self.complain)
+        self._inlets: dict[str, IncomingQueue] = {}
         self._called: dict[str, str] = {}
         self._offered: set[str] = set()
         self._requests = _Requests()
@@ -81,7 +81,7 @@ class EndpointSession:
         """What the client is charged for, and when to read on from it."""
         return self._session.reading
 
-    def take(self, frame: Frame) -> None:
+    def take(self, frame: RosTcpFrame) -> None:
         """Do what a frame asks for."""
         body, self._body = self._body, None
         try:
@@ -106,7 +106,7 @@ class EndpointSession:
 
     # ------------------------------------------------------------------------------------ topics
 
-    def _command(self, frame: Frame) -> None:
+    def _command(self, frame: RosTcpFrame) -> None:
         action = self._commands.get(frame.destination)
         if action is None:
             raise BridgeError(f"no such command; known: {', '.join(self._commands)}")
@@ -119,7 +119,7 @@ class EndpointSession:
         self._check_room(self._inlets, name)
         self._session.advertise(topic, msgtype, latched=bool(fields.get("latch", False)))
         self._payloads.learn(msgtype)
-        self._inlets[name] = Inlet(self._session, topic, msgtype, depth)
+        self._inlets[name] = IncomingQueue(self._session, topic, msgtype, depth)
 
     def _remove_publisher(self, fields: Fields) -> None:
         inlet = self._inlets.pop(text_field(fields, "topic"), None)
@@ -128,7 +128,7 @@ class EndpointSession:
         if all(other.topic != inlet.topic for other in self._inlets.values()):
             self._session.unadvertise(inlet.topic)
 
-    def _message(self, frame: Frame) -> None:
+    def _message(self, frame: RosTcpFrame) -> None:
         inlet = self._inlets.get(frame.destination)
         if inlet is None:
             raise BridgeError(f"Not registered to publish topic '{frame.destination[:200]}'")
@@ -166,7 +166,7 @@ class EndpointSession:
         number = number_field(fields, "srv_id")
         self._body = ("request", number, lambda frame: self._call(number, frame))
 
-    def _call(self, number: int, frame: Frame) -> None:
+    def _call(self, number: int, frame: RosTcpFrame) -> None:
         self._calls.call(number, frame, self._called.get(frame.destination))
 
     def _lack_body(self, what: str, number: int) -> None:
@@ -208,7 +208,7 @@ class EndpointSession:
         number, error = number_field(fields, "srv_id"), fields.get("error")
         self._body = ("response", number, lambda frame: self._answer(number, frame, error))
 
-    def _answer(self, number: int, frame: Frame, error: Any) -> None:
+    def _answer(self, number: int, frame: RosTcpFrame, error: Any) -> None:
         """Hand the client's response to whoever called its service."""
         reply, srvtype = self._requests.pop(number)
         if error is not None:

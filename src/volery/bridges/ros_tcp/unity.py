@@ -14,10 +14,10 @@ from fnmatch import fnmatchcase
 
 from volery.bridges.ros_tcp import wire as ros_tcp
 from volery.bridges.ros_tcp.calls import Calls
-from volery.bridges.ros_tcp.incoming_queue import Inlet
-from volery.bridges.ros_tcp.outbox import Outbox
+from volery.bridges.ros_tcp.incoming_queue import IncomingQueue
+from volery.bridges.ros_tcp.outbox import RosTcpOutbox
 from volery.bridges.ros_tcp.payloads import payloads_of
-from volery.bridges.ros_tcp.wire import Frame, Generation, number_field
+from volery.bridges.ros_tcp.wire import Generation, RosTcpFrame, number_field
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.graph import TopicInfo
 from volery.graph.session import Gateway
@@ -56,7 +56,7 @@ class Selection:
 
 
 class UnitySession:
-    """One connection to an endpoint. All but the wake belongs to the door's thread.
+    """One connection to an endpoint. All but the wake belongs to the bridge's thread.
 
     note: called, by any thread, with what the other side complains of and with what is not sent.
     begun: called once it is known which messages the endpoint speaks.
@@ -77,9 +77,9 @@ class UnitySession:
         self._note = note
         self._begun = begun
         self._session = gateway.open(name)
-        self.outbox = Outbox(self._session, payloads_of("ros1"), wake, note)
+        self.outbox = RosTcpOutbox(self._session, payloads_of("ros1"), wake, note)
         self._calls = Calls(self._session, self.outbox, note)
-        self._inlets: dict[str, Inlet] = {}
+        self._inlets: dict[str, IncomingQueue] = {}
         self._sent: set[str] = set()
         self._served: dict[str, str] = {}
         self._registered: dict[str, list[str]] = {}
@@ -135,7 +135,7 @@ class UnitySession:
                     new.append((topic, self._receive if receives else self._send))
         return new
 
-    def take(self, frame: Frame) -> None:
+    def take(self, frame: RosTcpFrame) -> None:
         """Do what a frame asks for. `BridgeError` for a handshake that cannot be understood."""
         number, self._request = self._request, None
         if frame.destination == "__handshake":
@@ -186,7 +186,7 @@ class UnitySession:
             f"the package {msgtype.partition('/')[0]} where the endpoint runs"
         )
 
-    def _message(self, frame: Frame) -> None:
+    def _message(self, frame: RosTcpFrame) -> None:
         inlet = self._inlets.get(frame.destination)
         if inlet is None:
             raise BridgeError("a message on a topic that was not subscribed to")
@@ -194,7 +194,9 @@ class UnitySession:
 
     def _receive(self, topic: TopicInfo) -> None:
         self._session.advertise(topic.name, topic.msgtype)
-        self._inlets[topic.name] = Inlet(self._session, topic.name, topic.msgtype, self._depth)
+        self._inlets[topic.name] = IncomingQueue(
+            self._session, topic.name, topic.msgtype, self._depth
+        )
         self._register("subscribe", topic.name, topic.msgtype)
 
     def _send(self, topic: TopicInfo) -> None:

@@ -42,14 +42,14 @@ _APART_BYTES = 16 << 10
 """A longer payload that has not come whole is received where it stays, without a copy."""
 
 
-class Frame(NamedTuple):
+class RosTcpFrame(NamedTuple):
     """One frame; the payload may be kept, nobody writes to it any more."""
 
     destination: str
     payload: Bytes
 
 
-class FrameParser:
+class RosTcpFrameParser:
     """Cuts a stream of bytes into frames.
 
     Bytes are written where `space` says, `written` tells how many came. Work is linear in them, and
@@ -82,12 +82,12 @@ class FrameParser:
             return self._apart[self._filled :]
         return self._scratch[self._end :]
 
-    def written(self, count: int) -> list[Frame]:
+    def written(self, count: int) -> list[RosTcpFrame]:
         """Frames that are whole now that `count` more bytes are there.
 
         `BridgeError` for a frame over the limits: what follows it means nothing.
         """
-        frames: list[Frame] = []
+        frames: list[RosTcpFrame] = []
         if self._apart is not None:
             self._filled += count
             if self._filled < len(self._apart):
@@ -101,9 +101,9 @@ class FrameParser:
         self._compact()
         return frames
 
-    def feed(self, data: Bytes) -> list[Frame]:
+    def feed(self, data: Bytes) -> list[RosTcpFrame]:
         """Frames that are whole with `data`; `BridgeError` as for `written`."""
-        frames: list[Frame] = []
+        frames: list[RosTcpFrame] = []
         rest = memoryview(data)
         while rest:
             space = self.space()
@@ -117,7 +117,7 @@ class FrameParser:
         """Forgets a frame that is not whole: no more bytes come. Its memory is free at once."""
         self._apart = None
 
-    def _advance(self, frames: list[Frame]) -> bool:
+    def _advance(self, frames: list[RosTcpFrame]) -> bool:
         """Read the next part of a frame; False where bytes are missing."""
         if self._destination_bytes is None:
             self._destination_bytes = self._length("destination", self._most_destination)
@@ -163,10 +163,10 @@ class FrameParser:
         self._apart[: self._filled] = self._scratch[self._start : self._end]
         self._start = self._end
 
-    def _finish(self, payload: Bytes, frames: list[Frame]) -> None:
+    def _finish(self, payload: Bytes, frames: list[RosTcpFrame]) -> None:
         destination = self._destination or ""
         if destination or payload:
-            frames.append(Frame(destination, payload))
+            frames.append(RosTcpFrame(destination, payload))
         else:
             self.keepalives += 1
         self._destination_bytes = self._destination = self._payload_bytes = None

@@ -8,7 +8,7 @@ from volery.bridges.rosbridge.fields import read_id, with_id
 from volery.bridges.rosbridge.wire import Operation
 
 
-class Gate(Protocol):
+class AccessPolicy(Protocol):
     """Stands before the operations of one client, those of the connection itself excepted."""
 
     def check(self, operation: Operation) -> bool:

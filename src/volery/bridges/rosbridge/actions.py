@@ -20,7 +20,7 @@ from volery.bridges.rosbridge.fields import (
     read_text,
     with_id,
 )
-from volery.bridges.rosbridge.message_encoder import Forms
+from volery.bridges.rosbridge.message_encoder import MessageEncoder
 from volery.bridges.rosbridge.services import Post, Send
 from volery.bridges.rosbridge.wire import Operation
 from volery.core.errors import BridgeError, GraphError
@@ -59,10 +59,10 @@ class _Acting:
     goal: Goal
 
 
-class Actions:
+class RosbridgeActions:
     """The actions of one client. Its methods belong to the client's thread."""
 
-    def __init__(self, session: Session, forms: Forms, send: Send, post: Post) -> None:
+    def __init__(self, session: Session, forms: MessageEncoder, send: Send, post: Post) -> None:
         self._session = session
         self._graph = session.graph
         self._forms = forms

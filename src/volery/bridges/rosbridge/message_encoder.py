@@ -29,7 +29,7 @@ MOST_KEPT_BYTES = 32 * 1024 * 1024
 _BYTES = {"uint8", "char", "byte"}
 
 
-class Forms:
+class MessageEncoder:
     """Encodes messages for all clients of a server. For one thread."""
 
     def __init__(self, generation: Generation = "ros2") -> None:

@@ -19,8 +19,8 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
-from volery.bridges.rosbridge.access_policy import Gate, refusal
-from volery.bridges.rosbridge.actions import Actions
+from volery.bridges.rosbridge.access_policy import AccessPolicy, refusal
+from volery.bridges.rosbridge.actions import RosbridgeActions
 from volery.bridges.rosbridge.cbor_codec import encode_cbor
 from volery.bridges.rosbridge.fields import read_choice, read_id, with_id
 from volery.bridges.rosbridge.fragments import MOST_FRAGMENTS, Assembly, split
@@ -30,9 +30,9 @@ from volery.bridges.rosbridge.message_budget import (
     MAX_TEXT_BYTES,
     MAX_UNAUTHORIZED_BYTES,
 )
-from volery.bridges.rosbridge.message_encoder import Forms
-from volery.bridges.rosbridge.services import Post, Services
-from volery.bridges.rosbridge.topics import Topics
+from volery.bridges.rosbridge.message_encoder import MessageEncoder
+from volery.bridges.rosbridge.services import Post, RosbridgeServices
+from volery.bridges.rosbridge.topics import RosbridgeTopics
 from volery.bridges.rosbridge.wire import (
     Frame,
     Operation,
@@ -57,10 +57,10 @@ MOST_WRAPS = 3
 
 
 @dataclass(frozen=True)
-class Shared:
+class ServerContext:
     """What all clients of a server have in common."""
 
-    forms: Forms = field(default_factory=Forms)
+    forms: MessageEncoder = field(default_factory=MessageEncoder)
     now_ns: Callable[[], int] = lambda: 0
     """Simulated time."""
     token: str | None = None
@@ -92,12 +92,12 @@ class RosbridgePeer:
     def __init__(
         self,
         session: Session,
-        shared: Shared,
+        shared: ServerContext,
         *,
         wake: Callable[[], None],
         post: Post,
         authorized: bool = False,
-        gate: Gate | None = None,
+        gate: AccessPolicy | None = None,
     ) -> None:
         self.authorized = authorized or shared.token is None
         self.on_authorized: Callable[[], None] = lambda: None
@@ -116,10 +116,10 @@ class RosbridgePeer:
         self._numbers = itertools.count()
         self._closed = False
         self._now_s = 0.0
-        self._topics = Topics(session, wake, shared.now_ns, self._complain)
+        self._topics = RosbridgeTopics(session, wake, shared.now_ns, self._complain)
         guarded = self._poster(post)
-        self._services = Services(session, shared.forms, self.send, guarded)
-        self._actions = Actions(session, shared.forms, self.send, guarded)
+        self._services = RosbridgeServices(session, shared.forms, self.send, guarded)
+        self._actions = RosbridgeActions(session, shared.forms, self.send, guarded)
         self._handlers: dict[str, Callable[[Operation], None]] = {
             "advertise": self._topics.advertise,
             "unadvertise": self._topics.unadvertise,

@@ -1,6 +1,6 @@
 """The rosapi services: what clients of rosbridge ask about the graph.
 
-They are ordinary services of the graph under `/rosapi/`, so that clients of every door may ask.
+They are ordinary services of the graph under `/rosapi/`, so that clients of every bridge may ask.
 Every session is a node there, and the simulation itself is the node `/volery`.
 """
 

@@ -1,4 +1,4 @@
-"""rosbridge v2 server: a door for roslib, roslibpy, Foxglove, ROS# and web pages."""
+"""rosbridge v2 server: a bridge for roslib, roslibpy, Foxglove, ROS# and web pages."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from volery.bridges.origins import Origins
 from volery.bridges.rosbridge.bulk_turns import BulkTurns
 from volery.bridges.rosbridge.first_message import GuardedConnection, guarded
 from volery.bridges.rosbridge.message_budget import MAX_MESSAGE_BYTES
-from volery.bridges.rosbridge.message_encoder import Forms, Generation
-from volery.bridges.rosbridge.protocol import RosbridgePeer, Shared
+from volery.bridges.rosbridge.message_encoder import Generation, MessageEncoder
+from volery.bridges.rosbridge.protocol import RosbridgePeer, ServerContext
 from volery.bridges.rosbridge.rosapi import RosApi
 from volery.bridges.rosbridge.rosapi_parameters import Parameters
 from volery.bridges.rosbridge.tf_republisher import TfRepublisher
-from volery.bridges.rosbridge.token_check import Checkpoint
+from volery.bridges.rosbridge.token_check import TokenCheck
 from volery.bridges.rosbridge.websocket_session import Bell, converse, post_to
 from volery.bridges.rosbridge.wire import CBOR_PROTOCOL
 from volery.bridges.unsent import bound_unsent
@@ -118,7 +118,7 @@ class RosbridgeServer:
         self._shown: WeakSet[ServerConnection] = WeakSet()
         """Clients whose request for a connection carried the token."""
         self._gateway: Gateway | None = None
-        self._shared = Shared()
+        self._shared = ServerContext()
         self._bulk = BulkTurns()
 
     @property
@@ -145,7 +145,9 @@ class RosbridgeServer:
         check_token(self.host, self._token)
         graph = gateway.graph
         self._gateway = gateway
-        self._shared = Shared(Forms(self._generation), graph.now_ns, self._token, self._most_bytes)
+        self._shared = ServerContext(
+            MessageEncoder(self._generation), graph.now_ns, self._token, self._most_bytes
+        )
         try:
             opening = Opening(look_at_http, HANDSHAKE_TIMEOUT_S)
             self._listener = open_listener(self.host, self.port, "rosbridge", opening=opening)
@@ -167,7 +169,7 @@ class RosbridgeServer:
         except OSError as error:
             raise BridgeError(
                 f"rosbridge cannot listen on {self.host}:{self.port}: {error.strerror or error}; "
-                f"end the program that has the port, or choose another: --door rosbridge=PORT"
+                f"end the program that has the port, or choose another: --bridge rosbridge=PORT"
             ) from None
         self.port = next(iter(self._server.sockets)).getsockname()[1]
         self._rosapi = RosApi(gateway, self._generation, graph.now_ns, self._parameters)
@@ -253,7 +255,7 @@ class RosbridgeServer:
         peer.on_authorized = lambda: _allow(connection)
         self._clients.add(connection)
         prove = partial(self._prove, connection)
-        checkpoint = Checkpoint(
+        checkpoint = TokenCheck(
             self._guesses, _address_of(connection), connection.wait_closed, prove
         )
         if peer.authorized:

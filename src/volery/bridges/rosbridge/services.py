@@ -15,7 +15,7 @@ from volery.bridges.rosbridge.fields import (
     read_text,
     with_id,
 )
-from volery.bridges.rosbridge.message_encoder import Forms
+from volery.bridges.rosbridge.message_encoder import MessageEncoder
 from volery.bridges.rosbridge.wire import Operation
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.codecs.definition_store import EMPTY_MEMBER
@@ -34,10 +34,10 @@ Post = Callable[[Callable[[], None]], None]
 """Has a function called in the client's thread, from any other."""
 
 
-class Services:
+class RosbridgeServices:
     """The services of one client. Its methods belong to the client's thread."""
 
-    def __init__(self, session: Session, forms: Forms, send: Send, post: Post) -> None:
+    def __init__(self, session: Session, forms: MessageEncoder, send: Send, post: Post) -> None:
         self._session = session
         self._forms = forms
         self._send = send

@@ -12,7 +12,7 @@ from volery.core.token_guesses import TokenGuesses
 
 
 @dataclass(frozen=True)
-class Checkpoint:
+class TokenCheck:
     """What the frames of one client pass until it is authorized."""
 
     guesses: TokenGuesses

@@ -37,7 +37,7 @@ _HEADER = "std_msgs/msg/Header"
 
 
 @dataclass(frozen=True)
-class Wishes:
+class SubscriptionOptions:
     """How one subscription wants its messages."""
 
     throttle_s: float = 0.0
@@ -58,12 +58,12 @@ class Wishes:
         return 1 if self.throttle_s else DEFAULT_DEPTH
 
 
-def read_wishes(operation: Operation) -> Wishes:
+def read_wishes(operation: Operation) -> SubscriptionOptions:
     """Wishes of a `subscribe` operation. `BridgeError` for values that cannot be."""
     size = read_number(operation, "fragment_size", 0, 0, 1e9)
     qos = read_qos(operation)
     length = int(read_number(operation, "queue_length", 0, 0, MOST_DEPTH))
-    return Wishes(
+    return SubscriptionOptions(
         read_number(operation, "throttle_rate", 0, 0, 1e9) / 1000.0,
         length or (0 if qos is None else qos.depth),
         int(size) or None,
@@ -72,10 +72,10 @@ def read_wishes(operation: Operation) -> Wishes:
     )
 
 
-def combine(wishes: list[Wishes]) -> Wishes:
+def combine(wishes: list[SubscriptionOptions]) -> SubscriptionOptions:
     """What satisfies all: lowest throttle, longest queue, smallest fragments, most compact form."""
     sizes = [w.fragment_size for w in wishes if w.fragment_size]
-    return Wishes(
+    return SubscriptionOptions(
         min(w.throttle_s for w in wishes),
         max(w.queue_length for w in wishes),
         min(sizes) if sizes else None,
@@ -84,15 +84,15 @@ def combine(wishes: list[Wishes]) -> Wishes:
     )
 
 
-class Stream:
+class TopicStream:
     """One topic on its way to one client."""
 
     def __init__(self, name: str, msgtype: str | None) -> None:
         self.name = name
         """As the client calls the topic."""
         self.msgtype = msgtype
-        self.requests: dict[Id, Wishes] = {}
-        self.wishes = Wishes()
+        self.requests: dict[Id, SubscriptionOptions] = {}
+        self.wishes = SubscriptionOptions()
         self.mailbox: SubscriptionQueue | None = None
         self._tuned = (0, False)
         self._left: deque[Published] = deque()
@@ -153,7 +153,7 @@ def _latched(session: Session, name: str) -> bool:
     return any(info.name == topic and info.latched for info in session.graph.topics())
 
 
-class Topics:
+class RosbridgeTopics:
     """The topics of one client."""
 
     def __init__(
@@ -167,11 +167,11 @@ class Topics:
         self._complain = complain
         self._wake = wake
         self._now_ns = now_ns
-        self._streams: dict[str, Stream] = {}
+        self._streams: dict[str, TopicStream] = {}
         self._published: dict[str, str] = {}
-        self._ready: deque[Stream] = deque()
+        self._ready: deque[TopicStream] = deque()
         """Streams whose mailboxes have woken; the simulation's thread appends."""
-        self._held: list[Stream] = []
+        self._held: list[TopicStream] = []
         """Streams with messages whose time has not come."""
 
     def advertise(self, operation: Operation) -> None:
@@ -227,7 +227,7 @@ class Topics:
         if stream is None:
             if len(self._streams) >= MOST_STREAMS:
                 raise BridgeError(f"subscribe: more than {MOST_STREAMS} topics")
-            stream = Stream(name, msgtype)
+            stream = TopicStream(name, msgtype)
         elif msgtype and msgtype != self._session.graph.topic_type(absolute(name)):
             raise GraphError(f"topic '{name}' is subscribed to with another type than {msgtype}")
         if key not in stream.requests and len(stream.requests) >= MOST_REQUESTS:
@@ -257,14 +257,14 @@ class Topics:
             return
         self._end(stream)
 
-    def _end(self, stream: Stream) -> None:
+    def _end(self, stream: TopicStream) -> None:
         """Send a topic no more."""
         stream.requests.clear()
         self._streams.pop(stream.name, None)
         if stream.mailbox is not None:
             self._session.unsubscribe(stream.mailbox)
 
-    def take(self, now_s: float) -> Iterator[tuple[Stream, Published]]:
+    def take(self, now_s: float) -> Iterator[tuple[TopicStream, Published]]:
         """Messages whose time has come, in turn one of every stream."""
         ready = [self._ready.popleft() for _ in range(len(self._ready))]
         busy = list(dict.fromkeys((*self._held, *ready)))
@@ -290,7 +290,7 @@ class Topics:
         times = [stream.due_s(now_s) for stream in self._held if stream.requests]
         return min((time for time in times if time is not None), default=None)
 
-    def _tune(self, stream: Stream, *, anew: bool) -> None:
+    def _tune(self, stream: TopicStream, *, anew: bool) -> None:
         def wake() -> None:
             self._ready.append(stream)
             self._wake()

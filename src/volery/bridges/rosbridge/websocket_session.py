@@ -14,7 +14,7 @@ from typing import Any, Protocol
 from volery.bridges.bridge_host import wake_of
 from volery.bridges.rosbridge.bulk_turns import TURN_S, BulkTurns, Writer
 from volery.bridges.rosbridge.protocol import RosbridgePeer
-from volery.bridges.rosbridge.token_check import Checkpoint
+from volery.bridges.rosbridge.token_check import TokenCheck
 from volery.bridges.rosbridge.wire import Frame
 
 POLICY_VIOLATION = 1008
@@ -26,7 +26,7 @@ _LONGEST_SILENCE_S = 10.0
 """Time a client has to show its token."""
 
 
-class Channel(Protocol):
+class WebSocketSession(Protocol):
     """A WebSocket that stands. All methods raise where it does no more."""
 
     async def recv(self) -> Frame:
@@ -69,11 +69,11 @@ def post_to(loop: asyncio.AbstractEventLoop) -> Callable[[Callable[[], Any]], No
 
 
 async def converse(
-    channel: Channel,
+    channel: WebSocketSession,
     bell: Bell,
     peer: RosbridgePeer,
     bulk: BulkTurns,
-    checkpoint: Checkpoint | None = None,
+    checkpoint: TokenCheck | None = None,
 ) -> Exception | None:
     """Serve a client until it leaves or must go, then close its peer.
 
@@ -99,7 +99,10 @@ async def converse(
 
 
 async def _read(
-    channel: Channel, peer: RosbridgePeer, read: asyncio.Event, checkpoint: Checkpoint | None
+    channel: WebSocketSession,
+    peer: RosbridgePeer,
+    read: asyncio.Event,
+    checkpoint: TokenCheck | None,
 ) -> None:
     """Hand the client's frames to its peer until it leaves or must go."""
     spent_s = 0.0
@@ -132,7 +135,7 @@ async def _read(
 
 
 async def _write(
-    channel: Channel, peer: RosbridgePeer, bell: Bell, turns: Writer, read: asyncio.Event
+    channel: WebSocketSession, peer: RosbridgePeer, bell: Bell, turns: Writer, read: asyncio.Event
 ) -> None:
     """Send what the peer has to say, as fast as the client reads."""
     while True:

@@ -1,7 +1,7 @@
 """The ROS side of the sensor link: it connects, and fills a graph of its own with what it gets.
 
-    with Doors(gateway) as doors:
-        doors.open(SensorLinkClient("127.0.0.1", 10100, image_port=10101))
+    with BridgeHost(gateway) as bridges:
+        bridges.open(SensorLinkClient("127.0.0.1", 10100, image_port=10101))
 
 Everything that the environment measures appears under its topic (`/uav1/laser/horizontal/scan`);
 poses published on `/uavN/pose_command` and `/uavN/goal_pose` go to the environment. When the
@@ -15,7 +15,7 @@ import contextlib
 from collections import deque
 
 from volery.bridges.bridge_host import wake_of
-from volery.bridges.ros_tcp.incoming_queue import Inlet
+from volery.bridges.ros_tcp.incoming_queue import IncomingQueue
 from volery.bridges.sensor_link.commands import COMMAND_TOPICS
 from volery.bridges.sensor_link.payloads import (
     PAYLOADS,
@@ -25,7 +25,12 @@ from volery.bridges.sensor_link.payloads import (
     stamp_of,
 )
 from volery.bridges.sensor_link.server import IMAGE_PORT, PORT
-from volery.bridges.sensor_link.wire import Frame, FrameParser, Kind, encode_frame
+from volery.bridges.sensor_link.wire import (
+    SensorLinkFrame,
+    SensorLinkKind,
+    SensorLinkParser,
+    encode_frame,
+)
 from volery.core.errors import BridgeError, GraphError
 from volery.core.network_access import write_while_open
 from volery.graph.session import Gateway, Session
@@ -39,7 +44,7 @@ _NOTICES_KEPT = 100
 
 
 class SensorLinkClient:
-    """A door to an environment that speaks the sensor link.
+    """A bridge to an environment that speaks the sensor link.
 
     image_port: None leaves images alone. Counters are for reading only.
     """
@@ -52,9 +57,9 @@ class SensorLinkClient:
         self._image_port = image_port
         self._tasks: list[asyncio.Task[None]] = []
         self._writer: asyncio.StreamWriter | None = None
-        self._inlets: dict[str, Inlet] = {}
+        self._inlets: dict[str, IncomingQueue] = {}
         self._sequences: dict[tuple[int, str], int] = {}
-        self._commands: dict[tuple[Kind, int], SubscriptionQueue] = {}
+        self._commands: dict[tuple[SensorLinkKind, int], SubscriptionQueue] = {}
         self._sent = 0
         self.received = 0
         """Messages received."""
@@ -98,7 +103,7 @@ class SensorLinkClient:
         except (OSError, OverflowError) as error:
             raise BridgeError(
                 f"sensor link: nobody listens on {self._host}:{port} ({error}): "
-                "start the simulation with this door, or name its port"
+                "start the simulation with this bridge, or name its port"
             ) from None
         if port == self._port:
             self._writer = writer
@@ -124,7 +129,7 @@ class SensorLinkClient:
                 attempt += 1
 
     async def _read(self, reader: asyncio.StreamReader) -> None:
-        parser = FrameParser()
+        parser = SensorLinkParser()
         with contextlib.suppress(OSError):
             while data := await reader.read(_READ_BYTES):
                 for frame in parser.feed(data):
@@ -132,15 +137,15 @@ class SensorLinkClient:
                 await asyncio.sleep(0)
         self.corrupt += parser.corrupt
 
-    def _take(self, frame: Frame) -> None:
-        if frame.kind == Kind.NOTICE:
+    def _take(self, frame: SensorLinkFrame) -> None:
+        if frame.kind == SensorLinkKind.NOTICE:
             self.notices.append(decode_notice(frame.payload))
             return
         try:
             name, message = decode_payload(frame.kind, frame.payload, frame.stamp_ns)
             topic = f"/uav{frame.uav}/{name}"
-            self._inlet(topic, PAYLOADS[Kind(frame.kind)].msgtype).put(message)
-            if frame.kind in (Kind.POSE, Kind.LASER_SCAN):
+            self._inlet(topic, PAYLOADS[SensorLinkKind(frame.kind)].msgtype).put(message)
+            if frame.kind in (SensorLinkKind.POSE, SensorLinkKind.LASER_SCAN):
                 self._listen_to(frame.uav)
         except (BridgeError, GraphError):
             self.refused += 1
@@ -148,15 +153,15 @@ class SensorLinkClient:
         self.received += 1
         self._count_lost(topic, frame)
 
-    def _inlet(self, topic: str, msgtype: str) -> Inlet:
+    def _inlet(self, topic: str, msgtype: str) -> IncomingQueue:
         inlet = self._inlets.get(topic)
         if inlet is None or inlet.msgtype != msgtype:
             self._session.advertise(topic, msgtype)
-            inlet = Inlet(self._session, topic, msgtype, _DEPTH)
+            inlet = IncomingQueue(self._session, topic, msgtype, _DEPTH)
             self._inlets[topic] = inlet
         return inlet
 
-    def _count_lost(self, topic: str, frame: Frame) -> None:
+    def _count_lost(self, topic: str, frame: SensorLinkFrame) -> None:
         key = (frame.kind, topic)
         before = self._sequences.get(key)
         self._sequences[key] = frame.sequence
@@ -167,7 +172,7 @@ class SensorLinkClient:
 
     def _listen_to(self, uav: int) -> None:
         """Carry the commands for a UAV from now on."""
-        if (Kind.POSE_COMMAND, uav) in self._commands:
+        if (SensorLinkKind.POSE_COMMAND, uav) in self._commands:
             return
         for kind, topic in COMMAND_TOPICS.items():
             self._commands[kind, uav] = self._session.subscribe(

@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from volery.bridges.ros_tcp.incoming_queue import Inlet
+from volery.bridges.ros_tcp.incoming_queue import IncomingQueue
 from volery.bridges.sensor_link.payloads import PAYLOADS, decode_payload
-from volery.bridges.sensor_link.wire import Frame, Kind
+from volery.bridges.sensor_link.wire import SensorLinkFrame, SensorLinkKind
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.session import Session
 
-COMMAND_TOPICS = {Kind.POSE_COMMAND: "pose_command", Kind.GOAL_POSE: "goal_pose"}
+COMMAND_TOPICS = {
+    SensorLinkKind.POSE_COMMAND: "pose_command",
+    SensorLinkKind.GOAL_POSE: "goal_pose",
+}
 """Topics below the UAV's."""
 
 _DEPTH = 2
@@ -19,28 +22,32 @@ _DEPTH = 2
 _UNIT_TOLERANCE = 0.01
 
 
-class Commands:
+class SensorLinkCommands:
     """Publishes one client's commands through its session."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._inlets: dict[tuple[int, int], Inlet] = {}
+        self._inlets: dict[tuple[int, int], IncomingQueue] = {}
 
-    def take(self, frame: Frame) -> None:
+    def take(self, frame: SensorLinkFrame) -> None:
         """Publish the command of a frame; `BridgeError` tells why it cannot be."""
-        topic = COMMAND_TOPICS.get(Kind(frame.kind)) if frame.kind in list(Kind) else None
+        topic = (
+            COMMAND_TOPICS.get(SensorLinkKind(frame.kind))
+            if frame.kind in list(SensorLinkKind)
+            else None
+        )
         if topic is None:
             known = ", ".join(f"{kind.name} ({int(kind)})" for kind in COMMAND_TOPICS)
             raise BridgeError(f"frames of type {frame.kind} are not taken here, only {known}")
-        kind = Kind(frame.kind)
+        kind = SensorLinkKind(frame.kind)
         _, pose = decode_payload(kind, frame.payload, frame.stamp_ns)
-        _check_pose(pose, may_keep_heading=kind is Kind.GOAL_POSE)
+        _check_pose(pose, may_keep_heading=kind is SensorLinkKind.GOAL_POSE)
         inlet = self._inlets.get((kind, frame.uav))
         if inlet is None:
             inlet = self._inlets[kind, frame.uav] = self._inlet(kind, frame.uav, topic)
         inlet.put(pose)
 
-    def _inlet(self, kind: Kind, uav: int, topic: str) -> Inlet:
+    def _inlet(self, kind: SensorLinkKind, uav: int, topic: str) -> IncomingQueue:
         below = f"/uav{uav}/"
         if not any(found.name.startswith(below) for found in self._session.graph.topics()):
             raise BridgeError(f"there is no UAV {uav}")
@@ -49,7 +56,7 @@ class Commands:
             self._session.advertise(name, msgtype)
         except GraphError as error:
             raise BridgeError(str(error)) from None
-        return Inlet(self._session, name, msgtype, _DEPTH)
+        return IncomingQueue(self._session, name, msgtype, _DEPTH)
 
 
 def _check_pose(stamped: Any, *, may_keep_heading: bool) -> None:

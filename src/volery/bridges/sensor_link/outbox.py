@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Hashable
 
 
-class Outbox:
+class SensorLinkOutbox:
     """Bounded queues of frames, one a sensor. depth: frames that may wait in each."""
 
     def __init__(self, depth: int) -> None:

@@ -44,7 +44,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.bridges.sensor_link.wire import Kind
+from volery.bridges.sensor_link.wire import SensorLinkKind
 from volery.core.clock import NS_PER_S
 from volery.core.errors import BridgeError
 from volery.graph.messages import (
@@ -125,7 +125,7 @@ class _Reader:
             )
 
 
-def encode_payload(kind: Kind, message: Any, name: str = "") -> bytes:
+def encode_payload(kind: SensorLinkKind, message: Any, name: str = "") -> bytes:
     """Payload of a ROS message; `name`: its topic below the UAV's, unused for commands.
 
     Raises
@@ -154,7 +154,7 @@ def decode_payload(kind: int, payload: bytes, stamp_ns: int) -> tuple[str, Any]:
     if not 0 <= stamp_ns < _STAMP_LIMIT_NS:
         raise BridgeError(f"a stamp of {stamp_ns} ns is out of range")
     reader = _Reader(payload)
-    found = PAYLOADS[Kind(kind)].decode(reader, stamp_ns)
+    found = PAYLOADS[SensorLinkKind(kind)].decode(reader, stamp_ns)
     reader.end()
     return found
 
@@ -319,12 +319,16 @@ def _decode_command(reader: _Reader, stamp_ns: int) -> tuple[str, Any]:
     return "", PoseStamped(header(stamp_ns, frame), Pose(Point(*n[:3]), Quaternion(*n[3:])))
 
 
-PAYLOADS: dict[Kind, Payload] = {
-    Kind.LASER_SCAN: Payload("sensor_msgs/msg/LaserScan", _encode_scan, _decode_scan),
-    Kind.POSE: Payload("nav_msgs/msg/Odometry", _encode_pose, _decode_pose),
-    Kind.IMU: Payload("sensor_msgs/msg/Imu", _encode_imu, _decode_imu),
-    Kind.SONAR: Payload("sensor_msgs/msg/Range", _encode_sonar, _decode_sonar),
-    Kind.IMAGE: Payload("sensor_msgs/msg/Image", _encode_image, _decode_image),
-    Kind.POSE_COMMAND: Payload("geometry_msgs/msg/PoseStamped", _encode_command, _decode_command),
-    Kind.GOAL_POSE: Payload("geometry_msgs/msg/PoseStamped", _encode_command, _decode_command),
+PAYLOADS: dict[SensorLinkKind, Payload] = {
+    SensorLinkKind.LASER_SCAN: Payload("sensor_msgs/msg/LaserScan", _encode_scan, _decode_scan),
+    SensorLinkKind.POSE: Payload("nav_msgs/msg/Odometry", _encode_pose, _decode_pose),
+    SensorLinkKind.IMU: Payload("sensor_msgs/msg/Imu", _encode_imu, _decode_imu),
+    SensorLinkKind.SONAR: Payload("sensor_msgs/msg/Range", _encode_sonar, _decode_sonar),
+    SensorLinkKind.IMAGE: Payload("sensor_msgs/msg/Image", _encode_image, _decode_image),
+    SensorLinkKind.POSE_COMMAND: Payload(
+        "geometry_msgs/msg/PoseStamped", _encode_command, _decode_command
+    ),
+    SensorLinkKind.GOAL_POSE: Payload(
+        "geometry_msgs/msg/PoseStamped", _encode_command, _decode_command
+    ),
 }

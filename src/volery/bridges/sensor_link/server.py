@@ -1,6 +1,6 @@
 """The environment's side of the sensor link: it listens, and tells everyone who connects.
 
-    doors.open(SensorLink(port=10100, image_port=10101))
+    bridges.open(SensorLink(port=10100, image_port=10101))
 
 Every client gets the frames of all sensors of all UAVs, and may send poses. Images go out on a port
 of their own, so that scans wait for none. Form of the frames: `volery.bridges.sensor_link.wire`.
@@ -12,11 +12,23 @@ import asyncio
 import errno
 from dataclasses import dataclass
 
-from volery.bridges.sensor_link.commands import Commands
-from volery.bridges.sensor_link.outbox import Outbox
+from volery.bridges.sensor_link.commands import SensorLinkCommands
+from volery.bridges.sensor_link.outbox import SensorLinkOutbox
 from volery.bridges.sensor_link.payloads import encode_notice
-from volery.bridges.sensor_link.streams import IMAGES, SENSORS, Stream, Streams, period_from_hz
-from volery.bridges.sensor_link.wire import VERSION, Frame, FrameParser, Kind, encode_frame
+from volery.bridges.sensor_link.streams import (
+    IMAGES,
+    SENSORS,
+    SensorStream,
+    SensorStreams,
+    period_from_hz,
+)
+from volery.bridges.sensor_link.wire import (
+    VERSION,
+    SensorLinkFrame,
+    SensorLinkKind,
+    SensorLinkParser,
+    encode_frame,
+)
 from volery.core.errors import BridgeError
 from volery.core.listener import Listener, open_listener
 from volery.core.network_access import check_address, tend
@@ -50,7 +62,7 @@ class ClientInfo:
 
 
 class SensorLink:
-    """A door for programs on the ROS side.
+    """A bridge for programs on the ROS side.
 
     Parameters
     ----------
@@ -118,7 +130,13 @@ class _Port:
     """One listening port and its clients."""
 
     def __init__(
-        self, host: str, port: int, kinds: tuple[Kind, ...], name: str, depth: int, period_ns: int
+        self,
+        host: str,
+        port: int,
+        kinds: tuple[SensorLinkKind, ...],
+        name: str,
+        depth: int,
+        period_ns: int,
     ) -> None:
         self.port = port
         self._host = host
@@ -129,7 +147,7 @@ class _Port:
         self._server: asyncio.Server | None = None
         self._listener: Listener | None = None
         self._clients: set[_Client] = set()
-        self._streams: Streams
+        self._streams: SensorStreams
 
     async def open(self, gateway: Gateway) -> None:
         loop = asyncio.get_running_loop()
@@ -144,7 +162,7 @@ class _Port:
             raise _cannot_listen(self._host, self.port, error) from None
         self.port = self._server.sockets[0].getsockname()[1]
         name = f"{self._name} {self._host}:{self.port}"
-        self._streams = Streams(
+        self._streams = SensorStreams(
             gateway, name, self._kinds, self._send, depth=self._depth, period_ns=self._period_ns
         )
 
@@ -195,7 +213,7 @@ class _Port:
     def infos(self) -> list[ClientInfo]:
         return sorted((client.info for client in tuple(self._clients)), key=lambda info: info.name)
 
-    def _send(self, stream: Stream, frame: bytes) -> None:
+    def _send(self, stream: SensorStream, frame: bytes) -> None:
         for client in tuple(self._clients):
             client.put(stream, frame)
 
@@ -207,8 +225,8 @@ class _Client(asyncio.Protocol):
         self._port = port
         self._gateway = gateway
         self._name = name
-        self._outbox = Outbox(port.depth)
-        self._parser = FrameParser(_COMMAND_LIMIT_BYTES)
+        self._outbox = SensorLinkOutbox(port.depth)
+        self._parser = SensorLinkParser(_COMMAND_LIMIT_BYTES)
         self._preamble = Preamble()
         self._paused = False
         self._notices = 0
@@ -227,7 +245,7 @@ class _Client(asyncio.Protocol):
             transport.close()
             return
         self._session = self._gateway.open(self._name)
-        self._commands = Commands(self._session)
+        self._commands = SensorLinkCommands(self._session)
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
         self._port.forget(self)
@@ -276,7 +294,7 @@ class _Client(asyncio.Protocol):
         self._paused = False
         self._flush()
 
-    def put(self, stream: Stream, frame: bytes) -> None:
+    def put(self, stream: SensorStream, frame: bytes) -> None:
         """Send a frame, or let it wait."""
         self._outbox.put(stream, frame)
         self._flush()
@@ -290,16 +308,16 @@ class _Client(asyncio.Protocol):
         parser, outbox = self._parser, self._outbox
         return ClientInfo(self._name, parser.frames, parser.corrupt, outbox.dropped, len(outbox))
 
-    def _take(self, frame: Frame) -> None:
+    def _take(self, frame: SensorLinkFrame) -> None:
         try:
             self._commands.take(frame)
         except BridgeError as error:
             self._notify(f"frame {frame.sequence} of UAV {frame.uav} is refused: {error}")
 
     def _notify(self, text: str) -> None:
-        frame = encode_frame(Kind.NOTICE, 0, self._notices, 0, encode_notice(text))
+        frame = encode_frame(SensorLinkKind.NOTICE, 0, self._notices, 0, encode_notice(text))
         self._notices += 1
-        self._outbox.put(Kind.NOTICE, frame)
+        self._outbox.put(SensorLinkKind.NOTICE, frame)
         self._flush()
 
     def _flush(self) -> None:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from volery.bridges.bridge_host import wake_of
 from volery.bridges.sensor_link.payloads import PAYLOADS, encode_payload, stamp_of
 from volery.bridges.sensor_link.wire import (
-    Kind,
+    SensorLinkKind,
     crc_of_head,
     encode_frame,
     encode_head,
@@ -23,8 +23,8 @@ from volery.graph.messages import Published
 from volery.graph.session import Gateway, Session
 from volery.graph.subscription_queue import SubscriptionQueue
 
-SENSORS = (Kind.LASER_SCAN, Kind.POSE, Kind.IMU, Kind.SONAR)
-IMAGES = (Kind.IMAGE,)
+SENSORS = (SensorLinkKind.LASER_SCAN, SensorLinkKind.POSE, SensorLinkKind.IMU, SensorLinkKind.SONAR)
+IMAGES = (SensorLinkKind.IMAGE,)
 
 _UAV_TOPIC = re.compile(r"/uav([1-9]\d{0,4})/(.+)")
 _MOST_UAVS = 0xFFFF
@@ -32,14 +32,14 @@ _NEW_TOPICS_PERIOD_S = 0.5
 _CRC_STEP_BYTES = 64 << 10
 """A fifth of a millisecond: so long others wait for an image's CRC."""
 
-Send = Callable[["Stream", bytes], None]
+Send = Callable[["SensorStream", bytes], None]
 """Takes a sensor's frame for all clients."""
 
 
-class Stream:
+class SensorStream:
     """One sensor's messages on their way to clients."""
 
-    def __init__(self, kind: Kind, uav: int, name: str) -> None:
+    def __init__(self, kind: SensorLinkKind, uav: int, name: str) -> None:
         self.kind = kind
         self.uav = uav
         self.name = name
@@ -53,12 +53,12 @@ class Stream:
 class Due(NamedTuple):
     """A message to be sent, and its number among those of its sensor."""
 
-    stream: Stream
+    stream: SensorStream
     published: Published
     sequence: int
 
 
-class Streams:
+class SensorStreams:
     """The sensors of some kinds. All methods belong to the event loop's thread.
 
     While nobody is connected nothing is subscribed. depth: messages a sensor that may wait here.
@@ -69,7 +69,7 @@ class Streams:
         self,
         gateway: Gateway,
         name: str,
-        kinds: Iterable[Kind],
+        kinds: Iterable[SensorLinkKind],
         send: Send,
         *,
         depth: int,
@@ -82,8 +82,8 @@ class Streams:
         self._depth = depth
         self._period_ns = period_ns
         self._session: Session | None = None
-        self._streams: dict[str, Stream] = {}
-        self._ready: deque[Stream] = deque()
+        self._streams: dict[str, SensorStream] = {}
+        self._ready: deque[SensorStream] = deque()
         self._come = asyncio.Event()
         self._woken = False
         self._tasks: list[asyncio.Task[None]] = []
@@ -116,13 +116,13 @@ class Streams:
                 if kind is not None and found is not None and int(found[1]) <= _MOST_UAVS:
                     stream = self._streams.get(topic.name)
                     if stream is None:
-                        stream = Stream(kind, int(found[1]), found[2])
+                        stream = SensorStream(kind, int(found[1]), found[2])
                         self._streams[topic.name] = stream
                     if stream.mailbox is None:
                         self._subscribe(topic.name, topic.msgtype, stream)
             await asyncio.sleep(_NEW_TOPICS_PERIOD_S)
 
-    def _subscribe(self, topic: str, msgtype: str, stream: Stream) -> None:
+    def _subscribe(self, topic: str, msgtype: str, stream: SensorStream) -> None:
         assert self._session is not None
 
         def stir() -> None:
@@ -146,7 +146,7 @@ class Streams:
                 for due in self._take(self._ready.popleft()):
                     await self._send_one(due)
 
-    def _take(self, stream: Stream) -> list[Due]:
+    def _take(self, stream: SensorStream) -> list[Due]:
         taken = [] if stream.mailbox is None else stream.mailbox.take()
         due = []
         for published in taken:
@@ -155,7 +155,7 @@ class Streams:
                 stream.sequence += 1
         return due
 
-    def _is_due(self, stream: Stream, time_ns: int) -> bool:
+    def _is_due(self, stream: SensorStream, time_ns: int) -> bool:
         """Whether the stream's rate lets a message of this time through."""
         period, went_back = self._period_ns, time_ns < stream.last_ns
         stream.last_ns = time_ns

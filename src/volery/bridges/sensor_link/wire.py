@@ -7,7 +7,7 @@ numbers are little-endian and packed without padding:
 |---|---|---|---|
 | 0 | 4 | | sync word `AA 56 4C 59` |
 | 4 | 1 | u8 | version of the protocol, 1 |
-| 5 | 1 | u8 | type of the payload, see `Kind` |
+| 5 | 1 | u8 | type of the payload, see `SensorLinkKind` |
 | 6 | 2 | u16 | number of the UAV, from 1; 0: none |
 | 8 | 4 | u32 | n, bytes of payload, at most `limit_of(kind)` |
 | 12 | 4 | u32 | sequence: one more with each frame of this type, UAV and sensor, modulo 2**32 |
@@ -39,7 +39,7 @@ OTHER_LIMIT_BYTES = 1 << 20
 _HEAD = struct.Struct("<BBHIIq")
 
 
-class Kind(IntEnum):
+class SensorLinkKind(IntEnum):
     """Types of payload; below 128 from the environment, from there on to it."""
 
     LASER_SCAN = 1
@@ -53,7 +53,7 @@ class Kind(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class SensorLinkFrame:
     """One frame, its checks passed; `kind` may be a type that is not known here."""
 
     kind: int
@@ -65,7 +65,7 @@ class Frame:
 
 def limit_of(kind: int) -> int:
     """Most bytes that a payload of this type may have."""
-    return IMAGE_LIMIT_BYTES if kind == Kind.IMAGE else OTHER_LIMIT_BYTES
+    return IMAGE_LIMIT_BYTES if kind == SensorLinkKind.IMAGE else OTHER_LIMIT_BYTES
 
 
 def encode_head(kind: int, uav: int, sequence: int, stamp_ns: int, payload_bytes: int) -> bytes:
@@ -100,7 +100,7 @@ def crc_of_head(head: bytes) -> int:
     return crc16(head[len(SYNC) :])
 
 
-class FrameParser(FrameScanner[Frame]):
+class SensorLinkParser(FrameScanner[SensorLinkFrame]):
     """Finds the sensor link's frames in a stream of bytes.
 
     limit_bytes: frames with longer payloads count as damaged, beside the limits of their types.
@@ -126,8 +126,8 @@ class FrameParser(FrameScanner[Frame]):
             return Flaw.LENGTH
         return int(length)
 
-    def frame_of(self, view: memoryview) -> Frame:
+    def frame_of(self, view: memoryview) -> SensorLinkFrame:
         """The frame of whole bytes."""
         _, kind, uav, _, sequence, stamp_ns = _HEAD.unpack_from(view, len(SYNC))
         payload = bytes(view[HEAD_BYTES : len(view) - CRC_BYTES])
-        return Frame(kind, uav, sequence, stamp_ns, payload)
+        return SensorLinkFrame(kind, uav, sequence, stamp_ns, payload)

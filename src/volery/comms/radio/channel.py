@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from volery.comms.addresses import is_station
 from volery.comms.link_model import Delivery
-from volery.comms.protocol import Frame
+from volery.comms.protocol import StationFrame
 from volery.comms.radio.path_loss import Paths, loss_db
 from volery.comms.radio.reception import air_time_ns, packet_error_rate, snr_db
 from volery.core import rng
 from volery.core.clock import NS_PER_S
-from volery.core.saved_state import keep, put_back
+from volery.core.saved_state import restore_attributes, save_attributes
 from volery.scenario.radio import Radio
 
 Array = NDArray[np.float64]
@@ -39,7 +39,7 @@ class _Sent(NamedTuple):
     ends_ns: int
 
 
-class RadioLink:
+class RadioChannel:
     """Decides over frames; call it in the order of time.
 
     seed: of the run; each pair has streams of its own, of which a frame's number takes its draws,
@@ -62,7 +62,9 @@ class RadioLink:
         self.counts: Counter[str] = Counter()
         """Frames `sent`, `received` and `faded` (once for each receiver), `crowded_out` before."""
 
-    def __call__(self, time_ns: int, source: int, destination: int, frame: Frame) -> Delivery:
+    def __call__(
+        self, time_ns: int, source: int, destination: int, frame: StationFrame
+    ) -> Delivery:
         """Fate of a frame on its way to one station."""
         before = self._sent.get(source)
         again = before is not None and before[:2] == (frame.session, frame.sequence)
@@ -102,13 +104,15 @@ class RadioLink:
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        return copy.deepcopy(keep(self, self.STATE))
+        return copy.deepcopy(save_attributes(self, self.STATE))
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
-        put_back(self, copy.deepcopy(state))
+        restore_attributes(self, copy.deepcopy(state))
 
-    def _try(self, source: int, destination: int, frame: Frame, snr: float) -> tuple[int, bool]:
+    def _try(
+        self, source: int, destination: int, frame: StationFrame, snr: float
+    ) -> tuple[int, bool]:
         """How often the frame is sent, and whether it is received at last."""
         tries = 1 + (self._radio.retries if is_station(frame.destination) else 0)
         if not np.isfinite(snr):

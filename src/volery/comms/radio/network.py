@@ -15,10 +15,10 @@ from typing import Any, Protocol
 from volery.comms.address_assignment import free_address
 from volery.comms.addresses import ALL, FIRST_GROUND, Identity
 from volery.comms.link_model import Delivery, Link, ideal_link
-from volery.comms.local_network import Exchange
+from volery.comms.local_network import LocalNetwork
 from volery.comms.payloads import decode_named, encode_named
-from volery.comms.protocol import Frame, Kind
-from volery.comms.radio.channel import RadioLink
+from volery.comms.protocol import StationFrame, StationFrameKind
+from volery.comms.radio.channel import RadioChannel
 from volery.comms.server.settings import RouterSettings
 from volery.core.errors import CommandError, CommsError
 from volery.graph.graph import Graph, Publisher, Subscription
@@ -57,7 +57,7 @@ class _Member:
     heard: dict[str, Publisher] = field(default_factory=dict)
 
 
-class RadioNet:
+class RadioNetwork:
     """The stations of a run.
 
     link: None for ideal ones. A message too long for a frame is dropped and counted.
@@ -68,14 +68,14 @@ class RadioNet:
         graph: Graph,
         timers: Timers,
         topics: tuple[RelayedTopic, ...],
-        link: RadioLink | None = None,
+        link: RadioChannel | None = None,
     ) -> None:
         self._graph = graph
         self._timers = timers
         self._topics = topics
         self._radio = link
         self._inner: Link = link or ideal_link
-        self._exchange = Exchange(_RULES, self._decide, graph.now_ns())
+        self._exchange = LocalNetwork(_RULES, self._decide, graph.now_ns())
         self._members: dict[str, _Member] = {}
         self._silent: Counter[int] = Counter()
         """How many faults there are of each station."""
@@ -85,7 +85,7 @@ class RadioNet:
         timers.every(_TICK_S, self._advance, wanted=lambda: bool(self._members))
 
     @property
-    def link(self) -> RadioLink | None:
+    def link(self) -> RadioChannel | None:
         """The model; None: links are ideal."""
         return self._radio
 
@@ -159,7 +159,7 @@ class RadioNet:
             station = self._exchange.station(self._members[name].address)
             try:
                 payload = encode_named(topic.name, topic.type, published.message)
-                station.send(Kind.SENSING, ALL, payload, now_ns)
+                station.send(StationFrameKind.SENSING, ALL, payload, now_ns)
             except CommsError:
                 self.too_long += 1
                 return
@@ -179,13 +179,13 @@ class RadioNet:
             self._due_ns = due_ns
             self._timers.at(due_ns, self._advance)
 
-    def _hear(self, address: int, frame: Frame) -> None:
+    def _hear(self, address: int, frame: StationFrame) -> None:
         named = decode_named(frame.payload)
         for member in self._members.values():
             if member.address == address and named.name in member.heard:
                 member.heard[named.name].publish(named.message)
 
-    def _decide(self, time_ns: int, source: int, destination: int, frame: Frame) -> Delivery:
+    def _decide(self, time_ns: int, source: int, destination: int, frame: StationFrame) -> Delivery:
         if self._silent[source] > 0 or self._silent[destination] > 0:
             return _LOST
         return self._inner(time_ns, source, destination, frame)

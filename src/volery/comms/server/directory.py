@@ -11,10 +11,10 @@ from collections.abc import Iterator
 
 from volery.comms.addresses import is_meant, is_station
 from volery.comms.control_payloads import Reason
-from volery.comms.protocol import Frame, Kind
-from volery.comms.server.mailbox import Mailbox
+from volery.comms.protocol import StationFrame, StationFrameKind
+from volery.comms.server.mailbox import StationQueue
 from volery.comms.server.rate import RateLimit
-from volery.comms.server.records import Known
+from volery.comms.server.records import StationRecord
 from volery.comms.server.settings import RouterSettings
 from volery.core.clock import NS_PER_S
 
@@ -26,27 +26,29 @@ class Directory:
 
     def __init__(self, settings: RouterSettings, now_ns: int) -> None:
         self._settings = settings
-        self._stations: dict[int, Known] = {}
+        self._stations: dict[int, StationRecord] = {}
         self._grace_ends_ns = now_ns + round(settings.grace_s * NS_PER_S)
-        self._to_many: deque[Frame] = deque()
+        self._to_many: deque[StationFrame] = deque()
         self._next_sweep_ns = now_ns
 
-    def find(self, address: int) -> Known | None:
+    def find(self, address: int) -> StationRecord | None:
         """A station that is known."""
         return self._stations.get(address)
 
-    def stations(self) -> list[Known]:
+    def stations(self) -> list[StationRecord]:
         """All that are known."""
         return list(self._stations.values())
 
-    def add(self, address: int, now_ns: int) -> Known:
+    def add(self, address: int, now_ns: int) -> StationRecord:
         """A station that is not known yet."""
         rules = self._settings
         rate = RateLimit(rules.rate_messages_s, rules.rate_bytes_s, rules.burst_messages, now_ns)
-        station = self._stations[address] = Known(address, Mailbox(rules), rate, left_ns=now_ns)
+        station = self._stations[address] = StationRecord(
+            address, StationQueue(rules), rate, left_ns=now_ns
+        )
         return station
 
-    def remove(self, address: int) -> list[Frame]:
+    def remove(self, address: int) -> list[StationFrame]:
         """Know a station no more; returns what waited for it."""
         return self._stations.pop(address).mailbox.clear()
 
@@ -54,29 +56,29 @@ class Directory:
         """Whether stations that have not been here count as known."""
         return now_ns < self._grace_ends_ns
 
-    def meant(self, frame: Frame) -> list[Known]:
+    def meant(self, frame: StationFrame) -> list[StationRecord]:
         """Stations that a message to many is meant for, its source left out.
 
         Sensing is not for those who have been away for long.
         """
-        lasts = frame.kind != Kind.SENSING
+        lasts = frame.kind != StationFrameKind.SENSING
         return [
             each
             for each in self._stations.values()
             if (lasts or not each.is_gone) and self._is_meant(each.address, frame)
         ]
 
-    def keep(self, frame: Frame) -> list[Frame]:
+    def keep(self, frame: StationFrame) -> list[StationFrame]:
         """Keep a message to many for those who come; returns what is kept no longer for it."""
         self._to_many.append(frame)
         too_many = max(len(self._to_many) - self._settings.grace_messages, 0)
         return [self._to_many.popleft() for _ in range(too_many)]
 
-    def kept_for(self, address: int) -> list[Frame]:
+    def kept_for(self, address: int) -> list[StationFrame]:
         """What is kept for a station that comes now."""
         return [frame for frame in self._to_many if self._is_meant(address, frame)]
 
-    def sweep(self, now_ns: int) -> Iterator[tuple[Frame, Reason | None]]:
+    def sweep(self, now_ns: int) -> Iterator[tuple[StationFrame, Reason | None]]:
         """What has become too old, with the reason for which it does not come.
 
         None: a message to many that is kept for nobody any more; who was here has it.
@@ -100,18 +102,18 @@ class Directory:
                     station.is_gone = True
                     yield from ((f, Reason.EXPIRED) for f in station.mailbox.expire_many())
 
-    def _is_forgotten(self, station: Known, now_ns: int) -> bool:
+    def _is_forgotten(self, station: StationRecord, now_ns: int) -> bool:
         if station.connection is not None:
             return False
         if not station.appeared:
             return not self.expects(now_ns)
         return now_ns - station.left_ns > self._settings.forget_s * NS_PER_S
 
-    def _becomes_gone(self, station: Known, now_ns: int) -> bool:
+    def _becomes_gone(self, station: StationRecord, now_ns: int) -> bool:
         away_ns = now_ns - station.left_ns
         waits = station.is_gone or station.connection is not None
         return not waits and away_ns > self._settings.keep_many_s * NS_PER_S
 
-    def _is_meant(self, address: int, frame: Frame) -> bool:
+    def _is_meant(self, address: int, frame: StationFrame) -> bool:
         planes = self._settings.planes_per_batch
         return address != frame.source and is_meant(address, frame.destination, planes)

@@ -11,9 +11,9 @@ import heapq
 from volery.comms.addresses import SERVER, is_station
 from volery.comms.control_payloads import Reason, Refusal, decode_received, encode_refusal
 from volery.comms.link_model import Link
-from volery.comms.protocol import Frame, Kind, encode_frame
+from volery.comms.protocol import StationFrame, StationFrameKind, encode_frame
 from volery.comms.server.directory import Directory
-from volery.comms.server.records import Known
+from volery.comms.server.records import StationRecord
 from volery.comms.server.settings import RouterSettings
 from volery.comms.server.statistics import Tally
 from volery.core.clock import NS_PER_S
@@ -24,7 +24,7 @@ _SETTLED_AT_ONCE = 64
 _SETTLED_NS = NS_PER_S // 5
 
 
-class PostOffice:
+class Dispatcher:
     """Knows the stations and carries their messages. now_ns: the clock at the start."""
 
     def __init__(self, settings: RouterSettings, now_ns: int, link: Link) -> None:
@@ -57,7 +57,7 @@ class PostOffice:
                 if station.settled:
                     self.wake(station)
 
-    def accept(self, source: Known, frame: Frame, now_ns: int) -> None:
+    def accept(self, source: StationRecord, frame: StationFrame, now_ns: int) -> None:
         """A message from a station, which may have sent it before."""
         if frame.sequence <= source.last:
             self.tally.counts["duplicates"] += 1
@@ -81,7 +81,7 @@ class PostOffice:
             for no_longer in self.directory.keep(frame):
                 self._settle(no_longer)
 
-    def take_received(self, station: Known, frame: Frame) -> None:
+    def take_received(self, station: StationRecord, frame: StationFrame) -> None:
         """A station tells what has come."""
         try:
             for entry in decode_received(frame.payload):
@@ -93,21 +93,25 @@ class PostOffice:
             return
         self.wake(station)  # there is room on its way again
 
-    def _receivers(self, frame: Frame, now_ns: int) -> list[Known] | None:
+    def _receivers(self, frame: StationFrame, now_ns: int) -> list[StationRecord] | None:
         """Stations that a message is meant for; None where nobody is known for whom it is.
 
         Sensing for many may have no receiver: nobody listens.
         """
         if not is_station(frame.destination):
             meant = self.directory.meant(frame)
-            vain = not meant and frame.kind == Kind.COMMAND and not self.directory.expects(now_ns)
+            vain = (
+                not meant
+                and frame.kind == StationFrameKind.COMMAND
+                and not self.directory.expects(now_ns)
+            )
             return None if vain else meant
         station = self.directory.find(frame.destination)
         if station is None and self.directory.expects(now_ns):
             station = self.expect(frame.destination, now_ns)
         return None if station is None else [station]
 
-    def expect(self, address: int, now_ns: int) -> Known:
+    def expect(self, address: int, now_ns: int) -> StationRecord:
         """A station not known before, with what was sent to many and is kept for it."""
         station = self.directory.add(address, now_ns)
         for frame in self.directory.kept_for(address):
@@ -123,7 +127,7 @@ class PostOffice:
         for frame in self.directory.remove(address):
             self._settle(frame)
 
-    def _post(self, station: Known, frame: Frame, now_ns: int) -> None:
+    def _post(self, station: StationRecord, frame: StationFrame, now_ns: int) -> None:
         """Put one message into one mailbox."""
         delivery = self._link(now_ns, frame.source, station.address, frame)
         if delivery.lost:
@@ -143,9 +147,9 @@ class PostOffice:
         if due_ns > now_ns:
             heapq.heappush(self._due, (due_ns, station.address))
 
-    def _dispose(self, frame: Frame, reason: Reason, at: int | None = None) -> None:
+    def _dispose(self, frame: StationFrame, reason: Reason, at: int | None = None) -> None:
         """Done with a message that does not come: told for commands, counted for sensing."""
-        if frame.kind == Kind.COMMAND or reason is Reason.UNKNOWN:
+        if frame.kind == StationFrameKind.COMMAND or reason is Reason.UNKNOWN:
             self.tally.refused[reason] += 1
             self._tell_refused(frame, reason, frame.destination if at is None else at)
         elif reason is Reason.FULL:
@@ -156,17 +160,19 @@ class PostOffice:
             self.tally.counts["expired"] += 1
         self._settle(frame)
 
-    def _tell_refused(self, frame: Frame, reason: Reason, at: int) -> None:
+    def _tell_refused(self, frame: StationFrame, reason: Reason, at: int) -> None:
         source = self.directory.find(frame.source)
         if source is None or source.session != frame.session:
             return
         known = is_station(at) or reason is not Reason.UNKNOWN
         text = _REFUSED[reason].format(at) if known else "nobody of them is here"
         refusal = encode_refusal(Refusal(reason, frame.sequence, text))
-        source.control.append(encode_frame(Kind.REFUSAL, SERVER, frame.source, payload=refusal))
+        source.control.append(
+            encode_frame(StationFrameKind.REFUSAL, SERVER, frame.source, payload=refusal)
+        )
         self.wake(source)
 
-    def _settle(self, frame: Frame) -> None:
+    def _settle(self, frame: StationFrame) -> None:
         """One station less that has not got this message."""
         source = self.directory.find(frame.source)
         if source is None or source.session != frame.session:
@@ -179,7 +185,7 @@ class PostOffice:
             if len(source.settled) >= _SETTLED_AT_ONCE:
                 self.wake(source)
 
-    def wake(self, station: Known | None) -> None:
+    def wake(self, station: StationRecord | None) -> None:
         """There is something to send to a station."""
         if station is not None and station.connection is not None:
             self.woken.add(station.connection)

@@ -12,14 +12,14 @@ from typing import NamedTuple
 
 from volery.comms.addresses import is_station
 from volery.comms.control_payloads import Received
-from volery.comms.protocol import Frame, Kind
+from volery.comms.protocol import StationFrame, StationFrameKind
 from volery.comms.server.settings import RouterSettings
 
 
-class Waiting(NamedTuple):
+class QueuedMessage(NamedTuple):
     """A message in a mailbox."""
 
-    frame: Frame
+    frame: StationFrame
     arrived_ns: int
     due_ns: int
     """Not to be handed over before."""
@@ -27,11 +27,11 @@ class Waiting(NamedTuple):
     """Counts the messages of a lane."""
 
 
-class Posted(NamedTuple):
+class SentMessage(NamedTuple):
     """What became of a new message."""
 
     kept: bool
-    dropped: tuple[Frame, ...] = ()
+    dropped: tuple[StationFrame, ...] = ()
     """Measurements that had to go for it."""
 
 
@@ -39,9 +39,9 @@ class _Lane:
     """Messages from one source, commands and sensing apart, so that either can be bounded."""
 
     def __init__(self) -> None:
-        self.commands: deque[Waiting] = deque()
-        self.sensing: deque[Waiting] = deque()
-        self.sent: deque[Waiting] = deque()
+        self.commands: deque[QueuedMessage] = deque()
+        self.sensing: deque[QueuedMessage] = deque()
+        self.sent: deque[QueuedMessage] = deque()
         """On their way: the station has not yet told that they came."""
         self.last_due_ns = 0
         self.count = 0
@@ -49,17 +49,17 @@ class _Lane:
     def __len__(self) -> int:
         return len(self.commands) + len(self.sensing)
 
-    def of(self, kind: int) -> deque[Waiting]:
-        return self.commands if kind == Kind.COMMAND else self.sensing
+    def of(self, kind: int) -> deque[QueuedMessage]:
+        return self.commands if kind == StationFrameKind.COMMAND else self.sensing
 
-    def next(self) -> deque[Waiting]:
+    def next(self) -> deque[QueuedMessage]:
         """The queue whose first message is the lane's first."""
         if not self.commands or not self.sensing:
             return self.commands or self.sensing
         earlier = self.commands[0].number < self.sensing[0].number
         return self.commands if earlier else self.sensing
 
-    def acknowledged(self, upto: Received) -> Iterator[Waiting]:
+    def acknowledged(self, upto: Received) -> Iterator[QueuedMessage]:
         """Remove what came, up to a sequence of a session; what was sent before it came too."""
         last = -1
         for index, waiting in enumerate(self.sent):
@@ -78,7 +78,7 @@ class _Lane:
             self.of(waiting.frame.kind).appendleft(waiting)
 
 
-class Mailbox:
+class StationQueue:
     """Bounded queues of messages for one station."""
 
     def __init__(self, settings: RouterSettings) -> None:
@@ -92,25 +92,25 @@ class Mailbox:
         """Messages that wait or are on their way."""
         return sum(len(lane) for lane in self._lanes.values()) + self._on_the_way
 
-    def put(self, frame: Frame, now_ns: int, delay_ns: int = 0) -> tuple[Posted, int]:
+    def put(self, frame: StationFrame, now_ns: int, delay_ns: int = 0) -> tuple[SentMessage, int]:
         """Add a message; also when it may go. A full lane drops its oldest sensing, no command."""
         lane = self._lanes.setdefault(frame.source, _Lane())
         queue, size = lane.of(frame.kind), len(frame.data)
-        dropped: list[Frame] = []
+        dropped: list[StationFrame] = []
         while self._is_full(queue, size):
-            if frame.kind == Kind.COMMAND or not queue:
-                return Posted(False, tuple(dropped)), 0
+            if frame.kind == StationFrameKind.COMMAND or not queue:
+                return SentMessage(False, tuple(dropped)), 0
             dropped.append(queue.popleft().frame)
             self._bytes -= len(dropped[-1].data)
         if frame.source not in self._turns:
             self._turns.append(frame.source)
         lane.last_due_ns = due_ns = max(lane.last_due_ns, now_ns + delay_ns)
         lane.count += 1
-        queue.append(Waiting(frame, now_ns, due_ns, lane.count))
+        queue.append(QueuedMessage(frame, now_ns, due_ns, lane.count))
         self._bytes += size
-        return Posted(True, tuple(dropped)), due_ns
+        return SentMessage(True, tuple(dropped)), due_ns
 
-    def take(self, now_ns: int) -> Frame | None:
+    def take(self, now_ns: int) -> StationFrame | None:
         """The next message, whose source then is the last to have its turn; None: nothing is due.
 
         It counts as on its way until `received`; at most `window` do.
@@ -135,7 +135,7 @@ class Mailbox:
             return waiting.frame
         return None
 
-    def received(self, upto: Received) -> list[Frame]:
+    def received(self, upto: Received) -> list[StationFrame]:
         """Remove and return what the station has told to have come."""
         lane = self._lanes.get(upto.source)
         if lane is None:
@@ -154,9 +154,9 @@ class Mailbox:
                 self._turns.append(source)
         self._on_the_way = 0
 
-    def expire(self, before_ns: int) -> list[Frame]:
+    def expire(self, before_ns: int) -> list[StationFrame]:
         """Remove and return what has waited since before an instant."""
-        old: list[Frame] = []
+        old: list[StationFrame] = []
         for source, lane in list(self._lanes.items()):
             for queue in (lane.commands, lane.sensing):
                 while queue and queue[0].arrived_ns < before_ns:
@@ -166,9 +166,9 @@ class Mailbox:
             self._forget_empty(source, lane)
         return old
 
-    def expire_many(self) -> list[Frame]:
+    def expire_many(self) -> list[StationFrame]:
         """Remove and return the sensing that was sent to many."""
-        old: list[Frame] = []
+        old: list[StationFrame] = []
         for source, lane in list(self._lanes.items()):
             gone = [w.frame for w in lane.sensing if not is_station(w.frame.destination)]
             if gone:
@@ -179,7 +179,7 @@ class Mailbox:
             self._forget_empty(source, lane)
         return old
 
-    def clear(self) -> list[Frame]:
+    def clear(self) -> list[StationFrame]:
         """Remove and return everything."""
         self.rewind()
         lanes = self._lanes.values()
@@ -189,7 +189,7 @@ class Mailbox:
         self._bytes = 0
         return everything
 
-    def _is_full(self, queue: deque[Waiting], size: int) -> bool:
+    def _is_full(self, queue: deque[QueuedMessage], size: int) -> bool:
         rules = self._settings
         return len(queue) >= rules.lane_depth or self._bytes + size > rules.mailbox_bytes
 

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, field
 
-from volery.comms.protocol import FrameParser
-from volery.comms.server.mailbox import Mailbox
+from volery.comms.protocol import StationFrameParser
+from volery.comms.server.mailbox import StationQueue
 from volery.comms.server.rate import RateLimit
 
 
 @dataclass(slots=True)
-class Known:
+class StationRecord:
     """A station that has been here, or is expected."""
 
     address: int
-    mailbox: Mailbox
+    mailbox: StationQueue
     rate: RateLimit
     name: str = ""
     connection: int | None = None
@@ -36,13 +36,13 @@ class Known:
 
 
 @dataclass(slots=True)
-class Connection:
+class StationConnection:
     """A connection, identified or not."""
 
     opened_ns: int
     heard_ns: int
-    station: Known | None = None
-    parser: FrameParser = field(default_factory=FrameParser)
+    station: StationRecord | None = None
+    parser: StationFrameParser = field(default_factory=StationFrameParser)
     control: list[bytes] = field(default_factory=list)
     is_held: bool = False
     """Whether what it has sent waits elsewhere."""

@@ -26,10 +26,10 @@ from volery.comms.control_payloads import (
     encode_welcome,
 )
 from volery.comms.link_model import Link, ideal_link
-from volery.comms.protocol import MESSAGES, Frame, Kind, encode_frame
+from volery.comms.protocol import MESSAGES, StationFrame, StationFrameKind, encode_frame
 from volery.comms.server.admission import admit
-from volery.comms.server.dispatcher import PostOffice
-from volery.comms.server.records import Connection, Known
+from volery.comms.server.dispatcher import Dispatcher
+from volery.comms.server.records import StationConnection, StationRecord
 from volery.comms.server.settings import RouterSettings
 from volery.comms.server.statistics import Statistics
 from volery.core.clock import NS_PER_S
@@ -57,9 +57,9 @@ class Router:
     ) -> None:
         self._settings = settings
         self._boot = boot
-        self._connections: dict[int, Connection] = {}
+        self._connections: dict[int, StationConnection] = {}
         self._opened = 0
-        self._office = PostOffice(settings, now_ns, link)
+        self._office = Dispatcher(settings, now_ns, link)
         self._tally = self._office.tally
         self._directory = self._office.directory
         self._woken = self._office.woken
@@ -72,7 +72,7 @@ class Router:
             self._tally.refused[Reason.FULL] += 1
             return None
         self._opened += 1
-        self._connections[self._opened] = Connection(now_ns, now_ns)
+        self._connections[self._opened] = StationConnection(now_ns, now_ns)
         return self._opened
 
     def receive(self, connection: int, data: bytes | memoryview, now_ns: int) -> None:
@@ -178,7 +178,9 @@ class Router:
 
     # ------------------------------------------------------------------------------------ frames
 
-    def _take_frame(self, number: int, connection: Connection, frame: Frame, now_ns: int) -> None:
+    def _take_frame(
+        self, number: int, connection: StationConnection, frame: StationFrame, now_ns: int
+    ) -> None:
         station = connection.station
         if station is None:
             self._greet(number, connection, frame, now_ns)
@@ -188,17 +190,19 @@ class Router:
             self._refuse_connection(number, Reason.PROTOCOL, "a frame in another's name")
         elif frame.kind in MESSAGES:
             self._office.accept(station, frame, now_ns)
-        elif frame.kind == Kind.RECEIVED:
+        elif frame.kind == StationFrameKind.RECEIVED:
             self._office.take_received(station, frame)
-        elif frame.kind == Kind.PING:
-            station.control.append(encode_frame(Kind.PONG, SERVER, station.address))
+        elif frame.kind == StationFrameKind.PING:
+            station.control.append(encode_frame(StationFrameKind.PONG, SERVER, station.address))
             self._office.wake(station)
         else:
             self._tally.counts["unexpected"] += 1
 
-    def _greet(self, number: int, connection: Connection, frame: Frame, now_ns: int) -> None:
+    def _greet(
+        self, number: int, connection: StationConnection, frame: StationFrame, now_ns: int
+    ) -> None:
         try:
-            if frame.kind != Kind.HELLO:
+            if frame.kind != StationFrameKind.HELLO:
                 raise CommsError("the first frame must be HELLO")
             refused = admit(decode_hello(frame.payload), frame.source, self._settings)
         except CommsError as error:
@@ -220,11 +224,13 @@ class Router:
         station.settled.clear()  # WELCOME tells it by what it leaves away
         welcome = Welcome(self._boot, station.last, tuple(station.unsettled)[:MOST_SEQUENCES])
         connection.control.append(
-            encode_frame(Kind.WELCOME, SERVER, station.address, payload=encode_welcome(welcome))
+            encode_frame(
+                StationFrameKind.WELCOME, SERVER, station.address, payload=encode_welcome(welcome)
+            )
         )
         self._woken.add(number)
 
-    def _replace(self, station: Known) -> None:
+    def _replace(self, station: StationRecord) -> None:
         """The same station anew: the newest wins, since the old connection is most often dead."""
         old = station.connection
         if old is not None:
@@ -235,12 +241,14 @@ class Router:
 
     # ------------------------------------------------------------------------------------ small
 
-    def _settled_frame(self, station: Known) -> bytes:
+    def _settled_frame(self, station: StationRecord) -> bytes:
         told = station.settled[:MOST_SEQUENCES]
         del station.settled[:MOST_SEQUENCES]
-        return encode_frame(Kind.SETTLED, SERVER, station.address, payload=encode_settled(told))
+        return encode_frame(
+            StationFrameKind.SETTLED, SERVER, station.address, payload=encode_settled(told)
+        )
 
-    def _end_silent(self, number: int, connection: Connection, now_ns: int) -> None:
+    def _end_silent(self, number: int, connection: StationConnection, now_ns: int) -> None:
         greeted = connection.station is not None
         since = connection.heard_ns if greeted else connection.opened_ns
         allowed_s = self._settings.silence_s if greeted else self._settings.hello_s
@@ -256,6 +264,8 @@ class Router:
         self._tally.refused[reason] += 1
         payload = encode_refusal(Refusal(reason, 0, text))
         to = 0 if connection.station is None else connection.station.address
-        connection.control.append(encode_frame(Kind.REFUSAL, SERVER, to, payload=payload))
+        connection.control.append(
+            encode_frame(StationFrameKind.REFUSAL, SERVER, to, payload=payload)
+        )
         connection.closing = True
         self._woken.add(number)

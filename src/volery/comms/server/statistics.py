@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from volery.comms.control_payloads import Reason
-from volery.comms.protocol import FrameParser
+from volery.comms.protocol import StationFrameParser
 from volery.core.framing import Flaw
 
 
@@ -61,13 +61,13 @@ class Tally:
         self.refused: Counter[Reason] = Counter()
         self.corrupt: Counter[Flaw] = Counter()
 
-    def add(self, parser: FrameParser) -> None:
+    def add(self, parser: StationFrameParser) -> None:
         """Keep the counts of a connection that has ended."""
         self.corrupt.update(parser.flaws)
         self.counts["noise_bytes"] += parser.noise_bytes
 
     def statistics(
-        self, parsers: Sequence[FrameParser], present: int, away: int, waiting: int
+        self, parsers: Sequence[StationFrameParser], present: int, away: int, waiting: int
     ) -> Statistics:
         """The counts and how things stand. parsers: of the open connections."""
         count = self.counts

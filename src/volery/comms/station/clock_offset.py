@@ -17,7 +17,7 @@ _LONGEST_KEPT_NS = 65 * NS_PER_S
 """Older than a server keeps messages, and a little: then the clocks differ. Modelling choices."""
 
 
-class Freshness:
+class ClockOffset:
     """Of the messages of one source."""
 
     def __init__(self) -> None:

@@ -28,9 +28,15 @@ from volery.comms.control_payloads import (
     encode_hello,
     encode_received,
 )
-from volery.comms.protocol import MESSAGES, Frame, FrameParser, Kind, encode_frame
-from volery.comms.station.receive_log import Inbox
-from volery.comms.station.send_buffer import Held
+from volery.comms.protocol import (
+    MESSAGES,
+    StationFrame,
+    StationFrameKind,
+    StationFrameParser,
+    encode_frame,
+)
+from volery.comms.station.receive_log import ReceiveLog
+from volery.comms.station.send_buffer import SendBuffer
 from volery.core.clock import NS_PER_S
 from volery.core.errors import CommsError
 
@@ -65,9 +71,9 @@ class StationCore:
         self._session = session
         hello = Hello(identity.batch, identity.plane, planes_per_batch, name, token or "")
         self._hello = encode_hello(hello)
-        self._parser = FrameParser()
-        self._held = Held()
-        self._inbox = Inbox()
+        self._parser = StationFrameParser()
+        self._held = SendBuffer()
+        self._inbox = ReceiveLog()
         self._out: list[bytes] = []
         self._sequence = 0
         self._spoke_ns = 0
@@ -104,22 +110,22 @@ class StationCore:
 
     def connected(self, now_ns: int) -> None:
         """A new connection: introduce ourselves."""
-        self._parser = FrameParser()
+        self._parser = StationFrameParser()
         self._heard_ns = now_ns
         self.joined = False
         self._out = []
-        self._say(Kind.HELLO, self._hello, now_ns)
+        self._say(StationFrameKind.HELLO, self._hello, now_ns)
 
     def disconnected(self) -> None:
         """The connection has ended."""
         self.corrupt += self._parser.corrupt
-        self._parser = FrameParser()
+        self._parser = StationFrameParser()
         self.joined = False
         self._out = []
 
     def send(
         self,
-        kind: Kind,
+        kind: StationFrameKind,
         destination: int,
         payload: bytes,
         now_ns: int,
@@ -155,7 +161,7 @@ class StationCore:
             self._spoke_ns = now_ns
         return sequence
 
-    def feed(self, data: bytes | memoryview, now_ns: int) -> list[Frame]:
+    def feed(self, data: bytes | memoryview, now_ns: int) -> list[StationFrame]:
         """New messages in these bytes."""
         messages = []
         for frame in self._parser.feed(data):
@@ -176,7 +182,7 @@ class StationCore:
         told = self._inbox.take()
         for start in range(0, len(told), _MOST_RECEIVED):
             part = told[start : start + _MOST_RECEIVED]
-            self._say(Kind.RECEIVED, encode_received(part), now_ns)
+            self._say(StationFrameKind.RECEIVED, encode_received(part), now_ns)
 
     @property
     def has_to_acknowledge(self) -> bool:
@@ -187,7 +193,7 @@ class StationCore:
         """Acknowledge, and keep the connection alive; call it every second or more often."""
         self.acknowledge(now_ns)
         if self.joined and now_ns - self._spoke_ns >= _PING_NS * 9 // 10:
-            self._say(Kind.PING, b"", now_ns)
+            self._say(StationFrameKind.PING, b"", now_ns)
 
     def is_deaf(self, now_ns: int) -> bool:
         """Whether nothing has come for so long that the server must be taken for dead."""
@@ -199,13 +205,13 @@ class StationCore:
         self._out = []
         return data
 
-    def _take_control(self, frame: Frame) -> None:
+    def _take_control(self, frame: StationFrame) -> None:
         try:
-            if frame.kind == Kind.SETTLED:
+            if frame.kind == StationFrameKind.SETTLED:
                 self._held.settle(decode_settled(frame.payload))
-            elif frame.kind == Kind.WELCOME:
+            elif frame.kind == StationFrameKind.WELCOME:
                 self._take_welcome(frame.payload)
-            elif frame.kind == Kind.REFUSAL:
+            elif frame.kind == StationFrameKind.REFUSAL:
                 self._take_refusal(decode_refusal(frame.payload))
         except CommsError:
             self.corrupt += 1
@@ -224,7 +230,7 @@ class StationCore:
         elif refusal.reason in FATAL:
             self.fatal = refusal
 
-    def _say(self, kind: Kind, payload: bytes, now_ns: int) -> None:
+    def _say(self, kind: StationFrameKind, payload: bytes, now_ns: int) -> None:
         self._out.append(
             encode_frame(kind, self.address, SERVER, self._session, 0, now_ns, payload)
         )

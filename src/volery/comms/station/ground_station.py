@@ -21,15 +21,15 @@ from volery.comms.payloads import (
     decode_named,
     encode_named,
 )
-from volery.comms.protocol import Frame, Kind
+from volery.comms.protocol import StationFrame, StationFrameKind
 from volery.comms.station.address_parsing import address_of
-from volery.comms.station.clock_offset import Freshness
+from volery.comms.station.clock_offset import ClockOffset
 from volery.comms.station.statuses import mission_gist, slam_gist
 from volery.core.clock import NS_PER_S
 from volery.core.errors import CommsError
 from volery.graph.messages import Point, message_type
 
-Send = Callable[[Kind, int, bytes], int]
+Send = Callable[[StationFrameKind, int, bytes], int]
 
 HELP = """\
 list                        state of each UAV; of those that tell it, mission and SLAM
@@ -52,7 +52,7 @@ _TYPED = {"return_home": "return", "take_off_to": "take_off"}
 """Words of people for commands of another name."""
 
 
-class Row(NamedTuple):
+class StationRow(NamedTuple):
     """One UAV, for a table."""
 
     name: str
@@ -82,7 +82,7 @@ HEAD = (
 )
 
 
-class Ground:
+class GroundStation:
     """Knows what UAVs tell, and turns lines into commands.
 
     send: sends a message, as `Station.send`. planes_per_batch: as of the server. is_joined: whether
@@ -99,12 +99,12 @@ class Ground:
         self._is_joined = is_joined
         self._planes = planes_per_batch
         self._states: dict[int, tuple[Any, int]] = {}
-        self._fresh: dict[int, Freshness] = {}
+        self._fresh: dict[int, ClockOffset] = {}
         self._missions: dict[int, Any] = {}
         self._slams: dict[int, str] = {}
         self._asked: dict[int, str] = {}
 
-    def take(self, frame: Frame, now_ns: int) -> str | None:
+    def take(self, frame: StationFrame, now_ns: int) -> str | None:
         """Take a message; a line to be shown, where there is something to say.
 
         now_ns: by a clock that never goes back, near the time of day that stations put on frames.
@@ -115,7 +115,7 @@ class Ground:
             return f"{self._name(frame.source)}: {error}"
         if named[:2] == (STATE, STATE_TYPE):
             before = self._states.get(frame.source)
-            fresh = self._fresh.setdefault(frame.source, Freshness())
+            fresh = self._fresh.setdefault(frame.source, ClockOffset())
             made_ns = fresh.made_ns(frame.time_ns, now_ns)
             self._states[frame.source] = named.message, made_ns
             mode = named.message.mode
@@ -147,7 +147,7 @@ class Ground:
         asked = self._asked.get(refusal.sequence)
         return f"refused: {asked + ': ' if asked else ''}{refusal.text}"
 
-    def rows(self, now_ns: int) -> list[Row]:
+    def rows(self, now_ns: int) -> list[StationRow]:
         """Every UAV that has been heard, by address."""
         return [
             self._row(address, state, now_ns - made_ns)
@@ -174,7 +174,9 @@ class Ground:
         address = address_of(rest[0], self._planes, names)
         request = f"{COMMANDS[name]}_Request"
         message = message_type(request)(**fields)
-        sequence = self._send(Kind.COMMAND, address, encode_named(name, request, message))
+        sequence = self._send(
+            StationFrameKind.COMMAND, address, encode_named(name, request, message)
+        )
         said = f"{word} to {rest[0]}"
         self._asked[sequence] = said
         anybody = is_station(address) or any(
@@ -208,11 +210,11 @@ class Ground:
             return f"ground{identity.plane}"
         return f"{identity.batch}.{identity.plane}"
 
-    def _row(self, address: int, state: Any, age_ns: int) -> Row:
+    def _row(self, address: int, state: Any, age_ns: int) -> StationRow:
         place, velocity = state.position, state.velocity
         mission = self._missions.get(address)
         speed = math.hypot(velocity.x, velocity.y, velocity.z)
-        return Row(
+        return StationRow(
             state.name,
             self._label(address),
             state.mode,

@@ -18,7 +18,7 @@ from typing import Any
 from volery.comms.address_assignment import free_address
 from volery.comms.addresses import ALL, PLANES_PER_BATCH, Identity
 from volery.comms.payloads import decode_named, encode_named
-from volery.comms.protocol import Frame, Kind
+from volery.comms.protocol import StationFrame, StationFrameKind
 from volery.comms.server.tcp import PORT
 from volery.comms.station.tcp import Station
 from volery.core.errors import CommsError, GraphError
@@ -56,7 +56,7 @@ class RadioNode(Node):
         name = self.get_namespace().strip("/")
         identity = Identity.of(free_address(name, ()) if number < 0 else number, planes)
 
-        self._heard: queue.Queue[Frame] = queue.Queue(_HEARD_MOST)
+        self._heard: queue.Queue[StationFrame] = queue.Queue(_HEARD_MOST)
         self._publishers = {}
         for text in topics:
             topic, msgtype = _topic_of(text)
@@ -107,9 +107,9 @@ class RadioNode(Node):
 
     def _send(self, payload: bytes) -> None:
         with contextlib.suppress(CommsError):  # no room: as good as lost
-            self._station.send(Kind.SENSING, ALL, payload)
+            self._station.send(StationFrameKind.SENSING, ALL, payload)
 
-    def _take(self, frame: Frame) -> None:
+    def _take(self, frame: StationFrame) -> None:
         """In the loop's thread: keep for the node's own; the oldest goes where there is no room."""
         while True:
             with contextlib.suppress(queue.Full):

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from volery.comms.control_payloads import Received
-from volery.comms.protocol import Frame
+from volery.comms.protocol import StationFrame
 
 _SESSIONS_KEPT = 8
 """Of each source: a source that started anew may still have messages of before on their way."""
 
 
-class Inbox:
+class ReceiveLog:
     """Remembers how far each source has come in each of its latest sessions."""
 
     def __init__(self) -> None:
@@ -23,7 +23,7 @@ class Inbox:
         """Messages since the last `take`."""
         return self._unacknowledged
 
-    def is_new(self, frame: Frame) -> bool:
+    def is_new(self, frame: StationFrame) -> bool:
         """Whether a message comes for the first time; it will be acknowledged in either case."""
         sessions = self._last.setdefault(frame.source, {})
         last = sessions.get(frame.session, 0)

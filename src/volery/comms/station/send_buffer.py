@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable
 from typing import NamedTuple
 
 from volery.comms.addresses import is_station
-from volery.comms.protocol import Kind
+from volery.comms.protocol import StationFrameKind
 from volery.core.errors import CommsError
 from volery.core.plurals import counted
 
@@ -17,17 +17,17 @@ MOST = 4000
 
 
 class _Message(NamedTuple):
-    kind: Kind
+    kind: StationFrameKind
     destination: int
     data: bytes
 
 
-class Held:
+class SendBuffer:
     """Messages by sequence, oldest first."""
 
     def __init__(self) -> None:
         self._messages: dict[int, _Message] = {}
-        self._of: dict[int, dict[int, Kind]] = {}
+        self._of: dict[int, dict[int, StationFrameKind]] = {}
         """By destination: kinds by sequence."""
         self.dropped = 0
         """Measurements that had to go for newer ones."""
@@ -39,12 +39,14 @@ class Held:
         """Whether a message is held."""
         return sequence in self._messages
 
-    def put(self, sequence: int, kind: Kind, destination: int, data: bytes) -> None:
+    def put(self, sequence: int, kind: StationFrameKind, destination: int, data: bytes) -> None:
         """Hold a message. `CommsError` where there is no room, nor a measurement to give way."""
         there = self._of.setdefault(destination, {})
         if len(there) >= MOST_A_DESTINATION or len(self._messages) >= MOST:
-            oldest = next((s for s, held in there.items() if held is Kind.SENSING), None)
-            if kind is Kind.COMMAND or oldest is None:
+            oldest = next(
+                (s for s, held in there.items() if held is StationFrameKind.SENSING), None
+            )
+            if kind is StationFrameKind.COMMAND or oldest is None:
                 raise CommsError(
                     f"{counted(len(there), 'message')} to {destination} and "
                     f"{len(self._messages)} in all are not settled yet: no room for another one"

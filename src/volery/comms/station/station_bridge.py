@@ -1,6 +1,6 @@
-"""A door that makes every UAV of a graph a station: it tells its state and takes commands.
+"""A bridge that makes every UAV of a graph a station: it tells its state and takes commands.
 
-    doors.open(UavStations("127.0.0.1", 10200))
+    bridges.open(StationBridge("127.0.0.1", 10200))
 
 Where a UAV has a mission (`task_manager`), that takes hold, land and return, so that it does not
 fly on against them; before a `go_to` it is put on hold.
@@ -32,7 +32,7 @@ from volery.comms.payloads import (
     decode_named,
     encode_named,
 )
-from volery.comms.protocol import Frame, Kind
+from volery.comms.protocol import StationFrame, StationFrameKind
 from volery.comms.server.tcp import PORT
 from volery.comms.station.statuses import slam_gist
 from volery.comms.station.tcp import Station
@@ -82,7 +82,7 @@ def _gist(message: Any) -> object:
     return slam_gist(message.data)
 
 
-class UavStations:
+class StationBridge:
     """One station for each UAV.
 
     host, port, token, planes_per_batch: of the communication server, as of `Station`.
@@ -173,8 +173,8 @@ class UavStations:
         await station.start(timeout_s=None)
         return station
 
-    def _take(self, session: Session, uav: str, frame: Frame) -> None:
-        if frame.kind != Kind.COMMAND:
+    def _take(self, session: Session, uav: str, frame: StationFrame) -> None:
+        if frame.kind != StationFrameKind.COMMAND:
             return
         tell = partial(self._tell, uav, frame.source)
         try:
@@ -226,4 +226,4 @@ class UavStations:
 def _send(station: Station, to: int, payload: bytes) -> None:
     """Send a measurement; where nothing can be held any more it is as good as lost by radio."""
     with contextlib.suppress(CommsError):
-        station.send(Kind.SENSING, to, payload)
+        station.send(StationFrameKind.SENSING, to, payload)

@@ -17,7 +17,7 @@ from collections.abc import Callable
 
 from volery.comms.addresses import PLANES_PER_BATCH, Identity
 from volery.comms.control_payloads import Refusal
-from volery.comms.protocol import Frame, Kind
+from volery.comms.protocol import StationFrame, StationFrameKind
 from volery.comms.server.tcp import PORT
 from volery.comms.station.core import StationCore
 from volery.core.errors import CommsError
@@ -55,7 +55,7 @@ class Station:
     def __init__(
         self,
         identity: Identity,
-        on_message: Callable[[Frame], None] = _ignore,
+        on_message: Callable[[StationFrame], None] = _ignore,
         on_refusal: Callable[[Refusal], None] = _ignore,
         *,
         on_joined: Callable[[bool], None] = _ignore,
@@ -125,7 +125,7 @@ class Station:
             self._pipe.transport.abort()
             self._lost(self._pipe)
 
-    def send(self, kind: Kind, destination: int, payload: bytes) -> int:
+    def send(self, kind: StationFrameKind, destination: int, payload: bytes) -> int:
         """Send a message, now or when there is a server; `CommsError` as of `StationCore.send`."""
         sequence = self.core.send(kind, destination, payload, time.monotonic_ns(), time.time_ns())
         if not self._sends:  # once for all that is sent in this turn of the loop

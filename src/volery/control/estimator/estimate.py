@@ -27,7 +27,7 @@ class Estimate(NamedTuple):
     """(N, 3) m/s^2, body axes."""
 
 
-class Gate(NamedTuple):
+class InnovationGate(NamedTuple):
     """How one aid fared since the start, rows of UAVs."""
 
     innovation: Array

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from volery.control.estimator.alignment import start_covariance
 from volery.control.estimator.checks import checked_rows, each_of, shaped
-from volery.control.estimator.estimate import Estimate, Gate
+from volery.control.estimator.estimate import Estimate, InnovationGate
 from volery.control.estimator.filter_kernels import predict_rows
 from volery.control.estimator.output_predictor import present_covariances
 from volery.control.estimator.queue_kernels import enqueue_rows
@@ -29,7 +29,7 @@ from volery.control.estimator.records import (
     STATES,
     TUNING,
     WORK,
-    Aid,
+    AidingSource,
     tuning_of,
 )
 from volery.control.estimator.settings import EstimatorSettings, Mounting, StartSigmas
@@ -264,9 +264,9 @@ class Estimator:
         present_covariances(self._filters, self._tunings, self._rings, rows, self._work, out)
         return out.reshape(-1, STATES, STATES)
 
-    def gate(self, aid: Aid) -> Gate:
+    def gate(self, aid: AidingSource) -> InnovationGate:
         """Views of how measurements of an aid passed their gate."""
-        return Gate(*(self._filters[name][:, aid] for name in Gate._fields))
+        return InnovationGate(*(self._filters[name][:, aid] for name in InnovationGate._fields))
 
     @property
     def restarts(self) -> NDArray[np.int64]:

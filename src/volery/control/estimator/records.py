@@ -26,7 +26,7 @@ QUEUE = 96
 """Measurements of one UAV that can wait for the horizon."""
 
 
-class Aid(IntEnum):
+class AidingSource(IntEnum):
     """What corrects the filter, each with its own gate."""
 
     GNSS_POSITION = PARTS * GNSS

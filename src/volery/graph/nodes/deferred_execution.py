@@ -22,7 +22,7 @@ from volery.core.errors import GraphError
 Action = Callable[[], Any]
 
 
-class Deferring(Protocol):
+class Deferred(Protocol):
     """Whoever can do something at a simulated time."""
 
     def at(self, time_ns: int, action: Action) -> None:
@@ -69,7 +69,7 @@ class DeferredExecutor:
     """
 
     def __init__(
-        self, name: str, latency_ns: int, deferring: Deferring, now_ns: Callable[[], int]
+        self, name: str, latency_ns: int, deferring: Deferred, now_ns: Callable[[], int]
     ) -> None:
         self._latency_ns = latency_ns
         self._deferring = deferring

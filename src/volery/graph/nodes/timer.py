@@ -6,10 +6,10 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 from volery.core.clock import ns_from_s
-from volery.graph.nodes.deferred_execution import Deferring
+from volery.graph.nodes.deferred_execution import Deferred
 
 
-class Timers(Deferring, Protocol):
+class Timers(Deferred, Protocol):
     """Calls back at simulated times."""
 
     def every(

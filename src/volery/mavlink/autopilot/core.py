@@ -24,12 +24,12 @@ from volery.mavlink.autopilot import (
     streams,
 )
 from volery.mavlink.autopilot.flight_log import FlightLog
-from volery.mavlink.autopilot.geo_reference import Earth
+from volery.mavlink.autopilot.geo_reference import GeoReference
 from volery.mavlink.autopilot.mission_protocol import keep_transfers_going
 from volery.mavlink.autopilot.parameters import Value, refusal
-from volery.mavlink.autopilot.state import Link, Memory, Source
+from volery.mavlink.autopilot.state import AutopilotState, LinkState, Source
 from volery.mavlink.autopilot.telemetry import HEARTBEAT, status_texts
-from volery.mavlink.autopilot.vehicle import Build, FlightState, Vector, Vehicle
+from volery.mavlink.autopilot.vehicle import FlightState, Vector, Vehicle, VehicleInfo
 from volery.mavlink.codec import AUTOPILOT, Codec, Parser, dialect
 from volery.mavlink.framing import Framer
 
@@ -47,14 +47,14 @@ class Autopilot:
         self,
         system: int,
         vehicle: Vehicle,
-        build: Build,
+        build: VehicleInfo,
         parameters: dict[str, Value] | None = None,
     ) -> None:
         self.system = system
         self.vehicle = vehicle
         self.build = build
-        self.earth = Earth(*build.origin)
-        self.memory = Memory()
+        self.earth = GeoReference(*build.origin)
+        self.memory = AutopilotState()
         self.log = FlightLog()
         self._codec = Codec(system)
         self._parser = Parser()
@@ -72,7 +72,7 @@ class Autopilot:
         if link not in memory.links:
             if len(memory.links) >= MOST_LINKS:
                 return
-            memory.links[link] = streams.begin(Link(link, profile), now_ns)
+            memory.links[link] = streams.begin(LinkState(link, profile), now_ns)
         for frame in self._framer.datagram(data):
             own = (frame.system, frame.component) == (self.system, AUTOPILOT)
             message = None if own else self._parser.decode(frame.data)

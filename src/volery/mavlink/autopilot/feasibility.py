@@ -46,7 +46,7 @@ def look(pilot: Autopilot) -> None:
         mode_transitions.enter(pilot, Mode.HOLD)
 
 
-def _trouble_of_take_off(pilot: Autopilot, items: list[plans.Item]) -> str:
+def _trouble_of_take_off(pilot: Autopilot, items: list[plans.MissionItem]) -> str:
     home = _home(pilot)
     placed = False
     for item in items:
@@ -59,7 +59,7 @@ def _trouble_of_take_off(pilot: Autopilot, items: list[plans.Item]) -> str:
     return ""
 
 
-def _trouble_with_fence(pilot: Autopilot, items: list[plans.Item]) -> str:
+def _trouble_with_fence(pilot: Autopilot, items: list[plans.MissionItem]) -> str:
     for number, item in enumerate(items, 1):
         if item.command in plans.PLACED and breach(pilot, _place_of(pilot, item)):
             return f"Geofence violation for waypoint {number}"
@@ -82,7 +82,7 @@ def _home(pilot: Autopilot) -> Vector:
     return pilot.memory.home or pilot.memory.origin
 
 
-def _place_of(pilot: Autopilot, item: plans.Item) -> Vector:
+def _place_of(pilot: Autopilot, item: plans.MissionItem) -> Vector:
     from volery.mavlink.autopilot.mission_flight import place_of
 
     return place_of(pilot, item)

@@ -18,8 +18,8 @@ from volery.mavlink.autopilot import (
 )
 from volery.mavlink.autopilot.legs import fly_leg
 from volery.mavlink.autopilot.modes import Mode
-from volery.mavlink.autopilot.setpoints import Setpoint
-from volery.mavlink.autopilot.state import Leg
+from volery.mavlink.autopilot.setpoints import OffboardSetpoint
+from volery.mavlink.autopilot.state import MissionLeg
 
 if TYPE_CHECKING:
     from volery.mavlink.autopilot.core import Autopilot
@@ -48,7 +48,7 @@ def _take_off(pilot: Autopilot, state: FlightState) -> None:
         goes_on = wants_mission and not mode_transitions.obstacle_to(pilot, Mode.MISSION)
         leg = memory.leg
         if leg is None and memory.take_off_goal is not None:
-            leg = Leg(memory.take_off_goal, None, mode_transitions.cruise(pilot))
+            leg = MissionLeg(memory.take_off_goal, None, mode_transitions.cruise(pilot))
         mode_transitions.enter(pilot, Mode.MISSION if goes_on else Mode.HOLD)
         memory.leg = None if goes_on else leg
 
@@ -63,7 +63,7 @@ def _land(pilot: Autopilot, state: FlightState) -> None:
         mode_transitions.order(pilot, "land", pilot.vehicle.land())
     if pilot.memory.target is None:
         x, y, _ = state.position
-        pilot.memory.target = Setpoint(position=(x, y, math.nan))
+        pilot.memory.target = OffboardSetpoint(position=(x, y, math.nan))
 
 
 _FLIGHTS: dict[Mode, Callable[[Autopilot, FlightState], None]] = {

@@ -13,8 +13,8 @@ from volery.core.frames import enu_of_ned
 from volery.mavlink.autopilot import mode_transitions
 from volery.mavlink.autopilot.legs import approach_speed
 from volery.mavlink.autopilot.modes import Mode
-from volery.mavlink.autopilot.setpoints import Setpoint
-from volery.mavlink.autopilot.state import Target
+from volery.mavlink.autopilot.setpoints import OffboardSetpoint
+from volery.mavlink.autopilot.state import FollowTarget
 
 if TYPE_CHECKING:
     from volery.mavlink.autopilot.core import Autopilot
@@ -51,7 +51,7 @@ def take(pilot: Autopilot, _source: Source, message: Any) -> None:
     memory, before = pilot.memory, pilot.memory.followed
     if before is None:
         start = velocity if known else (0.0, 0.0, 0.0)
-        memory.followed = Target(measured, start, memory.now_ns)
+        memory.followed = FollowTarget(measured, start, memory.now_ns)
     else:
         _fuse(pilot, before, measured, velocity if known else None)
     target = memory.followed
@@ -59,7 +59,9 @@ def take(pilot: Autopilot, _source: Source, message: Any) -> None:
         target.course = math.atan2(target.velocity[1], target.velocity[0])
 
 
-def _fuse(pilot: Autopilot, target: Target, measured: Vector, velocity: Vector | None) -> None:
+def _fuse(
+    pilot: Autopilot, target: FollowTarget, measured: Vector, velocity: Vector | None
+) -> None:
     """Corrects an estimate by a measurement: PX4's filter by FLW_TGT_RS."""
     share = min(max(float(pilot.parameter("FLW_TGT_RS")), 0.1), 1.0)
     beta = share ** (1.0 / 3.0)
@@ -104,19 +106,19 @@ def fly(pilot: Autopilot, state: FlightState) -> None:
     climb = math.copysign(min(limit, approach_speed(abs(z), brake)), z)
     dx, dy = there[0] - state.position[0], there[1] - state.position[1]
     yaw = math.atan2(dy, dx) if math.hypot(dx, dy) > _FACED_M else None
-    memory.target = Setpoint(position=goal, yaw=math.nan if yaw is None else yaw)
+    memory.target = OffboardSetpoint(position=goal, yaw=math.nan if yaw is None else yaw)
     pilot.vehicle.steer((reduced * level[0], reduced * level[1], climb), yaw, 0.0)
     mode_transitions.order(pilot, "steer")
 
 
-def _position_now(pilot: Autopilot, target: Target) -> Vector:
+def _position_now(pilot: Autopilot, target: FollowTarget) -> Vector:
     """Returns the position of the target, moved on by its velocity."""
     since_s = min(pilot.memory.now_ns - target.time_ns, _STALE_NS) * 1e-9
     x, y, z = (p + since_s * v for p, v in zip(target.position, target.velocity, strict=True))
     return x, y, z
 
 
-def _position_beside(pilot: Autopilot, target: Target, there: Vector) -> Vector:
+def _position_beside(pilot: Autopilot, target: FollowTarget, there: Vector) -> Vector:
     """Returns where the UAV wants to be; beside a target without a course: on its own side."""
     if target.course is None:
         here = pilot.state.position

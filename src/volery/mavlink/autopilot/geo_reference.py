@@ -8,7 +8,7 @@ from volery.core.geodesy import LocalFrame, ecef_from_geodetic, geodetic_from_ec
 from volery.mavlink.autopilot.vehicle import Vector
 
 
-class Earth:
+class GeoReference:
     """The map on the earth: latitude and longitude in degrees, altitude in m."""
 
     def __init__(self, latitude: float, longitude: float, altitude: float) -> None:

@@ -45,7 +45,7 @@ def breach(pilot: Autopilot, place: Vector) -> str:
     return "" if not inside or any(inside) else "the area to stay in"
 
 
-def _point(pilot: Autopilot, item: plans.Item) -> tuple[float, float]:
+def _point(pilot: Autopilot, item: plans.MissionItem) -> tuple[float, float]:
     x, y, _ = pilot.earth.place(item.latitude, item.longitude, pilot.build.origin[2])
     return x, y
 

@@ -13,7 +13,7 @@ from volery.core.errors import GraphError
 from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import Point, Quaternion, Vector3
 from volery.graph.nodes.node import Node
-from volery.mavlink.autopilot.vehicle import Build, FlightState, Vector
+from volery.mavlink.autopilot.vehicle import FlightState, Vector, VehicleInfo
 from volery.mavlink.autopilot.vehicle import Quaternion as Turn
 
 _TRIGGER = "std_srvs/srv/Trigger"
@@ -159,12 +159,12 @@ def _ask(client: Any, request: Any = None) -> str:
     return "" if response.success else str(response.message) or "refused"
 
 
-def build_of(node: Node) -> Build:
+def build_of(node: Node) -> VehicleInfo:
     """What of the UAV never changes. `GraphError` where the graph does not tell."""
     told = node.create_client(_GET_BUILD, "get_build").call()
     if not told.success:
         raise GraphError(told.message)
-    return Build(
+    return VehicleInfo(
         told.airframe,
         told.rotors,
         told.hover_thrust,

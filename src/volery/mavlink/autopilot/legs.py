@@ -10,11 +10,11 @@ import math
 from typing import TYPE_CHECKING
 
 from volery.mavlink.autopilot import mode_transitions
-from volery.mavlink.autopilot.setpoints import Setpoint
+from volery.mavlink.autopilot.setpoints import OffboardSetpoint
 
 if TYPE_CHECKING:
     from volery.mavlink.autopilot.core import Autopilot
-    from volery.mavlink.autopilot.state import Leg
+    from volery.mavlink.autopilot.state import MissionLeg
 
 _NEAR_M = 1.5
 """Where the place itself is told."""
@@ -23,12 +23,12 @@ _GAIN = 0.95
 _ARRIVED_M, _ARRIVED_M_S = 0.3, 0.5
 
 
-def fly_leg(pilot: Autopilot, leg: Leg) -> bool:
+def fly_leg(pilot: Autopilot, leg: MissionLeg) -> bool:
     """Fly on; whether the UAV is there and rests."""
     state = pilot.state
     x, y, z = (goal - here for goal, here in zip(leg.target, state.position, strict=True))
     level, away = math.hypot(x, y), math.hypot(x, y, z)
-    pilot.memory.target = Setpoint(
+    pilot.memory.target = OffboardSetpoint(
         position=leg.target, yaw=math.nan if leg.yaw is None else leg.yaw
     )
     if leg.locked:

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, NamedTuple
 from volery.core.frames import frd_of_flu, ned_of_enu, q_ned_frd_of_enu_flu
 from volery.mavlink.autopilot import motion
 from volery.mavlink.autopilot.modes import Mode
-from volery.mavlink.autopilot.ulog import Topic
+from volery.mavlink.autopilot.ulog import UlogTopic
 
 if TYPE_CHECKING:
     from volery.mavlink.autopilot.core import Autopilot
-    from volery.mavlink.autopilot.geo_reference import Earth
+    from volery.mavlink.autopilot.geo_reference import GeoReference
     from volery.mavlink.autopilot.vehicle import Vector
 
 Values = Sequence[float]
@@ -47,7 +47,7 @@ class LoggedTopic(NamedTuple):
     values: None where there is nothing to log.
     """
 
-    topic: Topic
+    topic: UlogTopic
     period_ns: int
     values: Callable[[Autopilot], Values | None]
 
@@ -85,7 +85,7 @@ def _local_position(pilot: Autopilot) -> Values:
 
 
 @lru_cache(maxsize=256)
-def _reference(earth: Earth, origin: Vector) -> Vector:
+def _reference(earth: GeoReference, origin: Vector) -> Vector:
     """Latitude and longitude in degrees and altitude where the local frame begins."""
     return earth.geodetic(origin)
 
@@ -214,6 +214,6 @@ _DESCRIBED: tuple[tuple[str, str, int, Callable[[Autopilot], Values | None]], ..
     ),
 )
 TOPICS = tuple(
-    LoggedTopic(Topic(number, name, fields), period_ms * 1_000_000, values)
+    LoggedTopic(UlogTopic(number, name, fields), period_ms * 1_000_000, values)
     for number, (name, fields, period_ms, values) in enumerate(_DESCRIBED)
 )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from volery.core.rotations import from_rpy
 from volery.mavlink.autopilot import mode_transitions
-from volery.mavlink.autopilot.state import Sticks
+from volery.mavlink.autopilot.state import ManualInput
 
 if TYPE_CHECKING:
     from volery.mavlink.autopilot.core import Autopilot
@@ -33,7 +33,7 @@ def take(pilot: Autopilot, _source: object, message: Any) -> None:
     if any(abs(part) > 1000 for part in parts):
         return
     x, y, z, r = (part / 1000.0 for part in parts)
-    pilot.memory.sticks = Sticks(x, y, 2.0 * z - 1.0, r, pilot.memory.now_ns)
+    pilot.memory.sticks = ManualInput(x, y, 2.0 * z - 1.0, r, pilot.memory.now_ns)
 
 
 def fly_position(pilot: Autopilot, state: FlightState) -> None:
@@ -98,7 +98,7 @@ def _climb(pilot: Autopilot, up: float) -> float:
     return up * float(pilot.parameter("MPC_Z_VEL_MAX_UP" if up > 0.0 else "MPC_Z_VEL_MAX_DN"))
 
 
-def _alive(sticks: Sticks) -> tuple[float, float, float, float]:
+def _alive(sticks: ManualInput) -> tuple[float, float, float, float]:
     """Deflections beyond the dead zone, from 0 there to 1."""
     forward, right, up, turn = (
         math.copysign(max(0.0, abs(part) - _DEAD) / (1.0 - _DEAD), part)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from volery.mavlink.autopilot import home, mode_transitions, payload_items, plans
 from volery.mavlink.autopilot.legs import bearing, fly_leg
 from volery.mavlink.autopilot.modes import Mode
-from volery.mavlink.autopilot.state import Leg
+from volery.mavlink.autopilot.state import MissionLeg
 from volery.mavlink.codec import dialect
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def fly(pilot: Autopilot, state: FlightState) -> None:
         _reach(pilot, mission)
 
 
-def _face_interest(pilot: Autopilot, mission: Mission, item: plans.Item) -> None:
+def _face_interest(pilot: Autopilot, mission: Mission, item: plans.MissionItem) -> None:
     """On the way to a place look at the region of interest, as PX4's multicopters do."""
     leg = pilot.memory.leg
     if mission.interest is None or leg is None or leg.locked or item.command not in _FACING:
@@ -67,7 +67,7 @@ def _reach(pilot: Autopilot, mission: Mission) -> None:
             pilot.say(6, f"Mission finished, {'landed' if landed else 'loitering'}")
 
 
-def _advance(mission: Mission, items: list[plans.Item]) -> None:
+def _advance(mission: Mission, items: list[plans.MissionItem]) -> None:
     item = items[mission.current]
     mission.entered = mission.waiting = False
     following = mission.current + 1
@@ -85,7 +85,7 @@ def _advance(mission: Mission, items: list[plans.Item]) -> None:
         mission.current = following
 
 
-def _do(pilot: Autopilot, mission: Mission, item: plans.Item, state: FlightState) -> bool:
+def _do(pilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState) -> bool:
     """Do an item; whether it is done."""
     if state.mode == "LANDED" and item.command != plans.TAKE_OFF:
         return _do_on_ground(pilot, mission, item, state)
@@ -107,7 +107,9 @@ def _do(pilot: Autopilot, mission: Mission, item: plans.Item, state: FlightState
     return _set(pilot, mission, item)
 
 
-def _do_on_ground(pilot: Autopilot, mission: Mission, item: plans.Item, state: FlightState) -> bool:
+def _do_on_ground(
+    pilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
+) -> bool:
     """From the ground it starts by itself where a place is wanted, as PX4 does."""
     if item.command == plans.LAND:
         return True
@@ -120,7 +122,7 @@ def _do_on_ground(pilot: Autopilot, mission: Mission, item: plans.Item, state: F
     return item.command == plans.RETURN_TO_LAUNCH or _set(pilot, mission, item)
 
 
-def _set(pilot: Autopilot, mission: Mission, item: plans.Item) -> bool:
+def _set(pilot: Autopilot, mission: Mission, item: plans.MissionItem) -> bool:
     """What takes no time."""
     if item.command == plans.CHANGE_SPEED and item.params[1] > 0.0:
         mission.speed = item.params[1]
@@ -138,7 +140,9 @@ def _set(pilot: Autopilot, mission: Mission, item: plans.Item) -> bool:
     return True
 
 
-def _take_off(pilot: Autopilot, mission: Mission, item: plans.Item, state: FlightState) -> bool:
+def _take_off(
+    pilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
+) -> bool:
     memory = pilot.memory
     _, _, z = place_of(pilot, item)
     if state.mode == "LANDED":
@@ -151,11 +155,15 @@ def _take_off(pilot: Autopilot, mission: Mission, item: plans.Item, state: Fligh
     if not mission.entered:
         mission.entered = True
         x, y, _ = state.position
-        memory.leg = Leg((x, y, max(z, state.position[2])), None, mode_transitions.cruise(pilot))
+        memory.leg = MissionLeg(
+            (x, y, max(z, state.position[2])), None, mode_transitions.cruise(pilot)
+        )
     return memory.leg is None or fly_leg(pilot, memory.leg)
 
 
-def _waypoint(pilot: Autopilot, mission: Mission, item: plans.Item, state: FlightState) -> bool:
+def _waypoint(
+    pilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
+) -> bool:
     memory = pilot.memory
     if state.mode == "TAKE_OFF":
         return False
@@ -166,7 +174,7 @@ def _waypoint(pilot: Autopilot, mission: Mission, item: plans.Item, state: Fligh
         yaw = 0.5 * math.pi - math.radians(item.params[3])
         turns = math.isfinite(yaw) and item.command != plans.LOITER_TIME  # which says no heading
         facing = yaw if turns else bearing(pilot, target)
-        memory.leg = Leg(target, facing, mode_transitions.cruise(pilot))
+        memory.leg = MissionLeg(target, facing, mode_transitions.cruise(pilot))
     leg = memory.leg
     rests = fly_leg(pilot, leg)
     last = mission.current + 1 == len(memory.plans[plans.MISSION])
@@ -184,7 +192,7 @@ def _waypoint(pilot: Autopilot, mission: Mission, item: plans.Item, state: Fligh
 
 
 def _change_height(
-    pilot: Autopilot, mission: Mission, item: plans.Item, state: FlightState
+    pilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
 ) -> bool:
     """LOITER_TO_ALT: at the present height to within its radius, then to its height."""
     memory = pilot.memory
@@ -194,18 +202,18 @@ def _change_height(
     if not mission.entered or memory.leg is None:
         mission.entered = True
         target = (x, y, state.position[2])
-        memory.leg = Leg(target, bearing(pilot, target), mode_transitions.cruise(pilot))
+        memory.leg = MissionLeg(target, bearing(pilot, target), mode_transitions.cruise(pilot))
     own = abs(item.params[1])
     radius = own if math.isfinite(own) and own > 0.0 else _LOITER_RADIUS_M
     radius += float(pilot.parameter("NAV_ACC_RAD"))
     level = math.hypot(x - state.position[0], y - state.position[1])
     if level <= radius and memory.leg.target[2] != z:
-        memory.leg = Leg((x, y, z), memory.leg.yaw, memory.leg.speed)
+        memory.leg = MissionLeg((x, y, z), memory.leg.yaw, memory.leg.speed)
     fly_leg(pilot, memory.leg)
     return level <= radius and _near_height(pilot, z)
 
 
-def _is_near(pilot: Autopilot, item: plans.Item, leg: Leg) -> bool:
+def _is_near(pilot: Autopilot, item: plans.MissionItem, leg: MissionLeg) -> bool:
     """Whether it is within the radius of acceptance, the item's own or NAV_ACC_RAD."""
     own = item.params[1] if item.command == plans.WAYPOINT else 0.0
     radius = own if math.isfinite(own) and own > 0.0 else float(pilot.parameter("NAV_ACC_RAD"))
@@ -218,7 +226,7 @@ def _near_height(pilot: Autopilot, z: float) -> bool:
     return abs(z - pilot.state.position[2]) < float(pilot.parameter("NAV_MC_ALT_RAD"))
 
 
-def _land(pilot: Autopilot, mission: Mission, item: plans.Item, state: FlightState) -> bool:
+def _land(pilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState) -> bool:
     memory = pilot.memory
     if memory.order == "land":
         return False  # done once it is on the ground
@@ -227,7 +235,7 @@ def _land(pilot: Autopilot, mission: Mission, item: plans.Item, state: FlightSta
         x, y, z = state.position
         if item.placed:
             x, y, _ = place_of(pilot, item)
-        memory.leg = Leg((x, y, z), None, mode_transitions.cruise(pilot))
+        memory.leg = MissionLeg((x, y, z), None, mode_transitions.cruise(pilot))
     if memory.leg is not None and not fly_leg(pilot, memory.leg):
         return False
     memory.leg = None
@@ -235,7 +243,7 @@ def _land(pilot: Autopilot, mission: Mission, item: plans.Item, state: FlightSta
     return False
 
 
-def _delay(pilot: Autopilot, mission: Mission, item: plans.Item, state: FlightState) -> bool:
+def _delay(pilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState) -> bool:
     if pilot.memory.leg is not None and state.mode != "LANDED":
         fly_leg(pilot, pilot.memory.leg)
     if not mission.waiting:
@@ -243,7 +251,7 @@ def _delay(pilot: Autopilot, mission: Mission, item: plans.Item, state: FlightSt
     return _has_waited(pilot, mission, item.params[0])
 
 
-def _face(pilot: Autopilot, mission: Mission, item: plans.Item, state: FlightState) -> bool:
+def _face(pilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState) -> bool:
     """CONDITION_YAW: turn on the spot, relative or from north clockwise."""
     memory = pilot.memory
     if not mission.entered:
@@ -255,7 +263,9 @@ def _face(pilot: Autopilot, mission: Mission, item: plans.Item, state: FlightSta
         else:
             yaw = 0.5 * math.pi - angle
         target = state.position if memory.leg is None else memory.leg.target
-        memory.leg = Leg(target, math.remainder(yaw, 2.0 * math.pi), mode_transitions.cruise(pilot))
+        memory.leg = MissionLeg(
+            target, math.remainder(yaw, 2.0 * math.pi), mode_transitions.cruise(pilot)
+        )
     leg = memory.leg
     if leg is None or leg.yaw is None:
         return True
@@ -267,7 +277,7 @@ def _has_waited(pilot: Autopilot, mission: Mission, seconds: float) -> bool:
     return pilot.memory.now_ns - mission.since_ns >= seconds * 1e9
 
 
-def place_of(pilot: Autopilot, item: plans.Item) -> Vector:
+def place_of(pilot: Autopilot, item: plans.MissionItem) -> Vector:
     """Where an item lies in the map, m; above home or the sea as its frame says."""
     x, y, _ = pilot.state.position
     if item.placed:

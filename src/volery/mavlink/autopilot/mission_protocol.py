@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from volery.mavlink.autopilot import feasibility, plans
-from volery.mavlink.autopilot.state import Mission, Transfer
+from volery.mavlink.autopilot.state import Mission, MissionTransfer
 from volery.mavlink.codec import dialect
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def begin_upload(pilot: Autopilot, source: Source, message: Any) -> None:
         _answer(pilot, source, plans.NO_SPACE, kind)
         return
     now_ns = pilot.memory.now_ns
-    transfer = Transfer(kind, source, True, count, time_ns=now_ns)
+    transfer = MissionTransfer(kind, source, True, count, time_ns=now_ns)
     if count == 0:
         _take_over(pilot, transfer)
         return
@@ -152,19 +152,19 @@ def keep_transfers_going(pilot: Autopilot) -> None:
             _ask(pilot, transfer)
 
 
-def _ask(pilot: Autopilot, transfer: Transfer) -> None:
+def _ask(pilot: Autopilot, transfer: MissionTransfer) -> None:
     link, system, component = transfer.source
     transfer.asked_ns = pilot.memory.now_ns
     request = dialect().MAVLink_mission_request_int_message
     pilot.send(request(system, component, len(transfer.items), transfer.kind), link)
 
 
-def _end(pilot: Autopilot, transfer: Transfer, result: int) -> None:
+def _end(pilot: Autopilot, transfer: MissionTransfer, result: int) -> None:
     pilot.memory.transfers.pop(transfer.kind, None)
     _answer(pilot, transfer.source, result, transfer.kind)
 
 
-def _take_over(pilot: Autopilot, transfer: Transfer) -> None:
+def _take_over(pilot: Autopilot, transfer: MissionTransfer) -> None:
     _replace(pilot, transfer.kind, transfer.items)
     pilot.memory.last_items[transfer.kind] = (transfer.source, transfer.count - 1)
     _end(pilot, transfer, plans.ACCEPTED)
@@ -172,7 +172,7 @@ def _take_over(pilot: Autopilot, transfer: Transfer) -> None:
         feasibility.look(pilot)
 
 
-def _replace(pilot: Autopilot, kind: int, items: list[plans.Item]) -> None:
+def _replace(pilot: Autopilot, kind: int, items: list[plans.MissionItem]) -> None:
     pilot.memory.plans[kind] = items
     if kind == plans.MISSION:
         pilot.memory.mission = Mission()

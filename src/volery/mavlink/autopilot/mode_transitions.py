@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from volery.mavlink.autopilot import arming, feasibility, mode_requirements
 from volery.mavlink.autopilot.modes import Mode
-from volery.mavlink.autopilot.state import Leg
+from volery.mavlink.autopilot.state import MissionLeg
 
 if TYPE_CHECKING:
     from volery.mavlink.autopilot.core import Autopilot
@@ -52,7 +52,7 @@ def cruise(pilot: Autopilot) -> float:
 
 def go_to(pilot: Autopilot, place: Vector, yaw: float | None) -> None:
     """Fly to a place at cruising speed."""
-    pilot.memory.leg = Leg(place, yaw, cruise(pilot))
+    pilot.memory.leg = MissionLeg(place, yaw, cruise(pilot))
 
 
 def obstacle_to(pilot: Autopilot, mode: Mode) -> str:

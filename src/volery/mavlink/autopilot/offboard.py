@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from volery.mavlink.autopilot import mode_transitions
 from volery.mavlink.autopilot.modes import Mode
 from volery.mavlink.autopilot.setpoints import (
-    Setpoint,
+    OffboardSetpoint,
     attitude_setpoint,
     global_setpoint,
     local_setpoint,
@@ -53,7 +53,7 @@ def take_attitude(pilot: Autopilot, source: Source, message: Any) -> None:
     take(pilot, source, attitude_setpoint(message))
 
 
-def take(pilot: Autopilot, source: Source, setpoint: Setpoint) -> None:
+def take(pilot: Autopilot, source: Source, setpoint: OffboardSetpoint) -> None:
     """Hear a setpoint; in offboard mode it is flown at once."""
     memory = pilot.memory
     offboard, now_ns = memory.offboard, memory.now_ns
@@ -88,7 +88,7 @@ def fly(pilot: Autopilot, state: FlightState) -> None:
     _fly(pilot, state, setpoint, fresh=False)
 
 
-def _fly(pilot: Autopilot, state: FlightState, setpoint: Setpoint, *, fresh: bool) -> None:
+def _fly(pilot: Autopilot, state: FlightState, setpoint: OffboardSetpoint, *, fresh: bool) -> None:
     memory = pilot.memory
     memory.target = setpoint
     if setpoint.attitude is not None or setpoint.rates is not None:
@@ -106,7 +106,7 @@ def _fly(pilot: Autopilot, state: FlightState, setpoint: Setpoint, *, fresh: boo
         _steer(pilot, state, setpoint, fresh=fresh)
 
 
-def _hold_attitude(pilot: Autopilot, setpoint: Setpoint, *, fresh: bool) -> None:
+def _hold_attitude(pilot: Autopilot, setpoint: OffboardSetpoint, *, fresh: bool) -> None:
     if not fresh and pilot.memory.order in ("tilt", "spin"):
         return
     if setpoint.attitude is not None:
@@ -117,7 +117,7 @@ def _hold_attitude(pilot: Autopilot, setpoint: Setpoint, *, fresh: bool) -> None
         mode_transitions.order(pilot, "spin")
 
 
-def _is_up(pilot: Autopilot, state: FlightState, setpoint: Setpoint) -> bool:
+def _is_up(pilot: Autopilot, state: FlightState, setpoint: OffboardSetpoint) -> bool:
     """Whether it is high enough to follow setpoints; from the ground it starts for those upwards.
 
     Attitudes need no start: their thrust decides.
@@ -140,25 +140,27 @@ def _is_up(pilot: Autopilot, state: FlightState, setpoint: Setpoint) -> bool:
     return True
 
 
-def _is_place(setpoint: Setpoint) -> bool:
+def _is_place(setpoint: OffboardSetpoint) -> bool:
     moves = any(map(math.isfinite, (*setpoint.velocity, *setpoint.acceleration)))
     return _finite(setpoint.position) and not moves and not math.isfinite(setpoint.yaw_rate)
 
 
-def _go(pilot: Autopilot, setpoint: Setpoint, *, fresh: bool) -> None:
+def _go(pilot: Autopilot, setpoint: OffboardSetpoint, *, fresh: bool) -> None:
     leg = pilot.memory.leg
     yaw = setpoint.yaw if math.isfinite(setpoint.yaw) else None
     same = leg is not None and (leg.target, leg.yaw) == (setpoint.position, yaw)
     if same and pilot.memory.order == "go_to":
         return
     if fresh or not same:
-        from volery.mavlink.autopilot.state import Leg
+        from volery.mavlink.autopilot.state import MissionLeg
 
-        pilot.memory.leg = Leg(setpoint.position, yaw, 0.0, locked=True)
+        pilot.memory.leg = MissionLeg(setpoint.position, yaw, 0.0, locked=True)
         mode_transitions.order(pilot, "go_to", pilot.vehicle.go_to(setpoint.position, yaw))
 
 
-def _track(pilot: Autopilot, state: FlightState, setpoint: Setpoint, *, fresh: bool) -> None:
+def _track(
+    pilot: Autopilot, state: FlightState, setpoint: OffboardSetpoint, *, fresh: bool
+) -> None:
     if math.dist(setpoint.position, state.position) > _TRACKED_M:
         _steer(pilot, state, setpoint, fresh=fresh)
     elif fresh:
@@ -167,7 +169,7 @@ def _track(pilot: Autopilot, state: FlightState, setpoint: Setpoint, *, fresh: b
         mode_transitions.order(pilot, "follow")
 
 
-def _push(pilot: Autopilot, setpoint: Setpoint, *, fresh: bool) -> None:
+def _push(pilot: Autopilot, setpoint: OffboardSetpoint, *, fresh: bool) -> None:
     if fresh or pilot.memory.order != "push":
         push = (
             _turned(pilot, setpoint.acceleration) if setpoint.in_heading else setpoint.acceleration
@@ -176,7 +178,9 @@ def _push(pilot: Autopilot, setpoint: Setpoint, *, fresh: bool) -> None:
         mode_transitions.order(pilot, "push")
 
 
-def _steer(pilot: Autopilot, state: FlightState, setpoint: Setpoint, *, fresh: bool) -> None:
+def _steer(
+    pilot: Autopilot, state: FlightState, setpoint: OffboardSetpoint, *, fresh: bool
+) -> None:
     """Fly velocities; axes that have a place are drawn to it."""
     age_ns = pilot.memory.now_ns - pilot.memory.ordered_ns
     placed = any(map(math.isfinite, setpoint.position)) or setpoint.in_heading
@@ -197,7 +201,7 @@ def _steer(pilot: Autopilot, state: FlightState, setpoint: Setpoint, *, fresh: b
     mode_transitions.order(pilot, "steer")
 
 
-def _turn(setpoint: Setpoint) -> tuple[float | None, float]:
+def _turn(setpoint: OffboardSetpoint) -> tuple[float | None, float]:
     rate = setpoint.yaw_rate if math.isfinite(setpoint.yaw_rate) else 0.0
     return (setpoint.yaw if math.isfinite(setpoint.yaw) else None), rate
 

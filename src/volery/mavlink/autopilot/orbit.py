@@ -14,8 +14,8 @@ from volery.mavlink.autopilot.acknowledgement import ACCEPTED, DENIED, TEMPORARI
 from volery.mavlink.autopilot.legs import approach_speed, fly_leg
 from volery.mavlink.autopilot.modes import Mode
 from volery.mavlink.autopilot.motion import degrees_e7, us
-from volery.mavlink.autopilot.setpoints import Setpoint
-from volery.mavlink.autopilot.state import Leg, Orbit
+from volery.mavlink.autopilot.setpoints import OffboardSetpoint
+from volery.mavlink.autopilot.state import MissionLeg, Orbit
 from volery.mavlink.codec import dialect
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def fly(pilot: Autopilot, state: FlightState) -> None:
     climb = math.copysign(_climb(pilot, z), -z)
     yaw, rate = _facing(orbit, outward, turning)
     velocity = along[0] - back * outward[0], along[1] - back * outward[1], climb
-    memory.target = Setpoint(velocity=velocity, yaw=math.nan if yaw is None else yaw)
+    memory.target = OffboardSetpoint(velocity=velocity, yaw=math.nan if yaw is None else yaw)
     pilot.vehicle.steer(velocity, yaw, rate)
     mode_transitions.order(pilot, "steer")
 
@@ -119,7 +119,7 @@ def _approach(pilot: Autopilot, orbit: Orbit, outward: tuple[float, float], off_
         size = abs(orbit.radius)
         target = x + size * outward[0], y + size * outward[1], z
         yaw, _ = _facing(orbit, outward, 0.0)
-        pilot.memory.leg = Leg(target, yaw, mode_transitions.cruise(pilot))
+        pilot.memory.leg = MissionLeg(target, yaw, mode_transitions.cruise(pilot))
     if off_m > _ON_CIRCLE_M and not fly_leg(pilot, pilot.memory.leg):
         return False
     pilot.memory.leg = None

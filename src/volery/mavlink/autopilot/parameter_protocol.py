@@ -20,7 +20,7 @@ from volery.mavlink.codec import dialect
 
 if TYPE_CHECKING:
     from volery.mavlink.autopilot.core import Autopilot
-    from volery.mavlink.autopilot.state import Link, Source
+    from volery.mavlink.autopilot.state import LinkState, Source
 
 _DOES_NOT_EXIST, _OUT_OF_RANGE, _READ_ONLY, _WRONG_TYPE = 1, 2, 5, 7
 """MAV_PARAM_ERROR."""
@@ -34,7 +34,7 @@ def send_list(pilot: Autopilot, source: Source, _message: Any) -> None:
     pilot.memory.links[source[0]].parameters_to_send = list(reversed(range(len(NAMES))))
 
 
-def send_some(pilot: Autopilot, link: Link) -> None:
+def send_some(pilot: Autopilot, link: LinkState) -> None:
     """Go on with a list."""
     for _ in range(min(A_TICK, len(link.parameters_to_send))):
         _tell(pilot, link.number, NAMES[link.parameters_to_send.pop()])

@@ -16,7 +16,7 @@ UINT32, INT32, REAL32 = 5, 6, 9
 """MAV_PARAM_TYPE."""
 
 
-class Parameter(NamedTuple):
+class AutopilotParameter(NamedTuple):
     """One parameter: default, allowed range, what it does. `fixed` ones cannot be set."""
 
     default: Value
@@ -26,65 +26,99 @@ class Parameter(NamedTuple):
     fixed: bool = False
 
 
-DEFAULTS: dict[str, Parameter] = {
-    "BAT_CRIT_THR": Parameter(0.07, 0.05, 0.5, "charge below which the battery is critical"),
-    "BAT_EMERGEN_THR": Parameter(0.05, 0.03, 0.5, "charge below which it is an emergency"),
-    "BAT_LOW_THR": Parameter(0.15, 0.12, 0.5, "charge below which the battery is low"),
-    "COM_ARM_WO_GPS": Parameter(0, 0, 1, "1: arms without a fix"),
-    "COM_DISARM_LAND": Parameter(2.0, -1, 20, "s from landing to disarming; <= 0: never"),
-    "COM_DISARM_PRFLT": Parameter(10.0, -1, 60, "s from arming without take-off to disarming"),
-    "COM_DL_LOSS_T": Parameter(10, 5, 300, "s without a ground station's heartbeat: link lost"),
-    "COM_LOW_BAT_ACT": Parameter(
+DEFAULTS: dict[str, AutopilotParameter] = {
+    "BAT_CRIT_THR": AutopilotParameter(
+        0.07, 0.05, 0.5, "charge below which the battery is critical"
+    ),
+    "BAT_EMERGEN_THR": AutopilotParameter(0.05, 0.03, 0.5, "charge below which it is an emergency"),
+    "BAT_LOW_THR": AutopilotParameter(0.15, 0.12, 0.5, "charge below which the battery is low"),
+    "COM_ARM_WO_GPS": AutopilotParameter(0, 0, 1, "1: arms without a fix"),
+    "COM_DISARM_LAND": AutopilotParameter(2.0, -1, 20, "s from landing to disarming; <= 0: never"),
+    "COM_DISARM_PRFLT": AutopilotParameter(
+        10.0, -1, 60, "s from arming without take-off to disarming"
+    ),
+    "COM_DL_LOSS_T": AutopilotParameter(
+        10, 5, 300, "s without a ground station's heartbeat: link lost"
+    ),
+    "COM_LOW_BAT_ACT": AutopilotParameter(
         0, 0, 3, "0 warning, 2 land when critical, 3 return when critical, land in an emergency"
     ),
-    "COM_OBL_RC_ACT": Parameter(
+    "COM_OBL_RC_ACT": AutopilotParameter(
         0, 0, 5, "offboard lost: 0 1 2 sticks, else hold; 3 return, 4 land, 5 hold"
     ),
-    "COM_OF_LOSS_T": Parameter(1.0, 0.0, 60.0, "s without a setpoint after which offboard is lost"),
-    "COM_RC_LOSS_T": Parameter(0.5, 0.0, 35.0, "s without MANUAL_CONTROL: sticks lost"),
-    "COM_TAKEOFF_ACT": Parameter(0, 0, 1, "after take-off: 0 hold, 1 mission"),
-    "FLW_TGT_ALT_M": Parameter(0, 0, 2, "follow: height above 0 1 home, 2 the target"),
-    "FLW_TGT_DST": Parameter(8.0, 1.0, 1000.0, "m from the target along the ground"),
-    "FLW_TGT_FA": Parameter(180.0, -180.0, 180.0, "deg clockwise from the target's course"),
-    "FLW_TGT_HT": Parameter(8.0, 8.0, 150.0, "m of height while it follows"),
-    "FLW_TGT_MAX_VEL": Parameter(5.0, 0.0, 20.0, "m/s towards its position beside the target"),
-    "FLW_TGT_RS": Parameter(0.1, 0.0, 1.0, "share of the old estimate that a position leaves"),
-    "GF_ACTION": Parameter(2, 0, 5, "fence: 0 none, 1 warning, 2 hold, 3 return, 4 end, 5 land"),
-    "GF_MAX_HOR_DIST": Parameter(0.0, 0.0, 10000.0, "m from home; 0: any"),
-    "GF_MAX_VER_DIST": Parameter(0.0, 0.0, 10000.0, "m above home; 0: any"),
-    "MAV_SYS_ID": Parameter(1, 1, 250, "system id", fixed=True),
-    "MAV_TYPE": Parameter(2, 0, 22, "2 quadrotor, 13 hexarotor, 14 octorotor", fixed=True),
-    "MIS_DIST_1WP": Parameter(
+    "COM_OF_LOSS_T": AutopilotParameter(
+        1.0, 0.0, 60.0, "s without a setpoint after which offboard is lost"
+    ),
+    "COM_RC_LOSS_T": AutopilotParameter(0.5, 0.0, 35.0, "s without MANUAL_CONTROL: sticks lost"),
+    "COM_TAKEOFF_ACT": AutopilotParameter(0, 0, 1, "after take-off: 0 hold, 1 mission"),
+    "FLW_TGT_ALT_M": AutopilotParameter(0, 0, 2, "follow: height above 0 1 home, 2 the target"),
+    "FLW_TGT_DST": AutopilotParameter(8.0, 1.0, 1000.0, "m from the target along the ground"),
+    "FLW_TGT_FA": AutopilotParameter(
+        180.0, -180.0, 180.0, "deg clockwise from the target's course"
+    ),
+    "FLW_TGT_HT": AutopilotParameter(8.0, 8.0, 150.0, "m of height while it follows"),
+    "FLW_TGT_MAX_VEL": AutopilotParameter(
+        5.0, 0.0, 20.0, "m/s towards its position beside the target"
+    ),
+    "FLW_TGT_RS": AutopilotParameter(
+        0.1, 0.0, 1.0, "share of the old estimate that a position leaves"
+    ),
+    "GF_ACTION": AutopilotParameter(
+        2, 0, 5, "fence: 0 none, 1 warning, 2 hold, 3 return, 4 end, 5 land"
+    ),
+    "GF_MAX_HOR_DIST": AutopilotParameter(0.0, 0.0, 10000.0, "m from home; 0: any"),
+    "GF_MAX_VER_DIST": AutopilotParameter(0.0, 0.0, 10000.0, "m above home; 0: any"),
+    "MAV_SYS_ID": AutopilotParameter(1, 1, 250, "system id", fixed=True),
+    "MAV_TYPE": AutopilotParameter(2, 0, 22, "2 quadrotor, 13 hexarotor, 14 octorotor", fixed=True),
+    "MIS_DIST_1WP": AutopilotParameter(
         10000.0, -1.0, 100000.0, "m from home: farther first waypoints are told of; <= 0: none"
     ),
-    "MIS_TAKEOFF_ALT": Parameter(2.5, 0.0, 80.0, "m: height of a take-off that names none"),
-    "MPC_ACC_HOR": Parameter(3.0, 0.5, 15.0, "m/s^2 of the way to places"),
-    "MPC_LAND_ALT1": Parameter(10.0, 0.0, 122.0, "m above home: lower landings sink more slowly"),
-    "MPC_LAND_ALT2": Parameter(5.0, 0.0, 122.0, "m above home: lower ones with MPC_LAND_SPEED"),
-    "MPC_LAND_SPEED": Parameter(0.7, 0.6, 4.0, "m/s of a landing near the ground"),
-    "MPC_MAN_TILT_MAX": Parameter(35.0, 1.0, 70.0, "deg at full stick, altitude mode"),
-    "MPC_MAN_Y_MAX": Parameter(150.0, 0.0, 400.0, "deg/s of yaw at full stick"),
-    "MPC_THR_HOVER": Parameter(0.5, 0.1, 0.8, "share of the full thrust that carries", fixed=True),
-    "MPC_VEL_MANUAL": Parameter(10.0, 3.0, 20.0, "m/s at full stick, position mode"),
-    "MPC_XY_CRUISE": Parameter(5.0, 3.0, 20.0, "m/s of the way to places"),
-    "MPC_XY_VEL_MAX": Parameter(12.0, 0.0, 20.0, "m/s: no setpoint is flown faster"),
-    "MPC_Z_VEL_MAX_DN": Parameter(1.5, 0.5, 4.0, "m/s of descent, at most"),
-    "MPC_Z_VEL_MAX_UP": Parameter(3.0, 0.5, 8.0, "m/s of climb, at most"),
-    "MPC_Z_V_AUTO_DN": Parameter(1.5, 0.5, 4.0, "m/s of descent to places and of landings"),
-    "MPC_Z_V_AUTO_UP": Parameter(3.0, 0.5, 8.0, "m/s of climb to places"),
-    "NAV_ACC_RAD": Parameter(2.0, 0.05, 200.0, "m from a waypoint that count as there"),
-    "NAV_DLL_ACT": Parameter(0, 0, 3, "link lost: 0 nothing, 1 hold, 2 return, 3 land"),
-    "NAV_MC_ALT_RAD": Parameter(0.8, 0.05, 200.0, "m above or below that count as there"),
-    "NAV_RCL_ACT": Parameter(2, 1, 3, "sticks lost: 1 hold, 2 return, 3 land"),
-    "RTL_DESCEND_ALT": Parameter(30.0, 0.0, 100.0, "m above home: returns come down to there"),
-    "RTL_LAND_DELAY": Parameter(0.0, -1.0, 300.0, "s that a return waits there; -1: for ever"),
-    "RTL_MIN_DIST": Parameter(10.0, 0.5, 100.0, "m from home: nearer returns do not climb"),
-    "RTL_RETURN_ALT": Parameter(60.0, 0.0, 150.0, "m above home: height of a return"),
-    "SDLOG_MODE": Parameter(
+    "MIS_TAKEOFF_ALT": AutopilotParameter(
+        2.5, 0.0, 80.0, "m: height of a take-off that names none"
+    ),
+    "MPC_ACC_HOR": AutopilotParameter(3.0, 0.5, 15.0, "m/s^2 of the way to places"),
+    "MPC_LAND_ALT1": AutopilotParameter(
+        10.0, 0.0, 122.0, "m above home: lower landings sink more slowly"
+    ),
+    "MPC_LAND_ALT2": AutopilotParameter(
+        5.0, 0.0, 122.0, "m above home: lower ones with MPC_LAND_SPEED"
+    ),
+    "MPC_LAND_SPEED": AutopilotParameter(0.7, 0.6, 4.0, "m/s of a landing near the ground"),
+    "MPC_MAN_TILT_MAX": AutopilotParameter(35.0, 1.0, 70.0, "deg at full stick, altitude mode"),
+    "MPC_MAN_Y_MAX": AutopilotParameter(150.0, 0.0, 400.0, "deg/s of yaw at full stick"),
+    "MPC_THR_HOVER": AutopilotParameter(
+        0.5, 0.1, 0.8, "share of the full thrust that carries", fixed=True
+    ),
+    "MPC_VEL_MANUAL": AutopilotParameter(10.0, 3.0, 20.0, "m/s at full stick, position mode"),
+    "MPC_XY_CRUISE": AutopilotParameter(5.0, 3.0, 20.0, "m/s of the way to places"),
+    "MPC_XY_VEL_MAX": AutopilotParameter(12.0, 0.0, 20.0, "m/s: no setpoint is flown faster"),
+    "MPC_Z_VEL_MAX_DN": AutopilotParameter(1.5, 0.5, 4.0, "m/s of descent, at most"),
+    "MPC_Z_VEL_MAX_UP": AutopilotParameter(3.0, 0.5, 8.0, "m/s of climb, at most"),
+    "MPC_Z_V_AUTO_DN": AutopilotParameter(
+        1.5, 0.5, 4.0, "m/s of descent to places and of landings"
+    ),
+    "MPC_Z_V_AUTO_UP": AutopilotParameter(3.0, 0.5, 8.0, "m/s of climb to places"),
+    "NAV_ACC_RAD": AutopilotParameter(2.0, 0.05, 200.0, "m from a waypoint that count as there"),
+    "NAV_DLL_ACT": AutopilotParameter(0, 0, 3, "link lost: 0 nothing, 1 hold, 2 return, 3 land"),
+    "NAV_MC_ALT_RAD": AutopilotParameter(0.8, 0.05, 200.0, "m above or below that count as there"),
+    "NAV_RCL_ACT": AutopilotParameter(2, 1, 3, "sticks lost: 1 hold, 2 return, 3 land"),
+    "RTL_DESCEND_ALT": AutopilotParameter(
+        30.0, 0.0, 100.0, "m above home: returns come down to there"
+    ),
+    "RTL_LAND_DELAY": AutopilotParameter(
+        0.0, -1.0, 300.0, "s that a return waits there; -1: for ever"
+    ),
+    "RTL_MIN_DIST": AutopilotParameter(
+        10.0, 0.5, 100.0, "m from home: nearer returns do not climb"
+    ),
+    "RTL_RETURN_ALT": AutopilotParameter(60.0, 0.0, 150.0, "m above home: height of a return"),
+    "SDLOG_MODE": AutopilotParameter(
         0, -1, 2, "flight log: -1 none, 0 armed, 1 from the start to the first disarming, 2 always"
     ),
-    "SYS_AUTOSTART": Parameter(4001, 0, 9999999, "PX4's number of a generic quadrotor", fixed=True),
-    "SYS_FAILURE_EN": Parameter(0, 0, 1, "1: failures may be injected"),
+    "SYS_AUTOSTART": AutopilotParameter(
+        4001, 0, 9999999, "PX4's number of a generic quadrotor", fixed=True
+    ),
+    "SYS_FAILURE_EN": AutopilotParameter(0, 0, 1, "1: failures may be injected"),
 }
 NAMES = tuple(sorted(DEFAULTS))
 CHECK = "_HASH_CHECK"

@@ -48,7 +48,7 @@ CANCELLED = 15
 """MAV_MISSION_RESULT."""
 
 
-class Item(NamedTuple):
+class MissionItem(NamedTuple):
     """One item. latitude and longitude in degrees, nan where none was given; altitude m."""
 
     command: int
@@ -67,7 +67,7 @@ class Item(NamedTuple):
         return math.isfinite(self.latitude) and math.isfinite(self.longitude) and not here
 
 
-def item_of(message: Any) -> Item:
+def item_of(message: Any) -> MissionItem:
     """Of a MISSION_ITEM_INT or a MISSION_ITEM."""
     frame = int(message.frame)
     params = (message.param1, message.param2, message.param3, message.param4)
@@ -75,10 +75,12 @@ def item_of(message: Any) -> Item:
     if message.get_type() == "MISSION_ITEM_INT":
         unset = message.x == -(2**31) or message.y == -(2**31)
         x, y = (math.nan, math.nan) if unset else (x * 1e-7, y * 1e-7)
-    return Item(int(message.command), frame, params, x, y, message.z, bool(message.autocontinue))
+    return MissionItem(
+        int(message.command), frame, params, x, y, message.z, bool(message.autocontinue)
+    )
 
 
-def fault_of(item: Item, kind: int, count: int) -> int:  # noqa: PLR0911
+def fault_of(item: MissionItem, kind: int, count: int) -> int:  # noqa: PLR0911
     """MAV_MISSION_RESULT of an item of a plan of `count` items."""
     if item.command not in _KNOWN[kind]:
         return UNSUPPORTED
@@ -101,7 +103,7 @@ def fault_of(item: Item, kind: int, count: int) -> int:  # noqa: PLR0911
     return _fault_of_place(item, kind)
 
 
-def _fault_of_place(item: Item, kind: int) -> int:  # noqa: PLR0911
+def _fault_of_place(item: MissionItem, kind: int) -> int:  # noqa: PLR0911
     if item.frame not in (*AMSL, *ABOVE_HOME, *(MISSION_FRAME if kind != MISSION else ())):
         return BAD_FRAME
     if kind != MISSION or item.placed:
@@ -119,7 +121,7 @@ def _fault_of_place(item: Item, kind: int) -> int:  # noqa: PLR0911
     return ACCEPTED
 
 
-def polygons_are_whole(items: list[Item]) -> bool:
+def polygons_are_whole(items: list[MissionItem]) -> bool:
     """Whether each polygon of a fence has as many corners, one after the other, as it says."""
     k = 0
     while k < len(items):
@@ -134,7 +136,7 @@ def polygons_are_whole(items: list[Item]) -> bool:
     return True
 
 
-def flies_for_ever(items: list[Item]) -> bool:
+def flies_for_ever(items: list[MissionItem]) -> bool:
     """Whether jumps can go round without any item that is flown or waits."""
     busy = {*PLACED, DELAY, CONDITION_DELAY, CONDITION_YAW, RETURN_TO_LAUNCH}
     for start, item in enumerate(items):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from volery.mavlink.autopilot import mode_transitions, plans
 from volery.mavlink.autopilot.legs import bearing, fly_leg
 from volery.mavlink.autopilot.mission_flight import place_of
-from volery.mavlink.autopilot.state import Leg, Return
+from volery.mavlink.autopilot.state import MissionLeg, ReturnState
 
 if TYPE_CHECKING:
     from volery.mavlink.autopilot.core import Autopilot
@@ -21,7 +21,7 @@ def fly(pilot: Autopilot, state: FlightState) -> None:
     if state.mode == "LANDED" or memory.order == "land":
         return
     if memory.way_home is None:
-        memory.way_home = Return(goal_of(pilot), "climb", memory.now_ns)
+        memory.way_home = ReturnState(goal_of(pilot), "climb", memory.now_ns)
         _begin_leg(pilot, memory.way_home)
     if memory.leg is not None and not fly_leg(pilot, memory.leg):
         return
@@ -33,7 +33,7 @@ def fly(pilot: Autopilot, state: FlightState) -> None:
             mode_transitions.order(pilot, "land", pilot.vehicle.land())
         return
     following = {"climb": "cross", "cross": "descend", "descend": "wait"}[way.phase]
-    memory.way_home = Return(way.goal, following, memory.now_ns)
+    memory.way_home = ReturnState(way.goal, following, memory.now_ns)
     if following != "wait":
         _begin_leg(pilot, memory.way_home)
 
@@ -46,17 +46,17 @@ def goal_of(pilot: Autopilot) -> Vector:
     return min(points, key=lambda point: math.dist(point[:2], pilot.state.position[:2]))
 
 
-def _begin_leg(pilot: Autopilot, way: Return) -> None:
+def _begin_leg(pilot: Autopilot, way: ReturnState) -> None:
     memory = pilot.memory
     x, y, z = pilot.state.position
     goal, home = way.goal, memory.home or memory.origin
     if way.phase == "climb":
         far = math.dist(goal[:2], (x, y)) > float(pilot.parameter("RTL_MIN_DIST"))
         top = max(z, home[2] + float(pilot.parameter("RTL_RETURN_ALT"))) if far else z
-        memory.leg = Leg((x, y, top), None, mode_transitions.cruise(pilot))
+        memory.leg = MissionLeg((x, y, top), None, mode_transitions.cruise(pilot))
     elif way.phase == "cross":
         target = (goal[0], goal[1], z if memory.leg is None else memory.leg.target[2])
-        memory.leg = Leg(target, bearing(pilot, target), mode_transitions.cruise(pilot))
+        memory.leg = MissionLeg(target, bearing(pilot, target), mode_transitions.cruise(pilot))
     else:
         low = min(z, max(goal[2], home[2]) + float(pilot.parameter("RTL_DESCEND_ALT")))
-        memory.leg = Leg((goal[0], goal[1], low), None, mode_transitions.cruise(pilot))
+        memory.leg = MissionLeg((goal[0], goal[1], low), None, mode_transitions.cruise(pilot))

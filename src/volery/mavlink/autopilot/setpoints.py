@@ -22,7 +22,7 @@ _FORCE, _NO_YAW, _NO_YAW_RATE = 512, 1024, 2048
 _NOTHING = (math.nan, math.nan, math.nan)
 
 
-class Setpoint(NamedTuple):
+class OffboardSetpoint(NamedTuple):
     """What is to be flown: ENU, FLU, rad; nan where something is left open."""
 
     position: Vector = _NOTHING
@@ -38,7 +38,7 @@ class Setpoint(NamedTuple):
     thrust: float = math.nan
 
 
-def local_setpoint(message: Any, origin: Vector) -> Setpoint:
+def local_setpoint(message: Any, origin: Vector) -> OffboardSetpoint:
     """Of a SET_POSITION_TARGET_LOCAL_NED. `CommandError` says why PX4 would not take it."""
     if message.coordinate_frame not in (1, 8, 12):
         raise CommandError(f"setpoints in frame {message.coordinate_frame} are not flown")
@@ -51,7 +51,7 @@ def local_setpoint(message: Any, origin: Vector) -> Setpoint:
     return _motion(message, position, in_heading)
 
 
-def global_setpoint(message: Any, position: Vector) -> Setpoint:
+def global_setpoint(message: Any, position: Vector) -> OffboardSetpoint:
     """Of a SET_POSITION_TARGET_GLOBAL_INT whose place is `position`, m, map."""
     if message.coordinate_frame not in (0, 3, _GLOBAL, *_ABOVE_HOME):
         raise CommandError(f"setpoints in frame {message.coordinate_frame} are not flown")
@@ -59,7 +59,7 @@ def global_setpoint(message: Any, position: Vector) -> Setpoint:
     return _motion(message, (east, north, -down), in_heading=False)
 
 
-def _motion(message: Any, position: Vector, in_heading: bool) -> Setpoint:
+def _motion(message: Any, position: Vector, in_heading: bool) -> OffboardSetpoint:
     mask = message.type_mask
     if mask & _FORCE:
         raise CommandError("setpoints of forces are not flown")
@@ -80,10 +80,10 @@ def _motion(message: Any, position: Vector, in_heading: bool) -> Setpoint:
         yaw = math.remainder(yaw, 2.0 * math.pi)
     if in_heading and math.isfinite(yaw):
         yaw = math.nan  # PX4 reads it relative to the heading; there only rates make sense
-    return Setpoint(position, velocity, push, yaw, rate, in_heading)
+    return OffboardSetpoint(position, velocity, push, yaw, rate, in_heading)
 
 
-def attitude_setpoint(message: Any) -> Setpoint:
+def attitude_setpoint(message: Any) -> OffboardSetpoint:
     """Of a SET_ATTITUDE_TARGET: an attitude, or body rates, with a thrust from 0 to 1."""
     mask, thrust = message.type_mask, message.thrust
     if mask & 64 or not 0.0 <= thrust <= 1.0:
@@ -94,11 +94,11 @@ def attitude_setpoint(message: Any) -> Setpoint:
         if not (math.isfinite(length) and 0.9 <= length <= 1.1):
             raise CommandError("an attitude must be a unit quaternion")
         q = (x / length, y / length, z / length, w / length)
-        return Setpoint(attitude=q_enu_flu_of_ned_frd(q), thrust=thrust)
+        return OffboardSetpoint(attitude=q_enu_flu_of_ned_frd(q), thrust=thrust)
     rates = (message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate)
     if mask & 7 or not all(math.isfinite(rate) and abs(rate) < 50.0 for rate in rates):
         raise CommandError("three finite body rates are needed")
-    return Setpoint(rates=flu_of_frd(rates), thrust=thrust)
+    return OffboardSetpoint(rates=flu_of_frd(rates), thrust=thrust)
 
 
 def _masked(vector: Vector, mask: int, first_bit: int) -> Vector:

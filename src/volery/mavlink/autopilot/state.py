@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 from volery.mavlink.autopilot.modes import Mode
 from volery.mavlink.autopilot.parameters import Value, defaults
-from volery.mavlink.autopilot.plans import Item
-from volery.mavlink.autopilot.setpoints import Setpoint
+from volery.mavlink.autopilot.plans import MissionItem
+from volery.mavlink.autopilot.setpoints import OffboardSetpoint
 from volery.mavlink.autopilot.vehicle import FlightState, Vector
 
 Source = tuple[int, int, int]
@@ -17,7 +17,7 @@ Source = tuple[int, int, int]
 
 
 @dataclass
-class Link:
+class LinkState:
     """One connection: its streams and who was heard on it."""
 
     number: int
@@ -32,7 +32,7 @@ class Link:
 
 
 @dataclass
-class Sticks:
+class ManualInput:
     """The newest MANUAL_CONTROL: forward, right, up (each -1 to 1), turn to the right."""
 
     forward: float = 0.0
@@ -46,7 +46,7 @@ class Sticks:
 class Offboard:
     """Setpoints as they come, whether they are flown or not."""
 
-    setpoint: Setpoint | None = None
+    setpoint: OffboardSetpoint | None = None
     time_ns: int = -(1 << 62)
     begun_ns: int = -(1 << 62)
     """Since when they have come without a gap."""
@@ -57,14 +57,14 @@ class Offboard:
 
 
 @dataclass
-class Transfer:
+class MissionTransfer:
     """A plan on its way, up or down."""
 
     kind: int
     source: Source
     upload: bool
     count: int
-    items: list[Item] = field(default_factory=list)
+    items: list[MissionItem] = field(default_factory=list)
     time_ns: int = 0
     """Of the last sign of the other side."""
     asked_ns: int = 0
@@ -72,7 +72,7 @@ class Transfer:
 
 
 @dataclass
-class Leg:
+class MissionLeg:
     """A way to a place, flown by velocities until it is near."""
 
     target: Vector
@@ -116,7 +116,7 @@ class Orbit:
 
 
 @dataclass
-class Target:
+class FollowTarget:
     """Estimate of what is followed: m, m/s, map, at a time."""
 
     position: Vector
@@ -135,7 +135,7 @@ class Calibration:
     percent: int = -1
 
 
-class Return(NamedTuple):
+class ReturnState(NamedTuple):
     """Where a way home leads, and how far it has come."""
 
     goal: Vector
@@ -144,7 +144,7 @@ class Return(NamedTuple):
 
 
 @dataclass
-class Memory:
+class AutopilotState:
     """The whole."""
 
     state: FlightState | None = None
@@ -164,7 +164,7 @@ class Memory:
     ordered_ns: int = 0
     sinks: float = math.nan
     """m/s at which the present landing was told to go down; nan: nothing was told."""
-    target: Setpoint | None = None
+    target: OffboardSetpoint | None = None
     """What is flown, for who watches."""
     home: Vector | None = None
     chosen_home: Vector | None = None
@@ -174,20 +174,20 @@ class Memory:
     cruise: float = math.nan
     """m/s asked for by command; nan: the parameter's."""
     parameters: dict[str, Value] = field(default_factory=defaults)
-    plans: dict[int, list[Item]] = field(default_factory=lambda: {0: [], 1: [], 2: []})
+    plans: dict[int, list[MissionItem]] = field(default_factory=lambda: {0: [], 1: [], 2: []})
     """By MAV_MISSION_TYPE: mission, fence, rally."""
-    transfers: dict[int, Transfer] = field(default_factory=dict)
+    transfers: dict[int, MissionTransfer] = field(default_factory=dict)
     last_items: dict[int, tuple[Source, int]] = field(default_factory=dict)
     """By MAV_MISSION_TYPE: whose upload came through last, and the number of its last item."""
     mission: Mission = field(default_factory=Mission)
-    leg: Leg | None = None
-    way_home: Return | None = None
-    sticks: Sticks = field(default_factory=Sticks)
+    leg: MissionLeg | None = None
+    way_home: ReturnState | None = None
+    sticks: ManualInput = field(default_factory=ManualInput)
     climb_thrust: float = 0.0
     """Altitude mode: what its integral has come to, share of the hover thrust."""
     altitude_target: float = math.nan
     offboard: Offboard = field(default_factory=Offboard)
-    links: dict[int, Link] = field(default_factory=dict)
+    links: dict[int, LinkState] = field(default_factory=dict)
     ground_heard_ns: int = -1
     """When a ground station's heartbeat came last; -1: never."""
     fix_ns: int = 0
@@ -200,7 +200,7 @@ class Memory:
     failures: dict[tuple[int, int], dict[str, Any]] = field(default_factory=dict)
     """Injected faults of the simulation, by FAILURE_UNIT and instance."""
     orbit: Orbit | None = None
-    followed: Target | None = None
+    followed: FollowTarget | None = None
     calibration: Calibration | None = None
     shells: dict[Source, str] = field(default_factory=dict)
     """Unfinished lines of the system shell."""

@@ -15,7 +15,7 @@ from volery.mavlink.codec import dialect
 
 if TYPE_CHECKING:
     from volery.mavlink.autopilot.core import Autopilot
-    from volery.mavlink.autopilot.state import Link
+    from volery.mavlink.autopilot.state import LinkState
 
 NONE, ONBOARD, GROUND = 0, 1, 2
 _ALWAYS = {0: 1.0}
@@ -50,7 +50,7 @@ _HEARTBEAT = 0
 """Which cannot be asked to come otherwise."""
 
 
-def begin(link: Link, now_ns: int) -> Link:
+def begin(link: LinkState, now_ns: int) -> LinkState:
     """Give a link the streams of its profile."""
     rates = RATES_HZ.get(link.profile, _ALWAYS)
     link.periods_ns = {number: round(1e9 / rate) for number, rate in rates.items()}
@@ -58,7 +58,7 @@ def begin(link: Link, now_ns: int) -> Link:
     return link
 
 
-def ask_for(pilot: Autopilot, link: Link, number: int, period_us: float) -> bool:
+def ask_for(pilot: Autopilot, link: LinkState, number: int, period_us: float) -> bool:
     """Send a message each `period_us` on a link: 0 as at its beginning, -1 never.
 
     Whether that can be; no faster than the state of the vehicle comes.
@@ -79,7 +79,7 @@ def ask_for(pilot: Autopilot, link: Link, number: int, period_us: float) -> bool
     return True
 
 
-def interval_of(link: Link, number: int) -> Any:
+def interval_of(link: LinkState, number: int) -> Any:
     """MESSAGE_INTERVAL of a message; -1 of one that is not sent, or that is not there."""
     period_ns = link.periods_ns.get(number)
     period_us = -1 if period_ns is None else period_ns // 1000

@@ -29,7 +29,7 @@ _CODES = {
 }
 
 
-class Topic:
+class UlogTopic:
     """One kind of sample: its name in a log and its fields, in the order that values are given.
 
     fields: such as "uint64_t timestamp; float[4] q"; the first one is the timestamp.

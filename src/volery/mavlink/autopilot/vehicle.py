@@ -36,7 +36,7 @@ class FlightState(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Build:
+class VehicleInfo:
     """What of a UAV never changes."""
 
     airframe: str

@@ -1,13 +1,13 @@
 """Real ArduCopters fly the UAVs: ArduPilot's JSON interface over UDP, in lock step.
 
-    with Simulation(with_ardupilot(scenario)) as simulation, Doors(simulation.gateway) as doors:
-        doors.open(ArdupilotDoor())     # 9002 + 10 i; `arducopter --model JSON -I i` speaks
+    with Simulation(with_ardupilot(scenario)) as simulation, BridgeHost(simulation.gateway) as
+    bridges:
+        bridges.open(ArdupilotBridge())     # 9002 + 10 i; `arducopter --model JSON -I i` speaks
         simulation.run(speed=1.0)
 
-Every 1.25 ms of simulated time each ArduPilot is told the state of its UAV, and the simulation
-waits for the outputs that it answers with. Who is silent ends the run or is given up, see
-`Patience`. One that was restarted counts its frames from 0 again: it is met anew, with a clock that
-begins anew.
+Every 1.25 ms of simulated time the bridge sends each ArduPilot the state of its UAV and waits for
+its outputs. An autopilot that times out ends the run or is given up, see `TimeoutPolicy`. One that
+restarts counts its frames from 0 again; its session and its clock begin again.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ from volery.mavlink.hil.ardupilot_json import (
     shares,
     state_line,
 )
-from volery.mavlink.hil.connection_notice import NOTICE_S, Absence
-from volery.mavlink.hil.lock_step import PATIENCE, Meetings, News, Patience, uavs_with
+from volery.mavlink.hil.connection_notice import NOTICE_S, ConnectionNotice
+from volery.mavlink.hil.lock_step import PATIENCE, LockStepSession, News, TimeoutPolicy, uavs_with
 from volery.mavlink.hil.sensor_readings import inertial_of, parts
 from volery.mavlink.links.connection import why_not
 
@@ -58,7 +58,7 @@ _log = logging.getLogger(__name__)
 Address = tuple[Any, ...]
 
 
-class ArdupilotDoor:
+class ArdupilotBridge:
     """Listens for instance i, the autopilot of the i-th UAV, at `port` + 10 i.
 
     The gateway knows the rotors of each UAV. notice_s: wall time after which the bridge logs that
@@ -70,12 +70,12 @@ class ArdupilotDoor:
         host: str = "127.0.0.1",
         port: int = PORT,
         *,
-        patience: Patience = PATIENCE,
+        patience: TimeoutPolicy = PATIENCE,
         anywhere: bool = False,
         notice_s: float | None = NOTICE_S,
     ) -> None:
         self._notice_s = notice_s
-        self._absence: Absence | None = None
+        self._absence: ConnectionNotice | None = None
         self._host, self._port = host, port
         self._patience = patience
         self._anywhere = anywhere
@@ -106,7 +106,9 @@ class ArdupilotDoor:
             seat = _Seat(gateway, uav, motors, self._patience)
             self._seats.append(seat)
             await self._listen(seat, self._port + PORT_STEP * k)
-        self._absence = Absence("ArduPilot", self._missing, self._how_to_start, self._notice_s)
+        self._absence = ConnectionNotice(
+            "ArduPilot", self._missing, self._how_to_start, self._notice_s
+        )
 
     async def stop(self) -> None:
         """Let all ArduPilots go."""
@@ -145,7 +147,7 @@ class _Seat(asyncio.DatagramProtocol):
     """Where the ArduPilot of one UAV sits."""
 
     def __init__(
-        self, gateway: Gateway, uav: str, motors: tuple[int, ...], patience: Patience
+        self, gateway: Gateway, uav: str, motors: tuple[int, ...], patience: TimeoutPolicy
     ) -> None:
         self.uav = uav
         self.peer: Address | None = None
@@ -160,7 +162,7 @@ class _Seat(asyncio.DatagramProtocol):
         self._slow: dict[str, Any] = {}
         """Newest messages of topics that do not come each time."""
         self._begin_ns: int | None = None
-        self._meetings = Meetings(
+        self._meetings = LockStepSession(
             gateway, uav, "ardupilot", self, period_ns=PERIOD_NS, topics=_TOPICS, patience=patience
         )
 

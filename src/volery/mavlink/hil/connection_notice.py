@@ -10,12 +10,12 @@ import logging
 from collections.abc import Callable, Mapping
 
 NOTICE_S = 5.0
-"""Of wall time after a door has opened; PX4 connects within one second of its start."""
+"""Of wall time after a bridge has opened; PX4 connects within one second of its start."""
 _MOST_NAMED = 3
 _log = logging.getLogger(__name__)
 
 
-class Absence:
+class ConnectionNotice:
     """Looks once, in the loop that runs, after `after_s` (None: never) unless `cancel` comes first.
 
     what: the kind of autopilot. missing: where it is awaited, by UAV that has none. hint: how to

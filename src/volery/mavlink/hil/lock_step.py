@@ -44,7 +44,7 @@ News = Mapping[str, Any]
 """Newest messages that have come since the last meeting, by topic below the UAV's name."""
 
 
-class Patience(NamedTuple):
+class TimeoutPolicy(NamedTuple):
     """How long an autopilot that has begun to answer may be silent, and what happens then."""
 
     timeout_s: float = 10.0
@@ -53,10 +53,10 @@ class Patience(NamedTuple):
     """Whether it is then waited for no more, its rotors still; else the run ends with an error."""
 
 
-PATIENCE = Patience()
+PATIENCE = TimeoutPolicy()
 
 
-class Pilot(Protocol):
+class ExternalAutopilot(Protocol):
     """The autopilot's side."""
 
     @property
@@ -77,7 +77,7 @@ class Pilot(Protocol):
         """It was silent for too long: let it go."""
 
 
-class Meetings:
+class LockStepSession:
     """Joins the lock step for `uav` at once; `close` leaves it.
 
     kind: `px4` or another word for names. topics: message types by topic below the UAV's name.
@@ -91,11 +91,11 @@ class Meetings:
         gateway: Gateway,
         uav: str,
         kind: str,
-        pilot: Pilot,
+        pilot: ExternalAutopilot,
         *,
         period_ns: int,
         topics: Mapping[str, str],
-        patience: Patience,
+        patience: TimeoutPolicy,
     ) -> None:
         self.lock = threading.RLock()
         self._uav, self._pilot, self._patience = uav, pilot, patience

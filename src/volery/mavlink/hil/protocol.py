@@ -51,7 +51,7 @@ class Fix(NamedTuple):
     vertical_m: float
 
 
-class Sensed(NamedTuple):
+class SensorValues(NamedTuple):
     """What was measured for a meeting; None: nothing new of that sensor."""
 
     inertial: Inertial
@@ -86,7 +86,7 @@ class HilLink:
         self.locked = False
         """Whether PX4 has begun to answer in lock step, and is to be waited for from now on."""
 
-    def tell(self, time_ns: int, sensed: Sensed) -> bytes:
+    def tell(self, time_ns: int, sensed: SensorValues) -> bytes:
         """Frames for a meeting at a simulated time."""
         frames = self._sensor(time_ns // 1000, sensed)
         if sensed.fix is not None:
@@ -118,7 +118,7 @@ class HilLink:
         self._sequence = (self._sequence + 1) % 256
         return self._codec.pack(message, self._sequence)
 
-    def _sensor(self, time_us: int, sensed: Sensed) -> bytes:
+    def _sensor(self, time_us: int, sensed: SensorValues) -> bytes:
         fields = ACCELEROMETER | GYROSCOPE
         field = (0.0, 0.0, 0.0)
         if sensed.field is not None:

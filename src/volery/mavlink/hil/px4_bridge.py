@@ -1,13 +1,13 @@
 """Real PX4s fly the UAVs: a TCP server for each vehicle, in lock step with the simulation.
 
-    with Simulation(with_px4(scenario)) as simulation, Doors(simulation.gateway) as doors:
-        doors.open(Px4Door())                        # 4560 + i; PX4 instances connect
+    with Simulation(with_px4(scenario)) as simulation, BridgeHost(simulation.gateway) as bridges:
+        bridges.open(Px4Bridge())                        # 4560 + i; PX4 instances connect
         simulation.run(speed=1.0)
 
 Every 4 ms of simulated time all vehicles are told what their sensors measured, and the simulation
 waits for those PX4s that have begun to answer. One that is silent for too long ends the run with an
-error or is given up, see `Patience`. A PX4 that leaves may connect anew, as a restarted one; at a
-reset of the simulation all are sent away, because none can go back in time.
+error or is given up, see `TimeoutPolicy`. A PX4 that leaves may connect anew, as a restarted one;
+at a reset of the simulation all are sent away, because none can go back in time.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from volery.core.network_access import check_address, tend
 from volery.core.preamble import Preamble
 from volery.graph.session import Gateway
 from volery.mavlink.codec import dialect
-from volery.mavlink.hil.connection_notice import NOTICE_S, Absence
-from volery.mavlink.hil.lock_step import PATIENCE, Patience, uavs_with
+from volery.mavlink.hil.connection_notice import NOTICE_S, ConnectionNotice
+from volery.mavlink.hil.lock_step import PATIENCE, TimeoutPolicy, uavs_with
 from volery.mavlink.hil.px4_processes import MOST_INSTANCES
-from volery.mavlink.hil.session import HilSeat
+from volery.mavlink.hil.session import HilSession
 from volery.mavlink.links.connection import why_not
 
 PORT = 4560
@@ -38,7 +38,7 @@ _MOST_CONNECTIONS = 4
 _log = logging.getLogger(__name__)
 
 
-class Px4Door:
+class Px4Bridge:
     """Serves PX4 instance i, the autopilot of the i-th UAV, at `port` + i.
 
     notice_s: wall time after which it is said that PX4s are missing; None: somebody else says so.
@@ -49,17 +49,17 @@ class Px4Door:
         host: str = "127.0.0.1",
         port: int = PORT,
         *,
-        patience: Patience = PATIENCE,
+        patience: TimeoutPolicy = PATIENCE,
         anywhere: bool = False,
         notice_s: float | None = NOTICE_S,
     ) -> None:
         self._host, self._port = host, port
         self._notice_s = notice_s
-        self._absence: Absence | None = None
+        self._absence: ConnectionNotice | None = None
         self._patience = patience
         self._anywhere = anywhere
         self._servers: list[asyncio.Server] = []
-        self._seats: list[HilSeat] = []
+        self._seats: list[HilSession] = []
 
     @property
     def name(self) -> str:
@@ -83,11 +83,11 @@ class Px4Door:
         if not uavs:
             raise BridgeError("no UAV has the IMU that a PX4 needs")
         for k, uav in enumerate(uavs):
-            seat = HilSeat(gateway, uav, k + 1, self._patience)
+            seat = HilSession(gateway, uav, k + 1, self._patience)
             self._seats.append(seat)
             await self._listen(seat, self._port + k)
         if self._notice_s is not None:
-            self._absence = Absence(
+            self._absence = ConnectionNotice(
                 "PX4", self._missing, lambda: how_to_start(len(uavs), self._port), self._notice_s
             )
 
@@ -112,7 +112,7 @@ class Px4Door:
             if not seat.taken
         }
 
-    async def _listen(self, seat: HilSeat, port: int) -> None:
+    async def _listen(self, seat: HilSession, port: int) -> None:
         loop = asyncio.get_running_loop()
         try:
             listener = open_listener(
@@ -137,7 +137,7 @@ class _Connection(asyncio.Protocol):
     _transport: asyncio.Transport
     _out: socket.socket | None = None
 
-    def __init__(self, seat: HilSeat, listener: Listener) -> None:
+    def __init__(self, seat: HilSession, listener: Listener) -> None:
         self._seat = seat
         self._listener = listener
         self._preamble = Preamble()

@@ -1,6 +1,6 @@
 """Hardware in the loop: one UAV is flown by a PX4 at the other end of a serial line.
 
-    doors.open(Px4Serial("/dev/ttyACM0"))        # hardware with SYS_HITL = 1
+    bridges.open(Px4Serial("/dev/ttyACM0"))        # hardware with SYS_HITL = 1
 
 The same messages as over TCP. Hardware has a clock of its own and is not waited for, so that the
 simulation must run in real time; a PX4 that takes its time from the simulator is waited for.
@@ -13,9 +13,9 @@ import asyncio
 from volery.core.errors import BridgeError
 from volery.graph.session import Gateway
 from volery.mavlink.codec import dialect
-from volery.mavlink.hil.connection_notice import NOTICE_S, Absence
-from volery.mavlink.hil.lock_step import PATIENCE, Patience, uavs_with
-from volery.mavlink.hil.session import HilSeat
+from volery.mavlink.hil.connection_notice import NOTICE_S, ConnectionNotice
+from volery.mavlink.hil.lock_step import PATIENCE, TimeoutPolicy, uavs_with
+from volery.mavlink.hil.session import HilSession
 from volery.mavlink.links.serial_line import SerialLine
 
 BAUD = 921600
@@ -24,8 +24,8 @@ _BEAT_S = 1.0
 _LEAST_BAUD = 230400
 
 
-class Px4Serial:
-    """Serves the first UAV that no other autopilot door serves.
+class Px4SerialBridge:
+    """Serves the first UAV that no other autopilot bridge serves.
 
     path: of the device. baud: its speed. notice_s: wall time after which it is said that nothing is
     heard there; None: the caller says so.
@@ -38,15 +38,15 @@ class Px4Serial:
         path: str,
         baud: int = BAUD,
         *,
-        patience: Patience = PATIENCE,
+        patience: TimeoutPolicy = PATIENCE,
         notice_s: float | None = NOTICE_S,
     ) -> None:
         self._path, self._baud = path, baud
         self._patience = patience
         self._notice_s = notice_s
-        self._absence: Absence | None = None
+        self._absence: ConnectionNotice | None = None
         self._line: SerialLine | None = None
-        self._seat: HilSeat | None = None
+        self._seat: HilSession | None = None
         self._beats: asyncio.Task[None] | None = None
 
     @property
@@ -72,10 +72,10 @@ class Px4Serial:
         if not free:
             raise BridgeError(f"{self._path}: no UAV with an IMU is left for a PX4 there")
         self._line = SerialLine(self._path, self._baud, self._take)
-        self._seat = HilSeat(gateway, free[0], uavs.index(free[0]) + 1, self._patience)
+        self._seat = HilSession(gateway, free[0], uavs.index(free[0]) + 1, self._patience)
         self._hear = self._seat.take(self)
         self._beats = asyncio.create_task(self._beat())
-        self._absence = Absence("PX4", self._missing, _how_to_start, self._notice_s)
+        self._absence = ConnectionNotice("PX4", self._missing, _how_to_start, self._notice_s)
 
     async def stop(self) -> None:
         """Close the line."""

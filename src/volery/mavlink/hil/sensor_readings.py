@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from volery.mavlink.autopilot.vehicle import Vector
-from volery.mavlink.hil.protocol import Fix, Inertial, Sensed
+from volery.mavlink.hil.protocol import Fix, Inertial, SensorValues
 
 TOPICS = {
     "imu": "sensor_msgs/msg/Imu",
@@ -21,13 +21,13 @@ TOPICS = {
 _NOWHERE = Fix(math.nan, math.nan, math.nan, (0.0, 0.0, 0.0), 0.0, 0.0)
 
 
-class Sensing:
+class SensorReadings:
     """Reads one UAV's sensors; the temperature of the air is remembered."""
 
     def __init__(self) -> None:
         self._temperature = 20.0
 
-    def read(self, news: Mapping[str, Any]) -> Sensed | None:
+    def read(self, news: Mapping[str, Any]) -> SensorValues | None:
         """What is new in the messages by topic; None without a reading of the IMU."""
         imu = news.get("imu")
         if imu is None:
@@ -35,7 +35,7 @@ class Sensing:
         if "pressure/temperature" in news:
             self._temperature = float(news["pressure/temperature"].temperature)
         field, pressure = news.get("mag"), news.get("pressure")
-        return Sensed(
+        return SensorValues(
             inertial_of(imu),
             None if field is None else parts(field.magnetic_field),
             None if pressure is None else float(pressure.fluid_pressure),

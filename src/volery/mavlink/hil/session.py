@@ -8,9 +8,9 @@ from functools import partial
 from typing import Protocol
 
 from volery.graph.session import Gateway
-from volery.mavlink.hil.lock_step import Meetings, News, Patience
+from volery.mavlink.hil.lock_step import LockStepSession, News, TimeoutPolicy
 from volery.mavlink.hil.protocol import PERIOD_NS, Actuators, HilLink
-from volery.mavlink.hil.sensor_readings import TOPICS, Sensing
+from volery.mavlink.hil.sensor_readings import TOPICS, SensorReadings
 
 _STILL = (0.0,) * 16
 _NOISE_BYTES = 64
@@ -18,7 +18,7 @@ _NOISE_BYTES = 64
 _log = logging.getLogger(__name__)
 
 
-class Way(Protocol):
+class HilConnection(Protocol):
     """What carries bytes to a PX4."""
 
     is_for_any_thread: bool
@@ -31,21 +31,21 @@ class Way(Protocol):
         """End the connection."""
 
 
-class HilSeat:
+class HilSession:
     """One PX4's part in the lock step; `system` is the id that it has. Use `take` and `leave`.
 
     An answer releases the meeting only if it was made after it, as its time says.
     """
 
-    def __init__(self, gateway: Gateway, uav: str, system: int, patience: Patience) -> None:
+    def __init__(self, gateway: Gateway, uav: str, system: int, patience: TimeoutPolicy) -> None:
         self.uav = uav
         self._system = system
-        self._way: Way | None = None
+        self._way: HilConnection | None = None
         self._link = HilLink(system)
         self._noise, self._told = 0, False
         self._is_armed = False
-        self._sensing = Sensing()
-        self._meetings = Meetings(
+        self._sensing = SensorReadings()
+        self._meetings = LockStepSession(
             gateway, uav, "px4", self, period_ns=PERIOD_NS, topics=TOPICS, patience=patience
         )
 
@@ -59,7 +59,7 @@ class HilSeat:
         """Whether a MAVLink frame has come from who is there."""
         return self.taken and self._link.spoken
 
-    def take(self, way: Way) -> Callable[[bytes], None]:
+    def take(self, way: HilConnection) -> Callable[[bytes], None]:
         """Let a new PX4 sit down; what it sends is to be given to the result."""
         with self._meetings.lock:
             self._way = way
@@ -129,7 +129,7 @@ class HilSeat:
             way.end()
             self.leave(why)
 
-    def _hear(self, way: Way, data: bytes) -> None:
+    def _hear(self, way: HilConnection, data: bytes) -> None:
         with self._meetings.lock:
             if way is self._way:  # it was not let go meanwhile
                 self._take_in(data)

@@ -1,4 +1,4 @@
-"""What MAVLink's doors share: one connection that carries all vehicles."""
+"""What MAVLink's bridges share: one connection that carries all vehicles."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from volery.mavlink.codec import Parser
 from volery.mavlink.framing import Framer
 from volery.mavlink.links.rate_limits import IntakeAccount
 from volery.mavlink.links.signing import Signing
-from volery.mavlink.links.vehicle_registry import Fleet
+from volery.mavlink.links.vehicle_registry import VehicleRegistry
 
 
-class Party:
+class MavlinkConnection:
     """One connection that carries all vehicles: TCP clients and serial lines.
 
     account: limits what is read of it; None: nothing does.
@@ -19,7 +19,7 @@ class Party:
 
     def __init__(
         self,
-        fleet: Fleet,
+        fleet: VehicleRegistry,
         number: int,
         profile: int,
         key: bytes | None = None,

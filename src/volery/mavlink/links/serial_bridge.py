@@ -7,9 +7,9 @@ import asyncio
 from volery.graph.session import Gateway
 from volery.mavlink.autopilot.streams import GROUND
 from volery.mavlink.codec import dialect
-from volery.mavlink.links.connection import Party
+from volery.mavlink.links.connection import MavlinkConnection
 from volery.mavlink.links.serial_line import SerialLine
-from volery.mavlink.links.vehicle_registry import Fleet, Sink
+from volery.mavlink.links.vehicle_registry import Sink, VehicleRegistry
 
 
 class MavlinkSerial:
@@ -21,10 +21,10 @@ class MavlinkSerial:
     def __init__(self, path: str, baud: int = 57600, *, key: bytes | None = None) -> None:
         self._key = key
         self._path, self._baud = path, baud
-        self._fleet: Fleet | None = None
+        self._fleet: VehicleRegistry | None = None
         self._looks: asyncio.Task[None] | None = None
         self._line: SerialLine | None = None
-        self._party: Party | None = None
+        self._party: MavlinkConnection | None = None
 
     @property
     def name(self) -> str:
@@ -35,8 +35,8 @@ class MavlinkSerial:
         """Open the line. `BridgeError` where that is not possible."""
         dialect()
         self._line = SerialLine(self._path, self._baud, self._take)
-        self._fleet = Fleet(gateway, self.name, self._join, lambda _system: None)
-        self._party = Party(self._fleet, self._line.number, GROUND, self._key)
+        self._fleet = VehicleRegistry(gateway, self.name, self._join, lambda _system: None)
+        self._party = MavlinkConnection(self._fleet, self._line.number, GROUND, self._key)
         self._fleet.look()
         self._looks = asyncio.create_task(self._fleet.keep_looking())
 

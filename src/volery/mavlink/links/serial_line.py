@@ -1,4 +1,4 @@
-"""A serial line, raw, in the loop of a door."""
+"""A serial line, raw, in the loop of a bridge."""
 
 from __future__ import annotations
 

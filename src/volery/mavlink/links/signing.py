@@ -15,7 +15,7 @@ from pathlib import Path
 
 from volery.core.errors import BridgeError
 from volery.mavlink.codec import check_of, crc_extra_of
-from volery.mavlink.framing import SIGNED, Frame, lengths_of
+from volery.mavlink.framing import SIGNED, MavlinkFrame, lengths_of
 
 _RADIO_STATUS = 109
 """Made by radios, which have no key."""
@@ -77,7 +77,7 @@ class Signing:
             at += length
         return b"".join(signed)
 
-    def accepts(self, frame: Frame) -> bool:
+    def accepts(self, frame: MavlinkFrame) -> bool:
         """Whether a frame that came counts."""
         if self._key is None or frame.message == _RADIO_STATUS:
             return True
@@ -97,7 +97,7 @@ class Signing:
         self._stamp = max(self._stamp, stamp)
         return True
 
-    def _refuse(self, frame: Frame, why: str) -> bool:
+    def _refuse(self, frame: MavlinkFrame, why: str) -> bool:
         """Say why a sender is not heard, once each; False."""
         source = (frame.system, frame.component, why)
         if source not in self._told:

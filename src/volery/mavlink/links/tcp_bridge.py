@@ -12,9 +12,9 @@ from volery.graph.session import Gateway
 from volery.mavlink.autopilot.streams import GROUND
 from volery.mavlink.codec import dialect
 from volery.mavlink.links import ports
-from volery.mavlink.links.connection import Party, why_not
+from volery.mavlink.links.connection import MavlinkConnection, why_not
 from volery.mavlink.links.rate_limits import IntakeLimits
-from volery.mavlink.links.vehicle_registry import Fleet, Sink
+from volery.mavlink.links.vehicle_registry import Sink, VehicleRegistry
 
 _UNSENT_BYTES = 1 << 18
 """What may wait for a TCP client who does not read; what comes then is lost for him."""
@@ -45,7 +45,7 @@ class MavlinkTcp:
         self._server: asyncio.Server | None = None
         self._listener: Listener | None = None
         self._intake = IntakeLimits()
-        self._fleet: Fleet | None = None
+        self._fleet: VehicleRegistry | None = None
         self._looks: asyncio.Task[None] | None = None
         self._clients: dict[int, _TcpClient] = {}
         self._numbers = 0
@@ -74,7 +74,7 @@ class MavlinkTcp:
                 f"cannot listen on {self.host}:{self.port}: {why_not(error)}"
             ) from None
         self.port = self._server.sockets[0].getsockname()[1]
-        self._fleet = Fleet(gateway, self.name, self._join, lambda _system: None)
+        self._fleet = VehicleRegistry(gateway, self.name, self._join, lambda _system: None)
         self._fleet.look()
         self._looks = asyncio.create_task(self._fleet.keep_looking())
 
@@ -109,7 +109,9 @@ class MavlinkTcp:
             return
         self._numbers += 1
         number = (self.port + self._numbers) % 65535
-        client.party = Party(self._fleet, number, GROUND, self._key, self._intake.account())
+        client.party = MavlinkConnection(
+            self._fleet, number, GROUND, self._key, self._intake.account()
+        )
         self._clients[number] = client
         for system in self._fleet.systems:
             client.party.greet(system)
@@ -134,10 +136,10 @@ class _TcpClient(asyncio.BufferedProtocol):
     """One connection."""
 
     transport: asyncio.Transport
-    party: Party
+    party: MavlinkConnection
 
-    def __init__(self, door: MavlinkTcp) -> None:
-        self._door = door
+    def __init__(self, bridge: MavlinkTcp) -> None:
+        self._bridge = bridge
         self._full = False
         self._bite = bytearray(_BITE_BYTES)
         self.preamble = Preamble()
@@ -155,7 +157,7 @@ class _TcpClient(asyncio.BufferedProtocol):
         self.transport = transport
         transport.set_write_buffer_limits(_UNSENT_BYTES)
         tend(transport.get_extra_info("socket"))
-        self._door._opened(self)
+        self._bridge._opened(self)
 
     def get_buffer(self, sizehint: int) -> bytearray:  # noqa: ARG002
         """As of asyncio."""
@@ -165,12 +167,12 @@ class _TcpClient(asyncio.BufferedProtocol):
         """As of asyncio."""
         data = self.preamble.feed(bytes(self._bite[:nbytes]))
         if self.preamble.refused is not None:
-            self._door._end_stranger(self)
+            self._bridge._end_stranger(self)
             return
         pause_s = self.party.take(data)
         if not self._proven and self.party.has_spoken:
             self._proven = True
-            self._door._prove(self)
+            self._bridge._prove(self)
         if pause_s > 0.0 and not self.transport.is_closing():
             self.transport.pause_reading()
             self._read_after(pause_s)
@@ -197,4 +199,4 @@ class _TcpClient(asyncio.BufferedProtocol):
         """As of asyncio."""
         if self._pause is not None:
             self._pause.cancel()
-        self._door._closed(self)
+        self._bridge._closed(self)

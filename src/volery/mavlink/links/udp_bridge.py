@@ -1,4 +1,4 @@
-"""MAVLink over UDP, as PX4's simulations have it: `doors.open(MavlinkUdp())`.
+"""MAVLink over UDP, as PX4's simulations have it: `bridges.open(MavlinkUdp())`.
 
 UAVs without an autopilot are not there for it; see `volery.mavlink.scenario_setup`.
 """
@@ -19,8 +19,8 @@ from volery.mavlink.links import ports
 from volery.mavlink.links.connection import why_not
 from volery.mavlink.links.rate_limits import IntakeAccount, IntakeLimits
 from volery.mavlink.links.signing import Signing
-from volery.mavlink.links.udp_reader import UdpInlet, connected_beside
-from volery.mavlink.links.vehicle_registry import Fleet, Sink
+from volery.mavlink.links.udp_reader import UdpReader, connected_beside
+from volery.mavlink.links.vehicle_registry import Sink, VehicleRegistry
 
 _MOST_WITH_PEERS = 64
 """Vehicles whose agreed peers have sockets of their own; those of further vehicles share one."""
@@ -53,7 +53,7 @@ class MavlinkUdp:
         self._anywhere = anywhere
         self._intake = IntakeLimits()
         self._links: dict[int, list[_UdpLink]] = {}
-        self._fleet: Fleet | None = None
+        self._fleet: VehicleRegistry | None = None
         self._looks: asyncio.Task[None] | None = None
 
     @property
@@ -66,7 +66,7 @@ class MavlinkUdp:
         """Begin to send. `BridgeError` where a port is taken."""
         dialect()
         check_address(self._host, anywhere=self._anywhere, flag="--allow-remote")
-        self._fleet = Fleet(gateway, self.name, self._join, self._leave)
+        self._fleet = VehicleRegistry(gateway, self.name, self._join, self._leave)
         self._fleet.look()
         self._looks = asyncio.create_task(self._fleet.keep_looking())
 
@@ -129,7 +129,7 @@ class _UdpLink:
 
     def __init__(
         self,
-        fleet: Fleet,
+        fleet: VehicleRegistry,
         system: int,
         profile: int,
         own: int,
@@ -171,12 +171,12 @@ class _UdpLink:
             inlet.close()
         self._fleet.close_link(self._system, self.number)
 
-    def _read_from(self, sock: socket.socket) -> UdpInlet:
+    def _read_from(self, sock: socket.socket) -> UdpReader:
         def deliver(frames: bytes) -> None:
             self._fleet.send(self._system, self.number, self._profile, frames)
 
         account = self._intake.account()
-        return UdpInlet(sock, account, self._take, deliver, lambda: self._fleet.pause_s)
+        return UdpReader(sock, account, self._take, deliver, lambda: self._fleet.pause_s)
 
     def _take(
         self, data: bytes, peer: tuple[str, int], account: IntakeAccount

@@ -25,7 +25,7 @@ Take = Callable[[bytes, Any, IntakeAccount], tuple[bytes, float]]
 """Takes a datagram and its sender; returns its frames, and how long (s) none must be read."""
 
 
-class UdpInlet:
+class UdpReader:
     """Reads one socket in the running loop.
 
     take: called for each datagram. deliver: for the frames of a turn, joined. may_read: for how

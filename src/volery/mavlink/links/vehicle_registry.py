@@ -1,6 +1,6 @@
-"""The autopilots of a graph as a door sees them: frames to them and from them, vehicles that come.
+"""The autopilots of a graph as a bridge sees them: their frames, and vehicles that are added.
 
-Works in the loop of the door; the session carries everything to the simulation's thread.
+Works in the loop of the bridge; the session carries everything to the simulation's thread.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Sink = Callable[[int, bytes], None]
 
 
 @dataclass(eq=False)
-class Craft:
+class RegisteredVehicle:
     """One vehicle with an autopilot."""
 
     name: str
@@ -46,7 +46,7 @@ class Craft:
     heard_s: float = 0.0
 
 
-class Fleet:
+class VehicleRegistry:
     """All vehicles of a gateway's graph that have autopilots.
 
     `joined(craft)` is called for each, and gives back what takes its frames; `left(craft)` when it
@@ -63,7 +63,7 @@ class Fleet:
         self._session: Session = gateway.open(name)
         self._joined, self._left = joined, left
         self._loop = asyncio.get_running_loop()
-        self._craft: dict[int, Craft] = {}
+        self._craft: dict[int, RegisteredVehicle] = {}
         self._packets = message_type(PACKETS)
         self._closed = False
 
@@ -136,7 +136,7 @@ class Fleet:
                 self._loop.call_soon_threadsafe(self._drain, system)
 
         mailbox = self._session.subscribe(f"/{name}{_OUT}", PACKETS, depth=_DEPTH, wake=wake)
-        craft = Craft(name, system, mailbox, _nowhere)
+        craft = RegisteredVehicle(name, system, mailbox, _nowhere)
         self._craft[system] = craft
         craft.sink = self._joined(name, system)
 
@@ -159,7 +159,7 @@ class Fleet:
                 craft.heartbeat = data[: _HEAD + data[1] + 2]
             craft.sink(message.link, data)
 
-    def _forget(self, craft: Craft) -> None:
+    def _forget(self, craft: RegisteredVehicle) -> None:
         del self._craft[craft.system]
         self._session.unsubscribe(craft.mailbox)
         with contextlib.suppress(GraphError):
@@ -172,4 +172,4 @@ _MAGIC, _HEAD = 0xFD, 10
 
 
 def _nowhere(_link: int, _data: bytes) -> None:
-    """Take frames of a vehicle whose door is not open yet."""
+    """Take frames of a vehicle whose bridge is not open yet."""

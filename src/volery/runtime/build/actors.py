@@ -7,15 +7,21 @@ import math
 from volery.core import rotations
 from volery.scenario import actors as schema
 from volery.scenario.schema import Scenario
-from volery.world.actors import SHAPES, MovingThings, Thing
-from volery.world.actors.motions import CircleMotion, GivenMotion, HeightAt, Motion, WaypointMotion
+from volery.world.actors import SHAPES, MovingActor, MovingActors
+from volery.world.actors.motions import (
+    ActorMotion,
+    CircleMotion,
+    GivenMotion,
+    HeightAt,
+    WaypointMotion,
+)
 from volery.world.terrain import Terrain
 
 _TURN_M = {"person": 0.3, "car": 2.0, "bird": 2.0}
 """How far ahead of a waypoint, and behind it, a thing turns: a modelling choice."""
 
 
-def build_things(scenario: Scenario, terrain: Terrain) -> MovingThings | None:
+def build_things(scenario: Scenario, terrain: Terrain) -> MovingActors | None:
     """Things of the scenario, None without any."""
     if not scenario.world.things:
         return None
@@ -24,17 +30,17 @@ def build_things(scenario: Scenario, terrain: Terrain) -> MovingThings | None:
     def ground(x: float, y: float) -> float:
         return float(terrain.height(x, y))
 
-    return MovingThings(
+    return MovingActors(
         [
-            Thing(thing.name, thing.shape, shapes[thing.shape], _motion(thing, ground))
+            MovingActor(thing.name, thing.shape, shapes[thing.shape], _motion(thing, ground))
             for thing in scenario.world.things
         ]
     )
 
 
-def _motion(thing: schema.Thing, ground: HeightAt) -> Motion:
+def _motion(thing: schema.Actor, ground: HeightAt) -> ActorMotion:
     motion = thing.motion
-    if isinstance(motion, schema.Waypoints):
+    if isinstance(motion, schema.WaypointActor):
         return WaypointMotion(
             motion.waypoints_m,
             motion.speed_m_s,
@@ -43,7 +49,7 @@ def _motion(thing: schema.Thing, ground: HeightAt) -> Motion:
             turn_m=_TURN_M[thing.shape],
             ground=ground if len(motion.waypoints_m[0]) == 2 else None,
         )
-    if isinstance(motion, schema.Circle):
+    if isinstance(motion, schema.CircleActor):
         return CircleMotion(
             motion.centre_m,
             motion.radius_m,

@@ -10,8 +10,8 @@ from volery.control.fleet import Fleet
 from volery.engine.engine import SensorBank
 from volery.runtime.build.estimation import build_estimation
 from volery.runtime.build.fleet import add_bodies, build_fleet
-from volery.runtime.build.placement import Start
-from volery.runtime.build.sensor_suites import Fitted, fit_sensors
+from volery.runtime.build.placement import StartPose
+from volery.runtime.build.sensor_suites import SensorInstance, fit_sensors
 from volery.runtime.build.sensors import build_banks
 from volery.scenario.schema import Scenario
 from volery.world.scene import Scene
@@ -25,12 +25,12 @@ class Assembly:
     """A fleet at its start, with sensors and estimators."""
 
     fleet: Fleet
-    fitted: list[Fitted]
+    fitted: list[SensorInstance]
     banks: list[SensorBank]
     estimation: Estimation | None
 
 
-def assemble(scenario: Scenario, starts: Sequence[Start], scene: Scene) -> Assembly:
+def assemble(scenario: Scenario, starts: Sequence[StartPose], scene: Scene) -> Assembly:
     """Build the UAVs of `starts`, whose bodies take the place of those in `scene`.
 
     Raises `ScenarioError` and `DataFileError` for what cannot be built; the scene is unchanged

@@ -19,7 +19,7 @@ from volery.sensors.sonar import load_sonar_model
 if TYPE_CHECKING:
     from volery.control.estimator.settings import EstimatorSettings, Mounting
     from volery.engine.estimation import Estimation
-    from volery.runtime.build.sensor_suites import Fitted
+    from volery.runtime.build.sensor_suites import SensorInstance
 
 _AIDS = ("imu", "gnss", "barometer", "magnetometer", "sonar")
 _START_M, _START_M_S, _START_TILT_RAD, _START_HEADING_RAD = 0.5, 0.02, 0.01, 0.03
@@ -28,7 +28,7 @@ surveyed place, at rest, and aligned by gravity and compass."""
 
 
 def build_estimation(
-    scenario: Scenario, fitted: Sequence[Fitted], fleet: Fleet
+    scenario: Scenario, fitted: Sequence[SensorInstance], fleet: Fleet
 ) -> Estimation | None:
     """Estimators of the UAVs that have a sensor of kind "estimate"; None where there are none."""
     wanted = [sensor for sensor in fitted if sensor.spec.kind == "estimate"]
@@ -39,7 +39,7 @@ def build_estimation(
     from volery.control.estimator.settings import StartSigmas
     from volery.engine.estimation import Estimation, EstimationSetup
 
-    by_uav: dict[int, dict[str, Fitted]] = {sensor.id.uav: {} for sensor in wanted}
+    by_uav: dict[int, dict[str, SensorInstance]] = {sensor.id.uav: {} for sensor in wanted}
     for sensor in fitted:
         if sensor.spec.kind in _AIDS and sensor.id.uav in by_uav:
             by_uav[sensor.id.uav].setdefault(sensor.spec.kind, sensor)  # the first of each kind
@@ -83,24 +83,24 @@ class _Knowledge:
         self._settings: dict[tuple[Any, ...], EstimatorSettings] = {}
         self._gnss: dict[str, GnssModel] = {}
 
-    def settings(self, aids: Mapping[str, Fitted]) -> EstimatorSettings:
+    def settings(self, aids: Mapping[str, SensorInstance]) -> EstimatorSettings:
         """Settings of an estimator that listens to `aids`."""
         key = tuple((kind, aid.spec) for kind, aid in sorted(aids.items()))
         if key not in self._settings:
             self._settings[key] = self._make_settings(aids)
         return self._settings[key]
 
-    def gyro_variance(self, aids: Mapping[str, Fitted]) -> float:
+    def gyro_variance(self, aids: Mapping[str, SensorInstance]) -> float:
         """rad^2/s^2 of one gyroscope reading."""
         settings = self.settings(aids)
         return settings.gyro_noise_density_rad_s_sqrt_hz**2 * settings.imu_rate_hz
 
-    def drift_variance(self, aids: Mapping[str, Fitted]) -> tuple[float, float, float]:
+    def drift_variance(self, aids: Mapping[str, SensorInstance]) -> tuple[float, float, float]:
         """m^2 of the receiver's slow error, east, north, up; zero without one."""
         horizontal, _, vertical = self._drift(aids)
         return horizontal**2, horizontal**2, vertical**2
 
-    def _make_settings(self, aids: Mapping[str, Fitted]) -> EstimatorSettings:
+    def _make_settings(self, aids: Mapping[str, SensorInstance]) -> EstimatorSettings:
         from volery.control.estimator.settings import EstimatorSettings
 
         keys = set(EstimatorSettings.model_fields)
@@ -116,20 +116,20 @@ class _Knowledge:
             values["range_half_cone_rad"] = math.radians(cone / 2.0)
         return EstimatorSettings(**values)
 
-    def _drift(self, aids: Mapping[str, Fitted]) -> tuple[float, float, float]:
+    def _drift(self, aids: Mapping[str, SensorInstance]) -> tuple[float, float, float]:
         if "gnss" not in aids:
             return 0.0, 0.0, 0.0
         model = self._receiver(aids)
         return model.horizontal_drift_m, model.horizontal_drift_m, model.vertical_drift_m
 
-    def _receiver(self, aids: Mapping[str, Fitted]) -> GnssModel:
+    def _receiver(self, aids: Mapping[str, SensorInstance]) -> GnssModel:
         name = aids["gnss"].spec.model
         if name not in self._gnss:
             self._gnss[name] = load_gnss_model(self._model(name))
         return self._gnss[name]
 
 
-def _mounting(aids: Mapping[str, Fitted]) -> Mounting:
+def _mounting(aids: Mapping[str, SensorInstance]) -> Mounting:
     from volery.control.estimator.settings import Mounting
 
     places: dict[str, Any] = {}

@@ -12,7 +12,7 @@ from volery.control.flight_modes import FlightMode
 from volery.control.gains import ControlRates
 from volery.core.errors import CommandError, DataFileError, ScenarioError
 from volery.core.plurals import counted
-from volery.runtime.build.placement import Start, place_uavs
+from volery.runtime.build.placement import StartPose, place_uavs
 from volery.runtime.build.plant import plant_of_type
 from volery.runtime.build.worlds import build_weather
 from volery.scenario.schema import Scenario
@@ -22,7 +22,7 @@ from volery.world.scene import Scene
 from volery.world.terrain import Terrain
 
 
-def place(scenario: Scenario, scene: Scene, terrain: Terrain) -> tuple[Start, ...]:
+def place(scenario: Scenario, scene: Scene, terrain: Terrain) -> tuple[StartPose, ...]:
     """Where every UAV starts. Raises `ScenarioError` for what cannot be."""
     return place_uavs(scenario, airframes_of(scenario), scene, terrain)
 
@@ -57,7 +57,7 @@ def airframes_of(scenario: Scenario) -> dict[str, Airframe]:
 
 
 def build_fleet(
-    scenario: Scenario, starts: Sequence[Start], names: Sequence[str], *, copies: int = 1
+    scenario: Scenario, starts: Sequence[StartPose], names: Sequence[str], *, copies: int = 1
 ) -> Fleet:
     """The UAVs at their places in the scenario's weather, `names` in messages.
 
@@ -98,7 +98,7 @@ def check_free(fleet: Fleet, row: int, position_map: NDArray[np.float64]) -> Non
         )
 
 
-def add_bodies(scene: Scene, starts: Sequence[Start], *, copies: int = 1) -> None:
+def add_bodies(scene: Scene, starts: Sequence[StartPose], *, copies: int = 1) -> None:
     """Make the UAVs' bodies visible to the sensors of their own copy."""
     kinds: list[Airframe] = []
     for start in starts:

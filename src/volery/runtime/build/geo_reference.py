@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from volery.core.geodesy import LocalFrame
 from volery.scenario.navigation import DeniedBox, DeniedPolygon
 from volery.scenario.schema import World
-from volery.sensors.gnss_denial import Denial, Prism
+from volery.sensors.gnss_denial import GnssDenial, Prism
 from volery.world.magnetic_field import angles_of_field, field_enu, field_of_angles
 
 
@@ -33,9 +33,9 @@ def magnetic_field_map(world: World) -> NDArray[np.float64]:
     return field_of_angles(declination, inclination, strength)
 
 
-def denial(world: World) -> Denial:
+def denial(world: World) -> GnssDenial:
     """Where the scenario denies satellite signals."""
-    return Denial(world.gnss_denied, tuple(_prism(area) for area in world.gnss_denied_areas))
+    return GnssDenial(world.gnss_denied, tuple(_prism(area) for area in world.gnss_denied_areas))
 
 
 def _prism(area: DeniedBox | DeniedPolygon) -> Prism:

@@ -16,15 +16,15 @@ from volery.graph.nodes.node import Context, Node
 from volery.publishing.camera_messages import Camera
 from volery.publishing.graph_publisher import GraphPublisher
 from volery.runtime.build.node_loading import start_node
-from volery.runtime.build.placement import Start
-from volery.runtime.build.sensor_suites import RESULT_OF, Fitted
+from volery.runtime.build.placement import StartPose
+from volery.runtime.build.sensor_suites import RESULT_OF, SensorInstance
 from volery.runtime.vehicles.uav import Uav
 from volery.scenario.camera import CameraSensor
 from volery.scenario.schema import EstimateSensor, NodeEntry, Scenario
 from volery.sensors.samples import JointAngles
 
 
-def announce_sensors(publisher: GraphPublisher, fitted: Sequence[Fitted]) -> None:
+def announce_sensors(publisher: GraphPublisher, fitted: Sequence[SensorInstance]) -> None:
     """Advertise what the sensors publish."""
     for sensor in fitted:
         if sensor.lidar is not None:
@@ -46,7 +46,7 @@ START_POSE = "{start_pose}"
 
 def start_nodes(
     scenario: Scenario,
-    starts: Sequence[Start],
+    starts: Sequence[StartPose],
     graph: Graph,
     engine: Engine,
     now_ns: Callable[[], int],
@@ -62,7 +62,7 @@ def start_nodes(
     return nodes
 
 
-def _with_start(entry: NodeEntry, start: Start) -> NodeEntry:
+def _with_start(entry: NodeEntry, start: StartPose) -> NodeEntry:
     """An entry whose parameters know where the UAV begins: x, y, z, m, and yaw, rad, in the map."""
     if START_POSE not in entry.parameters.values():
         return entry

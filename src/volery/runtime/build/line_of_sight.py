@@ -22,7 +22,7 @@ _TRUNK_M = 2.0
 _NEAREST_M = 0.05
 
 
-class RadioSight:
+class LineOfSight:
     """Looks along straight lines through the static world; UAVs and things do not count."""
 
     def __init__(self, scene: Scene, forest: Forest | None) -> None:

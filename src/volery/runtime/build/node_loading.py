@@ -182,7 +182,7 @@ def _hint(found: Any) -> str:
         return ""
     return (
         ", but of the rclpy of a sourced ROS: run Volery in a shell where none is sourced, or run "
-        "the node with ros2 run and open --door ros2"
+        "the node with ros2 run and open --bridge ros2"
     )
 
 

@@ -33,7 +33,7 @@ _CLIMB_LOOKS = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Start:
+class StartPose:
     """One UAV before the first step; two of them are never the same UAV."""
 
     name: str
@@ -47,13 +47,13 @@ class Start:
 
 def place_uavs(
     scenario: Scenario, airframes: dict[str, Airframe], scene: Scene, terrain: Terrain
-) -> tuple[Start, ...]:
+) -> tuple[StartPose, ...]:
     """Places of all UAVs, numbered from uav1 through the groups.
 
     Raises `PlacementError` naming the UAV, its key and what it stands in: a tree, a building,
     the ground, another UAV.
     """
-    starts: list[Start] = []
+    starts: list[StartPose] = []
     for g, group in enumerate(scenario.uavs):
         airframe = airframes[group.type]
         yaw = rotations.from_rpy(0.0, 0.0, math.radians(group.yaw_deg))
@@ -66,7 +66,7 @@ def place_uavs(
                 place = _nearest_free(place, airframe, altitude, scene, terrain, starts, where)
             check_place(place, airframe, scene, terrain, starts, where, hint=_HINT)
             starts.append(
-                Start(
+                StartPose(
                     name,
                     group.type,
                     airframe,
@@ -103,7 +103,7 @@ def _nearest_free(
     altitude: float,
     scene: Scene,
     terrain: Terrain,
-    others: list[Start],
+    others: list[StartPose],
     where: str,
 ) -> Array:
     """Nearest place on a spiral with room to stand, to climb and to keep from the others."""
@@ -150,7 +150,7 @@ def check_place(
     airframe: Airframe,
     scene: Scene,
     terrain: Terrain,
-    others: Sequence[Start],
+    others: Sequence[StartPose],
     where: str,
     *,
     hint: str = "",

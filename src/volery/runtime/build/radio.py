@@ -7,11 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.comms.radio.channel import RadioLink
-from volery.comms.radio.network import RadioNet
+from volery.comms.radio.channel import RadioChannel
+from volery.comms.radio.network import RadioNetwork
 from volery.engine.engine import Engine
 from volery.graph.graph import Graph
-from volery.runtime.build.line_of_sight import RadioSight
+from volery.runtime.build.line_of_sight import LineOfSight
 from volery.scenario.schema import Scenario
 from volery.world.forest import Forest
 
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 def build_radio(
     scenario: Scenario, graph: Graph, engine: Engine, forest: Forest | None
-) -> RadioNet | None:
+) -> RadioNetwork | None:
     """The network that UAVs of a scenario join; None where it has no radio."""
     radio = scenario.radio
     if radio is None:
@@ -33,6 +33,6 @@ def build_radio(
 
     link = None
     if radio.links == "modelled":
-        link = RadioLink(radio, scenario.seed, places, RadioSight(engine.scene, forest))
-    net = RadioNet(graph, engine, radio.topics, link)
+        link = RadioChannel(radio, scenario.seed, places, LineOfSight(engine.scene, forest))
+    net = RadioNetwork(graph, engine, radio.topics, link)
     return net

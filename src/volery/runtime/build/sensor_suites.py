@@ -14,7 +14,7 @@ from volery.core import rotations
 from volery.core.errors import DataFileError, ScenarioError
 from volery.core.rng import stream_key
 from volery.publishing.lidar_publishing import lidar_topic
-from volery.runtime.build.placement import Start
+from volery.runtime.build.placement import StartPose
 from volery.scenario import schema
 from volery.scenario.camera import CameraSensor
 from volery.sensors.lidar_model import LidarModel, load_lidar
@@ -58,7 +58,7 @@ PICTURE = ("width", "height", "horizontal_fov_deg", "samples")
 
 
 @dataclass(frozen=True)
-class Fitted:
+class SensorInstance:
     """One sensor on one UAV, before it joins a bank."""
 
     id: SensorId
@@ -86,7 +86,7 @@ class Fitted:
         return lidar_topic(self.id, self.lidar, self.spec.topic)
 
 
-def fit_sensors(scenario: schema.Scenario, starts: Sequence[Start]) -> list[Fitted]:
+def fit_sensors(scenario: schema.Scenario, starts: Sequence[StartPose]) -> list[SensorInstance]:
     """Every sensor of every UAV, in fleet order.
 
     Raises `DataFileError` for a LIDAR model that cannot be loaded, `ScenarioError` where two LIDARs
@@ -94,7 +94,7 @@ def fit_sensors(scenario: schema.Scenario, starts: Sequence[Start]) -> list[Fitt
     """
     models = _LidarModels(scenario)
     fitted = [
-        Fitted(
+        SensorInstance(
             SensorId(row, start.name, spec.name),
             spec,
             _mount(spec),
@@ -109,7 +109,7 @@ def fit_sensors(scenario: schema.Scenario, starts: Sequence[Start]) -> list[Fitt
     return fitted
 
 
-def _pair(seed: int, sensor: Fitted) -> list[Fitted]:
+def _pair(seed: int, sensor: SensorInstance) -> list[SensorInstance]:
     """The left and the right camera of a stereo pair; any other sensor as it is."""
     spec = sensor.spec
     if not isinstance(spec, CameraSensor) or spec.stereo is None:
@@ -134,7 +134,7 @@ def _moved(mount: Mount, y: float) -> Mount:
     return mount._replace(position_body=mount.position_body + offset)
 
 
-def refit(fitted: Sequence[Fitted], seed: int, first_row: int = 0) -> list[Fitted]:
+def refit(fitted: Sequence[SensorInstance], seed: int, first_row: int = 0) -> list[SensorInstance]:
     """The same sensors with the noise of a run of `seed`, on UAVs from `first_row` on."""
     return [
         replace(
@@ -169,7 +169,7 @@ class _LidarModels:
         return self._loaded[spec.model]
 
 
-def _check_topics(scenario: schema.Scenario, fitted: Sequence[Fitted]) -> None:
+def _check_topics(scenario: schema.Scenario, fitted: Sequence[SensorInstance]) -> None:
     """Refuse LIDARs that would publish on one topic."""
     taken: dict[str, str] = {}
     for sensor in fitted:
@@ -183,7 +183,7 @@ def _check_topics(scenario: schema.Scenario, fitted: Sequence[Fitted]) -> None:
             )
 
 
-def lidar_mounts(fitted: Sequence[Fitted], *, planar: bool) -> Mapping[str, Mount]:
+def lidar_mounts(fitted: Sequence[SensorInstance], *, planar: bool) -> Mapping[str, Mount]:
     """Topics of LaserScans, or of PointCloud2s, and how their LIDARs are mounted."""
     return MappingProxyType(
         {

@@ -14,7 +14,7 @@ from volery.core.clock import Schedule, ns_from_s
 from volery.core.errors import DataFileError
 from volery.engine.engine import SensorBank
 from volery.runtime.build.geo_reference import denial, local_frame, magnetic_field_map
-from volery.runtime.build.sensor_suites import PICTURE, RESULT_OF, Fitted
+from volery.runtime.build.sensor_suites import PICTURE, RESULT_OF, SensorInstance
 from volery.runtime.build.worlds import light_of
 from volery.scenario import schema
 from volery.sensors.bank import Bank
@@ -42,13 +42,13 @@ if TYPE_CHECKING:
 
 def build_banks(
     scenario: schema.Scenario,
-    fitted: Sequence[Fitted],
+    fitted: Sequence[SensorInstance],
     fleet: Fleet,
     scene: Scene,
     estimation: Estimation | None = None,
 ) -> list[SensorBank]:
     """Banks of all sensors, in a fixed order: estimates last, after what they are made of."""
-    groups: dict[tuple[Any, ...], list[Fitted]] = defaultdict(list)
+    groups: dict[tuple[Any, ...], list[SensorInstance]] = defaultdict(list)
     for sensor in sorted(fitted, key=lambda sensor: sensor.spec.kind == "estimate"):
         groups[sensor.bank_key].append(sensor)
     builder = _Builder(scenario, fleet, scene, estimation)
@@ -78,8 +78,8 @@ class _Builder:
         self._fleet = fleet
         self._scene = scene
 
-    def build(self, group: list[Fitted]) -> Bank:
-        by_kind: dict[str, Callable[[list[Fitted]], Bank]] = {
+    def build(self, group: list[SensorInstance]) -> Bank:
+        by_kind: dict[str, Callable[[list[SensorInstance]], Bank]] = {
             "lidar": self._lidar,
             "camera": self._camera,
             "imu": self._imu,
@@ -98,7 +98,7 @@ class _Builder:
             name = group[0].id.name
             raise DataFileError(f"{self._scenario}: sensor '{name}': {error}") from None
 
-    def _lidar(self, group: list[Fitted]) -> Bank:
+    def _lidar(self, group: list[SensorInstance]) -> Bank:
         model = group[0].lidar
         assert model is not None
         return LidarBank(
@@ -111,7 +111,7 @@ class _Builder:
             intensities=_wants_intensities(group[0].spec, model),
         )
 
-    def _camera(self, group: list[Fitted]) -> Bank:
+    def _camera(self, group: list[SensorInstance]) -> Bank:
         from volery.sensors.cameras.bank import CameraBank
         from volery.sensors.cameras.model import load_camera
 
@@ -127,22 +127,22 @@ class _Builder:
             light_of(self._world),
         )
 
-    def _imu(self, group: list[Fitted]) -> Bank:
+    def _imu(self, group: list[SensorInstance]) -> Bank:
         spec = group[0].spec
         model = load_imu_model(self._model(spec.model))
         return ImuBank(model, _schedule(group), _ids(group), *_places(group), _keys(group))
 
-    def _sonar(self, group: list[Fitted]) -> Bank:
+    def _sonar(self, group: list[SensorInstance]) -> Bank:
         model = load_sonar_model(self._model(group[0].spec.model))
         return SonarBank(
             model, _schedule(group), _ids(group), *_places(group), _keys(group), self._scene
         )
 
-    def _odometry(self, group: list[Fitted]) -> Bank:
+    def _odometry(self, group: list[SensorInstance]) -> Bank:
         model = load_odometry_model(self._model(group[0].spec.model))
         return OdometryBank(model, _schedule(group), _ids(group), _keys(group), self._fleet)
 
-    def _estimate(self, group: list[Fitted]) -> Bank:
+    def _estimate(self, group: list[SensorInstance]) -> Bank:
         from volery.sensors.estimate import EstimateBank
 
         assert self._estimation is not None
@@ -151,10 +151,10 @@ class _Builder:
         estimator = self._estimation.estimator
         return EstimateBank(_schedule(group), _ids(group), estimator, rows, variance)
 
-    def _ground_truth(self, group: list[Fitted]) -> Bank:
+    def _ground_truth(self, group: list[SensorInstance]) -> Bank:
         return GroundTruthBank(_schedule(group), _ids(group))
 
-    def _gnss(self, group: list[Fitted]) -> Bank:
+    def _gnss(self, group: list[SensorInstance]) -> Bank:
         model = load_gnss_model(self._model(group[0].spec.model))
         places, _ = _places(group)
         return GnssBank(
@@ -167,19 +167,19 @@ class _Builder:
             denial(self._world),
         )
 
-    def _barometer(self, group: list[Fitted]) -> Bank:
+    def _barometer(self, group: list[SensorInstance]) -> Bank:
         model = load_barometer_model(self._model(group[0].spec.model))
         places, _ = _places(group)
         altitude = self._world.origin.altitude_m
         return BarometerBank(model, _schedule(group), _ids(group), places, _keys(group), altitude)
 
-    def _magnetometer(self, group: list[Fitted]) -> Bank:
+    def _magnetometer(self, group: list[SensorInstance]) -> Bank:
         model = load_magnetometer_model(self._model(group[0].spec.model))
         _, turns = _places(group)
         field = magnetic_field_map(self._world)
         return MagnetometerBank(model, _schedule(group), _ids(group), turns, _keys(group), field)
 
-    def _battery(self, group: list[Fitted]) -> Bank:
+    def _battery(self, group: list[SensorInstance]) -> Bank:
         return BatteryBank(_schedule(group), _ids(group), self._fleet)
 
 
@@ -193,24 +193,24 @@ def _wants_intensities(spec: schema.LidarSensor, model: LidarModel) -> bool:
     return spec.intensities or model.intensity.published
 
 
-def _ids(group: list[Fitted]) -> tuple[SensorId, ...]:
+def _ids(group: list[SensorInstance]) -> tuple[SensorId, ...]:
     return tuple(sensor.id for sensor in group)
 
 
-def _places(group: list[Fitted]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _places(group: list[SensorInstance]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return (
         np.array([s.mount.position_body for s in group]),
         np.array([s.mount.attitude_body for s in group]),
     )
 
 
-def _keys(group: list[Fitted]) -> NDArray[np.uint64] | None:
+def _keys(group: list[SensorInstance]) -> NDArray[np.uint64] | None:
     return np.array([s.key for s in group]) if group[0].spec.noise else None
 
 
-def _phase_ns(group: list[Fitted]) -> int:
+def _phase_ns(group: list[SensorInstance]) -> int:
     return ns_from_s(group[0].spec.phase_s)
 
 
-def _schedule(group: list[Fitted]) -> Schedule:
+def _schedule(group: list[SensorInstance]) -> Schedule:
     return Schedule.from_hz(group[0].spec.rate_hz, _phase_ns(group))

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from volery.runtime.monitoring.monitor import LiveTopics
+from volery.runtime.monitoring.monitor import Monitor
 
-__all__ = ["LiveTopics"]
+__all__ = ["Monitor"]

@@ -22,7 +22,7 @@ from volery.graph.messages import (
     Vector3,
     header,
 )
-from volery.runtime.monitoring.live_topic import Present
+from volery.runtime.monitoring.live_topic import LiveTopic
 
 Array = NDArray[np.float64]
 
@@ -32,10 +32,10 @@ _LEAST_S = 0.05
 """Between two messages that are shown: smooth enough to the eye at a twentieth of real time."""
 
 
-def tell_poses(graph: Graph, engine: Engine) -> Present:
+def tell_poses(graph: Graph, engine: Engine) -> LiveTopic:
     """Tell `map -> uavN/base_link` of every UAV in fleet order, then `map -> NAME` of things."""
     publisher = graph.advertise(TOPIC, TFMessage)
-    return Present(
+    return LiveTopic(
         publisher, lambda: _message(engine), lambda: _content(engine), _PERIOD_S, _LEAST_S
     )
 

@@ -18,7 +18,7 @@ Timers = Callable[..., None]
 
 
 @dataclass
-class Present:
+class LiveTopic:
     """Tells what `message()` says each `period_s` of simulated time, and between where it changed.
 
     `content()` is cheap to make and differs from the last one where the message would. Shown are

@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING
 
 from volery.engine.engine import Engine
 from volery.runtime.monitoring.ground_truth_tf import tell_poses
-from volery.runtime.monitoring.status import Status, Told
-from volery.runtime.monitoring.vehicles import Vehicles
+from volery.runtime.monitoring.status import Status, StatusSources
+from volery.runtime.monitoring.vehicles import VehicleTopic
 
 if TYPE_CHECKING:
     from volery.runtime.simulation import Simulation
 
 
-class LiveTopics:
+class Monitor:
     """Tells of places, vehicles and the run itself; changes nothing of what is simulated."""
 
-    def __init__(self, simulation: Simulation, engine: Engine, told: Told) -> None:
+    def __init__(self, simulation: Simulation, engine: Engine, told: StatusSources) -> None:
         self._graph = simulation.graph
-        vehicles = Vehicles(
+        vehicles = VehicleTopic(
             engine, simulation.uavs, simulation.gateway, simulation.pilots.holder_of
         )
         self._present = (tell_poses(simulation.graph, engine), vehicles.present)

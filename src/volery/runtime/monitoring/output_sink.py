@@ -16,7 +16,7 @@ NOT_OF_THE_WORLD = ("/volery/", "/ground_truth/tf", "/rosout")
 """Topics of the simulation and its clients, of poses that are in already, and of nodes' logs."""
 
 
-class Outlet:
+class OutputSink:
     """The engine's `Sink` in a simulation."""
 
     def __init__(self, fleet: Fleet, graph: Graph, publisher: GraphPublisher) -> None:

@@ -30,7 +30,7 @@ class Progress:
         return (self.before_s + self.time_s) / self.wall_s if self.wall_s > 0.0 else 0.0
 
 
-class ProgressTeller:
+class ProgressPublisher:
     """Calls `on_progress`, if there is one, where enough wall time has gone by."""
 
     def __init__(

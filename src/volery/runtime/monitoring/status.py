@@ -69,7 +69,7 @@ class Speedometer:
 
 
 @dataclass
-class Told:
+class StatusSources:
     """What the status tells that services know."""
 
     state: Callable[[], int]
@@ -80,7 +80,7 @@ class Told:
 class Status:
     """Shows how a simulation runs, five times a second of wall time."""
 
-    def __init__(self, simulation: Simulation, told: Told) -> None:
+    def __init__(self, simulation: Simulation, told: StatusSources) -> None:
         self._simulation = simulation
         self._told = told
         self._publisher = simulation.graph.advertise(TOPIC, _TYPE)

@@ -17,7 +17,7 @@ from volery.engine.engine import Engine
 from volery.graph.lazy_list import LazyList
 from volery.graph.messages import Point, Vector3, header, message_type
 from volery.graph.session import Gateway
-from volery.runtime.monitoring.live_topic import Present
+from volery.runtime.monitoring.live_topic import LiveTopic
 from volery.runtime.vehicles.uav import Uav
 
 TOPIC = "/volery/vehicles"
@@ -40,7 +40,7 @@ class _Build:
     has_battery: NDArray[np.bool_]
 
 
-class Vehicles:
+class VehicleTopic:
     """Tells of all UAVs of an engine.
 
     `uavs` are their handles, `gateway` knows their clients, `holder` tells who steers a UAV.
@@ -59,7 +59,7 @@ class Vehicles:
         self._build = _build_of(engine.fleet)
         self._holder = holder
         publisher = gateway.graph.advertise(TOPIC, _ALL)
-        self.present = Present(publisher, self.message, self.content, _PERIOD_S, _LEAST_S)
+        self.present = LiveTopic(publisher, self.message, self.content, _PERIOD_S, _LEAST_S)
 
     def message(self) -> Any:
         """All UAVs as they are now, as a VehicleStates."""

@@ -43,7 +43,7 @@ _AT_THE_END_BY_NAME = {
 _SETS_PARAMETERS = {"rosapi_msgs/srv/SetParam", "rosapi_msgs/srv/DeleteParam"}
 
 
-class Weight(Enum):
+class CommandEffect(Enum):
     """What a command may do to the flight."""
 
     ASKS = "nothing: it only asks"
@@ -55,21 +55,21 @@ def restarts(taken: ClientCommand) -> bool:
     """Return whether a command has effect where a scenario has ended."""
     if taken.kind == "call" and (taken.type in _AT_THE_END or taken.name in _AT_THE_END_BY_NAME):
         return True
-    return weight_of(taken) is not Weight.CHANGES
+    return weight_of(taken) is not CommandEffect.CHANGES
 
 
-def weight_of(taken: ClientCommand) -> Weight:
+def weight_of(taken: ClientCommand) -> CommandEffect:
     """How much hangs on a command; of services that nobody knows: the results."""
     if taken.kind in ("publish", "answer", "failure"):
-        return Weight.CHANGES
+        return CommandEffect.CHANGES
     if taken.kind != "call":
-        return Weight.PACES
+        return CommandEffect.PACES
     package, _, name = taken.type.partition("/srv/")
     if name.startswith(_ASKING.get(package, ())):
-        return Weight.ASKS
+        return CommandEffect.ASKS
     if package == "rosapi_msgs" and taken.type not in _SETS_PARAMETERS:
-        return Weight.ASKS
+        return CommandEffect.ASKS
     if taken.type == _SET_STATE:
         state = _STOPPED if taken.content is None else int(taken.content.state.state)
-        return Weight.CHANGES if state == _STOPPED else Weight.PACES
-    return Weight.PACES if taken.type in _PACE else Weight.CHANGES
+        return CommandEffect.CHANGES if state == _STOPPED else CommandEffect.PACES
+    return CommandEffect.PACES if taken.type in _PACE else CommandEffect.CHANGES

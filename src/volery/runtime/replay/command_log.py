@@ -11,14 +11,14 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from volery.core.errors import GraphError
-from volery.engine.command_queue import Moment
+from volery.engine.command_queue import CommandTime
 from volery.engine.engine import Engine
 from volery.graph import command_records as records
 from volery.graph.graph import Graph
 from volery.graph.messages import Published
 from volery.graph.session import ClientCommand
 from volery.graph.subscription_queue import array_bytes
-from volery.runtime.replay.command_effects import Weight, weight_of
+from volery.runtime.replay.command_effects import CommandEffect, weight_of
 
 MOST_KEPT_BYTES = 32 * 1024 * 1024
 """Of commands that logs begun later are given (modelling choice); beyond that none are kept."""
@@ -29,7 +29,7 @@ _OVERHEAD_BYTES = 400
 class _Kept(NamedTuple):
     number: int
     time_ns: int
-    moment: Moment
+    moment: CommandTime
     taken: ClientCommand
     """Without its content where `cdr` has that."""
     cdr: bytes | None
@@ -56,14 +56,14 @@ class CommandLog:
     def watch(self, taken: ClientCommand) -> None:
         """Note what a client does. `GraphError` where that must not be."""
         weight = weight_of(taken)
-        if self.repeats and weight is Weight.CHANGES:
+        if self.repeats and weight is CommandEffect.CHANGES:
             raise GraphError("a recorded flight is repeated; nothing else may change it")
         if reason := self.refuse(taken):
             raise GraphError(reason)
-        if weight is not Weight.ASKS:
+        if weight is not CommandEffect.ASKS:
             self.note(taken, weight)
 
-    def note(self, taken: ClientCommand, weight: Weight) -> None:
+    def note(self, taken: ClientCommand, weight: CommandEffect) -> None:
         """Tell of a command that is about to take effect."""
         cdr = None if records.is_large(taken) else records.content_bytes(taken)
         moment = self._engine.moment
@@ -72,14 +72,14 @@ class CommandLog:
         if self._publisher.wanted:
             self._publisher.publish(_message(kept))
         self._keep(kept)
-        if weight is Weight.CHANGES:
+        if weight is CommandEffect.CHANGES:
             self._engine.count_command()
 
     def end(self) -> None:
         """Tell that the flight is over; a second time nothing happens."""
         if not self._ended:
             self._ended = True
-            self.note(ClientCommand("", "end", "", ""), Weight.PACES)
+            self.note(ClientCommand("", "end", "", ""), CommandEffect.PACES)
             self._graph.deliver()
 
     def earlier(self) -> Iterator[Published]:

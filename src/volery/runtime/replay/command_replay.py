@@ -15,22 +15,22 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any
 
-from volery.bridges.logs.recorded_flight import Command, RecordedFlight
+from volery.bridges.logs.recorded_flight import RecordedCommand, RecordedFlight
 from volery.core.errors import CommandError, GraphError
-from volery.engine.command_queue import Moment
+from volery.engine.command_queue import CommandTime
 from volery.engine.engine import Engine
 from volery.engine.pacing import Pacer
 from volery.graph.graph import Graph, Publisher
 from volery.graph.service_reply import ServiceReply
 from volery.graph.session import ClientCommand, Gateway
-from volery.runtime.replay.command_effects import Weight, weight_of
+from volery.runtime.replay.command_effects import CommandEffect, weight_of
 from volery.runtime.replay.command_log import CommandLog
-from volery.runtime.services.simulation_state import State
+from volery.runtime.services.simulation_state import RunState
 
 _SET_STATE = "simulation_interfaces/srv/SetSimulationState"
 
 
-class Repetition:
+class CommandReplay:
     """Takes the commands of a recorded flight; the `Repeats` of an engine."""
 
     def __init__(
@@ -41,7 +41,7 @@ class Repetition:
         pacer: Pacer,
         log: CommandLog,
     ) -> None:
-        self._commands: Sequence[Command] = flight.commands
+        self._commands: Sequence[RecordedCommand] = flight.commands
         self._engine = engine
         self._pacer = pacer
         self._log = log
@@ -77,11 +77,11 @@ class Repetition:
         self.over = self.over or ended
         return self._next > first
 
-    def _due(self) -> Command | None:
+    def _due(self) -> RecordedCommand | None:
         if self._next == len(self._commands):
             return None
         command = self._commands[self._next]
-        moment, here = Moment(command.step, command.turn), self._engine.moment
+        moment, here = CommandTime(command.step, command.turn), self._engine.moment
         if moment < here:
             raise CommandError(
                 f"the flight is not the recorded one: command {command.number} "
@@ -107,11 +107,13 @@ class Repetition:
     def _is_left_out(self, taken: ClientCommand) -> bool:
         """Whether a command changed only the pace, or was refused because of the pace."""
         if taken.kind == "call" and taken.type == _SET_STATE:
-            state = State.STOPPED if taken.content is None else taken.content.state.state
+            state = RunState.STOPPED if taken.content is None else taken.content.state.state
             again = self._stopped and self._engine.time_ns == 0
-            self._stopped = state == State.STOPPED or (self._stopped and state != State.PLAYING)
-            return again or state != State.STOPPED
-        return taken.kind in ("call", "goal", "cancel") and weight_of(taken) is Weight.PACES
+            self._stopped = state == RunState.STOPPED or (
+                self._stopped and state != RunState.PLAYING
+            )
+            return again or state != RunState.STOPPED
+        return taken.kind in ("call", "goal", "cancel") and weight_of(taken) is CommandEffect.PACES
 
 
 class _Clients:

@@ -1,7 +1,7 @@
 """A recorded log in the place of a simulation: a graph that tells again what was told then.
 
-    with Player(Path("flight.mcap")) as player, Doors(player.gateway) as doors:
-        doors.open(RosbridgeServer())
+    with LogPlayer(Path("flight.mcap")) as player, BridgeHost(player.gateway) as bridges:
+        bridges.open(RosbridgeServer())
         player.run()
 
 It has its own clock, the log's, which can be paused, paced and put anywhere. Nothing is simulated:
@@ -19,11 +19,11 @@ from pathlib import Path
 from typing import Any
 
 from volery.bridges.logs.playback import Playback
-from volery.bridges.logs.recorded_flight import Origin, origin_of
+from volery.bridges.logs.recorded_flight import RecordedScenario, origin_of
 from volery.core.clock import NS_PER_S, ns_from_s, s_from_ns
 from volery.core.errors import CommandError, RecordingError, VoleryError
 from volery.engine.call_budget import CallBudget
-from volery.engine.command_queue import Inbox
+from volery.engine.command_queue import CommandQueue
 from volery.graph.graph import Graph
 from volery.graph.messages import Clock, time_from_ns
 from volery.graph.session import Gateway
@@ -31,10 +31,10 @@ from volery.runtime.build.geometry import Geometry
 from volery.runtime.build.worlds import geometry_of
 from volery.runtime.monitoring.progress import Progress
 from volery.runtime.replay.scenario_record import scenario_of
-from volery.runtime.services.player import PlayerServices, State
+from volery.runtime.services.player import PlayerServices, RunState
 from volery.runtime.services.worlds import OnLoad
 from volery.scenario import library
-from volery.scenario.catalog import Shelf
+from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.schema import Scenario
 
 _SLICE_S = 0.004
@@ -50,7 +50,7 @@ _GLANCE_S = 0.05
 _NEWCOMERS = "new subscribers"
 
 
-class Player:
+class LogPlayer:
     """Plays the log at `path` on a graph of its own.
 
     `speed` is a factor of real time, None plays as fast as possible; with `loop` it begins again at
@@ -72,13 +72,13 @@ class Player:
         paused: bool = False,
         on_load: OnLoad | None = None,
         on_close: Callable[[], None] | None = None,
-        shelf: Shelf | None = None,
+        shelf: ScenarioCatalog | None = None,
         own: Scenario | None = None,
     ) -> None:
         _check_speed(speed)
         self.path = Path(path)
         self._playback = Playback(self.path)
-        self._inbox = Inbox()
+        self._inbox = CommandQueue()
         self.graph = Graph(lambda: self._playback.now_ns, self._inbox.post)
         self.gateway = Gateway(
             self.graph,
@@ -156,13 +156,13 @@ class Player:
         return self._speed
 
     @property
-    def state(self) -> State:
+    def state(self) -> RunState:
         """As `simulation_interfaces` names it: stopped at the start."""
         if self.quitting:
-            return State.QUITTING
+            return RunState.QUITTING
         if not self._paused:
-            return State.PLAYING
-        return State.STOPPED if self.time_ns == self._playback.start_ns else State.PAUSED
+            return RunState.PLAYING
+        return RunState.STOPPED if self.time_ns == self._playback.start_ns else RunState.PAUSED
 
     # ---------------------------------------------------------------------------------- steering
 
@@ -256,7 +256,7 @@ class Player:
         self.quitting = True
         self._playback.close()
 
-    def __enter__(self) -> Player:
+    def __enter__(self) -> LogPlayer:
         return self
 
     def __exit__(self, *_exception: object) -> None:
@@ -340,12 +340,14 @@ class Player:
     def _tell_soon(self) -> None:
         self._clock_due = self._state_due = 0.0
 
-    def _known_origin(self) -> Origin | None:
+    def _known_origin(self) -> RecordedScenario | None:
         with suppress(RecordingError):
             return origin_of(self._playback.log)
         return None
 
-    def _known_scenario(self, own: Scenario | None, shelf: Shelf | None) -> Scenario | None:
+    def _known_scenario(
+        self, own: Scenario | None, shelf: ScenarioCatalog | None
+    ) -> Scenario | None:
         origin, folder = self.origin, self.path.parent
         if own is not None and origin is not None:
             return scenario_of(origin, own, folder=folder)  # another one is a mistake of the user's
@@ -372,7 +374,7 @@ class Player:
         }
 
 
-def _of_shelf(shelf: Shelf | None, name: str) -> Scenario | None:
+def _of_shelf(shelf: ScenarioCatalog | None, name: str) -> Scenario | None:
     """A scenario with files of its own beside it; shipped ones have none."""
     if shelf is None or name in library.names() or name not in shelf.names():
         return None

@@ -8,7 +8,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from volery.bridges.logs.recorded_flight import ORIGIN_TOPIC, Origin
+from volery.bridges.logs.recorded_flight import ORIGIN_TOPIC, RecordedScenario
 from volery.core.errors import ScenarioError
 from volery.graph.graph import Graph
 from volery.graph.messages import String
@@ -23,14 +23,14 @@ def tell_origin(graph: Graph, scenario: Scenario) -> None:
     publisher.publish(String(origin_of_scenario(scenario).to_json()))
 
 
-def origin_of_scenario(scenario: Scenario) -> Origin:
+def origin_of_scenario(scenario: Scenario) -> RecordedScenario:
     """What a log is told of a scenario."""
     content = scenario.model_dump(exclude_unset=True)
-    return Origin(scenario.name, scenario.seed, version("volery"), content)
+    return RecordedScenario(scenario.name, scenario.seed, version("volery"), content)
 
 
 def scenario_of(
-    origin: Origin, own: Scenario | None = None, *, folder: Path | None = None
+    origin: RecordedScenario, own: Scenario | None = None, *, folder: Path | None = None
 ) -> Scenario:
     """Return the scenario that a log tells of.
 

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from volery.runtime.services.service_set import Services, open_services
+from volery.runtime.services.service_set import ServiceSet, open_services
 
-__all__ = ["Services", "open_services"]
+__all__ = ["ServiceSet", "open_services"]

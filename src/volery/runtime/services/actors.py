@@ -16,7 +16,7 @@ from volery.graph.messages import (
     Vector3,
     header,
 )
-from volery.world.actors import MovingThings
+from volery.world.actors import MovingActors
 from volery.world.actors.motions import GivenMotion
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _PERIOD_S = 0.02
 
 
-def offer_things(simulation: Simulation, things: MovingThings, every: Callable[..., None]) -> None:
+def offer_things(simulation: Simulation, things: MovingActors, every: Callable[..., None]) -> None:
     """Tell of all things on `/tf`, 50 times a second; listen to `/things/NAME/pose`.
 
     A pose in the map that comes there is that of the thing from now on; a rotation of zeros keeps

@@ -6,7 +6,7 @@ from typing import Any
 
 from volery.graph.graph import Graph
 from volery.runtime.services.results import Fields, offer_command
-from volery.runtime.vehicles.control_authority import Pilots
+from volery.runtime.vehicles.control_authority import ControlAuthority
 
 _OURS = "volery_interfaces/srv"
 TAKE, RELEASE, HAND_OVER = (
@@ -16,8 +16,8 @@ TAKE, RELEASE, HAND_OVER = (
 )
 
 
-def offer_piloting(graph: Graph, pilots: Pilots) -> None:
-    """Offer taking, releasing and handing over; see `Pilots`."""
+def offer_piloting(graph: Graph, pilots: ControlAuthority) -> None:
+    """Offer taking, releasing and handing over; see `ControlAuthority`."""
 
     def take(request: Any) -> Fields:
         pilots.take(request.uav, request.pilot)

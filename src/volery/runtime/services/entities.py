@@ -18,7 +18,7 @@ from volery.runtime.services.filters import (
     name_filter,
     tag_filter,
 )
-from volery.runtime.services.results import Code, Fields, RefusedError, filled, offer_result
+from volery.runtime.services.results import Fields, RefusedError, ResultCode, filled, offer_result
 
 if TYPE_CHECKING:
     from volery.runtime.simulation import Simulation
@@ -116,7 +116,7 @@ class Entities:
     def _find(self, name: str) -> Entity:
         found = next((entity for entity in self._all() if entity.name == name), None)
         if found is None:
-            raise RefusedError(Code.NOT_FOUND, f"there is no entity '{name}'")
+            raise RefusedError(ResultCode.NOT_FOUND, f"there is no entity '{name}'")
         return found
 
     # ------------------------------------------------------------------------------------ changes
@@ -125,19 +125,19 @@ class Entities:
         entity, state = self._find(request.entity), request.state
         if state.header.frame_id not in ("", "map"):
             reason = f"states are set in 'map', not in '{state.header.frame_id}'"
-            raise RefusedError(Code.OPERATION_FAILED, reason)
+            raise RefusedError(ResultCode.OPERATION_FAILED, reason)
         if request.set_acceleration:
             reason = "accelerations follow from forces and cannot be set"
-            raise RefusedError(Code.FEATURE_UNSUPPORTED, reason)
+            raise RefusedError(ResultCode.FEATURE_UNSUPPORTED, reason)
         if not (request.set_pose or request.set_twist):
             raise RefusedError(
-                Code.OPERATION_FAILED, "nothing to set: set_pose or set_twist must be true"
+                ResultCode.OPERATION_FAILED, "nothing to set: set_pose or set_twist must be true"
             )
         if request.set_twist:
             twist = [_numbers(state.twist.linear), _numbers(state.twist.angular)]
             if not np.isfinite(twist).all() or np.abs(twist).max() > _FASTEST:
                 reason = f"a twist is up to {_FASTEST:g} m/s or rad/s"
-                raise RefusedError(Code.OPERATION_FAILED, reason)
+                raise RefusedError(ResultCode.OPERATION_FAILED, reason)
         if entity.category is not Category.ROBOT:
             self._set_thing(entity, request)
             return
@@ -156,7 +156,7 @@ class Entities:
             attitude = np.array([turn.x, turn.y, turn.z, turn.w])
         if request.set_twist:
             if any(_numbers(request.state.twist.angular)):
-                raise RefusedError(Code.FEATURE_UNSUPPORTED, "things do not turn by a twist")
+                raise RefusedError(ResultCode.FEATURE_UNSUPPORTED, "things do not turn by a twist")
             velocity = np.array(_numbers(request.state.twist.linear))
         self._simulation.put_thing(entity.name, position, attitude, velocity)
 

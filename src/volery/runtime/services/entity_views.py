@@ -14,7 +14,7 @@ from volery.runtime.services.filters import Category
 from volery.runtime.vehicles.uav import Uav
 from volery.scenario.schema import UavType
 from volery.vehicle.body_shape import body_shape
-from volery.world.actors import MovingThings, Thing
+from volery.world.actors import MovingActor, MovingActors
 from volery.world.scene_content import BodyShape
 
 Array = NDArray[np.float64]
@@ -65,7 +65,7 @@ def entity_of_uav(uav: Uav, types: Mapping[str, UavType]) -> Entity:
     )
 
 
-def entities_of_things(things: MovingThings | None, time_ns: int) -> Iterator[Entity]:
+def entities_of_things(things: MovingActors | None, time_ns: int) -> Iterator[Entity]:
     """All things, in order."""
     if things is None:
         return
@@ -87,5 +87,5 @@ def entities_of_things(things: MovingThings | None, time_ns: int) -> Iterator[En
         )
 
 
-def _shape_of(thing: Thing) -> BodyShape:
+def _shape_of(thing: MovingActor) -> BodyShape:
     return thing.shape

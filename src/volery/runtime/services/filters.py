@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from volery.core.errors import PatternError
 from volery.core.patterns import posix_search
-from volery.runtime.services.results import Code, RefusedError
+from volery.runtime.services.results import RefusedError, ResultCode
 
 Array = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ def name_filter(pattern: str) -> Callable[[str], bool]:
     try:
         return posix_search(pattern)
     except PatternError as error:
-        raise RefusedError(Code.OPERATION_FAILED, f"filter: {error}") from None
+        raise RefusedError(ResultCode.OPERATION_FAILED, f"filter: {error}") from None
 
 
 def tag_filter(tags: Any) -> Callable[[Sequence[str]], bool]:
@@ -55,7 +55,7 @@ def tag_filter(tags: Any) -> Callable[[Sequence[str]], bool]:
         return lambda _own: True
     if tags.filter_mode not in (0, 1):
         reason = f"filter_mode is 0 (any) or 1 (all), not {tags.filter_mode}"
-        raise RefusedError(Code.OPERATION_FAILED, reason)
+        raise RefusedError(ResultCode.OPERATION_FAILED, reason)
     if tags.filter_mode == 1:
         return lambda own: wanted <= set(own)
     return lambda own: bool(wanted & set(own))
@@ -72,16 +72,18 @@ def bounds_filter(bounds: Any) -> Callable[[Array, float], bool]:
         return lambda _position, _radius: True
     if kind == BoundsType.CONVEX_HULL:
         raise RefusedError(
-            Code.FEATURE_UNSUPPORTED, "convex hulls are not supported; use box or sphere"
+            ResultCode.FEATURE_UNSUPPORTED, "convex hulls are not supported; use box or sphere"
         )
     if kind not in (BoundsType.BOX, BoundsType.SPHERE):
-        raise RefusedError(Code.OPERATION_FAILED, f"there are no bounds of type {kind}")
+        raise RefusedError(ResultCode.OPERATION_FAILED, f"there are no bounds of type {kind}")
     if len(points) != 2 or not np.isfinite(points).all():
-        raise RefusedError(Code.OPERATION_FAILED, "these bounds need two finite points")
+        raise RefusedError(ResultCode.OPERATION_FAILED, "these bounds need two finite points")
     if kind == BoundsType.SPHERE:
         center, reach = points[0], float(points[1, 0])
         if reach < 0.0:
-            raise RefusedError(Code.OPERATION_FAILED, "the radius of a sphere is not negative")
+            raise RefusedError(
+                ResultCode.OPERATION_FAILED, "the radius of a sphere is not negative"
+            )
         return lambda position, radius: _distance(position, center) <= reach + radius
     low, high = points.min(axis=0), points.max(axis=0)
     return lambda position, radius: _distance(position, np.clip(position, low, high)) <= radius

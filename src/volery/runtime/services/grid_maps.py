@@ -23,7 +23,7 @@ from volery.graph.messages import (
     single,
     time_from_ns,
 )
-from volery.runtime.grid_map_manager import GridWorld
+from volery.runtime.grid_map_manager import GridMapManager
 from volery.runtime.services.results import Fields, offer_command
 from volery.scenario.grid_map import RECEIVED, GridMapWorld
 from volery.world.grid_maps import GridMap
@@ -39,7 +39,7 @@ _LEVEL = 1e-3
 
 
 def offer_grid_maps(
-    graph: Graph, world: GridWorld, settings: GridMapWorld, now_ns: Callable[[], int]
+    graph: Graph, world: GridMapManager, settings: GridMapWorld, now_ns: Callable[[], int]
 ) -> None:
     """Tell of the map on `/map`, latched; take others on `/map_in`; offer the services."""
     publisher = graph.advertise("/map", OccupancyGrid, latched=True)

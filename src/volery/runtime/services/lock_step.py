@@ -1,4 +1,4 @@
-"""Lock-step partners over doors: the simulation waits for programs in other processes.
+"""Lock-step partners over bridges: the simulation waits for programs in other processes.
 
 A client calls `/volery/join_lock_step`, subscribes `/volery/lock_step/NAME/go` and publishes on
 `/volery/lock_step/NAME/done`, both `rosgraph_msgs/Clock`. At each meeting the simulation sends the

@@ -9,17 +9,17 @@ import numpy as np
 
 from volery.graph.graph import Graph
 from volery.graph.messages import Vector3
-from volery.runtime.build.placement import Start
+from volery.runtime.build.placement import StartPose
 from volery.runtime.services.entities import pose_message
 from volery.runtime.services.filters import BoundsType, tag_filter
-from volery.runtime.services.results import Code, Fields, RefusedError, filled, offer_result
+from volery.runtime.services.results import Fields, RefusedError, ResultCode, filled, offer_result
 
 _MSG = "simulation_interfaces/msg"
 _SRV = "simulation_interfaces/srv"
 _SUFFIX = "_start"
 
 
-def offer_named_poses(graph: Graph, starts: Sequence[Start]) -> None:
+def offer_named_poses(graph: Graph, starts: Sequence[StartPose]) -> None:
     """Offer `/get_named_poses` and `/get_named_pose_bounds`: `uav1_start`, `uav2_start`, ..."""
     by_name = {f"{start.name}{_SUFFIX}": start for start in starts}
 
@@ -31,7 +31,7 @@ def offer_named_poses(graph: Graph, starts: Sequence[Start]) -> None:
     def bounds(request: Any) -> Fields:
         start = by_name.get(request.name)
         if start is None:
-            raise RefusedError(Code.NOT_FOUND, f"there is no named pose '{request.name}'")
+            raise RefusedError(ResultCode.NOT_FOUND, f"there is no named pose '{request.name}'")
         center, radius = start.position_map, start.airframe.body.collision_radius_m
         points = [Vector3(*center.tolist()), Vector3(radius, 0.0, 0.0)]
         return {"bounds": filled(f"{_MSG}/Bounds", {"type": BoundsType.SPHERE, "points": points})}
@@ -40,7 +40,7 @@ def offer_named_poses(graph: Graph, starts: Sequence[Start]) -> None:
     offer_result(graph, "/get_named_pose_bounds", f"{_SRV}/GetNamedPoseBounds", bounds)
 
 
-def _named(name: str, start: Start) -> Any:
+def _named(name: str, start: StartPose) -> Any:
     fields = {
         "name": name,
         "description": f"where {start.name} starts",

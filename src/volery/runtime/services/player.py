@@ -10,22 +10,22 @@ import numpy as np
 from volery.core.errors import CommandError
 from volery.runtime.services.features import PLAYER_FEATURES, offer_features
 from volery.runtime.services.results import (
-    Code,
     Fields,
     Handler,
     RefusedError,
+    ResultCode,
     filled,
     offer_command,
     offer_result,
 )
-from volery.runtime.services.simulation_state import WRONG_TRANSITION, State
+from volery.runtime.services.simulation_state import WRONG_TRANSITION, RunState
 from volery.runtime.services.worlds import OnLoad, offer_worlds
 
 if TYPE_CHECKING:
-    from volery.runtime.replay.log_player import Player
-    from volery.scenario.catalog import Shelf
+    from volery.runtime.replay.log_player import LogPlayer
+    from volery.scenario.catalog import ScenarioCatalog
 
-__all__ = ["PlayerServices", "State"]
+__all__ = ["PlayerServices", "RunState"]
 
 _SRV = "simulation_interfaces/srv"
 _OURS = "volery_interfaces"
@@ -39,9 +39,9 @@ class PlayerServices:
 
     def __init__(
         self,
-        player: Player,
+        player: LogPlayer,
         on_load: OnLoad | None,
-        shelf: Shelf | None,
+        shelf: ScenarioCatalog | None,
         on_close: Callable[[], None] | None = None,
     ) -> None:
         self._player = player
@@ -92,14 +92,14 @@ class PlayerServices:
         player, wanted = self._player, int(request.state.state)
         if wanted == player.state:
             raise RefusedError(_ALREADY_THERE, f"the player is {player.state.name} already")
-        if wanted == State.PLAYING:
+        if wanted == RunState.PLAYING:
             player.resume()
-        elif wanted == State.PAUSED:
+        elif wanted == RunState.PAUSED:
             player.pause()
-        elif wanted == State.STOPPED:
+        elif wanted == RunState.STOPPED:
             player.pause()
             player.seek(player.start_s)
-        elif wanted == State.QUITTING:
+        elif wanted == RunState.QUITTING:
             player.quit()
         else:
             raise RefusedError(WRONG_TRANSITION, f"state {wanted} cannot be asked for")
@@ -108,11 +108,11 @@ class PlayerServices:
         steps = int(request.steps)
         if not 1 <= steps <= _MOST_STEPS:
             reason = f"steps must be 1 to {_MOST_STEPS}, not {steps}"
-            raise RefusedError(Code.OPERATION_FAILED, reason)
+            raise RefusedError(ResultCode.OPERATION_FAILED, reason)
         try:
             self._player.single_step(steps)
         except CommandError as error:
-            raise RefusedError(Code.INCORRECT_STATE, str(error)) from None
+            raise RefusedError(ResultCode.INCORRECT_STATE, str(error)) from None
 
     def _set_speed(self, request: Any) -> None:
         self._player.set_speed(request.factor if request.factor > 0.0 else None)

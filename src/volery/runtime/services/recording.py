@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from volery.bridges.logs.log_writer import Log, open_log
+from volery.bridges.logs.log_writer import LogWriter, open_log
 from volery.bridges.logs.recorded_topics import recorded_topics
 from volery.bridges.logs.recordings_quota import room_left
 from volery.core.errors import RecordingError
@@ -17,14 +17,14 @@ from volery.runtime.services.results import Fields, offer_command
 _OURS = "volery_interfaces/srv"
 
 
-class Recording:
+class RecordingServices:
     """Offers `/volery/start_recording` and `/volery/stop_recording`: one log at a time."""
 
     def __init__(self, graph: Graph, folder: Path | None, commands: CommandLog) -> None:
         self._graph = graph
         self._commands = commands
         self._folder = None if folder is None else Path(folder)
-        self._log: Log | None = None
+        self._log: LogWriter | None = None
         self._subscription: Subscription | None = None
         self._failure: RecordingError | None = None
         self._room = 0
@@ -75,7 +75,7 @@ class Recording:
             raise failure
         return {"path": str(log.path), "messages": log.messages}
 
-    def _end(self) -> Log:
+    def _end(self) -> LogWriter:
         log, self._log = self._log, None
         assert log is not None
         self._leave()

@@ -24,7 +24,7 @@ _MAX_CHARACTERS = 1_000
 """Of the reason of a refusal."""
 
 
-class Code(IntEnum):
+class ResultCode(IntEnum):
     """`simulation_interfaces/msg/Result`, what every service of the standard answers with."""
 
     FEATURE_UNSUPPORTED = 0
@@ -42,7 +42,7 @@ class RefusedError(Exception):
         self.code = int(code)
 
 
-def result(code: int = Code.OK, reason: str = "") -> Any:
+def result(code: int = ResultCode.OK, reason: str = "") -> Any:
     """A `simulation_interfaces/msg/Result`."""
     return message_type("simulation_interfaces/msg/Result")(result=int(code), error_message=reason)
 
@@ -57,7 +57,7 @@ def filled(name: str, fields: Fields | None = None) -> Any:
 
 def failed(error: Exception) -> Any:
     """The Result that tells of an error."""
-    code = error.code if isinstance(error, RefusedError) else Code.OPERATION_FAILED
+    code = error.code if isinstance(error, RefusedError) else ResultCode.OPERATION_FAILED
     return result(code, reason_of(error))
 
 

@@ -13,22 +13,22 @@ from volery.runtime.services.entities import Entities
 from volery.runtime.services.features import offer_features
 from volery.runtime.services.grid_maps import offer_grid_maps
 from volery.runtime.services.named_poses import offer_named_poses
-from volery.runtime.services.recording import Recording
-from volery.runtime.services.simulation_state import Playing
+from volery.runtime.services.recording import RecordingServices
+from volery.runtime.services.simulation_state import SimulationStateServices
 from volery.runtime.services.single_steps import offer_steps
-from volery.runtime.services.snapshot_services import KeptStates
-from volery.runtime.services.spawning import Spawning
+from volery.runtime.services.snapshot_services import SnapshotServices
+from volery.runtime.services.spawning import SpawnServices
 from volery.runtime.services.worlds import OnLoad, offer_worlds
-from volery.scenario.catalog import Shelf
+from volery.scenario.catalog import ScenarioCatalog
 
 if TYPE_CHECKING:
     from volery.runtime.simulation import Simulation
 
 
-class Services:
+class ServiceSet:
     """What the services of one simulation hold on to."""
 
-    def __init__(self, playing: Playing, recording: Recording) -> None:
+    def __init__(self, playing: SimulationStateServices, recording: RecordingServices) -> None:
         self._playing = playing
         self._recording = recording
 
@@ -52,9 +52,9 @@ def open_services(
     *,
     recordings: Path | None = None,
     on_load: OnLoad | None = None,
-    shelf: Shelf | None = None,
+    shelf: ScenarioCatalog | None = None,
     every: Callable[..., None],
-) -> Services:
+) -> ServiceSet:
     """Offer the standard's services and ours; what the arguments mean, `Simulation` says.
 
     `every(period_s, callback, wanted=...)` has something done in simulated time.
@@ -62,8 +62,8 @@ def open_services(
     graph = simulation.graph
     offer_features(graph, loads_worlds=on_load is not None)
     Entities(simulation).offer()
-    Spawning(simulation).offer()
-    playing = Playing(simulation)
+    SpawnServices(simulation).offer()
+    playing = SimulationStateServices(simulation)
     playing.offer()
     offer_steps(simulation)
     offer_worlds(graph, simulation.scenario, on_load, shelf)
@@ -75,7 +75,7 @@ def open_services(
         settings = simulation.scenario.world.grid_map
         offer_grid_maps(graph, simulation.grid_world, settings, lambda: simulation.time_ns)
     offer_piloting(graph, simulation.pilots)
-    KeptStates(simulation).offer()
-    recording = Recording(graph, recordings, simulation.commands)
+    SnapshotServices(simulation).offer()
+    recording = RecordingServices(graph, recordings, simulation.commands)
     recording.offer()
-    return Services(playing, recording)
+    return ServiceSet(playing, recording)

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 from volery.core.errors import SnapshotError
 from volery.runtime.replay.command_effects import CONTINUE_RUN
 from volery.runtime.services.results import (
-    Code,
     Fields,
     RefusedError,
+    ResultCode,
     filled,
     offer_command,
     offer_result,
@@ -26,7 +26,7 @@ WRONG_TRANSITION = 103
 _TIME, _STATE, _SPAWNED, _ALL = 1, 2, 4, 255
 
 
-class State(IntEnum):
+class RunState(IntEnum):
     """`simulation_interfaces/msg/SimulationState`."""
 
     STOPPED = 0
@@ -37,7 +37,7 @@ class State(IntEnum):
     LOADING_WORLD = 5
 
 
-class Playing:
+class SimulationStateServices:
     """The state of a simulation: stopped is paused at the start, after a reset."""
 
     def __init__(self, simulation: Simulation) -> None:
@@ -60,14 +60,14 @@ class Playing:
         return {"message": "the flight continues past the scenario's end"}
 
     @property
-    def state(self) -> State:
+    def state(self) -> RunState:
         """The present state."""
         simulation = self._simulation
         if simulation.quitting:
-            return State.QUITTING
+            return RunState.QUITTING
         if not simulation.paused:
-            return State.PLAYING
-        return State.STOPPED if self._stopped and simulation.time_ns == 0 else State.PAUSED
+            return RunState.PLAYING
+        return RunState.STOPPED if self._stopped and simulation.time_ns == 0 else RunState.PAUSED
 
     def _get(self, _request: Any) -> Fields:
         state = {"state": int(self.state)}
@@ -77,20 +77,20 @@ class Playing:
         wanted, state = int(request.state.state), self.state
         if wanted == state:
             raise RefusedError(_ALREADY_THERE, f"the simulation is {state.name} already")
-        if state is State.QUITTING:
+        if state is RunState.QUITTING:
             raise RefusedError(WRONG_TRANSITION, "the simulation quits")
-        if wanted == State.PLAYING:
+        if wanted == RunState.PLAYING:
             if self._simulation.end.waits:
                 raise RefusedError(WRONG_TRANSITION, self._simulation.end.notice)
             self._stopped = False
             self._simulation.resume()
-        elif wanted == State.PAUSED:
-            if state is State.STOPPED:
+        elif wanted == RunState.PAUSED:
+            if state is RunState.STOPPED:
                 raise RefusedError(WRONG_TRANSITION, "it is stopped; play it, then pause it")
             self._simulation.pause()
-        elif wanted == State.STOPPED:
+        elif wanted == RunState.STOPPED:
             self._stop()
-        elif wanted == State.QUITTING:
+        elif wanted == RunState.QUITTING:
             self._simulation.quit()
         else:
             raise RefusedError(WRONG_TRANSITION, f"state {wanted} cannot be asked for")
@@ -107,14 +107,14 @@ class Playing:
         """Time and state go back together, and take the UAVs with them that were spawned."""
         scope = int(request.scope)
         if scope != _ALL and scope & ~(_TIME | _STATE | _SPAWNED):
-            raise RefusedError(Code.OPERATION_FAILED, f"there is no scope {scope}")
+            raise RefusedError(ResultCode.OPERATION_FAILED, f"there is no scope {scope}")
         if scope == _SPAWNED:
             self._simulation.delete_spawned()
             return
         if scope not in (0, _ALL) and not (scope & _TIME and scope & _STATE):
             reason = "time and state are reset together: SCOPE_DEFAULT, SCOPE_ALL, or both bits"
-            raise RefusedError(Code.FEATURE_UNSUPPORTED, reason)
+            raise RefusedError(ResultCode.FEATURE_UNSUPPORTED, reason)
         if scope == _TIME | _STATE and self._simulation.spawned:
             reason = "spawned UAVs go with a reset: add SCOPE_SPAWNED, or delete them first"
-            raise RefusedError(Code.FEATURE_UNSUPPORTED, reason)
+            raise RefusedError(ResultCode.FEATURE_UNSUPPORTED, reason)
         self._simulation.reset()

@@ -9,8 +9,8 @@ from volery.core.plurals import counted
 from volery.engine.single_steps import StepRequest
 from volery.graph.actions import Goal
 from volery.runtime.services.results import (
-    Code,
     RefusedError,
+    ResultCode,
     Settle,
     failed,
     filled,
@@ -46,15 +46,19 @@ def offer_steps(simulation: Simulation) -> None:
 
 def _begin(simulation: Simulation, steps: int, tell: Any) -> StepRequest:
     if not 1 <= steps <= _MOST_STEPS:
-        raise RefusedError(Code.OPERATION_FAILED, f"steps must be 1 to {_MOST_STEPS}, not {steps}")
+        raise RefusedError(
+            ResultCode.OPERATION_FAILED, f"steps must be 1 to {_MOST_STEPS}, not {steps}"
+        )
     if simulation.end.waits:
-        raise RefusedError(Code.INCORRECT_STATE, simulation.end.notice)
+        raise RefusedError(ResultCode.INCORRECT_STATE, simulation.end.notice)
     if not simulation.paused:
-        raise RefusedError(Code.INCORRECT_STATE, "steps are made while paused; pause it first")
+        raise RefusedError(
+            ResultCode.INCORRECT_STATE, "steps are made while paused; pause it first"
+        )
     try:
         return simulation.single_step(steps, tell)
     except CommandError as error:  # it went on meanwhile
-        raise RefusedError(Code.INCORRECT_STATE, str(error)) from None
+        raise RefusedError(ResultCode.INCORRECT_STATE, str(error)) from None
 
 
 def _take(simulation: Simulation, goal: Goal) -> None:
@@ -84,7 +88,7 @@ def _interrupted(steps: StepRequest) -> RefusedError | None:
     if not steps.left:
         return None
     reason = f"{steps.made} of {counted(steps.steps, 'step')} made: {steps.reason}"
-    return RefusedError(Code.OPERATION_FAILED, reason)
+    return RefusedError(ResultCode.OPERATION_FAILED, reason)
 
 
 def _result(code: Any) -> Any:

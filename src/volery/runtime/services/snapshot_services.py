@@ -17,7 +17,7 @@ _MOST_STATES = 16
 _LONGEST_NAME = 100
 
 
-class KeptStates:
+class SnapshotServices:
     """Offers `/volery/snapshot`, `restore`, `forget_snapshot`, `list_snapshots`, `reset_uav`."""
 
     def __init__(self, simulation: Simulation) -> None:

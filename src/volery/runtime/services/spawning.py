@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from volery.core.errors import PlacementError, SpawnError, SpawnFault, VoleryError
 from volery.runtime.services.results import (
-    Code,
     Fields,
     RefusedError,
+    ResultCode,
     failed,
     filled,
     offer_result,
@@ -32,11 +32,11 @@ _SPAWN_FAILED = 150
 _CODES = {
     SpawnFault.NAME: _NAME_INVALID,
     SpawnFault.NAME_TAKEN: _NAME_NOT_UNIQUE,
-    SpawnFault.TYPE: Code.NOT_FOUND,
+    SpawnFault.TYPE: ResultCode.NOT_FOUND,
 }
 
 
-class Spawning:
+class SpawnServices:
     """Answers what can be spawned, spawns and deletes."""
 
     def __init__(self, simulation: Simulation) -> None:
@@ -99,7 +99,7 @@ class Spawning:
             except RefusedError as error:
                 fields = {"result": failed(error)}
             results.append(filled(f"{_MSG}/SpawnResult", fields))
-        missing = sum(each.result.result != Code.OK for each in results)
+        missing = sum(each.result.result != ResultCode.OK for each in results)
         if missing:
             reason = f"{missing} of {len(results)} were not spawned; see their results"
             return {"result": result(_SPAWN_FAILED, reason), "results": results}
@@ -107,7 +107,7 @@ class Spawning:
 
     def _delete(self, request: Any) -> None:
         if request.entity not in self._simulation.uavs:
-            raise RefusedError(Code.NOT_FOUND, f"there is no entity '{request.entity}'")
+            raise RefusedError(ResultCode.NOT_FOUND, f"there is no entity '{request.entity}'")
         self._simulation.delete_uav(request.entity)
 
     def _name(self, request: Any) -> str:

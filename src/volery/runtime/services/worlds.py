@@ -10,9 +10,9 @@ from volery.core.errors import ScenarioError, VoleryError
 from volery.graph.graph import Graph
 from volery.runtime.services.filters import tag_filter
 from volery.runtime.services.results import (
-    Code,
     Fields,
     RefusedError,
+    ResultCode,
     filled,
     offer_command,
     offer_result,
@@ -20,7 +20,7 @@ from volery.runtime.services.results import (
 from volery.runtime.services.scenario_loading import offer_choices
 from volery.runtime.services.spawning import resource
 from volery.scenario import library
-from volery.scenario.catalog import Shelf
+from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.changes import LogRequest, WorldRequest
 from volery.scenario.load import load_scenario
 from volery.scenario.schema import Scenario
@@ -36,20 +36,23 @@ OnLoad = Callable[[WorldRequest | LogRequest | None], None]
 
 
 def offer_worlds(
-    graph: Graph, loaded: Scenario | None, on_load: OnLoad | None, shelf: Shelf | None = None
+    graph: Graph,
+    loaded: Scenario | None,
+    on_load: OnLoad | None,
+    shelf: ScenarioCatalog | None = None,
 ) -> None:
     """Offer what is known of worlds, and loading and unloading them where `on_load` does that.
 
     That is the owner's business: the process builds another simulation, or none. `loaded`: the
     present scenario. `shelf`: where scenarios and logs come from, None: the library alone.
     """
-    shelf = shelf or Shelf()
+    shelf = shelf or ScenarioCatalog()
 
     def available(request: Any) -> Fields:
         passes = tag_filter(request.filter)
         if list(request.additional_sources) and not request.continue_on_error:
             reason = "there are no sources of worlds but the library of scenarios"
-            raise RefusedError(Code.FEATURE_UNSUPPORTED, reason)
+            raise RefusedError(ResultCode.FEATURE_UNSUPPORTED, reason)
         names = shelf.names()
         worlds = [_read(shelf, name) for name in names]
         return {"worlds": [_world(s, names) for s in worlds if passes(tags_of(s))]}
@@ -76,11 +79,11 @@ def offer_worlds(
     def change(request: WorldRequest | LogRequest | None) -> None:
         if on_load is None:
             reason = "this process simulates one scenario; start another one for another world"
-            raise RefusedError(Code.FEATURE_UNSUPPORTED, reason)
+            raise RefusedError(ResultCode.FEATURE_UNSUPPORTED, reason)
         try:
             on_load(request)
         except VoleryError as error:
-            raise RefusedError(Code.OPERATION_FAILED, str(error)) from None
+            raise RefusedError(ResultCode.OPERATION_FAILED, str(error)) from None
 
     offer_result(graph, "/get_available_worlds", f"{_SRV}/GetAvailableWorlds", available)
     offer_result(graph, "/get_current_world", f"{_SRV}/GetCurrentWorld", current)
@@ -98,14 +101,14 @@ def tags_of(scenario: Scenario) -> list[str]:
     return [f"{world.terrain.kind}_ground", *there]
 
 
-def _wanted(source: Any, shelf: Shelf) -> Scenario:
+def _wanted(source: Any, shelf: ScenarioCatalog) -> Scenario:
     if source.resource_string:
         raise RefusedError(_UNSUPPORTED_FORMAT, "worlds are loaded by name, not from a string")
     if not source.uri:
         raise RefusedError(_NO_RESOURCE, "uri must be the name of a scenario of the library")
     if source.uri not in shelf.names():
         known = ", ".join(shelf.names())
-        raise RefusedError(Code.NOT_FOUND, f"no scenario '{source.uri}'; known: {known}")
+        raise RefusedError(ResultCode.NOT_FOUND, f"no scenario '{source.uri}'; known: {known}")
     try:
         return _read(shelf, source.uri)
     except ScenarioError as error:
@@ -117,7 +120,7 @@ def _shipped(name: str) -> Scenario:
     return load_scenario(name)
 
 
-def _read(shelf: Shelf, name: str) -> Scenario:
+def _read(shelf: ScenarioCatalog, name: str) -> Scenario:
     return _shipped(name) if name in library.names() else shelf.load(name)
 
 

@@ -1,8 +1,8 @@
 """Who steers which UAV, where several pilots are there at once.
 
 This is an agreement between people, not part of what is simulated: a reset or a snapshot leaves it
-as it is. Programs of doors, and nodes of the scenario, command UAVs without asking here; clients of
-the page's server are held to it (`volery.server.access_policy`).
+as it is. Programs of bridges, and nodes of the scenario, command UAVs without asking here; clients
+of the page's server are held to it (`volery.server.access_policy`).
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def operator_key(name: str) -> str:
     return unicodedata.normalize("NFKC", operator_name(name).casefold())
 
 
-class Pilots:
+class ControlAuthority:
     """The pilots of one simulation; `names` gives its UAVs.
 
     Any thread may ask; changes are made in the simulation's thread.

@@ -27,7 +27,7 @@ _SILENT_S, _TOLD_S = 2.0, 5.0
 """Poses that have not come for so long are missed, and told of. Modelling choices."""
 
 
-class PoseAids:
+class ExternalOdometry:
     """The odometry topics that estimators of UAVs listen to; `start` has them watched.
 
     Where none is heard, a UAV that stands with its rotors off is known not to move: without that
@@ -79,14 +79,16 @@ def _taker(engine: Engine, uav_name: str, aid: PoseAid) -> Callable[[Published],
     sigma_rad = math.radians(aid.sigma_deg)
 
     def take(published: Published) -> None:
-        from volery.engine.estimation import Pose  # late: its kernels compile for seconds
+        from volery.engine.estimation import (
+            PoseMeasurement,  # late: its kernels compile for seconds
+        )
 
         stamp_ns = stamp_of(published.message)
         place, turn = _read(published.message)
         readable = np.isfinite(place).all() and 0.9 < norm(turn) < 1.1
         if not readable or stamp_ns > engine.time_ns or engine.estimation is None:
             return
-        pose = Pose(stamp_ns, place, turn, aid.sigma_m, sigma_rad)
+        pose = PoseMeasurement(stamp_ns, place, turn, aid.sigma_m, sigma_rad)
         engine.estimation.take_pose(engine.names.index(uav_name), pose, gap_ns=gap_ns)
 
     return take

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.comms.radio.network import RadioNet
+from volery.comms.radio.network import RadioNetwork
 from volery.core.errors import CommandError, PlacementError
 from volery.engine.engine import Engine
 from volery.engine.faults import FaultPlan
@@ -19,13 +19,13 @@ from volery.graph.nodes.node import Node
 from volery.publishing.graph_publisher import GraphPublisher
 from volery.runtime.build.assembly import Assembly, assemble
 from volery.runtime.build.graph import announce_sensors, start_nodes, start_system_nodes
-from volery.runtime.build.placement import Start, check_room
-from volery.runtime.build.sensor_suites import Fitted, refit
-from volery.runtime.monitoring.output_sink import Outlet
+from volery.runtime.build.placement import StartPose, check_room
+from volery.runtime.build.sensor_suites import SensorInstance, refit
+from volery.runtime.monitoring.output_sink import OutputSink
 from volery.runtime.services.results import Close
 from volery.runtime.services.uav_services import offer_uav_services
 from volery.runtime.vehicles.command_interface import open_commands
-from volery.runtime.vehicles.external_odometry import PoseAids
+from volery.runtime.vehicles.external_odometry import ExternalOdometry
 from volery.runtime.vehicles.flight_states import FlightStates
 from volery.runtime.vehicles.uav import Uav
 from volery.scenario.schema import Scenario, Sensor
@@ -39,7 +39,7 @@ _ROOT = "/"
 
 
 @dataclass
-class Beginning:
+class InitialState:
     """How a UAV begins: its row in a state of a fleet that has not moved yet."""
 
     fleet: dict[str, Any]
@@ -47,7 +47,7 @@ class Beginning:
 
 
 @dataclass
-class Crew:
+class VehicleManager:
     """The UAVs of an engine: starts, sensors, handles, commands on the graph, nodes.
 
     `open(parts)` makes the first ones; `regroup(starts)` replaces them by others, of whom those
@@ -59,24 +59,24 @@ class Crew:
     engine: Engine
     graph: Graph
     publisher: GraphPublisher
-    outlet: Outlet
+    outlet: OutputSink
     faults: FaultPlan
-    starts: tuple[Start, ...]
+    starts: tuple[StartPose, ...]
     """In fleet order."""
     terrain: Terrain
-    radio: RadioNet | None = None
-    fitted: list[Fitted] = field(default_factory=list)
+    radio: RadioNetwork | None = None
+    fitted: list[SensorInstance] = field(default_factory=list)
     uavs: dict[str, Uav] = field(default_factory=dict)
     nodes: list[Node] = field(default_factory=list)
     """In fleet order, then those of the whole system."""
-    beginnings: dict[str, Beginning] = field(default_factory=dict)
+    beginnings: dict[str, InitialState] = field(default_factory=dict)
     flight_states: FlightStates = field(init=False)
-    pose_aids: PoseAids = field(init=False)
+    pose_aids: ExternalOdometry = field(init=False)
     _closes: dict[str, list[Close]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         origin = self.scenario.world.origin
-        self.pose_aids = PoseAids(self.graph, self.engine)
+        self.pose_aids = ExternalOdometry(self.graph, self.engine)
         self.flight_states = FlightStates(self.graph, self.engine, origin)
 
     def open(self, parts: Assembly) -> None:
@@ -86,7 +86,7 @@ class Crew:
         self._take_over(parts, self.starts)
         self.start_nodes()
 
-    def regroup(self, starts: Sequence[Start]) -> None:
+    def regroup(self, starts: Sequence[StartPose]) -> None:
         """Fly with the UAVs `starts` from now on; nodes of new ones wait for `start_nodes`."""
         if not self.engine.stands:
             raise CommandError("UAVs come and go between ticks; use post()")
@@ -138,7 +138,7 @@ class Crew:
     # -------------------------------------------------------------------------------- inside
 
     def _take_over(
-        self, parts: Assembly, new: Sequence[Start], going_on: set[str] | None = None
+        self, parts: Assembly, new: Sequence[StartPose], going_on: set[str] | None = None
     ) -> None:
         names = tuple(start.name for start in self.starts)
         begun = parts.fleet.get_state()
@@ -156,7 +156,7 @@ class Crew:
                 self.publisher.cameras.set_size(bank.sensors, cameras.bank.pixels)
         for row, start in enumerate(self.starts):
             if start.name in fresh:
-                self.beginnings[start.name] = Beginning(begun, row)
+                self.beginnings[start.name] = InitialState(begun, row)
                 self._enlist(start, row)
             else:
                 self.uavs[start.name].move_to((parts.fleet, row))
@@ -165,7 +165,7 @@ class Crew:
             self.faults.enlist(fresh)
             self._restart_sensors(fresh)
 
-    def _enlist(self, start: Start, row: int) -> None:
+    def _enlist(self, start: StartPose, row: int) -> None:
         flight = self.scenario.types[start.type_name].flight
         uav = Uav(self.engine.fleet, row, start.name, flight, start.type_name, self._check_goal)
         self.uavs[start.name] = uav
@@ -187,7 +187,7 @@ class Crew:
         except PlacementError as error:
             raise CommandError(str(error)) from None
 
-    def _sensors_of(self, start: Start) -> Sequence[Sensor]:
+    def _sensors_of(self, start: StartPose) -> Sequence[Sensor]:
         return self.scenario.types[start.type_name].sensors
 
     def _dismiss(self, name: str) -> None:

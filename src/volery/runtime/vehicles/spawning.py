@@ -15,9 +15,9 @@ from volery.core.errors import (
     SpawnError,
     SpawnFault,
 )
-from volery.runtime.build.placement import Start, check_place, on_ground, stands_on_ground
-from volery.runtime.snapshot_manager import Keeper
-from volery.runtime.vehicles.manager import Crew
+from volery.runtime.build.placement import StartPose, check_place, on_ground, stands_on_ground
+from volery.runtime.snapshot_manager import SnapshotManager
+from volery.runtime.vehicles.manager import VehicleManager
 from volery.runtime.vehicles.teleport import near
 from volery.runtime.vehicles.uav import Uav
 from volery.scenario.schema import (
@@ -40,7 +40,9 @@ _TAKEN = ("volery", "tf", "tf_static", "clock", "events", "rosapi", "map", "map_
 class Spawner:
     """Adds UAVs to a crew and takes them out."""
 
-    def __init__(self, crew: Crew, keeper: Keeper, scene: Scene, terrain: Terrain) -> None:
+    def __init__(
+        self, crew: VehicleManager, keeper: SnapshotManager, scene: Scene, terrain: Terrain
+    ) -> None:
         self._crew = crew
         self._keeper = keeper
         self._scene = scene
@@ -103,7 +105,7 @@ class Spawner:
         airframe: Airframe,
         position_map: ArrayLike,
         attitude: ArrayLike,
-    ) -> Start:
+    ) -> StartPose:
         place = np.asarray(position_map, dtype=np.float64)
         if place.shape != (3,) or not np.isfinite(place).all():
             raise PlacementError(f"a position is three finite numbers, not {position_map!r}")
@@ -115,7 +117,7 @@ class Spawner:
         others = near(self._crew.starts, self._crew.engine.fleet.state.position_map, place)
         check_place(place, airframe, self._scene, self._terrain, others, name)
         stands = stands_on_ground(place, airframe, self._terrain)
-        return Start(name, kind, airframe, place, turn, on_ground=stands, takes_off=False)
+        return StartPose(name, kind, airframe, place, turn, on_ground=stands, takes_off=False)
 
 
 def usual_type(airframe: Airframe) -> UavType:

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from volery.core import rotations
 from volery.core.errors import CommandError, PlacementError
 from volery.engine.engine import Engine
-from volery.runtime.build.placement import Start, check_place, lifted, stands_on_ground
-from volery.runtime.vehicles.manager import Crew
+from volery.runtime.build.placement import StartPose, check_place, lifted, stands_on_ground
+from volery.runtime.vehicles.manager import VehicleManager
 from volery.world.scene import Scene
 from volery.world.terrain import Terrain
 
@@ -22,7 +22,7 @@ _REACH_M = 10.0
 """Larger than any two UAVs."""
 
 
-class Relocator:
+class Teleporter:
     """Puts UAVs of an engine where there is room for them."""
 
     def __init__(
@@ -30,7 +30,7 @@ class Relocator:
         engine: Engine,
         scene: Scene,
         terrain: Terrain,
-        crew: Crew,
+        crew: VehicleManager,
     ) -> None:
         self._engine = engine
         self._scene = scene
@@ -76,7 +76,7 @@ class Relocator:
         check_place(position, start.airframe, self._scene, self._terrain, others, start.name)
 
 
-def near(starts: Sequence[Start], present: Array, position: Array) -> list[Start]:
+def near(starts: Sequence[StartPose], present: Array, position: Array) -> list[StartPose]:
     """Those of the UAVs that are within reach of `position` (3,) m, at their `present` (N, 3) m."""
     rows = np.flatnonzero(np.linalg.norm(present - position, axis=1) < _REACH_M).tolist()
     return [replace(starts[row], position_map=present[row]) for row in rows]

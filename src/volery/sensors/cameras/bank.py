@@ -12,7 +12,7 @@ from volery.control.fleet import Fleet
 from volery.core.clock import Schedule
 from volery.core.errors import DataFileError
 from volery.sensors.bank import NoisyBank
-from volery.sensors.cameras.camera import EVERY_PART, Part, Pictures, take
+from volery.sensors.cameras.camera import EVERY_PART, Images, Part, take
 from volery.sensors.cameras.light import Light
 from volery.sensors.cameras.model import CameraModel
 from volery.sensors.cameras.precipitation import falling_in
@@ -93,7 +93,7 @@ class CameraBank(NoisyBank):
         return CameraFrames(self.sensors, time_ns, self._model, **_arrays(pictures))
 
 
-def _arrays(pictures: Pictures) -> dict[str, Any]:
+def _arrays(pictures: Images) -> dict[str, Any]:
     """Arrays of all parts, without pixels where a part was not wanted."""
     count = next(len(part) for part in pictures if part is not None)
     return {

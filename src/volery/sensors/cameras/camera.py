@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.workers import Workers, new_counter
-from volery.sensors.aim_kernels import LidarBatch
+from volery.sensors.aim_kernels import RayBatch
 from volery.sensors.cameras.camera_kernels import NORMALS, Frames, Optics, take_pictures
 from volery.sensors.cameras.light import Light
 from volery.sensors.cameras.model import CameraModel
 from volery.sensors.cameras.pixel_table import PIECE
 from volery.sensors.cameras.precipitation import Falling
-from volery.sensors.cameras.weather_kernels import View, draw_falling
+from volery.sensors.cameras.weather_kernels import WeatherView, draw_falling
 from volery.sensors.lidar import move_bodies
 from volery.vehicle.fleet import RotorTurns
 from volery.vehicle.pose_history import PoseHistory
@@ -29,7 +29,7 @@ Part = Literal["colour", "depth", "labels"]
 EVERY_PART: tuple[Part, ...] = ("colour", "depth", "labels")
 
 
-class Pictures(NamedTuple):
+class Images(NamedTuple):
     """S pictures; what was not wanted is None."""
 
     colour: NDArray[np.uint8] | None
@@ -47,14 +47,14 @@ def take(
     scene: Scene,
     model: CameraModel,
     light: Light,
-    batch: LidarBatch,
+    batch: RayBatch,
     history: PoseHistory,
     *,
     rotors: RotorTurns | None = None,
     parts: Collection[Part] = EVERY_PART,
     falling: Sequence[Falling] = (),
     workers: Workers | None = None,
-) -> Pictures:
+) -> Images:
     """Expose the batch's pictures: the first row of each at its `sweep_start_ns`.
 
     Noise follows from `key` and `scan_number`, the number of a camera's picture.
@@ -108,7 +108,7 @@ def take(
             view = _view_of(model)
             team.run(draw_falling, view, light, kind, batch, history, new_counter(), frames)
     shape = shots, model.height, model.width
-    return Pictures(
+    return Images(
         frames.colour.reshape(*shape, 3) if colour else None,
         frames.depth.reshape(shape) if "depth" in parts else None,
         frames.instance.reshape(shape) if labels else None,
@@ -116,8 +116,8 @@ def take(
     )
 
 
-def _view_of(model: CameraModel) -> View:
-    return View(
+def _view_of(model: CameraModel) -> WeatherView:
+    return WeatherView(
         model.width,
         model.height,
         model.focal_px,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from volery.core.compiled import inner_kernel, kernel
 from volery.core.rng import random_bits
 from volery.core.workers import fetch_add
-from volery.sensors.aim_kernels import LidarBatch, sensor_frame
+from volery.sensors.aim_kernels import RayBatch, sensor_frame
 from volery.sensors.cameras.hit_kernels import new_scratch, note_hits
 from volery.sensors.cameras.light import CODES, Light
 from volery.sensors.cameras.pixel_table import PIECE, PixelTable
@@ -62,7 +62,7 @@ class Optics(NamedTuple):
 @inner_kernel
 def _aim(
     table: PixelTable,
-    batch: LidarBatch,
+    batch: RayBatch,
     shot: int,
     history: PoseHistory,
     first: int,
@@ -90,7 +90,7 @@ def _aim(
 def _near(
     scene: SceneHandle,
     table: PixelTable,
-    batch: LidarBatch,
+    batch: RayBatch,
     shot: int,
     piece: int,
     history: PoseHistory,
@@ -132,7 +132,7 @@ def _near(
 
 
 @inner_kernel
-def _first_number(table: PixelTable, batch: LidarBatch, shot: int) -> int:
+def _first_number(table: PixelTable, batch: RayBatch, shot: int) -> int:
     """Where in its stream a picture's random bits begin: a number a pixel."""
     room = table.direction.shape[0] * LANES
     return int(batch.scan_number[shot] * room)
@@ -142,7 +142,7 @@ def _first_number(table: PixelTable, batch: LidarBatch, shot: int) -> int:
 def _write_geometry(
     table: PixelTable,
     optics: Optics,
-    batch: LidarBatch,
+    batch: RayBatch,
     block: RayBlock,
     first: int,
     count: int,
@@ -200,7 +200,7 @@ def _write_colour(
     table: PixelTable,
     optics: Optics,
     light: Light,
-    batch: LidarBatch,
+    batch: RayBatch,
     first: int,
     count: int,
     shot: int,
@@ -240,7 +240,7 @@ def take_pictures(
     table: PixelTable,
     optics: Optics,
     light: Light,
-    batch: LidarBatch,
+    batch: RayBatch,
     history: PoseHistory,
     bodies_start_ns: int,
     bodies_end_ns: int,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from volery.core.compiled import inner_kernel, kernel
 from volery.core.rng import random_bits
 from volery.core.workers import fetch_add
-from volery.sensors.aim_kernels import Frame, LidarBatch, sensor_frame
+from volery.sensors.aim_kernels import Frame, RayBatch, sensor_frame
 from volery.sensors.cameras.camera_kernels import Frames
 from volery.sensors.cameras.light import CLEAR, CODES, Light
 from volery.sensors.cameras.precipitation import Falling
@@ -32,7 +32,7 @@ _CELL_MASK = 0xFFFFFFFF
 f4 = np.float32
 
 
-class View(NamedTuple):
+class WeatherView(NamedTuple):
     """A camera as particles fall through its view."""
 
     width: int
@@ -52,7 +52,9 @@ class View(NamedTuple):
 
 
 @inner_kernel
-def _seen_at(view: View, frame: Frame, x: float, y: float, z: float) -> tuple[float, float, float]:
+def _seen_at(
+    view: WeatherView, frame: Frame, x: float, y: float, z: float
+) -> tuple[float, float, float]:
     """Column, row and depth, m, of a point of the map; a depth of 0 or less: it is not in view."""
     dx, dy, dz = x - frame[0], y - frame[1], z - frame[2]
     ahead = dx * frame[3] + dy * frame[4] + dz * frame[5]
@@ -73,7 +75,7 @@ def _seen_at(view: View, frame: Frame, x: float, y: float, z: float) -> tuple[fl
 
 @inner_kernel
 def _draw(
-    view: View,
+    view: WeatherView,
     light: Light,
     particle: Falling,
     start: tuple[float, float, float],
@@ -121,7 +123,7 @@ def _draw(
 
 
 @inner_kernel
-def _box(view: View, frame: Frame, reach: float, j: int) -> tuple[float, float]:
+def _box(view: WeatherView, frame: Frame, reach: float, j: int) -> tuple[float, float]:
     """Least and greatest coordinate `j` of what is seen up to `reach`."""
     aside = view.across * reach * (abs(frame[6 + j]) + abs(frame[9 + j]))
     far = frame[j] + reach * frame[3 + j]
@@ -130,7 +132,7 @@ def _box(view: View, frame: Frame, reach: float, j: int) -> tuple[float, float]:
 
 @inner_kernel
 def _draw_all(
-    view: View,
+    view: WeatherView,
     light: Light,
     particle: Falling,
     before: Frame,
@@ -174,10 +176,10 @@ def _draw_all(
 
 @kernel
 def draw_falling(
-    view: View,
+    view: WeatherView,
     light: Light,
     particle: Falling,
-    batch: LidarBatch,
+    batch: RayBatch,
     history: PoseHistory,
     counter: NDArray[np.int64],
     frames: Frames,

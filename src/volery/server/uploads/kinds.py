@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from volery.server.bounded_process import Bounds
+from volery.server.bounded_process import ProcessBounds
 from volery.server.replies import RefusedError
 
-BOUNDS = Bounds(memory_bytes=8 << 30, cpu_s=90, wall_s=300.0)
+BOUNDS = ProcessBounds(memory_bytes=8 << 30, cpu_s=90, wall_s=300.0)
 """Of the process that checks one; Embree and the compiler reserve a gigabyte they do not use."""
 
 

@@ -12,11 +12,11 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
 from volery.scenario import library
-from volery.scenario.catalog import Shelf
+from volery.scenario.catalog import ScenarioCatalog
 from volery.server.bounded_process import BoundedError, run_bounded
 from volery.server.replies import RefusedError
 from volery.server.request_bodies import check_pilot, save_body
-from volery.server.server_state import Site
+from volery.server.server_state import ServerState
 from volery.server.uploads.kinds import BOUNDS, MOST_UPLOADS, kind_of_upload, suffix_of
 
 _MOST_CHARACTERS = 30
@@ -28,7 +28,7 @@ _MOST_WORDS = 600
 async def upload(request: Request) -> Response:
     """Take a file, check it by building its world, answer with the name of its scenario."""
     check_pilot(request)
-    site: Site = request.app.state.site
+    site: ServerState = request.app.state.site
     kind_name = request.query_params.get("kind", "")
     kind = kind_of_upload(kind_name)
     called = request.query_params.get("name", "")[:200]
@@ -50,7 +50,7 @@ async def upload(request: Request) -> Response:
     return JSONResponse({"scenario": name}, 201)
 
 
-def name_for(called: str, shelf: Shelf) -> str:
+def name_for(called: str, shelf: ScenarioCatalog) -> str:
     """A free name of a scenario that reminds of the client's file name."""
     stem = PurePosixPath(called.replace("\\", "/")).stem.lower()
     words = re.sub(r"[^a-z0-9]+", "_", stem).strip("_")

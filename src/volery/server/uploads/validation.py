@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 from volery.core.errors import VoleryError
-from volery.scenario.catalog import Shelf
+from volery.scenario.catalog import ScenarioCatalog
 from volery.server.bounded_process import bound_this_process
 from volery.server.uploads.kinds import BOUNDS, SCENARIO
 from volery.server.uploads.scenario_builder import toml_of
@@ -29,7 +29,7 @@ def check(kind: str, path: Path, name: str, called: str) -> None:
     from volery.scenario.load import load_scenario
     from volery.server.uploads.scenario_file import check_contents, text_of
 
-    target = path.parent / Shelf.FILE
+    target = path.parent / ScenarioCatalog.FILE
     own = kind == SCENARIO
     text = text_of(path, name) if own else toml_of(kind, path, name, called)
     target.write_text(text, encoding="utf-8")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from volery.world.actors.moving import MovingThings, Thing
+from volery.world.actors.moving import MovingActor, MovingActors
 from volery.world.actors.shapes import SHAPES
 
-__all__ = ["SHAPES", "MovingThings", "Thing"]
+__all__ = ["SHAPES", "MovingActor", "MovingActors"]

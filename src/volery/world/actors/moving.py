@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from volery.core.clock import s_from_ns
 from volery.core.errors import CommandError
-from volery.world.actors.motions import GivenMotion, Motion
+from volery.world.actors.motions import ActorMotion, GivenMotion
 from volery.world.scene_content import BodyShape
 
 Array = NDArray[np.float64]
@@ -19,26 +19,26 @@ _VELOCITY_STEP_S = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Thing:
+class MovingActor:
     """One of them. `kind`: what it is, such as person."""
 
     name: str
     kind: str
     shape: BodyShape
-    motion: Motion
+    motion: ActorMotion
 
 
-class MovingThings:
+class MovingActors:
     """All things of a world, in a fixed order."""
 
-    def __init__(self, things: Sequence[Thing]) -> None:
+    def __init__(self, things: Sequence[MovingActor]) -> None:
         self._things = tuple(things)
 
     def __len__(self) -> int:
         return len(self._things)
 
     @property
-    def things(self) -> tuple[Thing, ...]:
+    def things(self) -> tuple[MovingActor, ...]:
         """In order."""
         return self._things
 

@@ -14,7 +14,7 @@ _UNSURE_M = 0.5
 """Standard deviation of the place that the scans alone leave, of the last second's way."""
 
 
-class Watched(NamedTuple):
+class PlanarHealth(NamedTuple):
     """What is looked at."""
 
     now_ns: int
@@ -32,7 +32,7 @@ class Watched(NamedTuple):
     is_placed: bool
 
 
-def judged(it: Watched) -> tuple[str, list[str]]:
+def judged(it: PlanarHealth) -> tuple[str, list[str]]:
     """State (starting, tracking, degraded, lost) and what is wrong."""
     problems = []
     long = max(_SILENT_NS, 4 * it.period_ns)

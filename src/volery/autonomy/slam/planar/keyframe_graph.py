@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.slam.planar.loop_closure import Closer, Closure
-from volery.autonomy.slam.planar.pose_graph import Edge, optimised
+from volery.autonomy.slam.planar.loop_closure import PlanarLoopCloser, PlanarLoopClosure
+from volery.autonomy.slam.planar.pose_graph import PlanarEdge, optimised
 from volery.autonomy.slam.planar.poses import between, compose, grown, turned
 from volery.autonomy.slam.planar.settings import PlanarSettings
-from volery.autonomy.slam.planar.tracker import Kept
+from volery.autonomy.slam.planar.tracker import PlanarTrackerState
 from volery.autonomy.slam.pose_graph import load_gtsam
-from volery.core.saved_state import keep, put_back
+from volery.core.saved_state import restore_attributes, save_attributes
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ _AT_LAST = 8
 """Closures that say nothing new wait for so many others before all are made to fit."""
 
 
-class PlanarWay:
+class PlanarKeyframeGraph:
     """Keyframes and their graph; `start` (3,) is the first one's pose in the map."""
 
     _STATE = (
@@ -47,12 +47,12 @@ class PlanarWay:
         if has_loops:
             load_gtsam()
         self._settings = settings
-        self._closer = Closer(settings) if has_loops else None
+        self._closer = PlanarLoopCloser(settings) if has_loops else None
         self._start = np.asarray(start, np.float64)
-        self.frames: list[Kept] = []
+        self.frames: list[PlanarTrackerState] = []
         self.poses: list[Array] = []
         """Of the keyframes in the map, (3,)."""
-        self.edges: list[Edge] = []
+        self.edges: list[PlanarEdge] = []
         self.session = 0
         self.is_placed = True
         """Whether it is known where in the map the present session is."""
@@ -62,12 +62,12 @@ class PlanarWay:
         """Of the newest keyframe in the map."""
         self._spread: list[Array] = []
         """Covariance of each keyframe."""
-        self._pending: Closure | None = None
+        self._pending: PlanarLoopClosure | None = None
         self._tried_at = -1e9
         self._cursor = 0
         self._waiting = 0
 
-    def add(self, frame: Kept) -> bool:
+    def add(self, frame: PlanarTrackerState) -> bool:
         """Take in a keyframe; whether the map has been corrected."""
         self._append(frame)
         if self._closer is None or frame.travelled - self._tried_at < _TRY_EACH:
@@ -100,7 +100,7 @@ class PlanarWay:
 
     # --------------------------------------------------------------------------------- keyframes
 
-    def _append(self, frame: Kept) -> None:
+    def _append(self, frame: PlanarTrackerState) -> None:
         if not self.frames:
             self._put(frame, compose(self._start, frame.pose), np.diag([1e-6] * 3))
             return
@@ -111,11 +111,11 @@ class PlanarWay:
         row, before = len(self.frames), self.poses[-1]
         yaw = float(step[2])  # gtsam's noise lies in the axes of the step's end
         information = np.linalg.inv(turned(of_step, -yaw))
-        self.edges.append(Edge(row - 1, row, step, 0.5 * (information + information.T)))
+        self.edges.append(PlanarEdge(row - 1, row, step, 0.5 * (information + information.T)))
         spread = grown(self._spread[-1], before, step, of_step)
         self._put(frame, compose(before, step), spread)
 
-    def _put(self, frame: Kept, pose: Array, spread: Array) -> None:
+    def _put(self, frame: PlanarTrackerState, pose: Array, spread: Array) -> None:
         self.changes += 1
         self.frames.append(frame)
         self.poses.append(pose)
@@ -165,7 +165,7 @@ class PlanarWay:
             yield old[self._cursor % len(old)]
             self._cursor += 5  # neighbours look alike
 
-    def _weigh(self, found: Closure) -> bool:
+    def _weigh(self, found: PlanarLoopClosure) -> bool:
         """Let a closure count, at once or once another one has agreed with it."""
         c, away = self._settings.closing, found.away
         far = math.hypot(away[0], away[1]) > c.far_m or abs(float(away[2])) > c.far_rad
@@ -183,7 +183,7 @@ class PlanarWay:
         self._fit()
         return True
 
-    def _agree(self, one: Closure, other: Closure) -> bool:
+    def _agree(self, one: PlanarLoopClosure, other: PlanarLoopClosure) -> bool:
         """Whether two closures move the newest keyframes to the same place."""
         c, first, second = self._settings.closing, one.edge, other.edge
         a, b = self.frames[first.to], self.frames[second.to]
@@ -197,7 +197,7 @@ class PlanarWay:
             and abs(float(left[2])) < c.again_rad
         )
 
-    def _take(self, found: list[Closure]) -> None:
+    def _take(self, found: list[PlanarLoopClosure]) -> None:
         for closure in found:
             self.edges.append(closure.edge)
             yaw = float(self.poses[closure.edge.to][2])
@@ -224,8 +224,8 @@ class PlanarWay:
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        return keep(self, self._STATE)
+        return save_attributes(self, self._STATE)
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
-        put_back(self, state)
+        restore_attributes(self, state)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from volery.autonomy.slam.planar.fit_kernels import fit
 from volery.autonomy.slam.planar.map_kernels import CELL_M, blur, build, pool
 from volery.autonomy.slam.planar.search_kernels import search
-from volery.autonomy.slam.planar.settings import Fitting
+from volery.autonomy.slam.planar.settings import MatchingSettings
 
 Array = NDArray[np.float64]
 
@@ -19,7 +19,7 @@ _MOST_CELLS = 30_000
 _NOWHERE = np.array([0.0, 0.0, -1.0])
 
 
-class Fit(NamedTuple):
+class ScanMatch(NamedTuple):
     """How a scan lies on a map."""
 
     pose: Array
@@ -32,13 +32,13 @@ class Fit(NamedTuple):
     """Of all returns."""
 
 
-class LocalMap:
+class PlanarSubmap:
     """Walls within `reach_m` of a middle.
 
     levels: of the search, whose widest squares are 2^(levels - 1) cells.
     """
 
-    def __init__(self, reach_m: float, levels: int, fitting: Fitting) -> None:
+    def __init__(self, reach_m: float, levels: int, fitting: MatchingSettings) -> None:
         n = 2 * math.ceil(reach_m / CELL_M)
         self._grid = np.full((n, n), -1, np.int32)
         self._cells = np.zeros((_MOST_CELLS, 2), np.int32)
@@ -64,7 +64,7 @@ class LocalMap:
         blur(self._cells, self._sums, self.count, self._corner, least, self._fields[0])
         pool(self._fields)
 
-    def fit(self, points: Array, start: Array, certainty: Array | None = None) -> Fit:
+    def fit(self, points: Array, start: Array, certainty: Array | None = None) -> ScanMatch:
         """Lay points (K, 2) on it from a pose (3,), held to that by `certainty` (3, 3)."""
         f = self._fitting
         pose, information = start.copy(), np.zeros((3, 3))
@@ -76,7 +76,7 @@ class LocalMap:
             )
         )  # fmt: skip
         pose[2] = math.remainder(pose[2], math.tau)
-        return Fit(pose, information, met, met / max(len(points), 1))
+        return ScanMatch(pose, information, met, met / max(len(points), 1))
 
     def search(
         self,

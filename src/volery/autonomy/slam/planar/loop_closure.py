@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.slam.planar.local_map import Fit, LocalMap
-from volery.autonomy.slam.planar.pose_graph import Edge
+from volery.autonomy.slam.planar.local_map import PlanarSubmap, ScanMatch
+from volery.autonomy.slam.planar.pose_graph import PlanarEdge
 from volery.autonomy.slam.planar.poses import between, placed
 from volery.autonomy.slam.planar.scans import thinned
 from volery.autonomy.slam.planar.settings import PlanarSettings
-from volery.autonomy.slam.planar.tracker import Kept
+from volery.autonomy.slam.planar.tracker import PlanarTrackerState
 
 Array = NDArray[np.float64]
 
@@ -34,31 +34,31 @@ _FLOOR = np.diag([0.02**2, 0.02**2, 0.004**2])
 """Least covariance of a closure."""
 
 
-class Closure(NamedTuple):
+class PlanarLoopClosure(NamedTuple):
     """A place seen again, how well, and how far it moves the newest keyframe."""
 
-    edge: Edge
-    fit: Fit
+    edge: PlanarEdge
+    fit: ScanMatch
     away: Array
     """(3,) from where the newest keyframe seemed to be, in the axes of the older one."""
 
 
-class Closer:
+class PlanarLoopCloser:
     """Lays the newest keyframes onto old ones; `poses` are those of all in the map, (3,) each."""
 
     def __init__(self, settings: PlanarSettings) -> None:
         self._settings = settings
         reach = settings.returns.reach_m + settings.closing.around_m
-        self._map = LocalMap(min(reach, 40.0), _LEVELS, settings.fitting)
+        self._map = PlanarSubmap(min(reach, 40.0), _LEVELS, settings.fitting)
 
     def close(
         self,
-        frames: Sequence[Kept],
+        frames: Sequence[PlanarTrackerState],
         poses: Sequence[Array],
         newest: int,
         older: int,
         reach: Array,
-    ) -> Closure | None:
+    ) -> PlanarLoopClosure | None:
         """The newest keyframe as seen from an older one; None where they do not fit.
 
         reach: (3,) how far the newest one may be from where it seems to be, m and rad.
@@ -82,8 +82,8 @@ class Closer:
         if not self._is_believed(found, away, reach, frames[newest].usual):
             return None
         information = self._information(found.information, float(found.pose[2]))
-        edge = Edge(older, newest, found.pose, information, is_closure=True)
-        return Closure(edge, found, away)
+        edge = PlanarEdge(older, newest, found.pose, information, is_closure=True)
+        return PlanarLoopClosure(edge, found, away)
 
     def _found(self, query: Array, guess: Array, reach: Array) -> Array | None:
         """Where it lies best in the window; None where nothing fits, or two places do."""
@@ -110,7 +110,7 @@ class Closer:
         across = abs(float(axes[:, 1] @ (other[:2] - pose[:2])))
         return across < 0.4 and abs(math.remainder(float(other[2] - pose[2]), math.tau)) < 0.1
 
-    def _is_believed(self, found: Fit, away: Array, reach: Array, usual: float) -> bool:
+    def _is_believed(self, found: ScanMatch, away: Array, reach: Array, usual: float) -> bool:
         c = self._settings.closing
         share = min(max(c.share * usual, c.least_share), c.most_share)
         values = np.linalg.eigvalsh(found.information[:2, :2])
@@ -130,7 +130,7 @@ class Closer:
         return np.asarray(np.linalg.inv(np.linalg.inv(own + 1e-3 * np.eye(3)) + _FLOOR))
 
     def _around(
-        self, frames: Sequence[Kept], poses: Sequence[Array], newest: int, older: int
+        self, frames: Sequence[PlanarTrackerState], poses: Sequence[Array], newest: int, older: int
     ) -> list[int]:
         """Old keyframes of the older one's surroundings, the nearest ones."""
         c, here = self._settings.closing, frames[newest]
@@ -146,7 +146,7 @@ class Closer:
         near = sorted((k for k in away if away[k] < c.around_m), key=lambda k: away[k])
         return near[:_MOST_FRAMES]
 
-    def _query(self, frames: Sequence[Kept], newest: int) -> Array:
+    def _query(self, frames: Sequence[PlanarTrackerState], newest: int) -> Array:
         """What the way just travelled saw (K, 2), in the axes of the newest keyframe."""
         here, parts = frames[newest], []
         for k in range(newest, max(newest - _MOST_QUERIES, -1), -1):

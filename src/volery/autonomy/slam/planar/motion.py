@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.slam.planar.poses import compose, turned
-from volery.autonomy.slam.planar.settings import Moving
+from volery.autonomy.slam.planar.settings import MotionSettings
 
 Array = NDArray[np.float64]
 
@@ -24,10 +24,10 @@ _LONGEST_S = 3.0
 """Nobody goes on as he went for longer: then the velocity is not known."""
 
 
-class Motion:
+class PlanarMotion:
     """Pose (3,), velocity (3,) in the body's axes, and their covariance (6, 6)."""
 
-    def __init__(self, settings: Moving) -> None:
+    def __init__(self, settings: MotionSettings) -> None:
         self._settings = settings
         self.pose = np.zeros(3)
         self.velocity = np.zeros(3)

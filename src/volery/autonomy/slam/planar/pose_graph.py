@@ -20,7 +20,7 @@ _MOST_SIGMAS = 7.0
 """A closure that lies farther off afterwards was none."""
 
 
-class Edge(NamedTuple):
+class PlanarEdge(NamedTuple):
     """Keyframe `to` as seen from keyframe `origin`."""
 
     origin: int
@@ -32,7 +32,7 @@ class Edge(NamedTuple):
     is_closure: bool = False
 
 
-def optimised(poses: list[Array], edges: list[Edge]) -> tuple[list[Array], list[Edge]]:
+def optimised(poses: list[Array], edges: list[PlanarEdge]) -> tuple[list[Array], list[PlanarEdge]]:
     """Poses (3,) that fit the edges best, the first one stays; and the edges without false ones."""
     found = _solved(poses, edges)
     kept = [edge for edge in edges if not edge.is_closure or _misfit(found, edge) <= _MOST_SIGMAS]
@@ -41,14 +41,14 @@ def optimised(poses: list[Array], edges: list[Edge]) -> tuple[list[Array], list[
     return found, kept
 
 
-def _misfit(poses: list[Array], edge: Edge) -> float:
+def _misfit(poses: list[Array], edge: PlanarEdge) -> float:
     """How far, in standard deviations, an edge is from what it measured."""
     seen = between(poses[edge.origin], poses[edge.to])
     away = between(edge.measured, seen)
     return math.sqrt(max(float(away @ edge.information @ away), 0.0))
 
 
-def _solved(poses: list[Array], edges: list[Edge]) -> list[Array]:
+def _solved(poses: list[Array], edges: list[PlanarEdge]) -> list[Array]:
     gtsam = load_gtsam()
     graph, start = gtsam.NonlinearFactorGraph(), gtsam.Values()
     for k, pose in enumerate(poses):
@@ -64,7 +64,7 @@ def _solved(poses: list[Array], edges: list[Edge]) -> list[Array]:
     return [np.array([pose.x(), pose.y(), pose.theta()]) for pose in solved]
 
 
-def _factor(gtsam: Any, edge: Edge) -> Any:
+def _factor(gtsam: Any, edge: PlanarEdge) -> Any:
     noise = gtsam.noiseModel.Gaussian.Information(np.asfortranarray(edge.information))
     if edge.is_closure:
         kernel = gtsam.noiseModel.mEstimator.Cauchy.Create(_BEND)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.perception.static_transforms import Mount
-from volery.autonomy.slam.planar.settings import Returns
+from volery.autonomy.slam.planar.settings import ReturnSettings
 from volery.core import rotations
 from volery.core.compiled import kernel
 from volery.graph.messages import LaserScan
@@ -16,7 +16,7 @@ from volery.graph.messages import LaserScan
 Array = NDArray[np.float64]
 
 
-def returns(scan: LaserScan, mount: Mount, velocity: Array, kept: Returns) -> Array:
+def returns(scan: LaserScan, mount: Mount, velocity: Array, kept: ReturnSettings) -> Array:
     """Returns (K, 2) m in the body as it is at the first beam.
 
     velocity: (3,) of the body in its own axes, m/s and rad/s, by which each beam is placed.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Returns:
+class ReturnSettings:
     """Which returns of a scan count."""
 
     nearest_m: float = 0.05
@@ -20,7 +20,7 @@ class Returns:
 
 
 @dataclass(frozen=True)
-class Fitting:
+class MatchingSettings:
     """How returns are compared with a map."""
 
     sigma_m: float = 0.03
@@ -39,7 +39,7 @@ class Fitting:
 
 
 @dataclass(frozen=True)
-class Moving:
+class MotionSettings:
     """How it may move."""
 
     accel_m2_s3: float = 0.3
@@ -54,7 +54,7 @@ class Moving:
 
 
 @dataclass(frozen=True)
-class Keeping:
+class KeyframeSettings:
     """Which scans become keyframes, and which of them the local map is made of."""
 
     step_m: float = 0.5
@@ -69,7 +69,7 @@ class Keeping:
 
 
 @dataclass(frozen=True)
-class Closing:
+class LoopClosureSettings:
     """When a place counts as seen again."""
 
     apart_m: float = 10.0
@@ -96,8 +96,8 @@ class Closing:
 class PlanarSettings:
     """All of them."""
 
-    returns: Returns = Returns()
-    fitting: Fitting = Fitting()
-    moving: Moving = Moving()
-    keeping: Keeping = Keeping()
-    closing: Closing = Closing()
+    returns: ReturnSettings = ReturnSettings()
+    fitting: MatchingSettings = MatchingSettings()
+    moving: MotionSettings = MotionSettings()
+    keeping: KeyframeSettings = KeyframeSettings()
+    closing: LoopClosureSettings = LoopClosureSettings()

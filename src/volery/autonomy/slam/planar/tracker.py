@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.slam.planar.health import is_open
-from volery.autonomy.slam.planar.local_map import Fit, LocalMap
-from volery.autonomy.slam.planar.motion import Motion
+from volery.autonomy.slam.planar.local_map import PlanarSubmap, ScanMatch
+from volery.autonomy.slam.planar.motion import PlanarMotion
 from volery.autonomy.slam.planar.poses import between, placed
 from volery.autonomy.slam.planar.scans import thinned
 from volery.autonomy.slam.planar.settings import PlanarSettings
 from volery.core.clock import NS_PER_S
-from volery.core.saved_state import keep, put_back
+from volery.core.saved_state import restore_attributes, save_attributes
 
 Array = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ _FLOOR = np.diag([0.008**2, 0.008**2, 0.0015**2])
 """Least covariance of a step between keyframes: what map and scanner have in common."""
 
 
-class Kept(NamedTuple):
+class PlanarTrackerState(NamedTuple):
     """A keyframe as the follower leaves it."""
 
     time_ns: int
@@ -60,12 +60,12 @@ class Kept(NamedTuple):
     """Counts how often the motion was lost."""
 
 
-class Follower:
+class PlanarTracker:
     """Motion, local map and the newest keyframe."""
 
     def __init__(self, settings: PlanarSettings) -> None:
         self.settings = settings
-        self.motion = Motion(settings.moving)
+        self.motion = PlanarMotion(settings.moving)
         self.time_ns: int | None = None
         self.travelled = self.travelled_m = 0.0
         self.share = self.usual = 0.0
@@ -76,9 +76,9 @@ class Follower:
         """Whether too few things are in reach, or what is seen leaves a direction open."""
         self._misfit_ns = 0
         self._has_odometry = False
-        self._map = LocalMap(settings.returns.reach_m + 4.0, _LEVELS, settings.fitting)
-        self._local: deque[Kept] = deque()
-        self._last: Kept | None = None
+        self._map = PlanarSubmap(settings.returns.reach_m + 4.0, _LEVELS, settings.fitting)
+        self._local: deque[PlanarTrackerState] = deque()
+        self._last: PlanarTrackerState | None = None
         self._since = np.zeros((3, 3))
         """Covariance of the pose as seen from the newest keyframe, in that one's axes."""
         self._fresh_share = 0.0
@@ -90,14 +90,14 @@ class Follower:
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps."""
-        motion = keep(self.motion, ("pose", "velocity", "covariance"))
-        return {"motion": motion, "local": tuple(self._local), **keep(self, self._STATE)}
+        motion = save_attributes(self.motion, ("pose", "velocity", "covariance"))
+        return {"motion": motion, "local": tuple(self._local), **save_attributes(self, self._STATE)}
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
-        put_back(self.motion, state["motion"])
+        restore_attributes(self.motion, state["motion"])
         self._local = deque(state["local"])
-        put_back(self, {name: state[name] for name in self._STATE})
+        restore_attributes(self, {name: state[name] for name in self._STATE})
         self._redraw()
 
     def set_clock(self, time_ns: int) -> None:
@@ -127,7 +127,7 @@ class Follower:
         self.motion.forget_velocity()
         return False
 
-    def follow(self, time_ns: int, returns: Array, step: Array | None) -> Kept | None:
+    def follow(self, time_ns: int, returns: Array, step: Array | None) -> PlanarTrackerState | None:
         """Take in the returns (K, 2) of a scan; the keyframe that it has become, if it has.
 
         step: (3,) since the scan before, by the odometry.
@@ -155,7 +155,7 @@ class Follower:
 
     # ---------------------------------------------------------------------------------- matching
 
-    def _match(self, points: Array) -> Fit:
+    def _match(self, points: Array) -> ScanMatch:
         """By least squares from where it should be; where that fits poorly, by search."""
         motion = self.motion
         found = self._map.fit(points, motion.pose, motion.certainty)
@@ -173,13 +173,13 @@ class Follower:
         other = self._map.fit(points, start)
         return other if other.share > found.share + 0.03 else found
 
-    def _is_surprising(self, found: Fit) -> bool:
+    def _is_surprising(self, found: ScanMatch) -> bool:
         """Whether the scan lies farther from where it should be than three sigma."""
         away = found.pose - self.motion.pose
         away[2] = math.remainder(float(away[2]), math.tau)
         return float(away @ self.motion.certainty @ away) > 16.0
 
-    def _judge(self, time_ns: int, dt: float, found: Fit) -> None:
+    def _judge(self, time_ns: int, dt: float, found: ScanMatch) -> None:
         self.share = found.share
         if self.share >= _LOST_SHARE * self.usual:
             self.misfits = 0
@@ -190,7 +190,7 @@ class Follower:
         if self.misfits == 1:
             self._misfit_ns = time_ns
 
-    def _count_way(self, before: Array, added: Array, found: Fit | None) -> None:
+    def _count_way(self, before: Array, added: Array, found: ScanMatch | None) -> None:
         moved = between(before, self.motion.pose)
         self.travelled_m += math.hypot(moved[0], moved[1])
         self.travelled += math.hypot(moved[0], moved[1]) + _TURN_M * abs(float(moved[2]))
@@ -211,7 +211,7 @@ class Follower:
 
     # --------------------------------------------------------------------------------- keyframes
 
-    def _is_due(self, found: Fit | None) -> bool:
+    def _is_due(self, found: ScanMatch | None) -> bool:
         if found is None or self.misfits or self._last is None:
             return False
         k = self.settings.keeping
@@ -226,14 +226,14 @@ class Follower:
             or (stale and (way > k.least_m or turn > k.least_rad))
         )
 
-    def _keep(self, time_ns: int, returns: Array) -> Kept:
+    def _keep(self, time_ns: int, returns: Array) -> PlanarTrackerState:
         r, pose = self.settings.returns, self.motion.pose.copy()
         step, covariance = np.zeros(3), np.zeros((3, 3))
         if self._last is not None:
             step = between(self._last.pose, pose)
             covariance = self._since + _FLOOR
         points = thinned(returns, r.apart_m, r.most_kept)
-        kept = Kept(
+        kept = PlanarTrackerState(
             time_ns, pose, points, step, covariance, self.travelled, self.usual, self.session
         )
         self._last = kept

@@ -7,9 +7,9 @@ import numpy as np
 from volery.autonomy.perception.static_transforms import LEVEL
 from volery.autonomy.perception.warmup import a_scan
 from volery.autonomy.slam import messages
-from volery.autonomy.slam.planar.local_map import LocalMap
+from volery.autonomy.slam.planar.local_map import PlanarSubmap
 from volery.autonomy.slam.planar.scans import returns, thinned
-from volery.autonomy.slam.planar.settings import Fitting, Returns
+from volery.autonomy.slam.planar.settings import MatchingSettings, ReturnSettings
 from volery.core import rotations
 
 _LEVELS = 2
@@ -21,8 +21,8 @@ def walls() -> None:
     for per_beam_s in (0.0, 0.001):  # beams that were cast at once, or one after the other
         scan = a_scan()
         scan.time_increment = per_beam_s
-        points = thinned(returns(scan, LEVEL, np.zeros(3), Returns()), 0.04, 20)
-    known = LocalMap(2.0, _LEVELS, Fitting())
+        points = thinned(returns(scan, LEVEL, np.zeros(3), ReturnSettings()), 0.04, 20)
+    known = PlanarSubmap(2.0, _LEVELS, MatchingSettings())
     known.draw(points, np.zeros(3))
     known.fit(points, np.zeros(3))
     known.search(points, np.zeros(3), np.full(3, 0.1))

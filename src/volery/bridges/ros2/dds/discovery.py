@@ -10,8 +10,8 @@ from typing import NamedTuple
 from cyclonedds.builtin import BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription
 from cyclonedds.domain import DomainParticipant
 
-from volery.bridges.ros2.dds.endpoint_info import Announced, announcements
-from volery.bridges.ros2.dds.reader_thread import Ear
+from volery.bridges.ros2.dds.endpoint_info import EndpointInfo, announcements
+from volery.bridges.ros2.dds.reader_thread import ReaderThread
 from volery.bridges.ros2.dds.service_peers import CLIENT, why_foreign
 from volery.bridges.ros2.middleware import Profile, RemotePublisher
 from volery.bridges.ros2.names import ros_type, service_of, topic_of
@@ -24,7 +24,7 @@ _REQUEST = "_Request"
 _HASH = re.compile(rb"typehash=(RIHS\d+_\w+);")
 
 
-class Endpoint(NamedTuple):
+class DdsEndpoint(NamedTuple):
     """A reader or writer of somebody else."""
 
     dds_topic: str
@@ -36,11 +36,11 @@ class Endpoint(NamedTuple):
 class Discovery:
     """Keeps track of the endpoints of others."""
 
-    def __init__(self, participant: DomainParticipant, ear: Ear) -> None:
+    def __init__(self, participant: DomainParticipant, ear: ReaderThread) -> None:
         self._own = participant.guid.bytes
         self._lock = threading.Lock()
-        self._writers: dict[bytes, Endpoint] = {}
-        self._readers: dict[bytes, Endpoint] = {}
+        self._writers: dict[bytes, DdsEndpoint] = {}
+        self._readers: dict[bytes, DdsEndpoint] = {}
         self._told: list[Callable[[], None]] = []
         self._sources = []
         for topic, known in (
@@ -103,8 +103,8 @@ class Discovery:
         named = ((service_of(w.dds_topic), k) for k, w in writers if mark not in w.user_data)
         return {service: why_foreign(CLIENT, key) for service, key in named if service}
 
-    def _taker(self, known: dict[bytes, Endpoint]) -> Callable[[list[Announced]], None]:
-        def take(samples: list[Announced]) -> None:
+    def _taker(self, known: dict[bytes, DdsEndpoint]) -> Callable[[list[EndpointInfo]], None]:
+        def take(samples: list[EndpointInfo]) -> None:
             changed = False
             for sample in samples:
                 alive = sample.sample_info.instance_state == _ALIVE
@@ -119,11 +119,11 @@ class Discovery:
 
         return take
 
-    def _meet(self, known: dict[bytes, Endpoint], met: Announced) -> bool:
+    def _meet(self, known: dict[bytes, DdsEndpoint], met: EndpointInfo) -> bool:
         msgtype = ros_type(met.type_name or "")
         if met.participant_key == self._own or msgtype is None or met.terms is None:
             return False
-        endpoint = Endpoint(met.dds_topic or "", msgtype, *met.terms)
+        endpoint = DdsEndpoint(met.dds_topic or "", msgtype, *met.terms)
         with self._lock:
             known[met.key] = endpoint
         return True

@@ -29,7 +29,7 @@ _GID_TYPE = "rmw_dds_common/msg/Gid"
 PROFILE = Profile(latched=True, depth=1)
 
 
-class Record:
+class DiscoveryInfo:
     """The nodes of one participant and their endpoints; `publish` tells of what has changed."""
 
     def __init__(self, participant: DomainParticipant) -> None:

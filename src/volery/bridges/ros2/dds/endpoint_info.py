@@ -20,7 +20,7 @@ from volery.bridges.ros2.dds import library
 from volery.bridges.ros2.middleware import Profile
 
 
-class Announced(NamedTuple):
+class EndpointInfo(NamedTuple):
     """An endpoint."""
 
     key: bytes
@@ -28,13 +28,13 @@ class Announced(NamedTuple):
     """Both GUIDs, 16 bytes."""
     dds_topic: str | None
     type_name: str | None
-    terms: Terms | None
+    terms: EndpointQos | None
     """None, like the names, in the sample that tells that it has left."""
     sample_info: Any
     """None where it was looked up."""
 
 
-class Terms(NamedTuple):
+class EndpointQos(NamedTuple):
     """Its policies, as far as they matter here."""
 
     profile: Profile
@@ -44,32 +44,32 @@ class Terms(NamedTuple):
 
 
 def announcements(participant: DomainParticipant, topic: BuiltinTopic) -> BuiltinDataReader:
-    """Reader of endpoints as they come and go; its samples are `Announced`."""
+    """Reader of endpoints as they come and go; its samples are `EndpointInfo`."""
     reader = BuiltinDataReader(participant, topic)
     reader._constructor, reader._cqos_conv = _announced, terms_at
     return reader
 
 
-def matched_reader(writer: Any, handle: int) -> Announced | None:
+def matched_reader(writer: Any, handle: int) -> EndpointInfo | None:
     """The reader of a writer that has the instance handle; None if it has left."""
-    found: Announced | None = ddspy_get_matched_subscription_data(
+    found: EndpointInfo | None = ddspy_get_matched_subscription_data(
         writer._ref, handle, _announced, terms_at
     )
     return found
 
 
-def matched_writer(reader: Any, handle: int) -> Announced | None:
+def matched_writer(reader: Any, handle: int) -> EndpointInfo | None:
     """The writer of a reader that has the instance handle; None if it has left."""
-    found: Announced | None = ddspy_get_matched_publication_data(
+    found: EndpointInfo | None = ddspy_get_matched_publication_data(
         reader._ref, handle, _announced, terms_at
     )
     return found
 
 
-def terms_at(qos: int) -> Terms:
+def terms_at(qos: int) -> EndpointQos:
     """Terms in a `dds_qos_t`, by its address."""
     profile = Profile(reliable=library.is_reliable(qos), latched=library.is_latched(qos))
-    return Terms(profile, library.user_data(qos))
+    return EndpointQos(profile, library.user_data(qos))
 
 
 def _announced(
@@ -78,8 +78,8 @@ def _announced(
     _participant_handle: int,
     dds_topic: str | None,
     type_name: str | None,
-    terms: Terms | None,
+    terms: EndpointQos | None,
     sample_info: Any,
     _type_id: bytes | None,
-) -> Announced:
-    return Announced(key, participant_key, dds_topic, type_name, terms, sample_info)
+) -> EndpointInfo:
+    return EndpointInfo(key, participant_key, dds_topic, type_name, terms, sample_info)

@@ -18,12 +18,12 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
 from volery.bridges.ros2.dds import library
-from volery.bridges.ros2.dds.discovery_info import Record
+from volery.bridges.ros2.dds.discovery_info import DiscoveryInfo
 from volery.bridges.ros2.dds.endpoint_info import matched_reader, matched_writer
 from volery.bridges.ros2.dds.idl_types import message_struct, request_struct
 from volery.bridges.ros2.dds.qos import qos_of
-from volery.bridges.ros2.dds.reader_thread import Ear
-from volery.bridges.ros2.dds.service_peers import CLIENT, SERVER, Counterparts
+from volery.bridges.ros2.dds.reader_thread import ReaderThread
+from volery.bridges.ros2.dds.service_peers import CLIENT, SERVER, ServicePeers
 from volery.bridges.ros2.middleware import (
     ServiceSpec,
     TakeMessage,
@@ -33,7 +33,7 @@ from volery.bridges.ros2.middleware import (
 from volery.bridges.ros2.names import NodeName, dds_reply_topic, dds_request_topic, dds_topic
 from volery.bridges.ros2.profiles import SERVICES
 from volery.bridges.ros2.type_hashes import message_hash
-from volery.bridges.ros2.warning_filter import Complaints
+from volery.bridges.ros2.warning_filter import WarningFilter
 
 _HEADER = struct.Struct("<Qq")
 """rmw_cyclonedds' cdds_request_header_t: whose question, and its number."""
@@ -44,10 +44,12 @@ _MOST_WAITING = 1000
 """Questions of one client that have no answer yet; the oldest is given up beyond."""
 
 
-class Place:
+class DdsTopicName:
     """What endpoints are made of: the participant, its ear and its record."""
 
-    def __init__(self, participant: DomainParticipant, ear: Ear, record: Record) -> None:
+    def __init__(
+        self, participant: DomainParticipant, ear: ReaderThread, record: DiscoveryInfo
+    ) -> None:
         self.participant = participant
         self.ear = ear
         self.record = record
@@ -56,7 +58,7 @@ class Place:
 class DdsWriter:
     """A publisher."""
 
-    def __init__(self, place: Place, spec: TopicSpec) -> None:
+    def __init__(self, place: DdsTopicName, spec: TopicSpec) -> None:
         user_data = f"typehash={message_hash(spec.msgtype)};".encode()
         topic = Topic(place.participant, dds_topic(spec.topic), message_struct(spec.msgtype))
         self._half = _Half(place, spec.node)
@@ -79,7 +81,7 @@ class DdsWriter:
 class DdsReader:
     """A subscription."""
 
-    def __init__(self, place: Place, spec: TopicSpec, take: TakeMessage) -> None:
+    def __init__(self, place: DdsTopicName, spec: TopicSpec, take: TakeMessage) -> None:
         user_data = f"typehash={message_hash(spec.msgtype)};".encode()
         topic = Topic(place.participant, dds_topic(spec.topic), message_struct(spec.msgtype))
         self._half = _Half(place, spec.node)
@@ -93,7 +95,7 @@ class DdsReader:
 class DdsServer:
     """A service on offer."""
 
-    def __init__(self, place: Place, spec: ServiceSpec, take: TakeRequest) -> None:
+    def __init__(self, place: DdsTopicName, spec: ServiceSpec, take: TakeRequest) -> None:
         requests, replies = _topics(place, spec)
         self._half = _Half(place, spec.node)
         qos = qos_of(SERVICES, _identity(SERVER))
@@ -101,9 +103,9 @@ class DdsServer:
         self._name, self._srvtype = spec.service, spec.srvtype
         self._take = take
         self._missed = (0, 0)
-        self._complaints = Complaints()
+        self._complaints = WarningFilter()
         self._reader = self._half.reader(requests, qos, self._on_request)
-        self._clients = Counterparts(CLIENT, partial(matched_writer, self._reader))
+        self._clients = ServicePeers(CLIENT, partial(matched_writer, self._reader))
 
     def close(self) -> None:
         """Offer it no more."""
@@ -157,7 +159,7 @@ class DdsServer:
 class DdsCaller:
     """A client of a service."""
 
-    def __init__(self, place: Place, spec: ServiceSpec) -> None:
+    def __init__(self, place: DdsTopicName, spec: ServiceSpec) -> None:
         requests, replies = _topics(place, spec)
         self._half = _Half(place, spec.node)
         qos = qos_of(SERVICES, _identity(CLIENT))
@@ -167,7 +169,7 @@ class DdsCaller:
         self._waiting: dict[int, tuple[TakeMessage, Callable[[], None]]] = {}
         self._lock = threading.Lock()
         self._reader = self._half.reader(replies, qos, self._on_reply)
-        self._servers = Counterparts(SERVER, partial(matched_reader, self._writer))
+        self._servers = ServicePeers(SERVER, partial(matched_reader, self._writer))
 
     @property
     def ready(self) -> bool:
@@ -223,7 +225,7 @@ class DdsCaller:
 class _Half:
     """The entities of one endpoint, which come and go together."""
 
-    def __init__(self, place: Place, node: NodeName) -> None:
+    def __init__(self, place: DdsTopicName, node: NodeName) -> None:
         self._place = place
         self._node = node
         self._entities: list[tuple[Any, bool]] = []
@@ -264,7 +266,7 @@ class _Half:
             library.delete(self._topics.pop())
 
 
-def _topics(place: Place, spec: ServiceSpec) -> tuple[Topic, Topic]:
+def _topics(place: DdsTopicName, spec: ServiceSpec) -> tuple[Topic, Topic]:
     """Topics of a service's requests and replies."""
     requests = request_struct(f"{spec.srvtype}_Request")
     responses = request_struct(f"{spec.srvtype}_Response")

@@ -1,7 +1,7 @@
 """The few functions of Cyclone DDS's C library that are called past its Python package.
 
 The package's own `write` holds Python's lock while it works. Called through ctypes, the same C
-function runs without it, so that neither engine nor doors wait for a network.
+function runs without it, so that neither engine nor bridges wait for a network.
 """
 
 from __future__ import annotations

@@ -7,10 +7,16 @@ import weakref
 from collections.abc import Callable, Mapping, Sequence
 
 from volery.bridges.ros2.dds.discovery import Discovery
-from volery.bridges.ros2.dds.discovery_info import Record
+from volery.bridges.ros2.dds.discovery_info import DiscoveryInfo
 from volery.bridges.ros2.dds.domain import join_domain, leave_domain
-from volery.bridges.ros2.dds.endpoints import DdsCaller, DdsReader, DdsServer, DdsWriter, Place
-from volery.bridges.ros2.dds.reader_thread import Ear
+from volery.bridges.ros2.dds.endpoints import (
+    DdsCaller,
+    DdsReader,
+    DdsServer,
+    DdsTopicName,
+    DdsWriter,
+)
+from volery.bridges.ros2.dds.reader_thread import ReaderThread
 from volery.bridges.ros2.middleware import (
     RemotePublisher,
     ServiceSpec,
@@ -41,9 +47,9 @@ class DdsParticipant:
         self._callers: weakref.WeakSet[DdsCaller] = weakref.WeakSet()
         self._servers: weakref.WeakSet[DdsServer] = weakref.WeakSet()
         self._lock = threading.Lock()
-        self._ear = Ear(self._participant, self._check_callers)
-        self._record = Record(self._participant)
-        self._place = Place(self._participant, self._ear, self._record)
+        self._ear = ReaderThread(self._participant, self._check_callers)
+        self._record = DiscoveryInfo(self._participant)
+        self._place = DdsTopicName(self._participant, self._ear, self._record)
         self._discovery = Discovery(self._participant, self._ear)
         self._discovery.when_changed(self._check_clients)
         self._closed = False

@@ -32,7 +32,7 @@ _log = logging.getLogger(__name__)
 Take = Callable[[list[Any]], None]
 
 
-class Ear:
+class ReaderThread:
     """Waits for data and hands it out; calls `now_and_then` some times a second."""
 
     def __init__(self, participant: DomainParticipant, now_and_then: Callable[[], None]) -> None:

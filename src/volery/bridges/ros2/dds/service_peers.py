@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from volery.bridges.ros2.dds.endpoint_info import Announced
+from volery.bridges.ros2.dds.endpoint_info import EndpointInfo
 
 CLIENT, SERVER = "clientid", "serviceid"
 _FAST_DDS = b"\x01\x0f"
@@ -39,13 +39,13 @@ def why_foreign(word: str, key: bytes) -> str:
 _MOST_KNOWN = 10_000
 
 
-class Counterparts:
+class ServicePeers:
     """The matched endpoints of one side, by their instance handles.
 
     look_up: what an endpoint tells of itself; None once it has left.
     """
 
-    def __init__(self, word: str, look_up: Callable[[int], Announced | None]) -> None:
+    def __init__(self, word: str, look_up: Callable[[int], EndpointInfo | None]) -> None:
         self._word = word
         self._mark = f"{word}=".encode()
         self._look_up = look_up

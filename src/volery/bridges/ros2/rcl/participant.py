@@ -1,7 +1,7 @@
 """A participant in a ROS 2 graph on the sourced rclpy; a `middleware.Participant`.
 
 Messages cross as bytes: rclpy publishes and delivers them serialised. For nodes (`volery node ...
---via rclpy`), not for the door: rclpy has no way to leave out what the same process publishes.
+--via rclpy`), not for the bridge: rclpy has no way to leave out what the same process publishes.
 """
 
 from __future__ import annotations

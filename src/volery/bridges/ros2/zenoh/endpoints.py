@@ -30,7 +30,7 @@ _LONGEST_CALL_S = 3600.0
 """Results of actions take their time."""
 
 
-class Place:
+class ZenohTopicName:
     """What endpoints are made of."""
 
     def __init__(self, session: Any, domain_id: int, ids: Callable[[Any], tuple[int, int]]) -> None:
@@ -48,7 +48,7 @@ class Place:
 class ZenohWriter:
     """A publisher; what it latches is kept in a cache that late subscribers ask."""
 
-    def __init__(self, place: Place, spec: TopicSpec) -> None:
+    def __init__(self, place: ZenohTopicName, spec: TopicSpec) -> None:
         key = topic_key(place.domain_id, spec.topic, spec.msgtype)
         profile = spec.profile
         reliability = (
@@ -92,7 +92,7 @@ class ZenohWriter:
 class ZenohReader:
     """A subscription."""
 
-    def __init__(self, place: Place, spec: TopicSpec, take: TakeMessage) -> None:
+    def __init__(self, place: ZenohTopicName, spec: TopicSpec, take: TakeMessage) -> None:
         key = topic_key(place.domain_id, spec.topic, spec.msgtype)
 
         def hear(sample: Any) -> None:
@@ -119,7 +119,7 @@ class ZenohReader:
 class ZenohServer:
     """A service on offer."""
 
-    def __init__(self, place: Place, spec: ServiceSpec, take: TakeRequest) -> None:
+    def __init__(self, place: ZenohTopicName, spec: ServiceSpec, take: TakeRequest) -> None:
         self._key = service_key(place.domain_id, spec.service, spec.srvtype)
         self._take = take
         self._queryable = place.session.declare_queryable(self._key, self._on_query, complete=True)
@@ -149,7 +149,7 @@ class ZenohCaller:
     """A client of a service."""
 
     def __init__(
-        self, place: Place, spec: ServiceSpec, is_there: Callable[[ServiceSpec], bool]
+        self, place: ZenohTopicName, spec: ServiceSpec, is_there: Callable[[ServiceSpec], bool]
     ) -> None:
         self._place = place
         self._spec = spec

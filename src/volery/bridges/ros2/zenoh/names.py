@@ -27,7 +27,7 @@ _ATTACHMENT = struct.Struct("<qqB16s")
 GID_BYTES = 16
 
 
-class Endpoint(NamedTuple):
+class ZenohEndpoint(NamedTuple):
     """What a liveliness token tells of a publisher, subscription, server or client."""
 
     session: str
@@ -112,7 +112,7 @@ def qos_words(profile: Profile) -> str:
     return f"{reliability}:{durability}:{_KEEP_LAST},{profile.depth}:{_REST}"
 
 
-def read_token(token: str) -> Endpoint | None:
+def read_token(token: str) -> ZenohEndpoint | None:
     """What a token tells; None for that of a node, and for what is no token of an endpoint."""
     parts = token.split("/")
     if len(parts) != _ENDPOINT_PARTS or parts[0] != SPACE:
@@ -123,7 +123,7 @@ def read_token(token: str) -> Endpoint | None:
         return None
     node = NodeName(namespace.replace(_SLASH, "/"), name)
     plain = topic.replace(_SLASH, "/")
-    return Endpoint(session, kind, node, plain, msgtype, type_hash, _read_qos(qos))
+    return ZenohEndpoint(session, kind, node, plain, msgtype, type_hash, _read_qos(qos))
 
 
 def _read_qos(words: str) -> Profile:

@@ -20,10 +20,10 @@ from volery.bridges.ros2.middleware import (
 from volery.bridges.ros2.names import NodeName
 from volery.bridges.ros2.type_hashes import service_hash
 from volery.bridges.ros2.zenoh.endpoints import (
-    Place,
     ZenohCaller,
     ZenohReader,
     ZenohServer,
+    ZenohTopicName,
     ZenohWriter,
 )
 from volery.bridges.ros2.zenoh.names import (
@@ -31,7 +31,7 @@ from volery.bridges.ros2.zenoh.names import (
     SERVER,
     SPACE,
     SUBSCRIPTION,
-    Endpoint,
+    ZenohEndpoint,
     node_token,
     read_token,
 )
@@ -54,11 +54,11 @@ class ZenohParticipant:
         self._domain_id = domain_id
         self._session, reach = open_session(router)
         self.where = f"{reach}, domain {domain_id}"
-        self._place = Place(self._session, domain_id, self._ids)
+        self._place = ZenohTopicName(self._session, domain_id, self._ids)
         self._numbers = itertools.count()
         self._lock = threading.RLock()
         self._nodes: dict[NodeName, tuple[int, Any]] = {}
-        self._others: dict[str, Endpoint] = {}
+        self._others: dict[str, ZenohEndpoint] = {}
         self._told: list[Callable[[], None]] = []
         self._callers: weakref.WeakSet[ZenohCaller] = weakref.WeakSet()
         self._closed = False
@@ -134,7 +134,7 @@ class ZenohParticipant:
         with self._lock:
             return self._nodes[node][0], next(self._numbers)
 
-    def _of_kind(self, kind: str) -> list[Endpoint]:
+    def _of_kind(self, kind: str) -> list[ZenohEndpoint]:
         with self._lock:
             return [endpoint for endpoint in self._others.values() if endpoint.kind == kind]
 

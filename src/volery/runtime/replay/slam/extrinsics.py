@@ -9,19 +9,19 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from volery.autonomy.perception.static_transforms import FixedJoints, Mount
-from volery.bridges.logs.recorded_flight import ORIGIN_TOPIC, Origin
+from volery.autonomy.perception.static_transforms import Mount, StaticTransforms
+from volery.bridges.logs.recorded_flight import ORIGIN_TOPIC, RecordedScenario
 from volery.core import rotations
 from volery.core.errors import RecordingError, ScenarioError
 from volery.runtime.replay.scenario_record import scenario_of
-from volery.runtime.replay.slam.sources import Heard
+from volery.runtime.replay.slam.sources import SlamInput
 
 _BODIES = ("base_link", "base_footprint", "base")
 """Last parts of names that the body's frame goes by."""
 _STRING = "std_msgs/msg/String"
 
 
-class Log(Protocol):
+class ExtrinsicsLog(Protocol):
     """What is asked of a log here."""
 
     path: Path
@@ -30,11 +30,11 @@ class Log(Protocol):
     def topics(self) -> dict[str, str]:
         """Types by topic."""
 
-    def messages(self, wanted: set[str]) -> Iterator[Heard]:
+    def messages(self, wanted: set[str]) -> Iterator[SlamInput]:
         """Those of some topics in the order of the file."""
 
 
-def frames_of(source: Log, topics: dict[str, str]) -> dict[str, str]:
+def frames_of(source: ExtrinsicsLog, topics: dict[str, str]) -> dict[str, str]:
     """Frames of scanners, topics by name, as their first messages have them.
 
     Names whose topics say nothing are left out.
@@ -48,13 +48,13 @@ def frames_of(source: Log, topics: dict[str, str]) -> dict[str, str]:
     return frames
 
 
-def read_joints(source: Log, frames: set[str]) -> tuple[FixedJoints, set[str]]:
+def read_joints(source: ExtrinsicsLog, frames: set[str]) -> tuple[StaticTransforms, set[str]]:
     """Joints between frames of scanners and the body, and the frames of which nothing tells.
 
     First counts `/tf_static`, then `/tf`, of whose moving joints the place alone is taken (what
     they turn by is not the mount's), then the scenario that the log tells.
     """
-    joints = FixedJoints()
+    joints = StaticTransforms()
     for _, _, message in source.messages({"/tf_static"} & set(source.topics)):
         joints.add(message)
     open_ = {frame for frame in frames if not _is_in_body(joints, frame)}
@@ -66,7 +66,7 @@ def read_joints(source: Log, frames: set[str]) -> tuple[FixedJoints, set[str]]:
     return joints, {frame for frame in unknown if frame not in joints.joints}
 
 
-def _chain(joints: FixedJoints, frame: str) -> list[str]:
+def _chain(joints: StaticTransforms, frame: str) -> list[str]:
     """The frame and those before it."""
     chain = [frame]
     while chain[-1] in joints.joints and len(chain) < 17:
@@ -78,17 +78,17 @@ def _is_body(frame: str) -> bool:
     return frame.rpartition("/")[2] in _BODIES
 
 
-def _is_in_body(joints: FixedJoints, frame: str) -> bool:
+def _is_in_body(joints: StaticTransforms, frame: str) -> bool:
     return any(map(_is_body, _chain(joints, frame)))
 
 
-def _join_moving(source: Log, joints: FixedJoints, frames: set[str]) -> None:
+def _join_moving(source: ExtrinsicsLog, joints: StaticTransforms, frames: set[str]) -> None:
     """Add what `/tf` tells of these frames, or of those that they hang on.
 
     Where no frame goes by a body's name, a joint of the frame itself counts alone: those before it
     may be the vehicle's own motion.
     """
-    both = FixedJoints()
+    both = StaticTransforms()
     both.joints = dict(joints.joints)
     for _, _, message in source.messages({"/tf"}):
         for found in message.transforms:
@@ -107,11 +107,11 @@ def _join_moving(source: Log, joints: FixedJoints, frames: set[str]) -> None:
         joints.joints |= {name: both.joints[name] for name in names if name in both.joints}
 
 
-def _join_by_scenario(source: Log, joints: FixedJoints, frames: set[str]) -> None:
+def _join_by_scenario(source: ExtrinsicsLog, joints: StaticTransforms, frames: set[str]) -> None:
     """Add the mounts of the scenario that was flown."""
     for _, _, message in source.messages({ORIGIN_TOPIC}):
         try:
-            scenario = scenario_of(Origin.from_json(message.data))
+            scenario = scenario_of(RecordedScenario.from_json(message.data))
         except (RecordingError, ScenarioError):  # of another version
             return
         kinds = [group.type for group in scenario.uavs for _ in range(group.count)]

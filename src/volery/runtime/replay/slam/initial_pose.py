@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from contextlib import closing
 
-from volery.bridges.logs.recorded_flight import ORIGIN_TOPIC, Origin
+from volery.bridges.logs.recorded_flight import ORIGIN_TOPIC, RecordedScenario
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
 from volery.core.errors import VoleryError
 from volery.runtime.build.fleet import place
 from volery.runtime.build.worlds import build_world
 from volery.runtime.replay.scenario_record import scenario_of
-from volery.runtime.replay.slam.extrinsics import Log
+from volery.runtime.replay.slam.extrinsics import ExtrinsicsLog
 
 Pose = tuple[float, float, float, float]
 """x, y, z in m and yaw in rad, in the map."""
@@ -22,7 +22,7 @@ _BEGINNING_NS = NS_PER_S
 """A log whose first scan is later does not begin where the scenario does."""
 
 
-def beginning_of(source: Log, uav: str, scan: str) -> Pose | None:
+def beginning_of(source: ExtrinsicsLog, uav: str, scan: str) -> Pose | None:
     """The pose of `uav`; None where the log is none of Volery's, or does not tell it.
 
     First counts the ground truth in the log, then, of a log that begins with the flight, the place
@@ -39,7 +39,7 @@ def beginning_of(source: Log, uav: str, scan: str) -> Pose | None:
     return _scenario_pose(source, uav)
 
 
-def _true_pose(source: Log, topic: str) -> Pose | None:
+def _true_pose(source: ExtrinsicsLog, topic: str) -> Pose | None:
     for _, _, message in source.messages({topic}):
         if message.header.frame_id != _MAP:
             return None
@@ -48,11 +48,13 @@ def _true_pose(source: Log, topic: str) -> Pose | None:
     return None
 
 
-def _scenario_pose(source: Log, uav: str) -> Pose | None:
+def _scenario_pose(source: ExtrinsicsLog, uav: str) -> Pose | None:
     """Where `{start_pose}` is in the scenario that was flown; its world is built for that."""
     for _, _, message in source.messages({ORIGIN_TOPIC}):
         try:
-            scenario = scenario_of(Origin.from_json(message.data), folder=source.path.parent)
+            scenario = scenario_of(
+                RecordedScenario.from_json(message.data), folder=source.path.parent
+            )
             terrain, _, _, scene = build_world(scenario, 1)
             with closing(scene):
                 starts = place(scenario, scene, terrain)

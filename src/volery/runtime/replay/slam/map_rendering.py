@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.mapping.log_odds import LogOddsGrid
-from volery.autonomy.mapping.vertical_structures import Columns
+from volery.autonomy.mapping.vertical_structures import VerticalStructures
 from volery.autonomy.perception.static_transforms import Mount
 from volery.core import rotations
 from volery.core.errors import RecordingError
 from volery.graph.messages import LaserScan, stamp_of
-from volery.runtime.replay.slam.offline_slam import Outcome
-from volery.runtime.replay.slam.trajectory import Trajectory
+from volery.runtime.replay.slam.offline_slam import SlamResult
+from volery.runtime.replay.slam.trajectory import EstimatedTrajectory
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ _EVERY, _NEAREST_GROUND_M, _FARTHEST_GROUND_M = 4, 0.6, 20.0
 """Beams of the nodding LIDAR that tell where the ground is: each fourth, m."""
 
 
-def draw_map(outcome: Outcome, cell_m: float, reach_m: float) -> LogOddsGrid:
+def draw_map(outcome: SlamResult, cell_m: float, reach_m: float) -> LogOddsGrid:
     """The grid of a run; returns beyond `reach_m` are free space up to there.
 
     Its cells are `cell_m` wide, or so many times doubled that it needs no more memory than there
@@ -70,12 +70,12 @@ def fitting_cell(size: Array, cell_m: float) -> float:
 
 
 def _rays(
-    trajectory: Trajectory,
+    trajectory: EstimatedTrajectory,
     row: int,
     scan: LaserScan,
     mount: Mount,
     reach_m: float,
-    ground: Columns | None,
+    ground: VerticalStructures | None,
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Starts and ends (K, 2) of a scan in the map, and which end in something."""
     ranges = np.asarray(scan.ranges, np.float64)
@@ -98,7 +98,7 @@ def _rays(
     return starts[:, :2], ends[:, :2], hits
 
 
-def _ground(outcome: Outcome) -> Columns | None:
+def _ground(outcome: SlamResult) -> VerticalStructures | None:
     """Where the ground is, by the nodding LIDAR; None where there is none."""
     if not outcome.nodding or not len(outcome.nods):
         return None
@@ -116,11 +116,11 @@ def _ground(outcome: Outcome) -> Columns | None:
         body = rotations.rotate(mount.attitude, along) + mount.position
         place, turn = _poses(outcome.trajectory, row, scan, beams)
         found.append(rotations.rotate(turn, body) + place)
-    return Columns(np.concatenate(found))
+    return VerticalStructures(np.concatenate(found))
 
 
 def _poses(
-    trajectory: Trajectory, row: int, scan: LaserScan, beams: NDArray[np.int64]
+    trajectory: EstimatedTrajectory, row: int, scan: LaserScan, beams: NDArray[np.int64]
 ) -> tuple[Array, Array]:
     """Where the body was at each beam: positions (K, 3), attitudes (K, 4)."""
     first = stamp_of(scan) - int(trajectory.time_ns[row]) + int(trajectory.clock_ns[row])

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.perception.static_transforms import FixedJoints, Mount
+from volery.autonomy.perception.static_transforms import Mount, StaticTransforms
 from volery.core.clock import NS_PER_S
 from volery.core.errors import RecordingError
 from volery.graph.messages import LaserScan, stamp_of
@@ -21,8 +21,14 @@ from volery.runtime.replay.slam.extrinsics import frames_of, read_joints
 from volery.runtime.replay.slam.initial_pose import beginning_of
 from volery.runtime.replay.slam.log_host import LogHost
 from volery.runtime.replay.slam.sources import LogSource, TextSource
-from volery.runtime.replay.slam.topic_selection import LEVEL, NODDING, Asked, Channels, choose
-from volery.runtime.replay.slam.trajectory import Trajectory, corrected, way_m
+from volery.runtime.replay.slam.topic_selection import (
+    LEVEL,
+    NODDING,
+    RequestedTopics,
+    TopicSelection,
+    choose,
+)
+from volery.runtime.replay.slam.trajectory import EstimatedTrajectory, corrected, way_m
 from volery.runtime.warmup.parallel_compilation import compile_all
 
 Array = NDArray[np.float64]
@@ -41,7 +47,7 @@ _PATIENCE_S = 60.0
 class SlamOptions:
     """What the user may say beside the log."""
 
-    asked: Asked = field(default_factory=Asked)
+    asked: RequestedTopics = field(default_factory=RequestedTopics)
     start: tuple[float, float, float, float] | None = None
     """x, y, z in m and yaw in rad; None: as a log of Volery's tells it, else the map's origin."""
     level_mount: tuple[float, float, float] | None = None
@@ -51,11 +57,11 @@ class SlamOptions:
 
 
 @dataclass
-class Outcome:
+class SlamResult:
     """What came of a run."""
 
-    channels: Channels
-    trajectory: Trajectory
+    channels: TopicSelection
+    trajectory: EstimatedTrajectory
     scans: list[tuple[int, LaserScan]]
     """Row of the trajectory, and the scan of then."""
     mount: Callable[[str], Mount]
@@ -80,7 +86,7 @@ class Outcome:
     """Way over ground by the odometry that was heard; None: none was."""
 
 
-class SlamRun:
+class OfflineSlam:
     """Feeds a node with a log. `RecordingError` where the log has not what it needs."""
 
     def __init__(self, source: LogSource | TextSource, options: SlamOptions) -> None:
@@ -88,7 +94,7 @@ class SlamRun:
         self.channels = choose(source.path, source.topics, options.asked)
         self.start = options.start or beginning_of(source, self.channels.uav, self.channels.scan)
         """Where it begins; None: at the map's origin."""
-        self._joints = FixedJoints()
+        self._joints = StaticTransforms()
         self._frames: dict[str, str] = {}
         """Of the LIDARs, level and nodding, that the node hears."""
         self._host = LogHost()
@@ -109,7 +115,7 @@ class SlamRun:
         self._problems: dict[str, float] = defaultdict(float)
         self._status_ns = 0
 
-    def run(self, tell: Callable[[int, float], None] | None = None) -> Outcome:
+    def run(self, tell: Callable[[int, float], None] | None = None) -> SlamResult:
         """Go through the whole log; `tell` hears of scans and seconds of the log so far."""
         uav, host = self.channels.uav, self._host
         self._start_node()
@@ -242,7 +248,7 @@ class SlamRun:
         """What has come to count since the log's end."""
         return {k: v for k, v in self._status.items() if k in ("closures", "keyframes")}
 
-    def _outcome(self, heard: int, lasted_s: float, cpu_s: float) -> Outcome:
+    def _outcome(self, heard: int, lasted_s: float, cpu_s: float) -> SlamResult:
         if not self._times:
             reason = ", ".join(self._status.get("problems", ())) or "no scan was usable"
             raise RecordingError(f"{self._source.path}: the SLAM never began ({reason})")
@@ -254,7 +260,7 @@ class SlamRun:
             np.array(self._times, np.int64), way[:, :3], way[:, 3:], keyframe_ns, keyframes,
             self._tilt,
         )  # fmt: skip
-        return Outcome(
+        return SlamResult(
             self.channels, trajectory, self._scans, self._mount, heard, lasted_s, cpu_s,
             self._status, self._states, self._problems, self._nodding,
             np.array(sorted(self._nods)).reshape(-1, 2),

@@ -17,7 +17,7 @@ from volery.core.plurals import counted
 from volery.runtime.replay.slam.ros2_bags import BagWalk, bag_topics
 
 
-class Heard(NamedTuple):
+class SlamInput(NamedTuple):
     """A message of a log."""
 
     topic: str
@@ -40,7 +40,7 @@ class LogSource:
     doubts: tuple[str, ...] = ()
     _walk: Any = field(default=None, repr=False)
 
-    def messages(self, wanted: set[str]) -> Iterator[Heard]:
+    def messages(self, wanted: set[str]) -> Iterator[SlamInput]:
         """Those of some topics in the order of the file."""
         decoder = LogDecoder()
         walk = self._walk(self.path)
@@ -53,7 +53,7 @@ class LogSource:
                 self.refused += 1
                 self.trouble = self.trouble or f"{record.topic.topic}: {error}"
                 continue
-            yield Heard(record.topic.topic, record.time_ns, message)
+            yield SlamInput(record.topic.topic, record.time_ns, message)
         self.trouble = self.trouble or getattr(walk, "trouble", "")
 
 
@@ -82,12 +82,12 @@ class TextSource:
             found[f"{uav}/odom"] = "nav_msgs/msg/Odometry"
         return found
 
-    def messages(self, wanted: set[str]) -> Iterator[Heard]:
+    def messages(self, wanted: set[str]) -> Iterator[SlamInput]:
         """Those of some topics in the order of the lines."""
         scans = TextScans(self.path, self.layout)
         for published in scans:
             if published.topic in wanted:
-                yield Heard(published.topic, published.time_ns, published.message)
+                yield SlamInput(published.topic, published.time_ns, published.message)
         self.refused, self.doubts = scans.left_out, scans.doubts
         if scans.left_out:
             self.trouble = f"{counted(scans.left_out, 'line')} left out; {scans.trouble}"

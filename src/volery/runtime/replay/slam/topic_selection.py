@@ -13,7 +13,7 @@ _NOT_SENSED = ("ground_truth/odom", "slam/odom")
 
 
 @dataclass(frozen=True)
-class Asked:
+class RequestedTopics:
     """What the user says of a log's topics; None: as they are called here, or the only ones."""
 
     uav: str | None = None
@@ -26,7 +26,7 @@ class Asked:
 
 
 @dataclass(frozen=True)
-class Channels:
+class TopicSelection:
     """Topics by what they are for; `names` are those of the log by those that the node hears."""
 
     uav: str
@@ -39,7 +39,7 @@ class Channels:
         return self.names[f"/{self.uav}/{LEVEL}"]
 
 
-def choose(path: Path, topics: dict[str, str], asked: Asked) -> Channels:
+def choose(path: Path, topics: dict[str, str], asked: RequestedTopics) -> TopicSelection:
     """The topics of a log, types by topic. `RecordingError` where it cannot be said which."""
     _check_uav(path, topics, asked)
     scan = _one(path, topics, SCAN, asked.scan, asked.uav, LEVEL)
@@ -59,7 +59,7 @@ def choose(path: Path, topics: dict[str, str], asked: Asked) -> Channels:
         odometry = _one(path, topics, ODOMETRY, asked.odometry, uav, "odom", needed=needed)
         if odometry is not None:
             names[f"/{uav}/odom"] = odometry
-    return Channels(uav, names, bool(wanted))
+    return TopicSelection(uav, names, bool(wanted))
 
 
 def other_uavs(topics: dict[str, str], uav: str) -> list[str]:
@@ -67,7 +67,7 @@ def other_uavs(topics: dict[str, str], uav: str) -> list[str]:
     return sorted({t.split("/")[1] for t in topics if t.endswith(f"/{LEVEL}")} - {"", uav})
 
 
-def _check_uav(path: Path, topics: dict[str, str], asked: Asked) -> None:
+def _check_uav(path: Path, topics: dict[str, str], asked: RequestedTopics) -> None:
     """Refuse a UAV of which the log has nothing."""
     uav = asked.uav
     if uav is None or asked.scan is not None or any(t.startswith(f"/{uav}/") for t in topics):

@@ -18,7 +18,7 @@ _NEAR_NS = 100_000_000
 """A keyframe and the odometry of its time."""
 
 
-class Trajectory(NamedTuple):
+class EstimatedTrajectory(NamedTuple):
     """Poses in the map."""
 
     time_ns: Times
@@ -68,7 +68,7 @@ def corrected(
     keyframe_ns: Times,
     keyframes: Array,
     tilt: Array,
-) -> Trajectory:
+) -> EstimatedTrajectory:
     """The odometry's way, laid onto the keyframes' poses (K, 4) x, y, z, yaw in the map.
 
     Between two keyframes it goes from the one's correction to the other's. tilt: (4,) of the
@@ -80,7 +80,7 @@ def corrected(
     rows, keyframes = rows[kept], keyframes[kept]
     clock = rising(time_ns)
     if not len(rows):
-        return Trajectory(time_ns, clock, position, attitude)
+        return EstimatedTrajectory(time_ns, clock, position, attitude)
     turns = keyframes[:, 3] - rotations.yaw_of(attitude[rows])
     after = np.clip(np.searchsorted(rows, np.arange(len(clock)), side="right"), 1, len(rows))
     one, other = after - 1, np.minimum(after, len(rows) - 1)
@@ -90,7 +90,7 @@ def corrected(
     places = laid[0][0] + share * (laid[1][0] - laid[0][0])
     sign = np.where((laid[0][1] * laid[1][1]).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0)
     turned = rotations.normalize((1.0 - share) * laid[0][1] + share * sign * laid[1][1])
-    return Trajectory(time_ns, clock, places, turned)
+    return EstimatedTrajectory(time_ns, clock, places, turned)
 
 
 def _laid(
@@ -103,7 +103,7 @@ def _laid(
     return moved, rotations.multiply(about, attitude)
 
 
-def write_tum(path: Path, trajectory: Trajectory) -> None:
+def write_tum(path: Path, trajectory: EstimatedTrajectory) -> None:
     """Write it as text: a pose a line, `timestamp x y z qx qy qz qw`, s and m."""
     try:
         with path.open("w", encoding="utf-8") as file:
