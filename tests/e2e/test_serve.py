@@ -87,7 +87,7 @@ class Server:
 @pytest.fixture(scope="module")
 def server(tmp_path_factory):
     folder = tmp_path_factory.mktemp("served")
-    server = Server("serve", "--port", 0, "--uavs", 2, "--recordings", folder, "--threads", 1)
+    server = Server("serve", "--port", 0, "--uavs", 2, "--recordings-dir", folder, "--threads", 1)
     server.wait_for(state="flying")
     yield server
     server.end(signal.SIGKILL)
@@ -179,7 +179,7 @@ def test_an_uploaded_map_is_flown(server):
 
 
 def test_a_scenario_that_ends_stays_and_one_that_cannot_be_leads_back(server):
-    folder = server.process.args[server.process.args.index("--recordings") + 1]
+    folder = server.process.args[server.process.args.index("--recordings-dir") + 1]
     for name, height in (("short", 0.5), ("buried", -30.0)):
         made = Path(folder) / "uploads" / name
         made.mkdir(parents=True, exist_ok=True)

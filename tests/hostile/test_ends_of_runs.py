@@ -172,7 +172,7 @@ def test_every_command_that_stays_ends_by_a_signal(tmp_path, command, number):
     """Servers that were asked to end have done what they were for: 0; a node says by what."""
     log = write(tmp_path / "flight.mcap")
     words, sign = {
-        "serve": (["serve", "--port", "0", "--recordings", tmp_path], "flying"),
+        "serve": (["serve", "--port", "0", "--recordings-dir", tmp_path], "flying"),
         "play": (["play", log, "--bridge", f"rosbridge={free_port()}"], "playing"),
         "comms": (["comms", "--port", "0"], "open "),
         "node": (["node", "gap_following", "--via", NOWHERE], ""),

@@ -298,7 +298,9 @@ def test_a_pilot_reads_no_file_of_the_server(tmp_path: Path, secret: Path) -> No
     sys.path.insert(0, str(Path(__file__).parents[1] / "e2e"))
     from test_serve import Ros, Server
 
-    server = Server("serve", "--port", 0, "--recordings", tmp_path / "recordings", "--threads", 1)
+    server = Server(
+        "serve", "--port", 0, "--recordings-dir", tmp_path / "recordings", "--threads", 1
+    )
     try:
         server.wait_for(state="flying")
         first_line = Path("/etc/passwd").read_text().splitlines()[0]

@@ -14,7 +14,7 @@ def served(tmp_path_factory, chromium):
     from page_serving import Served
 
     folder = tmp_path_factory.mktemp("recordings")
-    with Served("hover", "--recordings", str(folder), "--uavs", "3") as server:
+    with Served("hover", "--recordings-dir", str(folder), "--uavs", "3") as server:
         yield server
 
 

@@ -22,7 +22,7 @@ def recordings(tmp_path_factory):
 def served(recordings, chromium):
     from page_serving import Served
 
-    with Served("hover", "--recordings", str(recordings), "--uavs", "2") as server:
+    with Served("hover", "--recordings-dir", str(recordings), "--uavs", "2") as server:
         yield server
 
 

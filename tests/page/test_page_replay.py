@@ -21,7 +21,7 @@ REPEATED_S = 400.0
 @pytest.fixture(scope="module")
 def served(chromium, tmp_path_factory):
     folder = tmp_path_factory.mktemp("recordings")
-    with Served("hover", "--uavs", "2", "--recordings", str(folder)) as server:
+    with Served("hover", "--uavs", "2", "--recordings-dir", str(folder)) as server:
         yield server
 
 

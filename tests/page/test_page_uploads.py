@@ -115,7 +115,7 @@ WRONG = {
 @pytest.fixture(scope="module")
 def served(chromium, tmp_path_factory):
     folder = tmp_path_factory.mktemp("recordings")
-    with Served("hover", "--recordings", str(folder)) as server:
+    with Served("hover", "--recordings-dir", str(folder)) as server:
         yield server
 
 

@@ -52,7 +52,7 @@ def served(chromium, tmp_path_factory):
         (folder / "uploads" / name).mkdir(parents=True)
         (folder / "uploads" / name / "scenario.toml").write_text(text)
     (folder / "uploads" / "blocks" / "blocks.csv").write_text("0,0,0\n0,1,0\n0,0,0\n")
-    with Served("hover", "--recordings", str(folder)) as server:
+    with Served("hover", "--recordings-dir", str(folder)) as server:
         yield server
 
 

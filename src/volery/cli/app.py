@@ -18,7 +18,7 @@ from volery.cli.radio_commands import comms, gcs
 
 app = typer.Typer(
     name="volery",
-    help="Flies many UAVs with LIDARs and cameras in lock step.",
+    help="Simulate many UAVs with LIDARs, cameras and autopilots in lock step.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     add_completion=False,
@@ -43,7 +43,7 @@ def volery(
         ),
     ] = False,
 ) -> None:
-    """Fly many UAVs with LIDARs and cameras in lock step."""
+    """Simulate many UAVs with LIDARs, cameras and autopilots in lock step."""
 
 
 app.command(cls=PageCommand)(run)

@@ -38,9 +38,9 @@ def check_bridges(options: RunOptions) -> None:
         )
     heeds_silence = any(name in _OUTSIDE for name in names)
     waits_otherwise = options.autopilot_timeout_s != RunOptions.autopilot_timeout_s
-    if (options.drop_silent or waits_otherwise) and not heeds_silence:
+    if (options.drop_on_timeout or waits_otherwise) and not heeds_silence:
         raise BridgeError(
-            "--autopilot-timeout and --drop-silent are about autopilots outside, and none of their "
+            "--autopilot-timeout and --drop-on-timeout are for external autopilots; none of their "
             f"bridges is open: --bridge {', '.join(_OUTSIDE)}"
         )
     domains = [text for text in options.bridges if text.partition("=")[0] in _ROS2]

@@ -78,7 +78,7 @@ def _bridge_options(options: RunOptions) -> BridgeOptions:
         interfaces=options.interfaces,
         mavlink_key=options.mavlink_key,
         autopilot_timeout_s=options.autopilot_timeout_s,
-        drop_on_timeout=options.drop_silent,
+        drop_on_timeout=options.drop_on_timeout,
         reports_missing_autopilots=options.px4_dir is None,  # else `_px4_instances` does
     )
 

@@ -70,7 +70,7 @@ class RunOptions:
     """Of PX4's sources: instances are run beside the flight; None: by somebody else, or none."""
     autopilot_timeout_s: float = 10.0
     """Wall time that an autopilot in lock step may be silent ..."""
-    drop_silent: bool = False
+    drop_on_timeout: bool = False
     """... and whether it is then waited for no more; else the run ends."""
     start_paused: bool = False
     wait_for: tuple[str, ...] = ()

@@ -1,4 +1,4 @@
-"""Commands that fly: a scenario, one after the other for the page, a log, real autopilots."""
+"""Commands that run scenarios, logs, autopilots and nodes."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def run(
     topics: run_options.Topics = None,
     exclude: run_options.Exclude = None,
     report: run_options.Report = None,
-    recordings: run_options.Recordings = None,
+    recordings_dir: run_options.RecordingsDir = None,
     overwrite: run_options.Overwrite = False,
     digest: run_options.Digest = False,
     page: run_options.Page = None,
@@ -61,7 +61,7 @@ def run(
     ros2_interface: InterfaceOption = None,
     px4_dir: Px4DirOption = None,
     autopilot_timeout: SilenceOption = 10.0,
-    drop_silent: DropOption = False,
+    drop_on_timeout: DropOption = False,
     mavlink_key: MavlinkKeyOption = None,
     traceback: TracebackOption = False,  # noqa: ARG001  # of `guarded`
 ) -> None:
@@ -70,14 +70,13 @@ def run(
     Bridges: rosbridge, ros-tcp (Unity), ros-tcp-2, ros-tcp-connector, ros1, ros2, ros2-zenoh,
     sensor-link, comms, mavlink, mavlink-tcp, mavlink-serial, px4, px4-serial, ardupilot.
 
-    At a terminal keys steer it: space pauses and goes on, . (or s) makes one physics step,
-    + and - double and halve the speed, m frees it. Ctrl-C ends the flight and still writes log and
-    report.
+    Keys at a terminal: space pauses and resumes, . (or s) runs one physics step, + and - double
+    and halve the real-time factor, m lifts it. Ctrl-C ends the run and writes log and report.
     """
     from volery.cli.run import RunOptions, fly, parse_speed
 
     if middleware == "zenoh" and not ros2:
-        raise BridgeError("--middleware zenoh is of --ros2; without that, --bridge ros2-zenoh")
+        raise BridgeError("--middleware zenoh needs --ros2; or use --bridge ros2-zenoh")
     bridges = (*(bridge or ()), *((("ros2" if middleware == "dds" else "ros2-zenoh"),) * ros2))
     if px4_dir is not None and not any(text.partition("=")[0] == "px4" for text in bridges):
         bridges = (*bridges, "px4")
@@ -92,7 +91,7 @@ def run(
         bridges=bridges,
         domain_id=domain_id,
         interfaces=tuple(ros2_interface or ()),
-        recordings=recordings,
+        recordings=recordings_dir,
         allow_remote=allow_remote,
         token=token,
         threads=threads,
@@ -107,7 +106,7 @@ def run(
         replay_commands=replay_commands,
         px4_dir=px4_dir,
         autopilot_timeout_s=autopilot_timeout,
-        drop_silent=drop_silent,
+        drop_on_timeout=drop_on_timeout,
         start_paused=start_paused,
         wait_for=tuple(name for names in wait_for or () for name in names.split(",") if name),
         wait_timeout_s=wait_timeout,
@@ -123,45 +122,50 @@ def serve(
     scenario: Annotated[
         str | None,
         typer.Argument(
-            help="Name from `volery list`, or a TOML file; hover for an hour unless given."
+            help="Scenario name (volery list) or TOML file; default: hover for an hour."
         ),
     ] = None,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Of the page; 0: a free one.")] = 8080,
-    host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Set the page's port; 0 picks a free one.")
+    ] = 8080,
+    host: Annotated[str, typer.Option(help="Set the address to listen on.")] = "127.0.0.1",
     allow_remote: Annotated[
-        bool, typer.Option("--allow-remote", help="Listen beyond this machine.")
+        bool, typer.Option("--allow-remote", help="Accept remote clients.")
     ] = False,
     token: Annotated[
         str | None,
         typer.Option(
-            envvar="VOLERY_TOKEN", help="What pilots must show; needed with --allow-remote."
+            envvar="VOLERY_TOKEN",
+            help="Require this token from operators; needed with --allow-remote.",
         ),
     ] = None,
     viewer_token: Annotated[
         str | None,
-        typer.Option(envvar="VOLERY_VIEWER_TOKEN", help="What those must show who only look on."),
+        typer.Option(envvar="VOLERY_VIEWER_TOKEN", help="Require this token from viewers."),
     ] = None,
     origin: Annotated[
         list[str] | None,
-        typer.Option(help="Let in pages of this origin too, such as that of a reverse proxy."),
+        typer.Option(help="Accept pages of this origin, such as a reverse proxy's, repeatable."),
     ] = None,
-    recordings: Annotated[
-        Path, typer.Option(help="Folder for recordings; uploads go to its folder uploads.")
+    recordings_dir: Annotated[
+        Path, typer.Option(help="Set the folder of recordings; uploads go to its folder uploads.")
     ] = Path("runs/recordings"),
-    uavs: Annotated[int | None, typer.Option(help="Number of UAVs of the first scenario.")] = None,
-    seconds: Annotated[
-        float | None, typer.Option(help="Simulated seconds of the first scenario.")
+    uavs: Annotated[
+        int | None, typer.Option(help="Set the number of UAVs of the first scenario.")
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of the first scenario.")] = None,
-    speed: Annotated[str, typer.Option(help="Factor of real time, or max.")] = "1",
+    seconds: Annotated[
+        float | None, typer.Option(help="Set the duration of the first scenario, simulated s.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Set the seed of the first scenario.")] = None,
+    speed: Annotated[str, typer.Option(help="Set the real-time factor, or max.")] = "1",
     threads: ThreadsOption = None,
     trust: TrustOption = False,
     bridge: BridgesOption = None,
     traceback: TracebackOption = False,  # noqa: ARG001
 ) -> None:
-    """Serve the page until Ctrl-C: one world after the other, as its visitors choose.
+    """Serve the page until Ctrl-C; its visitors choose the scenarios.
 
-    A scenario that ends stays there, paused at its end.
+    A scenario that ends stays loaded, paused at its end.
     """
     from volery.cli.run import RunOptions, parse_speed
     from volery.cli.serve import ServeOptions, serve
@@ -178,7 +182,7 @@ def serve(
                 trust=trust,
                 speed=parse_speed(speed),
                 bridges=tuple(bridge or ()),
-                recordings=recordings,
+                recordings=recordings_dir,
                 allow_remote=allow_remote,
                 token=token,
                 threads=threads,
@@ -189,8 +193,8 @@ def serve(
                 tokens=Tokens(token, viewer_token),
                 anywhere=allow_remote,
                 origins=tuple(origin or ()),
-                recordings=recordings,
-                uploads=recordings / "uploads",
+                recordings=recordings_dir,
+                uploads=recordings_dir / "uploads",
             ),
         )
     )
@@ -201,19 +205,19 @@ def play(
     log: Annotated[Path, typer.Argument(help="A .mcap or .bag log.")],
     scenario: Annotated[
         Path | None,
-        typer.Option(help="Your own file of its scenario, for files that its world needs."),
+        typer.Option(help="Read the world's data files from the folder of this scenario file."),
     ] = None,
-    speed: Annotated[str, typer.Option(help="Factor of real time, or max.")] = "1",
-    loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end.")] = False,
-    paused: Annotated[bool, typer.Option("--paused", help="Wait at the beginning.")] = False,
+    speed: Annotated[str, typer.Option(help="Set the real-time factor, or max.")] = "1",
+    loop: Annotated[bool, typer.Option("--loop", help="Loop the log.")] = False,
+    paused: Annotated[bool, typer.Option("--paused", help="Start paused.")] = False,
     bridge: BridgesOption = None,
     allow_remote: RemoteOption = False,
     token: BridgeTokenOption = None,
 ) -> None:
-    """Play a recorded log behind bridges, rosbridge unless others are named, until Ctrl-C.
+    """Play a log over bridges (rosbridge by default) until Ctrl-C.
 
-    At a terminal keys steer it: space pauses and goes on, . (or s) makes one physics step,
-    + and - double and halve the speed, m frees it, comma and slash leap 5 s back and forward.
+    Keys at a terminal: space pauses and resumes, . (or s) runs one physics step, + and - double
+    and halve the real-time factor, m lifts it, comma and slash seek 5 s back and forward.
     """
     from volery.cli.play import play as play_log
     from volery.cli.run import RunOptions, parse_speed
@@ -230,11 +234,9 @@ def play(
 
 @guarded
 def list_scenarios(
-    nodes: Annotated[
-        bool, typer.Option("--nodes", help="List the nodes that have a name instead.")
-    ] = False,
+    nodes: Annotated[bool, typer.Option("--nodes", help="List registered nodes instead.")] = False,
 ) -> None:
-    """List the scenarios that ship."""
+    """List the shipped scenarios."""
     from volery.cli.list import show_nodes, show_scenarios
 
     if nodes:
@@ -246,26 +248,30 @@ def list_scenarios(
 @guarded
 def px4(
     px4_dir: Annotated[
-        Path, typer.Option(help="Of PX4-Autopilot, in which `make px4_sitl_default` was run.")
+        Path, typer.Option(help="Use this PX4-Autopilot folder, built by `make px4_sitl_default`.")
     ],
-    count: Annotated[int, typer.Option(min=1, help="Instances, one for each UAV.")] = 1,
-    first: Annotated[int, typer.Option(min=0, help="Number of the first one.")] = 0,
-    host: Annotated[str, typer.Option(help="Where the simulation runs.")] = "127.0.0.1",
-    folder: Annotated[
-        Path | None, typer.Option(help="For parameters and logs, which else are not kept.")
+    count: Annotated[
+        int, typer.Option(min=1, help="Set the number of instances, one for each UAV.")
+    ] = 1,
+    first: Annotated[int, typer.Option(min=0, help="Set the number of the first instance.")] = 0,
+    host: Annotated[str, typer.Option(help="Set the host of the simulation.")] = "127.0.0.1",
+    work_dir: Annotated[
+        Path | None, typer.Option(help="Keep parameters and logs in this folder.")
     ] = None,
     speed: Annotated[
-        float | None, typer.Option(min=0.01, help="Factor of real time, for PX4's time-outs.")
+        float | None, typer.Option(min=0.01, help="Scale PX4's timeouts to this real-time factor.")
     ] = None,
     airframe: Annotated[
         str | None,
-        typer.Option(help="Fit PX4 to this airframe, by name or .toml file, not to its own Iris."),
+        typer.Option(
+            help="Set PX4's parameters for this airframe, a name or .toml file; default: Iris."
+        ),
     ] = None,
 ) -> None:
     """Run PX4s for a simulation with `--bridge px4`, until Ctrl-C.
 
-    Instance i flies the i-th UAV, counted from 0. After a reset of the simulation, and when a run
-    has ended, they begin anew and wait for it.
+    Instance i flies the i-th UAV, from 0. Instances restart after a reset of the simulation and
+    after the end of a run.
     """
     from volery.cli.px4 import run_px4
 
@@ -274,7 +280,7 @@ def px4(
         count,
         first=first,
         host=host,
-        folder=folder,
+        folder=work_dir,
         speed=speed,
         airframe=airframe,
     )
@@ -282,18 +288,23 @@ def px4(
 
 @guarded
 def launch(
-    profile: Annotated[Path, typer.Argument(help="A .toml profile with \\[\\[launch]] in it.")],
+    profile: Annotated[
+        Path, typer.Argument(help="Launch profile, a .toml file with \\[\\[launch]].")
+    ],
     via: Annotated[
-        str | None, typer.Option(help="Way into the graph, as of `volery node`.")
+        str | None, typer.Option(help="Join the graph this way, see `volery node`.")
     ] = None,
     trust: TrustOption = False,
-    namespace: Annotated[str | None, typer.Option(help="Of the nodes, such as /uav1.")] = None,
+    namespace: Annotated[
+        str | None, typer.Option(help="Set the namespace of the nodes, such as /uav1.")
+    ] = None,
     lock_step: Annotated[
-        float | None, typer.Option(help="The simulation waits for them each so many seconds.")
+        float | None,
+        typer.Option(help="Synchronize the simulation with the nodes at this period, s."),
     ] = None,
     traceback: TracebackOption = False,  # noqa: ARG001
 ) -> None:
-    """Run the nodes of a launch profile in a process of their own."""
+    """Run the nodes of a launch profile in one process."""
     from volery.cli.launch import launch_profile
 
     launch_profile(profile, via=via, namespace=namespace, lock_step_s=lock_step, trust=trust)

@@ -17,31 +17,31 @@ service_app = typer.Typer(no_args_is_help=True, context_settings=_CONTEXT)
 
 Via = Annotated[
     str,
-    typer.Option(help=f"Way into the graph: {WAYS}; else VOLERY_VIA."),
+    typer.Option(help=f"Join the graph by {WAYS}; default: VOLERY_VIA."),
 ]
 ViaOfAll = Annotated[
     str,
-    typer.Option("--via", envvar="VOLERY_VIA", help=f"Way into the graph, here or last: {WAYS}."),
+    typer.Option("--via", envvar="VOLERY_VIA", help=f"Join the graph by {WAYS}."),
 ]
 Topic = Annotated[str, typer.Argument(help="Name of a topic.")]
 Service = Annotated[str, typer.Argument(help="Name of a service.")]
-Types = Annotated[bool, typer.Option("--types", "-t", help="Show types too.")]
+Types = Annotated[bool, typer.Option("--types", "-t", help="Show types.")]
 
 
 @topic_app.callback()
 def topics(context: typer.Context, via: ViaOfAll = DEFAULT_VIA) -> None:
-    """Look at topics and publish on them."""
+    """Inspect topics and publish on them."""
     _use(context, via)
 
 
 @service_app.callback()
 def services(context: typer.Context, via: ViaOfAll = DEFAULT_VIA) -> None:
-    """Look at services and call them."""
+    """Inspect and call services."""
     _use(context, via)
 
 
 def _use(context: typer.Context, via: str) -> None:
-    """Have the group's commands take this way unless they are given one themselves."""
+    """Sets the default of `--via` for the group's commands."""
     commands = getattr(context.command, "commands", {})
     context.default_map = {name: {"via": via} for name in commands}
 
@@ -52,27 +52,31 @@ def node(
     via: Annotated[
         str | None,
         typer.Option(
-            help=f"Way into the graph: {WAYS}; else the profile's, VOLERY_VIA, {DEFAULT_VIA}."
+            help=f"Join the graph by {WAYS}; default: the profile's, VOLERY_VIA, {DEFAULT_VIA}."
         ),
     ] = None,
-    namespace: Annotated[str | None, typer.Option(help="Such as /uav1.")] = None,
+    namespace: Annotated[str | None, typer.Option(help="Set the namespace, such as /uav1.")] = None,
     profile: Annotated[
-        Path | None, typer.Option(help="TOML: way, namespace, clock, other names, parameters.")
+        Path | None,
+        typer.Option(
+            help="Read connection, namespace, clock, remappings and parameters from TOML."
+        ),
     ] = None,
     param: Annotated[
-        list[str] | None, typer.Option("--param", "-p", help="NAME=VALUE, repeatable.")
+        list[str] | None,
+        typer.Option("--param", "-p", help="Set a parameter, NAME=VALUE, repeatable."),
     ] = None,
     lock_step: Annotated[
         float | None,
-        typer.Option(help="Have the simulation wait for the node each so many simulated s: 0.001."),
+        typer.Option(help="Synchronize the simulation with the node at this period, simulated s."),
     ] = None,
     messages: Annotated[
         list[str] | None,
-        typer.Option(help="Folder of ROS packages with .msg and .srv files, repeatable."),
+        typer.Option(help="Read .msg and .srv files of this folder of ROS packages, repeatable."),
     ] = None,
     traceback: TracebackOption = False,  # noqa: ARG001  # of `guarded`
 ) -> None:
-    """Run a node as a process of its own, on the graph of a simulation or a real vehicle."""
+    """Run a node in its own process, on the graph of a simulation or a real vehicle."""
     from volery.cli.node import NodeOptions, run_node
 
     run_node(
@@ -106,9 +110,9 @@ def topic_echo(
     topic: Topic,
     via: Via = DEFAULT_VIA,
     count: Annotated[
-        int | None, typer.Option("--count", "-n", min=1, help="End after so many messages.")
+        int | None, typer.Option("--count", "-n", min=1, help="Exit after this many messages.")
     ] = None,
-    once: Annotated[bool, typer.Option("--once", help="End after one message.")] = False,
+    once: Annotated[bool, typer.Option("--once", help="Exit after one message.")] = False,
     full_length: Annotated[
         bool, typer.Option("--full-length", "-f", help="Show all elements of long arrays.")
     ] = False,
@@ -124,7 +128,9 @@ def topic_echo(
 def topic_hz(
     topic: Topic,
     via: Via = DEFAULT_VIA,
-    window: Annotated[int, typer.Option("--window", "-w", min=2, help="Messages.")] = 10_000,
+    window: Annotated[
+        int, typer.Option("--window", "-w", min=2, help="Average over this many messages.")
+    ] = 10_000,
 ) -> None:
     """Print a topic's rate each second until Ctrl-C."""
     from volery.cli.topics import Window, measure
@@ -137,7 +143,9 @@ def topic_hz(
 def topic_bw(
     topic: Topic,
     via: Via = DEFAULT_VIA,
-    window: Annotated[int, typer.Option("--window", "-w", min=2, help="Messages.")] = 100,
+    window: Annotated[
+        int, typer.Option("--window", "-w", min=2, help="Average over this many messages.")
+    ] = 100,
 ) -> None:
     """Print a topic's bandwidth, in CDR bytes, each second until Ctrl-C."""
     from volery.cli.topics import Window, measure
@@ -149,12 +157,12 @@ def topic_bw(
 @guarded
 def topic_pub(
     topic: Topic,
-    msgtype: Annotated[str, typer.Argument(help="Such as geometry_msgs/msg/Twist.")],
-    values: Annotated[str, typer.Argument(help='YAML: "{linear: {x: 1.0}}".')] = "{}",
+    msgtype: Annotated[str, typer.Argument(help="Type, such as geometry_msgs/msg/Twist.")],
+    values: Annotated[str, typer.Argument(help='Message as YAML: "{linear: {x: 1.0}}".')] = "{}",
     via: Via = DEFAULT_VIA,
-    rate: Annotated[float, typer.Option("--rate", "-r", help="Hz.")] = 1.0,
+    rate: Annotated[float, typer.Option("--rate", "-r", help="Set the rate, Hz.")] = 1.0,
     times: Annotated[
-        int | None, typer.Option("--times", "-t", min=1, help="End after so many messages.")
+        int | None, typer.Option("--times", "-t", min=1, help="Exit after this many messages.")
     ] = None,
     once: Annotated[bool, typer.Option("--once", "-1", help="Publish one message.")] = False,
 ) -> None:
@@ -186,9 +194,11 @@ def service_type(service: Service, via: Via = DEFAULT_VIA) -> None:
 @guarded
 def service_call(
     service: Service,
-    values: Annotated[str | None, typer.Argument(help='YAML: "{altitude_m: 3.0}".')] = None,
+    values: Annotated[
+        str | None, typer.Argument(help='Request as YAML: "{altitude_m: 3.0}".')
+    ] = None,
     via: Via = DEFAULT_VIA,
-    timeout: Annotated[float, typer.Option(help="s.")] = 10.0,
+    timeout: Annotated[float, typer.Option(help="Set the timeout, s.")] = 10.0,
 ) -> None:
     """Call a service and print its response."""
     from volery.cli.services import call

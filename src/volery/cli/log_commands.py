@@ -1,4 +1,4 @@
-"""Commands on what was recorded: look, mend, convert, map, report."""
+"""Commands on logs: info, recover, convert, slam, report."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from volery.cli.error_reporting import guarded, warn
 
 @guarded
 def info(file: Annotated[Path, typer.Argument(help="A .mcap or .bag log.")]) -> None:
-    """Show what is in a log."""
+    """Show the contents of a log."""
     from volery.cli.logs import show_log
 
     if not show_log(file):
@@ -21,12 +21,12 @@ def info(file: Annotated[Path, typer.Argument(help="A .mcap or .bag log.")]) -> 
 
 @guarded
 def recover(
-    file: Annotated[Path, typer.Argument(help="A log that was cut off.")],
+    file: Annotated[Path, typer.Argument(help="A truncated log.")],
     out: Annotated[
-        Path | None, typer.Argument(help="The new log; FILE.recovered by default.")
+        Path | None, typer.Argument(help="The new log; default: FILE.recovered.")
     ] = None,
 ) -> None:
-    """Write a log that was cut off as a whole file."""
+    """Recover a truncated log."""
     from volery.cli.logs import recover_log
 
     recover_log(file, out)
@@ -34,14 +34,14 @@ def recover(
 
 @guarded
 def convert(
-    file: Annotated[Path, typer.Argument(help="A plain text log with one scan a line.")],
+    file: Annotated[Path, typer.Argument(help="A text log, one scan per line.")],
     out: Annotated[Path, typer.Argument(help="The new log, .mcap or .bag.")],
-    layout: Annotated[
-        Path, typer.Option(help="A TOML file that says what stands in which column.")
-    ],
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the new log.")] = False,
+    layout: Annotated[Path, typer.Option(help="Read the columns' meaning from this TOML file.")],
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace an existing log.")
+    ] = False,
 ) -> None:
-    """Turn a scanner's text log into one that can be played, shown and mapped."""
+    """Convert a scanner's text log to .mcap or .bag."""
     from volery.cli.logs import convert_log
 
     convert_log(file, out, layout, overwrite=overwrite)
@@ -51,53 +51,62 @@ def convert(
 def slam(
     log: Annotated[
         Path,
-        typer.Argument(help="A .mcap or .bag log, a ROS 2 bag, or a scanner's text log."),
+        typer.Argument(help="A .mcap or .bag log, a ROS 2 bag or a text log."),
     ],
-    out: Annotated[Path, typer.Option(help="The folder to write map and path into.")] = Path(
-        "slam"
-    ),
+    out: Annotated[Path, typer.Option(help="Write map and path into this folder.")] = Path("slam"),
     layout: Annotated[
         Path | None,
-        typer.Option(help="For a text log: a TOML file that says what stands in which column."),
+        typer.Option(help="Read the columns' meaning of a text log from this TOML file."),
     ] = None,
-    uav: Annotated[str | None, typer.Option(help="Name, where the log has several.")] = None,
-    scan: Annotated[str | None, typer.Option(help="Topic of the level LIDAR.")] = None,
-    odom: Annotated[str | None, typer.Option(help="Topic of the wheels' odometry.")] = None,
-    imu_topic: Annotated[str | None, typer.Option(help="Topic of the IMU.")] = None,
+    uav: Annotated[str | None, typer.Option(help="Select the UAV by name.")] = None,
+    scan_topic: Annotated[
+        str | None, typer.Option(help="Set the topic of the horizontal LIDAR.")
+    ] = None,
+    odom_topic: Annotated[str | None, typer.Option(help="Set the topic of wheel odometry.")] = None,
+    imu_topic: Annotated[str | None, typer.Option(help="Set the topic of the IMU.")] = None,
     no_odometry: Annotated[
-        bool, typer.Option("--no-odometry", help="Leave odometry out that the log has.")
+        bool, typer.Option("--no-odometry", help="Ignore the log's odometry.")
     ] = False,
     imu: Annotated[
         bool | None,
         typer.Option(
-            "--imu/--no-imu", help="In space, or in the plane; by what the log has unless said."
+            "--imu/--no-imu",
+            help="Map with the IMU in 3D, or in the plane; default: by the log's topics.",
         ),
     ] = None,
-    start: Annotated[
-        str | None, typer.Option(metavar="X,Y,Z,YAW_DEG", help="Where in the map it begins.")
+    initial_pose: Annotated[
+        str | None,
+        typer.Option(metavar="X,Y,Z,YAW_DEG", help="Set the initial pose in the map."),
     ] = None,
     level_mount: Annotated[
-        str | None, typer.Option(metavar="X,Y,Z", help="Of the level LIDAR, not /tf_static's.")
+        str | None,
+        typer.Option(
+            metavar="X,Y,Z", help="Set the horizontal LIDAR's position; overrides /tf_static."
+        ),
     ] = None,
     nodding_mount: Annotated[
-        str | None, typer.Option(metavar="X,Y,Z", help="Of the nodding one.")
+        str | None, typer.Option(metavar="X,Y,Z", help="Set the nodding LIDAR's position.")
     ] = None,
     resolution: Annotated[
-        float, typer.Option(min=0.01, max=1.0, help="Width of the map's cells, m.")
+        float, typer.Option(min=0.01, max=1.0, help="Set the cell size of the map, m.")
     ] = 0.05,
-    reach: Annotated[float, typer.Option(min=1.0, max=60.0, help="Farther is left out, m.")] = 30.0,
-    loops: Annotated[
-        bool, typer.Option("--loops/--no-loops", help="Correct by places seen again (gtsam).")
+    max_range: Annotated[
+        float, typer.Option(min=1.0, max=60.0, help="Ignore returns beyond this range, m.")
+    ] = 30.0,
+    loop_closure: Annotated[
+        bool,
+        typer.Option("--loop-closure/--no-loop-closure", help="Apply loop closures (gtsam)."),
     ] = True,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace older files.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")] = False,
 ) -> None:
     """Map a recorded log: map.png, map.pgm and .yaml (map_server), path.tum, summary.json."""
     from volery.cli.slam import SlamArguments, map_log
 
     map_log(
         SlamArguments(
-            log, out, layout, uav, scan, odom, imu_topic, not no_odometry, imu, start, level_mount,
-            nodding_mount, resolution, reach, loops, overwrite,
+            log, out, layout, uav, scan_topic, odom_topic, imu_topic, not no_odometry, imu,
+            initial_pose, level_mount, nodding_mount, resolution, max_range, loop_closure,
+            overwrite,
         )
     )  # fmt: skip
 
@@ -105,22 +114,23 @@ def slam(
 @guarded
 def report(
     log: Annotated[Path, typer.Argument(help="A .mcap or .bag log of a simulated flight.")],
-    out: Annotated[Path, typer.Option(help="The folder to write index.html into.")] = Path(
-        "report"
-    ),
+    out: Annotated[Path, typer.Option(help="Write index.html into this folder.")] = Path("report"),
     compare: Annotated[
-        Path | None, typer.Option(help="Log of a real flight, laid over the simulated one.")
+        Path | None, typer.Option(help="Compare with this log of a real flight.")
     ] = None,
     compare_topic: Annotated[
         str | None,
-        typer.Option(help="Its topic of poses, where there are several."),
+        typer.Option(help="Select the topic of poses of that log."),
     ] = None,
     uav: Annotated[
-        str | None, typer.Option(help="UAV to draw, else all; or to compare with, else the first.")
+        str | None,
+        typer.Option(help="Draw, or compare with, this UAV; default: all, the first."),
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an older one.")] = False,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace an existing report.")
+    ] = False,
 ) -> None:
-    """Draw the ways of a log, simulated against estimated, with a map of trunks."""
+    """Draw the true and estimated trajectories of a log, with a map of trunks."""
     from volery.report.trajectory_page import write_log_report
 
     written = write_log_report(

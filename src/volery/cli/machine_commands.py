@@ -1,4 +1,4 @@
-"""Commands about this machine: how fast Volery is on it, and whether all is well."""
+"""Commands about this machine: bench and doctor."""
 
 from __future__ import annotations
 
@@ -15,14 +15,16 @@ _QUICK = [name for name, bench in BENCHES.items() if bench.has_quick]
 
 @guarded
 def bench(
-    name: Annotated[str, typer.Argument(help=f"all, or one: {', '.join(BENCHES)}.")],
-    json: Annotated[bool, typer.Option("--json", help="Print one JSON object a bench.")] = False,
-    out: Annotated[Path | None, typer.Option(help="Write the JSON to this file too.")] = None,
+    name: Annotated[str, typer.Argument(help=f"Benchmark: all, {', '.join(BENCHES)}.")],
+    json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON object per benchmark.")
+    ] = False,
+    out: Annotated[Path | None, typer.Option(help="Write the JSON to this file.")] = None,
     markdown: Annotated[
-        Path | None, typer.Option(help="Write a page with figures and bounds.")
+        Path | None, typer.Option(help="Write figures and bounds as a page.")
     ] = None,
     quick: Annotated[
-        bool, typer.Option("--quick", help=f"Shorter, where the bench can: {', '.join(_QUICK)}.")
+        bool, typer.Option("--quick", help=f"Run the short version of {', '.join(_QUICK)}.")
     ] = False,
 ) -> None:
     """Measure how fast Volery is on this machine."""
@@ -33,7 +35,7 @@ def bench(
 
 @guarded
 def doctor() -> None:
-    """Check this machine and installation; each line is ok or says how to mend it."""
+    """Check this machine and installation; problems come with their fix."""
     from volery.cli.doctor import examine
 
     if not examine():

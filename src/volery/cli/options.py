@@ -1,4 +1,4 @@
-"""Options that several commands take, and one whose value may be left away."""
+"""Options shared by several commands, and one whose value is optional."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Annotated, Any, Literal
 import typer
 from typer.core import TyperCommand
 
-FLIGHT, FILES, BRIDGES = "The flight", "What is written", "Bridges and access"
+FLIGHT, FILES, BRIDGES = "Flight", "Output files", "Bridges and access"
 ROS2, AUTOPILOTS = "ROS 2", "Autopilots"
-"""How a help groups many options."""
+"""Panels of options in help texts."""
 
 BridgesOption = Annotated[
     list[str] | None,
@@ -22,57 +22,64 @@ BridgesOption = Annotated[
 RemoteOption = Annotated[
     bool,
     typer.Option(
-        "--allow-remote", help="Let bridges listen beyond this machine.", rich_help_panel=BRIDGES
+        "--allow-remote", help="Allow bridges to accept remote clients.", rich_help_panel=BRIDGES
     ),
 ]
 TokenOption = Annotated[
-    str | None, typer.Option(envvar="VOLERY_TOKEN", help="What remote clients must show.")
+    str | None, typer.Option(envvar="VOLERY_TOKEN", help="Require this token from remote clients.")
 ]
 BridgeTokenOption = Annotated[
     str | None,
     typer.Option(
-        envvar="VOLERY_TOKEN", help="What remote clients must show.", rich_help_panel=BRIDGES
+        envvar="VOLERY_TOKEN",
+        help="Require this token from remote clients.",
+        rich_help_panel=BRIDGES,
     ),
 ]
 Ros2Option = Annotated[
     bool,
     typer.Option(
         "--ros2",
-        help="Take part in a ROS 2 graph: the bridge ros2 or ros2-zenoh.",
+        help="Join the ROS 2 graph by the bridge ros2 or ros2-zenoh.",
         rich_help_panel=ROS2,
     ),
 ]
 DomainOption = Annotated[
     int | None,
     typer.Option(
-        min=0, max=232, help="ROS 2 domain; ROS_DOMAIN_ID unless given.", rich_help_panel=ROS2
+        min=0, max=232, help="Set the ROS 2 domain; default: ROS_DOMAIN_ID.", rich_help_panel=ROS2
     ),
 ]
 MiddlewareOption = Annotated[
     Literal["dds", "zenoh"],
-    typer.Option(help="How --ros2 talks to ROS 2.", rich_help_panel=ROS2),
+    typer.Option(help="Set the middleware of --ros2.", rich_help_panel=ROS2),
 ]
 InterfaceOption = Annotated[
     list[str] | None,
     typer.Option(
-        help="Network interface for ROS 2 over DDS, repeatable; else this machine alone.",
+        help="Use this network interface for DDS, repeatable; default: loopback.",
         rich_help_panel=ROS2,
     ),
 ]
 TrustOption = Annotated[
     bool,
-    typer.Option("--trust", help="Run nodes that lie beside the file.", rich_help_panel=FLIGHT),
+    typer.Option(
+        "--trust", help="Run node code from the scenario's folder.", rich_help_panel=FLIGHT
+    ),
 ]
 ThreadsOption = Annotated[
     int | None,
     typer.Option(
-        min=1, max=256, help="Threads; results do not depend on it.", rich_help_panel=FLIGHT
+        min=1,
+        max=256,
+        help="Set the number of threads; results do not depend on it.",
+        rich_help_panel=FLIGHT,
     ),
 ]
 Px4DirOption = Annotated[
     Path | None,
     typer.Option(
-        help="Run the PX4 of this folder for each UAV; opens the bridge px4.",
+        help="Start the PX4 build of this folder for each UAV; opens the bridge px4.",
         rich_help_panel=AUTOPILOTS,
     ),
 ]
@@ -80,32 +87,35 @@ SilenceOption = Annotated[
     float,
     typer.Option(
         min=0.1,
-        help="Wall seconds that an autopilot in lock step may be silent.",
+        help="Set the timeout of autopilots in lock step, wall s.",
         rich_help_panel=AUTOPILOTS,
     ),
 ]
 MavlinkKeyOption = Annotated[
     Path | None,
     typer.Option(
-        help="File with a text whose SHA-256 signs MAVLink; what is unsigned counts not.",
+        help="Sign MAVLink by the SHA-256 of this file's text; drop unsigned frames.",
         rich_help_panel=AUTOPILOTS,
     ),
 ]
 DropOption = Annotated[
     bool,
     typer.Option(
-        "--drop-silent",
-        help="Go on without a silent autopilot; else the run ends.",
+        "--drop-on-timeout",
+        help="Continue after an autopilot times out; default: end the run.",
         rich_help_panel=AUTOPILOTS,
     ),
 ]
 
 TracebackOption = Annotated[
-    bool, typer.Option("--traceback", help="Print all frames of an error.", show_default=False)
+    bool, typer.Option("--traceback", help="Print the traceback of an error.", show_default=False)
 ]
 
-BatchSizeOption = Annotated[
-    int, typer.Option(min=1, max=0x7F00, help="Planes a batch; linear id = it x batch + plane.")
+GroupSizeOption = Annotated[
+    int,
+    typer.Option(
+        min=1, max=0x7F00, help="Set the planes of a group; linear id = group x size + plane."
+    ),
 ]
 
 

@@ -8,38 +8,42 @@ from typing import Annotated
 import typer
 
 from volery.cli.error_reporting import guarded
-from volery.cli.options import BatchSizeOption, TokenOption
+from volery.cli.options import GroupSizeOption, TokenOption
 
 
 @guarded
 def comms(
-    port: Annotated[int, typer.Option(min=0, max=65535, help="0: a free one.")] = 10200,
-    host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
-    batch_size: BatchSizeOption = 4,
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Set the port; 0 picks a free one.")
+    ] = 10200,
+    host: Annotated[str, typer.Option(help="Set the address to listen on.")] = "127.0.0.1",
+    group_size: GroupSizeOption = 4,
     allow_remote: Annotated[
-        bool, typer.Option("--allow-remote", help="Listen beyond this machine; needs a token.")
+        bool, typer.Option("--allow-remote", help="Accept remote clients; needs a token.")
     ] = False,
     token: TokenOption = None,
 ) -> None:
-    """Serve the radio network's stations until Ctrl-C: UAVs and ground stations."""
+    """Run the communication server of UAVs and ground stations until Ctrl-C."""
     from volery.cli.comms import serve_stations
     from volery.comms.server.settings import RouterSettings
 
-    settings = RouterSettings(planes_per_batch=batch_size, token=token)
+    settings = RouterSettings(planes_per_batch=group_size, token=token)
     serve_stations(host, port, settings, anywhere=allow_remote)
 
 
 @guarded
 def gcs(
     server: Annotated[
-        str, typer.Option(metavar="HOST:PORT", help="Of volery comms.")
+        str, typer.Option(metavar="HOST:PORT", help="Connect to this `volery comms`.")
     ] = "127.0.0.1:10200",
-    number: Annotated[int, typer.Option(min=0, max=255, help="Of this ground station.")] = 0,
-    batch_size: BatchSizeOption = 4,
+    station_id: Annotated[
+        int, typer.Option(min=0, max=255, help="Set the number of this ground station.")
+    ] = 0,
+    group_size: GroupSizeOption = 4,
     token: TokenOption = None,
-    log: Annotated[Path | None, typer.Option(help="Append what is said to this file.")] = None,
+    log: Annotated[Path | None, typer.Option(help="Append all lines to this file.")] = None,
 ) -> None:
-    """Watch and command UAVs over the radio network, line by line; help lists the commands."""
+    """Monitor and command UAVs over the radio network; type help for the commands."""
     from volery.cli.gcs import command_station
 
-    command_station(server, number, token, batch_size, log)
+    command_station(server, station_id, token, group_size, log)

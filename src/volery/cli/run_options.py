@@ -1,4 +1,4 @@
-"""The options of `volery run` alone, as its help groups them; those of several: `cli.options`."""
+"""Options of `volery run`, in the order of its help; shared ones are in `cli.options`."""
 
 from __future__ import annotations
 
@@ -9,28 +9,28 @@ import typer
 
 from volery.cli.options import BRIDGES, FILES, FLIGHT
 
-# What is flown.
-Scenario = Annotated[str, typer.Argument(help="Name from `volery list`, or a TOML file.")]
-Uavs = Annotated[int | None, typer.Option(help="Number of UAVs.", rich_help_panel=FLIGHT)]
+# Flight.
+Scenario = Annotated[str, typer.Argument(help="Scenario name (volery list) or TOML file.")]
+Uavs = Annotated[int | None, typer.Option(help="Set the number of UAVs.", rich_help_panel=FLIGHT)]
 Seconds = Annotated[
-    float | None, typer.Option(help="Simulated seconds to fly.", rich_help_panel=FLIGHT)
+    float | None, typer.Option(help="Set the duration, simulated s.", rich_help_panel=FLIGHT)
 ]
 Seed = Annotated[
-    int | None, typer.Option(help="Seed of everything random.", rich_help_panel=FLIGHT)
+    int | None, typer.Option(help="Set the seed of all random streams.", rich_help_panel=FLIGHT)
 ]
 NoNodes = Annotated[
     bool,
     typer.Option(
         "--no-nodes",
-        help="Without the scenario's nodes: they run elsewhere.",
+        help="Do not start the scenario's nodes.",
         rich_help_panel=FLIGHT,
     ),
 ]
 Speed = Annotated[
     str | None,
     typer.Option(
-        help="Set the factor of real time, such as 1 or 2.5, or max [default: 1 with bridges or a "
-        "page, else max].",
+        help="Set the real-time factor, such as 1 or 2.5, or max; default: 1 with bridges or a "
+        "page, else max.",
         rich_help_panel=FLIGHT,
     ),
 ]
@@ -48,17 +48,17 @@ WaitFor = Annotated[
 ]
 WaitTimeout = Annotated[
     float,
-    typer.Option(min=0.1, help="Wall seconds that --wait-for waits.", rich_help_panel=FLIGHT),
+    typer.Option(min=0.1, help="Set the timeout of --wait-for, wall s.", rich_help_panel=FLIGHT),
 ]
 ReplayCommands = Annotated[
     Path | None,
     typer.Option(
-        help="Give every command again that clients gave in this recorded flight.",
+        help="Replay the client commands of this log.",
         rich_help_panel=FLIGHT,
     ),
 ]
 
-# What is left of it.
+# Output files.
 Record = Annotated[
     Path | None,
     typer.Option(help="Write a log: .mcap (ROS 2) or .bag (ROS 1).", rich_help_panel=FILES),
@@ -66,23 +66,23 @@ Record = Annotated[
 Topics = Annotated[
     list[str] | None,
     typer.Option(
-        help="Record these topics alone, such as '/uav*/laser/**'; repeatable. Without it: all, "
-        "and no picture twice.",
+        help="Record only these topics, such as '/uav*/laser/**', repeatable; default: all, "
+        "each image once.",
         rich_help_panel=FILES,
     ),
 ]
 Exclude = Annotated[
     list[str] | None,
-    typer.Option(help="Do not record these topics; repeatable.", rich_help_panel=FILES),
+    typer.Option(help="Do not record these topics, repeatable.", rich_help_panel=FILES),
 ]
 Report = Annotated[
     Path | None,
     typer.Option(help="Write an illustrated report into this folder.", rich_help_panel=FILES),
 ]
-Recordings = Annotated[
+RecordingsDir = Annotated[
     Path | None,
     typer.Option(
-        help="Folder in which clients may record: /volery/start_recording.",
+        help="Let clients record into this folder (/volery/start_recording).",
         rich_help_panel=FILES,
     ),
 ]
@@ -93,18 +93,18 @@ Digest = Annotated[
     bool,
     typer.Option(
         "--digest",
-        help="Print the SHA-256 over all states and messages, in order and by topic.",
+        help="Print the SHA-256 of all states and messages, in order and by topic.",
         rich_help_panel=FILES,
     ),
 ]
 
-# Who looks on.
+# Page.
 Page = Annotated[
     str | None,
     typer.Option(
         metavar="[=HOST:PORT]",
-        help="Show the flight on a page in the browser, at 127.0.0.1:8080 by default; the page "
-        "stays open at the end until Ctrl-C.",
+        help="Serve a page of the flight, at 127.0.0.1:8080 by default; it stays open until "
+        "Ctrl-C.",
         rich_help_panel=BRIDGES,
     ),
 ]
@@ -112,7 +112,7 @@ ExitAtEnd = Annotated[
     bool,
     typer.Option(
         "--exit-at-end",
-        help="End a run with a page where its scenario ends.",
+        help="Exit at the end of the scenario, even with a page.",
         rich_help_panel=BRIDGES,
     ),
 ]

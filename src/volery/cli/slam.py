@@ -68,7 +68,7 @@ def map_log(asked: SlamArguments) -> None:
     topics = RequestedTopics(
         asked.uav, asked.scan, asked.odometry, asked.imu_topic, asked.has_odometry, asked.has_imu
     )
-    start = _numbers(asked.start, 4, "--start")
+    start = _numbers(asked.start, 4, "--initial-pose")
     options = SlamOptions(
         topics,
         None if start is None else (*start[:3], math.radians(start[3])),
@@ -110,7 +110,9 @@ def _beginning(start: Pose | None, asked: Pose | None) -> str:
     if start is None or asked is not None:
         return ""
     x, y, z, yaw = _in_degrees(start)
-    return f" from {x:g}, {y:g}, {z:g} m, {yaw:g} degrees, as it tells; --start says otherwise"
+    return (
+        f" from {x:g}, {y:g}, {z:g} m, {yaw:g} degrees, as it tells; --initial-pose says otherwise"
+    )
 
 
 def _in_degrees(start: Pose | None) -> tuple[float, float, float, float]:

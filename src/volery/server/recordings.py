@@ -53,7 +53,7 @@ async def bring_recording(request: Request) -> Response:
     site: ServerState = request.app.state.site
     folder = site.recordings
     if folder is None:
-        raise RefusedError(409, "this server keeps no recordings; start it with --recordings")
+        raise RefusedError(409, "this server keeps no recordings; start it with --recordings-dir")
     called = request.query_params.get("name", "")[:200]
     suffix = PurePosixPath(called.replace("\\", "/")).suffix.lower()
     if suffix not in _SUFFIXES:

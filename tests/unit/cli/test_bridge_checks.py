@@ -23,7 +23,7 @@ from volery.scenario.load import load_scenario
         (("px4", "px4=4600"), {}, "px4 serves all of them"),
         (("rosbridge",), {"mavlink_key": Path("no_such_file")}, "--mavlink-key signs MAVLink"),
         (("rosbridge",), {"domain_id": 4}, "--domain-id 4: no bridge to ROS 2 is open"),
-        (("mavlink",), {"drop_silent": True}, "--drop-silent are about autopilots outside"),
+        (("mavlink",), {"drop_on_timeout": True}, "--drop-on-timeout are for external autopilots"),
         (("mavlink",), {"autopilot_timeout_s": 3.0}, "--autopilot-timeout and"),
         (("ros2=7",), {"domain_id": 4}, "--domain-id 4: ros2=7 has its own"),
         (("ros2-zenoh",), {"interfaces": ("eth0",)}, "--ros2-interface is for ROS 2 over DDS"),
@@ -39,7 +39,7 @@ def test_what_does_not_go_together(bridges, more, text):
     [
         ((), {}),
         (("mavlink", "mavlink-tcp", "mavlink=14600", "ros2"), {"mavlink_key": Path("k")}),
-        (("px4-serial=/dev/ttyACM0", "px4-serial=/dev/ttyACM1"), {"drop_silent": True}),
+        (("px4-serial=/dev/ttyACM0", "px4-serial=/dev/ttyACM1"), {"drop_on_timeout": True}),
         (("ros2", "ros2=7"), {"domain_id": 4, "interfaces": ("eth0",)}),
         (("ros2-zenoh=host:7447",), {"domain_id": 4}),
     ],
@@ -84,7 +84,7 @@ def test_a_scenario_with_autopilots_is_not_flown_by_others_too():
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        (["--bridge", "ros2", "--middleware", "zenoh"], "--middleware zenoh is of --ros2"),
+        (["--bridge", "ros2", "--middleware", "zenoh"], "--middleware zenoh needs --ros2"),
         (["--domain-id", "4"], "no bridge to ROS 2 is open"),
         (["--bridge", "mavlink", "--bridge", "px4"], "two autopilots"),
     ],

@@ -98,7 +98,7 @@ def test_a_file_that_cannot_be_read_is_told_without_numbers(
 
 def test_the_options_of_a_run_are_grouped() -> None:
     told = runner.invoke(app, ["run", "--help"]).stdout
-    titles = ("The flight", "What is written", "Bridges and access", "ROS 2", "Autopilots")
+    titles = ("Flight", "Output files", "Bridges and access", "ROS 2", "Autopilots")
     groups = [f"─ {title} ─" for title in titles]
     firsts = ("--uavs", "--record", "--page", "--ros2 ", "--px4-dir")
     places = [told.index(text) for pair in zip(groups, firsts, strict=True) for text in pair]

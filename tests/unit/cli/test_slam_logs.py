@@ -142,7 +142,14 @@ def as_ros2_bag(log, folder):
 
 def test_odometry_and_closures_can_be_left_out(text, tmp_path):
     layout = ("--layout", text / "layout.toml")
-    more = ("--no-odometry", "--no-loops", "--start", "10,5,0,90", "--resolution", "0.1")
+    more = (
+        "--no-odometry",
+        "--no-loop-closure",
+        "--initial-pose",
+        "10,5,0,90",
+        "--resolution",
+        "0.1",
+    )
     result = slam(text / "scans.txt", *layout, "--out", tmp_path / "out", *more)
     assert result.exit_code == 0, result.output
     told = json.loads((tmp_path / "out" / "summary.json").read_text())
@@ -231,8 +238,16 @@ def test_a_clock_set_back_in_the_middle_costs_no_scan(text, carried, tmp_path):
         ("1 2 3\n", (), "a scanner's text log needs --layout"),
         ("1 2 3\n", ("--layout", "layout.toml"), "3 columns where the layout needs"),
         ("1 2 3\n", ("--layout", "none.toml"), "none.toml: cannot be read"),
-        ("1 2 3\n", ("--layout", "layout.toml", "--start", "1,2"), "--start: 4 numbers"),
-        ("1 2 3\n", ("--layout", "layout.toml", "--scan", "/scan"), "there is no sensor_msgs"),
+        (
+            "1 2 3\n",
+            ("--layout", "layout.toml", "--initial-pose", "1,2"),
+            "--initial-pose: 4 numbers",
+        ),
+        (
+            "1 2 3\n",
+            ("--layout", "layout.toml", "--scan-topic", "/scan"),
+            "there is no sensor_msgs",
+        ),
         ("1 2 3\n", ("--layout", "layout.toml", "--imu"), "which sensor_msgs/msg/Imu is meant"),
         (None, (), "cannot read the log"),
     ],

@@ -291,7 +291,7 @@ def test_a_script_waits_for_the_first_states(graph) -> None:
 
 def test_a_wrong_batch_size_is_refused_once() -> None:
     with served() as (_, port):
-        command = Gcs(port, "--batch-size", "7").command
+        command = Gcs(port, "--group-size", "7").command
         done = subprocess.run(command, capture_output=True, text=True, check=False, input="")
     assert done.returncode == 2
     assert done.stdout == ""

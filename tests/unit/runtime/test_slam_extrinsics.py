@@ -122,7 +122,7 @@ def slam(log, out, *more):
 @pytest.mark.parametrize("tells", ["static", "moving", "bracket", "scenario"])
 def test_a_log_gives_the_way_that_its_own_slam_told(tells, flown, tmp_path):
     flown.write(tmp_path / "flight.mcap", tells=tells)
-    result = slam(tmp_path / "flight.mcap", tmp_path / "out", "--start", "0,0,0,0")
+    result = slam(tmp_path / "flight.mcap", tmp_path / "out", "--initial-pose", "0,0,0,0")
     assert result.exit_code == 0, result.output
     assert "as it tells" not in result.output
     path = np.loadtxt(tmp_path / "out" / "path.tum")
@@ -154,7 +154,7 @@ def test_it_begins_where_a_log_of_volerys_tells(more, begins, flown, tmp_path):
     flown.write(tmp_path / "flight.mcap", tells="scenario", **more)
     result = slam(tmp_path / "flight.mcap", tmp_path / "out")
     assert result.exit_code == 0, result.output
-    assert ("as it tells; --start says otherwise" in result.output) == any(begins)
+    assert ("as it tells; --initial-pose says otherwise" in result.output) == any(begins)
     told = json.loads((tmp_path / "out" / "summary.json").read_text())["start"]
     np.testing.assert_allclose(told, begins, atol=0.02)
     path = np.loadtxt(tmp_path / "out" / "path.tum")[:, 1:4]

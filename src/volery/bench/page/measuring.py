@@ -76,7 +76,7 @@ def _serving(toml: str) -> Iterator[PageProcess]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scenario.toml"
         path.write_text(toml, encoding="utf-8")
-        with PageProcess(str(path), "--recordings", folder) as server:
+        with PageProcess(str(path), "--recordings-dir", folder) as server:
             yield server
 
 
