@@ -183,7 +183,7 @@ class PlainBackend:
         places = origins[ground] + distance[ground, None] * directions[ground]
         material[ground] = [ground_material(handle.cover, x, y) for x, y, _ in places]
         bodies = handle.bodies
-        uavs = len(bodies.scene) - bodies.things
+        uavs = len(bodies.scene) - bodies.actors
         for row in range(len(bodies.scene)):
             own_copy = exclude // bodies.crew == row // bodies.crew
             seen = (exclude < 0) | ((exclude != row) & own_copy) | (row >= uavs)

@@ -111,7 +111,7 @@ def opened(simulate):
     server = RosbridgeServer("127.0.0.1", 0)
     with BridgeHost(simulation.gateway) as bridges:
         bridges.open(server)
-        simulation.be_prompt()
+        simulation.use_low_latency()
         thread = threading.Thread(target=lambda: simulation.run(600.0, speed=1.0))
         thread.start()
         page = Page(server.port)
@@ -152,7 +152,7 @@ def test_blocks_change(opened, state):
     info = {"resolution": 2.0, "width": 2, "height": 1}
     info["origin"] = {"position": {"x": 40.0, "y": 40.0}, "orientation": {"w": 1.0}}
     message = {"header": {"frame_id": "map"}, "info": info, "data": [100, 0]}
-    roslibpy.Topic(page.ros, "/map_in", "nav_msgs/OccupancyGrid").publish(message)
+    roslibpy.Topic(page.ros, "/map_command", "nav_msgs/OccupancyGrid").publish(message)
     page.watch("/map", "nav_msgs/OccupancyGrid")
     answer = page.volery("set_grid_map", "SetGridMap", block_height=9.0, cell_size=3.0)
     assert answer["success"], answer["message"]
@@ -196,7 +196,7 @@ def test_steps_snapshots_and_the_way_back(opened):
     page.watch("/weather", "volery_interfaces/Weather")
     paused_at = simulation.time_ns
     for name in ("first", "second"):
-        assert page.volery("snapshot", "ByName", name=name)["success"]
+        assert page.volery("save_snapshot", "ByName", name=name)["success"]
         page.ask("/step_simulation", "simulation_interfaces/StepSimulation", steps=40)
     told = page.volery("list_snapshots", "ListSnapshots")
     assert told["names"] == ["first", "second"]
@@ -206,7 +206,7 @@ def test_steps_snapshots_and_the_way_back(opened):
     until(lambda: page.heard["/weather"]["rain"] == 5.0)
     page.put("uav2", [20.0, 20.0, 5.0])
     until(lambda: page.place("uav2")[0] == 20.0)
-    assert page.volery("restore", "ByName", name="first")["success"]
+    assert page.volery("restore_snapshot", "ByName", name="first")["success"]
     until(lambda: page.heard["/weather"]["rain"] == 0.0)
     until(lambda: page.place("uav2")[0] == pytest.approx(10.0, abs=0.1))
     stamp = page.heard["/ground_truth/tf"]["transforms"][0]["header"]["stamp"]
@@ -225,7 +225,7 @@ def test_returns_and_commands_are_told(opened):
 
     until(landing)
     assert page.heard["/volery/vehicles"]["vehicles"][0]["command_age"] == -1.0
-    choices = page.volery("get_choices", "GetChoices")
+    choices = page.volery("get_scenario_options", "GetScenarioOptions")
     assert "uavs" in json.loads(choices["changes_schema"])["properties"]
     refused = page.volery("load_scenario", "LoadScenario", scenario="hover", changes='{"uavs": 2}')
     assert not refused["success"]

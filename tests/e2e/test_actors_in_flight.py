@@ -19,16 +19,16 @@ SCAN = "/uav1/laser/horizontal/scan"
 
 
 def outside(name="van", shape="car", place=(6.0, 0.0), yaw_deg=0.0):
-    motion = {"kind": "outside", "position_m": list(place), "yaw_deg": yaw_deg}
+    motion = {"kind": "external", "position_m": list(place), "yaw_deg": yaw_deg}
     return {"name": name, "shape": shape, "motion": motion}
 
 
 @pytest.fixture
-def things_data():
+def actors_data():
     return {
         "name": "street",
         "physics": {"on_contact": "bounce"},
-        "world": {"things": [outside()]},
+        "world": {"actors": [outside()]},
         "types": {
             "f450": {
                 "sensors": [
@@ -60,10 +60,10 @@ def ahead(scan):
     return float(ranges[len(ranges) // 2])
 
 
-def test_lidars_cameras_and_sonars_see_them(simulate, things_data):
-    things_data["types"]["f450"]["plant"] = "kinematic"
-    things_data["uavs"][0]["position_m"] = [0.0, 0.0, 0.7]
-    simulation = simulate(things_data)
+def test_lidars_cameras_and_sonars_see_them(simulate, actors_data):
+    actors_data["types"]["f450"]["plant"] = "kinematic"
+    actors_data["uavs"][0]["position_m"] = [0.0, 0.0, 0.7]
+    simulation = simulate(actors_data)
     scans, ranges = listen(simulation, SCAN), listen(simulation, "/uav1/range")
     depth = listen(simulation, "/uav1/camera/depth")
     labels = listen(simulation, "/uav1/camera/labels/material")
@@ -74,14 +74,14 @@ def test_lidars_cameras_and_sonars_see_them(simulate, things_data):
     materials = np.frombuffer(labels[-1].data, np.uint8).reshape(48, 64)
     assert {Material.CAR_PAINT, Material.RUBBER} <= set(materials.ravel().tolist())
     on_ground = ranges[-1].range
-    simulation.put_thing("van", [0.0, 0.0, -1.2])  # its roof is below the UAV now
+    simulation.set_actor_pose("van", [0.0, 0.0, -1.2])  # its roof is below the UAV now
     simulation.run(0.3)
     assert on_ground == pytest.approx(0.65, abs=0.05)
     assert ranges[-1].range == pytest.approx(0.65 - 0.25, abs=0.05)
 
 
-def test_a_walker_is_seen_where_it_is_at_the_beams_own_time(simulate, things_data):
-    things_data["world"]["things"] = [
+def test_a_walker_is_seen_where_it_is_at_the_beams_own_time(simulate, actors_data):
+    actors_data["world"]["actors"] = [
         {
             "name": "runner",
             "shape": "car",
@@ -93,8 +93,8 @@ def test_a_walker_is_seen_where_it_is_at_the_beams_own_time(simulate, things_dat
             },
         }
     ]
-    things_data["types"]["f450"]["plant"] = "kinematic"
-    simulation = simulate(things_data)
+    actors_data["types"]["f450"]["plant"] = "kinematic"
+    simulation = simulate(actors_data)
     scans = []
     simulation.graph.subscribe(SCAN, scans.append)
     simulation.run(0.5)
@@ -116,15 +116,15 @@ def meet(simulate, data, **change):
     return simulation, [e for e in simulation.events if e.kind is EventKind.COLLISION]
 
 
-def test_what_drives_into_a_hovering_uav_hits_it(simulate, things_data):
+def test_what_drives_into_a_hovering_uav_hits_it(simulate, actors_data):
     drive = {
         "kind": "waypoints",
         "waypoints_m": [[-12.0, 0.0], [12.0, 0.0]],
         "speed_m_s": 10.0,
         "at_end": "stop",
     }
-    things_data["world"]["things"] = [{"name": "truck", "shape": "car", "motion": drive}]
-    simulation, hits = meet(simulate, things_data)
+    actors_data["world"]["actors"] = [{"name": "truck", "shape": "car", "motion": drive}]
+    simulation, hits = meet(simulate, actors_data)
     first = hits[0]
     radius = simulation.uavs["uav1"].airframe.body.collision_radius_m
     assert (first.uav, first.partner) == ("uav1", "truck")
@@ -134,10 +134,10 @@ def test_what_drives_into_a_hovering_uav_hits_it(simulate, things_data):
     assert simulation.uavs["uav1"].position_map[0] > 1.0  # thrown ahead
 
 
-def test_who_flies_into_a_thing_crashes(simulate, things_data):
-    things_data["physics"] = {"on_contact": "crash"}
-    things_data["types"]["f450"]["plant"] = "rigid_body"
-    simulation = simulate(things_data)
+def test_who_flies_into_a_actor_crashes(simulate, actors_data):
+    actors_data["physics"] = {"on_contact": "crash"}
+    actors_data["types"]["f450"]["plant"] = "rigid_body"
+    simulation = simulate(actors_data)
     uav = simulation.uavs["uav1"]
     uav.go_to([12.0, 0.0, 0.8])
     simulation.run(6.0)
@@ -150,13 +150,13 @@ def test_who_flies_into_a_thing_crashes(simulate, things_data):
     assert uav.position_map[0] < 4.0
 
 
-def test_a_bird_that_passes_near_by_is_no_contact(simulate, things_data):
+def test_a_bird_that_passes_near_by_is_no_contact(simulate, actors_data):
     circle = {"kind": "circle", "centre_m": [0, 0, 0.7], "radius_m": 1.2, "speed_m_s": 3.0}
-    things_data["world"]["things"] = [{"name": "gull", "shape": "bird", "motion": circle}]
-    _, hits = meet(simulate, things_data)
+    actors_data["world"]["actors"] = [{"name": "gull", "shape": "bird", "motion": circle}]
+    _, hits = meet(simulate, actors_data)
     assert not hits
     circle["radius_m"] = 0.5
-    _, hits = meet(simulate, things_data)
+    _, hits = meet(simulate, actors_data)
     assert hits
     assert hits[0].partner == "gull"
 
@@ -175,7 +175,7 @@ def busy(data):
     ]
     walk = {"kind": "waypoints", "waypoints_m": [[-2, -2], [2, 8]], "speed_m_s": 2.0}
     fly = {"kind": "circle", "centre_m": [0, 3, 1.2], "radius_m": 3.0, "speed_m_s": 4.0}
-    data["world"]["things"] = [
+    data["world"]["actors"] = [
         {"name": "anna", "shape": "person", "motion": {**walk, "at_end": "back"}},
         {"name": "gull", "shape": "bird", "motion": fly},
         outside(place=(3.0, 0.0)),
@@ -183,13 +183,13 @@ def busy(data):
     return data
 
 
-def test_digests_do_not_depend_on_slices_or_threads(simulate, things_data):
+def test_digests_do_not_depend_on_slices_or_threads(simulate, actors_data):
     def fly(step, **options):
-        simulation = simulate(busy(things_data), **options)
+        simulation = simulate(busy(actors_data), **options)
         simulation.enable_digest()
         while simulation.time_ns < 4_000_000_000:
             if simulation.time_ns == 2_000_000_000:
-                simulation.put_thing("van", [1.0, 2.0, 0.0], None, [-0.5, 0.0, 0.0])
+                simulation.set_actor_pose("van", [1.0, 2.0, 0.0], None, [-0.5, 0.0, 0.0])
             simulation.step(step)
         partners = {e.partner for e in simulation.events if e.kind is EventKind.COLLISION}
         return simulation.digest(), partners
@@ -200,25 +200,25 @@ def test_digests_do_not_depend_on_slices_or_threads(simulate, things_data):
     assert {"gull", "van"} <= partners
 
 
-def test_snapshots_keep_things_and_contacts(simulate, things_data):
-    simulation = simulate(busy(things_data))
+def test_snapshots_keep_actors_and_contacts(simulate, actors_data):
+    simulation = simulate(busy(actors_data))
     simulation.enable_digest()
-    simulation.put_thing("van", [1.0, 2.0, 0.0], None, [-0.5, 0.0, 0.0])
+    simulation.set_actor_pose("van", [1.0, 2.0, 0.0], None, [-0.5, 0.0, 0.0])
     simulation.run(1.0)
     kept = simulation.snapshot()
     simulation.run(1.5)
     want = simulation.digest()
-    simulation.put_thing("van", [50.0, 0.0, 0.0])
+    simulation.set_actor_pose("van", [50.0, 0.0, 0.0])
     simulation.run(0.5)
     simulation.restore(kept)
     simulation.run(1.5)
     assert simulation.digest() == want
     simulation.reset()
-    assert simulation.things.poses_at(0)[2, :3].tolist() == [3.0, 0.0, 0.0]
+    assert simulation.actors.poses_at(0)[2, :3].tolist() == [3.0, 0.0, 0.0]
 
 
-def test_uavs_come_and_go_among_things(simulate, things_data):
-    simulation = simulate(things_data)
+def test_uavs_come_and_go_among_actors(simulate, actors_data):
+    simulation = simulate(actors_data)
     scans = listen(simulation, SCAN)
     simulation.run(0.2)
     simulation.spawn_uav("scout", "crazyflie", [2.0, 0.0, 0.7])
@@ -232,10 +232,10 @@ def test_uavs_come_and_go_among_things(simulate, things_data):
         simulation.spawn_uav("van", "crazyflie", [2.0, 0.0, 0.7])
 
 
-def test_copies_see_them_too(things_data):
-    things_data["types"]["f450"]["plant"] = "kinematic"
-    things_data["types"]["f450"]["sensors"] = things_data["types"]["f450"]["sensors"][:2]
-    with VectorizedSimulation(parse_scenario(things_data), 3) as copies:
+def test_copies_see_them_too(actors_data):
+    actors_data["types"]["f450"]["plant"] = "kinematic"
+    actors_data["types"]["f450"]["sensors"] = actors_data["types"]["f450"]["sensors"][:2]
+    with VectorizedSimulation(parse_scenario(actors_data), 3) as copies:
         copies.run(0.1)
         ranges = copies.reading("uav1", "horizontal")["echoes"][:, 0]
         middle = ranges[:, ranges.shape[1] // 2]
@@ -252,10 +252,10 @@ def call(simulation, service, **fields):
     return simulation.graph.call(service, request)
 
 
-def test_they_are_entities(simulate, things_data):
+def test_they_are_entities(simulate, actors_data):
     walk = {"kind": "waypoints", "waypoints_m": [[0, 5], [9, 5]], "speed_m_s": 1.0}
-    things_data["world"]["things"].append({"name": "anna", "shape": "person", "motion": walk})
-    simulation = simulate(things_data)
+    actors_data["world"]["actors"].append({"name": "anna", "shape": "person", "motion": walk})
+    simulation = simulate(actors_data)
     simulation.run(0.1)
     assert call(simulation, "/get_entities").entities == ["uav1", "van", "anna"]
     request = zero_message("simulation_interfaces/srv/GetEntities_Request")
@@ -264,7 +264,7 @@ def test_they_are_entities(simulate, things_data):
     request.filters.categories = [human]
     assert simulation.graph.call("/get_entities", request).entities == ["anna"]
     info = call(simulation, "/get_entity_info", entity="van").info
-    assert (info.category.category, info.tags) == (4, ["thing", "car"])
+    assert (info.category.category, info.tags) == (4, ["actor", "car"])
     bounds = call(simulation, "/get_entity_bounds", entity="van").bounds.points
     assert bounds[0].x - bounds[1].x == pytest.approx(4.4, abs=1e-5)
     state = call(simulation, "/get_entity_state", entity="anna").state
@@ -274,8 +274,8 @@ def test_they_are_entities(simulate, things_data):
     assert refused.result.result != 1
 
 
-def test_they_are_put_by_the_standard(simulate, things_data):
-    simulation = simulate(things_data)
+def test_they_are_put_by_the_standard(simulate, actors_data):
+    simulation = simulate(actors_data)
     state = zero_message("simulation_interfaces/msg/EntityState")
     state.pose = Pose(Point(4.0, 1.0, 0.0), Quaternion(0.0, 0.0, 1.0, 0.0))
     state.twist.linear.x = 2.0
@@ -283,7 +283,7 @@ def test_they_are_put_by_the_standard(simulate, things_data):
     assert call(simulation, "/set_entity_state", **both).result.result == 1
     simulation.run(0.5)
     np.testing.assert_allclose(
-        simulation.things.poses_at(simulation.time_ns)[0], [5.0, 1.0, 0, 0, 0, 1, 0], atol=1e-9
+        simulation.actors.poses_at(simulation.time_ns)[0], [5.0, 1.0, 0, 0, 0, 1, 0], atol=1e-9
     )
     state.twist.angular.z = 1.0
     refused = call(simulation, "/set_entity_state", **both).result
@@ -292,16 +292,16 @@ def test_they_are_put_by_the_standard(simulate, things_data):
     assert "finite" in call(simulation, "/set_entity_state", **both).result.error_message
 
 
-def test_they_are_put_by_a_topic_and_told_on_tf(simulate, things_data):
-    simulation = simulate(things_data)
+def test_they_are_put_by_a_topic_and_told_on_tf(simulate, actors_data):
+    simulation = simulate(actors_data)
     transforms = listen(simulation, "/tf")
-    sender = simulation.graph.advertise("/things/van/pose", PoseStamped)
+    sender = simulation.graph.advertise("/actors/van/pose", PoseStamped)
 
     def send(x, turn=(0.0, 0.0, 0.0, 1.0), frame="map"):
         pose = Pose(Point(x, 0.0, 0.0), Quaternion(*turn))
         sender.publish(PoseStamped(Header(time_from_ns(0), frame), pose))
         simulation.run(0.1)
-        return simulation.things.poses_at(simulation.time_ns)[0].tolist()
+        return simulation.actors.poses_at(simulation.time_ns)[0].tolist()
 
     assert send(9.0)[0] == 9.0
     assert send(10.0, (0.0, 0.0, 1.0, 0.0)) == [10.0, 0, 0, 0, 0, 1, 0]
@@ -316,7 +316,7 @@ def test_they_are_put_by_a_topic_and_told_on_tf(simulate, things_data):
 
 
 @pytest.mark.parametrize(
-    ("things", "words"),
+    ("actors", "words"),
     [
         ([outside("uav7")], "name of UAVs"),
         ([outside(), outside()], "used twice: van"),
@@ -338,15 +338,15 @@ def test_they_are_put_by_a_topic_and_told_on_tf(simulate, things_data):
         ),
     ],
 )
-def test_scenarios_that_cannot_be_are_refused(things_data, things, words):
-    things_data["world"]["things"] = things
+def test_scenarios_that_cannot_be_are_refused(actors_data, actors, words):
+    actors_data["world"]["actors"] = actors
     with pytest.raises(ScenarioError) as caught:
-        parse_scenario(things_data)
+        parse_scenario(actors_data)
     assert words in str(caught.value)
 
 
-def test_unknown_things_cannot_be_put(simulate, things_data, flat_data):
+def test_unknown_actors_cannot_be_put(simulate, actors_data, flat_data):
     with pytest.raises(CommandError, match="known: van"):
-        simulate(things_data).put_thing("x", [0, 0, 0])
+        simulate(actors_data).set_actor_pose("x", [0, 0, 0])
     with pytest.raises(CommandError, match="known: none"):
-        simulate(flat_data).put_thing("x", [0, 0, 0])
+        simulate(flat_data).set_actor_pose("x", [0, 0, 0])

@@ -95,7 +95,7 @@ def test_the_others_share_what_a_lost_uav_leaves(tmp_path, simulate):
     watch = Watch(simulate(field_data(tmp_path, patience_s=4.0)))
     watch.fly(20.0)
     for rotor in range(4):
-        watch.simulation.inject({"kind": "motor", "uav": "uav2", "rotor": rotor})
+        watch.simulation.inject_fault({"kind": "motor", "uav": "uav2", "rotor": rotor})
     watch.fly(400.0)
     free = np.array([[c == "0" for c in row] for row in FIELD[::-1]])
     assert watch.status["phases"] == {"uav1": "done", "uav2": "failed", "uav3": "done"}
@@ -130,7 +130,7 @@ def test_a_map_that_changes_is_planned_anew(tmp_path, simulate):
     more = np.array([[c == "1" for c in row] for row in FIELD[::-1]])
     more[4, 7] = True
     changed = GridMap("changed", more, CELL_M, 5.0, (0.0, 0.0), 0.0)
-    publisher = simulation.graph.advertise("/map_in", OccupancyGrid)
+    publisher = simulation.graph.advertise("/map_command", OccupancyGrid)
     publisher.publish(occupancy_of(changed, simulation.time_ns))
     watch.fly(400.0)
     np.testing.assert_array_equal(watch.covered == 100, ~more)

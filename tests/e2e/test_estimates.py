@@ -50,7 +50,7 @@ def test_flies_on_estimates_through_an_outage_and_lands(simulate, estimating_dat
     uav.go_to([15.0, 5.0, 6.0])
     simulation.run(10.0)
     np.testing.assert_allclose(uav.position_map, [15.0, 5.0, 6.0], atol=2.5)
-    simulation.inject({"kind": "gnss_loss", "uav": "uav1", "at_s": 18.0, "until_s": 38.0})
+    simulation.inject_fault({"kind": "gnss_loss", "uav": "uav1", "at_s": 18.0, "until_s": 38.0})
     simulation.run(21.0)
     simulation.run(6.0)
     uav.land()
@@ -71,7 +71,7 @@ def test_flies_on_estimates_through_an_outage_and_lands(simulate, estimating_dat
 
 
 def test_estimates_may_be_told_and_not_flown_on(simulate, estimating_data):
-    estimating_data["types"]["f450"]["sensors"][-1]["flies"] = False
+    estimating_data["types"]["f450"]["sensors"][-1]["used_for_control"] = False
     simulation = simulate(estimating_data)
     rows = errors_of(simulation)
     uav = simulation.uavs["uav1"]
@@ -162,7 +162,7 @@ def slam_data(estimating_data):
     estimating_data["world"]["gnss_denied"] = True
     estimating_data["types"]["f450"]["sensors"] = [
         {"kind": "imu"},
-        {"kind": "estimate", "pose": {"topic": "slam/odom"}},
+        {"kind": "estimate", "external_odometry": {"topic": "slam/odom"}},
         {"kind": "ground_truth"},
     ]
     return estimating_data

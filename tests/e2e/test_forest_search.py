@@ -89,7 +89,7 @@ def test_an_operators_hold_holds_until_resume() -> None:
         simulation.run(3.0)
         assert uav.mode.name == "HOLD"
         assert (str(manager.phase), manager.sector) == ("hold", -1)
-        assert "held by the operator" in manager.trouble
+        assert "held by the operator" in manager.problem
         assert np.linalg.norm(uav.position_map - place) < 0.3
         assert graph.call("/uav2/task_manager/resume").success
         simulation.run(5.0)
@@ -98,4 +98,4 @@ def test_an_operators_hold_holds_until_resume() -> None:
         assert graph.call("/uav2/task_manager/land").success
         simulation.run(8.0)
         assert (str(manager.phase), manager.sector) == ("done", -1)
-        assert manager.trouble == "landed by the operator"
+        assert manager.problem == "landed by the operator"

@@ -53,7 +53,7 @@ def running(simulate):
     server = RosbridgeServer("127.0.0.1", 0)
     with BridgeHost(simulation.gateway) as bridges:
         bridges.open(server)
-        simulation.be_prompt()
+        simulation.use_low_latency()
         thread = threading.Thread(target=run)
         thread.start()
         yield simulation, server.port
@@ -71,7 +71,7 @@ def test_a_web_client_builds_the_world(running):
         topic = "/uav1/laser/horizontal/scan"
         roslibpy.Topic(ros, topic, "sensor_msgs/LaserScan").subscribe(scans.append)
         until(lambda: scans)
-        sender = roslibpy.Topic(ros, "/map_in", "nav_msgs/OccupancyGrid")
+        sender = roslibpy.Topic(ros, "/map_command", "nav_msgs/OccupancyGrid")
         sender.publish(roslibpy.Message(MESSAGE))
         until(lambda: maps)
         assert maps[-1]["data"] == [0, 0, 100, 0]
@@ -80,12 +80,12 @@ def test_a_web_client_builds_the_world(running):
         service = roslibpy.Service(ros, "/volery/set_grid_map", "volery_interfaces/SetGridMap")
         answer = service.call(roslibpy.ServiceRequest({"block_height": 0.5}), timeout=10)
         assert answer["success"]
-        assert "'map_in', 2 x 2 cells of 2 m, blocks 0.5 m high" in answer["message"]
+        assert "'map_command', 2 x 2 cells of 2 m, blocks 0.5 m high" in answer["message"]
         until(lambda: ahead(scans[-1]) is None or np.isinf(ahead(scans[-1])))
         answer = service.call(roslibpy.ServiceRequest({"name": "x"}), timeout=10)
         assert (answer["success"], answer["message"]) == (
             False,
-            "there is no grid map 'x'; known: map_in",
+            "there is no grid map 'x'; known: map_command",
         )
     finally:
         ros.close()

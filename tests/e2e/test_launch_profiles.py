@@ -121,7 +121,7 @@ def test_the_same_over_rosbridge_in_lock_step(inside: tuple[Said, Path], outside
     ):
         bridges.open(server)
         said = listen(simulation)
-        flying, trouble = threading.Event(), []
+        flying, problem = threading.Event(), []
 
         def run_nodes() -> None:
             link = RosbridgeClient(f"ws://127.0.0.1:{server.port}", name="forest")
@@ -132,19 +132,19 @@ def test_the_same_over_rosbridge_in_lock_step(inside: tuple[Said, Path], outside
                 flying.set()
                 host.spin(lambda: not flying.is_set())
             except Exception as error:
-                trouble.append(error)
+                problem.append(error)
             finally:
                 link.close()
 
         thread = threading.Thread(target=run_nodes)
         thread.start()
-        while not flying.is_set() and not trouble:
+        while not flying.is_set() and not problem:
             simulation.post(lambda: None)
-            simulation.take_in()
+            simulation.process_commands()
         simulation.run(SECONDS)
         flying.clear()
         thread.join()
-        assert not trouble
+        assert not problem
     names = OUTPUTS[:4] if outside == 0 else OUTPUTS[4:]
     for name in names:
         assert messages(said)[name] == messages(inside[0])[name]
@@ -156,7 +156,7 @@ def test_the_same_on_a_played_bag(inside: tuple[Said, Path]) -> None:
     replay = Replay(path, topics=INPUTS, offset_s=summarize(path).start_ns * 1e-9)
     with Simulation(scenario_of(NODES, blind=True)) as simulation:
         said = listen(simulation)
-        simulation.play(replay)
+        simulation.replay_log(replay)
         simulation.run(SECONDS)
     assert messages(said) == messages(said_inside)
 

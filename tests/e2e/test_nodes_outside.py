@@ -110,7 +110,7 @@ def over_ros_tcp(generation):
 def fly_outside(way):
     with Simulation(scenario(with_node=False)) as simulation, way(simulation) as open_link:
         commands = listen(simulation)
-        flying, trouble = threading.Event(), []
+        flying, problem = threading.Event(), []
 
         def run_node():
             session = open_link()
@@ -123,19 +123,19 @@ def fly_outside(way):
                 flying.set()
                 host.spin(lambda: not flying.is_set())
             except Exception as error:
-                trouble.append(error)
+                problem.append(error)
             finally:
                 session.close()
 
         thread = threading.Thread(target=run_node)
         thread.start()
-        while not flying.is_set() and not trouble:
+        while not flying.is_set() and not problem:
             simulation.post(lambda: None)
-            simulation.take_in()
+            simulation.process_commands()
         simulation.run(SECONDS)
         flying.clear()
         thread.join()
-        assert not trouble
+        assert not problem
         return commands, simulation.uavs["uav1"].position_map
 
 
@@ -190,7 +190,7 @@ def test_a_name_is_taken_once():
         thread = threading.Thread(target=join)
         thread.start()
         while thread.is_alive():
-            simulation.take_in()
+            simulation.process_commands()
         thread.join()
         assert results[0] == "joined"
         assert "already" in results[1]
@@ -211,7 +211,7 @@ def test_who_does_not_answer_is_left_behind(gone):
         thread = threading.Thread(target=join)
         thread.start()
         while thread.is_alive():
-            simulation.take_in()
+            simulation.process_commands()
         thread.join()
         before = time.monotonic()
         simulation.run(0.5)

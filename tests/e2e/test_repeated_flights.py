@@ -57,13 +57,13 @@ DATA = {
 }
 
 
-class Pilot:
+class Operator:
     """A client behind a real WebSocket."""
 
-    def __init__(self, port, name="pilot"):
+    def __init__(self, port, name="operator"):
         self.client = RosbridgeClient(f"ws://127.0.0.1:{port}", name=name)
         self.client.advertise("/uav1/cmd_vel", "geometry_msgs/msg/Twist")
-        self.client.advertise("/map_in", "nav_msgs/msg/OccupancyGrid")
+        self.client.advertise("/map_command", "nav_msgs/msg/OccupancyGrid")
 
     def call(self, service, srvtype="std_srvs/srv/Trigger", **fields):
         request = zero_message(f"{srvtype}_Request")
@@ -89,7 +89,7 @@ class Pilot:
         message.info.origin.position.x = 20.0
         message.info.origin.orientation.w = 1.0
         message.data = np.resize(np.array([0, 0, 100], np.int8), cells * cells)
-        self.client.publish("/map_in", message)
+        self.client.publish("/map_command", message)
 
 
 def resource(uri):
@@ -106,13 +106,13 @@ def pose_at(x, y, z, kind="geometry_msgs/msg/PoseStamped"):
     return message
 
 
-def disturb(pilot, wait):
+def disturb(operator, wait):
     """Everything that a page can do, `wait()` in between."""
     for k in range(10):
-        pilot.fly(0.3 + 0.1 * k, -0.2)
+        operator.fly(0.3 + 0.1 * k, -0.2)
         wait(0.3)
     assert (
-        pilot.standard(
+        operator.standard(
             "spawn_entity",
             name="scout",
             entity_resource=resource("crazyflie"),
@@ -120,44 +120,44 @@ def disturb(pilot, wait):
         ).result.result
         == 1
     )
-    pilot.call("/scout/take_off")
-    pilot.ours("set_weather", "SetWeather", wind=Vector3(3.3, 1.1, 0.0), only=["wind"])
+    operator.call("/scout/take_off")
+    operator.ours("set_weather", "SetWeather", wind=Vector3(3.3, 1.1, 0.0), only=["wind"])
     wait(1.0)
-    pilot.ours("gust", "Gust", amplitude=Vector3(0.0, 2.7, 0.0), rise=0.31, duration=1.7)
-    pilot.call("/uav2/go_to", "volery_interfaces/srv/GoTo", position=zero_point(10.1, 2.2, 4.0))
+    operator.ours("gust", "Gust", amplitude=Vector3(0.0, 2.7, 0.0), rise=0.31, duration=1.7)
+    operator.call("/uav2/go_to", "volery_interfaces/srv/GoTo", position=zero_point(10.1, 2.2, 4.0))
     wait(0.6)
-    pilot.ours("snapshot", "ByName", name="early")
-    pilot.send_map(3)
-    pilot.send_map(90)
+    operator.ours("save_snapshot", "ByName", name="early")
+    operator.send_map(3)
+    operator.send_map(90)
     fault = {"kind": "motor", "uav": "uav2", "rotor": 1, "thrust_factor": 0.93}
-    pilot.ours("inject_fault", "InjectFault", fault=json.dumps(fault))
-    assert not pilot.ours("inject_fault", "InjectFault", fault="nonsense").success
+    operator.ours("inject_fault", "InjectFault", fault=json.dumps(fault))
+    assert not operator.ours("inject_fault", "InjectFault", fault="nonsense").success
     wait(0.7)
     state = zero_message("simulation_interfaces/msg/EntityState")
     state.pose = pose_at(-3.0, -4.0, 5.0).pose
-    pilot.standard("set_entity_state", entity="uav2", state=state, set_pose=True)
+    operator.standard("set_entity_state", entity="uav2", state=state, set_pose=True)
     wait(0.5)
-    assert pilot.ours("restore", "ByName", name="early").success
-    pilot.fly(-0.7, 0.1)
+    assert operator.ours("restore_snapshot", "ByName", name="early").success
+    operator.fly(-0.7, 0.1)
     wait(0.4)
-    assert pilot.standard("delete_entity", entity="scout").result.result == 1
+    assert operator.standard("delete_entity", entity="scout").result.result == 1
     wait(0.3)
     paused = zero_message("simulation_interfaces/msg/SimulationState")
     paused.state = 2
-    pilot.standard("set_simulation_state", state=paused)
-    pilot.fly(0.2, 0.2)
-    pilot.standard("step_simulation", steps=37)
-    pilot.call("/uav1/hold")
+    operator.standard("set_simulation_state", state=paused)
+    operator.fly(0.2, 0.2)
+    operator.standard("step_simulation", steps=37)
+    operator.call("/uav1/hold")
     playing = zero_message("simulation_interfaces/msg/SimulationState")
     playing.state = 1
-    pilot.standard("set_simulation_state", state=playing)
-    pilot.ours("set_speed", "SetSpeed", factor=0.0)
+    operator.standard("set_simulation_state", state=playing)
+    operator.ours("set_speed", "SetSpeed", factor=0.0)
     wait(0.3)
-    pilot.standard("reset_simulation")
+    operator.standard("reset_simulation")
     wait(1.1)
-    pilot.fly(0.5, 0.5)
+    operator.fly(0.5, 0.5)
     parameter = {"name": "/uav1/thinker:gain", "value": "0.35"}
-    answer = pilot.call("/rosapi/set_param", "rosapi_msgs/srv/SetParam", **parameter)
+    answer = operator.call("/rosapi/set_param", "rosapi_msgs/srv/SetParam", **parameter)
     assert answer.successful
     wait(0.6)
 
@@ -214,8 +214,8 @@ def recorded(path, speed, seed):
         server = RosbridgeServer("127.0.0.1", 0)
         with BridgeHost(simulation.gateway) as bridges:
             bridges.open(server)
-            simulation.be_prompt()
-            pilot = Pilot(server.port)
+            simulation.use_low_latency()
+            operator = Operator(server.port)
             chance = random.Random(seed)
             errors = []
 
@@ -227,7 +227,7 @@ def recorded(path, speed, seed):
 
             def work():
                 try:
-                    disturb(pilot, wait)
+                    disturb(operator, wait)
                     chance_to_end.set()
                 except BaseException as error:
                     errors.append(error)
@@ -238,7 +238,7 @@ def recorded(path, speed, seed):
             thread.start()
             simulation.run(speed=speed)
             thread.join()
-            pilot.client.close()
+            operator.client.close()
         assert not errors, errors
         assert chance_to_end.is_set()
         simulation.commands.end()
@@ -251,7 +251,7 @@ def repeated(path, again=None, **options):
     flight = read_flight(path)
     with Simulation(parse_scenario(flight.origin.content), threads=1) as simulation:
         simulation.enable_digest()
-        simulation.repeat(flight)
+        simulation.replay_commands(flight)
         log = None if again is None else open_log(again)
         if log is not None:
             simulation.graph.subscribe_all(log.write)
@@ -285,7 +285,13 @@ def test_a_disturbed_flight_is_repeated_to_the_byte(tmp_path, speed, seed):
     path, again = tmp_path / "flight.mcap", tmp_path / "again.mcap"
     digest = recorded(path, speed, seed)
     names = {command.taken.name for command in read_flight(path).commands}
-    assert names >= {"/spawn_entity", "/uav1/cmd_vel", "/map_in", "/volery/restore", "/uav1/hold"}
+    assert names >= {
+        "/spawn_entity",
+        "/uav1/cmd_vel",
+        "/map_command",
+        "/volery/restore_snapshot",
+        "/uav1/hold",
+    }
     assert "/volery/set_speed" in names  # logged, though it is not repeated
     assert repeated(path, again) == digest
     assert flown(again) == flown(path)
@@ -302,7 +308,7 @@ def test_without_its_commands_the_flight_is_another_one(tmp_path):
     with Simulation(parse_scenario(flight.origin.content), threads=1) as simulation:
         simulation.enable_digest()
         less = [c for c in flight.commands if c.taken.name != "/reset_simulation"]
-        simulation.repeat(replace(flight, commands=tuple(less)))
+        simulation.replay_commands(replace(flight, commands=tuple(less)))
         with pytest.raises(CommandError, match="is not the recorded one"):
             simulation.run()
         assert simulation.digest() != digest
@@ -321,19 +327,19 @@ def test_a_flight_of_the_command_line_is_repeated(tmp_path):
         for line in process.stderr:
             if found := re.match(r"open .*127\.0\.0\.1:(\d+)", line):
                 break
-        pilot = Pilot(int(found[1]))
+        operator = Operator(int(found[1]))
         try:
-            pilot.call("/uav2/land")
+            operator.call("/uav2/land")
             for _ in range(20):
-                pilot.fly(0.5, 0.1)
+                operator.fly(0.5, 0.1)
                 time.sleep(0.03)
-            pilot.ours("set_weather", "SetWeather", wind=Vector3(4.0, 0.0, 0.0), only=["wind"])
+            operator.ours("set_weather", "SetWeather", wind=Vector3(4.0, 0.0, 0.0), only=["wind"])
             time.sleep(0.5)
             quit_it = zero_message("simulation_interfaces/msg/SimulationState")
             quit_it.state = 3
-            pilot.standard("set_simulation_state", state=quit_it)
+            operator.standard("set_simulation_state", state=quit_it)
         finally:
-            pilot.client.close()
+            operator.client.close()
         out, _ = process.communicate(timeout=60)
     digest = re.search(r"digest  (\w+)", out)[1]
 
@@ -353,7 +359,7 @@ def test_a_flight_of_the_command_line_is_repeated(tmp_path):
 
 def test_a_recording_begun_late_holds_what_came_before(tmp_path):
     with Simulation(parse_scenario(DATA), threads=1, recordings=tmp_path) as simulation:
-        session = simulation.gateway.open("pilot")
+        session = simulation.gateway.open("operator")
         session.subscribe("/volery/log", wake=lambda: None)  # so that records are on their way
         session.advertise("/uav1/cmd_vel", "geometry_msgs/msg/Twist")
         session.publish("/uav1/cmd_vel", Twist(Vector3(1.0, 0.0, 0.0), Vector3(0.0, 0.0, 0.0)))
@@ -372,7 +378,7 @@ def test_a_recording_begun_late_holds_what_came_before(tmp_path):
     flight = read_flight(tmp_path / "late.mcap")
     assert [c.taken.kind for c in flight.commands] == ["advertise", "publish", "call"]
     with Simulation(parse_scenario(flight.origin.content), threads=1) as simulation:
-        simulation.repeat(flight)
+        simulation.replay_commands(flight)
         simulation.run()
         assert simulation.time_s == pytest.approx(1.0, abs=0.02)  # the log knows no more
         simulation.run(1.1 - simulation.time_s)
@@ -389,7 +395,7 @@ def test_nobody_changes_a_flight_that_is_repeated(tmp_path):
     log.close()
     flight = read_flight(path)
     with Simulation(parse_scenario(flight.origin.content), threads=1) as simulation:
-        simulation.repeat(flight)
+        simulation.replay_commands(flight)
         session = simulation.gateway.open("visitor")
         answers = []
         for service in ("/uav1/land", "/get_entities"):
@@ -400,7 +406,7 @@ def test_nobody_changes_a_flight_that_is_repeated(tmp_path):
         assert "is repeated" in str(answers[0])
         assert answers[1].entities == ["uav1", "uav2"]
         with pytest.raises(CommandError, match="from its start"):
-            simulation.repeat(flight)
+            simulation.replay_commands(flight)
 
 
 def finish(simulation, log):
@@ -421,11 +427,11 @@ def test_a_lock_step_partner_is_met_again(tmp_path):
         simulation.graph.subscribe_all(log.write)
         session = simulation.gateway.open("partner")
         session.advertise("/uav1/cmd_vel", "geometry_msgs/msg/Twist")
-        session.advertise("/volery/lock_step/pilot/done", clock)
+        session.advertise("/volery/lock_step/operator/done", clock)
         come = threading.Event()
-        go = session.subscribe("/volery/lock_step/pilot/go", clock, depth=5, wake=come.set)
+        go = session.subscribe("/volery/lock_step/operator/go", clock, depth=5, wake=come.set)
         request = zero_message("volery_interfaces/srv/JoinLockStep_Request")
-        request.name, request.period_s, request.timeout_s = "pilot", 0.05, 20.0
+        request.name, request.period_s, request.timeout_s = "operator", 0.05, 20.0
         joined = []
         session.call("/volery/join_lock_step", request, ServiceReply(joined.append, joined.append))
         meetings = []
@@ -440,7 +446,7 @@ def test_a_lock_step_partner_is_met_again(tmp_path):
                     turn = Vector3(0.0, 0.0, 0.7 * random.random())
                     session.publish("/uav1/cmd_vel", Twist(Vector3(0.5, 0.0, 0.0), turn))
                     assert stamp.nanosec % 50_000_000 == 0
-                    session.publish("/volery/lock_step/pilot/done", published.message)
+                    session.publish("/volery/lock_step/operator/done", published.message)
             session.close()
 
         thread = threading.Thread(target=steer)

@@ -139,7 +139,7 @@ def test_it_stops_while_a_sensor_fails(
 ) -> None:
     now = flight.simulation.time_s
     fault = {"kind": "sensor", "uav": "uav1", "sensor": sensor, "effect": effect}
-    flight.simulation.inject({**fault, "at_s": now, "until_s": now + FAULT_S})
+    flight.simulation.inject_fault({**fault, "at_s": now, "until_s": now + FAULT_S})
     flight.simulation.run(FAULT_S - 0.5)
     assert flight.status[-1]["state"] == "holding"
     assert problem in flight.status[-1]["problems"]
@@ -170,7 +170,7 @@ def test_it_stops_while_its_odometry_is_wrong(flight: Flight, spoil: str) -> Non
 def test_without_its_sonar_it_says_so_and_keeps_its_height(flight: Flight) -> None:
     now = flight.simulation.time_s
     fault = {"kind": "sensor", "uav": "uav1", "sensor": "range", "effect": "stuck"}
-    flight.simulation.inject({**fault, "at_s": now, "until_s": now + 12.0})
+    flight.simulation.inject_fault({**fault, "at_s": now, "until_s": now + 12.0})
     heights = []
     for _ in range(10):
         assert flight.way_m(1.0) > 0.1
@@ -188,7 +188,7 @@ def test_one_that_is_kidnapped_holds_finds_its_place_and_flies_on(flight: Flight
     simulation, told, poses = flight.simulation, [], []
     simulation.graph.subscribe("/uav1/slam/status", lambda p: told.append(p.message.data))
     simulation.graph.subscribe("/uav1/slam/pose", lambda p: poses.append(p.message))
-    simulation.inject({"kind": "displacement", "uav": "uav1", "offset_m": [0.0, 3.0, 0.0]})
+    simulation.inject_fault({"kind": "displacement", "uav": "uav1", "offset_m": [0.0, 3.0, 0.0]})
     simulation.run(20.0)
     states = [json.loads(text)["state"] for text in told]
     assert "lost" in states
@@ -218,14 +218,14 @@ def test_a_map_of_other_cells_is_refused_in_flight(flight: Flight, folder: Any) 
 
 
 def test_a_uav_that_is_not_heard_is_named_and_heard_again(simulate_search: Any) -> None:
-    simulation, troubles = simulate_search
-    simulation.inject({"kind": "radio", "uav": "uav2", "at_s": 8.0, "until_s": 16.0})
+    simulation, problems = simulate_search
+    simulation.inject_fault({"kind": "radio", "uav": "uav2", "at_s": 8.0, "until_s": 16.0})
     simulation.run(7.5)
-    assert troubles == {"uav1": "", "uav2": ""}
+    assert problems == {"uav1": "", "uav2": ""}
     simulation.run(7.5)
-    assert troubles == {"uav1": "silent: uav2", "uav2": "silent: uav1"}
+    assert problems == {"uav1": "silent: uav2", "uav2": "silent: uav1"}
     simulation.run(2.0)
-    assert troubles == {"uav1": "", "uav2": ""}
+    assert problems == {"uav1": "", "uav2": ""}
     assert not [e for e in simulation.events if e.kind in CONTACTS]
 
 
@@ -233,11 +233,11 @@ def test_a_uav_that_is_not_heard_is_named_and_heard_again(simulate_search: Any) 
 def _simulate_search() -> Any:
     """Two UAVs, and what each says is wrong."""
     with Simulation(search(2)) as simulation:
-        troubles: dict[str, str] = {}
+        problems: dict[str, str] = {}
         for name in simulation.uavs:
 
             def on_mission(published: Any, name: str = name) -> None:
-                troubles[name] = published.message.trouble
+                problems[name] = published.message.problem
 
             simulation.graph.subscribe(f"/{name}/mission", on_mission)
-        yield simulation, troubles
+        yield simulation, problems

@@ -205,7 +205,7 @@ def test_a_scenario_that_ends_stays_and_one_that_cannot_be_leads_back(server):
     with Ros(server) as ros:
         unloaded = ros.call("/unload_world", "simulation_interfaces/UnloadWorld")
         assert unloaded["result"]["result"] == 1
-    server.wait_for(state="lobby", world=None)
+    server.wait_for(state="no_world", world=None)
     with Ros(server) as ros:
         assert ros.load("hover")["result"] == 1
     server.wait_for(state="flying", scenario="hover")

@@ -58,7 +58,7 @@ def digest(said):
 def replayed(path):
     with Simulation(scenario_of(blind=True)) as simulation:
         said = listen(simulation)
-        simulation.play(Replay(path, topics=INPUTS, offset_s=summarize(path).start_ns * 1e-9))
+        simulation.replay_log(Replay(path, topics=INPUTS, offset_s=summarize(path).start_ns * 1e-9))
         simulation.run(SECONDS)
     return digest(said)
 

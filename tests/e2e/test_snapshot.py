@@ -183,17 +183,17 @@ def test_posted_restore_takes_the_run_back(simulate, flat_data):
 
 def test_no_snapshot_in_the_middle_of_a_tick(simulate, flat_data):
     simulation = simulate(flat_data)
-    trouble = []
+    problem = []
 
     def on_odometry(_published):
         try:
             simulation.snapshot()
         except SnapshotError as error:
-            trouble.append(str(error))
+            problem.append(str(error))
 
     simulation.graph.subscribe("/uav1/odom", on_odometry)
     simulation.run(0.05)
-    assert "middle of a tick" in trouble[0]
+    assert "middle of a tick" in problem[0]
 
 
 def test_undelivered_messages_are_kept(simulate, flat_data):

@@ -239,7 +239,7 @@ def _mend(path):
         return
     mended = summarize(out)
     assert mended.messages == recovery.messages
-    assert not mended.trouble
+    assert not mended.problem
     with contextlib.closing(Playback(out)) as playback:
         assert sum(topic.messages for topic in playback.topics) == recovery.messages
 

@@ -91,7 +91,7 @@ def wire(mutator):
 
 def autopilot(mutator):
     """An autopilot takes whatever is said, and never orders what is no number."""
-    pilot = Autopilot(1, _Vehicle(), _BUILD)
+    autopilot = Autopilot(1, _Vehicle(), _BUILD)
     modes = ("LANDED", "TAKE_OFF", "HOLD", "GO_TO", "VELOCITY", "LAND", "LOW_LEVEL", "CRASHED")
     height = 0.0
     for tick in range(12):
@@ -99,7 +99,7 @@ def autopilot(mutator):
         mode = mutator.pick(modes[:7]) if tick else "LANDED"
         height = max(0.0, height + mutator.pick((-0.5, 0.0, 1.0)))
         motion = ((0.0, 0.0, 0.0),) * 3
-        pilot.update(
+        autopilot.update(
             FlightState(
                 time_ns,
                 mode,
@@ -115,9 +115,9 @@ def autopilot(mutator):
             )
         )
         data = mutator.pick(_TALK) if mutator.chance(0.4) else _with_check(mutator)
-        pilot.receive(mutator.pick((0, 1)), mutator.pick((0, 1, 2, 9)), data, time_ns)
+        autopilot.receive(mutator.pick((0, 1)), mutator.pick((0, 1, 2, 9)), data, time_ns)
     framer = Framer()
-    for _, sent in pilot.take_sent():
+    for _, sent in autopilot.take_sent():
         assert [frame.data for frame in framer.datagram(sent)] == [sent]
     return 12
 

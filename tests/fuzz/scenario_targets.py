@@ -41,11 +41,11 @@ hour_of_day = 11.5
 latitude_deg = 47.4
 longitude_deg = 8.5
 altitude_m = 488.0
-[[world.things]]
+[[world.actors]]
 name = "bird"
 shape = "bird"
 motion = {kind = "circle", centre_m = [20.0, 0.0, 8.0], radius_m = 5.0, speed_m_s = 4.0}
-[[world.things]]
+[[world.actors]]
 name = "car"
 shape = "car"
 motion = {kind = "waypoints", waypoints_m = [[30.0, 0.0], [30.0, 20.0]], speed_m_s = 5.0}
@@ -59,7 +59,7 @@ sensors = [
   {kind = "gnss", position_m = [0.0, 0.0, 0.1]},
   {kind = "barometer"},
   {kind = "magnetometer"},
-  {kind = "estimate", flies = true},
+  {kind = "estimate", used_for_control = true},
   {kind = "sonar", position_m = [0.0, 0.0, -0.05], rpy_deg = [0.0, 90.0, 0.0]},
   {kind = "battery", rate_hz = 5.0},
   {kind = "ground_truth"},

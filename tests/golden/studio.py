@@ -55,7 +55,7 @@ class View:
 
 
 def _stands(name, shape, place, yaw_deg=0.0):
-    motion = {"kind": "outside", "position_m": place, "yaw_deg": yaw_deg}
+    motion = {"kind": "external", "position_m": place, "yaw_deg": yaw_deg}
     return {"name": name, "shape": shape, "motion": motion}
 
 
@@ -89,7 +89,7 @@ VIEWS = {
                 "cell_size_m": 3.0,
                 "block_height_m": 5.0,
             },
-            "things": [
+            "actors": [
                 _stands("walker", "person", (-3.0, 47.0), 200.0),
                 _stands("parked", "car", (4.0, 50.5), 30.0),
                 _stands("gull", "bird", (-5.5, 48.6, 3.0), 90.0),
@@ -112,7 +112,7 @@ class Studio:
         forest = build_forest(self._scenario, terrain, city)
         self._scene = build_scene(self._scenario, terrain, forest, city)
         self._scene.set_bodies([body_shape(load_airframe("f450"))], [0])  # whose camera it is
-        self._scene.move_things(_TIME_NS, _TIME_NS)
+        self._scene.move_actors(_TIME_NS, _TIME_NS)
 
     def shoot(self, weather, width=160, **options):
         """The (height, width, 3) picture in one of the `WEATHERS`, and depth if wanted."""

@@ -23,17 +23,17 @@ NODE, PARAMETER = "/uav1/gap_following", "height_m"
 
 
 @pytest.fixture
-def pilots():
-    pilots = ControlAuthority(lambda: ["uav1", "uav2"])
-    pilots.take("uav1", "Anna")
-    return pilots
+def operators():
+    operators = ControlAuthority(lambda: ["uav1", "uav2"])
+    operators.take("uav1", "Anna")
+    return operators
 
 
 @pytest.fixture
-def bob(pilots):
+def bob(operators):
     crew = OperatorNames()
     crew.sign_in("Anna")
-    return OperatorPolicy(crew.sign_in("Bob"), crew, pilots)
+    return OperatorPolicy(crew.sign_in("Bob"), crew, operators)
 
 
 def call(service, args=None):
@@ -162,15 +162,15 @@ def test_whatever_fault_is_of_a_uav_is_seen_as_about_it(uav, ascii_only):
 @pytest.mark.parametrize(
     "spelling", ["Anna", "Anna ", " anna", "ANNA", "An\u200bna", "Anna\x00", "Ａnna", "\tAnna\n"]
 )
-def test_one_operator_however_the_name_is_spelled(pilots, spelling):
+def test_one_operator_however_the_name_is_spelled(operators, spelling):
     assert same_operator("Anna", spelling)
-    pilots.take("uav1", spelling)
-    assert operator_name(pilots.holder_of("uav1")).casefold() == "anna"
+    operators.take("uav1", spelling)
+    assert operator_name(operators.holder_of("uav1")).casefold() == "anna"
     crew = OperatorNames()
     crew.sign_in("Anna")
     assert spelling in crew
     assert crew.sign_in(spelling) not in ("Anna", spelling)
-    with pytest.raises(BridgeError, match="another pilot"):
+    with pytest.raises(BridgeError, match="another operator"):
         crew.rename(crew.sign_in("Bob"), spelling)
 
 
@@ -180,17 +180,17 @@ def test_other_operators(name):
 
 
 def test_nobody_takes_a_name_by_spelling_it_otherwise(bob):
-    with pytest.raises(BridgeError, match="another pilot"):
-        bob.check(call("/volery/take_control", {"uav": "uav2", "pilot": "ANNA "}))
+    with pytest.raises(BridgeError, match="another operator"):
+        bob.check(call("/volery/take_control", {"uav": "uav2", "operator": "ANNA "}))
     assert bob.name == "Bob"
 
 
-def test_whoever_is_spelled_otherwise_keeps_control(pilots):
+def test_whoever_is_spelled_otherwise_keeps_control(operators):
     crew = OperatorNames()
-    anna = OperatorPolicy(crew.sign_in("anna"), crew, pilots)
+    anna = OperatorPolicy(crew.sign_in("anna"), crew, operators)
     assert anna.check(call("/uav1/land"))
-    pilots.release("uav1", "ANNA")
-    assert pilots.holder_of("uav1") == ""
+    operators.release("uav1", "ANNA")
+    assert operators.holder_of("uav1") == ""
 
 
 @given(st.text(max_size=60))

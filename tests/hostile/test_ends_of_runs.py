@@ -108,7 +108,7 @@ def test_a_signal_ends_a_flight_with_its_files(tmp_path, number, code, how):
         out, err = process.communicate(timeout=HANG_S)
     assert (process.returncode, err) == (code, "")
     assert f"Stopped {how}: flew" in out
-    assert summarize(log).trouble == ""
+    assert summarize(log).problem == ""
     assert f"Stopped {how}: this report shows" in (report / "index.html").read_text()
 
 
@@ -161,7 +161,7 @@ def test_a_terminal_that_closes_leaves_log_and_report(tmp_path):
         assert process.wait(timeout=HANG_S) == 129
     finally:
         ended(process)
-    assert summarize(log).trouble == ""
+    assert summarize(log).problem == ""
     assert (report / "index.html").exists()
 
 
@@ -203,7 +203,7 @@ def test_the_real_simulation_ends_by_sigterm(tmp_path):
         ended(process)
     assert process.returncode == 143, err
     assert "Stopped by SIGTERM: flew" in out
-    assert summarize(log).trouble == ""
+    assert summarize(log).problem == ""
 
 
 def free_port():
@@ -227,7 +227,7 @@ def test_a_log_has_one_writer(tmp_path, suffix):
     with pytest.raises(RecordingError, match="is being written by another process; end that first"):
         recover(path, tmp_path / f"other{suffix}")
     first.close()
-    assert summarize(path).trouble == ""
+    assert summarize(path).problem == ""
     open_log(path, overwrite=True).close()
     assert [entry.name for entry in tmp_path.iterdir()] == [path.name]
 

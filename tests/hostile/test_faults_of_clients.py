@@ -158,7 +158,7 @@ def test_a_publication_that_cannot_be_is_logged_once(client, caplog):
     client.session.advertise("/talk", String.__msgtype__)
     for _ in range(3):
         client.session.publish("/talk", message_type("std_msgs/msg/Bool")(True))
-    client.simulation.take_in()
+    client.simulation.process_commands()
     assert caplog.text.count("/talk' from stranger") == 1
 
 
@@ -198,14 +198,14 @@ BASES = {
         "state.pose.orientation.w": 1.0,
     },
     "/spawn_entity": {"entity_resource.uri": "f450", "initial_pose.pose.position.x": 50.0},
-    "/volery/take_control": {"pilot": "Anna"},
-    "/volery/release_control": {"pilot": "Anna"},
-    "/volery/hand_over": {"pilot": "Anna", "to": "Anna"},
+    "/volery/take_control": {"operator": "Anna"},
+    "/volery/release_control": {"operator": "Anna"},
+    "/volery/hand_over": {"operator": "Anna", "to": "Anna"},
     "/volery/gust": {"rise": 1.0},
     "/volery/join_lock_step": {"name": "p", "period_s": 0.01, "timeout_s": 1.0},
     "/rosapi/set_param": {"name": "/uav1/gap_following:height_m", "value": "2.0"},
 }
-LAST = ("delete", "reset", "/stop", "kill")
+LAST = ("delete", "reset", "/kill", "kill")
 """Services that leave little to ask afterwards."""
 
 

@@ -146,7 +146,7 @@ def test_every_key_that_names_a_file_is_confined(
     if kind in MODELS:
         told["types"] = {"f450": {**TYPES["f450"], **named(MODELS[kind], file)}}
     if kind == "messages":
-        told["messages"] = [str(secret)]
+        told["message_packages"] = [str(secret)]
     scenario = scenario_of(RecordedScenario("stranger", 1, "0", told), folder=own)
     with pytest.raises(VoleryError, match="may be read") as refused:
         Simulation(scenario, threads=1)

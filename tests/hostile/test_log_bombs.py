@@ -133,7 +133,7 @@ def test_a_chunk_costs_no_more_than_a_chunk_may(tmp_path, small_chunks, suffix, 
     bomb(path, compression, said)
     for read in (summarize, walked, Playback, read_flight, recover):
         assert peak_of(lambda read=read: read(path)) < 3 * CHUNK, read
-    assert "1 damaged chunk left out, at byte" in walked(path).trouble
+    assert "1 damaged chunk left out, at byte" in walked(path).problem
     assert list(tmp_path.iterdir()) == [path]
 
 
@@ -188,7 +188,7 @@ def test_topics_and_definitions_are_limited(tmp_path, monkeypatch):
             read(path)
     definition = b"# " + bytes([32]) * budgets.MAX_DEFINITION_BYTES
     path.write_bytes(MCAP_MAGIC + mcap_schema(1, definition) + mcap_channel(1) + padding(1))
-    assert "message definition of 1048" in walked(path).trouble
+    assert "message definition of 1048" in walked(path).problem
 
 
 def test_messages_of_a_chunk_are_limited(tmp_path, monkeypatch):
@@ -196,7 +196,7 @@ def test_messages_of_a_chunk_are_limited(tmp_path, monkeypatch):
     data = padding(0) * 1001
     path = tmp_path / "many.mcap"
     path.write_bytes(MCAP_MAGIC + mcap_channel(1) + mcap_chunk("", data, len(data)))
-    assert "more than 1000 messages in one chunk" in walked(path).trouble
+    assert "more than 1000 messages in one chunk" in walked(path).problem
 
 
 def test_a_player_keeps_few_large_chunks(tmp_path, monkeypatch):
@@ -291,7 +291,7 @@ def test_logs_are_looked_into_in_a_process_that_ends(tmp_path, monkeypatch):
     log.close()
     (tmp_path / "bad.bag").write_bytes(b"no log")
     good, bad = log_check.look_into([path, tmp_path / "bad.bag"])
-    assert good == {"seconds": 0.0, "messages": 1, "trouble": ""}
+    assert good == {"seconds": 0.0, "messages": 1, "problem": ""}
     assert "neither an MCAP log" in bad["error"]
     monkeypatch.setattr(log_check, "BOUNDS", ProcessBounds(3 << 30, 60, wall_s=0.05))
     (late,) = log_check.look_into([path], play=True)
@@ -340,5 +340,5 @@ def test_a_recording_ends_where_the_folder_is_full(tmp_path, monkeypatch):
         graph.deliver()
     with pytest.raises(RecordingError, match="the folder for recordings is full"):
         recording._stop(None)
-    assert summarize(tmp_path / "flight.mcap").trouble == ""
+    assert summarize(tmp_path / "flight.mcap").problem == ""
     assert (tmp_path / "flight.mcap").stat().st_size < 2_000_000

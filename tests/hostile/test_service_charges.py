@@ -64,7 +64,7 @@ def test_a_simulation_charges_what_viewers_call(simulate, tmp_path):
     offered = {*simulation.graph.services()} & READ_ONLY_SERVICES
     assert {*READ_ONLY_SERVICES} - offered == {*IN_PLAYBACK}
     inbox = simulation._engine.inbox
-    assert not uncharged(inbox, simulation.gateway, offered, simulation._engine.take_in)
+    assert not uncharged(inbox, simulation.gateway, offered, simulation._engine.process_commands)
 
 
 @pytest.fixture

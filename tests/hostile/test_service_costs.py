@@ -21,14 +21,14 @@ def client(simulate, flat_data):
 
 
 def test_choices_are_made_out_once(client, monkeypatch):
-    client.call("/volery/get_choices", None)
+    client.call("/volery/get_scenario_options", None)
 
     def forbidden(*_args, **_options):
         raise AssertionError("built again")
 
     monkeypatch.setattr(scenario_loading.Changes, "model_json_schema", forbidden)
     monkeypatch.setattr(scenario_loading, "describe", forbidden)
-    assert client.call("/volery/get_choices", None).success
+    assert client.call("/volery/get_scenario_options", None).success
 
 
 def test_worlds_are_read_once(simulate, flat_data, tmp_path, monkeypatch):
@@ -96,7 +96,7 @@ def test_a_loop_of_calls_is_deferred_in_order_and_others_are_not(client):
     assert spent_s <= MAX_FRACTION * wall_s + 0.2
     assert taken == [str(number) for number in range(len(taken))]
     assert client.session.waiting == 2_000 - len(taken) + 0
-    simulation.take_in()
+    simulation.process_commands()
     assert len(taken) == 2_000
     assert client.session.waiting == 0
 
@@ -115,6 +115,6 @@ def test_a_deferred_command_is_recorded_when_it_is_taken(client):
     for _ in range(3_000):
         client.session.publish("/burn", String("x" * 10))
     simulation.step(50)
-    simulation.take_in()
+    simulation.process_commands()
     assert len(moments) == 3_001
     assert moments == sorted(moments)

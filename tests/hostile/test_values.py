@@ -26,7 +26,7 @@ from volery.vehicle.identified import load_identified
 from volery.world.mesh_files import read_mesh
 from volery.world.weather.wind_field_files import read_wind_field
 
-_FAR = {"kind": "outside", "position_m": [1e300, 0.0]}
+_FAR = {"kind": "external", "position_m": [1e300, 0.0]}
 PACKAGE = Path(volery.__file__).parent
 NAN, INF = math.nan, math.inf
 
@@ -136,7 +136,7 @@ def test_a_wind_field_that_unpacks_to_too_much_is_not_unpacked(tmp_path, monkeyp
                 "species": {"broadleaf": 1.0},
             }
         },
-        {"things": [{"name": "c", "shape": "car", "motion": _FAR}]},
+        {"actors": [{"name": "c", "shape": "car", "motion": _FAR}]},
         {"gnss_denied_areas": [{"kind": "box", "region_m": [-1e308, -1e308, 1e308, 1e308]}]},
     ],
 )  # fmt: skip

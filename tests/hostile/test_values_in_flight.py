@@ -141,7 +141,7 @@ def test_hard_values_of_every_parameter_of_every_node(flown):
         before = parameter.value
         for value in HARD:
             done = simulation.post(partial(parameter.set, value))
-            simulation.take_in()
+            simulation.process_commands()
             error = done.exception(20.0)
             assert error is None or isinstance(error, GraphError), (full_name, name, value)
             if error is None:

@@ -46,7 +46,7 @@ def whole_data(folder):
     """Scenario data: two UAVs that fly by themselves, a kinematic one, things, blocks, radios."""
     blocks = folder / "blocks.csv"
     blocks.write_text("0,0,1\n0,0,0\n")
-    walker = {"kind": "outside", "position_m": [0.0, 30.0]}
+    walker = {"kind": "external", "position_m": [0.0, 30.0]}
     circle = {
         "kind": "circle",
         "centre_m": [0.0, 40.0, 20.0],
@@ -65,7 +65,7 @@ def whole_data(folder):
                 "block_height_m": 6.0,
                 "origin_m": [20.0, 60.0],
             },
-            "things": [
+            "actors": [
                 {"name": "walker", "shape": "person", "motion": walker},
                 {"name": "gull", "shape": "bird", "motion": circle},
             ],
@@ -104,13 +104,13 @@ class Client:
         """The answer of a service after a step, as a response or an error; None: there is none."""
         answers = []
         self.session.call(service, request, ServiceReply(answers.append, answers.append))
-        self.simulation.take_in()
+        self.simulation.process_commands()
         return answers[0] if answers else None
 
     def publish(self, topic, message):
         self.session.advertise(topic, message.__msgtype__)
         self.session.publish(topic, message)
-        self.simulation.take_in()
+        self.simulation.process_commands()
 
 
 NASTY_FLOATS = (float("nan"), float("inf"), float("-inf"), 1e308, -1e308, 1e18, -1.0, 0.0)

@@ -201,12 +201,12 @@ def test_control_is_taken_and_let_go(page, served):
     panel = inspect(page, "uav1")
     panel.get_by_label("Your name").fill("Anna")
     panel.get_by_role("button", name="Take control").click()
-    vehicle(served, "uav1", lambda uav: uav["holder"] == "Anna")
+    vehicle(served, "uav1", lambda uav: uav["operator"] == "Anna")
     with pytest.raises(roslibpy.core.ServiceException, match="held by Anna"):
         served.call("/uav1/hold", "std_srvs/srv/Trigger")
     panel.get_by_text("You control this UAV as Anna.").wait_for()
     panel.get_by_role("button", name="Release control").click()
-    vehicle(served, "uav1", lambda uav: uav["holder"] == "")
+    vehicle(served, "uav1", lambda uav: uav["operator"] == "")
 
 
 # ------------------------------------------------------------------------------------------ world

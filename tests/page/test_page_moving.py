@@ -260,7 +260,7 @@ def test_smoke_rises_from_a_crash(page, served):
     page.get_by_role("option", name="uav2").click()
     put(served, "uav3", 3.0, 2.0, 3.0)  # in the free part of the picture
     at = place(served, "uav3")
-    served.call("/uav3/stop", "std_srvs/srv/Trigger")
+    served.call("/uav3/kill", "std_srvs/srv/Trigger")
     vehicle(served, "uav3", lambda uav: uav["crashed"])
     page.get_by_role("option", name=re.compile("uav3.*crashed", re.DOTALL)).wait_for()
     wait_until(page, lambda page: on_screen(page, "uav3")["position"][2] < at[2] - 1.0)
@@ -272,7 +272,7 @@ def test_smoke_rises_from_a_crash(page, served):
 
 
 def test_a_crashed_uav_is_repaired(page, served):
-    served.call("/uav3/stop", "std_srvs/srv/Trigger")
+    served.call("/uav3/kill", "std_srvs/srv/Trigger")
     vehicle(served, "uav3", lambda uav: uav["crashed"])
     repair = inspect(page, "uav3").get_by_role("button", name="Repair and return to start")
     repair.click()

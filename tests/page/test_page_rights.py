@@ -15,7 +15,7 @@ from working import WIDE, inspect, open_panel
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
-PILOTS, VIEWERS = "pilots-secret-token", "viewers-secret-token"
+OPERATORS, VIEWERS = "pilots-secret-token", "viewers-secret-token"
 WHY_NOT = "View-only access: commands require an operator token"
 LOOK = "#view=fly&camera=-9_0_6_0_-0.3_0&uav=uav1"
 ASK = """
@@ -31,7 +31,7 @@ ASK = """
 
 @pytest.fixture(scope="module")
 def served(chromium):
-    with Served("hover", "--uavs", "2", "--viewer-token", VIEWERS, token=PILOTS) as server:
+    with Served("hover", "--uavs", "2", "--viewer-token", VIEWERS, token=OPERATORS) as server:
         for uav in ("uav1", "uav2"):
             vehicle(server, uav, lambda told: told["mode"] == "HOLD")
         yield server
@@ -53,7 +53,7 @@ def test_without_a_token_the_page_asks_for_one(browsing, served):
     page.get_by_label("Token").fill("wrong")
     page.get_by_role("button", name="Connect").click()
     page.get_by_text("The server does not accept this token").wait_for()
-    page.get_by_label("Token").fill(PILOTS)
+    page.get_by_label("Token").fill(OPERATORS)
     page.get_by_role("button", name="Connect").click()
     page.get_by_role("option", name="uav1").wait_for()
     assert "token" not in page.url
@@ -114,17 +114,17 @@ def test_the_server_refuses_a_viewer_whatever_his_page_does(browsing, served):
     assert page.evaluate(status, upload) == 403
 
 
-def test_two_pilots_and_a_hand_over(browsing, served):
-    anna, ben = enter(browsing, served, PILOTS), enter(browsing, served, PILOTS)
+def test_two_operators_and_a_hand_over(browsing, served):
+    anna, ben = enter(browsing, served, OPERATORS), enter(browsing, served, OPERATORS)
     annas, bens = inspect(anna, "uav1"), inspect(ben, "uav1")
     annas.get_by_label("Your name").fill("Anna")
     annas.get_by_role("button", name="Take control").click()
-    vehicle(served, "uav1", lambda uav: uav["holder"] == "Anna")
+    vehicle(served, "uav1", lambda uav: uav["operator"] == "Anna")
     bens.get_by_text("Anna controls this UAV: the server refuses your commands.").wait_for()
     # Ben takes the other one, by which Anna's page knows him.
     inspect(ben, "uav2").get_by_label("Your name").fill("Ben")
     bens.get_by_role("button", name="Take control").click()
-    vehicle(served, "uav2", lambda uav: uav["holder"] == "Ben")
+    vehicle(served, "uav2", lambda uav: uav["operator"] == "Ben")
     inspect(ben, "uav1").get_by_role("button", name="Land", exact=True).click()
     ben.get_by_role("alert").filter(has_text="held by Anna").first.wait_for()
     assert vehicle(served, "uav1")["mode"] != "LAND"
@@ -139,7 +139,7 @@ def test_two_pilots_and_a_hand_over(browsing, served):
     annas.get_by_label("New operator").fill("Ben")
     anna.keyboard.press("Escape")  # the list of names
     annas.get_by_role("button", name="Hand over").click()
-    vehicle(served, "uav1", lambda uav: uav["holder"] == "Ben")
+    vehicle(served, "uav1", lambda uav: uav["operator"] == "Ben")
     annas.get_by_text("Ben controls this UAV: the server refuses your commands.").wait_for()
     bens.get_by_text("You control this UAV as Ben.").wait_for()
     x = place(served, "uav1")[0]
@@ -150,5 +150,5 @@ def test_two_pilots_and_a_hand_over(browsing, served):
     with pytest.raises(roslibpy.core.ServiceException, match="held by Ben"):
         served.call("/uav1/hold", "std_srvs/srv/Trigger")
     ben.context.close()  # who leaves lets go
-    vehicle(served, "uav1", lambda uav: uav["holder"] == "")
+    vehicle(served, "uav1", lambda uav: uav["operator"] == "")
     until(lambda: np.isclose(vehicle(served, "uav1")["velocity"]["x"], 0.0, atol=0.2))

@@ -77,7 +77,7 @@ def _fly_ten(*, streams: bool) -> tuple[float, list[float]]:
 
 def _ask(simulation: Any) -> list[float]:
     """Ask a vehicle of a running simulation from a process of its own."""
-    simulation.be_prompt()
+    simulation.use_low_latency()
     thread = threading.Thread(target=lambda: simulation.run(600.0, speed=1.0))
     thread.start()
     command = [
@@ -116,7 +116,7 @@ def _setpoint_to_motor_ms() -> float:
         def send(message: Any) -> None:
             data = np.frombuffer(codec.pack(message, 0), np.uint8)
             frames.publish(message_type(PACKETS)(link=1, profile=0, closed=False, data=data))
-            simulation.take_in()
+            simulation.process_commands()
             simulation.graph.deliver()
 
         def steer(north: float) -> None:

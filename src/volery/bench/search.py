@@ -136,7 +136,7 @@ def flying() -> Iterator[BridgeHost]:
     with Simulation(_scenario()) as simulation:
         simulation.step(1)
         with BridgeHost(simulation.gateway) as bridges:
-            simulation.be_prompt()
+            simulation.use_low_latency()
             over = threading.Event()
 
             def run() -> None:
@@ -160,9 +160,9 @@ def exchange(via: str, port: int) -> list[list[int]]:
         time.sleep(_START_S)
         with _peer(via, port, "calling") as calling:
             out, _ = calling.communicate(timeout=_TIMEOUT_S)
-    told = json.loads(out.splitlines()[-1]) if out else {"took": [], "trouble": "it ended early"}
+    told = json.loads(out.splitlines()[-1]) if out else {"took": [], "problem": "it ended early"}
     if len(told["took"]) < _WARM_UP + _CALLS:
-        raise VoleryError(f"the calls of {JOIN} on {via} failed: {told['trouble']}")
+        raise VoleryError(f"the calls of {JOIN} on {via} failed: {told['problem']}")
     return [[int(ns) for ns in pair] for pair in told["took"]]
 
 

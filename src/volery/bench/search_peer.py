@@ -46,8 +46,8 @@ class Calling(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("calling", **options)
         self.took: list[tuple[int, int]] = []
-        self.trouble = ""
-        self._client = self.create_client(JOIN, f"/{CALLED}/search/come")
+        self.problem = ""
+        self._client = self.create_client(JOIN, f"/{CALLED}/search/join")
 
     def call(self) -> None:
         """Call once."""
@@ -57,7 +57,7 @@ class Calling(Node):
         def on_answer(answer: Future) -> None:
             back_ns = time.monotonic_ns()
             if answer.exception() is not None:
-                self.trouble = str(answer.exception())
+                self.problem = str(answer.exception())
                 return
             self.took.append((int(answer.result().message) - sent_ns, back_ns - sent_ns))
 
@@ -90,11 +90,11 @@ def make_calls(host: NodeHost, calls: int) -> None:
         limit = time.monotonic() + 1.0
         host.spin(lambda before=before, limit=limit: _answered(node, before, limit))  # type: ignore[misc]
         time.sleep(_PERIOD_S)
-    _say({"took": node.took, "trouble": node.trouble})
+    _say({"took": node.took, "problem": node.problem})
 
 
 def _answered(node: Calling, before: int, limit: float) -> bool:
-    return len(node.took) > before or bool(node.trouble) or time.monotonic() > limit
+    return len(node.took) > before or bool(node.problem) or time.monotonic() > limit
 
 
 def _wait_for_end(over: threading.Event) -> None:

@@ -62,7 +62,7 @@ def open_bridges(simulation: Any, options: RunOptions) -> Iterator[None]:
         for bridge in wanted:
             bridges.open(bridge)
             typer.echo(f"open    {bridge.name}", err=True)
-        simulation.be_prompt()
+        simulation.use_low_latency()
         with _px4_instances(simulation, wanted, options):
             yield
 

@@ -122,28 +122,28 @@ class CommandLineFlight:
     def fly(self) -> int:
         """Run to the end, to a signal or to an error; then write what is left to write."""
         code = 0
-        trouble = ""
+        problem = ""
         start = time.perf_counter()
         try:
             with self._keys:
                 self._await_clients()
                 self._simulation.run(speed=self._options.speed, on_progress=self._on_progress)
         except _StoppedError:
-            code, trouble = stopped_code(), f"Stopped {stopped_how()}"
+            code, problem = stopped_code(), f"Stopped {stopped_how()}"
         except RecordingError as error:
-            code, trouble = USER_ERROR, "The log could not be written"
+            code, problem = USER_ERROR, "The log could not be written"
             complain(str(error))
         except VoleryError as error:
-            code, trouble = USER_ERROR, "The flight ended with an error"
+            code, problem = USER_ERROR, "The flight ended with an error"
             complain_of(error)
         finally:
             self._wall_s = time.perf_counter() - start - self._simulation.paused_s
             closed = self._close_log()
         self._progress.finish(self._simulation.time_s)
-        self._tell_flight(trouble)
+        self._tell_flight(problem)
         if not closed and not code:
-            code, trouble = USER_ERROR, "The log could not be written"
-        report_written = self._write_report(trouble)
+            code, problem = USER_ERROR, "The log could not be written"
+        report_written = self._write_report(problem)
         code = code if report_written else code or USER_ERROR
         if not code and self._options.page is not None and not self._options.exit_at_end:
             self._stay()
@@ -225,15 +225,15 @@ class CommandLineFlight:
         self._tell_files(path)
         return path is not None
 
-    def _tell_flight(self, trouble: str) -> None:
+    def _tell_flight(self, problem: str) -> None:
         simulated = self._simulation.time_s
         factor = (self._before_s + simulated) / self._wall_s if self._wall_s > 0.0 else 0.0
         count = len(self._simulation.uav_names)
-        head = f"{trouble}: flew" if trouble else "Flew"
+        head = f"{problem}: flew" if problem else "Flew"
         since = " since the last reset" if self._before_s else ""
         typer.echo(
             f"{head} {simulated:.1f} s{since} with {counted(count, 'UAV')} "
-            f"in {self._wall_s:.1f} s ({factor:.1f} x real time){self._reason(trouble)}"
+            f"in {self._wall_s:.1f} s ({factor:.1f} x real time){self._reason(problem)}"
         )
         city = self._simulation.city
         if city is not None:
@@ -247,11 +247,11 @@ class CommandLineFlight:
                 f"  and more: {len(events)} contacts of {counted(len(counts), 'UAV')} in all"
             )
 
-    def _reason(self, trouble: str) -> str:
+    def _reason(self, problem: str) -> str:
         """Why a flight that nobody stopped is over before its time."""
         scenario = self._simulation.scenario
         early = self._simulation.time_s < scenario.duration_s
-        return "; all are down" if early and not trouble and self._all_down() else ""
+        return "; all are down" if early and not problem and self._all_down() else ""
 
     def _all_down(self) -> bool:
         simulation = self._simulation

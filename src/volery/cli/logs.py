@@ -31,8 +31,8 @@ def show_log(path: Path) -> bool:
     if rows:
         typer.echo("")
         print_table(("topic", "type", "messages", "rate"), rows, right=(2, 3))
-    if summary.trouble:
-        complain(f"{path}: {summary.trouble}; `volery recover {path}` writes what is readable")
+    if summary.problem:
+        complain(f"{path}: {summary.problem}; `volery recover {path}` writes what is readable")
         return False
     return True
 
@@ -42,12 +42,12 @@ def recover_log(path: Path, out: Path | None) -> None:
     from volery.bridges.logs.reader import summarize
     from volery.bridges.logs.recovery import recover
 
-    if out is None and not summarize(path).trouble:
+    if out is None and not summarize(path).problem:
         typer.echo(f"{path} is whole: nothing to recover")
         return
     recovery = recover(path, out)
-    if recovery.trouble:
-        typer.echo(f"{path}: {recovery.trouble}")
+    if recovery.problem:
+        typer.echo(f"{path}: {recovery.problem}")
     typer.echo(
         f"{counted(recovery.messages, 'message')} up to {recovery.end_ns / NS_PER_S:.3f} s "
         f"written to {recovery.path}"
@@ -73,7 +73,7 @@ def convert_log(path: Path, out: Path, layout: Path, *, overwrite: bool) -> None
         log.close()
         made.unlink(missing_ok=True)
     if scans.left_out:
-        warn(f"{path}: {counted(scans.left_out, 'line')} left out; {scans.trouble}")
+        warn(f"{path}: {counted(scans.left_out, 'line')} left out; {scans.problem}")
     for doubt in scans.doubts:
         warn(f"{path}: {doubt}")
     typer.echo(

@@ -50,7 +50,7 @@ def run_node(options: NodeOptions) -> None:
     from volery.scenario.schema import NodeEntry
 
     profile = Profile() if options.profile is None else load_profile(options.profile)
-    for name in (*options.messages, *profile.messages):
+    for name in (*options.messages, *profile.message_packages):
         add_definitions(_folder_of(name, options.profile))
     namespace = profile.namespace if options.namespace is None else options.namespace
     parameters = {**profile.parameters, **_parameters(options.parameters)}

@@ -49,10 +49,10 @@ def _check_parent(path: Path, what: str) -> None:
     above = parent.parent
     if parent.is_dir():
         return
-    trouble = f"there is no folder {parent}"
+    problem = f"there is no folder {parent}"
     if parent.exists():
-        trouble = f"{parent} is no folder"
+        problem = f"{parent} is no folder"
     elif above.is_dir() and above != above.parent:
         return
     hint = "" if parent.exists() else f"; `mkdir -p {parent}` makes it"
-    raise VoleryError(f"{path}: cannot create {what}: {trouble}{hint}")
+    raise VoleryError(f"{path}: cannot create {what}: {problem}{hint}")

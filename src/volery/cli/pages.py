@@ -37,10 +37,10 @@ class Page:
             self._server.building(scenario.name, scenario.description, message)
 
     def showing(self, world: Any, message: str = "") -> AbstractContextManager[None]:
-        """Let clients into a simulation or lobby while the context lasts."""
+        """Let clients into a simulation or idle while the context lasts."""
         if self._server is None:
             return nullcontext()
-        world.be_prompt()
+        world.use_low_latency()
         return self._server.showing(world, message)
 
 

@@ -70,6 +70,6 @@ def _introduce(player: Any) -> None:
     span = f"{player.start_s:.3f} to {player.end_s:.3f} s"
     messages = counted(sum(told["counts"]), "message")
     typer.echo(f"playing {player.path} ({span}, {messages}{what})", err=True)
-    if told["trouble"]:
+    if told["problem"]:
         mend = f"`volery recover {player.path}` writes what is readable"
-        typer.echo(f"        {told['trouble']}; {mend}", err=True)
+        typer.echo(f"        {told['problem']}; {mend}", err=True)

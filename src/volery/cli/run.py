@@ -93,7 +93,7 @@ def _build_and_fly(options: RunOptions, interrupts: Interrupts, page: Page) -> t
         )
         change.quit = simulation.quit
         if flight is not None:
-            simulation.repeat(flight)
+            simulation.replay_commands(flight)
         try:
             interrupts.be_gentle()
             with spared_objects(), open_bridges(simulation, options), page.showing(simulation):
@@ -108,12 +108,12 @@ def _wait_for_world(options: RunOptions, interrupts: Interrupts, page: Page) -> 
     from volery.runtime.idle_server import IdleServer
 
     change = _Change(options)
-    lobby = IdleServer(change.ask)
+    idle = IdleServer(change.ask)
     typer.echo("no world is loaded; /load_world brings one, Ctrl-C ends", err=True)
-    with open_bridges(lobby, options), page.showing(lobby):
-        while not (change.asked or lobby.quitting or interrupts.pressed):
-            lobby.wait(_GLANCE_S)
-        lobby.wait(_FAREWELL_S)
+    with open_bridges(idle, options), page.showing(idle):
+        while not (change.asked or idle.quitting or interrupts.pressed):
+            idle.wait(_GLANCE_S)
+        idle.wait(_FAREWELL_S)
     return stopped_code() if interrupts.pressed else 0, change
 
 

@@ -34,7 +34,7 @@ _log = logging.getLogger(__name__)
 
 _THREADS = 2
 _GLANCE_S = 0.02
-"""How often a world that stands still looks for clients, and a lobby for Ctrl-C."""
+"""How often a world that stands still looks for clients, and a idle for Ctrl-C."""
 _FAREWELL_S = 0.1
 """Time for the last answer to reach its client."""
 
@@ -118,7 +118,7 @@ class _Host:
         self._wish = wish
         self._present: Scenario | None = None
         """What was built last."""
-        self._trouble = ""
+        self._problem = ""
         """What went wrong last, for the page."""
         self._quits = False
 
@@ -142,8 +142,8 @@ class _Host:
             if self._present is None:
                 raise
             what = str(error) if isinstance(error, VoleryError) else _unexpected(error)
-            self._trouble = f"{wanted.name}: {what}"
-            complain_of(error, self._trouble)
+            self._problem = f"{wanted.name}: {what}"
+            complain_of(error, self._problem)
             self._wish.want(None if self._present is wanted else self._present)
 
     def _fly(self, scenario: Scenario) -> None:
@@ -151,7 +151,7 @@ class _Host:
         from volery import Simulation
 
         first, page = self._options.first, self._page
-        page.building(scenario, self._trouble)
+        page.building(scenario, self._problem)
         threads = _THREADS if first.threads is None else first.threads
         with Simulation(
             fit_out(scenario, first),
@@ -162,9 +162,9 @@ class _Host:
         ) as simulation:
             self._present, self._wish.quit = scenario, simulation.quit
             self._interrupts.be_gentle()
-            shown = page.showing(simulation, self._trouble)
+            shown = page.showing(simulation, self._problem)
             with spared_objects(), open_bridges(simulation, first), shown:
-                self._trouble = ""
+                self._problem = ""
                 typer.echo(f"flying  {scenario.name}", err=True)
                 self._stay(simulation)
             self._quits = simulation.quitting and not self._wish.asked
@@ -177,14 +177,14 @@ class _Host:
             log, on_load=self._wish.ask, on_close=self._return, shelf=self._wish.shelf
         ) as player:
             if player.scenario is not None:
-                self._page.building(player.scenario, self._trouble)
+                self._page.building(player.scenario, self._problem)
             _ = player.geometry  # made here: the server only reads it
             self._wish.quit = player.quit
             self._interrupts.be_gentle()
             first, page = self._options.first, self._page
-            shown = page.showing(player, self._trouble)
+            shown = page.showing(player, self._problem)
             with spared_objects(), open_bridges(player, first), shown:
-                self._trouble = ""
+                self._problem = ""
                 typer.echo(f"playing {log.name}", err=True)
                 while not (self._wish.asked or player.quitting or self._interrupts.pressed):
                     player.wait(_GLANCE_S)
@@ -216,14 +216,14 @@ class _Host:
         """Keep the bridges open with no world behind them."""
         from volery.runtime.idle_server import IdleServer
 
-        lobby = IdleServer(self._wish.ask, self._wish.shelf)
-        with open_bridges(lobby, self._options.first), self._page.showing(lobby, self._trouble):
+        idle = IdleServer(self._wish.ask, self._wish.shelf)
+        with open_bridges(idle, self._options.first), self._page.showing(idle, self._problem):
             typer.echo("no world is loaded", err=True)
-            self._trouble = ""
-            while not (self._wish.asked or lobby.quitting or self._interrupts.pressed):
-                lobby.wait(_GLANCE_S)
-            lobby.wait(_FAREWELL_S)
-        self._quits = lobby.quitting
+            self._problem = ""
+            while not (self._wish.asked or idle.quitting or self._interrupts.pressed):
+                idle.wait(_GLANCE_S)
+            idle.wait(_FAREWELL_S)
+        self._quits = idle.quitting
 
 
 def _first_scenario(options: RunOptions) -> Scenario:

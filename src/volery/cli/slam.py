@@ -85,8 +85,8 @@ def map_log(asked: SlamArguments) -> None:
     try:
         outcome = run.run(_Progress().tell)
     finally:  # what is wrong with the log is often why nothing came of it
-        for trouble in filter(None, (source.trouble, *source.doubts)):
-            warn(f"{asked.log}: {trouble}")
+        for problem in filter(None, (source.problem, *source.doubts)):
+            warn(f"{asked.log}: {problem}")
     cell_m = _write(asked, outcome)
     _tell(asked.out, _summary(asked, outcome, source.refused, cell_m, run.start))
     _advise(outcome, source.topics)

@@ -43,7 +43,7 @@ def wait_for_clients(
                 f"connected: {present}"
             )
         time.sleep(_PERIOD_S)
-        simulation.take_in()
+        simulation.process_commands()
         before, missing = missing, _missing(simulation, names)
         for name in before:
             if name not in missing:

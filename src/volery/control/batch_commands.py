@@ -15,31 +15,36 @@ _DEAF = (FlightMode.LANDED, FlightMode.TAKE_OFF, FlightMode.CRASHED)
 
 
 def command_velocities(
-    bodies: NDArray[np.void], pilots: NDArray[np.void], step: int, velocity: Array, yaw_rate: Array
+    bodies: NDArray[np.void],
+    control_states: NDArray[np.void],
+    step: int,
+    velocity: Array,
+    yaw_rate: Array,
 ) -> None:
     """Let all that fly follow `velocity` (N, 3) m/s in the level heading frame and `yaw_rate` (N,).
 
-    bodies, pilots: (N,) rows of `BODY` and `PILOT`. As `FleetCommands.command_velocity_body`, but
-    UAVs on the ground, wrecks and those that take off are passed over.
+    bodies, control_states: (N,) rows of `BODY` and `CONTROL_STATE`. As
+    `FleetCommands.command_velocity_body`, but UAVs on the ground, wrecks and those that take off
+    are passed over.
     """
-    hears = ~np.isin(pilots["mode"], [int(mode) for mode in _DEAF])
+    hears = ~np.isin(control_states["mode"], [int(mode) for mode in _DEAF])
     bodies["still_steps"][hears] = 0
     bodies["ground_budget"][hears] = 0.0
     bodies["downwash_budget"][hears] = 0.0
-    fresh = np.flatnonzero(hears & (pilots["level"] != ControlLevel.GUIDED))
+    fresh = np.flatnonzero(hears & (control_states["level"] != ControlLevel.GUIDED))
     if len(fresh):
         yaw = rotations.yaw_of(bodies["attitude"][fresh])
         heading = np.column_stack([np.cos(yaw), np.sin(yaw)])
-        pilots["level"][fresh] = ControlLevel.GUIDED
-        pilots["position"][fresh] = bodies["position_map"][fresh]
-        pilots["velocity"][fresh] = bodies["velocity_map"][fresh]
-        pilots["acceleration"][fresh] = 0.0
-        pilots["velocity_integral"][fresh] = 0.0
-        pilots["heading"][fresh] = pilots["heading_target"][fresh] = heading
-    pilots["mode"][hears] = FlightMode.VELOCITY
-    pilots["calm_ticks"][hears] = 0
-    pilots["velocity_target"][hears] = velocity[hears]
-    pilots["velocity_in_heading"][hears] = True
-    pilots["deadline_step"][hears] = step + pilots["timeout_steps"][hears]
-    pilots["turning"][hears] = True
-    pilots["yaw_rate_target"][hears] = yaw_rate[hears]
+        control_states["level"][fresh] = ControlLevel.GUIDED
+        control_states["position"][fresh] = bodies["position_map"][fresh]
+        control_states["velocity"][fresh] = bodies["velocity_map"][fresh]
+        control_states["acceleration"][fresh] = 0.0
+        control_states["velocity_integral"][fresh] = 0.0
+        control_states["heading"][fresh] = control_states["heading_target"][fresh] = heading
+    control_states["mode"][hears] = FlightMode.VELOCITY
+    control_states["calm_ticks"][hears] = 0
+    control_states["velocity_target"][hears] = velocity[hears]
+    control_states["velocity_in_heading"][hears] = True
+    control_states["deadline_step"][hears] = step + control_states["timeout_steps"][hears]
+    control_states["turning"][hears] = True
+    control_states["yaw_rate_target"][hears] = yaw_rate[hears]

@@ -54,8 +54,8 @@ class FleetCommands:
         self._dt = dt
         self._uavs = uavs
         self._bodies: NDArray[np.void] = uavs["body"]
-        self._pilots: NDArray[np.void] = uavs["pilot"]
-        self._paths = SegmentStore(self._pilots)
+        self._control_states: NDArray[np.void] = uavs["control_state"]
+        self._paths = SegmentStore(self._control_states)
 
     def __len__(self) -> int:
         """Number of UAVs."""
@@ -63,12 +63,12 @@ class FleetCommands:
 
     def mode(self, i: int) -> FlightMode:
         """Flight mode of UAV `i`."""
-        return FlightMode(int(self._pilots["mode"][i]))
+        return FlightMode(int(self._control_states["mode"][i]))
 
     @property
     def modes(self) -> NDArray[np.int64]:
         """(N,) flight modes, as numbers."""
-        modes: NDArray[np.int64] = self._pilots["mode"].copy()
+        modes: NDArray[np.int64] = self._control_states["mode"].copy()
         return modes
 
     def set_command_timeout(self, seconds: float, i: int | None = None) -> None:
@@ -79,12 +79,12 @@ class FleetCommands:
         if not 0.0 < seconds <= 60.0:
             raise CommandError(f"time-out = {seconds} s is out of range; up to 60 s is allowed")
         rows = slice(None) if i is None else i
-        self._pilots["timeout_steps"][rows] = max(1, round(seconds / self._dt))
+        self._control_states["timeout_steps"][rows] = max(1, round(seconds / self._dt))
 
     def rotor_reference(self, i: int) -> Array:
         """(R,) rad/s: what the controllers of UAV `i` asked of its rotors in the last step."""
         rotors = len(self.airframes[i].rotors.places)
-        return np.array(self._pilots["rotor_reference"][i, :rotors])
+        return np.array(self._control_states["rotor_reference"][i, :rotors])
 
     def command_rotor_speeds(self, i: int, speeds: ArrayLike) -> None:
         """Turn the rotors of UAV `i` at `speeds` (R,) rad/s, if its battery lets them."""
@@ -92,17 +92,17 @@ class FleetCommands:
         rotors = self.airframes[i].rotors
         shape = (len(rotors.places),)
         speeds = checked_within("rotor speeds", speeds, shape, rotors.max_speed_rad_s)
-        pilot = self._enter_low_level(i, ControlLevel.ROTORS)
-        pilot["rotor_target"][: len(speeds)] = speeds
+        control_state = self._enter_low_level(i, ControlLevel.ROTORS)
+        control_state["rotor_target"][: len(speeds)] = speeds
 
     def stop_rotors(self, i: int) -> None:
         """Stop the rotors of UAV `i` at once, wherever it is; in the air a flight mode starts them.
 
         A kinematic UAV, which has none, stands still in the air.
         """
-        pilot = self._enter_low_level(i, ControlLevel.STOPPED)
-        pilot["rotor_target"] = 0.0
-        pilot["thrust"] = 0.0
+        control_state = self._enter_low_level(i, ControlLevel.STOPPED)
+        control_state["rotor_target"] = 0.0
+        control_state["thrust"] = 0.0
 
     def command_rates(self, i: int, omega_body: ArrayLike, thrust: float) -> None:
         """Turn UAV `i` at `omega_body` (3,) rad/s, FLU, with `thrust` N along its z axis."""
@@ -110,19 +110,19 @@ class FleetCommands:
         limit = 4.0 * math.radians(self.airframes[i].limits.rate_deg_s)
         omega_body = checked("rates", omega_body, (3,), limit)
         thrust = self._checked_thrust(i, thrust)
-        pilot = self._enter_low_level(i, ControlLevel.RATES)
-        pilot["rates"] = omega_body
-        pilot["thrust"] = thrust
+        control_state = self._enter_low_level(i, ControlLevel.RATES)
+        control_state["rates"] = omega_body
+        control_state["thrust"] = thrust
 
     def command_attitude(self, i: int, attitude: ArrayLike, thrust: float) -> None:
         """Hold UAV `i` at `attitude` (4,), map from body, with `thrust` N along its z axis."""
         self._refuse_plants(i, "attitudes", Kinematic)
         attitude = checked_attitude(attitude)
         thrust = self._checked_thrust(i, thrust)
-        pilot = self._enter_low_level(i, ControlLevel.ATTITUDE)
-        pilot["attitude"] = attitude
-        pilot["thrust"] = thrust
-        pilot["yaw_rate"] = 0.0
+        control_state = self._enter_low_level(i, ControlLevel.ATTITUDE)
+        control_state["attitude"] = attitude
+        control_state["thrust"] = thrust
+        control_state["yaw_rate"] = 0.0
 
     def command_velocity_body(self, i: int, velocity: ArrayLike, yaw_rate: float = 0.0) -> None:
         """Fly UAV `i` at `velocity` (3,) m/s in its level heading frame (x forward, y left, z up).
@@ -143,7 +143,9 @@ class FleetCommands:
         """
         velocity = checked("velocity", velocity, (len(self), 3), 1e3)
         rate = checked("yaw rate", yaw_rate, (len(self),), 100.0)
-        batch_commands.command_velocities(self._bodies, self._pilots, self.step, velocity, rate)
+        batch_commands.command_velocities(
+            self._bodies, self._control_states, self.step, velocity, rate
+        )
 
     def command_velocity_map(
         self, i: int, velocity: ArrayLike, yaw_rate: float = 0.0, *, yaw: float | None = None
@@ -161,8 +163,8 @@ class FleetCommands:
         """Fly UAV `i` to `position` (3,) m, map, with heading `yaw` rad (None: as it is); hold."""
         position = checked("position", position, (3,), MAX_COORDINATE)
         angle = None if yaw is None else float(checked("yaw", yaw, (), 1e4))
-        pilot = self._enter_guided(i, FlightMode.GO_TO)
-        pilot["position_target"] = position
+        control_state = self._enter_guided(i, FlightMode.GO_TO)
+        control_state["position_target"] = position
         if angle is not None:
             self._face(i, angle)
 
@@ -186,20 +188,20 @@ class FleetCommands:
         acceleration = checked("acceleration", acceleration, (3,), 1e3)
         angle = None if yaw is None else float(checked("yaw", yaw, (), 1e4))
         rate = checked("yaw rate", yaw_rate, (), 100.0)
-        pilot = self._enter_guided(i, FlightMode.TRAJECTORY)
-        pilot["path_last"] = -1
-        pilot["start_step"] = self.step
-        pilot["deadline_step"] = self.step + pilot["timeout_steps"]
-        pilot["position_target"] = position
-        pilot["velocity_target"] = velocity
-        pilot["acceleration_target"] = acceleration
+        control_state = self._enter_guided(i, FlightMode.TRAJECTORY)
+        control_state["path_last"] = -1
+        control_state["start_step"] = self.step
+        control_state["deadline_step"] = self.step + control_state["timeout_steps"]
+        control_state["position_target"] = position
+        control_state["velocity_target"] = velocity
+        control_state["acceleration_target"] = acceleration
         if angle is not None:
             self._face(i, angle)
-            pilot["yaw_rate_target"] = rate
+            control_state["yaw_rate_target"] = rate
         elif rate != 0.0:
             self._turn(i, rate)
         else:
-            pilot["yaw_rate_target"] = 0.0
+            control_state["yaw_rate_target"] = 0.0
 
     def command_trajectory(self, i: int, trajectory: Trajectory) -> None:
         """Fly UAV `i` along `trajectory` from now on, then hold.
@@ -213,9 +215,9 @@ class FleetCommands:
         trajectory = trajectory.led_in_from(
             motion.position, motion.velocity, float(rotations.yaw_of(motion.attitude))
         )
-        pilot = self._enter_guided(i, FlightMode.TRAJECTORY)
-        pilot["start_step"] = self.step
-        pilot["path_faces"] = trajectory.faces
+        control_state = self._enter_guided(i, FlightMode.TRAJECTORY)
+        control_state["start_step"] = self.step
+        control_state["path_faces"] = trajectory.faces
         self._paths.put(i, trajectory.segments)
 
     def command_pose(
@@ -236,11 +238,11 @@ class FleetCommands:
         attitude = checked_attitude(attitude)
         velocity = checked("velocity", velocity, (3,), 1e3)
         omega_body = checked("rates", omega_body, (3,), 1e3)
-        pilot = self._enter_low_level(i, ControlLevel.POSE)
-        pilot["position_target"] = position
-        pilot["attitude"] = attitude
-        pilot["velocity_target"] = velocity
-        pilot["rates"] = omega_body
+        control_state = self._enter_low_level(i, ControlLevel.POSE)
+        control_state["position_target"] = position
+        control_state["attitude"] = attitude
+        control_state["velocity_target"] = velocity
+        control_state["rates"] = omega_body
 
     def take_off(self, i: int, altitude_m: float = 2.5) -> None:
         """Let UAV `i`, landed, climb to `altitude_m` above its place and hold."""
@@ -250,20 +252,20 @@ class FleetCommands:
         if self.mode(i) is not FlightMode.LANDED:
             raise CommandError(f"{self.names[i]} cannot take off: it flies ({self.mode(i).name})")
         place = self._believed(i).position
-        self._pilots["home"][i] = place
-        pilot = self._enter_guided(i, FlightMode.TAKE_OFF, from_ground=True)
-        pilot["position_target"] = place + np.array([0.0, 0.0, altitude_m])
+        self._control_states["home"][i] = place
+        control_state = self._enter_guided(i, FlightMode.TAKE_OFF, from_ground=True)
+        control_state["position_target"] = place + np.array([0.0, 0.0, altitude_m])
 
     def hold(self, i: int) -> None:
         """Let UAV `i` stop and stay where it comes to rest."""
-        pilot = self._enter_guided(i, FlightMode.HOLD)
-        pilot["braking"] = pilot["hurried"] = True
+        control_state = self._enter_guided(i, FlightMode.HOLD)
+        control_state["braking"] = control_state["hurried"] = True
 
     def land(self, i: int) -> None:
         """Let UAV `i` stop, descend straight down and stop its rotors on the ground."""
-        pilot = self._enter_guided(i, FlightMode.LAND)
-        pilot["braking"] = True
-        pilot["sink"] = 0.0
+        control_state = self._enter_guided(i, FlightMode.LAND)
+        control_state["braking"] = True
+        control_state["sink"] = 0.0
 
     def set_landing_speed(self, i: int, speed_m_s: float) -> None:
         """Let the present landing of UAV `i` sink at a speed other than its airframe's own."""
@@ -271,18 +273,18 @@ class FleetCommands:
             raise CommandError(f"landing speed = {speed_m_s} m/s is not above 0")
         if self.mode(i) is not FlightMode.LAND:
             raise CommandError(f"{self.names[i]} does not land ({self.mode(i).name})")
-        self._pilots["sink"][i] = speed_m_s
+        self._control_states["sink"][i] = speed_m_s
 
     def return_home(self, i: int, height_m: float = DEFAULT_RETURN_HEIGHT_M) -> None:
         """Let UAV `i` fly back at least `height_m` above its home, and land there."""
         if not (math.isfinite(height_m) and 0.0 < height_m <= MAX_COORDINATE):
             raise CommandError(f"return height = {height_m} m is not a height above home")
-        pilot = self._enter_guided(i, FlightMode.RETURN)
-        pilot["braking"] = True
-        pilot["phase"] = 0
-        pilot["sink"] = 0.0
-        pilot["return_height"] = max(
-            float(pilot["home"][2]) + height_m, float(self._believed(i).position[2])
+        control_state = self._enter_guided(i, FlightMode.RETURN)
+        control_state["braking"] = True
+        control_state["phase"] = 0
+        control_state["sink"] = 0.0
+        control_state["return_height"] = max(
+            float(control_state["home"][2]) + height_m, float(self._believed(i).position[2])
         )
 
     def command_acceleration(
@@ -316,19 +318,19 @@ class FleetCommands:
             angle = float(rotations.yaw_of(self._believed(i).attitude))
         most_thrust = len(airframe.rotors.places) * airframe.max_rotor_thrust
         thrust = airframe.body.mass_kg * math.hypot(*level, lift)
-        pilot = self._enter_low_level(i, ControlLevel.ATTITUDE)
+        control_state = self._enter_low_level(i, ControlLevel.ATTITUDE)
         up = np.array([-level[1], level[0], 0.0, math.hypot(*level, lift) + lift])
         facing = [0.0, 0.0, math.sin(0.5 * angle), math.cos(0.5 * angle)]
         upright = bool(up.any())  # else it falls freely: any attitude will do, so this one
-        pilot["attitude"] = (
+        control_state["attitude"] = (
             rotations.multiply(rotations.normalize(up), facing) if upright else facing
         )
-        pilot["thrust"] = min(thrust, most_thrust)
-        pilot["yaw_rate"] = rate
+        control_state["thrust"] = min(thrust, most_thrust)
+        control_state["yaw_rate"] = rate
 
     def set_home(self, i: int, position: ArrayLike) -> None:
         """Place (3,) m, map, to which UAV `i` returns; else that of its last take-off."""
-        self._pilots["home"][i] = checked("home", position, (3,), MAX_COORDINATE)
+        self._control_states["home"][i] = checked("home", position, (3,), MAX_COORDINATE)
 
     # -------------------------------------------------------------------------------- inside
 
@@ -376,46 +378,51 @@ class FleetCommands:
 
     def _enter_low_level(self, i: int, level: ControlLevel) -> Any:
         self._wake(i)
-        pilot: Any = self._pilots[i]
-        pilot["mode"] = FlightMode.LOW_LEVEL
-        pilot["level"] = level
-        return pilot
+        control_state: Any = self._control_states[i]
+        control_state["mode"] = FlightMode.LOW_LEVEL
+        control_state["level"] = level
+        return control_state
 
     def _enter_guided(self, i: int, mode: FlightMode, *, from_ground: bool = False) -> Any:
         self._refuse_wreck(i)
         if self.mode(i) is FlightMode.LANDED and not from_ground:
             raise CommandError(f"{self.names[i]} stands on the ground; it must take off first")
         self._wake(i)
-        pilot: Any = self._pilots[i]
-        if pilot["level"] != ControlLevel.GUIDED:
+        control_state: Any = self._control_states[i]
+        if control_state["level"] != ControlLevel.GUIDED:
             motion = self._believed(i)
             yaw = float(rotations.yaw_of(motion.attitude))
-            pilot["level"] = ControlLevel.GUIDED
-            pilot["position"] = motion.position
-            pilot["velocity"] = motion.velocity
-            pilot["acceleration"] = 0.0
-            pilot["velocity_integral"] = 0.0
-            pilot["heading"] = pilot["heading_target"] = math.cos(yaw), math.sin(yaw)
-        if mode is not FlightMode.VELOCITY and pilot["turning"]:
-            pilot["heading_target"] = pilot["heading"]
-            pilot["turning"] = False
-        pilot["mode"] = mode
-        pilot["braking"] = False
-        pilot["calm_ticks"] = 0
-        return pilot
+            control_state["level"] = ControlLevel.GUIDED
+            control_state["position"] = motion.position
+            control_state["velocity"] = motion.velocity
+            control_state["acceleration"] = 0.0
+            control_state["velocity_integral"] = 0.0
+            control_state["heading"] = control_state["heading_target"] = (
+                math.cos(yaw),
+                math.sin(yaw),
+            )
+        if mode is not FlightMode.VELOCITY and control_state["turning"]:
+            control_state["heading_target"] = control_state["heading"]
+            control_state["turning"] = False
+        control_state["mode"] = mode
+        control_state["braking"] = False
+        control_state["calm_ticks"] = 0
+        return control_state
 
     def _command_velocity(self, i: int, velocity: ArrayLike, *, in_heading: bool) -> None:
         velocity = checked("velocity", velocity, (3,), 1e3)
-        pilot = self._enter_guided(i, FlightMode.VELOCITY)
-        pilot["hurried"] |= not velocity.any() and bool(pilot["velocity_target"].any())
-        pilot["velocity_target"] = velocity
-        pilot["velocity_in_heading"] = in_heading
-        pilot["deadline_step"] = self.step + pilot["timeout_steps"]
+        control_state = self._enter_guided(i, FlightMode.VELOCITY)
+        control_state["hurried"] |= not velocity.any() and bool(
+            control_state["velocity_target"].any()
+        )
+        control_state["velocity_target"] = velocity
+        control_state["velocity_in_heading"] = in_heading
+        control_state["deadline_step"] = self.step + control_state["timeout_steps"]
 
     def _turn(self, i: int, rate: Array) -> None:
-        self._pilots["turning"][i] = True
-        self._pilots["yaw_rate_target"][i] = rate
+        self._control_states["turning"][i] = True
+        self._control_states["yaw_rate_target"][i] = rate
 
     def _face(self, i: int, yaw: float) -> None:
-        self._pilots["turning"][i] = False
-        self._pilots["heading_target"][i] = math.cos(yaw), math.sin(yaw)
+        self._control_states["turning"][i] = False
+        self._control_states["heading_target"][i] = math.cos(yaw), math.sin(yaw)

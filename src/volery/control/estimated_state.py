@@ -29,7 +29,7 @@ BELIEF = np.dtype(
     ],
     align=True,
 )
-"""The motion believed, and how far it is from the truth; `PILOT.errs` tells whether it is."""
+"""The estimated motion and its error; see `CONTROL_STATE.errs`."""
 
 
 class EstimatedState(NamedTuple):

@@ -28,8 +28,8 @@ from volery.control.model_table import (
     new_references,
 )
 from volery.control.setpoints import (
+    CONTROL_STATE,
     MAX_COORDINATE,
-    PILOT,
     ControlLevel,
     checked,
     checked_attitude,
@@ -261,7 +261,7 @@ class Fleet(FleetCommands):
         belief["velocity_error"][rows] = error.velocity_map
         belief["rotation_error"][rows] = error.rotation_map
         belief["rate_error"][rows] = error.omega_body
-        self._pilots["errs"][rows] = True
+        self._control_states["errs"][rows] = True
 
     def displace(self, i: int, offset: ArrayLike) -> None:
         """Put UAV `i` elsewhere at once, by `offset` (3,) m, map; its motion goes on there."""
@@ -304,13 +304,13 @@ class Fleet(FleetCommands):
         """Stop the rotors of UAV `i` for good."""
         self._bodies["crashed"][i] = True
         self._wake(i)
-        pilot: Any = self._pilots[i]
-        fresh = np.zeros(1, PILOT)[0]
+        control_state: Any = self._control_states[i]
+        fresh = np.zeros(1, CONTROL_STATE)[0]
         for name in ("home", "heading", "heading_target", "timeout_steps", "full_thrust"):
-            fresh[name] = pilot[name]
+            fresh[name] = control_state[name]
         fresh["mode"] = FlightMode.CRASHED
         fresh["level"] = ControlLevel.STOPPED
-        self._pilots[i] = fresh
+        self._control_states[i] = fresh
 
     def strike(
         self,
@@ -423,7 +423,7 @@ class Fleet(FleetCommands):
             health = [rotor.thrust for rotor in worn[i]] or np.ones(int(plant["rotors"]))
             fit_rotors(self._bodies[i], plant, health)
             charge_battery(self._bodies[i], plant, float(charge[i]))
-            self._pilots["full_thrust"][i] = self.airframes[i].max_rotor_thrust
+            self._control_states["full_thrust"][i] = self.airframes[i].max_rotor_thrust
 
     def _begin(self, modes: Sequence[FlightMode]) -> None:
         """Let UAVs be in their first modes where they are, which is their home."""
@@ -431,7 +431,7 @@ class Fleet(FleetCommands):
         weight = np.array([airframe.weight for airframe in self.airframes])
         attitude = self._bodies["attitude"]
         self._references = new_references(self._models, attitude, weight * flying)
-        self._pilots["home"] = self._bodies["position_map"]
+        self._control_states["home"] = self._bodies["position_map"]
         self._bodies["last_contact_step"][~flying] = 0
         for i in np.flatnonzero(flying):
             self._start_in_air(int(i))
@@ -442,7 +442,7 @@ class Fleet(FleetCommands):
         if self._bodies["crashed"][i]:
             return
         if self.mode(i) is not FlightMode.LANDED:
-            self._pilots["level"][i] = ControlLevel.STOPPED
+            self._control_states["level"][i] = ControlLevel.STOPPED
             self._enter_guided(i, FlightMode.HOLD)["braking"] = True
         elif in_air:
             self._start_in_air(i)
@@ -453,10 +453,10 @@ class Fleet(FleetCommands):
         airframe = self.airframes[i]
         trim = np.sqrt(hover_thrusts(airframe) / airframe.rotors.thrust_n_s2)
         self._bodies["rotor_speed"][i, : len(trim)] = trim
-        self._pilots["rotor_reference"][i, : len(trim)] = trim
-        pilot = self._enter_guided(i, FlightMode.HOLD, from_ground=True)
-        pilot["thrust"] = airframe.weight
-        pilot["position_target"] = self._bodies["position_map"][i]
+        self._control_states["rotor_reference"][i, : len(trim)] = trim
+        control_state = self._enter_guided(i, FlightMode.HOLD, from_ground=True)
+        control_state["thrust"] = airframe.weight
+        control_state["position_target"] = self._bodies["position_map"][i]
 
     def _collide(self, i: int, j: int | None, normal_map: ArrayLike, *how: Any) -> float:
         size = impulses.collide(self.airframes, self.state, i, j, normal_map, *how)

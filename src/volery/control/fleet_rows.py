@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from volery.control.estimated_state import new_beliefs
 from volery.control.flight_modes import FlightMode
 from volery.control.fused_step import UAV
-from volery.control.setpoints import checked, new_pilots
+from volery.control.setpoints import checked, new_control_states
 from volery.core.errors import CommandError
 from volery.core.plurals import counted
 from volery.vehicle.fleet import NEVER, new_bodies
@@ -57,7 +57,7 @@ def new_uavs(
     count = len(position)
     uavs = np.zeros(count, UAV)
     uavs["body"] = new_bodies(position, attitude)
-    uavs["pilot"] = new_pilots(attitude)
+    uavs["control_state"] = new_control_states(attitude)
     uavs["model"] = model_rows
     uavs["copy"] = checked("copies", one_each(copies, count), (count,), 2**31)
     uavs["belief"] = new_beliefs(count)
@@ -73,7 +73,7 @@ def begun_anew(start: NDArray[np.void], step: int, air_tick: int) -> NDArray[np.
     fresh = start.copy()
     fresh["turbulence"]["first_tick"] = air_tick
     for name in ("deadline_step", "start_step"):
-        fresh["pilot"][name] += step
+        fresh["control_state"][name] += step
     touched = fresh["body"]["last_contact_step"] > NEVER
     fresh["body"]["last_contact_step"][touched] += step
     return fresh

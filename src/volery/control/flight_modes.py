@@ -92,97 +92,107 @@ CLIMBING, CROSSING, DESCENDING = 0, 1, 2
 
 
 @apart_kernel
-def guide(pilot: Any, estimate: Any, gains: Any, paths: Any, step: int, dt: float) -> None:
-    """One guidance tick of a `PILOT`: mode changes, the reference, attitude and thrust setpoints.
+def guide(control_state: Any, estimate: Any, gains: Any, paths: Any, step: int, dt: float) -> None:
+    """Runs one guidance tick: mode changes, the reference, attitude and thrust setpoints.
 
     estimate: a record with `position_map`, `velocity_map`, `attitude`. paths: the segments of all
     trajectories. step: the physics step that begins now, for times.
     """
-    if pilot.level != _GUIDED:
+    if control_state.level != _GUIDED:
         return
-    move_on(pilot, gains)
-    fx, fy, fz = plan(pilot, estimate, gains, paths, step, dt)
-    by_velocity = pilot.mode == VELOCITY or pilot.braking
+    move_on(control_state, gains)
+    fx, fy, fz = plan(control_state, estimate, gains, paths, step, dt)
+    by_velocity = control_state.mode == VELOCITY or control_state.braking
     track(
-        pilot, estimate, gains, not by_velocity, not (by_velocity or pilot.mode == LAND), fx, fy, fz
+        control_state,
+        estimate,
+        gains,
+        not by_velocity,
+        not (by_velocity or control_state.mode == LAND),
+        fx,
+        fy,
+        fz,
     )
-    if pilot.mode == LAND:
-        _settle(pilot, gains)
-        _feel_ground(pilot, gains, estimate.velocity_map[2])
+    if control_state.mode == LAND:
+        _settle(control_state, gains)
+        _feel_ground(control_state, gains, estimate.velocity_map[2])
 
 
 @inner_kernel
 def plan(
-    pilot: Any, estimate: Any, gains: Any, paths: Any, step: int, dt: float
+    control_state: Any, estimate: Any, gains: Any, paths: Any, step: int, dt: float
 ) -> tuple[float, float, float]:
     """Change modes and choose how the reference moves; the acceleration to feed forward.
 
     The reference is that of this tick already.
     """
-    _end_what_ended(pilot, estimate, gains, paths, step, dt)
-    if pilot.mode == TRAJECTORY:
-        if pilot.path_last >= 0:
-            rate, fx, fy, fz = follow_path(pilot, gains, paths, step, dt)
+    _end_what_ended(control_state, estimate, gains, paths, step, dt)
+    if control_state.mode == TRAJECTORY:
+        if control_state.path_last >= 0:
+            rate, fx, fy, fz = follow_path(control_state, gains, paths, step, dt)
         else:
-            rate, fx, fy, fz = follow_setpoint(pilot, gains, step, dt)
-        turn_heading(pilot, estimate, gains, rate)
+            rate, fx, fy, fz = follow_setpoint(control_state, gains, step, dt)
+        turn_heading(control_state, estimate, gains, rate)
         return fx, fy, fz
-    turn_heading(pilot, estimate, gains, 0.0)
-    if pilot.mode == VELOCITY:
-        tx, ty, tz = wanted_velocity(pilot, estimate, gains)
-        steer_level(pilot, estimate, gains, tx, ty)
-        steer_height(pilot, estimate, gains, tz)
+    turn_heading(control_state, estimate, gains, 0.0)
+    if control_state.mode == VELOCITY:
+        tx, ty, tz = wanted_velocity(control_state, estimate, gains)
+        steer_level(control_state, estimate, gains, tx, ty)
+        steer_height(control_state, estimate, gains, tz)
     else:
-        if pilot.braking:
-            brake_level(pilot, estimate, gains)
+        if control_state.braking:
+            brake_level(control_state, estimate, gains)
         else:
-            lead_level(pilot, estimate, gains, gains.speed)
-        if pilot.mode == LAND:
-            sink = pilot.sink if pilot.sink > 0.0 else gains.landing
-            steer_height(pilot, estimate, gains, -sink)
-        elif pilot.braking:
-            brake_height(pilot, estimate, gains)
+            lead_level(control_state, estimate, gains, gains.speed)
+        if control_state.mode == LAND:
+            sink = control_state.sink if control_state.sink > 0.0 else gains.landing
+            steer_height(control_state, estimate, gains, -sink)
+        elif control_state.braking:
+            brake_height(control_state, estimate, gains)
         else:
-            climb = gains.take_off if pilot.mode == TAKE_OFF else gains.climb
-            lead_height(pilot, estimate, gains, climb, gains.descent)
+            climb = gains.take_off if control_state.mode == TAKE_OFF else gains.climb
+            lead_height(control_state, estimate, gains, climb, gains.descent)
     drag = gains.drag
     return (
-        pilot.acceleration[0] + drag * pilot.velocity[0],
-        pilot.acceleration[1] + drag * pilot.velocity[1],
-        pilot.acceleration[2],
+        control_state.acceleration[0] + drag * control_state.velocity[0],
+        control_state.acceleration[1] + drag * control_state.velocity[1],
+        control_state.acceleration[2],
     )
 
 
 @inner_kernel
 def _end_what_ended(
-    pilot: Any, estimate: Any, gains: Any, paths: Any, step: int, dt: float
+    control_state: Any, estimate: Any, gains: Any, paths: Any, step: int, dt: float
 ) -> None:
     """Time-outs, trajectories that are flown, places that are reached."""
-    following = pilot.mode == TRAJECTORY and pilot.path_last >= 0
+    following = control_state.mode == TRAJECTORY and control_state.path_last >= 0
     if following:
-        if path_is_flown(pilot, paths, step, dt):
-            pilot.mode = HOLD
-    elif pilot.mode in (VELOCITY, TRAJECTORY) and step >= pilot.deadline_step:
-        pilot.mode = HOLD
-        pilot.braking = True
-    if pilot.mode in (VELOCITY, TRAJECTORY):
+        if path_is_flown(control_state, paths, step, dt):
+            control_state.mode = HOLD
+    elif control_state.mode in (VELOCITY, TRAJECTORY) and step >= control_state.deadline_step:
+        control_state.mode = HOLD
+        control_state.braking = True
+    if control_state.mode in (VELOCITY, TRAJECTORY):
         return
-    if pilot.turning:  # stop where it looks
-        pilot.turning = False
-        pilot.heading_target[0], pilot.heading_target[1] = pilot.heading[0], pilot.heading[1]
+    if control_state.turning:  # stop where it looks
+        control_state.turning = False
+        control_state.heading_target[0], control_state.heading_target[1] = (
+            control_state.heading[0],
+            control_state.heading[1],
+        )
     vx, vy, vz = three(estimate.velocity_map)
-    slow = vx * vx + vy * vy + (0.0 if pilot.mode == LAND else vz * vz)
-    if pilot.braking and slow < _STOPPED_M_S**2:
-        _lock_place(pilot, estimate, gains)
-    elif not pilot.braking:
-        _change_mode(pilot, estimate)
+    slow = vx * vx + vy * vy + (0.0 if control_state.mode == LAND else vz * vz)
+    if control_state.braking and slow < _STOPPED_M_S**2:
+        _lock_place(control_state, estimate, gains)
+    elif not control_state.braking:
+        _change_mode(control_state, estimate)
 
 
 @inner_kernel
-def wanted_velocity(pilot: Any, estimate: Any, gains: Any) -> tuple[float, float, float]:
+def wanted_velocity(control_state: Any, estimate: Any, gains: Any) -> tuple[float, float, float]:
     """The velocity commanded (m/s, map), within the airframe's limits."""
-    tx, ty, tz = three(pilot.velocity_target)
-    if pilot.velocity_in_heading:
+    tx, ty, tz = three(control_state.velocity_target)
+    if control_state.velocity_in_heading:
         c, s = heading_of(estimate)
         tx, ty = c * tx - s * ty, s * tx + c * ty
     size = math.sqrt(tx * tx + ty * ty)
@@ -193,81 +203,83 @@ def wanted_velocity(pilot: Any, estimate: Any, gains: Any) -> tuple[float, float
 
 
 @inner_kernel
-def _lock_place(pilot: Any, estimate: Any, gains: Any) -> None:
+def _lock_place(control_state: Any, estimate: Any, gains: Any) -> None:
     """Hold the place at which it will come to rest."""
-    pilot.braking = False
+    control_state.braking = False
     for k in range(3):
         way = estimate.velocity_map[k] / gains.ease
-        pilot.position_target[k] = estimate.position_map[k] + way
-    if pilot.mode == RETURN:
-        pilot.position_target[2] = pilot.return_height
+        control_state.position_target[k] = estimate.position_map[k] + way
+    if control_state.mode == RETURN:
+        control_state.position_target[2] = control_state.return_height
 
 
 @inner_kernel
-def _change_mode(pilot: Any, estimate: Any) -> None:
+def _change_mode(control_state: Any, estimate: Any) -> None:
     """End what has arrived: TAKE_OFF and GO_TO hold, RETURN goes on to its next phase."""
-    dx = pilot.position_target[0] - estimate.position_map[0]
-    dy = pilot.position_target[1] - estimate.position_map[1]
-    dz = pilot.position_target[2] - estimate.position_map[2]
+    dx = control_state.position_target[0] - estimate.position_map[0]
+    dy = control_state.position_target[1] - estimate.position_map[1]
+    dz = control_state.position_target[2] - estimate.position_map[2]
     vx, vy, vz = three(estimate.velocity_map)
     near = dx * dx + dy * dy + dz * dz < _ARRIVED_M**2
     slow = vx * vx + vy * vy + vz * vz < _ARRIVED_M_S**2
     if not (near and slow):
         return
-    if pilot.mode in (TAKE_OFF, GO_TO):
-        pilot.mode = HOLD
-    elif pilot.mode == RETURN:
-        if pilot.phase == CLIMBING:
-            pilot.phase = CROSSING
-            pilot.position_target[0] = pilot.home[0]
-            pilot.position_target[1] = pilot.home[1]
-        elif pilot.phase == CROSSING:
-            pilot.phase = DESCENDING
-            pilot.position_target[2] = min(pilot.position_target[2], pilot.home[2] + _RETURN_LOW_M)
+    if control_state.mode in (TAKE_OFF, GO_TO):
+        control_state.mode = HOLD
+    elif control_state.mode == RETURN:
+        if control_state.phase == CLIMBING:
+            control_state.phase = CROSSING
+            control_state.position_target[0] = control_state.home[0]
+            control_state.position_target[1] = control_state.home[1]
+        elif control_state.phase == CROSSING:
+            control_state.phase = DESCENDING
+            control_state.position_target[2] = min(
+                control_state.position_target[2], control_state.home[2] + _RETURN_LOW_M
+            )
         else:
-            pilot.mode = LAND
-            pilot.calm_ticks = 0
+            control_state.mode = LAND
+            control_state.calm_ticks = 0
 
 
 @inner_kernel
-def _settle(pilot: Any, gains: Any) -> None:
+def _settle(control_state: Any, gains: Any) -> None:
     """Stay level while the ground carries it.
 
     The shock of the touch-down leaves estimates of the speed off by a metre a second, and who leans
     against that tips over.
     """
-    if pilot.thrust < _CARRIED_THRUST * gains.weight:
-        half = 0.5 * math.atan2(pilot.heading[1], pilot.heading[0])
-        pilot.attitude[0] = pilot.attitude[1] = 0.0
-        pilot.attitude[2], pilot.attitude[3] = math.sin(half), math.cos(half)
+    if control_state.thrust < _CARRIED_THRUST * gains.weight:
+        half = 0.5 * math.atan2(control_state.heading[1], control_state.heading[0])
+        control_state.attitude[0] = control_state.attitude[1] = 0.0
+        control_state.attitude[2], control_state.attitude[3] = math.sin(half), math.cos(half)
 
 
 @inner_kernel
-def _feel_ground(pilot: Any, gains: Any, vz: float) -> None:
+def _feel_ground(control_state: Any, gains: Any, vz: float) -> None:
     """Stop the rotors once the ground has carried part of the weight for a while."""
-    carried = pilot.thrust < _GROUND_THRUST * gains.weight and abs(vz) < _GROUND_M_S
+    carried = control_state.thrust < _GROUND_THRUST * gains.weight and abs(vz) < _GROUND_M_S
     if carried:
-        pilot.calm_ticks += _SURE
-    elif pilot.thrust < _FALLING_THRUST * gains.weight:
-        pilot.calm_ticks += _LIKELY
+        control_state.calm_ticks += _SURE
+    elif control_state.thrust < _FALLING_THRUST * gains.weight:
+        control_state.calm_ticks += _LIKELY
     else:
-        pilot.calm_ticks = 0
-    if pilot.calm_ticks * gains.tick >= _SURE * _GROUND_S:
-        stop(pilot)
-        pilot.mode = LANDED
+        control_state.calm_ticks = 0
+    if control_state.calm_ticks * gains.tick >= _SURE * _GROUND_S:
+        stop(control_state)
+        control_state.mode = LANDED
 
 
 @inner_kernel
-def stop(pilot: Any) -> None:
+def stop(control_state: Any) -> None:
     """Rotors off, controllers at rest."""
-    pilot.level = _STOPPED
-    pilot.thrust = 0.0
-    pilot.yaw_rate = 0.0
-    pilot.calm_ticks = 0
-    pilot.braking = False
+    control_state.level = _STOPPED
+    control_state.thrust = 0.0
+    control_state.yaw_rate = 0.0
+    control_state.calm_ticks = 0
+    control_state.braking = False
     for k in range(3):
-        pilot.velocity[k] = 0.0
-        pilot.acceleration[k] = 0.0
-        pilot.velocity_integral[k] = 0.0
-        pilot.rates[k] = 0.0
-        pilot.rate_integral[k] = 0.0
+        control_state.velocity[k] = 0.0
+        control_state.acceleration[k] = 0.0
+        control_state.velocity_integral[k] = 0.0
+        control_state.rates[k] = 0.0
+        control_state.rate_integral[k] = 0.0

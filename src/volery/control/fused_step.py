@@ -13,7 +13,7 @@ from volery.control.flight_modes import CRASHED, guide, stop
 from volery.control.gains import GAINS
 from volery.control.plant_dispatch import fly_otherwise
 from volery.control.rates_attitude import hold_attitude, hold_rates
-from volery.control.setpoints import PILOT
+from volery.control.setpoints import CONTROL_STATE
 from volery.vehicle.battery import GUIDANCE_TICKS as BATTERY_TICKS
 from volery.vehicle.battery import drain
 from volery.vehicle.compiled import fused_kernel, inner_kernel
@@ -43,7 +43,7 @@ UAV = np.dtype(
         ("body", BODY),
         ("model", "i8"),
         ("copy", "i8"),
-        ("pilot", PILOT),
+        ("control_state", CONTROL_STATE),
         ("belief", BELIEF),
         ("turbulence", TURBULENCE),
     ],
@@ -153,12 +153,12 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
                 first_phase,
             )  # counted on: divisions would cost as much as a rotor
             body = uavs[i].body
-            pilot = uavs[i].pilot
+            control_state = uavs[i].control_state
             belief = uavs[i].belief
             model = models[uavs[i].model]
             plant = model.plant
-            if draining and plant.battery.capacity > 0.0 and drain(body, plant, pilot):
-                _note(events[written], step + 1, i, BATTERY_FELL, pilot.mode, 0.0, body)
+            if draining and plant.battery.capacity > 0.0 and drain(body, plant, control_state):
+                _note(events[written], step + 1, i, BATTERY_FELL, control_state.mode, 0.0, body)
                 written += 1
             if guiding:
                 turn_rotors(body, plant, guidance_steps * dt)
@@ -168,38 +168,46 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
                 if air[0].rain_water > 0.0 and model.kind != KINEMATIC_MOTION:
                     feel_rain(body, plant, air[0], period)
             for now in range(step, step + together):
-                guided = guiding or pilot.hurried
-                pilot.hurried = False
+                guided = guiding or control_state.hurried
+                control_state.hurried = False
                 if body.asleep:
                     for k in range(3):
                         body.acceleration_map[k] = body.angular_acceleration_body[k] = 0.0
                 else:
-                    mode = pilot.mode
+                    mode = control_state.mode
                     if references is None or model.kind == RIGID_BODY:
                         turning = phase == 0 or guided
                         if guided:
                             believe_place(belief, body)
                         if turning:
-                            believe_attitude(belief, body, pilot.errs)
+                            believe_attitude(belief, body, control_state.errs)
                         if guided:
-                            guide(pilot, belief, model.gains, paths, now, dt)
+                            guide(control_state, belief, model.gains, paths, now, dt)
                         if turning:
-                            hold_attitude(pilot, belief, model.gains)
-                        ox, oy, oz = believed_rates(belief, body, pilot.errs)
-                        hold_rates(pilot, ox, oy, oz, model.gains, dt)
+                            hold_attitude(control_state, belief, model.gains)
+                        ox, oy, oz = believed_rates(belief, body, control_state.errs)
+                        hold_rates(control_state, ox, oy, oz, model.gains, dt)
                         if feels_ground(body, plant):
                             feel_ground(body, plant, grid, steepest, dt)
-                        accelerate(body, plant, pilot, dt)
+                        accelerate(body, plant, control_state, dt)
                         touch = NO_TOUCH
                         if near_ground(body, dt):
                             touch = meet_ground(
-                                body, plant, pilot, grid, steepest, bounce, scratch, now + 1, dt
+                                body,
+                                plant,
+                                control_state,
+                                grid,
+                                steepest,
+                                bounce,
+                                scratch,
+                                now + 1,
+                                dt,
                             )
                         carry(body, dt)
                     else:
                         touch = fly_otherwise(
                             body,
-                            pilot,
+                            control_state,
                             belief,
                             model,
                             references,
@@ -219,10 +227,12 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
                         written += 1
                         if touch == IMPACT and not bounce and model.kind != KINEMATIC_MOTION:
                             body.crashed = True
-                            pilot.mode = CRASHED
-                            stop(pilot)
-                    if pilot.mode != mode:
-                        _note(events[written], now + 1, i, MODE_CHANGE, pilot.mode, 0.0, body)
+                            control_state.mode = CRASHED
+                            stop(control_state)
+                    if control_state.mode != mode:
+                        _note(
+                            events[written], now + 1, i, MODE_CHANGE, control_state.mode, 0.0, body
+                        )
                         written += 1
                 for k in range(3):
                     history_position[row, i, k] = body.position_map[k]

@@ -21,21 +21,21 @@ def heading_of(estimate: Any) -> tuple[float, float]:
 
 
 @inner_kernel
-def turn_heading(pilot: Any, estimate: Any, gains: Any, rate: float) -> None:
+def turn_heading(control_state: Any, estimate: Any, gains: Any, rate: float) -> None:
     """Move the heading setpoint by its rate, or towards its target; set the rate fed forward.
 
     rate: rad/s at which the target itself turns.
     """
-    c, s = pilot.heading[0], pilot.heading[1]
+    c, s = control_state.heading[0], control_state.heading[1]
     most = gains.yaw_rate_limit * gains.tick
-    if pilot.turning:
-        step = min(max(pilot.yaw_rate_target * gains.tick, -most), most)
+    if control_state.turning:
+        step = min(max(control_state.yaw_rate_target * gains.tick, -most), most)
         hc, hs = heading_of(estimate)
         # wait for a vehicle that has fallen 30 degrees behind
         if c * hc + s * hs < 0.866 and step * (hc * s - hs * c) > 0.0:
             step = 0.0
     else:
-        gc, gs = pilot.heading_target[0], pilot.heading_target[1]
+        gc, gs = control_state.heading_target[0], control_state.heading_target[1]
         step = c * gs - s * gc  # the sine of the angle left
         if c * gc + s * gs < 0.0:
             step = math.copysign(1.0, step)
@@ -44,5 +44,5 @@ def turn_heading(pilot: Any, estimate: Any, gains: Any, rate: float) -> None:
     turn = 1.0 - 0.5 * step * step
     c, s = c * turn - s * step, s * turn + c * step
     n = 1.5 - 0.5 * (c * c + s * s)
-    pilot.heading[0], pilot.heading[1] = n * c, n * s
-    pilot.yaw_rate = step * gains.inverse_tick
+    control_state.heading[0], control_state.heading[1] = n * c, n * s
+    control_state.yaw_rate = step * gains.inverse_tick

@@ -30,7 +30,7 @@ _POSE = int(ControlLevel.POSE)
 @inner_kernel
 def fly_kinematic(
     body: Any,
-    pilot: Any,
+    control_state: Any,
     belief: Any,
     plant: Any,
     model: Any,
@@ -46,34 +46,34 @@ def fly_kinematic(
 
     model: a `KINEMATIC` row. guiding: whether this step begins with a guidance tick.
     """
-    if pilot.level == _STOPPED:
+    if control_state.level == _STOPPED:
         _rest(body, plant)
         return 0
     for r in range(plant.rotors):
         body.rotor_speed[r] = model.hover_speed
-    if pilot.level == _POSE:
-        _take_pose(body, pilot, dt)
+    if control_state.level == _POSE:
+        _take_pose(body, control_state, dt)
         return stop_at_ground(body, plant, model, grid, steepest, step + 1, dt)
     if guiding:
         for k in range(3):
-            pilot.position[k] = body.position_map[k]
-            pilot.velocity[k] = body.velocity_map[k]
-        pilot.heading[0], pilot.heading[1] = heading_of(body)
+            control_state.position[k] = body.position_map[k]
+            control_state.velocity[k] = body.velocity_map[k]
+        control_state.heading[0], control_state.heading[1] = heading_of(body)
         believe_place(belief, body)
-        believe_attitude(belief, body, pilot.errs)
-        plan(pilot, belief, gains, paths, step, dt)
-    if pilot.mode == VELOCITY:
-        _follow_velocity(body, pilot, model, gains, dt)
-    elif pilot.mode == TRAJECTORY:
-        _follow_trajectory(body, pilot, paths, step, dt)
+        believe_attitude(belief, body, control_state.errs)
+        plan(control_state, belief, gains, paths, step, dt)
+    if control_state.mode == VELOCITY:
+        _follow_velocity(body, control_state, model, gains, dt)
+    elif control_state.mode == TRAJECTORY:
+        _follow_trajectory(body, control_state, paths, step, dt)
     else:
-        ax, ay, az = three(pilot.acceleration)
+        ax, ay, az = three(control_state.acceleration)
         glide(body, ax, ay, az, dt)
-        turn_by(body, pilot.yaw_rate, dt)
+        turn_by(body, control_state.yaw_rate, dt)
     touch = stop_at_ground(body, plant, model, grid, steepest, step + 1, dt)
-    if body.on_ground and pilot.mode == LAND:
-        stop(pilot)
-        pilot.mode = LANDED
+    if body.on_ground and control_state.mode == LAND:
+        stop(control_state)
+        control_state.mode = LANDED
     return touch
 
 
@@ -89,37 +89,37 @@ def _rest(body: Any, plant: Any) -> None:
 
 
 @inner_kernel
-def _take_pose(body: Any, pilot: Any, dt: float) -> None:
-    px, py, pz = three(pilot.position_target)
-    vx, vy, vz = three(pilot.velocity_target)
+def _take_pose(body: Any, control_state: Any, dt: float) -> None:
+    px, py, pz = three(control_state.position_target)
+    vx, vy, vz = three(control_state.velocity_target)
     put(body, px, py, pz, vx, vy, vz, dt)
     for k in range(4):
-        body.attitude[k] = pilot.attitude[k]
+        body.attitude[k] = control_state.attitude[k]
     for k in range(3):
-        body.angular_acceleration_body[k] = (pilot.rates[k] - body.omega_body[k]) / dt
-        body.omega_body[k] = pilot.rates[k]
+        body.angular_acceleration_body[k] = (control_state.rates[k] - body.omega_body[k]) / dt
+        body.omega_body[k] = control_state.rates[k]
 
 
 @inner_kernel
-def _follow_velocity(body: Any, pilot: Any, model: Any, gains: Any, dt: float) -> None:
+def _follow_velocity(body: Any, control_state: Any, model: Any, gains: Any, dt: float) -> None:
     """The velocity commanded, at once or with a lag; the reference goes along."""
     if model.limited:
-        tx, ty, tz = wanted_velocity(pilot, body, gains)
+        tx, ty, tz = wanted_velocity(control_state, body, gains)
     else:
-        tx, ty, tz = three(pilot.velocity_target)
-        if pilot.velocity_in_heading:
+        tx, ty, tz = three(control_state.velocity_target)
+        if control_state.velocity_in_heading:
             c, s = heading_of(body)
             tx, ty = c * tx - s * ty, s * tx + c * ty
-    rate = pilot.yaw_rate
-    if pilot.turning:
-        rate = pilot.yaw_rate_target
+    rate = control_state.yaw_rate
+    if control_state.turning:
+        rate = control_state.yaw_rate_target
         if model.limited:
             rate = min(max(rate, -gains.yaw_rate_limit), gains.yaw_rate_limit)
         rate += model.left * (body.omega_body[2] - rate)
     tx += model.left * (body.velocity_map[0] - tx)
     ty += model.left * (body.velocity_map[1] - ty)
     tz += model.left * (body.velocity_map[2] - tz)
-    if pilot.velocity_in_heading:
+    if control_state.velocity_in_heading:
         c, s = heading_of(body)
         drive(body, c * tx + s * ty, c * ty - s * tx, tz, rate, dt)
     else:
@@ -127,15 +127,19 @@ def _follow_velocity(body: Any, pilot: Any, model: Any, gains: Any, dt: float) -
         put(body, px + dt * tx, py + dt * ty, pz + dt * tz, tx, ty, tz, dt)
         turn_by(body, rate, dt)
     for k in range(3):
-        pilot.acceleration[k] = 0.0
+        control_state.acceleration[k] = 0.0
 
 
 @inner_kernel
-def _follow_trajectory(body: Any, pilot: Any, paths: Any, step: int, dt: float) -> None:
+def _follow_trajectory(body: Any, control_state: Any, paths: Any, step: int, dt: float) -> None:
     """Where the trajectory, or the setpoint that moves on by itself, is at the step's end."""
-    t = path_time(pilot, step + 1, dt)
-    if pilot.path_last < 0:
-        p, v, a = pilot.position_target, pilot.velocity_target, pilot.acceleration_target
+    t = path_time(control_state, step + 1, dt)
+    if control_state.path_last < 0:
+        p, v, a = (
+            control_state.position_target,
+            control_state.velocity_target,
+            control_state.acceleration_target,
+        )
         h = 0.5 * t
         put(
             body,
@@ -147,17 +151,17 @@ def _follow_trajectory(body: Any, pilot: Any, paths: Any, step: int, dt: float) 
             v[2] + t * a[2],
             dt,
         )
-        turn_by(body, pilot.yaw_rate, dt)
+        turn_by(body, control_state.yaw_rate, dt)
         return
-    t = min(t, paths[pilot.path_last, END])
-    row = segment_at(paths, pilot.path_row, pilot.path_last, t)
+    t = min(t, paths[control_state.path_last, END])
+    row = segment_at(paths, control_state.path_row, control_state.path_last, t)
     t -= paths[row, 0]
     px, vx, _ = polynomial(paths, row, 0, t)
     py, vy, _ = polynomial(paths, row, 1, t)
     pz, vz, _ = polynomial(paths, row, 2, t)
     put(body, px, py, pz, vx, vy, vz, dt)
-    if pilot.path_faces:
+    if control_state.path_faces:
         yaw, rate, _ = polynomial(paths, row, 3, t)
         face(body, math.cos(yaw), math.sin(yaw), rate, dt)
     else:
-        turn_by(body, pilot.yaw_rate, dt)
+        turn_by(body, control_state.yaw_rate, dt)

@@ -4,7 +4,7 @@ Thrusts are `allocation_matrix` times (thrust, torques); the gains' `by_thrust` 
 with the inertia multiplied in. Where that leaves a rotor's range, the vehicle keeps its attitude
 first: roll and pitch are scaled only where they alone exceed the range, thrust then moves to where
 roll and pitch fit, and yaw gets what room is left.
-A battery that sags leaves the rotors less: the mixer shares out `pilot.full_thrust`, as an
+A battery that sags leaves the rotors less: the mixer shares out `control_state.full_thrust`, as an
 autopilot does whose outputs are shares of the present full throttle.
 """
 
@@ -18,8 +18,8 @@ from volery.vehicle.compiled import inner_kernel
 
 
 @inner_kernel
-def mix(gains: Any, thrust: float, ax: float, ay: float, az: float, pilot: Any) -> None:
-    """Rotor speeds into `pilot.rotor_reference`, rad/s.
+def mix(gains: Any, thrust: float, ax: float, ay: float, az: float, control_state: Any) -> None:
+    """Rotor speeds into `control_state.rotor_reference`, rad/s.
 
     thrust: N. (ax, ay, az): angular acceleration by the rotors' torque, rad/s^2, FLU.
     """
@@ -33,17 +33,17 @@ def mix(gains: Any, thrust: float, ax: float, ay: float, az: float, pilot: Any) 
         )
         # where a thrust is below zero it is done again below
         speed = roots(magnitudes(f) * gains.inverse_thrust_constant)
-        put_lanes(pilot.rotor_reference, first, speed)
-        beyond |= any_outside(f, lanes_at(gains.least_thrusts, first), pilot.full_thrust)
-    pilot.saturated = beyond
-    if pilot.saturated:
-        _share(gains, thrust, ax, ay, az, pilot)
+        put_lanes(control_state.rotor_reference, first, speed)
+        beyond |= any_outside(f, lanes_at(gains.least_thrusts, first), control_state.full_thrust)
+    control_state.saturated = beyond
+    if control_state.saturated:
+        _share(gains, thrust, ax, ay, az, control_state)
 
 
 @inner_kernel
-def _share(gains: Any, thrust: float, ax: float, ay: float, az: float, pilot: Any) -> None:
+def _share(gains: Any, thrust: float, ax: float, ay: float, az: float, control_state: Any) -> None:
     """Like `mix` where a rotor's range is exceeded."""
-    low, high = gains.idle_thrust, pilot.full_thrust
+    low, high = gains.idle_thrust, control_state.full_thrust
     # the largest share of roll and pitch for which some collective thrust keeps all rotors in range
     share = 1.0
     for a in range(gains.rotors):
@@ -66,13 +66,13 @@ def _share(gains: Any, thrust: float, ax: float, ay: float, az: float, pilot: An
     turn = 1.0
     for r in range(gains.rotors):
         f = gains.by_thrust[r] * total + share * (gains.by_roll[r] * ax + gains.by_pitch[r] * ay)
-        pilot.rotor_reference[r] = f
+        control_state.rotor_reference[r] = f
         y = gains.by_yaw[r] * az
         if y > 0.0:
             turn = min(turn, max(high - f, 0.0) / y)
         elif y < 0.0:
             turn = min(turn, max(f - low, 0.0) / -y)
     for r in range(gains.rotors):
-        f = pilot.rotor_reference[r] + turn * gains.by_yaw[r] * az
+        f = control_state.rotor_reference[r] + turn * gains.by_yaw[r] * az
         f = min(max(f, low), high)
-        pilot.rotor_reference[r] = math.sqrt(f * gains.inverse_thrust_constant)
+        control_state.rotor_reference[r] = math.sqrt(f * gains.inverse_thrust_constant)

@@ -25,7 +25,7 @@ _FAR = 0.999
 
 @inner_kernel
 def track(
-    pilot: Any,
+    control_state: Any,
     estimate: Any,
     gains: Any,
     level_placed: bool,
@@ -39,13 +39,13 @@ def track(
     level_placed, height_placed: whether places count, horizontally and vertically. (fx, fy, fz):
     acceleration fed forward, m/s^2, map.
     """
-    ex, ey, ez = _velocity_error(pilot, estimate)
-    ix, iy, iz = three(pilot.velocity_integral)
+    ex, ey, ez = _velocity_error(control_state, estimate)
+    ix, iy, iz = three(control_state.velocity_integral)
     if level_placed:
         fx += gains.level_velocity * ex + ix
         fy += gains.level_velocity * ey + iy
         vx, vy = ex, ey
-        ex, ey, far = _level_error(pilot, estimate, gains)
+        ex, ey, far = _level_error(control_state, estimate, gains)
         ax, ay = fx + gains.level_position * ex, fy + gains.level_position * ey
         if far:
             share = gains.level_velocity / gains.level_position
@@ -57,7 +57,7 @@ def track(
         level_learning = gains.velocity_integral
     if height_placed:
         vz = ez
-        ez, far = _height_error(pilot, estimate, gains)
+        ez, far = _height_error(control_state, estimate, gains)
         az = fz + gains.height_velocity * vz + gains.height_position * ez + iz + GRAVITY
         if far:
             ez += gains.height_velocity / gains.height_position * vz
@@ -81,25 +81,29 @@ def track(
     bound = gains.integral_limit
     if free_xy:
         gain = level_learning * gains.tick
-        pilot.velocity_integral[0] = min(max(ix + gain * ex, -bound), bound)
-        pilot.velocity_integral[1] = min(max(iy + gain * ey, -bound), bound)
+        control_state.velocity_integral[0] = min(max(ix + gain * ex, -bound), bound)
+        control_state.velocity_integral[1] = min(max(iy + gain * ey, -bound), bound)
     if free_z:
         gain = learning * gains.tick
-        pilot.velocity_integral[2] = min(max(iz + gain * ez, -bound), bound)
-    _point_thrust(pilot, estimate, gains, ax, ay, az)
+        control_state.velocity_integral[2] = min(max(iz + gain * ez, -bound), bound)
+    _point_thrust(control_state, estimate, gains, ax, ay, az)
 
 
 @inner_kernel
-def _velocity_error(pilot: Any, estimate: Any) -> tuple[float, float, float]:
+def _velocity_error(control_state: Any, estimate: Any) -> tuple[float, float, float]:
     vx, vy, vz = three(estimate.velocity_map)
-    return pilot.velocity[0] - vx, pilot.velocity[1] - vy, pilot.velocity[2] - vz
+    return (
+        control_state.velocity[0] - vx,
+        control_state.velocity[1] - vy,
+        control_state.velocity[2] - vz,
+    )
 
 
 @inner_kernel
-def _level_error(pilot: Any, estimate: Any, gains: Any) -> tuple[float, float, bool]:
+def _level_error(control_state: Any, estimate: Any, gains: Any) -> tuple[float, float, bool]:
     """Way (m) to the reference's place, no longer than the leash; whether it is at its end."""
-    ex = pilot.position[0] - estimate.position_map[0]
-    ey = pilot.position[1] - estimate.position_map[1]
+    ex = control_state.position[0] - estimate.position_map[0]
+    ey = control_state.position[1] - estimate.position_map[1]
     square = ex * ex + ey * ey
     near = _FAR * gains.level_leash
     if square <= near * near:
@@ -109,15 +113,17 @@ def _level_error(pilot: Any, estimate: Any, gains: Any) -> tuple[float, float, b
 
 
 @inner_kernel
-def _height_error(pilot: Any, estimate: Any, gains: Any) -> tuple[float, bool]:
+def _height_error(control_state: Any, estimate: Any, gains: Any) -> tuple[float, bool]:
     """Like `_level_error`, upwards."""
-    ez = pilot.position[2] - estimate.position_map[2]
+    ez = control_state.position[2] - estimate.position_map[2]
     limit = gains.height_leash
     return min(max(ez, -limit), limit), abs(ez) > _FAR * limit
 
 
 @inner_kernel
-def _point_thrust(pilot: Any, estimate: Any, gains: Any, ax: float, ay: float, az: float) -> None:
+def _point_thrust(
+    control_state: Any, estimate: Any, gains: Any, ax: float, ay: float, az: float
+) -> None:
     """Attitude whose z axis lies along (ax, ay, az), az > 0, with the heading setpoint; thrust."""
     k = 1.0 / math.sqrt(ax * ax + ay * ay + az * az)
     zx, zy, zz = ax * k, ay * k, az * k
@@ -126,7 +132,7 @@ def _point_thrust(pilot: Any, estimate: Any, gains: Any, ax: float, ay: float, a
     px, py, pw = -zy * k, zx * k, (1.0 + zz) * k
     # turn about z after which the x axis, seen from above, points along the heading
     m = 2.0 * k * k
-    c, s = pilot.heading[0], pilot.heading[1]
+    c, s = control_state.heading[0], control_state.heading[1]
     cy = (1.0 - zy * zy * m) * c + zx * zy * m * s
     sy = zx * zy * m * c + (1.0 - zx * zx * m) * s
     k = 1.0 / math.sqrt(cy * cy + sy * sy)
@@ -138,10 +144,10 @@ def _point_thrust(pilot: Any, estimate: Any, gains: Any, ax: float, ay: float, a
     else:
         hz = math.sqrt(0.5 * (1.0 - cy))
         hw = 0.5 * sy / hz
-    pilot.attitude[0] = px * hw + py * hz
-    pilot.attitude[1] = py * hw - px * hz
-    pilot.attitude[2] = pw * hz
-    pilot.attitude[3] = pw * hw
+    control_state.attitude[0] = px * hw + py * hz
+    control_state.attitude[1] = py * hw - px * hz
+    control_state.attitude[2] = pw * hz
+    control_state.attitude[3] = pw * hw
     # thrust: the part of the wanted acceleration that the present thrust axis can give
     qx, qy, qz, qw = four(estimate.attitude)
     along = (
@@ -149,4 +155,4 @@ def _point_thrust(pilot: Any, estimate: Any, gains: Any, ax: float, ay: float, a
         + ay * 2.0 * (qy * qz - qx * qw)
         + az * (1.0 - 2.0 * (qx * qx + qy * qy))
     )
-    pilot.thrust = min(max(gains.mass * along, gains.least_thrust), gains.most_thrust)
+    control_state.thrust = min(max(gains.mass * along, gains.least_thrust), gains.most_thrust)

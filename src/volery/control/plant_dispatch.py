@@ -20,7 +20,7 @@ _STOPPED = int(ControlLevel.STOPPED)
 @apart_kernel
 def fly_otherwise(
     body: Any,
-    pilot: Any,
+    control_state: Any,
     belief: Any,
     model: Any,
     references: Any,
@@ -43,16 +43,31 @@ def fly_otherwise(
     if model.kind == KINEMATIC_MOTION:
         kinematic = model.kinematic
         return fly_kinematic(
-            body, pilot, belief, plant, kinematic, gains, paths, grid, steepest, step, guiding, dt
+            body,
+            control_state,
+            belief,
+            plant,
+            kinematic,
+            gains,
+            paths,
+            grid,
+            steepest,
+            step,
+            guiding,
+            dt,
         )
     if guiding:
         believe_place(belief, body)
-        believe_attitude(belief, body, pilot.errs)
-        guide(pilot, belief, gains, paths, step, dt)
-    live = pilot.level != _STOPPED
-    accelerate_identified(body, plant, model.identified, pilot, live, references, i, now, dt)
+        believe_attitude(belief, body, control_state.errs)
+        guide(control_state, belief, gains, paths, step, dt)
+    live = control_state.level != _STOPPED
+    accelerate_identified(
+        body, plant, model.identified, control_state, live, references, i, now, dt
+    )
     touch = NO_TOUCH
     if near_ground(body, dt):
-        touch = meet_ground(body, plant, pilot, grid, steepest, bounce, scratch, step + 1, dt)
+        touch = meet_ground(
+            body, plant, control_state, grid, steepest, bounce, scratch, step + 1, dt
+        )
     carry(body, dt)
     return touch

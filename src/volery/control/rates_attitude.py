@@ -23,49 +23,53 @@ _ATTITUDE = int(ControlLevel.ATTITUDE)
 
 
 @inner_kernel
-def hold_rates(pilot: Any, ox: float, oy: float, oz: float, gains: Any, dt: float) -> None:
-    """Rotor speeds of a `PILOT` from its rates setpoint and thrust; (ox, oy, oz): rates, rad/s."""
-    if pilot.level <= _ROTORS:
-        most = 0.0 if pilot.level == _STOPPED else _full_speed(pilot, gains)
+def hold_rates(control_state: Any, ox: float, oy: float, oz: float, gains: Any, dt: float) -> None:
+    """Rotor speeds from the rates setpoint and thrust of a `CONTROL_STATE`; (ox, oy, oz): rad/s."""
+    if control_state.level <= _ROTORS:
+        most = 0.0 if control_state.level == _STOPPED else _full_speed(control_state, gains)
         for r in range(gains.rotors):
-            pilot.rotor_reference[r] = min(pilot.rotor_target[r], most)
+            control_state.rotor_reference[r] = min(control_state.rotor_target[r], most)
         return
     gx, gy, gz = three(gains.gyroscopic)
-    ax = _angular_acceleration(pilot, gains, 0, ox, dt) + gx * oy * oz
-    ay = _angular_acceleration(pilot, gains, 1, oy, dt) + gy * oz * ox
-    az = _angular_acceleration(pilot, gains, 2, oz, dt) + gz * ox * oy
-    mix(gains, pilot.thrust, ax, ay, az, pilot)
+    ax = _angular_acceleration(control_state, gains, 0, ox, dt) + gx * oy * oz
+    ay = _angular_acceleration(control_state, gains, 1, oy, dt) + gy * oz * ox
+    az = _angular_acceleration(control_state, gains, 2, oz, dt) + gz * ox * oy
+    mix(gains, control_state.thrust, ax, ay, az, control_state)
 
 
 @inner_kernel
-def _full_speed(pilot: Any, gains: Any) -> float:
+def _full_speed(control_state: Any, gains: Any) -> float:
     """Speed of a rotor that gives all it can, rad/s."""
-    return math.sqrt(pilot.full_thrust * gains.inverse_thrust_constant)
+    return math.sqrt(control_state.full_thrust * gains.inverse_thrust_constant)
 
 
 @inner_kernel
-def _angular_acceleration(pilot: Any, gains: Any, axis: int, rate: float, dt: float) -> float:
-    error = pilot.rates[axis] - rate
-    integral = pilot.rate_integral[axis]
-    if not (pilot.saturated and error * integral > 0.0):
+def _angular_acceleration(
+    control_state: Any, gains: Any, axis: int, rate: float, dt: float
+) -> float:
+    error = control_state.rates[axis] - rate
+    integral = control_state.rate_integral[axis]
+    if not (control_state.saturated and error * integral > 0.0):
         limit = gains.rate_integral_limit[axis]
         integral += gains.rate_integral[axis] * error * dt
         integral = min(max(integral, -limit), limit)
-        pilot.rate_integral[axis] = integral
-    wanted: float = gains.rate_drag[axis] * pilot.rates[axis] + gains.rate[axis] * error + integral
+        control_state.rate_integral[axis] = integral
+    wanted: float = (
+        gains.rate_drag[axis] * control_state.rates[axis] + gains.rate[axis] * error + integral
+    )
     return wanted
 
 
 @inner_kernel
-def hold_attitude(pilot: Any, estimate: Any, gains: Any) -> None:
-    """Body rates of a `PILOT` that turn the present attitude into the wanted one.
+def hold_attitude(control_state: Any, estimate: Any, gains: Any) -> None:
+    """Body rates of a `CONTROL_STATE` that turn the present attitude into the wanted one.
 
     estimate: a record with `attitude`.
     """
-    if pilot.level < _ATTITUDE:
+    if control_state.level < _ATTITUDE:
         return
     x, y, z, w = four(estimate.attitude)
-    sx, sy, sz, sw = four(pilot.attitude)
+    sx, sy, sz, sw = four(control_state.attitude)
     # error = conjugate(present) * wanted
     ex = w * sx - x * sw - y * sz + z * sy
     ey = w * sy + x * sz - y * sw - z * sx
@@ -92,7 +96,7 @@ def hold_attitude(pilot: Any, estimate: Any, gains: Any) -> None:
     up_x, up_y = 2.0 * (x * z - y * w), 2.0 * (y * z + x * w)
     up_z = 1.0 - 2.0 * (x * x + y * y)
     limit = gains.yaw_rate_limit
-    turn = min(max(turn + pilot.yaw_rate * up_z, -limit), limit)
-    pilot.rates[0] = px + pilot.yaw_rate * up_x
-    pilot.rates[1] = py + pilot.yaw_rate * up_y
-    pilot.rates[2] = turn
+    turn = min(max(turn + control_state.yaw_rate * up_z, -limit), limit)
+    control_state.rates[0] = px + control_state.yaw_rate * up_x
+    control_state.rates[1] = py + control_state.yaw_rate * up_y
+    control_state.rates[2] = turn

@@ -16,13 +16,13 @@ from volery.vehicle.compiled import inner_kernel
 
 
 @inner_kernel
-def move_on(pilot: Any, gains: Any) -> None:
-    """Take the reference of a `PILOT` from the last guidance tick to this one."""
+def move_on(control_state: Any, gains: Any) -> None:
+    """Take the reference of a `CONTROL_STATE` from the last guidance tick to this one."""
     tick = gains.tick
     for k in range(3):
-        change = tick * pilot.acceleration[k]
-        pilot.position[k] += tick * (pilot.velocity[k] + 0.5 * change)
-        pilot.velocity[k] += change
+        change = tick * control_state.acceleration[k]
+        control_state.position[k] += tick * (control_state.velocity[k] + 0.5 * change)
+        control_state.velocity[k] += change
 
 
 @inner_kernel
@@ -43,18 +43,18 @@ def approach(
 
 
 @inner_kernel
-def lead_level(pilot: Any, estimate: Any, gains: Any, speed: float) -> None:
+def lead_level(control_state: Any, estimate: Any, gains: Any, speed: float) -> None:
     """Choose the horizontal acceleration that leads to `position_target` at up to `speed` m/s."""
-    dx = pilot.position[0] - estimate.position_map[0]
-    dy = pilot.position[1] - estimate.position_map[1]
+    dx = control_state.position[0] - estimate.position_map[0]
+    dy = control_state.position[1] - estimate.position_map[1]
     square = dx * dx + dy * dy
     if square > gains.level_leash * gains.level_leash:
         share = gains.level_leash / math.sqrt(square)
-        pilot.position[0] = estimate.position_map[0] + share * dx
-        pilot.position[1] = estimate.position_map[1] + share * dy
-    vx, vy = pilot.velocity[0], pilot.velocity[1]
-    dx = pilot.position_target[0] - pilot.position[0]
-    dy = pilot.position_target[1] - pilot.position[1]
+        control_state.position[0] = estimate.position_map[0] + share * dx
+        control_state.position[1] = estimate.position_map[1] + share * dy
+    vx, vy = control_state.velocity[0], control_state.velocity[1]
+    dx = control_state.position_target[0] - control_state.position[0]
+    dy = control_state.position_target[1] - control_state.position[1]
     distance = math.sqrt(dx * dx + dy * dy)
     ax, ay = -gains.ease * vx, -gains.ease * vy
     if distance > 1e-9:
@@ -67,78 +67,82 @@ def lead_level(pilot: Any, estimate: Any, gains: Any, speed: float) -> None:
         ahead = (turn - slope) * along
         ax += (gains.ease * wanted + ahead) * nx - turn * vx
         ay += (gains.ease * wanted + ahead) * ny - turn * vy
-    _choose_level(pilot, gains, ax, ay, gains.acceleration * gains.ease * gains.tick)
+    _choose_level(control_state, gains, ax, ay, gains.acceleration * gains.ease * gains.tick)
 
 
 @inner_kernel
-def lead_height(pilot: Any, estimate: Any, gains: Any, climb: float, descent: float) -> None:
+def lead_height(
+    control_state: Any, estimate: Any, gains: Any, climb: float, descent: float
+) -> None:
     """Choose the vertical acceleration that leads to `position_target`, limits in m/s."""
-    ahead = pilot.position[2] - estimate.position_map[2]
+    ahead = control_state.position[2] - estimate.position_map[2]
     ahead = min(max(ahead, -gains.height_leash), gains.height_leash)
-    pilot.position[2] = estimate.position_map[2] + ahead
-    dz = pilot.position_target[2] - pilot.position[2]
+    control_state.position[2] = estimate.position_map[2] + ahead
+    dz = control_state.position_target[2] - control_state.position[2]
     limit = climb if dz > 0.0 else descent
     wanted, slope = approach(
         abs(dz), gains.position, gains.height_brake, gains.height_linear, limit
     )
-    vz = pilot.velocity[2]
+    vz = control_state.velocity[2]
     az = gains.ease * (math.copysign(wanted, dz) - vz) - slope * vz
-    _choose_height(pilot, gains, az, gains.climb_acceleration * gains.ease * gains.tick)
+    _choose_height(control_state, gains, az, gains.climb_acceleration * gains.ease * gains.tick)
 
 
 @inner_kernel
-def steer_level(pilot: Any, estimate: Any, gains: Any, tx: float, ty: float) -> None:
+def steer_level(control_state: Any, estimate: Any, gains: Any, tx: float, ty: float) -> None:
     """Choose the horizontal acceleration that brings the velocity to (tx, ty) m/s.
 
     The reference's place is the vehicle's own: places do not count.
     """
     rate = gains.inverse_tick
-    ax, ay = rate * (tx - pilot.velocity[0]), rate * (ty - pilot.velocity[1])
-    _choose_level(pilot, gains, ax, ay, math.inf)
-    pilot.position[0] = estimate.position_map[0]
-    pilot.position[1] = estimate.position_map[1]
+    ax, ay = rate * (tx - control_state.velocity[0]), rate * (ty - control_state.velocity[1])
+    _choose_level(control_state, gains, ax, ay, math.inf)
+    control_state.position[0] = estimate.position_map[0]
+    control_state.position[1] = estimate.position_map[1]
 
 
 @inner_kernel
-def steer_height(pilot: Any, estimate: Any, gains: Any, tz: float) -> None:
+def steer_height(control_state: Any, estimate: Any, gains: Any, tz: float) -> None:
     """Like `steer_level`, for the vertical velocity tz."""
-    _choose_height(pilot, gains, gains.inverse_tick * (tz - pilot.velocity[2]), math.inf)
-    pilot.position[2] = estimate.position_map[2]
+    _choose_height(
+        control_state, gains, gains.inverse_tick * (tz - control_state.velocity[2]), math.inf
+    )
+    control_state.position[2] = estimate.position_map[2]
 
 
 @inner_kernel
-def brake_level(pilot: Any, estimate: Any, gains: Any) -> None:
+def brake_level(control_state: Any, estimate: Any, gains: Any) -> None:
     """Choose the horizontal acceleration that ends in rest, gently; places do not count."""
-    ax, ay = -gains.ease * pilot.velocity[0], -gains.ease * pilot.velocity[1]
-    _choose_level(pilot, gains, ax, ay, gains.acceleration * gains.ease * gains.tick)
-    pilot.position[0] = estimate.position_map[0]
-    pilot.position[1] = estimate.position_map[1]
+    ax, ay = -gains.ease * control_state.velocity[0], -gains.ease * control_state.velocity[1]
+    _choose_level(control_state, gains, ax, ay, gains.acceleration * gains.ease * gains.tick)
+    control_state.position[0] = estimate.position_map[0]
+    control_state.position[1] = estimate.position_map[1]
 
 
 @inner_kernel
-def brake_height(pilot: Any, estimate: Any, gains: Any) -> None:
+def brake_height(control_state: Any, estimate: Any, gains: Any) -> None:
     """Like `brake_level`, vertically."""
-    az = -gains.ease * pilot.velocity[2]
-    _choose_height(pilot, gains, az, gains.climb_acceleration * gains.ease * gains.tick)
-    pilot.position[2] = estimate.position_map[2]
+    az = -gains.ease * control_state.velocity[2]
+    _choose_height(control_state, gains, az, gains.climb_acceleration * gains.ease * gains.tick)
+    control_state.position[2] = estimate.position_map[2]
 
 
 @inner_kernel
-def _choose_level(pilot: Any, gains: Any, ax: float, ay: float, most_change: float) -> None:
+def _choose_level(control_state: Any, gains: Any, ax: float, ay: float, most_change: float) -> None:
     square = ax * ax + ay * ay
     if square > gains.acceleration * gains.acceleration:
         share = gains.acceleration / math.sqrt(square)
         ax *= share
         ay *= share
-    dx, dy = ax - pilot.acceleration[0], ay - pilot.acceleration[1]
+    dx, dy = ax - control_state.acceleration[0], ay - control_state.acceleration[1]
     square = dx * dx + dy * dy
     share = most_change / math.sqrt(square) if square > most_change * most_change else 1.0
-    pilot.acceleration[0] += share * dx
-    pilot.acceleration[1] += share * dy
+    control_state.acceleration[0] += share * dx
+    control_state.acceleration[1] += share * dy
 
 
 @inner_kernel
-def _choose_height(pilot: Any, gains: Any, az: float, most_change: float) -> None:
+def _choose_height(control_state: Any, gains: Any, az: float, most_change: float) -> None:
     az = min(max(az, -gains.climb_acceleration), gains.climb_acceleration)
-    change = az - pilot.acceleration[2]
-    pilot.acceleration[2] += min(max(change, -most_change), most_change)
+    change = az - control_state.acceleration[2]
+    control_state.acceleration[2] += min(max(change, -most_change), most_change)

@@ -17,65 +17,72 @@ _LEAST_ROWS = 64
 
 
 class SegmentStore:
-    """Blocks of rows; pilots (N,) of `setpoints.PILOT` know which block is theirs.
+    """Blocks of rows; control_states (N,) of `setpoints.CONTROL_STATE` know which block is theirs.
 
-    A block is free as soon as its pilot flies something else. Room is made by moving the blocks
-    together, and doubled where they fill more than half of it.
+    A block is free as soon as its control_state flies something else. Room is made by moving the
+    blocks together, and doubled where they fill more than half of it.
     """
 
-    def __init__(self, pilots: NDArray[np.void]) -> None:
-        self._pilots = pilots
+    def __init__(self, control_states: NDArray[np.void]) -> None:
+        self._control_states = control_states
         self._used = 0
         self.rows: Array = np.zeros((_LEAST_ROWS, SEGMENT_COLUMNS))
 
     def put(self, i: int, segments: Array) -> None:
-        """Store the trajectory of pilot `i` in place of what it had."""
-        pilot: Any = self._pilots[i]
-        pilot["path_last"] = -1
+        """Store the trajectory of control_state `i` in place of what it had."""
+        control_state: Any = self._control_states[i]
+        control_state["path_last"] = -1
         if self._used + len(segments) > len(self.rows):
             self._make_room(len(segments))
         first = self._used
         self._used = first + len(segments)
         self.rows[first : self._used] = segments
-        pilot["path_first"] = pilot["path_row"] = first
-        pilot["path_last"] = self._used - 1
+        control_state["path_first"] = control_state["path_row"] = first
+        control_state["path_last"] = self._used - 1
 
     def continue_from(self, other: SegmentStore, kept: Sequence[tuple[int, int]]) -> None:
-        """Store what pilots of another store fly: for each pair, own row and the other's.
+        """Store what control_states of another store fly: for each pair, own row and the other's.
 
-        The pilots' records have been copied already.
+        The control_states' records have been copied already.
         """
         for own, _ in kept:
-            self._pilots["path_last"][own] = -1
+            self._control_states["path_last"][own] = -1
         for own, row in kept:
-            pilot: Any = other._pilots[row]
-            if pilot["mode"] == FlightMode.TRAJECTORY and pilot["path_last"] >= 0:
-                self.put(own, other.rows[pilot["path_first"] : pilot["path_last"] + 1])
-                self._pilots["path_row"][own] += pilot["path_row"] - pilot["path_first"]
+            control_state: Any = other._control_states[row]
+            if control_state["mode"] == FlightMode.TRAJECTORY and control_state["path_last"] >= 0:
+                self.put(
+                    own, other.rows[control_state["path_first"] : control_state["path_last"] + 1]
+                )
+                self._control_states["path_row"][own] += (
+                    control_state["path_row"] - control_state["path_first"]
+                )
 
     def get_state(self) -> Array:
         """What a snapshot keeps."""
         return self.rows[: self._used].copy()
 
     def set_state(self, state: Array) -> None:
-        """Go back to a `get_state`; the pilots' rows are theirs to bring back."""
+        """Go back to a `get_state`; the control_states' rows are theirs to bring back."""
         self._used = len(state)
         self.rows = np.zeros((max(_LEAST_ROWS, len(state)), SEGMENT_COLUMNS))
         self.rows[: self._used] = state
 
     def _make_room(self, wanted: int) -> None:
-        pilots = self._pilots
+        control_states = self._control_states
         live = np.flatnonzero(
-            (pilots["mode"] == FlightMode.TRAJECTORY) & (pilots["path_last"] >= 0)
+            (control_states["mode"] == FlightMode.TRAJECTORY) & (control_states["path_last"] >= 0)
         )
-        blocks = [self.rows[pilots["path_first"][i] : pilots["path_last"][i] + 1] for i in live]
+        blocks = [
+            self.rows[control_states["path_first"][i] : control_states["path_last"][i] + 1]
+            for i in live
+        ]
         used = sum(len(block) for block in blocks)
         rows = np.zeros((max(_LEAST_ROWS, 2 * (used + wanted)), SEGMENT_COLUMNS))
         self._used = 0
         for i, block in zip(live, blocks, strict=True):
-            shift = self._used - pilots["path_first"][i]
+            shift = self._used - control_states["path_first"][i]
             rows[self._used : self._used + len(block)] = block
             self._used += len(block)
             for name in ("path_first", "path_row", "path_last"):
-                pilots[name][i] += shift
+                control_states[name][i] += shift
         self.rows = rows

@@ -39,7 +39,7 @@ class ControlLevel(IntEnum):
     """Pose of a kinematic UAV, moved from outside."""
 
 
-PILOT = np.dtype(
+CONTROL_STATE = np.dtype(
     [
         # what every step reads or writes, close together for the cache
         ("mode", "i8"),  # flight_modes.FlightMode
@@ -88,17 +88,17 @@ PILOT = np.dtype(
 """Commands, setpoints and controller states of one UAV; what every step needs lies together."""
 
 
-def new_pilots(attitude: Array) -> NDArray[np.void]:
-    """Pilots (N,) of UAVs that stand still with `attitude` (N, 4)."""
-    pilots = np.zeros(len(attitude), PILOT)
-    pilots["path_last"] = -1
-    pilots["attitude"] = attitude
+def new_control_states(attitude: Array) -> NDArray[np.void]:
+    """Control states (N,) of UAVs that stand still with `attitude` (N, 4)."""
+    control_states = np.zeros(len(attitude), CONTROL_STATE)
+    control_states["path_last"] = -1
+    control_states["attitude"] = attitude
     x, y, z, w = attitude.T
     heading = np.stack([1.0 - 2.0 * (y * y + z * z), 2.0 * (w * z + x * y)], axis=-1)
     length = np.linalg.norm(heading, axis=-1, keepdims=True)
     heading = np.where(length > 1e-6, heading / np.maximum(length, 1e-6), [1.0, 0.0])
-    pilots["heading"] = pilots["heading_target"] = heading
-    return pilots
+    control_states["heading"] = control_states["heading_target"] = heading
+    return control_states
 
 
 def checked(what: str, value: ArrayLike, shape: tuple[int, ...], limit: float) -> Array:

@@ -41,77 +41,87 @@ def segment_at(segments: Any, row: int, last: int, t: float) -> int:
 
 
 @inner_kernel
-def path_time(pilot: Any, step: int, dt: float) -> float:
+def path_time(control_state: Any, step: int, dt: float) -> float:
     """Time (s) since the start of what is followed."""
-    time: float = (step - pilot.start_step) * dt
+    time: float = (step - control_state.start_step) * dt
     return time
 
 
 @inner_kernel
-def path_is_flown(pilot: Any, paths: Any, step: int, dt: float) -> bool:
+def path_is_flown(control_state: Any, paths: Any, step: int, dt: float) -> bool:
     """Whether a trajectory has ended; if so, what is held from now on is set."""
-    end = paths[pilot.path_last, END]
-    if path_time(pilot, step, dt) < end:
+    end = paths[control_state.path_last, END]
+    if path_time(control_state, step, dt) < end:
         return False
     speed = 0.0
     for k in range(3):
-        p, v, _ = polynomial(paths, pilot.path_last, k, end - paths[pilot.path_last, BEGIN])
-        pilot.position_target[k] = pilot.position[k] = p
-        pilot.velocity[k] = v
-        pilot.acceleration[k] = 0.0
+        p, v, _ = polynomial(
+            paths, control_state.path_last, k, end - paths[control_state.path_last, BEGIN]
+        )
+        control_state.position_target[k] = control_state.position[k] = p
+        control_state.velocity[k] = v
+        control_state.acceleration[k] = 0.0
         speed += v * v
-    pilot.braking = speed > _AT_REST_M_S**2
+    control_state.braking = speed > _AT_REST_M_S**2
     return True
 
 
 @inner_kernel
 def follow_path(
-    pilot: Any, gains: Any, paths: Any, step: int, dt: float
+    control_state: Any, gains: Any, paths: Any, step: int, dt: float
 ) -> tuple[float, float, float, float]:
     """Put the reference where the trajectory is now; the yaw rate and acceleration to feed."""
-    t = path_time(pilot, step, dt)
-    last = pilot.path_last
-    row = segment_at(paths, pilot.path_row, last, t)
-    pilot.path_row = row
+    t = path_time(control_state, step, dt)
+    last = control_state.path_last
+    row = segment_at(paths, control_state.path_row, last, t)
+    control_state.path_row = row
     begin = paths[row, BEGIN]
     for k in range(3):
-        pilot.position[k], pilot.velocity[k], pilot.acceleration[k] = polynomial(
-            paths, row, k, t - begin
+        control_state.position[k], control_state.velocity[k], control_state.acceleration[k] = (
+            polynomial(paths, row, k, t - begin)
         )
     rate = 0.0
-    if pilot.path_faces:
+    if control_state.path_faces:
         yaw, rate, _ = polynomial(paths, row, 3, t - begin)
-        pilot.heading_target[0], pilot.heading_target[1] = math.cos(yaw), math.sin(yaw)
+        control_state.heading_target[0], control_state.heading_target[1] = (
+            math.cos(yaw),
+            math.sin(yaw),
+        )
     t = min(t + gains.lead, paths[last, END])
     row = segment_at(paths, row, last, t)
     t -= paths[row, BEGIN]
     _, vx, ax = polynomial(paths, row, 0, t)
     _, vy, ay = polynomial(paths, row, 1, t)
-    az = pilot.acceleration[2]  # thrust answers at once
+    az = control_state.acceleration[2]  # thrust answers at once
     return rate, ax + gains.drag * vx, ay + gains.drag * vy, az
 
 
 @inner_kernel
 def follow_setpoint(
-    pilot: Any, gains: Any, step: int, dt: float
+    control_state: Any, gains: Any, step: int, dt: float
 ) -> tuple[float, float, float, float]:
     """Like `follow_path` for a single setpoint, which moves on by its velocity and acceleration."""
-    t = path_time(pilot, step, dt)
+    t = path_time(control_state, step, dt)
     for k in range(3):
-        a = pilot.acceleration_target[k]
-        pilot.acceleration[k] = a
-        pilot.velocity[k] = pilot.velocity_target[k] + a * t
-        pilot.position[k] = pilot.position_target[k] + t * (pilot.velocity_target[k] + 0.5 * a * t)
-    rate = pilot.yaw_rate_target
-    if not pilot.turning:
+        a = control_state.acceleration_target[k]
+        control_state.acceleration[k] = a
+        control_state.velocity[k] = control_state.velocity_target[k] + a * t
+        control_state.position[k] = control_state.position_target[k] + t * (
+            control_state.velocity_target[k] + 0.5 * a * t
+        )
+    rate = control_state.yaw_rate_target
+    if not control_state.turning:
         turn = rate * gains.tick
-        c, s = pilot.heading_target[0], pilot.heading_target[1]
+        c, s = control_state.heading_target[0], control_state.heading_target[1]
         ct, st = math.cos(turn), math.sin(turn)
-        pilot.heading_target[0], pilot.heading_target[1] = ct * c - st * s, ct * s + st * c
+        control_state.heading_target[0], control_state.heading_target[1] = (
+            ct * c - st * s,
+            ct * s + st * c,
+        )
     drag = gains.drag
     return (
         rate,
-        pilot.acceleration[0] + drag * pilot.velocity[0],
-        pilot.acceleration[1] + drag * pilot.velocity[1],
-        pilot.acceleration[2],
+        control_state.acceleration[0] + drag * control_state.velocity[0],
+        control_state.acceleration[1] + drag * control_state.velocity[1],
+        control_state.acceleration[2],
     )

@@ -66,6 +66,7 @@ _QUANTITIES: dict[str, Quantity] = {
     "ohm": Quantity("ohm", 1000.0, 0.0, {"mohm": 1e-3}),
     "w": Quantity("W", 1e5, 0.0, {"mW": 1e-3}),
     "seed": Quantity("", float(_LARGEST_INT), low=0.0),
+    "fraction": Quantity("", 1.0, low=0.0),
     "share": Quantity("", 1.0, low=0.0),
     "damping": Quantity("", 100.0, 1e-3),
     # what sensors measure, and their noise

@@ -38,14 +38,14 @@ Touch = Callable[[int, int, Array, bool, int], None]
 class ActorShapes:
     """The things of a world, and looks at their shapes from near by, in their own frames."""
 
-    def __init__(self, things: MovingActors) -> None:
-        self.things = things
-        self._reach = [2.0 * shape.radius + _FARTHEST_LOOK_M for shape in things.shapes]
+    def __init__(self, actors: MovingActors) -> None:
+        self.actors = actors
+        self._reach = [2.0 * shape.radius + _FARTHEST_LOOK_M for shape in actors.shapes]
         by_shape: dict[int, Scene] = {}
-        for shape in things.shapes:
+        for shape in actors.shapes:
             if id(shape) not in by_shape:
                 by_shape[id(shape)] = _alone(shape)
-        self._scenes = [by_shape[id(shape)] for shape in things.shapes]
+        self._scenes = [by_shape[id(shape)] for shape in actors.shapes]
 
     def from_place(self, k: int, pose: Array, place: Array) -> tuple[Array, float]:
         """(3,) m, map, from thing `k` at `pose` (7,) out to a place (3,) m, and the distance.
@@ -68,14 +68,14 @@ class ActorContacts:
     """Looks from UAVs at things in time, and tells `touch` of those that meet."""
 
     def __init__(self, fleet: Fleet, looks: ActorShapes, touch: Touch) -> None:
-        things = looks.things
+        actors = looks.actors
         self._fleet = fleet
-        self._things = things
+        self._actors = actors
         self._looks = looks
         self._touch = touch
         self._radius = np.array([a.body.collision_radius_m for a in fleet.airframes])
-        self._reach = np.array([shape.radius for shape in things.shapes])
-        self._touching = np.zeros((len(self._radius), len(things)), dtype=bool)
+        self._reach = np.array([shape.radius for shape in actors.shapes])
+        self._touching = np.zeros((len(self._radius), len(actors)), dtype=bool)
         self._next_ns = np.zeros(len(self._radius), dtype=np.int64)
         """When each UAV has to look again at the latest."""
 
@@ -92,7 +92,7 @@ class ActorContacts:
         rows = np.union1d(refilled, np.flatnonzero(self._next_ns <= time_ns))
         if not len(rows):
             return
-        poses, speeds = self._things.poses_at(time_ns), self._things.speeds_m_s
+        poses, speeds = self._actors.poses_at(time_ns), self._actors.speeds_m_s
         state = self._fleet.state
         for i in rows.tolist():
             gaps, is_near = self._look_around(i, poses, time_ns)

@@ -75,21 +75,21 @@ class Collisions:
         self._crew = len(names) // copies
         self._touching_uav = np.zeros((len(names), self._crew), dtype=bool)
         """Who touches whom (row, place of the other in the copy)."""
-        self._things = None if looks is None else ActorContacts(fleet, looks, self._touch_thing)
+        self._actors = None if looks is None else ActorContacts(fleet, looks, self._touch_actor)
         """Touches of things that move by themselves, where there are any."""
-        self._moving = None if looks is None else looks.things
+        self._moving = None if looks is None else looks.actors
         fleet.state.contact_budget[:] = 0.0
         fleet.state.separation_budget[:] = 0.0
 
     @property
     def next_look_ns(self) -> int | None:
         """When somebody has to look again at the latest; None where that follows from motion."""
-        return None if self._things is None else self._things.next_look_ns
+        return None if self._actors is None else self._actors.next_look_ns
 
     def resolve(self, time_ns: int) -> None:
         """Look around every UAV whose budget is used up; strike, report, and refill."""
         state = self._fleet.state
-        if self._things is None and not _is_used_up(state.contact_budget, state.separation_budget):
+        if self._actors is None and not _is_used_up(state.contact_budget, state.separation_budget):
             return
         used_up = np.flatnonzero(state.contact_budget <= 0.0)
         if len(used_up):
@@ -97,16 +97,16 @@ class Collisions:
         used_up = np.flatnonzero(state.separation_budget <= 0.0)
         for i in used_up:
             self._resolve_others(int(i), time_ns)
-        if self._things is not None:
-            self._things.resolve(used_up, time_ns)
+        if self._actors is not None:
+            self._actors.resolve(used_up, time_ns)
 
     def get_state(self) -> dict[str, Any]:
         """What a snapshot keeps beside the fleet's own budgets: who touches what."""
-        things = None if self._things is None else self._things.get_state()
+        actors = None if self._actors is None else self._actors.get_state()
         return {
             "solid": self._touched_solid.copy(),
             "uav": self._touching_uav.copy(),
-            "things": things,
+            "actors": actors,
         }
 
     def forget(self, rows: NDArray[np.int64]) -> None:
@@ -116,8 +116,8 @@ class Collisions:
         for row in rows.tolist():
             crew = self._crew_of(row)
             self._touching_uav[crew, row - crew.start] = False
-        if self._things is not None:
-            self._things.forget(rows)
+        if self._actors is not None:
+            self._actors.forget(rows)
         self._fleet.state.contact_budget[rows] = 0.0
         self._fleet.state.separation_budget[rows] = 0.0
 
@@ -126,10 +126,10 @@ class Collisions:
         self._touched_solid[self._touched_solid >= first_instance] = -1
         self._fleet.state.contact_budget[:] = 0.0
 
-    def look_at_things(self) -> None:
+    def look_at_actors(self) -> None:
         """Look at once at things, one of which was put somewhere."""
-        if self._things is not None:
-            self._things.look_again()
+        if self._actors is not None:
+            self._actors.look_again()
 
     def continue_from(self, other: Collisions, kept: Sequence[tuple[int, int]]) -> None:
         """Know who touches what of another fleet's UAVs: own row and the other's, for each pair.
@@ -139,15 +139,15 @@ class Collisions:
         own, theirs = np.array(kept, np.int64).reshape(-1, 2).T
         self._touched_solid[own] = other._touched_solid[theirs]
         self._touching_uav[np.ix_(own, own)] = other._touching_uav[np.ix_(theirs, theirs)]
-        if self._things is not None and other._things is not None:
-            self._things.continue_from(other._things, own, theirs)
+        if self._actors is not None and other._actors is not None:
+            self._actors.continue_from(other._actors, own, theirs)
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go back to a kept state."""
         self._touched_solid[...] = state["solid"]
         self._touching_uav[...] = state["uav"]
-        if self._things is not None:
-            self._things.set_state(state["things"])
+        if self._actors is not None:
+            self._actors.set_state(state["actors"])
 
     # ----------------------------------------------------------------------- trees and solids
 
@@ -212,7 +212,7 @@ class Collisions:
 
     # ------------------------------------------------------------------------------------- things
 
-    def _touch_thing(self, i: int, k: int, away: Array, is_new: bool, time_ns: int) -> None:
+    def _touch_actor(self, i: int, k: int, away: Array, is_new: bool, time_ns: int) -> None:
         """A thing is not moved by what it meets; a UAV is struck as fast as the two approach."""
         assert self._moving is not None
         state, normal = self._fleet.state, _unit(away)

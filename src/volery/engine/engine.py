@@ -110,9 +110,9 @@ class Engine:
         self.names = names
         """Of the UAVs, in fleet order."""
         self._response = CRASH if crash_on_contact else BOUNCE
-        self.things = scene.things
+        self.actors = scene.actors
         """What moves through the world by itself, where there is anything."""
-        self._looks = None if self.things is None else ActorShapes(self.things)
+        self._looks = None if self.actors is None else ActorShapes(self.actors)
         self.collisions = self._new_collisions(copies)
         self.state_check = StateCheck(fleet)
         self.banks = tuple(banks)
@@ -201,7 +201,7 @@ class Engine:
             if in_pieces and (self.fleet.step < before or self.is_broken_off):
                 return
 
-    def take_in(self, idle_s: float = 0.0) -> None:
+    def process_commands(self, idle_s: float = 0.0) -> None:
         """Do what was posted and hand out what that published; between ticks.
 
         idle_s: wall time to spare, in which clients may do more than their budget; see
@@ -263,15 +263,15 @@ class Engine:
         """Let other solids stand in the world from the next physics step on; see `Scene`."""
         self.collisions.look_again(self.scene.replace_solids(solids))
 
-    def put_thing(self, row: int, pose: ArrayLike, velocity: ArrayLike) -> None:
+    def set_actor_pose(self, row: int, pose: ArrayLike, velocity: ArrayLike) -> None:
         """Put a thing at `pose` (7,) from now on, moving on at `velocity` (3,) m/s, map.
 
         `CommandError` for one that has a way of its own.
         """
-        if self.things is None:
+        if self.actors is None:
             raise CommandError("there are no things in this world")
-        self.things.say(row, self.time_ns, pose, velocity)
-        self.collisions.look_at_things()
+        self.actors.say(row, self.time_ns, pose, velocity)
+        self.collisions.look_at_actors()
 
     def collect_events(self) -> list[Event]:
         """Events since the last call, oldest first."""
@@ -335,7 +335,7 @@ class Engine:
             "banks": [bank.get_state() for bank in self.banks],
             "due": [part.get_state() for part in self._due],
             "estimation": None if self.estimation is None else self.estimation.get_state(),
-            "things": None if self.things is None else self.things.get_state(),
+            "actors": None if self.actors is None else self.actors.get_state(),
             "new_events": list(self._new_events),
         }
 
@@ -350,8 +350,8 @@ class Engine:
             part.set_state(kept)
         if self.estimation is not None:
             self.estimation.set_state(state["estimation"])
-        if self.things is not None:
-            self.things.set_state(state["things"])
+        if self.actors is not None:
+            self.actors.set_state(state["actors"])
         self._new_events[:] = state["new_events"]
 
     # -------------------------------------------------------------------------------- inside

@@ -36,7 +36,7 @@ class EstimationSetup:
 
     uavs: Rows
     """(E,) rows of the fleet."""
-    flies: NDArray[np.bool_]
+    used_for_control: NDArray[np.bool_]
     """(E,) whether the UAV's controllers fly on the estimate."""
     listens: Mapping[tuple[int, str], int]
     """Estimator that listens to a sensor, by row of the UAV and name of the sensor."""
@@ -73,8 +73,8 @@ class Estimation:
         self.setup = setup
         self._fleet = fleet
         self._known: dict[int, tuple[tuple[SensorId, ...], Rows | slice, Rows]] = {}
-        flying = np.flatnonzero(setup.flies)
-        self._anyone_flies = len(flying) > 0
+        flying = np.flatnonzero(setup.used_for_control)
+        self._is_used_for_control = len(flying) > 0
         self._flying = in_one_piece(flying), in_one_piece(setup.uavs[flying])
         self._pose_ns = np.full(len(estimator), _NEVER_NS)
 
@@ -216,11 +216,11 @@ class Estimation:
 
     def _tell_fleet(self, rows: Rows | None = None) -> None:
         """Tell the controllers how far what they fly on is from the truth; `rows` (E,), or all."""
-        if not self._anyone_flies:
+        if not self._is_used_for_control:
             return
         flying, uavs = self._flying
         if rows is not None:
-            flying = rows[self.setup.flies[rows]]
+            flying = rows[self.setup.used_for_control[rows]]
             uavs = self.setup.uavs[flying]
         error = estimation_error(
             _rows_of(self.estimator.state, flying), _rows_of(self._fleet.state, uavs)

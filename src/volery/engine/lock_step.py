@@ -6,7 +6,7 @@ as reproducible as they are. Who lets the engine wait longer than the agreed tim
 an error, or, where that was agreed, is left behind. Nobody can take a partner back to an earlier
 state; one that begins anew by itself lets the simulation be reset.
 
-    partner = simulation.add_partner("pilot", period_s=0.02, timeout_s=5.0)
+    partner = simulation.add_partner("control_state", period_s=0.02, timeout_s=5.0)
 
     # in the partner's thread
     while (time_ns := partner.wait()) is not None:
@@ -43,7 +43,7 @@ class Partner:
         *,
         on_meeting: Callable[[int], None] | None = None,
         is_there: Callable[[], bool] | None = None,
-        restarts: bool = False,
+        supports_reset: bool = False,
         meets_at_start: bool = False,
         period_s: float = 0.0,
     ) -> None:
@@ -55,7 +55,7 @@ class Partner:
         self.name = name
         self.timeout_s = timeout_s
         self.period_s = period_s
-        self.restarts = restarts
+        self.supports_reset = supports_reset
         self.meets_at_start = meets_at_start
         self._on_timeout = on_timeout
         self._on_meeting = on_meeting
@@ -158,7 +158,7 @@ def check_terms(period_s: float, timeout_s: float, on_timeout: str, dt_ns: int) 
 class PartnerBarrier(Protocol):
     """How the engine waits: it does meanwhile what others post, the partners' own messages too."""
 
-    def take_in(self, idle_s: float) -> None:
+    def process_commands(self, idle_s: float) -> None:
         """Do what was posted; `idle_s` of wall time are to spare for it."""
 
     def wait(self, timeout_s: float) -> None:
@@ -186,7 +186,7 @@ def meet(partners: Sequence[Partner], time_ns: int, engine: PartnerBarrier) -> b
             if left_s <= 0.0:
                 break
             engine.wait(min(left_s, _LOOK_S))
-            engine.take_in(_SPARE_S)
+            engine.process_commands(_SPARE_S)
             if not engine.goes_on():
                 return False
     for partner in waited_for:

@@ -104,7 +104,7 @@ class Pacer:
         for request in dropped:
             request.tell()
 
-    def be_prompt(self) -> None:
+    def use_low_latency(self) -> None:
         """Make slices of `_PROMPT_SLICE_S`: what is commanded acts that soon in wall time."""
         self._slice_s = _PROMPT_SLICE_S
 

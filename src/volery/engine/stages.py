@@ -32,7 +32,7 @@ def take_commands(engine: Engine, _tick: Tick) -> None:
     Nothing is half done here, so that an action may take the simulation back to an earlier state.
     What was published is handed out, so that it acts on the physics steps of this very tick.
     """
-    engine.take_in()
+    engine.process_commands()
 
 
 def advance_vehicles(engine: Engine, tick: Tick) -> None:

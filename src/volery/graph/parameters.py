@@ -23,19 +23,19 @@ from volery.core.quantities import fault_in
 class Within(NamedTuple):
     """Bounds of a number; whatever is not finite lies outside."""
 
-    least: float
-    most: float = math.inf
+    min_value: float
+    max_value: float = math.inf
 
     def holds(self, value: Any) -> bool:
         """Whether a number lies within."""
-        return bool(self.least <= value <= self.most and value < math.inf)
+        return bool(self.min_value <= value <= self.max_value and value < math.inf)
 
     def __str__(self) -> str:
         """As an error tells it."""
         return (
-            f"{self.least:g} to {self.most:g}"
-            if self.most < math.inf
-            else f"{self.least:g} or more"
+            f"{self.min_value:g} to {self.max_value:g}"
+            if self.max_value < math.inf
+            else f"{self.min_value:g} or more"
         )
 
 

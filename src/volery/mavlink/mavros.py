@@ -55,10 +55,10 @@ _NOTHING = (math.nan, math.nan, math.nan)
 
 
 class Mavros:
-    """The topics below `prefix` of the autopilot `pilot`, on the graph of `node`."""
+    """The topics below `prefix` of the autopilot `autopilot`, on the graph of `node`."""
 
-    def __init__(self, node: Node, pilot: Autopilot, prefix: str) -> None:
-        self._pilot = pilot
+    def __init__(self, node: Node, autopilot: Autopilot, prefix: str) -> None:
+        self._autopilot = autopilot
         self._prefix = prefix if prefix.startswith("/") else f"{node.get_namespace()}/{prefix}"
         self._told: dict[str, int] = {}
         self._last_state: tuple[Any, ...] = ()
@@ -92,7 +92,7 @@ class Mavros:
 
     def tell(self) -> None:
         """Publish what is due."""
-        pilot, memory = self._pilot, self._pilot.memory
+        autopilot, memory = self._autopilot, self._autopilot.memory
         state = (memory.armed, memory.mode)
         if self._is_due("slow", _SLOW_NS) or state != self._last_state:
             self._last_state = state
@@ -102,7 +102,7 @@ class Mavros:
                 (self._battery, self._battery_message),
             ):
                 if publisher.wanted:
-                    publisher.publish(build(pilot))
+                    publisher.publish(build(autopilot))
         if self._is_due("fast", _FAST_NS):
             for publisher, build in (
                 (self._pose, self._pose_message),
@@ -111,10 +111,10 @@ class Mavros:
                 (self._global, self._global_message),
             ):
                 if publisher.wanted:
-                    publisher.publish(build(pilot))
+                    publisher.publish(build(autopilot))
 
     def _is_due(self, what: str, period_ns: int) -> bool:
-        now_ns = self._pilot.memory.now_ns
+        now_ns = self._autopilot.memory.now_ns
         last_ns = self._told.get(what, -period_ns)
         if 0 <= now_ns - last_ns < period_ns:
             return False
@@ -122,10 +122,10 @@ class Mavros:
         return True
 
     def _header(self, frame: str = "map") -> Any:
-        return header(self._pilot.memory.now_ns, frame)
+        return header(self._autopilot.memory.now_ns, frame)
 
-    def _state_message(self, pilot: Autopilot) -> Any:
-        memory = pilot.memory
+    def _state_message(self, autopilot: Autopilot) -> Any:
+        memory = autopilot.memory
         message = zero_message(_STATE)
         message.header = self._header("")
         message.connected, message.armed = True, memory.armed
@@ -135,46 +135,49 @@ class Mavros:
         message.system_status = 4 if memory.armed else 3
         return message
 
-    def _extended_message(self, pilot: Autopilot) -> Any:
+    def _extended_message(self, autopilot: Autopilot) -> Any:
         message = zero_message(_EXTENDED)
         message.header = self._header("")
         landed = {"LANDED": 1, "CRASHED": 1, "TAKE_OFF": 3, "LAND": 4}
-        message.landed_state = landed.get(pilot.state.mode, 2)
+        message.landed_state = landed.get(autopilot.state.mode, 2)
         return message
 
-    def _battery_message(self, pilot: Autopilot) -> Any:
+    def _battery_message(self, autopilot: Autopilot) -> Any:
         message = zero_message("sensor_msgs/msg/BatteryState")
         message.header = self._header("")
-        message.voltage, message.current = pilot.state.voltage, -pilot.state.current
-        message.percentage, message.present = pilot.state.charge, math.isfinite(pilot.state.charge)
+        message.voltage, message.current = autopilot.state.voltage, -autopilot.state.current
+        message.percentage, message.present = (
+            autopilot.state.charge,
+            math.isfinite(autopilot.state.charge),
+        )
         return message
 
-    def _local_pose(self, pilot: Autopilot) -> Any:
-        origin = pilot.memory.origin
-        x, y, z = (p - o for p, o in zip(pilot.state.position, origin, strict=True))
-        return Pose(Point(x, y, z), Quaternion(*pilot.state.attitude))
+    def _local_pose(self, autopilot: Autopilot) -> Any:
+        origin = autopilot.memory.origin
+        x, y, z = (p - o for p, o in zip(autopilot.state.position, origin, strict=True))
+        return Pose(Point(x, y, z), Quaternion(*autopilot.state.attitude))
 
-    def _pose_message(self, pilot: Autopilot) -> Any:
-        return PoseStamped(self._header(), self._local_pose(pilot))
+    def _pose_message(self, autopilot: Autopilot) -> Any:
+        return PoseStamped(self._header(), self._local_pose(autopilot))
 
-    def _velocity_message(self, pilot: Autopilot) -> Any:
-        twist = Twist(Vector3(*pilot.state.velocity), Vector3(*pilot.state.rates))
+    def _velocity_message(self, autopilot: Autopilot) -> Any:
+        twist = Twist(Vector3(*autopilot.state.velocity), Vector3(*autopilot.state.rates))
         return TwistStamped(self._header(), twist)
 
-    def _odom_message(self, pilot: Autopilot) -> Any:
-        turned = rotate(conjugate(pilot.state.attitude), pilot.state.velocity).tolist()
-        twist = Twist(Vector3(*turned), Vector3(*pilot.state.rates))
+    def _odom_message(self, autopilot: Autopilot) -> Any:
+        turned = rotate(conjugate(autopilot.state.attitude), autopilot.state.velocity).tolist()
+        twist = Twist(Vector3(*turned), Vector3(*autopilot.state.rates))
         nothing = np.zeros(36)
         return Odometry(
             self._header(),
             "base_link",
-            PoseWithCovariance(self._local_pose(pilot), nothing),
+            PoseWithCovariance(self._local_pose(autopilot), nothing),
             TwistWithCovariance(twist, nothing),
         )
 
-    def _global_message(self, pilot: Autopilot) -> Any:
-        latitude, longitude, altitude = pilot.earth.geodetic(pilot.state.position)
-        status: Any = NavSatStatus(-1 if pilot.memory.fix_lost else 0, 1)
+    def _global_message(self, autopilot: Autopilot) -> Any:
+        latitude, longitude, altitude = autopilot.earth.geodetic(autopilot.state.position)
+        status: Any = NavSatStatus(-1 if autopilot.memory.fix_lost else 0, 1)
         covariance = np.zeros(9)
         return NavSatFix(
             self._header("base_link"), status, latitude, longitude, altitude, covariance, 0
@@ -188,12 +191,12 @@ class Mavros:
                 setpoint = read(message)
             except CommandError:
                 return  # a setpoint that is none has nobody to tell
-            offboard.take(self._pilot, _SOURCE, setpoint)
+            offboard.take(self._autopilot, _SOURCE, setpoint)
 
         return take
 
     def _in_map(self, point: Any) -> Vector:
-        x, y, z = self._pilot.memory.origin
+        x, y, z = self._autopilot.memory.origin
         return x + point.x, y + point.y, z + point.z
 
     def _place(self, message: Any) -> OffboardSetpoint:
@@ -220,7 +223,7 @@ class Mavros:
         )
 
     def _arm(self, request: Any, response: Any) -> Any:
-        why = arming.obstacle(self._pilot) if request.value else "not landed"
+        why = arming.obstacle(self._autopilot) if request.value else "not landed"
         result = self._do(400, (1.0 if request.value else 0.0, 0.0))
         if result:
             _log.warning("%s: arming %s: %s", self._prefix, request.value, why)
@@ -230,7 +233,9 @@ class Mavros:
     def _set_mode(self, request: Any, response: Any) -> Any:
         mode = mode_named(request.custom_mode)
         why = (
-            "there is no such mode" if mode is None else mode_transitions.ask_for(self._pilot, mode)
+            "there is no such mode"
+            if mode is None
+            else mode_transitions.ask_for(self._autopilot, mode)
         )
         if why:
             self._refuse(f"mode '{request.custom_mode}': {why}")
@@ -240,7 +245,7 @@ class Mavros:
     def _refuse(self, what: str) -> None:
         """Tell why something is not done, for which the responses have no room."""
         _log.warning("%s: %s", self._prefix, what)
-        self._pilot.say(2, what)
+        self._autopilot.say(2, what)
 
     def _take_off(self, request: Any, response: Any) -> Any:
         params = (0.0, 0.0, 0.0, request.yaw, request.latitude, request.longitude)
@@ -261,7 +266,7 @@ class Mavros:
 
     def _do(self, number: int, params: tuple[float, ...]) -> int:
         filled = (*params, *(math.nan,) * (7 - len(params)))
-        return commands.do(self._pilot, _SOURCE, commands.Command(number, filled, None))
+        return commands.do(self._autopilot, _SOURCE, commands.Command(number, filled, None))
 
 
 def _velocity(twist: Any) -> OffboardSetpoint:

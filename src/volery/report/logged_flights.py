@@ -62,7 +62,7 @@ class LoggedFlight:
     lasts_s: float
     origin: RecordedScenario | None = None
     """The scenario, where the log tells it."""
-    trouble: str = ""
+    problem: str = ""
     """What is wrong with the file: cut off, damaged chunks; empty for a whole one."""
 
 
@@ -71,7 +71,7 @@ class LoggedTrajectory:
     """A way of a log, and what is wrong with the file."""
 
     way: RecordedTrajectory
-    trouble: str
+    problem: str
 
 
 @dataclass
@@ -107,7 +107,7 @@ class _Log:
     types: dict[str, str] = field(default_factory=dict)
     scenario: dict[str, Any] = field(default_factory=dict)
     origin: RecordedScenario | None = None
-    trouble: str = ""
+    problem: str = ""
     first_ns: int | None = None
     last_ns: int = 0
 
@@ -161,11 +161,11 @@ def read_flight(path: Path) -> LoggedFlight:
     names = sorted({topic.split("/")[1] for topic in log.ways if topic.count("/") > 1})
     uavs = [uav for name in names if (uav := log.uav(name)) is not None]
     if not uavs:
-        what = f"; the file is {log.trouble}" if log.trouble else ""
+        what = f"; the file is {log.problem}" if log.problem else ""
         raise VoleryError(f"{path}: no UAV tells its pose in it (/NAME/{ESTIMATES[-1]}){what}")
     told = {word: str(log.scenario.get(word) or "") for word in ("name", "description")}
     lasts_s = (log.last_ns - (log.first_ns or 0)) / NS_PER_S
-    return LoggedFlight(uavs, told["name"], told["description"], lasts_s, log.origin, log.trouble)
+    return LoggedFlight(uavs, told["name"], told["description"], lasts_s, log.origin, log.problem)
 
 
 def read_way(path: Path, topic: str | None = None) -> LoggedTrajectory:
@@ -176,13 +176,13 @@ def read_way(path: Path, topic: str | None = None) -> LoggedTrajectory:
     log = _read(path)
     known = [name for name, rows in log.ways.items() if rows.poses and _tells_a_way(name)]
     if topic is None and len(known) == 1:
-        return LoggedTrajectory(log.ways[known[0]].way(), log.trouble)
+        return LoggedTrajectory(log.ways[known[0]].way(), log.problem)
     if topic is None or topic not in log.ways:
         what = "which way is meant?" if topic is None else f"there is no {topic}."
         if topic in log.types:
             what = f"{topic} tells no poses: it is a {log.types[topic]}."
         raise VoleryError(f"{path}: {what} Poses stand on: {', '.join(sorted(known)) or 'nothing'}")
-    return LoggedTrajectory(log.ways[topic].way(), log.trouble)
+    return LoggedTrajectory(log.ways[topic].way(), log.problem)
 
 
 def _tells_a_way(topic: str) -> bool:
@@ -197,7 +197,7 @@ def _read(path: Path) -> _Log:
             log.take(record, decoder)
         except GraphError:
             continue  # of a type that is not known here
-    log.trouble = walk.trouble
+    log.problem = walk.problem
     return log
 
 

@@ -84,11 +84,11 @@ def write_log_report(
     chosen = _chosen(flight.uavs, uav, log)
     drawn = flight.uavs if uav is None or compare is not None else [chosen]
     trunks = true_trunks(flight.origin, log.parent)
-    parts = _trouble_notes(log, flight.trouble, warnings)
+    parts = _problem_notes(log, flight.problem, warnings)
     parts += [section for each in drawn for section in _estimate_section(each, trunks)]
     if compare is not None:
         real = read_way(compare, compare_topic)
-        parts += _trouble_notes(compare, real.trouble, warnings)
+        parts += _problem_notes(compare, real.problem, warnings)
         laid = _laid_over(chosen, real.way, compare)
         parts += _comparison_section(chosen, laid, compare, trunks)
         warnings += laid.doubts(compare)
@@ -101,12 +101,12 @@ def write_log_report(
     return LogReport(path, warnings, fit)
 
 
-def _trouble_notes(log: Path, trouble: str, warnings: list[str]) -> list[str]:
+def _problem_notes(log: Path, problem: str, warnings: list[str]) -> list[str]:
     """A note for the page where something is wrong with a log's file; a warning, too."""
-    if not trouble:
+    if not problem:
         return []
-    warnings.append(f"{log}: {trouble}; the report shows what can be read")
-    return [f'<p class="note">{escape(log.name)}: {escape(trouble)}.</p>']
+    warnings.append(f"{log}: {problem}; the report shows what can be read")
+    return [f'<p class="note">{escape(log.name)}: {escape(problem)}.</p>']
 
 
 def _chosen(uavs: Sequence[LoggedUav], name: str | None, log: Path) -> LoggedUav:

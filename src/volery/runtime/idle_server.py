@@ -34,7 +34,7 @@ class IdleServer:
         offer_result(self.graph, "/get_simulation_state", get, self._get_state)
         offer_result(self.graph, "/set_simulation_state", put, self._set_state)
 
-    def be_prompt(self) -> None:
+    def use_low_latency(self) -> None:
         """As of `Simulation`; here nothing else is done anyway."""
 
     def wait(self, timeout_s: float) -> None:

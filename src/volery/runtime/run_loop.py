@@ -79,7 +79,7 @@ class RunLoop:
             over = engine.fleet.step >= find_end() or (until is not None and until())
             over = over or self.quitting
             while self._is_held() and not (over and pacer.paused):
-                engine.take_in(pacer.idle_s())
+                engine.process_commands(pacer.idle_s())
                 self.look()
                 teller.tell(s_from_ns(engine.time_ns) - s_from_ns(start_ns))
                 if self.quitting:

@@ -92,7 +92,7 @@ class Simulation:
 
     uavs: Mapping[str, Uav]
     """In fleet order."""
-    pilots: ControlAuthority
+    operators: ControlAuthority
     """Who steers which UAV."""
     commands: CommandLog
     """What clients do, told on `/volery/log`."""
@@ -169,7 +169,7 @@ class Simulation:
             self.radio,
         )
         self.uavs = MappingProxyType(self._crew.uavs)
-        self.pilots = ControlAuthority(lambda: self.uav_names)
+        self.operators = ControlAuthority(lambda: self.uav_names)
         self._partners: list[Partner] = []
         self._replays: list[Replay] = []
         self._keep_time(publisher)
@@ -264,7 +264,7 @@ class Simulation:
 
         def process() -> None:
             on_wait()
-            self.take_in()
+            self.process_commands()
 
         self.end.wait(process)
 
@@ -321,12 +321,12 @@ class Simulation:
         """Make no more steps of a `single_step`."""
         self._pacer.drop_steps("cancelled", request)
 
-    def be_prompt(self) -> None:
+    def use_low_latency(self) -> None:
         """Keep real time to the physics step from now on, for clients who wait for answers.
 
         Costs a few tenths of a core; at full speed and for results it changes nothing.
         """
-        self._pacer.be_prompt()
+        self._pacer.use_low_latency()
 
     @property
     def weather(self) -> Weather:
@@ -354,7 +354,7 @@ class Simulation:
         """
         return self._engine.inbox.post(action)
 
-    def play(self, replay: Replay) -> None:
+    def replay_log(self, replay: Replay) -> None:
         """Let a recorded log speak into the graph, beginning now, in simulated time."""
         self._check_open()
         replay.start(self.graph, self._engine, lambda: self.time_ns)
@@ -365,7 +365,7 @@ class Simulation:
         """Whether a recorded log is speaking into the graph."""
         return any(replay.info.running for replay in self._replays)
 
-    def repeat(self, flight: RecordedFlight) -> None:
+    def replay_commands(self, flight: RecordedFlight) -> None:
         """Take the commands of a recorded flight again, each at its moment; see `repetition`.
 
         `run` ends where that flight did. `CommandError` where the simulation has begun.
@@ -378,19 +378,19 @@ class Simulation:
         )
         self.commands.repeats = self._loop.replays = True
 
-    def take_in(self) -> None:
+    def process_commands(self) -> None:
         """Do what other threads have posted, and hand out what that published, without a step.
 
         For the thread that owns the simulation; `run` and `step` do it by themselves.
         """
         self._check_open()
-        self._engine.take_in(math.inf)
+        self._engine.process_commands(math.inf)
         self._live.look()
 
-    def inject(self, fault: Fault | Mapping[str, Any]) -> None:
+    def inject_fault(self, fault: Fault | Mapping[str, Any]) -> None:
         """Let something go wrong: a fault as in a scenario's `faults`, at once if its time is past.
 
-        `simulation.inject({"kind": "motor", "uav": "uav1", "rotor": 0})`. Raises `CommandError` for
+        `simulation.inject_fault({"kind": "motor", "uav": "uav1", "rotor": 0})`. Raises `CommandError` for
         one that cannot be.
         """
         self._check_open()
@@ -415,7 +415,7 @@ class Simulation:
         on_timeout: Literal["stop", "leave"] = "stop",
         on_meeting: Callable[[int], None] | None = None,
         is_there: Callable[[], bool] | None = None,
-        restarts: bool = False,
+        supports_reset: bool = False,
         meets_at_start: bool = False,
     ) -> Partner:
         """Wait for an outside program each `period_s` of simulated time; see `engine.lock_step`.
@@ -436,7 +436,7 @@ class Simulation:
             on_timeout,
             on_meeting=on_meeting,
             is_there=is_there,
-            restarts=restarts,
+            supports_reset=supports_reset,
             meets_at_start=meets_at_start,
             period_s=period_s,
         )
@@ -511,7 +511,7 @@ class Simulation:
 
     # -------------------------------------------------------------------------------- changing it
 
-    def place_uav(self, name: str, position_map: ArrayLike, attitude: ArrayLike) -> None:
+    def set_uav_pose(self, name: str, position_map: ArrayLike, attitude: ArrayLike) -> None:
         """Put a UAV at (3,) m with (4,) x y z w, map from body; its motion goes on there.
 
         If it flies it holds there; if it stood it hovers where that is in the air. `PlacementError`
@@ -520,7 +520,7 @@ class Simulation:
         self._check_open()
         self._relocator.place(self._row_of(name), position_map, attitude)
 
-    def push_uav(self, name: str, velocity_map: ArrayLike, omega_map: ArrayLike) -> None:
+    def set_uav_velocity(self, name: str, velocity_map: ArrayLike, omega_map: ArrayLike) -> None:
         """Let a UAV move at (3,) m/s and turn at (3,) rad/s, map, from which its controllers go on.
 
         If it flies it brakes, and holds. `CommandError` for what is out of range.
@@ -529,11 +529,11 @@ class Simulation:
         self._relocator.move(self._row_of(name), velocity_map, omega_map)
 
     @property
-    def things(self) -> MovingActors | None:
+    def actors(self) -> MovingActors | None:
         """People, vehicles and birds of the scenario; None where it has none."""
-        return self.scene.things
+        return self.scene.actors
 
-    def put_thing(
+    def set_actor_pose(
         self,
         name: str,
         position_map: ArrayLike,
@@ -546,16 +546,16 @@ class Simulation:
         `CommandError` for one that does not exist, that goes its own way, or for such a place.
         """
         self._check_open()
-        if self.things is None or name not in self.things.names:
-            known = "none" if self.things is None else ", ".join(self.things.names)
+        if self.actors is None or name not in self.actors.names:
+            known = "none" if self.actors is None else ", ".join(self.actors.names)
             raise CommandError(f"there is no thing '{name}'; known: {known}")
-        row = self.things.names.index(name)
+        row = self.actors.names.index(name)
         if attitude is None:
-            attitude = self.things.poses_at(self.time_ns)[row, 3:]
+            attitude = self.actors.poses_at(self.time_ns)[row, 3:]
         position = checked("position", position_map, (3,), _FARTHEST_M)
         velocity = checked("velocity", velocity_map, (3,), _FASTEST_M_S)
         pose = np.concatenate([position, checked_attitude(attitude)])
-        self._engine.put_thing(row, pose, velocity)
+        self._engine.set_actor_pose(row, pose, velocity)
 
     def spawn_uav(
         self,

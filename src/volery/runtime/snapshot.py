@@ -92,7 +92,7 @@ def check_partners(partners: Sequence[Partner], what: str, *, to_start: bool = F
     to_start: it goes back to the start, where those can come along that begin anew.
     """
     for partner in partners:
-        if not (partner.has_left or (to_start and partner.restarts)):
+        if not (partner.has_left or (to_start and partner.supports_reset)):
             raise SnapshotError(
                 f"{what} is not possible: the state of lock-step partner '{partner.name}' is its "
                 "own; it must leave first"

@@ -1,13 +1,13 @@
-"""Scenario data of what moves by itself: people, vehicles, birds."""
+"""Scenario data of actors: people, vehicles, birds."""
 
 from __future__ import annotations
 
 import re
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
-from volery.scenario.base import Data, Name, NonNegative, Vector3
+from volery.scenario.base import Data, Name, NonNegative, Vector3, warn_of_former_word
 
 Speed = Annotated[float, Field(gt=0.0, le=100.0)]
 _UAV_NAME = re.compile(r"uav\d+")
@@ -50,16 +50,23 @@ class CircleActor(Data):
 
 
 class ExternalActor(Data):
-    """Stands where it is put by `/things/NAME/pose` or `/set_entity_state`."""
+    """Takes its pose from `/actors/NAME/pose` or `/set_entity_state`."""
 
-    kind: Literal["outside"]
+    kind: Literal["external", "outside"]
     position_m: Annotated[tuple[float, ...], Field(min_length=2, max_length=3)]
-    """Until then: x, y (on the ground) or x, y, z."""
+    """Initial position: x, y (on the ground) or x, y, z."""
     yaw_deg: float = 0.0
+
+    @field_validator("kind")
+    @classmethod
+    def _rename_former_kind(cls, kind: str) -> str:
+        if kind == "outside":
+            warn_of_former_word("motion 'outside'", "external")
+        return "external"
 
 
 class Actor(Data):
-    """One of them: every sensor sees it, and UAVs can hit it."""
+    """A moving body: every sensor sees it, and UAVs can hit it."""
 
     name: Name
     shape: Literal["person", "car", "bird"]
@@ -68,16 +75,16 @@ class Actor(Data):
     @model_validator(mode="after")
     def _is_no_uav(self) -> Self:
         if _UAV_NAME.fullmatch(self.name):
-            raise ValueError(f"'{self.name}' is a name of UAVs; a thing is called otherwise")
+            raise ValueError(f"'{self.name}' is a name of UAVs; give the actor another name")
         return self
 
 
-Things = Annotated[tuple[Actor, ...], Field(max_length=1000)]
+Actors = Annotated[tuple[Actor, ...], Field(max_length=1000)]
 
 
-def check_things(things: tuple[Actor, ...]) -> None:
-    """ValueError where two things have one name."""
-    names = [thing.name for thing in things]
+def check_actors(actors: tuple[Actor, ...]) -> None:
+    """Raises ValueError where two actors have one name."""
+    names = [actor.name for actor in actors]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise ValueError(f"names of things must differ; used twice: {', '.join(twice)}")
+        raise ValueError(f"names of actors must differ; used twice: {', '.join(twice)}")

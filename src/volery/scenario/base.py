@@ -1,13 +1,21 @@
-"""What scenarios are made of: frozen, checked data and the common kinds of numbers."""
+"""Base classes of scenario data: frozen, validated, with the common kinds of numbers."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from functools import cache
 from typing import Annotated, Any, ClassVar, get_args
 
 from annotated_types import Ge, Gt
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from volery.core.quantities import Quantity, fault_in
 
@@ -87,9 +95,31 @@ def _metadata(annotation: Any) -> list[Any]:
 
 
 class Data(Bounded):
-    """What scenarios are made of."""
+    """A table of a scenario."""
 
     model_config = ConfigDict(str_strip_whitespace=True)
+
+    former_keys: ClassVar[Mapping[str, str]] = {}
+    """Keys that recorded logs still hold, with today's names; each raises a DeprecationWarning."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _rename_former_keys(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping):
+            return data
+        former = {key: cls.former_keys[key] for key in data if key in cls.former_keys}
+        if not former:
+            return data
+        for old, new in former.items():
+            warn_of_former_word(f"key '{old}'", new)
+            if new in data:
+                raise ValueError(f"keys '{old}' and '{new}' are one; keep '{new}'")
+        return {former.get(key, key): value for key, value in data.items()}
+
+
+def warn_of_former_word(what: str, new: str) -> None:
+    """Warns that a scenario uses a word that has been renamed."""
+    warnings.warn(f"{what} of scenarios is named '{new}' now", DeprecationWarning, stacklevel=2)
 
 
 class SensorData(Data):

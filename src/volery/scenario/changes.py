@@ -140,7 +140,7 @@ def _forest(scenario: Scenario, changes: Changes) -> dict[str, Any]:
                 f"{_WHERE}: key 'tree_share': scenario '{scenario.name}' has no forest of an "
                 f"inventory{_hint(forest, 'tree_density_per_ha')}"
             )
-        return {"share": changes.tree_share}
+        return {"fraction": changes.tree_share}
     return {}
 
 

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from volery.scenario.base import Data, Vector2
 
 MapName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=80)]
-RECEIVED = "map_in"
+RECEIVED = "map_command"
 """Name of the map that came over the graph last."""
 Side = Annotated[float, Field(ge=0.001, le=1000.0)]
 

@@ -6,12 +6,13 @@ docs/scenarios.md explains it and `Scenario.model_json_schema()` serves editors.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, PrivateAttr, model_validator
 
 from volery.scenario.access import ScenarioAccess
-from volery.scenario.actors import Things, check_things
+from volery.scenario.actors import Actors, check_actors
 from volery.scenario.base import (
     Data,
     MountedSensor,
@@ -66,8 +67,10 @@ class InventoryForest(Data):
     """The inventory's names of species to names of shipped ones."""
     region_m: tuple[float, float, float, float] | None = None
     """x_min, y_min, x_max, y_max; trees with x_min <= x < x_max are kept. None keeps all."""
-    share: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
-    """Of the trees; chosen at random, those of a smaller share are among those of a larger one."""
+    fraction: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
+    """Of the trees, at random; the trees of a smaller fraction are among those of a larger one."""
+
+    former_keys: ClassVar[Mapping[str, str]] = {"share": "fraction"}
 
     @model_validator(mode="after")
     def _region_is_a_rectangle(self) -> Self:
@@ -92,7 +95,9 @@ class ProceduralForest(Data):
 
 
 class World(Data):
-    """Ground, trees, buildings, air."""
+    """Ground, trees, buildings, actors, air."""
+
+    former_keys: ClassVar[Mapping[str, str]] = {"things": "actors"}
 
     seed: Annotated[int, Field(ge=0, lt=2**63)] | None = None
     """Seed of what stands in the world alone; None: the scenario's seed grows it too."""
@@ -102,7 +107,7 @@ class World(Data):
     grid_map: GridMapWorld | None = None
     meshes: Annotated[tuple[UserMesh, ...], Field(max_length=1000)] = ()
     """Files of the user's own that stand in the world."""
-    things: Things = ()
+    actors: Actors = ()
     wind: Wind = Wind()
     weather: Weather = Weather()
     light: Daylight = Daylight()
@@ -113,8 +118,8 @@ class World(Data):
     gnss_denied_areas: tuple[DeniedArea, ...] = ()
 
     @model_validator(mode="after")
-    def _things_have_names(self) -> Self:
-        check_things(self.things)
+    def _actors_have_names(self) -> Self:
+        check_actors(self.actors)
         return self
 
 
@@ -171,7 +176,7 @@ class OdometrySensor(SensorData):
     rate_hz: Rate = 50.0
 
 
-class PoseAid(Data):
+class ExternalOdometrySource(Data):
     """Odometry of a node, such as a SLAM's, that aids an estimator; taken for one in the map.
 
     What such odometry states is how far it has drifted from the map. The UAV flies in the frame
@@ -192,9 +197,14 @@ class EstimateSensor(SensorData):
     kind: Literal["estimate"]
     name: Literal["odom"] = "odom"
     rate_hz: Rate = 50.0
-    flies: bool = True
-    """Whether the UAV's controllers fly on the estimate; false: on the truth."""
-    pose: PoseAid | None = None
+    used_for_control: bool = True
+    """Whether the UAV's controllers use the estimate; false: ground truth."""
+    external_odometry: ExternalOdometrySource | None = None
+
+    former_keys: ClassVar[Mapping[str, str]] = {
+        "flies": "used_for_control",
+        "pose": "external_odometry",
+    }
 
 
 class GroundTruthSensor(SensorData):
@@ -391,8 +401,10 @@ class Scenario(Data):
     nodes: tuple[NodeEntry, ...] = ()
     """Nodes of the whole system, one of each; their relative names begin at the root."""
     faults: tuple[Fault, ...] = ()
-    messages: tuple[str, ...] = ()
+    message_packages: tuple[str, ...] = ()
     """Folders of ROS packages whose `.msg`, `.srv` and `.action` files the nodes use."""
+
+    former_keys: ClassVar[Mapping[str, str]] = {"messages": "message_packages"}
 
     _access: ScenarioAccess = PrivateAttr(default_factory=ScenarioAccess)
 

@@ -184,8 +184,8 @@ def move_bodies(scene: Scene, history: PoseHistory, start: int, end: int) -> int
     """Let UAVs and things move through the interval; how many bodies there are."""
     table = scene.handle.bodies
     bodies = len(table.scene)
-    uavs = bodies - table.things
-    scene.move_things(start, end)
+    uavs = bodies - table.actors
+    scene.move_actors(start, end)
     if uavs:
         poses = np.empty((2, uavs, 3)), np.empty((2, uavs, 4))
         for i, time_ns in enumerate((start, end)):

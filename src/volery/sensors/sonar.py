@@ -75,7 +75,7 @@ class SonarBank(NoisyBank):
         origin = fleet.state.position_map[rows] + rotations.rotate(attitude, self._position_body)
         directions = rotations.rotate(map_from_sensor[:, None, :], self._cone[None, :, :])
         self._scene.move_bodies(fleet.state.position_map, fleet.state.attitude)
-        self._scene.move_things(time_ns, time_ns)
+        self._scene.move_actors(time_ns, time_ns)
         hits = self._scene.cast(
             np.repeat(origin, rays, axis=0),
             directions.reshape(-1, 3),

@@ -37,13 +37,13 @@ class ViewerPolicy:
             return True
         what = operation.get("service", operation.get("topic", operation.get("action", "")))
         doing = f"{op.replace('_', ' ')} {what}".strip()
-        raise BridgeError(f"a viewer may not {doing[:120]}; show the pilots' token")
+        raise BridgeError(f"a viewer may not {doing[:120]}; show the operators' token")
 
 
 class OperatorPolicy:
     """Lets a client command the UAVs that nobody else holds.
 
-    `name` is what the pilot is called; `crew` are all who are connected to this server. What it
+    `name` is what the operator is called; `crew` are all who are connected to this server. What it
     asks of the services of control it asks in its own name.
     """
 
@@ -51,17 +51,17 @@ class OperatorPolicy:
         self,
         name: str,
         crew: OperatorNames,
-        pilots: ControlAuthority,
+        operators: ControlAuthority,
         now_s: Callable[[], float] = time.monotonic,
     ) -> None:
         self.name = name
         self._crew = crew
-        self._pilots = pilots
+        self._operators = operators
         self._now_s = now_s
         self._told_s: dict[str, float] = {}
 
     def check(self, operation: Operation) -> bool:
-        """`BridgeError` for a command to a UAV that another pilot holds."""
+        """`BridgeError` for a command to a UAV that another operator holds."""
         op = operation["op"]
         if op == "call_service":
             service = service_of(operation)
@@ -91,34 +91,34 @@ class OperatorPolicy:
         return True
 
     def _check_free(self, name: str, operation: Operation) -> None:
-        """Refuse what is below, or about, a UAV that another pilot holds."""
+        """Refuse what is below, or about, a UAV that another operator holds."""
         try:
             about = {*parts_of(name), *names_in(operation.get("args"))}
         except CommandError as error:
             raise BridgeError(str(error)) from None
         for uav in sorted(about):
-            holder = self._pilots.holder_of(uav)
+            holder = self._operators.holder_of(uav)
             if holder and not same_operator(holder, self.name):
                 raise BridgeError(f"{uav} is held by {holder}, who can hand it over")
 
     def _sign(self, service: str, operation: Operation) -> None:
-        """See to it that the pilot speaks for nobody else."""
+        """See to it that the operator speaks for nobody else."""
         args = operation.get("args")
         if not isinstance(args, dict):
             raise BridgeError(f"{service}: args must be an object with uav")
-        called = args.get("pilot")
+        called = args.get("operator")
         if isinstance(called, str) and called.strip() and not same_operator(called, self.name):
             called = operator_name(called)
             if not 0 < len(called) <= MOST_CHARACTERS:
-                raise BridgeError(f"a pilot's name has 1 to {MOST_CHARACTERS} characters")
-            if service != TAKE or self._pilots.held_by(self.name):
+                raise BridgeError(f"an operator's name has 1 to {MOST_CHARACTERS} characters")
+            if service != TAKE or self._operators.held_by(self.name):
                 raise BridgeError(f"you are {self.name}, not {called[:MOST_CHARACTERS]}")
             self._crew.rename(self.name, called)
             self.name = called
         to = args.get("to")
         if service == HAND_OVER and to not in self._crew:
-            raise BridgeError(f"no pilot is called {str(to)[:MOST_CHARACTERS]!r} here")
-        operation["args"] = {**args, "pilot": self.name}
+            raise BridgeError(f"no operator is called {str(to)[:MOST_CHARACTERS]!r} here")
+        operation["args"] = {**args, "operator": self.name}
 
 
 def service_of(operation: Operation) -> str:

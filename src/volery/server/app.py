@@ -49,7 +49,7 @@ def make_app(
             Mount("/", PageFiles()),
         ],
         middleware=[guard],
-        exception_handlers={RefusedError: _tell_refusal, HTTPException: _tell_trouble},
+        exception_handlers={RefusedError: _tell_refusal, HTTPException: _tell_problem},
     )
     app.state.site = site
     app.state.world_files = WorldFiles()
@@ -62,7 +62,7 @@ async def _tell_refusal(_request: Request, error: Exception) -> Response:
     return refused(error.status, str(error))
 
 
-async def _tell_trouble(request: Request, error: Exception) -> Response:
+async def _tell_problem(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     known = {404: f"there is nothing at {request.url.path[:200]}"}
     return refused(error.status_code, known.get(error.status_code, error.detail))

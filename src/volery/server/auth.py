@@ -15,7 +15,7 @@ from volery.core.network_access import check_address, check_token, shows_token
 class Role(StrEnum):
     """What somebody may do."""
 
-    PILOT = "pilot"
+    OPERATOR = "operator"
     """Everything."""
     VIEWER = "viewer"
     """Look on: subscribe, and call services that change nothing."""
@@ -23,24 +23,24 @@ class Role(StrEnum):
 
 @dataclass(frozen=True)
 class Tokens:
-    """What must be shown; without a pilot's token everybody is a pilot."""
+    """What must be shown; without an operator's token everybody is an operator."""
 
-    pilot: str | None = None
+    operator: str | None = None
     viewer: str | None = None
 
     @property
     def needed(self) -> bool:
         """Whether one must be shown at all."""
-        return self.pilot is not None
+        return self.operator is not None
 
     def role_of(self, given: str | None) -> Role | None:
         """Role of who shows `given`; None: no token of ours."""
-        if self.pilot is None:
-            return Role.PILOT
+        if self.operator is None:
+            return Role.OPERATOR
         # both are compared, so that the time tells nothing of which one is near
-        pilot = shows_token(given, self.pilot)
+        operator = shows_token(given, self.operator)
         viewer = self.viewer is not None and shows_token(given, self.viewer)
-        return Role.PILOT if pilot else Role.VIEWER if viewer else None
+        return Role.OPERATOR if operator else Role.VIEWER if viewer else None
 
 
 def check_rights(host: str, tokens: Tokens, *, anywhere: bool) -> None:
@@ -49,9 +49,9 @@ def check_rights(host: str, tokens: Tokens, *, anywhere: bool) -> None:
     anywhere: consent to listening beyond loopback.
     """
     check_address(host, anywhere=anywhere, flag="--allow-remote and --token")
-    check_token(host, tokens.pilot)
-    if tokens.viewer is not None and (not tokens.needed or tokens.viewer == tokens.pilot):
-        raise BridgeError("--viewer-token needs a --token for pilots, and another one")
+    check_token(host, tokens.operator)
+    if tokens.viewer is not None and (not tokens.needed or tokens.viewer == tokens.operator):
+        raise BridgeError("--viewer-token needs a --token for operators, and another one")
 
 
 class Sessions:

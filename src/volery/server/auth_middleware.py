@@ -125,7 +125,7 @@ class AuthMiddleware:
     async def _recognize(self, scope: Scope, headers: Headers, receive: Receive) -> _Visitor:
         """Whose token or session this is; `RefusedError` where one is needed and missing."""
         if not self._tokens.needed:
-            return _Visitor(Role.PILOT, None)
+            return _Visitor(Role.OPERATOR, None)
         given = _token_of(scope, headers)
         if given is not None:
             role = await self._role_of(given, scope, receive)

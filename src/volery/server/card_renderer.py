@@ -68,7 +68,7 @@ def draw(name: str) -> bytes:
         simulation.run(view.at_s)
         eye = simulation.uavs["uav1"].position_map + view.eye_m
         photographer = simulation.uav_names[-1]
-        simulation.place_uav(photographer, eye, (0.0, 0.0, 0.0, 1.0))
+        simulation.set_uav_pose(photographer, eye, (0.0, 0.0, 0.0, 1.0))
         taken: list[Published] = []
         simulation.graph.subscribe(f"/{photographer}/card/image_raw", taken.append)
         simulation.run(_EXPOSURE_S)

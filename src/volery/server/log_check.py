@@ -3,7 +3,7 @@
     python -m volery.server.log_check summary FILE ...
     python -m volery.server.log_check play FILE
 
-Prints a JSON list with an object for each file: `seconds`, `messages`, `trouble`, or `error` alone.
+Prints a JSON list with an object for each file: `seconds`, `messages`, `problem`, or `error` alone.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def _of(path: Path, *, play: bool) -> dict[str, Any]:
     return {
         "seconds": round(summary.duration_s, 3),
         "messages": summary.messages,
-        "trouble": summary.trouble,
+        "problem": summary.problem,
     }
 
 

@@ -1,4 +1,4 @@
-"""Names of the pilots who are connected to the page's server, no two the same."""
+"""Names of the operators who are connected to the page's server, no two the same."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ class OperatorNames:
     def sign_in(self, wanted: str = "") -> str:
         """A name of one's own: the wanted one if it is free, else one with a number."""
         base = operator_name(wanted[: 4 * MOST_CHARACTERS])[: MOST_CHARACTERS - 5].strip()
-        number, name = 1, base or "pilot 1"
+        number, name = 1, base or "operator 1"
         while name in self:
             number += 1
-            name = f"{base or 'pilot'} {number}"
+            name = f"{base or 'operator'} {number}"
         self._names.add(operator_key(name))
         return name
 
     def rename(self, old: str, new: str) -> None:
         """Call oneself otherwise. `BridgeError` where another operator is called like that."""
         if new in self and operator_key(new) != operator_key(old):
-            raise BridgeError(f"another pilot is called {new}")
+            raise BridgeError(f"another operator is called {new}")
         self._names.discard(operator_key(old))
         self._names.add(operator_key(new))
 

@@ -126,7 +126,7 @@ class PageServer:
         name: str | None = getattr(world, "name", None) if scenario is None else scenario.name
         if name is None:
             told = ServerSituation(
-                ServerActivity.FAILED if message else ServerActivity.LOBBY, message=message
+                ServerActivity.FAILED if message else ServerActivity.NO_WORLD, message=message
             )
         else:
             what = "A recorded log." if scenario is None else scenario.description.strip()
@@ -142,7 +142,7 @@ class PageServer:
     def stop(self) -> None:
         """Let everybody go and end the thread; a second time nothing happens."""
         if self._thread.running:
-            self._leave(ServerSituation(ServerActivity.LOBBY, message="the server ends"))
+            self._leave(ServerSituation(ServerActivity.NO_WORLD, message="the server ends"))
             if self._server is not None:
                 self._server.should_exit = True
             self._call(self._end())

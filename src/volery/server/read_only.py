@@ -1,6 +1,6 @@
 """Services that change nothing: all that viewers may call, and nobody's command to a UAV.
 
-A new service joins this list, or is for pilots.
+A new service joins this list, or is for operators.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ READ_ONLY_SERVICES = frozenset(
         "/get_simulation_state",
         "/get_simulator_features",
         "/get_spawnables",
-        "/volery/get_choices",
+        "/volery/get_scenario_options",
         "/volery/get_grid_map",
         "/volery/get_weather",
         "/volery/list_snapshots",

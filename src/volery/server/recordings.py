@@ -17,7 +17,7 @@ from volery.bridges.logs.recordings_quota import room_left
 from volery.core.errors import RecordingError
 from volery.server.log_check import look_into
 from volery.server.replies import RefusedError
-from volery.server.request_bodies import check_pilot, save_body
+from volery.server.request_bodies import check_operator, save_body
 from volery.server.server_state import ServerState
 
 MOST_BYTES = 2_000_000_000
@@ -49,7 +49,7 @@ async def recording(request: Request) -> Response:
 
 async def bring_recording(request: Request) -> Response:
     """Take a log, and look whether it is one."""
-    check_pilot(request)
+    check_operator(request)
     site: ServerState = request.app.state.site
     folder = site.recordings
     if folder is None:
@@ -72,7 +72,7 @@ async def bring_recording(request: Request) -> Response:
         if "error" in found:
             raise RefusedError(422, found["error"].replace(str(waiting), called))
         if not found["messages"]:
-            raise RefusedError(422, f"there is no message in it. {found['trouble']}".strip())
+            raise RefusedError(422, f"there is no message in it. {found['problem']}".strip())
         name = _free_name(folder, called, suffix)
         waiting.rename(folder / name)
     finally:

@@ -64,10 +64,10 @@ async def _pieces_in_time(request: Request) -> AsyncIterator[bytes]:
             raise RefusedError(408, f"the file comes with less than {LEAST_BYTES_S:g} bytes/s")
 
 
-def check_pilot(request: Request) -> None:
+def check_operator(request: Request) -> None:
     """`RefusedError` for a viewer: what is brought here changes something."""
-    if request.state.role is not Role.PILOT:
-        raise RefusedError(403, "a viewer may not bring files; show the pilots' token")
+    if request.state.role is not Role.OPERATOR:
+        raise RefusedError(403, "a viewer may not bring files; show the operators' token")
 
 
 def _size(count: int) -> str:

@@ -71,22 +71,22 @@ async def serve_rosbridge(websocket: WebSocket) -> None:
 def _gate_of(
     websocket: WebSocket, site: ServerState, world: JoinedWorld
 ) -> Iterator[AccessPolicy | None]:
-    """What the client may do, as long as it is there; a pilot who leaves lets go of his UAVs."""
-    if websocket.state.role is not Role.PILOT:
+    """What the client may do, as long as it is there; an operator who leaves lets go of his UAVs."""
+    if websocket.state.role is not Role.OPERATOR:
         yield ViewerPolicy()
         return
-    pilots = world.pilots
-    if pilots is None:
+    operators = world.operators
+    if operators is None:
         yield None
         return
     gate = OperatorPolicy(
-        site.crew.sign_in(websocket.query_params.get("pilot", "")), site.crew, pilots
+        site.crew.sign_in(websocket.query_params.get("operator", "")), site.crew, operators
     )
     try:
         yield gate
     finally:
         site.crew.sign_out(gate.name)
-        world.gateway.post(lambda: pilots.leave(gate.name))
+        world.gateway.post(lambda: operators.leave(gate.name))
 
 
 async def _serve(
@@ -108,9 +108,9 @@ async def _serve(
     client = Client(channel, conversation)
     site.clients.add(client)
     try:
-        (trouble,) = await asyncio.gather(conversation, return_exceptions=True)
+        (problem,) = await asyncio.gather(conversation, return_exceptions=True)
     finally:
         site.clients.discard(client)
     gone = (WebSocketDisconnect, OSError, TimeoutError, asyncio.CancelledError)
-    if isinstance(trouble, BaseException) and not isinstance(trouble, gone):
-        _log.error("serving %s failed", name, exc_info=trouble)
+    if isinstance(problem, BaseException) and not isinstance(problem, gone):
+        _log.error("serving %s failed", name, exc_info=problem)

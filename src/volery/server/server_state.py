@@ -38,9 +38,9 @@ class ServerActivity(StrEnum):
     FLYING = "flying"
     ENDED = "ended"
     """A simulation waits at the end of its scenario."""
-    LOBBY = "lobby"
+    NO_WORLD = "no_world"
     FAILED = "failed"
-    """As in the lobby, because the scenario could not be built."""
+    """As in the idle, because the scenario could not be built."""
 
 
 @dataclass(frozen=True)
@@ -55,16 +55,16 @@ class ServerSituation:
 
 
 class World(Protocol):
-    """What clients can join: a simulation, a lobby, a recording.
+    """What clients can join: a simulation, a idle, a recording.
 
-    Where it has a `scenario`, `geometry` and `pilots`, as a `Simulation` has, they are served too.
-    Where it has no scenario but a `name`, as a log of unknown origin has, that is told.
+    Where it has a `scenario`, `geometry` and `operators`, as a `Simulation` has, they are served
+    too. Where it has no scenario but a `name`, as a log of unknown origin has, that is told.
     """
 
     graph: Graph
     gateway: Gateway
 
-    def be_prompt(self) -> None:
+    def use_low_latency(self) -> None:
         """Answer clients soon."""
 
 
@@ -75,7 +75,7 @@ class JoinedWorld:
         graph = world.graph
         self.gateway = world.gateway
         self.scenario: Scenario | None = getattr(world, "scenario", None)
-        self.pilots: ControlAuthority | None = getattr(world, "pilots", None)
+        self.operators: ControlAuthority | None = getattr(world, "operators", None)
         self.shared = ServerContext(MessageEncoder("ros2"), graph.now_ns)
         self.bulk = BulkTurns()
         self._world = world

@@ -87,10 +87,10 @@ def near_bodies(
     uav: whose rays they are, -1 for rays of nobody or of several.
     """
     count = 0
-    uavs = bodies.scene.shape[0] - bodies.things
+    uavs = bodies.scene.shape[0] - bodies.actors
     first = 0 if uav < 0 else uav - uav % bodies.crew
     crew = uavs if uav < 0 else bodies.crew
-    for n in range(crew + bodies.things):
+    for n in range(crew + bodies.actors):
         i = first + n if n < crew else uavs + n - crew
         if i == uav:
             continue
@@ -134,9 +134,9 @@ def _may_touch(
 @inner_kernel
 def _sees(bodies: BodyTable, uav: int, row: int) -> bool:
     """Whether rays of `uav` (-1: of nobody) may meet body `row`."""
-    is_thing = row >= bodies.scene.shape[0] - bodies.things
+    is_actor = row >= bodies.scene.shape[0] - bodies.actors
     own_copy = uav // bodies.crew == row // bodies.crew
-    return bool(uav < 0 or is_thing or (uav != row and own_copy))
+    return bool(uav < 0 or is_actor or (uav != row and own_copy))
 
 
 @inner_kernel

@@ -84,7 +84,7 @@ def forest_from_inventory(
     species: str,
     terrain: Terrain,
     region: Region | None = None,
-    share: float = 1.0,
+    fraction: float = 1.0,
     seed: int = 0,
     diameters: str | None = None,
     species_map: Mapping[str, str] | None = None,
@@ -95,11 +95,11 @@ def forest_from_inventory(
     species: species of trees for which the inventory names none, or one that does not ship; one
     warning counts the latter. species_map: shipped species by the inventory's names.
     region: (x0, y0, x1, y1) in m; trees with x0 <= x < x1 and y0 <= y < y1 stay. None keeps all.
-    share: of the trees, from 0 to 1, chosen at random.
+    fraction: of the trees, 0 to 1, chosen at random.
     diameters: name of the species' spread from which missing diameters come (None: its "stand").
 
     Sizes are drawn for the whole inventory before the region is cut out, so a tree is the same in
-    every region and with every share. Raises DataFileError for a bad file, ScenarioError for an
+    every region and with every fraction. Raises DataFileError for a bad file, ScenarioError for an
     unknown `species` or one in `species_map`.
     """
     trees = inventory if isinstance(inventory, Inventory) else read_inventory(inventory)
@@ -122,8 +122,8 @@ def forest_from_inventory(
         _check(region)
         x, y = trees.position.T
         rows = rows[(x >= region[0]) & (x < region[2]) & (y >= region[1]) & (y < region[3])]
-    if share < 1.0:
-        rows = rows[generator(seed, "forest/thinning").random(len(trees))[rows] < share]
+    if fraction < 1.0:
+        rows = rows[generator(seed, "forest/thinning").random(len(trees))[rows] < fraction]
     return _assemble(
         trees.position[rows],
         names[rows],

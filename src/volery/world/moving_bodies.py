@@ -46,9 +46,9 @@ def body_rows(
     return BodyRows(scenes[index], radius[index], materials[index], rotors[index])
 
 
-def body_table(uavs: BodyRows, things: BodyRows, crew: int) -> BodyTable:
+def body_table(uavs: BodyRows, actors: BodyRows, crew: int) -> BodyTable:
     """UAVs, `crew` of them a copy, then things, all of them nowhere yet."""
-    both = uavs, things
+    both = uavs, actors
     widest = max(rows.material.shape[1] for rows in both)
     count = sum(len(rows.scene) for rows in both)
     material = np.zeros((count, widest), dtype=np.uint8)
@@ -64,7 +64,7 @@ def body_table(uavs: BodyRows, things: BodyRows, crew: int) -> BodyTable:
         start=start,
         end=start.copy(),
         crew=crew,
-        things=len(things.scene),
+        actors=len(actors.scene),
         rotors=np.zeros((count, 0, 10)),
         turn=np.zeros((count, 0, 2)),
     )

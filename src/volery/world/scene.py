@@ -76,9 +76,9 @@ class Scene:
         self.solids = tuple(solids)
         self._content = collect(terrain, forest, detail, self.solids, cover)
         self.backend = EmbreeBackend(self._content)
-        self.things: MovingActors | None = None
+        self.actors: MovingActors | None = None
         """What moves by itself and is seen by all."""
-        self._uav_rows, self._thing_rows, self._crew = NO_ROWS, NO_ROWS, 1
+        self._uav_rows, self._actor_rows, self._crew = NO_ROWS, NO_ROWS, 1
         self._bodies = body_table(NO_ROWS, NO_ROWS, 1)
         self._is_twin = False
 
@@ -109,7 +109,7 @@ class Scene:
         twin = copy.copy(self)
         twin.workers = Workers(1)
         twin._uav_rows = NO_ROWS
-        twin._bodies = body_table(NO_ROWS, self._thing_rows, 1)
+        twin._bodies = body_table(NO_ROWS, self._actor_rows, 1)
         twin._is_twin = True
         return twin
 
@@ -147,8 +147,8 @@ class Scene:
         if instance < self.moving_offset:
             return self.solids[instance - 1 - self._content.trees].name
         row, uavs = instance - self.moving_offset, len(self._uav_rows.scene)
-        if self.things is not None and row >= uavs:
-            return self.things.names[row - uavs]
+        if self.actors is not None and row >= uavs:
+            return self.actors.names[row - uavs]
         return f"uav{row + 1}"
 
     def set_bodies(
@@ -164,14 +164,14 @@ class Scene:
             raise ValueError(f"shape_index must be in 0..{len(shapes) - 1}")
         self._uav_rows = body_rows(shapes, index, self.backend.shape_scenes(shapes))
         self._crew = max(len(index) // copies, 1)
-        self._bodies = body_table(self._uav_rows, self._thing_rows, self._crew)
+        self._bodies = body_table(self._uav_rows, self._actor_rows, self._crew)
 
-    def set_things(self, things: MovingActors) -> None:
-        """Let `things` be seen by all; `move_things` places them."""
-        scenes = self.backend.shape_scenes(things.shapes)
-        self.things = things
-        self._thing_rows = body_rows(things.shapes, np.arange(len(scenes)), scenes)
-        self._bodies = body_table(self._uav_rows, self._thing_rows, self._crew)
+    def set_actors(self, actors: MovingActors) -> None:
+        """Let `actors` be seen by all; `move_actors` places them."""
+        scenes = self.backend.shape_scenes(actors.shapes)
+        self.actors = actors
+        self._actor_rows = body_rows(actors.shapes, np.arange(len(scenes)), scenes)
+        self._bodies = body_table(self._uav_rows, self._actor_rows, self._crew)
 
     def move_bodies(
         self,
@@ -191,11 +191,11 @@ class Scene:
         end[:, :3] = position if end_position is None else end_position
         end[:, 3:] = attitude if end_attitude is None else end_attitude
 
-    def move_things(self, start_ns: int, end_ns: int) -> None:
+    def move_actors(self, start_ns: int, end_ns: int) -> None:
         """Place the things where they are at two simulated times, as `move_bodies` does UAVs."""
-        if self.things is not None:
+        if self.actors is not None:
             for table, time_ns in zip(self._poses, (start_ns, end_ns), strict=True):
-                table[len(self._uav_rows.scene) :] = self.things.poses_at(time_ns)
+                table[len(self._uav_rows.scene) :] = self.actors.poses_at(time_ns)
 
     @property
     def _poses(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

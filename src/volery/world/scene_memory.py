@@ -37,7 +37,7 @@ class BodyTable(NamedTuple):
     see discs."""
     turn: NDArray[np.float64]
     """(N, R, 2) rad, angles of the rotors at fractions 0 and 1."""
-    things: int
+    actors: int
     """How many of the last rows are things: people, vehicles, birds. Everybody sees them."""
 
 

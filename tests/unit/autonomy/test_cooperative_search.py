@@ -187,7 +187,7 @@ class Bodies:
 
     def call(self, name, finder, stamp_ns=0, place=(25.0, 15.0, 0.5)):
         request = message_type(f"{JOIN}_Request")(time_from_ns(stamp_ns), finder, Point(*place))
-        return self.graph.call(f"/{name}/search/come", request)
+        return self.graph.call(f"/{name}/search/join", request)
 
     def least_distance(self):
         tracks = [np.array(track) for track in self.tracks.values()]
@@ -336,8 +336,8 @@ def test_a_service_that_never_answers_is_called_again_and_given_up():
     bodies = searching()
     bodies.sees = {"uav1"}
     asked = []
-    bodies.graph.withdraw("/uav3/search/come")
-    bodies.graph.offer_async("/uav3/search/come", JOIN, lambda q, _: asked.append(q.finder))
+    bodies.graph.withdraw("/uav3/search/join")
+    bodies.graph.offer_async("/uav3/search/join", JOIN, lambda q, _: asked.append(q.finder))
     bodies.run_until(lambda: bodies.nodes["uav1"].phase is SearchPhase.HOME)
     assert asked == ["uav1"] * 20
     assert bodies.nodes["uav2"].phase is SearchPhase.HOME

@@ -63,7 +63,7 @@ def test_six_on_a_circle_change_sides():
     assert left < 0.5
 
 
-def test_each_takes_half_of_the_trouble():
+def test_each_takes_half_of_the_problem():
     (plane,) = half_planes(np.zeros(3), np.array([1.0, 0, 0]), [at(6.0, 0.5, -1.0)], SEPARATION, 0)
     (other,) = half_planes(
         np.array([6.0, 0.5, 0]), np.array([-1.0, 0, 0]), [at(0, 0, 1.0)], SEPARATION, 0

@@ -165,7 +165,7 @@ def test_the_rest_of_a_lost_uav_is_taken_over() -> None:
     for name in ("uav1", "uav3"):
         assert bench.managers[name].searched[left]
         assert bench.managers[name].phase == "done"
-        assert "silent: uav2" in bench.managers[name].trouble
+        assert "silent: uav2" in bench.managers[name].problem
 
 
 def test_one_that_gets_nowhere_leaves_its_sector_to_others() -> None:
@@ -184,7 +184,7 @@ def test_low_battery_brings_one_home_and_the_others_do_its_part() -> None:
     bench.uavs["uav3"].charge = 0.2
     bench.run(1.0)
     assert bench.managers["uav3"].phase == "return"
-    assert "low battery" in bench.managers["uav3"].trouble
+    assert "low battery" in bench.managers["uav3"].problem
     bench.run(170.0)
     assert set(bench.phases().values()) == {"done"}
     assert bench.managers["uav1"].searched.all()
@@ -199,12 +199,12 @@ def test_one_that_is_held_waits_and_others_take_its_sector() -> None:
     bench.run(30.0)
     assert uav.asked[-1] == "hold"
     assert (str(manager.phase), manager.sector) == ("hold", -1)
-    assert manager.trouble == "held by the operator"
+    assert manager.problem == "held by the operator"
     np.testing.assert_allclose(uav.place, place, atol=1.0)
     assert {bench.managers[n].sector for n in ("uav1", "uav3")} & {left} or manager.searched[left]
     bench.order("uav2", "resume")
     bench.run(2.0)
-    assert (str(manager.phase), manager.trouble, uav.paused) == ("search", "", False)
+    assert (str(manager.phase), manager.problem, uav.paused) == ("search", "", False)
     bench.run(140.0)
     assert set(bench.phases().values()) == {"done"}
     assert manager.searched.all()
@@ -267,7 +267,7 @@ def test_one_that_is_landed_gives_its_sector_up_and_may_go_on() -> None:
     bench.run(3.0)
     assert not uav.flies
     assert (str(manager.phase), manager.sector) == ("done", -1)
-    assert manager.trouble == "landed by the operator"
+    assert manager.problem == "landed by the operator"
     while not manager.searched[left]:  # by another one
         bench.run(1.0)
     assert not manager.searched.all()
@@ -322,7 +322,7 @@ def test_one_that_somebody_landed_says_so_and_gives_its_sector_up() -> None:
         sonar.publish(reading)
         bench.run(0.1)
     assert (str(manager.phase), manager.sector) == ("down", -1)
-    assert manager.trouble == "came down, and not by its mission"
+    assert manager.problem == "came down, and not by its mission"
     bench.run(80.0)
     assert not uav.flies
     assert bench.managers["uav1"].searched[left]
@@ -384,10 +384,10 @@ def test_it_holds_while_it_does_not_know_where_it_is() -> None:
     bench.run(10.0)
     bench.uavs["uav1"].silent = True
     bench.run(3.0)
-    assert bench.managers["uav1"].trouble == "no odometry"
+    assert bench.managers["uav1"].problem == "no odometry"
     bench.uavs["uav1"].silent = False
     bench.run(1.0)
-    assert bench.managers["uav1"].trouble == ""
+    assert bench.managers["uav1"].problem == ""
 
 
 def test_it_waits_and_in_the_end_lands_where_its_place_in_the_map_is_lost() -> None:
@@ -409,12 +409,12 @@ def test_it_waits_and_in_the_end_lands_where_its_place_in_the_map_is_lost() -> N
             bench.run(0.5)
 
     run(10.0, True)
-    assert manager.trouble == ""
+    assert manager.problem == ""
     run(4.0, False)
-    assert manager.trouble == UNKNOWN_PLACE
+    assert manager.problem == UNKNOWN_PLACE
     assert uav.flies
     run(2.0, True)
-    assert manager.trouble == ""
+    assert manager.problem == ""
     run(40.0, False)
     assert not uav.flies
 
@@ -490,7 +490,7 @@ def test_another_area_is_no_part_of_this_search() -> None:
     bench = TeamBench({"uav1": (0.0, 0.0)})
     bench.add("uav2", (0.0, 20.0), sector_m=30.0)
     bench.run(5.0)
-    assert bench.managers["uav1"].trouble == "another search: uav2"
+    assert bench.managers["uav1"].problem == "another search: uav2"
 
 
 def test_parameters_that_make_no_sense() -> None:

@@ -124,7 +124,7 @@ def test_summary(tmp_path: Path, flight: Flight, suffix: str) -> None:
     path = tmp_path / f"flight{suffix}"
     record(path, flight(2.0))
     summary = summarize(path)
-    assert summary.trouble == ""
+    assert summary.problem == ""
     assert summary.messages == 800
     assert (summary.start_ns, summary.end_ns) == (0, 1_975_000_000)
     scan = next(t for t in summary.topics if t.topic == "/uav1/laser/horizontal/scan")
@@ -152,7 +152,7 @@ def test_empty_run_gives_a_whole_log(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"flight{suffix}"
     record(path, [])
     summary = summarize(path)
-    assert (summary.messages, summary.trouble) == (0, "")
+    assert (summary.messages, summary.problem) == (0, "")
 
 
 @pytest.mark.parametrize("name", ["flight.txt", "flight", "flight.db3"])
@@ -197,7 +197,7 @@ def test_unfinished_log_is_readable_up_to_its_last_chunk(
     log.abort()
     summary = summarize(path)
     assert summary.messages == 400
-    assert "cut off" in summary.trouble
+    assert "cut off" in summary.problem
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
@@ -267,7 +267,7 @@ def test_file_size_limit_stops_the_run_with_one_error(
         signal.signal(signal.SIGXFSZ, handler)
     summary = summarize(path)
     assert summary.messages == log.messages > 100
-    assert "cut off" in summary.trouble
+    assert "cut off" in summary.problem
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
@@ -310,7 +310,7 @@ def test_killed_run_leaves_whole_chunks(tmp_path: Path, suffix: str) -> None:
         process.kill()
     assert process.returncode == -signal.SIGKILL
     summary = summarize(path)
-    assert "cut off" in summary.trouble
+    assert "cut off" in summary.problem
     # 8000 messages of 5 MB in all: at most the last megabyte is lost
     assert summary.messages > 5500
     assert summary.start_ns == 0

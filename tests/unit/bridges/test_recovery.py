@@ -45,13 +45,13 @@ def test_recovered_log_is_whole(tmp_path: Path, flight: Flight, suffix: str, kee
     path = tmp_path / f"flight{suffix}"
     total = cut(path, flight(2.0), keep)
     left = summarize(path)
-    assert "cut off" in left.trouble
+    assert "cut off" in left.problem
     assert total * keep * 0.6 <= left.messages <= total
     recovery = recover(path)
     assert recovery.path == recovered_name(path) == tmp_path / f"flight.recovered{suffix}"
     assert recovery.messages == left.messages
     whole = summarize(recovery.path)
-    assert whole.trouble == ""
+    assert whole.problem == ""
     assert whole.topics == left.topics
     assert (whole.start_ns, whole.end_ns) == (left.start_ns, left.end_ns)
     with AnyReader([recovery.path], default_typestore=typestore()) as reader:
@@ -71,7 +71,7 @@ def test_every_cut_is_survived(tmp_path: Path, flight: Flight, suffix: str) -> N
         except RecordingError:
             assert length < 20
         else:
-            assert summary.trouble
+            assert summary.problem
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
@@ -90,7 +90,7 @@ def test_damaged_chunk_is_left_out(tmp_path: Path, flight: Flight, suffix: str) 
     data[middle : middle + 2000] = bytes(2000)
     path.write_bytes(data)
     summary = summarize(path)
-    assert "1 damaged chunk left out" in summary.trouble
+    assert "1 damaged chunk left out" in summary.problem
     assert summary.messages == 300
 
 
@@ -141,7 +141,7 @@ def test_a_length_that_lies_claims_no_memory(tmp_path: Path, flight: Flight) -> 
         file.write(struct.pack("<I", 0xFFFFFFF0) + b"x")
     tracemalloc.start()
     try:
-        assert "cut off" in walked(path).trouble
+        assert "cut off" in walked(path).problem
         assert tracemalloc.get_traced_memory()[1] < 100e6
     finally:
         tracemalloc.stop()

@@ -115,7 +115,7 @@ def test_a_recorded_flight_played_into_a_fresh_graph_is_the_same(tmp_path, suffi
     assert told(world.heard) == told(hover)
     info = replay.info
     assert (info.running, info.published, info.skipped) == (False, len(hover), 0)
-    assert (info.trouble, info.refused, info.laps) == ("", {}, 1)
+    assert (info.problem, info.refused, info.laps) == ("", {}, 1)
 
 
 def test_played_into_a_running_simulation(tmp_path, hover):
@@ -275,7 +275,7 @@ def test_a_cut_log_is_played_up_to_the_cut(tmp_path, flight, suffix):
     world = World()
     replay = world.play(path, exclude=())
     world.run()
-    assert "cut off" in replay.info.trouble
+    assert "cut off" in replay.info.problem
     count = len(world.heard)
     assert 0 < count < len(messages)
     assert told(world.heard) == told(messages[:count])

@@ -25,7 +25,7 @@ def two():
         one.close()
 
 
-def test_a_client_that_is_closed_is_not_ready_and_in_no_trouble(two):
+def test_a_client_that_is_closed_is_not_ready_and_in_no_problem(two):
     """The participant's thread looks at it at any time."""
     here, there = two
     there.participant.server(ServiceSpec(there.node, "/do", TRIGGER), lambda _data, _answer: None)
@@ -33,7 +33,7 @@ def test_a_client_that_is_closed_is_not_ready_and_in_no_trouble(two):
     until(lambda: caller.ready)
     caller.close()
     assert not caller.ready
-    assert caller.trouble == ""
+    assert caller.problem == ""
 
 
 def test_what_is_due_and_fails_does_not_end_hearing(two, caplog):

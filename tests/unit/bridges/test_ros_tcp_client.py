@@ -176,8 +176,8 @@ def test_slips_are_told_to_who_makes_them(client):
 def test_the_endpoints_complaints_are_kept(loop, client):
     loop.graph.advertise("/number", "std_msgs/msg/Int32")
     client.subscribe("/number", STRING, wake=lambda: None)
-    until(lambda: client.trouble)
-    assert "std_msgs/msg/Int32" in client.trouble[0]
+    until(lambda: client.problem)
+    assert "std_msgs/msg/Int32" in client.problem[0]
 
 
 # ---------------------------------------------------------------------------------------- services
@@ -414,7 +414,7 @@ def test_unitys_endpoint_answers_calls(unity):
     other.command("response", srv_id=101)
     other.send("/do", b"\1\2")
     assert "Trigger_Response" in str(outcome.get(timeout=60.0))
-    assert "77" in client.trouble[0]
+    assert "77" in client.problem[0]
 
 
 @pytest.mark.parametrize(

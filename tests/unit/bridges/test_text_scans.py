@@ -81,7 +81,7 @@ def test_a_scanner_may_turn_clockwise(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("line", "trouble"),
+    ("line", "problem"),
     [
         ("1200000 0 0 0 1000 2000", "line 5: 6 columns where the layout needs 7"),
         ("1200000 0 0 0 1000 2000 far", "line 5: a column holds no number"),
@@ -92,11 +92,11 @@ def test_a_scanner_may_turn_clockwise(tmp_path):
         ("\x00\xff", "line 5: 1 column where"),
     ],
 )
-def test_lines_that_cannot_be_read_are_left_out_and_told(tmp_path, line, trouble):
+def test_lines_that_cannot_be_read_are_left_out_and_told(tmp_path, line, problem):
     scans = walk(tmp_path, f"{LINES}{line}\n1300000 0 0 0 1000 2000 3000\n")
     assert [one.time_ns for one in scans][-1] == 1_300_000_000
     assert (scans.scans, scans.left_out) == (3, 1)
-    assert re.match(trouble, scans.trouble)
+    assert re.match(problem, scans.problem)
 
 
 @pytest.mark.parametrize("text", ["", "# nothing\n", "one two three\n", "1 2 3\n"])
@@ -230,4 +230,4 @@ def test_a_time_of_too_many_digits_costs_its_line_alone(tmp_path):
     scans = walk(tmp_path, text)
     assert len(list(scans)) == 5
     assert scans.left_out == 1
-    assert "line 2: 1e-99" in scans.trouble
+    assert "line 2: 1e-99" in scans.problem

@@ -93,7 +93,7 @@ def test_the_line_is_that_of_a_walk(tmp_path, suffix, end, entries, chunk_every)
     assert [s.time_ns for s in found] == expected
     line = Timeline(log)
     assert (line.start_ns, line.end_ns) == (min(expected), max(expected))
-    assert bool(log.trouble) is not end
+    assert bool(log.problem) is not end
     log.close()
 
 
@@ -128,7 +128,7 @@ def test_logs_cut_off_anywhere_are_read_as_far_as_they_go(tmp_path, suffix):
     for size in (*range(14, len(whole), 37), *range(len(whole) - 150, len(whole))):
         path.write_bytes(whole[:size])
         log = open_chunks(path)
-        assert log.trouble
+        assert log.problem
         found = everything(log)
         assert told(found) == walked(path)
         lengths.add(len(found))
@@ -175,7 +175,7 @@ def test_mcap_files_of_others(tmp_path, compression, chunked, indexed):
     log = open_chunks(path)
     assert told(everything(log)) == walked(path)
     assert sum(log.counts().values()) == 200
-    assert not log.trouble
+    assert not log.problem
     log.close()
 
 

@@ -50,7 +50,7 @@ def test_run_writes_log_and_report(invoke: Invoke, tmp_path: Path) -> None:
     assert result.stderr == ""
     assert "\x1b" not in result.stdout
     assert summarize(log).messages == 400
-    assert summarize(log).trouble == ""
+    assert summarize(log).problem == ""
     page = (report / "index.html").read_text()
     assert "ab" * 32 in page
     assert "LIDARs saw" in page
@@ -152,7 +152,7 @@ def test_full_disk(
     left = summarize(log)
     assert 100 < left.messages < 4800
     assert f", {left.messages:,} messages)" in result.stdout
-    assert "cut off" in left.trouble
+    assert "cut off" in left.problem
     assert "The log could not be written" in (report / "index.html").read_text()
 
 
@@ -273,6 +273,6 @@ def test_ctrl_c_in_mid_flight(tmp_path: Path, suffix: str) -> None:
     assert f"log     {log}" in out
     assert f"report  {report / 'index.html'}" in out
     summary = summarize(log)
-    assert summary.trouble == ""
+    assert summary.problem == ""
     assert summary.messages > 50
     assert "Stopped with Ctrl-C: this report shows" in (report / "index.html").read_text()

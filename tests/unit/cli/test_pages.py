@@ -69,7 +69,7 @@ def test_addresses(page, host, port):
     settings = _settings_of(RunOptions("hover", page=page, token="t", allow_remote=True))
     assert (settings.host, settings.port) == (host, port)
     assert settings.anywhere
-    assert settings.tokens.pilot == "t"
+    assert settings.tokens.operator == "t"
 
 
 @pytest.mark.parametrize("page", ["x", "host:", ":80", "1:70000"])

@@ -156,13 +156,13 @@ def test_missions_and_slams_are_shown_where_they_are_told() -> None:
     assert desk.ground.take(frame(MISSION, MISSION_TYPE, status), 0) == "uav1: mission search 4"
     assert desk.ground.take(frame(MISSION, MISSION_TYPE, status), 0) is None
     held = zero_message(MISSION_TYPE)
-    held.phase, held.sector, held.trouble = "hold", -1, "held by the operator"
+    held.phase, held.sector, held.problem = "hold", -1, "held by the operator"
     line = desk.ground.take(frame(MISSION, MISSION_TYPE, held), 0)
     assert line == "uav1: mission hold, held by the operator"
     lost = json.dumps({"state": "lost", "problems": ["no imu"], "keyframes": 3})
     assert desk.ground.take(frame(SLAM, SLAM_TYPE, String(lost)), 0) == "uav1: SLAM lost: no imu"
     (row,) = desk.ground.rows(0)
-    assert (row.mission, row.slam, row.trouble) == ("hold", "lost: no imu", "held by the operator")
+    assert (row.mission, row.slam, row.problem) == ("hold", "lost: no imu", "held by the operator")
     assert desk.ground.take(frame(SLAM, SLAM_TYPE, String("[1]")), 0) == "uav1: SLAM ?"
 
 

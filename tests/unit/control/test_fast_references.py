@@ -35,7 +35,7 @@ def rotors_after(steps, command, number=1, into_tick=3):
     command(fleet)
     for _ in range(number):
         fleet.advance(steps // number, GRID)
-    return fleet._pilots["rotor_reference"].copy()
+    return fleet._control_states["rotor_reference"].copy()
 
 
 def nothing(fleet):

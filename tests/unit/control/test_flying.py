@@ -9,7 +9,7 @@ from volery.control.fleet import Fleet
 from volery.control.fleet_events import FleetEventKind
 from volery.control.flight_modes import FlightMode
 from volery.control.fused_step import UAV
-from volery.control.setpoints import PILOT
+from volery.control.setpoints import CONTROL_STATE
 from volery.core import rotations
 from volery.core.errors import CommandError
 from volery.vehicle.contact import standing_pose
@@ -434,7 +434,7 @@ def test_budgets_stop_after_a_whole_step(budget):
 
 
 def test_records_have_no_hidden_padding():
-    for record in (BODY, PILOT, UAV):
+    for record in (BODY, CONTROL_STATE, UAV):
         assert record.itemsize == sum(kind.itemsize for kind, _ in record.fields.values())
 
 

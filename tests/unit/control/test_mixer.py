@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from volery.control.gains import gains_of
 from volery.control.mixer import mix
-from volery.control.setpoints import new_pilots
+from volery.control.setpoints import new_control_states
 from volery.vehicle.airframe import wrench_matrix
 from volery.vehicle.compiled import fused_kernel
 
@@ -15,18 +15,18 @@ GAINS = {name: gains_of(frame, 1e-3) for name, frame in FRAMES.items()}
 
 
 @fused_kernel
-def _mix(gains, pilots, thrust, ax, ay, az):
-    mix(gains[0], thrust, ax, ay, az, pilots[0])
+def _mix(gains, control_states, thrust, ax, ay, az):
+    mix(gains[0], thrust, ax, ay, az, control_states[0])
 
 
 def mixed(name, thrust, torque):
     """Rotor thrusts, and the thrust and torque (4,) that they make."""
-    frame, pilots = FRAMES[name], new_pilots(np.array([[0.0, 0.0, 0.0, 1.0]]))
-    pilots["full_thrust"] = frame.max_rotor_thrust
+    frame, control_states = FRAMES[name], new_control_states(np.array([[0.0, 0.0, 0.0, 1.0]]))
+    control_states["full_thrust"] = frame.max_rotor_thrust
     acceleration = np.array(torque) / frame.body.inertia_kg_m2
-    _mix(GAINS[name], pilots, float(thrust), *map(float, acceleration))
-    speeds = pilots["rotor_reference"][0, : len(frame.rotors.places)]
-    assert not pilots["rotor_reference"][0, len(frame.rotors.places) :].any()
+    _mix(GAINS[name], control_states, float(thrust), *map(float, acceleration))
+    speeds = control_states["rotor_reference"][0, : len(frame.rotors.places)]
+    assert not control_states["rotor_reference"][0, len(frame.rotors.places) :].any()
     forces = frame.rotors.thrust_n_s2 * speeds**2
     return forces, wrench_matrix(frame)[2:] @ forces
 

@@ -9,7 +9,7 @@ from volery.control.gains import gains_of
 from volery.control.outer_loop import track
 from volery.control.reference import lead_height, lead_level, move_on
 from volery.control.rpt import tracking_gains
-from volery.control.setpoints import new_pilots
+from volery.control.setpoints import new_control_states
 from volery.vehicle.airframe import GRAVITY, Airframe
 from volery.vehicle.compiled import fused_kernel
 from volery.vehicle.drag import drag_acceleration
@@ -20,15 +20,15 @@ UP = np.array([[0.0, 0.0, 0.0, 1.0]])
 
 
 @fused_kernel
-def _track(pilots, bodies, gains, fx, fy, fz):
-    track(pilots[0], bodies[0], gains[0], True, True, fx, fy, fz)
+def _track(control_states, bodies, gains, fx, fy, fz):
+    track(control_states[0], bodies[0], gains[0], True, True, fx, fy, fz)
 
 
 @fused_kernel
-def _lead(pilots, bodies, gains):
-    move_on(pilots[0], gains[0])
-    lead_level(pilots[0], bodies[0], gains[0], gains[0].speed)
-    lead_height(pilots[0], bodies[0], gains[0], gains[0].climb, gains[0].descent)
+def _lead(control_states, bodies, gains):
+    move_on(control_states[0], gains[0])
+    lead_level(control_states[0], bodies[0], gains[0], gains[0].speed)
+    lead_height(control_states[0], bodies[0], gains[0], gains[0].climb, gains[0].descent)
 
 
 def fine_gains(airframe=F450, tick=1e-3):
@@ -37,25 +37,25 @@ def fine_gains(airframe=F450, tick=1e-3):
     return gains
 
 
-def asked(pilot, gains):
+def asked(control_state, gains):
     """Acceleration (3,) that attitude and thrust setpoints ask of a level vehicle."""
-    x, y, z, w = pilot["attitude"]
+    x, y, z, w = control_state["attitude"]
     axis = np.array([2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)])
-    upwards = pilot["thrust"] / gains["mass"]
+    upwards = control_state["thrust"] / gains["mass"]
     return axis * upwards / axis[2] - [0, 0, GRAVITY]
 
 
 def double_integrator(seconds, place, velocity=(0, 0, 0), push=(0, 0, 0), tick=1e-3, law=None):
     """Errors (K, 3) and integrals (K, 3) of p'' = a + push under the kernel's law."""
     gains = fine_gains(tick=tick) if law is None else law
-    pilots, bodies = new_pilots(UP), new_bodies(np.array([place], float), UP)
+    control_states, bodies = new_control_states(UP), new_bodies(np.array([place], float), UP)
     bodies["velocity_map"] = velocity
     errors, integrals = [], []
     for _ in range(round(seconds / tick)):
         errors.append(bodies["position_map"][0].copy())
-        integrals.append(pilots["velocity_integral"][0].copy())
-        _track(pilots, bodies, gains, 0.0, 0.0, 0.0)
-        a = asked(pilots[0], gains[0]) + push
+        integrals.append(control_states["velocity_integral"][0].copy())
+        _track(control_states, bodies, gains, 0.0, 0.0, 0.0)
+        a = asked(control_states[0], gains[0]) + push
         bodies["position_map"] += tick * bodies["velocity_map"] + 0.5 * tick**2 * a
         bodies["velocity_map"] += tick * a
     return np.array(errors), np.array(integrals)
@@ -109,14 +109,14 @@ def test_integrals_do_not_wind_up_in_saturation():
 
 def test_integral_stands_still_while_it_would_push_further():
     gains = fine_gains()
-    pilots, bodies = new_pilots(UP), new_bodies(np.array([[0.5, 0, 0]]), UP)
+    control_states, bodies = new_control_states(UP), new_bodies(np.array([[0.5, 0, 0]]), UP)
     bodies["velocity_map"] = (20, 0, 0)  # brakes at the limit, away from the reference
     for _ in range(100):
-        _track(pilots, bodies, gains, 0.0, 0.0, 0.0)
-    assert pilots["velocity_integral"][0, 0] == 0.0
+        _track(control_states, bodies, gains, 0.0, 0.0, 0.0)
+    assert control_states["velocity_integral"][0, 0] == 0.0
     bodies["position_map"] = (-0.5, 0, 0)  # now the error takes from the saturation
-    _track(pilots, bodies, gains, 0.0, 0.0, 0.0)
-    assert pilots["velocity_integral"][0, 0] > 0.0
+    _track(control_states, bodies, gains, 0.0, 0.0, 0.0)
+    assert control_states["velocity_integral"][0, 0] > 0.0
 
 
 def test_own_limits_of_the_integral_follow_the_drag():
@@ -136,16 +136,20 @@ def test_own_limits_of_the_integral_follow_the_drag():
 def test_the_reference_is_feasible_and_arrives(goal):
     gains = gains_of(F450, 1e-3)
     row, tick = gains[0], float(gains["tick"][0])
-    pilots, bodies = new_pilots(UP), new_bodies(np.zeros((1, 3)), UP)
-    pilots["position_target"] = goal
+    control_states, bodies = new_control_states(UP), new_bodies(np.zeros((1, 3)), UP)
+    control_states["position_target"] = goal
     if goal == (-2, 0, 0):
-        pilots["velocity"] = (6, 3, 0)  # must turn back first
+        control_states["velocity"] = (6, 3, 0)  # must turn back first
     seen = []
     for _ in range(round(40 / tick)):
-        bodies["position_map"] = pilots["position"] + tick * pilots["velocity"]  # follows well
-        _lead(pilots, bodies, gains)
-        pilot = pilots[0]
-        seen.append([*pilot["position"], *pilot["velocity"], *pilot["acceleration"]])
+        bodies["position_map"] = (
+            control_states["position"] + tick * control_states["velocity"]
+        )  # follows well
+        _lead(control_states, bodies, gains)
+        control_state = control_states[0]
+        seen.append(
+            [*control_state["position"], *control_state["velocity"], *control_state["acceleration"]]
+        )
     place, velocity, acceleration = np.split(np.array(seen), 3, axis=1)
     np.testing.assert_allclose(place[-1], goal, atol=1e-3)
     assert np.hypot(*velocity[:, :2].T).max() < 1.02 * row["speed"]
@@ -164,11 +168,11 @@ def test_the_reference_is_feasible_and_arrives(goal):
 
 def test_a_reference_waits_for_who_is_held_back():
     gains = gains_of(F450, 1e-3)
-    pilots, bodies = new_pilots(UP), new_bodies(np.zeros((1, 3)), UP)
-    pilots["position_target"] = (50, 0, 20)
+    control_states, bodies = new_control_states(UP), new_bodies(np.zeros((1, 3)), UP)
+    control_states["position_target"] = (50, 0, 20)
     for _ in range(1000):
-        _lead(pilots, bodies, gains)
-    ahead = pilots["position"][0]
+        _lead(control_states, bodies, gains)
+    ahead = control_states["position"][0]
     assert np.hypot(*ahead[:2]) <= gains["level_leash"][0] + 1e-9
     assert ahead[2] <= gains["height_leash"][0] + 1e-9
 

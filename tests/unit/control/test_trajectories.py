@@ -8,7 +8,7 @@ from scipy.interpolate import BPoly, CubicHermiteSpline
 from volery.control.fleet import Fleet
 from volery.control.flight_modes import FlightMode
 from volery.control.segment_store import SegmentStore
-from volery.control.setpoints import new_pilots
+from volery.control.setpoints import new_control_states
 from volery.control.trajectory import Trajectory
 from volery.control.trajectory_kernels import polynomial, segment_at
 from volery.core import rotations
@@ -280,20 +280,20 @@ def test_snapshot_returns_exactly_and_keeps_its_trajectories():
 
 
 def test_the_store_makes_room_and_loses_nothing():
-    pilots = new_pilots(np.array([LEVEL] * 5, float))
-    store = SegmentStore(pilots)
+    control_states = new_control_states(np.array([LEVEL] * 5, float))
+    store = SegmentStore(control_states)
     rng = np.random.default_rng(2)
     mine = {}
     for k in range(400):
         i = int(rng.integers(5))
         block = rng.normal(size=(int(rng.integers(1, 30)), store.rows.shape[1]))
-        pilots["mode"][i] = FlightMode.TRAJECTORY
+        control_states["mode"][i] = FlightMode.TRAJECTORY
         store.put(i, block)
         mine[i] = block
         if k % 7 == 0:
-            pilots["mode"][i] = FlightMode.HOLD
+            control_states["mode"][i] = FlightMode.HOLD
             mine.pop(i)
         for j, wanted in mine.items():
-            rows = store.rows[pilots["path_first"][j] : pilots["path_last"][j] + 1]
+            rows = store.rows[control_states["path_first"][j] : control_states["path_last"][j] + 1]
             np.testing.assert_array_equal(rows, wanted)
     assert len(store.rows) < 1000

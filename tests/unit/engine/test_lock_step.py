@@ -16,7 +16,7 @@ def in_thread(function):
     return thread
 
 
-def pilot(partner, uav, times, pause_s=0.0):
+def operator(partner, uav, times, pause_s=0.0):
     """Fly by a law of time alone, from another thread."""
 
     def work():
@@ -40,8 +40,8 @@ def test_engine_waits_and_obeys_in_time(simulate, flat_data):
         simulation = airborne(simulate, flat_data)
         simulation.enable_digest()
         times = []
-        partner = simulation.add_partner("pilot", period_s=0.05)
-        thread = pilot(partner, simulation.uavs["uav1"], times, pause_s)
+        partner = simulation.add_partner("operator", period_s=0.05)
+        thread = operator(partner, simulation.uavs["uav1"], times, pause_s)
         for seconds in slices:
             simulation.run(seconds)
         digests.add(simulation.digest())
@@ -124,10 +124,10 @@ def test_impossible_terms_are_refused(simulate, flat_data, values):
 def test_partners_that_begin_anew_come_along_in_a_reset(simulate, flat_data):
     simulation = airborne(simulate, flat_data)
     times = []
-    partner = simulation.add_partner("pilot", period_s=0.02, restarts=True)
-    pilot(partner, simulation.uavs["uav1"], times)
+    partner = simulation.add_partner("operator", period_s=0.02, supports_reset=True)
+    operator(partner, simulation.uavs["uav1"], times)
     simulation.run(0.05)
-    with pytest.raises(SnapshotError, match="partner 'pilot' is its own"):
+    with pytest.raises(SnapshotError, match="partner 'operator' is its own"):
         simulation.snapshot()
     simulation.reset()
     simulation.run(0.05)

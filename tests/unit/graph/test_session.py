@@ -206,7 +206,7 @@ def test_what_cannot_be_is_refused(bench, attempt, words):
 
 def test_nothing_is_lost_or_doubled_while_clients_come_and_go(bench):
     publisher = bench.graph.advertise("/out", STRING, latched=True)
-    stop, trouble, most = threading.Event(), [], 3000
+    stop, problem, most = threading.Event(), [], 3000
 
     def visit():
         while not stop.is_set():
@@ -216,7 +216,7 @@ def test_nothing_is_lost_or_doubled_while_clients_come_and_go(bench):
             session.close()
             numbers += [int(text) for text in texts(mailbox)]
             if numbers != list(range(numbers[0], numbers[0] + len(numbers))) if numbers else False:
-                trouble.append(numbers)
+                problem.append(numbers)
 
     threads = [threading.Thread(target=visit) for _ in range(3)]
     for thread in threads:
@@ -227,7 +227,7 @@ def test_nothing_is_lost_or_doubled_while_clients_come_and_go(bench):
     stop.set()
     for thread in threads:
         thread.join()
-    assert not trouble
+    assert not problem
 
 
 def test_last_words_of_who_leaves_are_heard(bench):

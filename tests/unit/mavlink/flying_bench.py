@@ -71,7 +71,7 @@ class Station:
         self._out.publish(
             message_type(PACKETS)(link=self.link, profile=self.profile, closed=False, data=data)
         )
-        self.simulation.take_in()
+        self.simulation.process_commands()
         self.simulation.graph.deliver()
 
     def seconds(self, seconds):

@@ -57,7 +57,7 @@ def opened():
         closing.extend([bridges, simulation])
         bridge = ArdupilotBridge(port=free_port(socket.SOCK_DGRAM), patience=patience)
         bridges.open(bridge)
-        simulation.take_in()
+        simulation.process_commands()
         return simulation, bridge
 
     yield open_one
@@ -70,26 +70,26 @@ def meet(simulation, bridge, count):
     end = time.monotonic() + 60.0
     while len(bridge.connected) < count and time.monotonic() < end:
         time.sleep(0.01)
-        simulation.take_in()
+        simulation.process_commands()
     assert len(bridge.connected) == count
 
 
-def finish(*pilots):
-    for pilot in pilots:
-        assert pilot.done.wait(60.0)
-        if pilot.fault:
-            raise pilot.fault
+def finish(*autopilots):
+    for autopilot in autopilots:
+        assert autopilot.done.wait(60.0)
+        if autopilot.fault:
+            raise autopilot.fault
 
 
 @pytest.mark.parametrize("magic", [18458, 29569])
 def test_a_vehicle_flies_in_lock_step(opened, magic):
     simulation, bridge = opened()
-    pilot = ArdupilotStandIn(bridge._port, 960, pwm=CLIMB, arm_at=80, magic=magic)
-    pilot.start()
+    autopilot = ArdupilotStandIn(bridge._port, 960, pwm=CLIMB, arm_at=80, magic=magic)
+    autopilot.start()
     meet(simulation, bridge, 1)
     simulation.run(1.2)
-    finish(pilot)
-    resting, climbing = pilot.states[40], pilot.states[-1]
+    finish(autopilot)
+    resting, climbing = autopilot.states[40], autopilot.states[-1]
     assert resting["imu", "accel_body"][2] == pytest.approx(-9.81, abs=0.4)
     assert climbing["", "velocity"][2] < -0.3
     assert climbing["", "position"][2] < resting["", "position"][2] - 0.1
@@ -98,51 +98,51 @@ def test_a_vehicle_flies_in_lock_step(opened, magic):
 
 def test_several_have_ports_of_their_own(opened):
     simulation, bridge = opened(count=2)
-    pilots = [ArdupilotStandIn(bridge._port + 10 * k, 160, pwm=1000 + k) for k in range(2)]
-    for pilot in pilots:
-        pilot.start()
+    autopilots = [ArdupilotStandIn(bridge._port + 10 * k, 160, pwm=1000 + k) for k in range(2)]
+    for autopilot in autopilots:
+        autopilot.start()
     meet(simulation, bridge, 2)
     simulation.run(0.2)
-    finish(*pilots)
-    places = [pilot.states[0]["", "position"] for pilot in pilots]
+    finish(*autopilots)
+    places = [autopilot.states[0]["", "position"] for autopilot in autopilots]
     assert places[1][1] - places[0][1] == pytest.approx(5.0, abs=0.1)
 
 
 def test_one_that_was_restarted_is_met_anew(opened):
     simulation, bridge = opened()
     for first in (5, 0):
-        pilot = ArdupilotStandIn(bridge._port, 80, first=first)
-        pilot.start()
+        autopilot = ArdupilotStandIn(bridge._port, 80, first=first)
+        autopilot.start()
         end = time.monotonic() + 60.0
         while bridge._seats[0]._number != first and time.monotonic() < end:
             time.sleep(0.01)
         simulation.run(0.1)
-        finish(pilot)
-        assert pilot.states[0]["", "timestamp"] == pytest.approx([0.00125])
+        finish(autopilot)
+        assert autopilot.states[0]["", "timestamp"] == pytest.approx([0.00125])
 
 
 def test_it_flies_on_after_a_reset(opened):
     simulation, bridge = opened()
-    pilot = ArdupilotStandIn(bridge._port, 160, pwm=CLIMB, may_jump=True)
-    pilot.start()
+    autopilot = ArdupilotStandIn(bridge._port, 160, pwm=CLIMB, may_jump=True)
+    autopilot.start()
     meet(simulation, bridge, 1)
     simulation.run(0.1)
     simulation.reset()
     simulation.run(0.1)
-    finish(pilot)
-    assert pilot.jumps == 1
+    finish(autopilot)
+    assert autopilot.jumps == 1
 
 
 def test_who_is_silent_ends_the_run_or_is_given_up(opened, caplog):
     simulation, bridge = opened(patience=TimeoutPolicy(0.3))
-    pilot = ArdupilotStandIn(bridge._port, 5)
-    pilot.start()
+    autopilot = ArdupilotStandIn(bridge._port, 5)
+    autopilot.start()
     meet(simulation, bridge, 1)
     with pytest.raises(PartnerError, match=r"'ardupilot_of_uav1' did not answer within 0\.3 s"):
         simulation.run(1.0)
     simulation, bridge = opened(patience=TimeoutPolicy(0.3, drops=True))
-    pilot = ArdupilotStandIn(bridge._port, 5, pwm=CLIMB)
-    pilot.start()
+    autopilot = ArdupilotStandIn(bridge._port, 5, pwm=CLIMB)
+    autopilot.start()
     meet(simulation, bridge, 1)
     with caplog.at_level(logging.WARNING, logger="volery.mavlink"):
         simulation.run(0.5)
@@ -152,23 +152,23 @@ def test_who_is_silent_ends_the_run_or_is_given_up(opened, caplog):
 
 def test_what_was_lost_is_said_again(opened):
     simulation, bridge = opened()
-    pilot = ArdupilotStandIn(bridge._port, 1)
-    pilot.send(0)
+    autopilot = ArdupilotStandIn(bridge._port, 1)
+    autopilot.send(0)
     meet(simulation, bridge, 1)
     run = threading.Thread(target=simulation.run, args=(0.0022,))
     run.start()
-    first = pilot.link.recv(65000)
-    pilot.send(0)  # as one that has not heard it
-    assert pilot.link.recv(65000) == first
-    pilot.send(1)
+    first = autopilot.link.recv(65000)
+    autopilot.send(0)  # as one that has not heard it
+    assert autopilot.link.recv(65000) == first
+    autopilot.send(1)
     run.join(60.0)
     assert not run.is_alive()
-    pilot.link.close()
+    autopilot.link.close()
 
 
 def test_noise_and_a_second_one_are_told_of_and_passed_over(opened, caplog):
     simulation, bridge = opened()
-    pilot = ArdupilotStandIn(bridge._port, 160, pwm=CLIMB)
+    autopilot = ArdupilotStandIn(bridge._port, 160, pwm=CLIMB)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         for data in (
             b"",
@@ -177,13 +177,13 @@ def test_noise_and_a_second_one_are_told_of_and_passed_over(opened, caplog):
             struct.pack("<HHI16H", 18459, 1, 0, *[0] * 16),
         ):
             other.sendto(data, ("127.0.0.1", bridge._port))
-        pilot.start()
+        autopilot.start()
         meet(simulation, bridge, 1)
         for number in (10_000, 0):  # one that flies elsewhere, and one that was just started
             frame = struct.pack("<HHI16H", 18458, 400, number, *[1000] * 16)
             other.sendto(frame, ("127.0.0.1", bridge._port))
         simulation.run(0.2)
-    finish(pilot)
+    finish(autopilot)
     assert caplog.messages == [
         "uav1: what speaks to its port is no ArduPilot",
         "uav1: its ArduPilot is there already; another one is not heard",
@@ -192,21 +192,21 @@ def test_noise_and_a_second_one_are_told_of_and_passed_over(opened, caplog):
 
 def test_a_frame_that_comes_late_begins_nothing_anew(opened):
     simulation, bridge = opened()
-    pilot = ArdupilotStandIn(bridge._port, 1)
-    pilot.send(1000)
+    autopilot = ArdupilotStandIn(bridge._port, 1)
+    autopilot.send(1000)
     meet(simulation, bridge, 1)
     run = threading.Thread(target=simulation.run, args=(0.0047,))
     run.start()
     times = []
     for number in (1001, 1002, 1003):
-        times += read(pilot.link.recv(65000).decode(), "", "timestamp", 1)
+        times += read(autopilot.link.recv(65000).decode(), "", "timestamp", 1)
         for late in (990, 999):
-            pilot.send(late)
-        pilot.send(number)
+            autopilot.send(late)
+        autopilot.send(number)
     run.join(60.0)
     assert not run.is_alive()
     assert times == pytest.approx([0.00125, 0.0025, 0.00375])
-    pilot.link.close()
+    autopilot.link.close()
 
 
 def test_frames_that_are_none():

@@ -188,7 +188,7 @@ def test_without_satellites_it_is_not_armed_and_lands():
     with simulation:
         station.seconds(1.0)
         station.up(2.0)
-        simulation.inject({"kind": "gnss_loss", "uav": "uav1"})
+        simulation.inject_fault({"kind": "gnss_loss", "uav": "uav1"})
         station.seconds(4.0)
         assert station.present_mode == HOLD
         station.seconds(2.5)

@@ -33,7 +33,7 @@ class Running:
         self._thread = threading.Thread(target=lambda: simulation.run(600.0, speed=1.0))
 
     def __enter__(self):
-        self.simulation.be_prompt()
+        self.simulation.use_low_latency()
         self._thread.start()
         return self
 

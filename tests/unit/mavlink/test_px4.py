@@ -42,7 +42,7 @@ def opened():
         closing.extend([bridges, simulation])
         bridge = Px4Bridge(port=free_port(), patience=patience)
         bridges.open(bridge)
-        simulation.take_in()
+        simulation.process_commands()
         return simulation, bridge
 
     yield open_one
@@ -55,23 +55,23 @@ def meet(simulation, bridge, count):
     end = time.monotonic() + 60.0
     while len(bridge.connected) < count and time.monotonic() < end:
         time.sleep(0.01)
-        simulation.take_in()
+        simulation.process_commands()
     assert len(bridge.connected) == count
 
 
 def test_a_vehicle_flies_in_lock_step(opened):
     simulation, bridge = opened()
-    pilot = StandIn(bridge._port, 400, throttle=CLIMB, arm_at=100)
+    autopilot = StandIn(bridge._port, 400, throttle=CLIMB, arm_at=100)
     meet(simulation, bridge, 1)
-    pilot.start()
+    autopilot.start()
     simulation.run(2.0)
-    assert pilot.done.wait(60.0)
-    if pilot.fault:
-        raise pilot.fault
-    assert len(pilot.sensors) == 400
-    assert pilot.groups & 0x1FFF == 0x1BFF  # all groups but the differential pressure
-    assert len(pilot.fixes) >= 3
-    at_rest, climbing = pilot.sensors[50], pilot.sensors[390]
+    assert autopilot.done.wait(60.0)
+    if autopilot.fault:
+        raise autopilot.fault
+    assert len(autopilot.sensors) == 400
+    assert autopilot.groups & 0x1FFF == 0x1BFF  # all groups but the differential pressure
+    assert len(autopilot.fixes) >= 3
+    at_rest, climbing = autopilot.sensors[50], autopilot.sensors[390]
     assert at_rest.zacc == pytest.approx(-9.81, abs=0.4)
     assert climbing.zacc < -10.0
     assert simulation.uavs["uav1"].position_map[2] > 0.3
@@ -109,37 +109,37 @@ def test_who_speaks_no_mavlink_gives_way_and_who_comes_after_a_px4_is_ended(open
 
 def test_several_vehicles_share_one_clock(opened):
     simulation, bridge = opened(count=2)
-    pilots = [StandIn(bridge._port + k, 150) for k in range(2)]
+    autopilots = [StandIn(bridge._port + k, 150) for k in range(2)]
     meet(simulation, bridge, 2)
-    for pilot in pilots:
-        pilot.start()
+    for autopilot in autopilots:
+        autopilot.start()
     simulation.run(1.0)
-    for pilot in pilots:
-        assert pilot.done.wait(60.0)
-        assert pilot.fault is None
-    first, second = ([s.time_usec for s in pilot.sensors[2:]] for pilot in pilots)
+    for autopilot in autopilots:
+        assert autopilot.done.wait(60.0)
+        assert autopilot.fault is None
+    first, second = ([s.time_usec for s in autopilot.sensors[2:]] for autopilot in autopilots)
     assert set(first) & set(second)
 
 
 def test_a_silent_one_ends_the_run_with_an_error(opened):
     simulation, bridge = opened(patience=TimeoutPolicy(0.5))
-    pilot = StandIn(bridge._port, 50, falls_silent=True)
+    autopilot = StandIn(bridge._port, 50, falls_silent=True)
     meet(simulation, bridge, 1)
-    pilot.start()
+    autopilot.start()
     with pytest.raises(PartnerError) as told:
         simulation.run(1.0)
-    told_s = round(pilot.sensors[-1].time_usec / 1e6 + 0.004, 3)
+    told_s = round(autopilot.sensors[-1].time_usec / 1e6 + 0.004, 3)
     assert str(told.value) == (
         f"partner 'px4_of_uav1' did not answer within 0.5 s of wall time at {told_s:.3f} s"
     )
-    pilot.close()
+    autopilot.close()
 
 
 def test_a_silent_one_is_given_up_where_that_is_wanted_and_may_come_back(opened, caplog):
     simulation, bridge = opened(patience=TimeoutPolicy(0.5, drops=True))
-    pilot = StandIn(bridge._port, 50, throttle=CLIMB, falls_silent=True)
+    autopilot = StandIn(bridge._port, 50, throttle=CLIMB, falls_silent=True)
     meet(simulation, bridge, 1)
-    pilot.start()
+    autopilot.start()
     with caplog.at_level(logging.WARNING, logger="volery.mavlink"):
         simulation.run(1.0)
     assert simulation.time_s == pytest.approx(1.0)
@@ -151,34 +151,34 @@ def test_a_silent_one_is_given_up_where_that_is_wanted_and_may_come_back(opened,
     simulation.run(0.5)
     assert again.done.wait(60.0)
     assert again.fault is None
-    pilot.close()
+    autopilot.close()
 
 
 def test_time_goes_on_without_one_that_is_disarmed_and_says_nothing(opened, caplog):
     """As PX4 in Offboard without setpoints: it answers again when time has gone on."""
     simulation, bridge = opened(patience=TimeoutPolicy(1.0))
-    pilot = StandIn(bridge._port, 50, arm_at=1000, dozes=100)
+    autopilot = StandIn(bridge._port, 50, arm_at=1000, dozes=100)
     meet(simulation, bridge, 1)
-    pilot.start()
+    autopilot.start()
     simulation.run(1.0)
-    assert pilot.done.wait(60.0)
-    if pilot.fault:
-        raise pilot.fault
-    assert len(pilot.sensors) == 200
+    assert autopilot.done.wait(60.0)
+    if autopilot.fault:
+        raise autopilot.fault
+    assert len(autopilot.sensors) == 200
     told = {text for text in caplog.messages if "silent" in text}
     assert told == {"uav1: its autopilot is disarmed and silent; it is not waited for"}
 
 
 def test_one_that_is_disarmed_and_never_answers_again_ends_the_run(opened):
     simulation, bridge = opened(patience=TimeoutPolicy(0.5))
-    pilot = StandIn(bridge._port, 50, arm_at=1000, falls_silent=True)
+    autopilot = StandIn(bridge._port, 50, arm_at=1000, falls_silent=True)
     meet(simulation, bridge, 1)
-    pilot.start()
+    autopilot.start()
     with pytest.raises(PartnerError, match=r"did not answer within 0\.5 s"):
         simulation.run(60.0)
-    assert len(pilot.sensors) == 50
+    assert len(autopilot.sensors) == 50
     assert 1.0 < simulation.time_s < 5.0  # about six times the patience, no faster than real time
-    pilot.close()
+    autopilot.close()
 
 
 def test_a_reset_sends_them_away_and_a_restarted_one_flies(opened, caplog):
@@ -205,13 +205,13 @@ def test_a_reset_sends_them_away_and_a_restarted_one_flies(opened, caplog):
 
 def test_one_with_a_clock_of_its_own_is_not_waited_for(opened):
     simulation, bridge = opened()
-    pilot = StandIn(bridge._port, 20, falls_silent=True, in_lock_step=False)
+    autopilot = StandIn(bridge._port, 20, falls_silent=True, in_lock_step=False)
     meet(simulation, bridge, 1)
-    pilot.start()
+    autopilot.start()
     simulation.run(1.0)
-    assert pilot.done.wait(60.0)
-    assert pilot.fault is None
-    pilot.close()
+    assert autopilot.done.wait(60.0)
+    assert autopilot.fault is None
+    autopilot.close()
 
 
 def test_one_on_a_serial_line_flies_the_uav_that_is_left():
@@ -219,24 +219,24 @@ def test_one_on_a_serial_line_flies_the_uav_that_is_left():
     simulation = Simulation(scenario(count=2), threads=1)
     with simulation, BridgeHost(simulation.gateway) as bridges:
         lines = [Px4SerialBridge(terminal.path) for terminal in terminals]
-        pilots = []
+        autopilots = []
         for terminal, line in zip(terminals, lines, strict=True):
             bridges.open(line)
-            simulation.take_in()
-            pilots.append(StandIn(0, 10_000, throttle=CLIMB, arm_at=50, link=terminal))
+            simulation.process_commands()
+            autopilots.append(StandIn(0, 10_000, throttle=CLIMB, arm_at=50, link=terminal))
         assert [line.uav for line in lines] == ["uav1", "uav2"]
         with pytest.raises(BridgeError, match="no UAV with an IMU is left"):
             bridges.open(Px4SerialBridge(terminals[0].path))
-        for pilot in pilots:
-            pilot.start()
+        for autopilot in autopilots:
+            autopilot.start()
         simulation.run(1.0)
         assert simulation.uavs["uav1"].position_map[2] > 0.2
         assert simulation.uavs["uav2"].position_map[2] > 0.2
-    for pilot in pilots:
-        pilot.close()
-        assert pilot.done.wait(60.0)
-        assert len(pilot.sensors) > 200
-        assert str(pilot.fault) == "the simulator closed the connection"
+    for autopilot in autopilots:
+        autopilot.close()
+        assert autopilot.done.wait(60.0)
+        assert len(autopilot.sensors) > 200
+        assert str(autopilot.fault) == "the simulator closed the connection"
 
 
 def test_a_serial_line_that_is_too_slow_is_told():
@@ -294,12 +294,12 @@ def test_in_step_the_simulation_tells_and_nobody_is_woken_for_it(opened, monkeyp
         return tell(seat, time_ns, news)
 
     monkeypatch.setattr(HilSession, "tell", told)
-    pilot = StandIn(bridge._port, 50)
+    autopilot = StandIn(bridge._port, 50)
     meet(simulation, bridge, 1)
-    pilot.start()
+    autopilot.start()
     simulation.run(1.0)
-    assert pilot.done.wait(60.0)
-    assert pilot.fault is None
+    assert autopilot.done.wait(60.0)
+    assert autopilot.fault is None
     in_step = [thread for thread, locked in tellers if locked]
     assert len(in_step) > 30
     assert set(in_step[2:]) == {threading.get_ident()}  # the first was on its way to the loop
@@ -312,19 +312,19 @@ def test_what_cannot_be_said_is_told_of_and_the_run_goes_on(opened, monkeypatch,
     def refuse(_link, _time_ns, _sensed):
         raise OverflowError("infinity is no integer")
 
-    pilot = StandIn(bridge._port, 50)
+    autopilot = StandIn(bridge._port, 50)
     meet(simulation, bridge, 1)
     monkeypatch.setattr(HilLink, "tell", refuse)
     simulation.run(0.1)
     assert simulation.time_s == pytest.approx(0.1)
-    pilot.close()
+    autopilot.close()
     told = [text for text in caplog.messages if "cannot be told" in text]
     assert told == ["uav1: its autopilot cannot be told what is sensed: infinity is no integer"]
 
 
 def test_who_was_let_go_is_not_obeyed(opened):
     simulation, bridge = opened()
-    pilot = StandIn(bridge._port, 50)
+    autopilot = StandIn(bridge._port, 50)
     meet(simulation, bridge, 1)
     (seat,) = bridge._seats
     asked = []
@@ -340,7 +340,7 @@ def test_who_was_let_go_is_not_obeyed(opened):
     asked.clear()
     hear(answer)
     assert asked == []
-    pilot.close()
+    autopilot.close()
 
 
 class _Way:

@@ -80,7 +80,7 @@ def test_a_recorded_flight_is_repeated(tmp_path):
     again = Simulation(scenario_of(flight.origin), threads=1)
     with again:
         again.enable_digest()
-        again.repeat(flight)
+        again.replay_commands(flight)
         again.run()
         assert again.digest() == digest
 
@@ -105,5 +105,5 @@ class GatewayStation(Station):
             data=np.frombuffer(data, np.uint8),
         )
         self._session.publish("/uav1/mavlink/in", message)
-        self.simulation.take_in()
+        self.simulation.process_commands()
         self.simulation.graph.deliver()

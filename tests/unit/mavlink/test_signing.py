@@ -143,7 +143,7 @@ def test_a_vehicle_hears_only_who_has_the_key():
     with simulation, BridgeHost(simulation.gateway) as bridges:
         bridge = MavlinkTcp(port=free_port(), key=KEY)
         bridges.open(bridge)
-        simulation.be_prompt()
+        simulation.use_low_latency()
         run.start()
         try:
             assert ack(bridge.port, None) is None

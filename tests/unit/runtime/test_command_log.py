@@ -46,7 +46,7 @@ def ask(simulation, service, srvtype, **fields):
     simulation.gateway.open("page").call(
         service, request, ServiceReply(answers.append, answers.append)
     )
-    simulation.take_in()
+    simulation.process_commands()
     return answers[0]
 
 
@@ -55,9 +55,9 @@ def test_a_command_is_told_as_it_is_taken(flying, heard):
     session = flying.gateway.open("pilot 7")
     session.advertise("/uav1/cmd_vel", "geometry_msgs/msg/Twist")
     session.publish("/uav1/cmd_vel", TWIST)
-    flying.take_in()
+    flying.process_commands()
     session.publish("/uav1/cmd_vel", TWIST)
-    flying.take_in()
+    flying.process_commands()
     advertised, first, second = heard
     assert (advertised.kind, advertised.latched, advertised.content) == ("advertise", False, "")
     assert (first.client, first.kind, first.name) == ("pilot 7", "publish", "/uav1/cmd_vel")
@@ -107,13 +107,13 @@ def test_how_much_hangs_on_a_command(kind, srvtype, weight):
 
 
 def test_the_record_of_going_back_is_not_taken_back(flying, heard):
-    ask(flying, "/volery/snapshot", f"{OURS}/ByName", name="a")
+    ask(flying, "/volery/save_snapshot", f"{OURS}/ByName", name="a")
     flying.run(0.1)
-    assert ask(flying, "/volery/restore", f"{OURS}/ByName", name="a").success
+    assert ask(flying, "/volery/restore_snapshot", f"{OURS}/ByName", name="a").success
     ask(flying, "/reset_simulation", f"{STANDARD}/ResetSimulation")
     flying.run(0.1)
     names = [record.name for record in heard]
-    assert names == ["/volery/snapshot", "/volery/restore", "/reset_simulation"]
+    assert names == ["/volery/save_snapshot", "/volery/restore_snapshot", "/reset_simulation"]
 
 
 def large_map(cells=100):
@@ -129,7 +129,7 @@ def test_a_large_message_is_logged_once(tmp_path, flying):
     session.advertise("/large", "nav_msgs/msg/OccupancyGrid", latched=True)
     session.publish("/large", large_map())
     session.publish("/large", large_map(3))
-    flying.take_in()
+    flying.process_commands()
     flying.commands.end()
     log.close()
     _, first, second, end = read_flight(tmp_path / "x.mcap").commands
@@ -148,7 +148,7 @@ def test_a_log_without_what_follows_is_refused(tmp_path, flying):
     session = flying.gateway.open("mapper")
     session.advertise("/large", "nav_msgs/msg/OccupancyGrid")
     session.publish("/large", large_map())
-    flying.take_in()
+    flying.process_commands()
     recorder.stop()
     with pytest.raises(RecordingError, match="lacks the messages of '/large'"):
         read_flight(tmp_path / "x.mcap")
@@ -168,18 +168,18 @@ def test_texts_and_lists_are_shortened_for_people():
 
 def test_what_is_kept_has_a_bound(tmp_path, flying, monkeypatch):
     monkeypatch.setattr(command_log, "MOST_KEPT_BYTES", 10_000)
-    session = flying.gateway.open("pilot")
+    session = flying.gateway.open("operator")
     session.advertise("/uav1/cmd_vel", "geometry_msgs/msg/Twist")
     for _ in range(100):
         session.publish("/uav1/cmd_vel", TWIST)
-    flying.take_in()
+    flying.process_commands()
     log = open_log(tmp_path / "x.mcap")
     for earlier in flying.commands.earlier():
         log.write(earlier)
     flying.graph.subscribe_all(log.write)
-    flying.take_in()
+    flying.process_commands()
     session.publish("/uav1/cmd_vel", TWIST)
-    flying.take_in()
+    flying.process_commands()
     flying.run(0.01)
     log.close()
     with pytest.raises(RecordingError, match="command 0 of the flight is missing"):
@@ -194,7 +194,7 @@ def test_what_is_kept_beyond_its_bound_holds_no_content(flying, monkeypatch):
         picture = zero_message("sensor_msgs/msg/CompressedImage")
         picture.data = np.zeros(6_000, np.uint8)
         session.publish("/picture", picture)
-    flying.take_in()
+    flying.process_commands()
     (only,) = flying.commands.earlier()
     assert (only.message.number, len(only.message.cdr), only.message.follows) == (3, 0, False)
 

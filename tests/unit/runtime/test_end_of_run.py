@@ -36,7 +36,7 @@ class Client:
                 reply = ServiceReply(answers.append, answers.append)
                 request = request_of(self.simulation.graph, service, **fields)
                 self.session.call(service, request, reply)
-                self.simulation.take_in()
+                self.simulation.process_commands()
             elif self.simulation.finished:
                 raise EndedError
 

@@ -123,7 +123,7 @@ def test_a_map_of_the_graph_becomes_blocks(simulate, blocks_data):
     simulation = simulate(blocks_data)
     ahead, shown = Ahead(simulation), []
     simulation.graph.subscribe("/map", lambda m: shown.append(m.message))
-    sender = simulation.graph.advertise("/map_in", OccupancyGrid)
+    sender = simulation.graph.advertise("/map_command", OccupancyGrid)
     simulation.run(0.1)
     assert (shown[0].info.width, shown[0].info.height) == (3, 7)
     assert shown[0].data.tolist() == [0, 0, 100] * 7
@@ -134,7 +134,10 @@ def test_a_map_of_the_graph_becomes_blocks(simulate, blocks_data):
     simulation.run(0.03)
     assert ahead.ranges[-1] == pytest.approx(4.0, abs=1e-3)
     assert shown[-1].data.tolist() == [0, 100, *[0] * 7, 100]
-    assert (simulation.grid_world.current.name, simulation.grid_world.current.rows) == ("map_in", 2)
+    assert (simulation.grid_world.current.name, simulation.grid_world.current.rows) == (
+        "map_command",
+        2,
+    )
     half = np.sqrt(0.5)  # a quarter turn: the rows run towards -x, the columns towards y
     sender.publish(occupancy([0, 0, 0, 100], 2, x=9.0, y=-1.5, turn=(0, 0, half, half)))
     simulation.run(0.03)
@@ -164,7 +167,7 @@ def test_unknown_cells_are_free_or_blocked(simulate, blocks_data, blocked, want)
     blocks_data["world"]["grid_map"] = {"unknown_is_blocked": blocked}
     simulation = simulate(blocks_data)
     ahead = Ahead(simulation)
-    sender = simulation.graph.advertise("/map_in", OccupancyGrid)
+    sender = simulation.graph.advertise("/map_command", OccupancyGrid)
     simulation.run(0.05)
     assert np.isinf(ahead.ranges[-1])
     assert simulation.grid_world.current is None
@@ -176,7 +179,7 @@ def test_unknown_cells_are_free_or_blocked(simulate, blocks_data, blocked, want)
 def test_maps_that_are_none_are_refused_in_an_event(simulate, blocks_data):
     simulation = simulate(blocks_data)
     before = simulation.grid_world.current
-    sender = simulation.graph.advertise("/map_in", OccupancyGrid)
+    sender = simulation.graph.advertise("/map_command", OccupancyGrid)
     wrong = [
         occupancy([0, 0, 0], 3),
         occupancy([0], 1, resolution=0.0),
@@ -251,7 +254,7 @@ def test_who_is_in_a_new_block_touches_it_with_the_next_step(simulate, blocks_da
     simulation.grid_world.change("near", cell_size_m=3.0)
     simulation.run(0.1)
     assert {event.kind for event in simulation.events} == {EventKind.WORLD}
-    sender = simulation.graph.advertise("/map_in", OccupancyGrid)
+    sender = simulation.graph.advertise("/map_command", OccupancyGrid)
     sender.publish(occupancy([100], 1, x=-20.0, y=-20.0, resolution=40.0))
     simulation.step(1)  # it is taken at the end of this one
     at_ns = simulation.time_ns
@@ -282,7 +285,7 @@ def test_uavs_are_not_placed_in_blocks(simulate, blocks_data):
         ({"cell_size_m": 0.0}, ScenarioError, "cell_size_m"),
         ({"block_height_m": 2000.0}, ScenarioError, "block_height_m"),
         ({"origin_m": [495.0, 0.0]}, ScenarioError, "beyond the terrain"),
-        ({"maps": [{"file": "map_in.csv"}]}, ScenarioError, "comes over the graph"),
+        ({"maps": [{"file": "map_command.csv"}]}, ScenarioError, "comes over the graph"),
         ({"maps": [{"file": "none.csv"}]}, DataFileError, "no file 'none.csv'"),
         ({"maps": [{"file": "a.csv"}, {"file": "b/a.csv"}]}, ScenarioError, "used twice: a"),
     ],

@@ -282,7 +282,7 @@ def test_logs_that_were_cut_off_are_played_as_far_as_they_go(tmp_path, suffix):
     with LogPlayer(path, speed=None) as player:
         player.graph.subscribe("/a", heard.append, m.String)
         play_out(player)
-        assert "index" in player.describe()["trouble"]
+        assert "index" in player.describe()["problem"]
     assert [p.message.data for p in heard] == ["0", "1", "2"]
     assert player.scenario is None
 

@@ -16,7 +16,7 @@ def scenario(tmp_path):
     """A function that makes a scenario with folders of messages."""
 
     def make(*folders):
-        made = load_scenario("hover").model_copy(update={"messages": folders})
+        made = load_scenario("hover").model_copy(update={"message_packages": folders})
         return made.with_access(ScenarioAccess(tmp_path))
 
     return make

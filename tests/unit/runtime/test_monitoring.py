@@ -14,10 +14,10 @@ from volery.runtime.monitoring.status import Speedometer
 TF = "/ground_truth/tf"
 VEHICLES = "/volery/vehicles"
 STATUS = "/volery/status"
-THING = {
+ACTOR = {
     "name": "walker",
     "shape": "person",
-    "motion": {"kind": "outside", "position_m": [30.0, 0.0, 0.0]},
+    "motion": {"kind": "external", "position_m": [30.0, 0.0, 0.0]},
 }
 
 
@@ -63,16 +63,16 @@ def test_true_poses_of_all_in_one_message(simulate, three):
         assert turn == uav.attitude.tolist()
 
 
-def test_things_come_after_the_uavs(simulate, flat_data):
-    flat_data["world"] = {"things": [THING]}
+def test_actors_come_after_the_uavs(simulate, flat_data):
+    flat_data["world"] = {"actors": [ACTOR]}
     simulation = simulate(flat_data)
     watcher = Watcher(simulation, TF)
     simulation.run(0.02)
     assert list(poses(watcher.last(TF))) == ["uav1/base_link", "walker"]
-    simulation.put_thing("walker", [31.0, 2.0, 0.0])
-    simulation.take_in()
+    simulation.set_actor_pose("walker", [31.0, 2.0, 0.0])
+    simulation.process_commands()
     time.sleep(0.06)
-    simulation.take_in()
+    simulation.process_commands()
     assert poses(watcher.last(TF))["walker"][0] == [31.0, 2.0, 0.0]
 
 
@@ -123,7 +123,7 @@ def test_vehicles_are_told_as_they_are(simulate, three):
         assert [v.x, v.y, v.z] == uav.velocity_map.tolist()
         full = uav.airframe.rotors.max_speed_rad_s
         assert vehicle.rotor_speed == pytest.approx(uav.rotor_speed.mean() / full, rel=1e-6)
-        assert (vehicle.command_age, vehicle.holder) == (-1.0, "")
+        assert (vehicle.command_age, vehicle.operator) == (-1.0, "")
 
 
 def test_the_ground_the_air_and_a_wreck(simulate, flat_data):
@@ -132,7 +132,7 @@ def test_the_ground_the_air_and_a_wreck(simulate, flat_data):
     simulation.run(0.2)
     standing = watcher.last(VEHICLES).vehicles[0]
     assert (standing.mode, standing.airborne, standing.rotor_speed) == ("LANDED", False, 0.0)
-    simulation.place_uav("uav1", [0.0, 0.0, 8.0], [0.0, 0.0, 0.0, 1.0])
+    simulation.set_uav_pose("uav1", [0.0, 0.0, 8.0], [0.0, 0.0, 0.0, 1.0])
     simulation.run(0.2)
     assert watcher.last(VEHICLES).vehicles[0].airborne
     simulation.uavs["uav1"].stop_rotors()
@@ -186,7 +186,7 @@ def test_how_long_nobody_outside_has_commanded(simulate, three):
     assert ages == [pytest.approx(0.5), pytest.approx(0.2), -1.0]
     simulation.restore(kept)
     time.sleep(0.25)
-    simulation.take_in()
+    simulation.process_commands()
     ages = [v.command_age for v in watcher.last(VEHICLES).vehicles]
     assert ages == [pytest.approx(0.1), -1.0, -1.0]
 
@@ -235,7 +235,7 @@ def test_what_changes_while_paused_is_shown(paused):
         wait_for(look)
 
     moved = [4.0, 7.0, 5.0]
-    paused.post(lambda: paused.place_uav("uav2", moved, [0.0, 0.0, 0.0, 1.0])).result()
+    paused.post(lambda: paused.set_uav_pose("uav2", moved, [0.0, 0.0, 0.0, 1.0])).result()
     shows(TF, lambda m: poses(m)["uav2/base_link"][0] == moved)
     shows(VEHICLES, lambda m: m.vehicles[1].position.z == 5.0)
     paused.post(paused.uavs["uav1"].land).result()
@@ -301,13 +301,13 @@ def test_the_status_knows_of_recordings_and_losses(simulate, flat_data, tmp_path
     assert ask(simulation, "/volery/start_recording", path="day/a.mcap").success
     simulation.run(0.2)  # ten true poses, of which the slow client loses eight
     simulation._live._status.jumped()
-    simulation.take_in()
+    simulation.process_commands()
     told = watcher.last(STATUS)
     assert (told.recording, told.dropped, told.clients) == ("day/a.mcap", 8, 2)
     late.session.close()
     assert ask(simulation, "/volery/stop_recording").success
     simulation._live._status.jumped()
-    simulation.take_in()
+    simulation.process_commands()
     told = watcher.last(STATUS)
     assert (told.recording, told.dropped, told.clients) == ("", 8, 1)
 
@@ -357,7 +357,7 @@ def test_nobody_inside_sees_what_follows_wall_time(paused):
     heard = []
     Watcher(paused, STATUS, TF)
     paused.post(lambda: paused.graph.subscribe_all(lambda m: heard.append(m.topic))).result()
-    paused.post(lambda: paused.place_uav("uav1", [3.0, 3.0, 4.0], [0.0, 0.0, 0.0, 1.0])).result()
+    paused.post(lambda: paused.set_uav_pose("uav1", [3.0, 3.0, 4.0], [0.0, 0.0, 0.0, 1.0])).result()
     time.sleep(0.6)
     assert STATUS not in heard
     assert TF not in heard
@@ -385,7 +385,7 @@ def test_after_a_jump_everybody_is_told_again(simulate, flat_data, tmp_path, how
     simulation.restore(kept) if how == "restore" else simulation.reset()
     time.sleep(0.25)
     simulation.post(lambda: None)
-    simulation.take_in()
+    simulation.process_commands()
     assert watcher.last("/weather").rain == 0.0
     assert watcher.last("/map").info.resolution == 1.0
     assert stamp_s(watcher.last(TF)) == (0.1 if how == "restore" else 0.0)

@@ -89,7 +89,7 @@ def test_ideal_links_take_no_time() -> None:
 
 def test_a_lost_radio_neither_sends_nor_hears() -> None:
     with Simulation(scenario_of(links="ideal")) as simulation:
-        simulation.inject({"kind": "radio", "uav": "uav2", "at_s": 1.05, "until_s": 2.05})
+        simulation.inject_fault({"kind": "radio", "uav": "uav2", "at_s": 1.05, "until_s": 2.05})
         simulation.run(3.0)
         missing = [t for t, _ in heard(simulation, 1) if 1.05e9 < t < 2.05e9]
         assert missing == []
@@ -97,7 +97,7 @@ def test_a_lost_radio_neither_sends_nor_hears() -> None:
         assert len(to_first) == 20
         assert len(heard(simulation, 1)) == 40
         with pytest.raises(CommandError, match="uav4 has no radio; with one: uav1"):
-            simulation.inject({"kind": "radio", "uav": "uav4"})
+            simulation.inject_fault({"kind": "radio", "uav": "uav4"})
 
 
 def test_a_snapshot_holds_what_is_on_the_air() -> None:

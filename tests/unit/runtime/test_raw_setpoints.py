@@ -1,4 +1,4 @@
-"""`setpoint_raw` and its services, `flight_state`, `get_build`."""
+"""`setpoint_raw` and its services, `flight_state`, `get_vehicle_info`."""
 
 import math
 
@@ -107,6 +107,6 @@ def test_state_comes_where_a_node_listens_and_tells_the_truth(simulation):
     count = len(heard)
     simulation.run(0.1)
     assert len(heard) == count
-    build = simulation.graph.call("/uav1/get_build")
+    build = simulation.graph.call("/uav1/get_vehicle_info")
     assert (build.airframe, build.rotors) == ("f450", 4)
     assert build.latitude == pytest.approx(47.397742)

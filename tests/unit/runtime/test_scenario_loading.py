@@ -15,7 +15,7 @@ from volery.scenario.load import load_scenario
 
 
 def test_what_can_be_chosen(simulate, flat_data):
-    told = ask(simulate(flat_data), "/volery/get_choices")
+    told = ask(simulate(flat_data), "/volery/get_scenario_options")
     assert told.success
     assert list(told.scenarios) == library.names()
     assert set(told.airframes) == {"crazyflie", "f450", "hummingbird", "iris"}

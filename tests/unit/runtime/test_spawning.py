@@ -95,7 +95,7 @@ def test_who_flies_a_trajectory_flies_on(simulate, flat_data):
         uav.take_off()
         simulation.run(4.0)
         path = [[0.0, 0.0, 0.0], [3.0, 0.0, 1.0], [6.0, 2.0, 0.0]]
-        uav.follow(Trajectory.from_samples([0.0, 3.0, 6.0], uav.position_map + path))
+        uav.follow_trajectory(Trajectory.from_samples([0.0, 3.0, 6.0], uav.position_map + path))
         simulation.run(1.5)
         if change:
             simulation.spawn_uav("other", "f450", [50.0, 0.0, 0.0])

@@ -176,15 +176,15 @@ def test_a_stop_acts_with_the_very_next_physics_step(pair, way):
     pair.run(0.1005)
     turning = pair.uavs["uav2"].rotor_speed
     if way == "service":
-        assert ask(pair, "/uav2/stop").success
+        assert ask(pair, "/uav2/kill").success
     else:
-        pair.post(lambda: ask(pair, "/uav2/stop"))
+        pair.post(lambda: ask(pair, "/uav2/kill"))
     pair.step()
     once = pair.uavs["uav2"].rotor_speed
     assert (once < turning).all()
     pair.step()
     assert (pair.uavs["uav2"].rotor_speed < once).all()
-    assert ask(pair, "/uav1/stop").success  # its rotors stand still
+    assert ask(pair, "/uav1/kill").success  # its rotors stand still
 
 
 def test_a_posted_twist_is_in_force_before_the_next_step(pair):
@@ -206,7 +206,7 @@ def test_a_stopped_kinematic_uav_stands_in_the_air(simulate, flat_data):
     simulation = simulate(flat_data)
     fly(simulation, 2.0, "uav1")
     simulation.run(0.3)
-    assert ask(simulation, "/uav1/stop").success
+    assert ask(simulation, "/uav1/kill").success
     stopped_at = simulation.uavs["uav1"].position_map
     simulation.run(0.2)
     assert np.linalg.norm(simulation.uavs["uav1"].position_map - stopped_at) < 0.01

@@ -151,26 +151,26 @@ def test_the_end_of_a_simulation_ends_its_recording(simulate, flat_data, tmp_pat
 def test_kept_states(simulate, flat_data):
     simulation = simulate(flat_data)
     simulation.run(0.5)
-    assert ask(simulation, "/volery/snapshot", name="early").success
+    assert ask(simulation, "/volery/save_snapshot", name="early").success
     simulation.run(0.5)
-    assert ask(simulation, "/volery/snapshot", name="late").success
+    assert ask(simulation, "/volery/save_snapshot", name="late").success
     listed = ask(simulation, "/volery/list_snapshots")
     assert list(listed.names) == ["early", "late"]
     assert [stamp.sec for stamp in listed.stamps] == [0, 1]
-    assert ask(simulation, "/volery/restore", name="early").success
+    assert ask(simulation, "/volery/restore_snapshot", name="early").success
     assert simulation.time_s == 0.5
-    assert ask(simulation, "/volery/forget_snapshot", name="early").success
-    refused(ask(simulation, "/volery/restore", name="early"), "late")
-    refused(ask(simulation, "/volery/forget_snapshot", name="early"))
-    refused(ask(simulation, "/volery/snapshot", name=""), "characters")
+    assert ask(simulation, "/volery/delete_snapshot", name="early").success
+    refused(ask(simulation, "/volery/restore_snapshot", name="early"), "late")
+    refused(ask(simulation, "/volery/delete_snapshot", name="early"))
+    refused(ask(simulation, "/volery/save_snapshot", name=""), "characters")
 
 
 def test_kept_states_are_bounded(simulate, flat_data):
     simulation = simulate(flat_data)
     for k in range(16):
-        assert ask(simulation, "/volery/snapshot", name=f"state {k}").success
-    refused(ask(simulation, "/volery/snapshot", name="one more"), "forget")
-    assert ask(simulation, "/volery/snapshot", name="state 3").success
+        assert ask(simulation, "/volery/save_snapshot", name=f"state {k}").success
+    refused(ask(simulation, "/volery/save_snapshot", name="one more"), "forget")
+    assert ask(simulation, "/volery/save_snapshot", name="state 3").success
 
 
 def test_what_follows_a_restore_is_the_same_again(simulate, flat_data):
@@ -178,11 +178,11 @@ def test_what_follows_a_restore_is_the_same_again(simulate, flat_data):
     simulation = simulate(flat_data)
     simulation.enable_digest()
     simulation.run(0.5)
-    ask(simulation, "/volery/snapshot", name="there")
+    ask(simulation, "/volery/save_snapshot", name="there")
     simulation.run(0.5)
     first = simulation.digest()
-    simulation.post(lambda: ask(simulation, "/volery/restore", name="there"))
-    simulation.take_in()
+    simulation.post(lambda: ask(simulation, "/volery/restore_snapshot", name="there"))
+    simulation.process_commands()
     simulation.run(0.5)
     assert simulation.digest() == first
 
@@ -190,7 +190,7 @@ def test_what_follows_a_restore_is_the_same_again(simulate, flat_data):
 def test_states_that_cannot_be_kept_are_told(simulate, flat_data):
     simulation = simulate(flat_data)
     partner = simulation.add_partner("other", period_s=0.1)
-    refused(ask(simulation, "/volery/snapshot", name="a"), "other")
+    refused(ask(simulation, "/volery/save_snapshot", name="a"), "other")
     partner.leave()
 
 

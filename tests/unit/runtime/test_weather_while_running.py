@@ -151,7 +151,7 @@ def test_a_recorded_weather_plays_back_exactly(simulate, seeing_data, tmp_path):
     ask(first, "/volery/stop_recording")
 
     again = simulate(seeing_data)
-    again.play(
+    again.replay_log(
         Replay(
             tmp_path / "weather.mcap", topics=("/weather",), remap={"/weather": "/weather_command"}
         )

@@ -142,7 +142,7 @@ def test_the_density_of_a_procedural_forest(wood_data):
 
 def test_a_share_of_an_inventory():
     scenario = load_scenario("longleaf")
-    assert apply(scenario, Changes(tree_share=0.25)).world.forest.share == 0.25
+    assert apply(scenario, Changes(tree_share=0.25)).world.forest.fraction == 0.25
     with pytest.raises(ScenarioError, match="use 'tree_share'"):
         apply(scenario, Changes(tree_density_per_ha=100.0))
     with pytest.raises(ScenarioError, match=r"has no procedural forest$"):

@@ -15,8 +15,8 @@ from volery.server.auth import Tokens
 from volery.server.page_server import PageServer
 from volery.server.settings import PageSettings
 
-PILOT, VIEWER = "pilots' token", "viewers' token"
-TOKENS = Tokens(PILOT, VIEWER)
+OPERATOR, VIEWER = "operators' token", "viewers' token"
+TOKENS = Tokens(OPERATOR, VIEWER)
 
 
 class Flight:

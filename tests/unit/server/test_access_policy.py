@@ -1,4 +1,4 @@
-"""What viewers and pilots may do, without a network."""
+"""What viewers and operators may do, without a network."""
 
 import pytest
 
@@ -59,14 +59,14 @@ def test_services_that_change_nothing_say_so_by_their_names():
 
 
 class Two:
-    """Two pilots at one simulation of two UAVs."""
+    """Two operators at one simulation of two UAVs."""
 
     def __init__(self):
-        self.pilots, crew = ControlAuthority(lambda: ("uav1", "uav2")), OperatorNames()
+        self.operators, crew = ControlAuthority(lambda: ("uav1", "uav2")), OperatorNames()
         self.now_s = 0.0
-        self.anna = OperatorPolicy(crew.sign_in("Anna"), crew, self.pilots, lambda: self.now_s)
-        self.ben = OperatorPolicy(crew.sign_in("Ben"), crew, self.pilots, lambda: self.now_s)
-        self.pilots.take("uav1", "Anna")
+        self.anna = OperatorPolicy(crew.sign_in("Anna"), crew, self.operators, lambda: self.now_s)
+        self.ben = OperatorPolicy(crew.sign_in("Ben"), crew, self.operators, lambda: self.now_s)
+        self.operators.take("uav1", "Anna")
 
 
 COMMANDS = [
@@ -86,12 +86,12 @@ COMMANDS = [
 
 
 @pytest.mark.parametrize("operation", COMMANDS)
-def test_a_uav_that_is_held_obeys_its_pilot_alone(operation):
+def test_a_uav_that_is_held_obeys_its_operator_alone(operation):
     two = Two()
     with pytest.raises(BridgeError, match="uav1 is held by Anna"):
         two.ben.check(operation)
     assert two.anna.check(operation)
-    two.pilots.release("uav1", "Anna")
+    two.operators.release("uav1", "Anna")
     assert two.ben.check(operation)
 
 
@@ -125,10 +125,10 @@ def test_nobody_speaks_for_somebody_else():
     two = Two()
     for service in ("/volery/release_control", "/volery/hand_over"):
         with pytest.raises(BridgeError, match="you are Ben, not Anna"):
-            two.ben.check(call(service, uav="uav1", pilot="Anna", to="Ben"))
-    with pytest.raises(BridgeError, match="another pilot is called Anna"):
-        two.ben.check(call("/volery/take_control", uav="uav2", pilot="Anna"))
-    with pytest.raises(BridgeError, match="no pilot is called 'Carl'"):
+            two.ben.check(call(service, uav="uav1", operator="Anna", to="Ben"))
+    with pytest.raises(BridgeError, match="another operator is called Anna"):
+        two.ben.check(call("/volery/take_control", uav="uav2", operator="Anna"))
+    with pytest.raises(BridgeError, match="no operator is called 'Carl'"):
         two.anna.check(call("/volery/hand_over", uav="uav1", to="Carl"))
     with pytest.raises(BridgeError, match="must be an object"):
         two.ben.check(
@@ -136,23 +136,23 @@ def test_nobody_speaks_for_somebody_else():
         )
     own = call("/volery/take_control", uav="uav2")
     assert two.ben.check(own)
-    assert own["args"] == {"uav": "uav2", "pilot": "Ben"}
+    assert own["args"] == {"uav": "uav2", "operator": "Ben"}
 
 
-def test_a_pilot_may_take_another_name_with_the_first_uav():
+def test_a_operator_may_take_another_name_with_the_first_uav():
     two = Two()
-    wanted = call("/volery/take_control", uav="uav2", pilot="Benjamin")
+    wanted = call("/volery/take_control", uav="uav2", operator="Benjamin")
     assert two.ben.check(wanted)
     assert two.ben.name == "Benjamin"
     assert two.anna.check(call("/volery/hand_over", uav="uav1", to="Benjamin"))
-    with pytest.raises(BridgeError, match="no pilot is called 'Ben'"):
+    with pytest.raises(BridgeError, match="no operator is called 'Ben'"):
         two.anna.check(call("/volery/hand_over", uav="uav1", to="Ben"))
 
 
 def test_names_are_ones_own():
     crew = OperatorNames()
     assert [crew.sign_in("Anna"), crew.sign_in("Anna")] == ["Anna", "Anna 2"]
-    assert [crew.sign_in(), crew.sign_in("\n")] == ["pilot 1", "pilot 2"]
+    assert [crew.sign_in(), crew.sign_in("\n")] == ["operator 1", "operator 2"]
     crew.sign_out("Anna")
     assert crew.sign_in("Anna") == "Anna"
     assert len(crew.sign_in("x" * 500)) <= 40

@@ -9,14 +9,14 @@ from volery.server.auth import Role, Sessions, Tokens, check_rights
 @pytest.mark.parametrize(
     ("tokens", "given", "role"),
     [
-        (Tokens(), None, Role.PILOT),
-        (Tokens(), "anything", Role.PILOT),
+        (Tokens(), None, Role.OPERATOR),
+        (Tokens(), "anything", Role.OPERATOR),
         (Tokens("a"), None, None),
         (Tokens("a"), "", None),
         (Tokens("a"), "b", None),
-        (Tokens("a"), "a", Role.PILOT),
+        (Tokens("a"), "a", Role.OPERATOR),
         (Tokens("a", "b"), "b", Role.VIEWER),
-        (Tokens("ä"), "ä", Role.PILOT),
+        (Tokens("ä"), "ä", Role.OPERATOR),
         (Tokens("a"), "\udcff", None),
     ],
 )
@@ -30,7 +30,7 @@ def test_a_ticket_is_worth_its_role_here_and_nowhere_else():
         ticket = sessions.ticket(role)
         assert sessions.role_of(ticket) is role
         assert others.role_of(ticket) is None
-        forged = ticket.replace(role, Role.PILOT if role is Role.VIEWER else Role.VIEWER)
+        forged = ticket.replace(role, Role.OPERATOR if role is Role.VIEWER else Role.VIEWER)
         assert sessions.role_of(forged) is None
     assert sessions.role_of(None) is None
     assert sessions.role_of("") is None

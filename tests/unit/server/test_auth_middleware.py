@@ -3,7 +3,7 @@
 import socket
 
 import pytest
-from page_bench import PILOT, TOKENS, VIEWER, Client, ask, serving
+from page_bench import OPERATOR, TOKENS, VIEWER, Client, ask, serving
 from websockets.exceptions import InvalidStatus
 
 ORIGIN = "https://sim.example.org"
@@ -94,7 +94,7 @@ def test_without_a_token_there_is_the_page_and_little_more(locked):
     assert refused.value.response.status_code == 401
 
 
-@pytest.mark.parametrize(("token", "role"), [(PILOT, "pilot"), (VIEWER, "viewer")])
+@pytest.mark.parametrize(("token", "role"), [(OPERATOR, "operator"), (VIEWER, "viewer")])
 def test_a_token_opens_and_a_cookie_keeps_open(locked, token, role):
     shown = ask(locked, f"/?token={quoted(token)}")
     cookie = shown.headers["Set-Cookie"]
@@ -118,7 +118,7 @@ def test_wrong_tokens_are_refused(locked):
     assert ask(locked, "/api/status?token=wrong").status == 401
     assert ask(locked, "/rosbridge?token=wrong").status == 401
     assert ask(locked, "/api/status", Authorization="Bearer wrong").status == 401
-    assert ask(locked, "/api/world.glb", Cookie=f"volery_{locked.port}=pilot-00").status == 401
+    assert ask(locked, "/api/world.glb", Cookie=f"volery_{locked.port}=operator-00").status == 401
 
 
 def test_the_page_itself_opens_with_a_wrong_token_and_gives_no_right(locked):
@@ -154,7 +154,7 @@ def test_no_path_leaves_its_folder(server, path):
     assert b"import" not in answer.body
 
 
-def test_what_is_no_http_is_no_trouble(server):
+def test_what_is_no_http_is_no_problem(server):
     with socket.create_connection(("127.0.0.1", server.port), timeout=60.0) as plug:
         plug.sendall(b"\x16\x03\x01 hello\r\n\r\n")
         plug.recv(100)

@@ -36,13 +36,13 @@ def test_status_tells_what_flies(server, flight):
     assert told["scenario"] == "hover"
     assert told["description"].startswith("One F450")
     assert told["world"] == flight.simulation.geometry.id
-    assert told["role"] == "pilot"
+    assert told["role"] == "operator"
     assert told["token_needed"] is False
     assert told["message"] == ""
 
 
 def test_states_between_worlds():
-    lobby = IdleServer(lambda _name: None)
+    idle = IdleServer(lambda _name: None)
     with serving() as server:
         assert ask(server, "/api/status").json["state"] == "building"
         server.building("longleaf", "Pines.", "hover: no place")
@@ -51,10 +51,10 @@ def test_states_between_worlds():
         assert (told["message"], told["world"]) == ("hover: no place", None)
         with Client(server) as client:
             assert client.to_the_end() == 1012
-        with server.showing(lobby):
-            assert ask(server, "/api/status").json["state"] == "lobby"
+        with server.showing(idle):
+            assert ask(server, "/api/status").json["state"] == "no_world"
             assert ask(server, "/api/world.glb").status == 404
-        with server.showing(lobby, "longleaf: no place"):
+        with server.showing(idle, "longleaf: no place"):
             told = ask(server, "/api/status").json
             assert (told["state"], told["message"]) == ("failed", "longleaf: no place")
 
@@ -73,7 +73,7 @@ def test_clients_take_part_in_the_graph(server):
 def test_services_that_change_nothing_are_there(server, flight):
     with Client(server) as client:
         offered = set(client.call("/rosapi/services")[0]["services"])
-    elsewhere = {"/volery/get_choices", "/volery/get_grid_map", "/volery/player/info"}
+    elsewhere = {"/volery/get_scenario_options", "/volery/get_grid_map", "/volery/player/info"}
     assert READ_ONLY_SERVICES - elsewhere <= offered
 
 
@@ -110,7 +110,7 @@ def test_a_viewer_sees_and_is_told_why_not_more(flight):
         values, success = client.call("/uav1/land")
         assert (success, values) == (
             False,
-            "a viewer may not call service /uav1/land; show the pilots' token",
+            "a viewer may not call service /uav1/land; show the operators' token",
         )
         client.send("publish", topic="/uav1/cmd_vel", msg={}, id="p")
         refused = client.until("status", id="p")
@@ -118,15 +118,15 @@ def test_a_viewer_sees_and_is_told_why_not_more(flight):
         assert "viewer" in refused["msg"]
 
 
-def test_one_pilot_at_a_time(server, flight):
-    pilots = flight.simulation.pilots
-    with Client(server, "?pilot=Ben") as ben:
-        with Client(server, "?pilot=Anna") as anna:
+def test_one_operator_at_a_time(server, flight):
+    operators = flight.simulation.operators
+    with Client(server, "?operator=Ben") as ben:
+        with Client(server, "?operator=Anna") as anna:
             values, _ = anna.call("/volery/take_control", uav="uav2")
             assert values == {"success": True, "message": "Anna steers uav2"}
-            assert pilots.holder_of("uav2") == "Anna"
+            assert operators.holder_of("uav2") == "Anna"
             ben.send("subscribe", topic="/volery/vehicles")
-            eventually(lambda: ben.until("publish")["msg"]["vehicles"][1]["holder"] == "Anna")
+            eventually(lambda: ben.until("publish")["msg"]["vehicles"][1]["operator"] == "Anna")
             values, success = ben.call("/uav2/hold")
             assert (success, values) == (False, "uav2 is held by Anna, who can hand it over")
             values, success = ben.call("/volery/take_control", uav="uav2")
@@ -136,12 +136,12 @@ def test_one_pilot_at_a_time(server, flight):
             assert "held by Anna" in ben.until("status", id="c")["msg"]
             assert anna.call("/uav2/hold")[1]
             assert anna.call("/volery/hand_over", uav="uav2", to="Ben")[0]["success"]
-            assert pilots.holder_of("uav2") == "Ben"
+            assert operators.holder_of("uav2") == "Ben"
             assert ben.call("/uav2/hold")[1]
             anna.call("/volery/take_control", uav="uav1")
-        eventually(lambda: pilots.holder_of("uav1") == "")  # Anna has left
-        assert pilots.holder_of("uav2") == "Ben"
-    eventually(lambda: pilots.holder_of("uav2") == "")
+        eventually(lambda: operators.holder_of("uav1") == "")  # Anna has left
+        assert operators.holder_of("uav2") == "Ben"
+    eventually(lambda: operators.holder_of("uav2") == "")
 
 
 def test_the_world_is_fetched_once(server, flight):

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 from urllib.parse import urljoin, urlsplit
 
 import pytest
-from page_bench import PILOT, TOKENS, ask, serving
+from page_bench import OPERATOR, TOKENS, ask, serving
 from websockets.sync.client import connect
 
 PREFIX = "/lab/sim1"
@@ -61,13 +61,13 @@ def get(server, path, **headers):
 
 
 def test_the_page_and_all_it_asks_for_are_found(server):
-    shown = get(server, f"{PREFIX}/", Authorization=f"Bearer {PILOT}")
+    shown = get(server, f"{PREFIX}/", Authorization=f"Bearer {OPERATOR}")
     page = f"http://127.0.0.1:{server.port}{PREFIX}/"
     for address in re.findall(rb'(?:href|src)="([^"]+)"', shown.body):
         assert urljoin(page, address.decode()).startswith(page), address
     cookie = shown.headers["Set-Cookie"].split(";")[0]
     status = get(server, f"{PREFIX}/api/status", Cookie=cookie)
-    assert status.json["role"] == "pilot"
+    assert status.json["role"] == "operator"
     assert get(server, f"{PREFIX}/api/world.glb", Cookie=cookie).body.startswith(b"glTF")
     (card, *_) = get(server, f"{PREFIX}/api/scenarios", Cookie=cookie).json
     picture = urlsplit(urljoin(page, card["picture"])).path

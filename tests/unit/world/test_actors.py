@@ -126,7 +126,7 @@ def test_what_was_said_is_known_of_the_past():
     assert motion.pose_at(11.9)[0] == 990
 
 
-def two_things():
+def two_actors():
     shapes = {name: SHAPES[name]() for name in SHAPES}
     walk = WaypointMotion([[5.0, -3.0, 0.0], [5.0, 3.0, 0.0]], 1.5, "back")
     return MovingActors(
@@ -138,16 +138,16 @@ def two_things():
 
 
 @pytest.mark.parametrize("scene_class", [Scene, PlainScene])
-def test_all_see_things_and_each_copy_its_own_uavs(scene_class):
+def test_all_see_actors_and_each_copy_its_own_uavs(scene_class):
     from volery.vehicle.airframe import load_airframe
     from volery.vehicle.body_shape import body_shape
 
     scene = scene_class(None, None)
-    things = two_things()
-    scene.set_things(things)
+    actors = two_actors()
+    scene.set_actors(actors)
     scene.set_bodies([body_shape(load_airframe("f450"))], [0, 0, 0, 0], copies=2)
     scene.move_bodies([[0, 0, 1.2], [2, 0, 1.2]] * 2, [[0, 0, 0, 1.0]] * 4)
-    scene.move_things(2_000_000_000, 2_000_000_000)  # anna passes y = 0
+    scene.move_actors(2_000_000_000, 2_000_000_000)  # anna passes y = 0
     o, d = [[0.0, 0.0, 1.2]] * 2, [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]
     for row in range(4):
         hits = scene.cast(o, d, 50.0, exclude=row)
@@ -165,27 +165,27 @@ def test_all_see_things_and_each_copy_its_own_uavs(scene_class):
     nobody = scene.cast([[10.0, 0.0, 1.2]], [[-1.0, 0.0, 0.0]], 50.0)
     assert scene.instance_name(int(nobody.instance[0])) == "anna"
     assert scene.occluded([[10.0, 0, 1.2]], [[4.0, 0, 1.2]], exclude=0)[0]
-    scene.move_things(0, 0)
+    scene.move_actors(0, 0)
     gone = scene.cast([[10.0, 0.0, 1.2]], [[-1.0, 0.0, 0.0]], 7.5)
     assert gone.instance[0] == -1
     half = scene.cast([[10.0, 0.0, 1.2]], [[-1.0, 0.0, 0.0]], 7.5, fraction=0.5)
-    scene.move_things(0, 4_000_000_000)
+    scene.move_actors(0, 4_000_000_000)
     half = scene.cast([[10.0, 0.0, 1.2]], [[-1.0, 0.0, 0.0]], 7.5, fraction=0.5)
     assert scene.instance_name(int(half.instance[0])) == "anna"  # half way through the interval
     twin = scene.twin()
-    twin.move_things(2_000_000_000, 2_000_000_000)
+    twin.move_actors(2_000_000_000, 2_000_000_000)
     assert twin.cast([[10.0, 0.0, 1.2]], [[-1.0, 0.0, 0.0]], 7.5).instance[0] >= 0
     scene.close()
 
 
-def test_things_know_where_they_are_and_who_may_put_them():
-    things = two_things()
-    np.testing.assert_allclose(things.velocity_at(0, 1_000_000_000), [0.0, 1.5, 0.0], atol=1e-6)
-    things.say(1, 10, [0, 0, 0, 0, 0, 0, 1], [3, 0, 0])
-    assert things.speeds_m_s.tolist() == [1.5, 3.0]
+def test_actors_know_where_they_are_and_who_may_put_them():
+    actors = two_actors()
+    np.testing.assert_allclose(actors.velocity_at(0, 1_000_000_000), [0.0, 1.5, 0.0], atol=1e-6)
+    actors.say(1, 10, [0, 0, 0, 0, 0, 0, 1], [3, 0, 0])
+    assert actors.speeds_m_s.tolist() == [1.5, 3.0]
     with pytest.raises(CommandError, match="anna goes its own way"):
-        things.say(0, 10, [0, 0, 0, 0, 0, 0, 1])
-    kept = things.get_state()
-    things.say(1, 20, [7, 0, 0, 0, 0, 0, 1])
-    things.set_state(kept)
-    np.testing.assert_allclose(things.poses_at(1_000_000_010)[1, :3], [3.0, 0, 0])
+        actors.say(0, 10, [0, 0, 0, 0, 0, 0, 1])
+    kept = actors.get_state()
+    actors.say(1, 20, [7, 0, 0, 0, 0, 0, 1])
+    actors.set_state(kept)
+    np.testing.assert_allclose(actors.poses_at(1_000_000_010)[1, :3], [3.0, 0, 0])

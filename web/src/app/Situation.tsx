@@ -26,7 +26,7 @@ export function Situation() {
   if (server?.token_needed === true || link === "refused") return <TokenNeeded />;
   if (server?.state === "building") return <Building />;
   if (server?.state === "failed") return <Failed />;
-  if (server?.state === "lobby") return <NoWorld />;
+  if (server?.state === "no_world") return <NoWorld />;
   if (link === "open" && ended) return <Ended />;
   return <Banner />;
 }

@@ -2021,7 +2021,7 @@ export interface volery_interfaces_MissionStatus {
   sectors: number;
   team: string[];
   targets: number;
-  trouble: string;
+  problem: string;
 }
 
 export interface volery_interfaces_PlayerState {
@@ -2100,7 +2100,7 @@ export interface volery_interfaces_VehicleState {
   velocity: geometry_msgs_Vector3;
   rotor_speed: number;
   command_age: number;
-  holder: string;
+  operator: string;
 }
 
 export interface volery_interfaces_VehicleStates {
@@ -2142,9 +2142,34 @@ export interface volery_interfaces_EndFault_Response {
   message: string;
 }
 
-export type volery_interfaces_GetBuild_Request = Record<string, never>;
+export type volery_interfaces_GetGridMap_Request = Record<string, never>;
 
-export interface volery_interfaces_GetBuild_Response {
+export interface volery_interfaces_GetGridMap_Response {
+  name: string;
+  names: string[];
+  block_height: number;
+  cell_size: number;
+  rows: number;
+  columns: number;
+  success: boolean;
+  message: string;
+}
+
+export type volery_interfaces_GetScenarioOptions_Request = Record<string, never>;
+
+export interface volery_interfaces_GetScenarioOptions_Response {
+  scenarios: string[];
+  airframes: string[];
+  sensor_sets: string[];
+  sensor_set_descriptions: string[];
+  changes_schema: string;
+  success: boolean;
+  message: string;
+}
+
+export type volery_interfaces_GetVehicleInfo_Request = Record<string, never>;
+
+export interface volery_interfaces_GetVehicleInfo_Response {
   success: boolean;
   message: string;
   airframe: string;
@@ -2159,31 +2184,6 @@ export interface volery_interfaces_GetBuild_Response {
   latitude: number;
   longitude: number;
   altitude: number;
-}
-
-export type volery_interfaces_GetChoices_Request = Record<string, never>;
-
-export interface volery_interfaces_GetChoices_Response {
-  scenarios: string[];
-  airframes: string[];
-  sensor_sets: string[];
-  sensor_set_descriptions: string[];
-  changes_schema: string;
-  success: boolean;
-  message: string;
-}
-
-export type volery_interfaces_GetGridMap_Request = Record<string, never>;
-
-export interface volery_interfaces_GetGridMap_Response {
-  name: string;
-  names: string[];
-  block_height: number;
-  cell_size: number;
-  rows: number;
-  columns: number;
-  success: boolean;
-  message: string;
 }
 
 export type volery_interfaces_GetWeather_Request = Record<string, never>;
@@ -2229,7 +2229,7 @@ export interface volery_interfaces_Gust_Response {
 
 export interface volery_interfaces_HandOver_Request {
   uav: string;
-  pilot: string;
+  operator: string;
   to: string;
 }
 
@@ -2251,8 +2251,8 @@ export interface volery_interfaces_JoinLockStep_Request {
   name: string;
   period_s: number;
   timeout_s: number;
-  stop_when_silent: boolean;
-  restarts: boolean;
+  stop_on_timeout: boolean;
+  supports_reset: boolean;
   meets_at_start: boolean;
 }
 
@@ -2320,14 +2320,14 @@ export interface volery_interfaces_PlayerInfo_Response {
   counts: (number | bigint)[];
   refused: string[];
   reasons: string[];
-  trouble: string;
+  problem: string;
   scenario: string;
   seed: number | bigint;
 }
 
 export interface volery_interfaces_ReleaseControl_Request {
   uav: string;
-  pilot: string;
+  operator: string;
 }
 
 export interface volery_interfaces_ReleaseControl_Response {
@@ -2439,7 +2439,7 @@ export interface volery_interfaces_StopRecording_Response {
 
 export interface volery_interfaces_TakeControl_Request {
   uav: string;
-  pilot: string;
+  operator: string;
 }
 
 export interface volery_interfaces_TakeControl_Response {
@@ -2687,9 +2687,9 @@ export interface Services {
   "tf2_msgs/srv/FrameGraph": { request: tf2_msgs_FrameGraph_Request; response: tf2_msgs_FrameGraph_Response };
   "volery_interfaces/srv/ByName": { request: volery_interfaces_ByName_Request; response: volery_interfaces_ByName_Response };
   "volery_interfaces/srv/EndFault": { request: volery_interfaces_EndFault_Request; response: volery_interfaces_EndFault_Response };
-  "volery_interfaces/srv/GetBuild": { request: volery_interfaces_GetBuild_Request; response: volery_interfaces_GetBuild_Response };
-  "volery_interfaces/srv/GetChoices": { request: volery_interfaces_GetChoices_Request; response: volery_interfaces_GetChoices_Response };
   "volery_interfaces/srv/GetGridMap": { request: volery_interfaces_GetGridMap_Request; response: volery_interfaces_GetGridMap_Response };
+  "volery_interfaces/srv/GetScenarioOptions": { request: volery_interfaces_GetScenarioOptions_Request; response: volery_interfaces_GetScenarioOptions_Response };
+  "volery_interfaces/srv/GetVehicleInfo": { request: volery_interfaces_GetVehicleInfo_Request; response: volery_interfaces_GetVehicleInfo_Response };
   "volery_interfaces/srv/GetWeather": { request: volery_interfaces_GetWeather_Request; response: volery_interfaces_GetWeather_Response };
   "volery_interfaces/srv/GoTo": { request: volery_interfaces_GoTo_Request; response: volery_interfaces_GoTo_Response };
   "volery_interfaces/srv/Gust": { request: volery_interfaces_Gust_Request; response: volery_interfaces_Gust_Response };

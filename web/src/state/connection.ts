@@ -20,15 +20,15 @@ export const useConnection = create<Connection>(() => ({
 
 /**
  * Connect to what the page's address names: `?ros=ws://robot:9090`, else the own server.
- * `pilot` is what the user wants to be called there; empty: as the server likes.
+ * `operator` is what the user wants to be called there; empty: as the server likes.
  */
-export function connectAsAddressed(address: Location, pilot: string): void {
+export function connectAsAddressed(address: Location, operator: string): void {
   const query = new URLSearchParams(address.search);
   const robot = query.get("ros");
   const own = new URL("./rosbridge", address.href);
   own.protocol = own.protocol === "https:" ? "wss:" : "ws:";
   own.search = own.hash = "";
-  if (pilot !== "") own.searchParams.set("pilot", pilot);
+  if (operator !== "") own.searchParams.set("operator", operator);
   useConnection.setState({ volery: robot === null });
   link.watch(() => {
     const { state, reason, url } = link;

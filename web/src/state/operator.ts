@@ -33,9 +33,9 @@ export async function take(uav: string): Promise<void> {
 
 /** Another operator that controls a UAV; empty: none. */
 export function useOtherOperator(uav: string): string {
-  const holder = useVehicles(({ list }) => list.find(({ name }) => name === uav)?.holder ?? "");
+  const operator = useVehicles(({ list }) => list.find(({ name }) => name === uav)?.operator ?? "");
   const own = useOperator(({ name }) => name);
-  return holder === own ? "" : holder;
+  return operator === own ? "" : operator;
 }
 
 /** A disconnection releases every UAV, and the next connection may have another name. */
@@ -46,5 +46,5 @@ export function followDisconnection(): void {
 }
 
 function holds(name: string): boolean {
-  return name !== "" && useVehicles.getState().list.some(({ holder }) => holder === name);
+  return name !== "" && useVehicles.getState().list.some(({ operator }) => operator === name);
 }

@@ -5,14 +5,14 @@ import type { volery_interfaces_SimulationStatus } from "../messages/generated.t
 
 /** What the server says of itself over HTTP (`./api/status`). */
 export interface ServerStatus {
-  state: "flying" | "ended" | "building" | "lobby" | "failed";
+  state: "flying" | "ended" | "building" | "no_world" | "failed";
   scenario: string;
   description: string;
   message: string;
   /** Changes with the geometry; null: there is none. */
   world: string | null;
   version: string;
-  role: "pilot" | "viewer";
+  role: "operator" | "viewer";
   token_needed: boolean;
 }
 

@@ -7,15 +7,15 @@ const address = (search: string) =>
 test("a token leaves the address, all else stays", () => {
   const replaceState = vi.fn();
   const history = { state: { a: 1 }, replaceState } as unknown as History;
-  hideToken(address("?pilot=Anna&token=se%20cret&token=again"), history);
-  expect(replaceState).toHaveBeenCalledWith({ a: 1 }, "", "/user/anna/?pilot=Anna#view=map");
+  hideToken(address("?operator=Anna&token=se%20cret&token=again"), history);
+  expect(replaceState).toHaveBeenCalledWith({ a: 1 }, "", "/user/anna/?operator=Anna#view=map");
   hideToken(address("?token=x"), history);
   expect(replaceState).toHaveBeenLastCalledWith({ a: 1 }, "", "/user/anna/#view=map");
 });
 
 test("an address without a token stays as it is", () => {
   const replaceState = vi.fn();
-  hideToken(address("?pilot=Anna"), { replaceState } as unknown as History);
+  hideToken(address("?operator=Anna"), { replaceState } as unknown as History);
   expect(replaceState).not.toHaveBeenCalled();
 });
 

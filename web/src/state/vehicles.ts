@@ -26,7 +26,7 @@ const UNKNOWN: VehicleState = {
   velocity: { x: NaN, y: NaN, z: NaN },
   rotor_speed: 0,
   command_age: -1,
-  holder: "",
+  operator: "",
 };
 
 /** Base frame of a UAV. */

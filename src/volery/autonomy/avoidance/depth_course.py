@@ -52,10 +52,14 @@ class DepthCourse(Node):
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
         self._distance = float(
-            self.declare_parameter("distance_m", 50.0, least=0.0, most=1e5).value
+            self.declare_parameter("distance_m", 50.0, min_value=0.0, max_value=1e5).value
         )
-        self._height = float(self.declare_parameter("height_m", 2.0, least=0.1, most=1e4).value)
-        self.speed = float(self.declare_parameter("speed_m_s", 2.0, least=0.01, most=100.0).value)
+        self._height = float(
+            self.declare_parameter("height_m", 2.0, min_value=0.1, max_value=1e4).value
+        )
+        self.speed = float(
+            self.declare_parameter("speed_m_s", 2.0, min_value=0.01, max_value=100.0).value
+        )
         camera = self.declare_parameter("camera", "camera").value
         self.mount = declare_numbers(self, "mount", [0.0, 0.0, 0.0], "[x, y, z]")
 

@@ -59,16 +59,18 @@ class RegionAvoidance(DepthCourse):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("region_avoidance", **options)
-        self._far = float(self.declare_parameter("far_m", 10.0, least=0.1, most=1e4).value)
-        self._threshold = float(self.declare_parameter("threshold", 0.6, least=0.0, most=1.0).value)
+        self._far = float(self.declare_parameter("far_m", 10.0, min_value=0.1, max_value=1e4).value)
+        self._threshold = float(
+            self.declare_parameter("threshold", 0.6, min_value=0.0, max_value=1.0).value
+        )
         self._region = declare_numbers(self, "region", [0.3, 0.2], "[width, height]")
         if not all(0.0 < share <= 1.0 for share in self._region):
             raise NodeError(f"region is [width, height], above 0 to 1, not {self._region}")
         self._sidestep = float(
-            self.declare_parameter("sidestep_m_s", 0.8, least=0.0, most=100.0).value
+            self.declare_parameter("sidestep_m_s", 0.8, min_value=0.0, max_value=100.0).value
         )
         self._margin_ns = round(
-            1e9 * self.declare_parameter("margin_s", 1.0, least=0.0, most=1e4).value
+            1e9 * self.declare_parameter("margin_s", 1.0, min_value=0.0, max_value=1e4).value
         )
         self._state = RegionAvoidanceState.FORWARD
         self._mean = 1.0

@@ -90,13 +90,15 @@ class Mapping(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("mapping", **options)
-        self._resolution = float(self.declare_parameter("resolution_m", 0.2, least=0.01).value)
-        self._reach = float(self.declare_parameter("reach_m", 15.0, least=0.1).value)
-        every = int(self.declare_parameter("every", 2, least=1).value)
-        rate = float(self.declare_parameter("scan_rate_hz", 5.0, least=0.01, most=1000.0).value)
-        extent = float(self.declare_parameter("extent_m", 500.0, least=1.0).value)
-        nodes = int(self.declare_parameter("max_nodes", 3_000_000, least=1).value)
-        self._half = float(self.declare_parameter("half_height_m", 0.6, least=0.01).value)
+        self._resolution = float(self.declare_parameter("resolution_m", 0.2, min_value=0.01).value)
+        self._reach = float(self.declare_parameter("reach_m", 15.0, min_value=0.1).value)
+        every = int(self.declare_parameter("every", 2, min_value=1).value)
+        rate = float(
+            self.declare_parameter("scan_rate_hz", 5.0, min_value=0.01, max_value=1000.0).value
+        )
+        extent = float(self.declare_parameter("extent_m", 500.0, min_value=1.0).value)
+        nodes = int(self.declare_parameter("max_nodes", 3_000_000, min_value=1).value)
+        self._half = float(self.declare_parameter("half_height_m", 0.6, min_value=0.01).value)
         self._folder = self.declare_folder("folder", f"maps{self.get_namespace()}")
         self._limits = MapLimits(self._resolution, extent, nodes)
         beams = Beams(reach_m=self._reach, every=every)
@@ -106,7 +108,7 @@ class Mapping(Node):
         }
         self._octree = Octree(self._resolution, nodes)
         self._grid = ProjectedGrid(
-            float(self.declare_parameter("grid_cell_m", 0.4, least=0.01).value), extent
+            float(self.declare_parameter("grid_cell_m", 0.4, min_value=0.01).value), extent
         )
         self._frame = MapFrame()
         self._motion, self._nod = MotionHistory(), NodHistory()
@@ -120,8 +122,8 @@ class Mapping(Node):
             self._load(map_file)
 
     def _open(self) -> None:
-        voxels_s = float(self.declare_parameter("voxels_period_s", 10.0, least=0.01).value)
-        grid_s = float(self.declare_parameter("grid_period_s", 1.0, least=0.01).value)
+        voxels_s = float(self.declare_parameter("voxels_period_s", 10.0, min_value=0.01).value)
+        grid_s = float(self.declare_parameter("grid_period_s", 1.0, min_value=0.01).value)
         self._voxels = self.create_publisher(messages.OCTOMAP, "octomap_binary", 1, latched=True)
         self._level = self.create_publisher(OccupancyGrid, "projected_map", 1, latched=True)
         self._status = self.create_publisher(String, "~/status", 1, latched=True)

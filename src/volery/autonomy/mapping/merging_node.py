@@ -46,8 +46,8 @@ class MapMerging(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("map_merging", **options)
         self._topics = list(self.declare_parameter("topics", ["/uav1/octomap_binary"]).value)
-        self._resolution = float(self.declare_parameter("resolution_m", 0.2, least=0.01).value)
-        self._most = int(self.declare_parameter("max_cells", 20_000_000, least=1).value)
+        self._resolution = float(self.declare_parameter("resolution_m", 0.2, min_value=0.01).value)
+        self._most = int(self.declare_parameter("max_cells", 20_000_000, min_value=1).value)
         self._maps: dict[str, Any] = {}
         self._placements: dict[str, Pose] = {}
         self._changed = False
@@ -60,7 +60,7 @@ class MapMerging(Node):
         self.create_subscription(TFMessage, "/tf", self._on_tf, 50)
         self.create_service("std_srvs/srv/Trigger", "~/merge", self._on_merge)
         self.create_timer(
-            float(self.declare_parameter("period_s", 20.0, least=0.01).value), self._on_timer
+            float(self.declare_parameter("period_s", 20.0, min_value=0.01).value), self._on_timer
         )
 
     def get_state(self) -> dict[str, Any]:

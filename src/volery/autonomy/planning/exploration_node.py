@@ -100,8 +100,8 @@ class Exploration(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("exploration", **options)
-        self._view = float(self.declare_parameter("view_m", 10.0, least=0.1).value)
-        self._cell = float(self.declare_parameter("cell_m", 1.0, least=0.05).value)
+        self._view = float(self.declare_parameter("view_m", 10.0, min_value=0.1).value)
+        self._cell = float(self.declare_parameter("cell_m", 1.0, min_value=0.05).value)
         self._frame = MapFrame()
         self._motion: OdometrySample | None = None
         self._area: SearchArea | None = None

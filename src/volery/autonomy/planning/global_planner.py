@@ -72,16 +72,16 @@ class GlobalPlanner(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("global_planner", **options)
-        self._height = float(self.declare_parameter("height_m", 3.0, least=0.1).value)
+        self._height = float(self.declare_parameter("height_m", 3.0, min_value=0.1).value)
         low, high = declare_numbers(self, "heights_m", [2.2, 4.2], "[least, most]")
         if not low < high:
             raise NodeError(f"heights_m is [least, most], not {[low, high]}")
         self._search = PathSearch(
-            radius_m=float(self.declare_parameter("radius_m", 0.8, least=0.05).value),
+            radius_m=float(self.declare_parameter("radius_m", 0.8, min_value=0.05).value),
             heights_m=(low, high),
-            iterations=int(self.declare_parameter("iterations", 4000, least=1).value),
+            iterations=int(self.declare_parameter("iterations", 4000, min_value=1).value),
         )
-        self._cell = float(self.declare_parameter("cell_m", 0.4, least=0.05).value)
+        self._cell = float(self.declare_parameter("cell_m", 0.4, min_value=0.05).value)
         self._seed = int(self.declare_parameter("seed", 1).value)
         self._frame = MapFrame()
         self._map: SolidVoxels | None = None

@@ -87,23 +87,23 @@ class LocalPlanner(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("local_planner", **options)
         mounts = {name: declare_mount(self, name) for name in ("level", "nodding")}
-        cell = float(self.declare_parameter("cell_m", 0.25, least=0.05, most=5.0).value)
+        cell = float(self.declare_parameter("cell_m", 0.25, min_value=0.05, max_value=5.0).value)
         scan_rate = float(
-            self.declare_parameter("scan_rate_hz", 13.3, least=0.1, most=1000.0).value
+            self.declare_parameter("scan_rate_hz", 13.3, min_value=0.1, max_value=1000.0).value
         )
         self._sight = Surroundings(mounts, cell, scan_rate)
-        self._height = self.declare_parameter("height_m", 3.0, least=0.1, read_only=False)
-        self._speed = self.declare_parameter("speed_m_s", 3.0, least=0.1, read_only=False)
+        self._height = self.declare_parameter("height_m", 3.0, min_value=0.1, read_only=False)
+        self._speed = self.declare_parameter("speed_m_s", 3.0, min_value=0.1, read_only=False)
         self._acceleration = float(
-            self.declare_parameter("acceleration_m_s2", 2.5, least=0.1).value
+            self.declare_parameter("acceleration_m_s2", 2.5, min_value=0.1).value
         )
-        self._radius = float(self.declare_parameter("radius_m", 0.6, least=0.05).value)
+        self._radius = float(self.declare_parameter("radius_m", 0.6, min_value=0.05).value)
         self._unknown_stops = bool(self.declare_parameter("unknown_stops", True).value)
         self._ahead_ns = ns_from_s(
-            float(self.declare_parameter("ahead_s", 0.1, least=0.0, most=10.0).value)
+            float(self.declare_parameter("ahead_s", 0.1, min_value=0.0, max_value=10.0).value)
         )
-        self._arrival_m = float(self.declare_parameter("arrival_m", 1.0, least=0.01).value)
-        radius = float(self.declare_parameter("separation_m", 2.0, least=0.0).value)
+        self._arrival_m = float(self.declare_parameter("arrival_m", 1.0, min_value=0.01).value)
+        radius = float(self.declare_parameter("separation_m", 2.0, min_value=0.0).value)
         self._separation = Separation(radius_m=radius)
         self._planning = RecedingHorizonPlanner(self._policy())
         self._frame = MapFrame()
@@ -119,7 +119,9 @@ class LocalPlanner(Node):
         self._open()
 
     def _open(self) -> None:
-        period = float(self.declare_parameter("period_s", 0.18, least=0.01, most=60.0).value)
+        period = float(
+            self.declare_parameter("period_s", 0.18, min_value=0.01, max_value=60.0).value
+        )
         self._trajectory = self.create_publisher(MultiDOFJointTrajectory, "planning/trajectory", 1)
         self._status = self.create_publisher(String, "planning/status", 1, latched=True)
         subscribe_odometry(self, self._frame, self._on_odometry, depth=5)

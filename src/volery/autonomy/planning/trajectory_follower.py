@@ -57,9 +57,9 @@ class TrajectoryFollower(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("follower", **options)
         odometry = str(self.declare_parameter("odometry", "odom").value)
-        self._gain = float(self.declare_parameter("gain", 1.2, least=0.0).value)
+        self._gain = float(self.declare_parameter("gain", 1.2, min_value=0.0).value)
         self._lead_ns = ns_from_s(
-            float(self.declare_parameter("lead_s", 0.25, least=0.0, most=10.0).value)
+            float(self.declare_parameter("lead_s", 0.25, min_value=0.0, max_value=10.0).value)
         )
         self._pose: OdometrySample | None = None
         self._heard_ns = 0

@@ -87,8 +87,8 @@ class PlanarSlam(Node):
             turn = rotations.from_rpy(*mount[3:])
             self._mount = Mount(np.array(mount[:3]), turn)
         kept = ReturnSettings(
-            nearest_m=float(self.declare_parameter("nearest_m", 0.05, least=0.0).value),
-            reach_m=float(self.declare_parameter("reach_m", 30.0, least=0.1).value),
+            nearest_m=float(self.declare_parameter("nearest_m", 0.05, min_value=0.0).value),
+            reach_m=float(self.declare_parameter("reach_m", 30.0, min_value=0.1).value),
         )
         self._settings = PlanarSettings(returns=kept)
         self._hears_odometry = bool(self.declare_parameter("odometry", True).value)

@@ -96,21 +96,27 @@ class Slam(Node):
         self._mounts = {name: np.array(declare_mount(self, name)) for name in ("level", "nodding")}
         self._imu_noise = ImuNoise(*noise) if noise else ImuNoise()
         self._matching = ScanMatching(
-            reach_m=float(self.declare_parameter("reach_m", 30.0, least=0.1).value)
+            reach_m=float(self.declare_parameter("reach_m", 30.0, min_value=0.1).value)
         )
-        self._standing = float(self.declare_parameter("standing_height_m", 0.2, least=0.0).value)
+        self._standing = float(
+            self.declare_parameter("standing_height_m", 0.2, min_value=0.0).value
+        )
         self._has_loops = bool(self.declare_parameter("loop_closures", True).value)
         period = NS_PER_S / float(
-            self.declare_parameter("scan_rate_hz", 20.0, least=0.1, most=1000.0).value
+            self.declare_parameter("scan_rate_hz", 20.0, min_value=0.1, max_value=1000.0).value
         )
         self._sweep_ns = round(0.9 * period)  # a scan that comes a little early is not left out
         self._odom_period_ns = round(
-            NS_PER_S / self.declare_parameter("odom_rate_hz", 50.0, least=0.1, most=1000.0).value
+            NS_PER_S
+            / self.declare_parameter("odom_rate_hz", 50.0, min_value=0.1, max_value=1000.0).value
         )
         self._uav = self.get_namespace().strip("/") or "uav"
         self._begin()
         self._open(
-            1.0 / float(self.declare_parameter("pose_rate_hz", 10.0, least=0.1, most=1000.0).value)
+            1.0
+            / float(
+                self.declare_parameter("pose_rate_hz", 10.0, min_value=0.1, max_value=1000.0).value
+            )
         )
 
     def _begin(self) -> None:

@@ -52,7 +52,7 @@ class TeamMember(Node):
         "searched",
         "targets",
         "team",
-        "trouble",
+        "problem",
         "_pose",
         "_pose_ns",
         "_frame",
@@ -84,7 +84,7 @@ class TeamMember(Node):
         self._given_up = np.zeros(count, np.bool_)
         self.targets = TargetList(settings.gate_m)
         self.team = TeamState(count)
-        self.trouble = ""
+        self.problem = ""
         self._frame = MapFrame()
         self._pose: OdometrySample | None = None
         self._pose_ns = 0
@@ -218,7 +218,7 @@ class TeamMember(Node):
                 len(self.searched),
                 heard,
                 len(self.targets.targets()),
-                self.trouble,
+                self.problem,
             )
         )
 

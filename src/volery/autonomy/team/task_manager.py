@@ -265,7 +265,7 @@ class TaskManager(TeamMember):
             self._home = pose.position.copy()
             self._stands_m = float(self._home[2])
             self._enter(MissionPhase.WAIT)
-        self.trouble = self.what_is_wrong(now)
+        self.problem = self.what_is_wrong(now)
         lost_s = (now - self._pose_ns) / NS_PER_S
         if lost_s > POSE_S and self.phase in ALOFT:
             self._wait_or_land(lost_s)

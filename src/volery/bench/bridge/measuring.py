@@ -125,7 +125,7 @@ def in_real_time(scenario: Scenario) -> Iterator[tuple[Simulation, BridgeHost]]:
     with Simulation(scenario) as simulation:
         simulation.step(1)  # what compiles does so before anybody measures
         with BridgeHost(simulation.gateway) as bridges:
-            simulation.be_prompt()
+            simulation.use_low_latency()
             over = threading.Event()
             thread = threading.Thread(target=_run, args=(simulation, over))
             thread.start()

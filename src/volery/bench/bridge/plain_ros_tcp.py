@@ -101,7 +101,7 @@ def round_trips(client: Client, uav: str, count: int) -> dict[str, Any]:
 
 def stops(client: Client, uav: str, count: int) -> dict[str, Any]:
     """When stop requests were sent, ns of the monotonic clock; between them the UAV recovers."""
-    service = f"/{uav}/stop"
+    service = f"/{uav}/kill"
     client.command("__ros_service", topic=service, message_name="std_srvs/Trigger")
     client.command("__ros_service", topic="/bench/recover", message_name="std_srvs/Trigger")
     time.sleep(_SETTLE_S)

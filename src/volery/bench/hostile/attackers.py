@@ -38,7 +38,7 @@ _STORM_PAUSE_S = 0.001
 _BURST = 100
 _CHUNK_BYTES = 1 << 20
 _SERVICES: Sequence[tuple[str, Any]] = (
-    ("/volery/get_choices", {}),
+    ("/volery/get_scenario_options", {}),
     ("/get_available_worlds", {}),
     ("/get_entities", {}),
     ("/get_entities_states", {}),

@@ -66,7 +66,7 @@ class Unindexed(NamedTuple):
 
 
 class ChunkedLog(ABC):
-    """The chunks of one file; a damaged one is empty, and `trouble` tells of it.
+    """The chunks of one file; a damaged one is empty, and `problem` tells of it.
 
     Raises `RecordingError` where the file describes or unpacks to more than any log does.
     """
@@ -97,7 +97,7 @@ class ChunkedLog(ABC):
         self._unpacking = None  # from here on what is played decides, a chunk at a time
 
     @property
-    def trouble(self) -> str:
+    def problem(self) -> str:
         """What is wrong with the file, as far as it was read; empty for a whole one."""
         return "; ".join(part for part in (self._cut, self._damage.describe()) if part)
 

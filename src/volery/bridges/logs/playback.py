@@ -48,7 +48,7 @@ class Playback:
         self.log = open_chunks(path)
         self._line = Timeline(self.log)
         if not self.log.chunks:
-            why = f" ({self.log.trouble})" if self.log.trouble else ""
+            why = f" ({self.log.problem})" if self.log.problem else ""
             self.log.close()
             raise RecordingError(f"{path}: holds no readable message{why}")
         self.start_ns, self.end_ns = self._line.start_ns, self._line.end_ns
@@ -91,9 +91,9 @@ class Playback:
         )
 
     @property
-    def trouble(self) -> str:
+    def problem(self) -> str:
         """What is wrong with the file; empty for a whole one."""
-        return self.log.trouble
+        return self.log.problem
 
     def advance(self, until_ns: int) -> bool:
         """Publish what was told up to `until_ns`, or some of it; whether that is all."""

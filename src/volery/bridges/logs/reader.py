@@ -23,7 +23,7 @@ class TopicSummary:
 
 @dataclass(frozen=True)
 class LogSummary:
-    """Contents of a log; `trouble` is empty for a whole file."""
+    """Contents of a log; `problem` is empty for a whole file."""
 
     path: Path
     format: str
@@ -32,7 +32,7 @@ class LogSummary:
     end_ns: int
     messages: int
     topics: tuple[TopicSummary, ...]
-    trouble: str = ""
+    problem: str = ""
 
     @property
     def duration_s(self) -> float:
@@ -53,7 +53,7 @@ def summarize(path: str | Path) -> LogSummary:
     kind = log_format(path)
     counts: dict[tuple[str, str], int] = {}
     indexed = (mcap_index if kind == "mcap" else bag_index)(path, counts)
-    trouble = ""
+    problem = ""
     if indexed is None:
         counts.clear()
         walk = LogWalk(path)
@@ -63,7 +63,7 @@ def summarize(path: str | Path) -> LogSummary:
             counts[key] = counts.get(key, 0) + 1
             first = record.time_ns if first < 0 else min(first, record.time_ns)
             last = max(last, record.time_ns)
-        trouble = walk.trouble
+        problem = walk.problem
         indexed = (max(first, 0), last)
     start, end = indexed
     seconds = (end - start) / NS_PER_S
@@ -72,4 +72,4 @@ def summarize(path: str | Path) -> LogSummary:
         for (topic, msgtype), count in sorted(counts.items())
     )
     size = path.stat().st_size
-    return LogSummary(path, kind, size, start, end, sum(counts.values()), topics, trouble)
+    return LogSummary(path, kind, size, start, end, sum(counts.values()), topics, problem)

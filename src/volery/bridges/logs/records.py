@@ -93,13 +93,13 @@ class LogRecord(NamedTuple):
 
 @dataclass
 class LogWalk:
-    """Iterate over it for the messages; afterwards `trouble` says what was wrong, if anything.
+    """Iterate over it for the messages; afterwards `problem` says what was wrong, if anything.
 
     Iterating raises `RecordingError` where the file describes or unpacks to more than any log does.
     """
 
     path: Path
-    trouble: str = ""
+    problem: str = ""
     damage: DamageCount = field(default_factory=DamageCount)
     _topics: dict[int, LogTopic] = field(default_factory=dict)
     _schemas: dict[int, Schema] = field(default_factory=dict)
@@ -114,8 +114,8 @@ class LogWalk:
         self._unpacking, self._described = UnpackingBudget(self.path, size), TopicBudget(self.path)
         with self.path.open("rb") as file:
             yield from _WALKS[log_format(self.path)](self, file, size)
-        parts = (self.trouble, self.damage.describe())
-        self.trouble = "; ".join(part for part in parts if part)
+        parts = (self.problem, self.damage.describe())
+        self.problem = "; ".join(part for part in parts if part)
 
     def _mcap(self, file: BinaryIO, size: int) -> Iterator[LogRecord]:
         position = len(MCAP_MAGIC)
@@ -123,17 +123,17 @@ class LogWalk:
             file.seek(position)
             head = file.read(mcap_format.HEAD.size)
             if len(head) < mcap_format.HEAD.size:
-                self.trouble = CUT_OFF
+                self.problem = CUT_OFF
                 return
             opcode, length = mcap_format.HEAD.unpack(head)
             begin, position = position, position + mcap_format.HEAD.size + length
             if position > size:
-                self.trouble = cut_at(begin)
+                self.problem = cut_at(begin)
                 return
             if opcode in (Opcode.DATA_END, Opcode.FOOTER):
                 file.seek(size - len(MCAP_MAGIC))
                 if file.read() != MCAP_MAGIC:
-                    self.trouble = CUT_OFF
+                    self.problem = CUT_OFF
                 return
             if opcode in mcap_format.READ:
                 try:
@@ -169,7 +169,7 @@ class LogWalk:
         while (begin := file.tell()) < size:
             record = _bag_record(file, size)
             if record is None:
-                self.trouble = cut_at(begin)
+                self.problem = cut_at(begin)
                 return
             head, data = record
             index.pass_record(head)
@@ -181,7 +181,7 @@ class LogWalk:
                     continue
                 yield from self._records(content)
         if not index.is_whole:
-            self.trouble = CUT_OFF
+            self.problem = CUT_OFF
 
     def _bag_content(self, head: dict[bytes, bytes], data: bytes) -> Content:
         unpacked = bag_format.unpack_chunk(head, data)

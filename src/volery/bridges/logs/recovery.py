@@ -24,7 +24,7 @@ class Recovery:
     path: Path
     messages: int
     end_ns: int
-    trouble: str
+    problem: str
     """What was wrong with the original; empty if nothing was."""
 
 
@@ -53,10 +53,10 @@ def recover(path: str | Path, out: str | Path | None = None) -> Recovery:
         records = iter(walk)
         first = next(records, None)
         if first is None:
-            trouble = f" ({walk.trouble})" if walk.trouble else ""
-            raise RecordingError(f"{path}: holds no readable message{trouble}; nothing is written")
+            problem = f" ({walk.problem})" if walk.problem else ""
+            raise RecordingError(f"{path}: holds no readable message{problem}; nothing is written")
         count, end_ns = _write(kind, itertools.chain([first], records), out)
-    return Recovery(out, count, end_ns, walk.trouble)
+    return Recovery(out, count, end_ns, walk.problem)
 
 
 def _write(kind: str, records: Iterable[LogRecord], out: Path) -> tuple[int, int]:

@@ -45,7 +45,7 @@ class ReplayInfo:
     """Messages that could not be published."""
     laps: int
     """How often the log was played to its end."""
-    trouble: str
+    problem: str
     """What was wrong with the file, as far as it was read: cut off, damaged chunks."""
     refused: Mapping[str, str]
     """Topics of which messages were skipped, each with the first reason."""
@@ -131,7 +131,7 @@ class Replay:
             self._published,
             self._skipped,
             self._laps,
-            self._stream.trouble,
+            self._stream.problem,
             dict(self._refused),
         )
 

@@ -13,13 +13,13 @@ class LogStream:
     """Reads a log forward, a chunk in memory at a time; `seek` backwards begins anew.
 
     Raises `RecordingError` where there is no log; a damaged one is read as far as it can be, and
-    `trouble` says what was wrong.
+    `problem` says what was wrong.
     """
 
     def __init__(self, path: Path, wants: Callable[[str], bool]) -> None:
         log_format(path)
         self.path = path
-        self.trouble = ""
+        self.problem = ""
         self.index = 0
         """Number of the record that `peek` shows, those that are not wanted counted too."""
         self.first_ns = 0
@@ -75,7 +75,7 @@ class LogStream:
             self._next = next(self._records, None)
         except (OSError, RecordingError) as error:  # the file has gone meanwhile
             self._next = None
-            self.trouble = f"cannot be read any more: {error}"
+            self.problem = f"cannot be read any more: {error}"
             return
         if self._next is None and self._walk is not None:
-            self.trouble = self._walk.trouble
+            self.problem = self._walk.problem

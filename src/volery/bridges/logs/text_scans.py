@@ -50,7 +50,7 @@ class TextScans:
 
     Iterating gives the `Published` messages of each line in turn: `/tf_static` with the mounting
     first, odometry where the log has it, the scan. A line that cannot be read is left out and
-    counted in `left_out`, `trouble` tells of the first one. Where the clock was set back the times
+    counted in `left_out`, `problem` tells of the first one. Where the clock was set back the times
     go back, too; `clock_set` counts that. Raises `RecordingError` where the file cannot be read, or
     holds no scan of this layout.
     """
@@ -60,7 +60,7 @@ class TextScans:
     scans: int = 0
     left_out: int = 0
     clock_set: int = 0
-    trouble: str = ""
+    problem: str = ""
     _most_columns: int = field(default=0, repr=False)
     _met: int = field(default=0, repr=False)
     """Beams that have met something in the scanner's reach."""
@@ -86,7 +86,7 @@ class TextScans:
         except OSError as error:
             raise RecordingError(f"{self.path}: cannot be read: {error.strerror}") from None
         if not self.scans:
-            reason = self.trouble or "it is empty"
+            reason = self.problem or "it is empty"
             raise RecordingError(f"{self.path}: holds no scan of this layout ({reason})")
 
     @property
@@ -119,7 +119,7 @@ class TextScans:
             time_ns = self._time_ns(words[self.layout.time.column])
         except ValueError as error:
             self.left_out += 1
-            self.trouble = self.trouble or f"line {number}: {error}"
+            self.problem = self.problem or f"line {number}: {error}"
             return
         self.clock_set += time_ns < self._newest_ns
         self._newest_ns = time_ns

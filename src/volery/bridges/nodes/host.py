@@ -165,8 +165,8 @@ class NodeHost:
             name,
             period_s,
             timeout_s,
-            stop_when_silent=False,
-            restarts=False,
+            stop_on_timeout=False,
+            supports_reset=False,
             meets_at_start=True,
         )
         answer = self.graph.call("/volery/join_lock_step", request)

@@ -62,7 +62,7 @@ class Profile(BaseModel):
     """Of the node that `volery node` starts."""
     launch: tuple[Launched, ...] = ()
     """What `volery launch` starts."""
-    messages: tuple[str, ...] = ()
+    message_packages: tuple[str, ...] = ()
     """Folders of ROS packages with message definitions, beside the profile."""
 
 

@@ -85,7 +85,7 @@ class Caller(Handle, Protocol):
         """Whether a server is there."""
 
     @property
-    def trouble(self) -> str:
+    def problem(self) -> str:
         """Why nobody answers though a server is there; empty where that is not known."""
 
     def call(self, request: bytes, on_response: TakeMessage, on_loss: Callable[[], None]) -> None:

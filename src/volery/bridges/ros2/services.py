@@ -147,11 +147,11 @@ def ask_server(caller: Caller, spec: ServiceSpec, request: Any, reply: ServiceRe
         reply.fail(GraphError(f"service '{spec.service}': its ROS 2 node has left"))
 
     try:
-        wait_for(lambda: caller.ready or bool(caller.trouble), _LONGEST_WAIT_S)
+        wait_for(lambda: caller.ready or bool(caller.problem), _LONGEST_WAIT_S)
         if not caller.ready:
             raise GraphError(
-                f"service '{spec.service}': {caller.trouble}"
-                if caller.trouble
+                f"service '{spec.service}': {caller.problem}"
+                if caller.problem
                 else f"nobody offers ROS 2 service '{spec.service}'"
             )
         caller.call(encode_cdr(request, f"{spec.srvtype}_Request"), respond, lose)

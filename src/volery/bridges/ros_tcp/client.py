@@ -90,7 +90,7 @@ class RosTcpClient(RemoteClient):
         self._start(connect_timeout_s)
 
     @property
-    def trouble(self) -> tuple[str, ...]:
+    def problem(self) -> tuple[str, ...]:
         """The newest complaints of the endpoint, and those about it."""
         return tuple(self._complaints)
 

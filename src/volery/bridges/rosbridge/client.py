@@ -83,7 +83,7 @@ class RosbridgeClient(RemoteClient):
         self._start(connect_timeout_s)
 
     @property
-    def trouble(self) -> tuple[str, ...]:
+    def problem(self) -> tuple[str, ...]:
         """The newest complaints of the server."""
         return tuple(self._state.complaints)
 

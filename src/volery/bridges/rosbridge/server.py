@@ -261,11 +261,11 @@ class RosbridgeServer:
         if peer.authorized:
             prove()
         try:
-            trouble = await converse(connection, bell, peer, self._bulk, checkpoint)
+            problem = await converse(connection, bell, peer, self._bulk, checkpoint)
         finally:
             self._clients.discard(connection)
-        if trouble is not None and not isinstance(trouble, ConnectionClosed):
-            _log.error("serving %s failed", session.name, exc_info=trouble)
+        if problem is not None and not isinstance(problem, ConnectionClosed):
+            _log.error("serving %s failed", session.name, exc_info=problem)
 
 
 def _address_of(connection: ServerConnection) -> str:

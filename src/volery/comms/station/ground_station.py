@@ -65,7 +65,7 @@ class StationRow(NamedTuple):
     mission: str = "-"
     """Phase and sector; `-`: it tells of none."""
     slam: str = "-"
-    trouble: str = ""
+    problem: str = ""
 
 
 HEAD = (
@@ -78,7 +78,7 @@ HEAD = (
     "heard (s ago)",
     "mission",
     "SLAM",
-    "trouble",
+    "problem",
 )
 
 
@@ -133,8 +133,8 @@ class GroundStation:
     def _take_mission(self, source: int, status: Any) -> str | None:
         """A line where phase, sector or trouble have changed."""
         before, self._missions[source] = self._missions.get(source), status
-        said = mission_gist(status.phase, status.sector), status.trouble
-        if before and said == (mission_gist(before.phase, before.sector), before.trouble):
+        said = mission_gist(status.phase, status.sector), status.problem
+        if before and said == (mission_gist(before.phase, before.sector), before.problem):
             return None
         return f"{self._name(source)}: mission {said[0]}{', ' + said[1] if said[1] else ''}"
 
@@ -224,7 +224,7 @@ class GroundStation:
             f"{age_ns / NS_PER_S:.1f}",
             "-" if mission is None else mission_gist(mission.phase, mission.sector),
             self._slams.get(address, "-"),
-            "" if mission is None else mission.trouble,
+            "" if mission is None else mission.problem,
         )
 
 

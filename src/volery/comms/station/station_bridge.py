@@ -78,7 +78,7 @@ class _Told:
 def _gist(message: Any) -> object:
     """What of a status makes people look up."""
     if hasattr(message, "phase"):
-        return message.phase, message.sector, message.trouble
+        return message.phase, message.sector, message.problem
     return slam_gist(message.data)
 
 

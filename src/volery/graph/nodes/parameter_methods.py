@@ -62,14 +62,14 @@ class ParameterMethods:
         ignore_override: bool = False,
         *,
         read_only: bool | None = None,
-        least: float | None = None,
-        most: float = math.inf,
+        min_value: float | None = None,
+        max_value: float = math.inf,
     ) -> Parameter:
         """Declare a parameter; an override given at start wins over the default `value`.
 
         Unless it is `read_only` it may be set while the node runs, which then reads
-        `Parameter.value` each time anew. A number with a `least` value is finite, and `most` at
-        most. descriptor: a `ParameterDescriptor`, with a description, bounds and `read_only`. A
+        `Parameter.value` each time anew. A number with a `min_value` is finite, and at most
+        `max_value`. descriptor: a `ParameterDescriptor`, with a description, bounds and `read_only`. A
         `ParameterType` in place of a value has the override alone give one. `GraphError` for what
         does not fit.
         """
@@ -81,7 +81,7 @@ class ParameterMethods:
             read_only = not self.settable_parameters if descriptor is None else descriptor.read_only
         if descriptor is not None and descriptor.dynamic_typing:
             like = None
-        within = _bounds(descriptor) if least is None else Within(least, most)
+        within = _bounds(descriptor) if min_value is None else Within(min_value, max_value)
         try:
             parameter = Parameter(
                 name,

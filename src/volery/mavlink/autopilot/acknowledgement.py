@@ -14,9 +14,9 @@ ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
 """MAV_RESULT."""
 
 
-def acknowledge(pilot: Autopilot, source: Source, command: int, result: int) -> None:
+def acknowledge(autopilot: Autopilot, source: Source, command: int, result: int) -> None:
     """Sends the result of a command to its sender."""
     link, system, component = source
     progress = 0  # PX4's, where the protocol would have 255
     ack = dialect().MAVLink_command_ack_message
-    pilot.send(ack(command, result, progress, 0, system, component), link)
+    autopilot.send(ack(command, result, progress, 0, system, component), link)

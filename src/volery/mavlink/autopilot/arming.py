@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot.core import Autopilot
 
 
-def troubles(pilot: Autopilot) -> list[str]:
+def problems(autopilot: Autopilot) -> list[str]:
     """What keeps the UAV from being armed; nothing where all is well."""
-    memory = pilot.memory
+    memory = autopilot.memory
     state = memory.state
     if state is None:
         return ["nothing is known of the vehicle"]
@@ -26,69 +26,69 @@ def troubles(pilot: Autopilot) -> list[str]:
         found.append("the vehicle has crashed")
     if memory.mode in (Mode.RETURN, Mode.LAND) and not memory.armed:
         found.append("mode not suitable for arming")
-    if memory.fix_lost and not pilot.parameter("COM_ARM_WO_GPS"):
+    if memory.fix_lost and not autopilot.parameter("COM_ARM_WO_GPS"):
         found.append("no satellite fix")
-    if math.isfinite(state.charge) and state.charge < float(pilot.parameter("BAT_LOW_THR")):
+    if math.isfinite(state.charge) and state.charge < float(autopilot.parameter("BAT_LOW_THR")):
         found.append("low battery")
     tilt = 1.0 - 2.0 * (state.attitude[0] ** 2 + state.attitude[1] ** 2)
     if not state.airborne and tilt < 0.7:  # PX4 refuses beyond about 45 deg
         found.append("the vehicle lies on its side")
-    lacks = mode_requirements.missing(pilot, memory.mode)
+    lacks = mode_requirements.missing(autopilot, memory.mode)
     found += [lacks] if lacks else []
-    if int(pilot.parameter("NAV_DLL_ACT")) and not mode_requirements.ground_is_there(pilot):
+    if int(autopilot.parameter("NAV_DLL_ACT")) and not mode_requirements.ground_is_there(autopilot):
         found.append("no connection to the ground control station")
     return found
 
 
-def obstacle(pilot: Autopilot) -> str:
+def obstacle(autopilot: Autopilot) -> str:
     """The first trouble, or what is wrong with the mission that it would begin; empty: none."""
-    found = troubles(pilot)
-    if not found and pilot.memory.mode is Mode.MISSION:
-        return feasibility.trouble(pilot)
+    found = problems(autopilot)
+    if not found and autopilot.memory.mode is Mode.MISSION:
+        return feasibility.problem(autopilot)
     return found[0] if found else ""
 
 
-def arm(pilot: Autopilot) -> str:
+def arm(autopilot: Autopilot) -> str:
     """Arm; why not, empty where it is armed. Nobody can force it: PX4 checks for all outside."""
-    memory = pilot.memory
+    memory = autopilot.memory
     if memory.armed:
         return ""
-    why = obstacle(pilot)
+    why = obstacle(autopilot)
     if why:
         return why
     memory.armed, memory.armed_ns = True, memory.now_ns
     memory.airborne, memory.failsafe = False, False
     memory.warned.clear()
-    home.set_on_arming(pilot)
-    pilot.say(6, "Armed by external command")
-    pilot.announce()
+    home.set_on_arming(autopilot)
+    autopilot.say(6, "Armed by external command")
+    autopilot.announce()
     return ""
 
 
-def disarm(pilot: Autopilot, *, forced: bool) -> str:
+def disarm(autopilot: Autopilot, *, forced: bool) -> str:
     """Disarm; in the air only by force, and then it falls. Why not, empty where it is done."""
-    state = pilot.state
+    state = autopilot.state
     landed = state.mode in ("LANDED", "CRASHED")
     if not landed:
         if not forced:
             return "not landed"
-        why = pilot.vehicle.stop()
+        why = autopilot.vehicle.stop()
         if why:
             return why
-    finish(pilot, "Disarmed by external command")
-    pilot.memory.order = "" if landed else "stop"
-    pilot.memory.ordered_ns = pilot.memory.now_ns
+    finish(autopilot, "Disarmed by external command")
+    autopilot.memory.order = "" if landed else "stop"
+    autopilot.memory.ordered_ns = autopilot.memory.now_ns
     return ""
 
 
-def finish(pilot: Autopilot, text: str) -> None:
+def finish(autopilot: Autopilot, text: str) -> None:
     """Be disarmed from now on."""
-    memory = pilot.memory
+    memory = autopilot.memory
     if not memory.armed:
         return
     memory.armed, memory.airborne, memory.failsafe = False, False, False
     memory.leg = memory.way_home = memory.target = None
     if memory.mode in (Mode.RETURN, Mode.LAND, Mode.TAKE_OFF, Mode.OFFBOARD):
         memory.mode = Mode.HOLD
-    pilot.say(6, text)
-    pilot.announce()
+    autopilot.say(6, text)
+    autopilot.announce()

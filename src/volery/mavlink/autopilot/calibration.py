@@ -31,16 +31,16 @@ _STEP_PERCENT = 5
 """Duration is a modelling choice, the step is PX4's."""
 
 
-def start(pilot: Autopilot, _source: Source, command: Command) -> int:
+def start(autopilot: Autopilot, _source: Source, command: Command) -> int:
     """Starts PREFLIGHT_CALIBRATION; without any sensor it cancels the present one."""
-    memory = pilot.memory
+    memory = autopilot.memory
     params = [0.0 if math.isnan(param) else param for param in command.params]
     if not any(params):
         if memory.calibration is not None:
             memory.calibration = None
-            pilot.say(6, "[cal] calibration cancelled")
+            autopilot.say(6, "[cal] calibration cancelled")
         return ACCEPTED
-    if memory.armed or memory.calibration is not None or pilot.state.mode != "LANDED":
+    if memory.armed or memory.calibration is not None or autopilot.state.mode != "LANDED":
         return TEMPORARILY_REJECTED
     sensor = _OFFERED.get(tuple(params[:5])) if not any(params[5:]) else None
     if sensor is None:
@@ -49,22 +49,22 @@ def start(pilot: Autopilot, _source: Source, command: Command) -> int:
     return ACCEPTED
 
 
-def update(pilot: Autopilot) -> None:
+def update(autopilot: Autopilot) -> None:
     """Reports the progress of a calibration."""
-    memory, calibration = pilot.memory, pilot.memory.calibration
+    memory, calibration = autopilot.memory, autopilot.memory.calibration
     if calibration is None:
         return
     if calibration.percent < 0:
-        pilot.say(6, f"[cal] calibration started: 2 {calibration.sensor}")
+        autopilot.say(6, f"[cal] calibration started: 2 {calibration.sensor}")
         calibration.percent = 0
-    if memory.armed or pilot.state.mode != "LANDED":
+    if memory.armed or autopilot.state.mode != "LANDED":
         memory.calibration = None
-        pilot.say(2, f"[cal] calibration failed: {calibration.sensor}")
+        autopilot.say(2, f"[cal] calibration failed: {calibration.sensor}")
         return
     percent = min((memory.now_ns - calibration.start_ns) * 100 // _DURATION_NS, 100)
     while calibration.percent + _STEP_PERCENT <= percent:
         calibration.percent += _STEP_PERCENT
-        pilot.say(6, f"[cal] progress <{calibration.percent}>")
+        autopilot.say(6, f"[cal] progress <{calibration.percent}>")
     if calibration.percent == 100:
         memory.calibration = None
-        pilot.say(6, f"[cal] calibration done: {calibration.sensor}")
+        autopilot.say(6, f"[cal] calibration done: {calibration.sensor}")

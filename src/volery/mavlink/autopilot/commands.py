@@ -52,77 +52,77 @@ class Command(NamedTuple):
     frame: int | None
 
 
-def take(pilot: Autopilot, source: Source, command: Command) -> None:
+def take(autopilot: Autopilot, source: Source, command: Command) -> None:
     """Do it, and answer whoever asked."""
-    acknowledge(pilot, source, command.number, do(pilot, source, command))
+    acknowledge(autopilot, source, command.number, do(autopilot, source, command))
 
 
-def do(pilot: Autopilot, source: Source, command: Command) -> int:
+def do(autopilot: Autopilot, source: Source, command: Command) -> int:
     """MAV_RESULT of doing it."""
     handler = _HANDLERS.get(command.number)
     if handler is None:
         return UNSUPPORTED
-    if pilot.memory.state is None:
+    if autopilot.memory.state is None:
         return TEMPORARILY_REJECTED
     try:
-        return handler(pilot, source, command)
+        return handler(autopilot, source, command)
     except CommandError as error:
-        pilot.say(4, str(error))
+        autopilot.say(4, str(error))
         return TEMPORARILY_REJECTED
 
 
-def _arm(pilot: Autopilot, _source: Source, command: Command) -> int:
+def _arm(autopilot: Autopilot, _source: Source, command: Command) -> int:
     wanted, force = command.params[0], command.params[1]
     forced = round(force) == 21196 if math.isfinite(force) else False  # PX4's magic number
     if wanted not in (0.0, 1.0):
         return DENIED
-    why = arming.arm(pilot) if wanted else arming.disarm(pilot, forced=forced)
+    why = arming.arm(autopilot) if wanted else arming.disarm(autopilot, forced=forced)
     if why:
-        pilot.say(2, f"{'Arming' if wanted else 'Disarming'} denied: {why}")
+        autopilot.say(2, f"{'Arming' if wanted else 'Disarming'} denied: {why}")
     return TEMPORARILY_REJECTED if why else ACCEPTED
 
 
-def _take_off(pilot: Autopilot, _source: Source, command: Command) -> int:
+def _take_off(autopilot: Autopilot, _source: Source, command: Command) -> int:
     altitude = command.params[6]
     if math.isinf(altitude):
         return DENIED
     height = math.nan
     if math.isfinite(altitude):
-        height = _height_in_map(pilot, altitude, command.frame) - pilot.state.position[2]
+        height = _height_in_map(autopilot, altitude, command.frame) - autopilot.state.position[2]
         if height <= 0.0:
-            pilot.say(4, "Take-off altitude is below the vehicle")
+            autopilot.say(4, "Take-off altitude is below the vehicle")
             return DENIED
-    pilot.memory.take_off_height = height
-    return _switch(pilot, Mode.TAKE_OFF)
+    autopilot.memory.take_off_height = height
+    return _switch(autopilot, Mode.TAKE_OFF)
 
 
-def _land(pilot: Autopilot, _source: Source, _command: Command) -> int:
-    return _switch(pilot, Mode.LAND)
+def _land(autopilot: Autopilot, _source: Source, _command: Command) -> int:
+    return _switch(autopilot, Mode.LAND)
 
 
-def _return(pilot: Autopilot, _source: Source, _command: Command) -> int:
-    return _switch(pilot, Mode.RETURN)
+def _return(autopilot: Autopilot, _source: Source, _command: Command) -> int:
+    return _switch(autopilot, Mode.RETURN)
 
 
-def _set_mode(pilot: Autopilot, _source: Source, command: Command) -> int:
+def _set_mode(autopilot: Autopilot, _source: Source, command: Command) -> int:
     base, main, sub = command.params[:3]
     if not (math.isfinite(base) and int(base) & 1 and math.isfinite(main)):
         return DENIED  # PX4's modes are custom ones
     mode = mode_of(int(main), int(sub) if math.isfinite(sub) else 0)
     if mode is None:
-        pilot.say(4, "This flight mode is not offered")
+        autopilot.say(4, "This flight mode is not offered")
         return UNSUPPORTED
-    return _switch(pilot, mode)
+    return _switch(autopilot, mode)
 
 
-def _switch(pilot: Autopilot, mode: Mode) -> int:
-    why = mode_transitions.ask_for(pilot, mode)
+def _switch(autopilot: Autopilot, mode: Mode) -> int:
+    why = mode_transitions.ask_for(autopilot, mode)
     if why:
-        pilot.say(2, f"Switching to mode '{mode.mavros}' not possible: {why}")
+        autopilot.say(2, f"Switching to mode '{mode.mavros}' not possible: {why}")
     return TEMPORARILY_REJECTED if why else ACCEPTED
 
 
-def _reposition(pilot: Autopilot, _source: Source, command: Command) -> int:
+def _reposition(autopilot: Autopilot, _source: Source, command: Command) -> int:
     """DO_REPOSITION: fly somewhere, hold there; what is nan stays as it is.
 
     Only its flag to change the mode takes a UAV out of another mode than hold, as in PX4.
@@ -131,119 +131,123 @@ def _reposition(pilot: Autopilot, _source: Source, command: Command) -> int:
     if any(math.isinf(param) for param in command.params):
         return DENIED
     changes_mode = math.isfinite(flags) and bool(int(flags) & _CHANGE_MODE)
-    if not mode_transitions.flies(pilot) or not (changes_mode or pilot.memory.mode is Mode.HOLD):
+    if not mode_transitions.flies(autopilot) or not (
+        changes_mode or autopilot.memory.mode is Mode.HOLD
+    ):
         return DENIED
-    x, y, z = pilot.state.position
+    x, y, z = autopilot.state.position
     if math.isfinite(latitude) and math.isfinite(longitude):
         if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
             return DENIED
-        x, y, _ = pilot.earth.place(latitude, longitude, pilot.build.origin[2])
+        x, y, _ = autopilot.earth.place(latitude, longitude, autopilot.build.origin[2])
     if math.isfinite(altitude):
-        z = _height_in_map(pilot, altitude, command.frame)
-    if int(pilot.parameter("GF_ACTION")) not in _FENCE_TELLS and breach(pilot, (x, y, z)):
-        pilot.say(2, "Reposition is outside geofence")
+        z = _height_in_map(autopilot, altitude, command.frame)
+    if int(autopilot.parameter("GF_ACTION")) not in _FENCE_TELLS and breach(autopilot, (x, y, z)):
+        autopilot.say(2, "Reposition is outside geofence")
         return DENIED
-    result = _switch(pilot, Mode.HOLD)
+    result = _switch(autopilot, Mode.HOLD)
     if result == ACCEPTED:
         if math.isfinite(speed) and speed > 0.0:
-            pilot.memory.cruise = speed
+            autopilot.memory.cruise = speed
         facing = 0.5 * math.pi - yaw if math.isfinite(yaw) else None
-        mode_transitions.go_to(pilot, (x, y, z), facing)
+        mode_transitions.go_to(autopilot, (x, y, z), facing)
     return result
 
 
-def _orbit(pilot: Autopilot, source: Source, command: Command) -> int:
+def _orbit(autopilot: Autopilot, source: Source, command: Command) -> int:
     # Above the sea in any frame, as PX4 reads it: MAVSDK sends it as relative.
-    height = _height_in_map(pilot, command.params[6], None)
-    result = orbit.prepare(pilot, source, command, height)
-    return _switch(pilot, Mode.ORBIT) if result == ACCEPTED else result
+    height = _height_in_map(autopilot, command.params[6], None)
+    result = orbit.prepare(autopilot, source, command, height)
+    return _switch(autopilot, Mode.ORBIT) if result == ACCEPTED else result
 
 
-def _change_speed(pilot: Autopilot, _source: Source, command: Command) -> int:
+def _change_speed(autopilot: Autopilot, _source: Source, command: Command) -> int:
     speed = command.params[1]
     if speed in (-1.0, -2.0):  # as it was
         speed = math.nan
     elif not (math.isfinite(speed) and speed > 0.0):
         return DENIED
-    if pilot.memory.mode is Mode.MISSION:
-        pilot.memory.mission.speed = speed
-    pilot.memory.cruise = speed
-    if pilot.memory.leg is not None:
-        pilot.memory.leg.speed = mode_transitions.cruise(pilot)
+    if autopilot.memory.mode is Mode.MISSION:
+        autopilot.memory.mission.speed = speed
+    autopilot.memory.cruise = speed
+    if autopilot.memory.leg is not None:
+        autopilot.memory.leg.speed = mode_transitions.cruise(autopilot)
     return ACCEPTED
 
 
-def _set_home(pilot: Autopilot, _source: Source, command: Command) -> int:
+def _set_home(autopilot: Autopilot, _source: Source, command: Command) -> int:
     latitude, longitude, altitude = command.params[4:7]
     if command.params[0] > 0.5:
-        home.set_here(pilot)
+        home.set_here(autopilot)
         return ACCEPTED
     if not all(map(math.isfinite, (latitude, longitude, altitude))):
         return DENIED
-    why = home.choose(pilot, latitude, longitude, _height_in_map(pilot, altitude, command.frame))
+    why = home.choose(
+        autopilot, latitude, longitude, _height_in_map(autopilot, altitude, command.frame)
+    )
     if why:
-        pilot.say(4, why)
+        autopilot.say(4, why)
     return DENIED if why else ACCEPTED
 
 
-def _start_mission(pilot: Autopilot, _source: Source, command: Command) -> int:
+def _start_mission(autopilot: Autopilot, _source: Source, command: Command) -> int:
     """MISSION_START: arm, and fly it from an item on; -1: from where it was."""
-    why = feasibility.obstacle(pilot)
+    why = feasibility.obstacle(autopilot)
     if why:
-        pilot.say(2, f"Mission start denied: {why}")
+        autopilot.say(2, f"Mission start denied: {why}")
         return DENIED
-    first, mission = command.params[0], pilot.memory.mission
-    if not -1.0 <= first < len(pilot.memory.plans[plans.MISSION]):
+    first, mission = command.params[0], autopilot.memory.mission
+    if not -1.0 <= first < len(autopilot.memory.plans[plans.MISSION]):
         return DENIED
     if first < 0.0:
         first = 0.0 if mission.complete else mission.current
     if mission.complete or int(first) != mission.current:
-        mission_protocol.jump_to(pilot, int(first))
-    result = _switch(pilot, Mode.MISSION)
-    if result == ACCEPTED and not pilot.memory.armed:
-        why = arming.arm(pilot)
+        mission_protocol.jump_to(autopilot, int(first))
+    result = _switch(autopilot, Mode.MISSION)
+    if result == ACCEPTED and not autopilot.memory.armed:
+        why = arming.arm(autopilot)
         if why:
-            pilot.say(2, f"Arming denied: {why}")
+            autopilot.say(2, f"Arming denied: {why}")
             return TEMPORARILY_REJECTED
     return result
 
 
-def _jump(pilot: Autopilot, _source: Source, command: Command) -> int:
+def _jump(autopilot: Autopilot, _source: Source, command: Command) -> int:
     number = command.params[0]
-    there = math.isfinite(number) and mission_protocol.jump_to(pilot, int(number))
+    there = math.isfinite(number) and mission_protocol.jump_to(autopilot, int(number))
     return ACCEPTED if there else DENIED
 
 
-def _pause(pilot: Autopilot, _source: Source, command: Command) -> int:
-    return _switch(pilot, Mode.MISSION if command.params[0] == 1.0 else Mode.HOLD)
+def _pause(autopilot: Autopilot, _source: Source, command: Command) -> int:
+    return _switch(autopilot, Mode.MISSION if command.params[0] == 1.0 else Mode.HOLD)
 
 
-def _check(pilot: Autopilot, _source: Source, _command: Command) -> int:
+def _check(autopilot: Autopilot, _source: Source, _command: Command) -> int:
     """RUN_PREARM_CHECKS: tell everything that keeps it from being armed."""
-    for why in arming.troubles(pilot):
-        pilot.say(2, f"Preflight Fail: {why}")
+    for why in arming.problems(autopilot):
+        autopilot.say(2, f"Preflight Fail: {why}")
     return ACCEPTED
 
 
-def _terminate(pilot: Autopilot, _source: Source, command: Command) -> int:
+def _terminate(autopilot: Autopilot, _source: Source, command: Command) -> int:
     """DO_FLIGHTTERMINATION: rotors off for good."""
     if not command.params[0] > 0.5:
         return ACCEPTED
-    why = arming.disarm(pilot, forced=True)
+    why = arming.disarm(autopilot, forced=True)
     return FAILED if why else ACCEPTED
 
 
-def _reboot(pilot: Autopilot, _source: Source, _command: Command) -> int:
+def _reboot(autopilot: Autopilot, _source: Source, _command: Command) -> int:
     """A simulated autopilot goes on as it is; `/reset_uav` begins anew."""
-    return DENIED if pilot.memory.armed else UNSUPPORTED
+    return DENIED if autopilot.memory.armed else UNSUPPORTED
 
 
-def _height_in_map(pilot: Autopilot, altitude: float, frame: int | None) -> float:
+def _height_in_map(autopilot: Autopilot, altitude: float, frame: int | None) -> float:
     """Z in the map of an altitude: above home in frames that say so, else above the sea."""
-    base: Vector = pilot.memory.home or pilot.memory.origin
+    base: Vector = autopilot.memory.home or autopilot.memory.origin
     if frame is not None and frame in _ABOVE_HOME:
         return base[2] + altitude
-    return altitude - pilot.build.origin[2]
+    return altitude - autopilot.build.origin[2]
 
 
 _HANDLERS: dict[int, Callable[[Autopilot, Source, Command], int]] = {

@@ -76,7 +76,7 @@ class CurrentMode(_Message):
     ordered_fieldnames = ("custom_mode", "intended_custom_mode", "standard_mode")
 
 
-def protocol_version(_pilot: Autopilot) -> Any:
+def protocol_version(_autopilot: Autopilot) -> Any:
     """Which frames are understood."""
     return ProtocolVersion(
         version=_SPOKEN,
@@ -87,12 +87,12 @@ def protocol_version(_pilot: Autopilot) -> Any:
     )
 
 
-def current_mode(pilot: Autopilot) -> Any:
+def current_mode(autopilot: Autopilot) -> Any:
     """The mode; the intended one is not known once a failsafe has acted."""
-    mode = pilot.memory.mode
+    mode = autopilot.memory.mode
     return CurrentMode(
         custom_mode=mode.custom_mode,
-        intended_custom_mode=0 if pilot.memory.failsafe else mode.custom_mode,
+        intended_custom_mode=0 if autopilot.memory.failsafe else mode.custom_mode,
         standard_mode=_STANDARD.get(mode, 0),
     )
 

@@ -20,26 +20,26 @@ _FIX_PATIENCE_NS = 5_000_000_000
 """Without a fix the estimate counts for this long, PX4's EKF2_NOAID_TOUT."""
 
 
-def check(pilot: Autopilot, state: FlightState) -> None:
+def check(autopilot: Autopilot, state: FlightState) -> None:
     """Look whether anything is wrong; tell of it once, and act on it once."""
-    memory = pilot.memory
+    memory = autopilot.memory
     memory.fix_lost = memory.now_ns - memory.fix_ns > _FIX_PATIENCE_NS
-    flies = memory.armed and mode_transitions.flies(pilot)
+    flies = memory.armed and mode_transitions.flies(autopilot)
     for name, look in _LOOKS.items():
-        found = look(pilot, state) if flies or name.startswith("battery") else None
+        found = look(autopilot, state) if flies or name.startswith("battery") else None
         if found is None:
             memory.warned.discard(name)
         elif name not in memory.warned:
             memory.warned.add(name)
             text, mode = found
-            pilot.say(2 if mode else 4, text)
+            autopilot.say(2 if mode else 4, text)
             if flies:
-                act(pilot, mode)
+                act(autopilot, mode)
 
 
-def act(pilot: Autopilot, mode: Mode | None) -> None:
+def act(autopilot: Autopilot, mode: Mode | None) -> None:
     """Enter the mode of a failsafe; a landing stays one, and who has no place lands at once."""
-    memory = pilot.memory
+    memory = autopilot.memory
     if mode is None:
         return
     if memory.fix_lost:
@@ -47,27 +47,27 @@ def act(pilot: Autopilot, mode: Mode | None) -> None:
     if memory.mode is Mode.LAND or (memory.mode is Mode.RETURN and mode is Mode.HOLD):
         return
     memory.failsafe = True
-    if mode is not memory.mode or (mode is Mode.HOLD and _is_under_way(pilot)):
-        mode_transitions.enter(pilot, mode)
+    if mode is not memory.mode or (mode is Mode.HOLD and _is_under_way(autopilot)):
+        mode_transitions.enter(autopilot, mode)
 
 
-def _is_under_way(pilot: Autopilot) -> bool:
+def _is_under_way(autopilot: Autopilot) -> bool:
     """Whether a UAV in hold still flies somewhere, by a reposition or by another's orders."""
-    return pilot.memory.leg is not None or pilot.memory.order not in ("hold", "HOLD")
+    return autopilot.memory.leg is not None or autopilot.memory.order not in ("hold", "HOLD")
 
 
-def _position(pilot: Autopilot, _state: FlightState) -> tuple[str, Mode | None] | None:
-    if not pilot.memory.fix_lost or pilot.memory.mode is Mode.ALTITUDE:
+def _position(autopilot: Autopilot, _state: FlightState) -> tuple[str, Mode | None] | None:
+    if not autopilot.memory.fix_lost or autopilot.memory.mode is Mode.ALTITUDE:
         return None
     return "Failsafe: position lost, landing", Mode.LAND
 
 
 def _battery(level: str) -> Callable[[Autopilot, FlightState], tuple[str, Mode | None] | None]:
-    def look(pilot: Autopilot, state: FlightState) -> tuple[str, Mode | None] | None:
-        threshold = float(pilot.parameter(f"BAT_{level}_THR"))
+    def look(autopilot: Autopilot, state: FlightState) -> tuple[str, Mode | None] | None:
+        threshold = float(autopilot.parameter(f"BAT_{level}_THR"))
         if not (math.isfinite(state.charge) and state.charge < threshold):
             return None
-        action = int(pilot.parameter("COM_LOW_BAT_ACT"))
+        action = int(autopilot.parameter("COM_LOW_BAT_ACT"))
         mode = None
         if level == "CRIT":
             mode = {2: Mode.LAND, 3: Mode.RETURN}.get(action)
@@ -79,32 +79,32 @@ def _battery(level: str) -> Callable[[Autopilot, FlightState], tuple[str, Mode |
     return look
 
 
-def _fence(pilot: Autopilot, state: FlightState) -> tuple[str, Mode | None] | None:
-    action = int(pilot.parameter("GF_ACTION"))
-    broken = breach(pilot, state.position) if action else ""
+def _fence(autopilot: Autopilot, state: FlightState) -> tuple[str, Mode | None] | None:
+    action = int(autopilot.parameter("GF_ACTION"))
+    broken = breach(autopilot, state.position) if action else ""
     if not broken:
         return None
     if action == 4:
-        arming.disarm(pilot, forced=True)
+        arming.disarm(autopilot, forced=True)
     mode = {2: Mode.HOLD, 3: Mode.RETURN, 5: Mode.LAND}.get(action)
     return f"Geofence violation: {broken}", mode
 
 
-def _link(pilot: Autopilot, _state: FlightState) -> tuple[str, Mode | None] | None:
+def _link(autopilot: Autopilot, _state: FlightState) -> tuple[str, Mode | None] | None:
     """As in PX4 one that was never heard counts as lost, and who lands already goes on landing."""
-    action = int(pilot.parameter("NAV_DLL_ACT"))
-    if not action or mode_requirements.ground_is_there(pilot):
+    action = int(autopilot.parameter("NAV_DLL_ACT"))
+    if not action or mode_requirements.ground_is_there(autopilot):
         return None
-    if pilot.memory.mode is Mode.LAND and "link" not in pilot.memory.warned:
+    if autopilot.memory.mode is Mode.LAND and "link" not in autopilot.memory.warned:
         return None
     mode = {1: Mode.HOLD, 2: Mode.RETURN, 3: Mode.LAND}[action]
     return "Failsafe: connection to ground station lost", mode
 
 
-def _sticks(pilot: Autopilot, _state: FlightState) -> tuple[str, Mode | None] | None:
-    if not pilot.memory.mode.by_sticks or mode_requirements.sticks_are_there(pilot):
+def _sticks(autopilot: Autopilot, _state: FlightState) -> tuple[str, Mode | None] | None:
+    if not autopilot.memory.mode.by_sticks or mode_requirements.sticks_are_there(autopilot):
         return None
-    mode = {1: Mode.HOLD, 3: Mode.LAND}.get(int(pilot.parameter("NAV_RCL_ACT")), Mode.RETURN)
+    mode = {1: Mode.HOLD, 3: Mode.LAND}.get(int(autopilot.parameter("NAV_RCL_ACT")), Mode.RETURN)
     return "Failsafe: manual control lost", mode
 
 

@@ -25,23 +25,23 @@ _OK, _OFF, _STUCK = 0, 1, 2
 _EFFECTS = {_OFF: "dropped", _STUCK: "stuck"}
 
 
-def inject(pilot: Autopilot, _source: Source, command: Command) -> int:
+def inject(autopilot: Autopilot, _source: Source, command: Command) -> int:
     """Lets a unit of the UAV fail, or ends its failure."""
     unit, kind, instance = (
         round(part) if math.isfinite(part) else 0 for part in command.params[:3]
     )
-    if pilot.parameter("SYS_FAILURE_EN") != 1:
+    if autopilot.parameter("SYS_FAILURE_EN") != 1:
         return DENIED
-    instances = _instances_of(pilot, unit, instance)
+    instances = _instances_of(autopilot, unit, instance)
     if not instances or not _is_supported(unit, kind):
         return UNSUPPORTED
-    if unit == _GPS and kind in (_OK, _OFF) and not pilot.memory.has_receiver:
-        pilot.memory.fix_denied = kind == _OFF
+    if unit == _GPS and kind in (_OK, _OFF) and not autopilot.memory.has_receiver:
+        autopilot.memory.fix_denied = kind == _OFF
         return ACCEPTED
     for number in instances:
-        why = _change(pilot, (unit, number), _fault_of(unit, kind, number))
+        why = _change(autopilot, (unit, number), _fault_of(unit, kind, number))
         if why:
-            pilot.say(4, why)
+            autopilot.say(4, why)
             return FAILED
     return ACCEPTED
 
@@ -51,10 +51,10 @@ def _is_supported(unit: int, kind: int) -> bool:
     return kind in ((_OK, _OFF) if unit == _MOTOR else (_OK, _OFF, _STUCK))
 
 
-def _instances_of(pilot: Autopilot, unit: int, instance: int) -> tuple[int, ...]:
+def _instances_of(autopilot: Autopilot, unit: int, instance: int) -> tuple[int, ...]:
     """Instances of a unit, from 1, that a command is about (0: all); none of what is not there."""
     if unit == _MOTOR:
-        all_of_them = tuple(range(1, pilot.build.rotors + 1))
+        all_of_them = tuple(range(1, autopilot.build.rotors + 1))
     else:
         all_of_them = (1,) if unit in _SENSORS else ()
     return tuple(number for number in all_of_them if instance in (0, number))
@@ -71,20 +71,20 @@ def _fault_of(unit: int, kind: int, instance: int) -> dict[str, Any] | None:
     return {"kind": "sensor", "sensor": _SENSORS[unit], "effect": _EFFECTS[kind]}
 
 
-def _change(pilot: Autopilot, key: tuple[int, int], fault: dict[str, Any] | None) -> str:
+def _change(autopilot: Autopilot, key: tuple[int, int], fault: dict[str, Any] | None) -> str:
     """Ends the failure of an instance and begins the next one; why not, empty where it is done."""
-    failures = pilot.memory.failures
+    failures = autopilot.memory.failures
     before = failures.pop(key, None)
     if before is not None:
-        why = pilot.vehicle.end_fault(before)
+        why = autopilot.vehicle.end_fault(before)
         if why:
             return why
         for other in failures.values():  # of the same sensor: it fails on
             if other.get("sensor", "") == before.get("sensor"):
-                pilot.vehicle.fail(other)
+                autopilot.vehicle.fail(other)
     if fault is None:
         return ""
-    why = pilot.vehicle.fail(fault)
+    why = autopilot.vehicle.fail(fault)
     if not why:
         failures[key] = fault
     return why

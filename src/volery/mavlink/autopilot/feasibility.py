@@ -18,40 +18,40 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot.vehicle import Vector
 
 
-def obstacle(pilot: Autopilot) -> str:
+def obstacle(autopilot: Autopilot) -> str:
     """What keeps a mission from being begun; empty where one is there that can be flown."""
-    return mode_requirements.missing(pilot, Mode.MISSION) or trouble(pilot)
+    return mode_requirements.missing(autopilot, Mode.MISSION) or problem(autopilot)
 
 
-def trouble(pilot: Autopilot) -> str:
+def problem(autopilot: Autopilot) -> str:
     """Why the mission on board cannot be flown now; empty where it can, or where there is none."""
-    items = pilot.memory.plans[plans.MISSION]
-    if items and items[0].command == plans.LAND and pilot.state.mode == "LANDED":
+    items = autopilot.memory.plans[plans.MISSION]
+    if items and items[0].command == plans.LAND and autopilot.state.mode == "LANDED":
         return "Mission rejected: starts with landing"
-    return _trouble_of_take_off(pilot, items) or _trouble_with_fence(pilot, items)
+    return _problem_of_take_off(autopilot, items) or _problem_with_fence(autopilot, items)
 
 
-def look(pilot: Autopilot) -> None:
+def look(autopilot: Autopilot) -> None:
     """Look at a new mission or fence: tell what is wrong, and hold where it was being flown."""
     from volery.mavlink.autopilot import mode_transitions
 
-    if pilot.memory.state is None:
+    if autopilot.memory.state is None:
         return
-    why = trouble(pilot)
+    why = problem(autopilot)
     if not why:
-        _warn_of_far_start(pilot)
+        _warn_of_far_start(autopilot)
         return
-    pilot.say(2, why)
-    if pilot.memory.mode is Mode.MISSION and pilot.memory.armed:
-        mode_transitions.enter(pilot, Mode.HOLD)
+    autopilot.say(2, why)
+    if autopilot.memory.mode is Mode.MISSION and autopilot.memory.armed:
+        mode_transitions.enter(autopilot, Mode.HOLD)
 
 
-def _trouble_of_take_off(pilot: Autopilot, items: list[plans.MissionItem]) -> str:
-    home = _home(pilot)
+def _problem_of_take_off(autopilot: Autopilot, items: list[plans.MissionItem]) -> str:
+    home = _home(autopilot)
     placed = False
     for item in items:
         if item.command == plans.TAKE_OFF:
-            if not _place_of(pilot, item)[2] > home[2]:
+            if not _place_of(autopilot, item)[2] > home[2]:
                 return "Mission rejected: Takeoff altitude below home altitude!"
             if placed:
                 return "Mission rejected: takeoff not first waypoint item"
@@ -59,30 +59,30 @@ def _trouble_of_take_off(pilot: Autopilot, items: list[plans.MissionItem]) -> st
     return ""
 
 
-def _trouble_with_fence(pilot: Autopilot, items: list[plans.MissionItem]) -> str:
+def _problem_with_fence(autopilot: Autopilot, items: list[plans.MissionItem]) -> str:
     for number, item in enumerate(items, 1):
-        if item.command in plans.PLACED and breach(pilot, _place_of(pilot, item)):
+        if item.command in plans.PLACED and breach(autopilot, _place_of(autopilot, item)):
             return f"Geofence violation for waypoint {number}"
     return ""
 
 
-def _warn_of_far_start(pilot: Autopilot) -> None:
+def _warn_of_far_start(autopilot: Autopilot) -> None:
     """Of a first waypoint beyond MIS_DIST_1WP, which may still be flown."""
-    limit = float(pilot.parameter("MIS_DIST_1WP"))
-    items = pilot.memory.plans[plans.MISSION]
+    limit = float(autopilot.parameter("MIS_DIST_1WP"))
+    items = autopilot.memory.plans[plans.MISSION]
     first = next((item for item in items if item.command in plans.PLACED and item.placed), None)
     if first is None or limit <= 0.0:
         return
-    away = math.dist(_place_of(pilot, first)[:2], _home(pilot)[:2])
+    away = math.dist(_place_of(autopilot, first)[:2], _home(autopilot)[:2])
     if away >= limit:
-        pilot.say(2, f"First waypoint far away from home: {away:.0f}m. Correct mission loaded?")
+        autopilot.say(2, f"First waypoint far away from home: {away:.0f}m. Correct mission loaded?")
 
 
-def _home(pilot: Autopilot) -> Vector:
-    return pilot.memory.home or pilot.memory.origin
+def _home(autopilot: Autopilot) -> Vector:
+    return autopilot.memory.home or autopilot.memory.origin
 
 
-def _place_of(pilot: Autopilot, item: plans.MissionItem) -> Vector:
+def _place_of(autopilot: Autopilot, item: plans.MissionItem) -> Vector:
     from volery.mavlink.autopilot.mission_flight import place_of
 
-    return place_of(pilot, item)
+    return place_of(autopilot, item)

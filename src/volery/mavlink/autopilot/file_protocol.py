@@ -29,7 +29,7 @@ _FAULTS = {
 """Error by opcode; 0 is none."""
 
 
-def answer_file_request(pilot: Autopilot, source: Source, message: Any) -> None:
+def answer_file_request(autopilot: Autopilot, source: Source, message: Any) -> None:
     """Answer a FILE_TRANSFER_PROTOCOL."""
     payload = bytes(message.payload)
     sequence, session, opcode, size, _, _, _, offset = _HEADER.unpack_from(payload)
@@ -38,4 +38,4 @@ def answer_file_request(pilot: Autopilot, source: Source, message: Any) -> None:
     head = _HEADER.pack(sequence + 1 & 0xFFFF, session, kind, len(data), opcode, 0, 0, offset)
     link, system, component = source
     answer = dialect().MAVLink_file_transfer_protocol_message
-    pilot.send(answer(0, system, component, (head + data).ljust(_PAYLOAD, b"\0")), link)
+    autopilot.send(answer(0, system, component, (head + data).ljust(_PAYLOAD, b"\0")), link)

@@ -42,25 +42,27 @@ class FlightLog:
         self._was_armed = False
         self._next_ns: list[int] = []
 
-    def update(self, pilot: Autopilot) -> None:
+    def update(self, autopilot: Autopilot) -> None:
         """Logs the newest state of the vehicle."""
-        is_wanted = self._is_wanted(pilot)
+        is_wanted = self._is_wanted(autopilot)
         if not is_wanted:
             self.end()
         elif not (self.is_recording or self._is_stopped):
-            self._begin(pilot)
+            self._begin(autopilot)
         if self.is_recording:
-            self._sample(pilot)
+            self._sample(autopilot)
 
-    def note(self, pilot: Autopilot, severity: int, text: str) -> None:
+    def note(self, autopilot: Autopilot, severity: int, text: str) -> None:
         """Logs a text that the vehicle sends."""
         if self.is_recording:
-            self._append(pilot, ulog.logged_text(severity, pilot.memory.now_ns // 1000, text))
+            self._append(
+                autopilot, ulog.logged_text(severity, autopilot.memory.now_ns // 1000, text)
+            )
 
-    def note_parameter(self, pilot: Autopilot, name: str) -> None:
+    def note_parameter(self, autopilot: Autopilot, name: str) -> None:
         """Logs a parameter that has changed."""
         if self.is_recording:
-            self._append(pilot, ulog.parameter(name, pilot.parameter(name)))
+            self._append(autopilot, ulog.parameter(name, autopilot.parameter(name)))
 
     def end(self) -> None:
         """Ends the present log; the next state may begin another one."""
@@ -72,53 +74,53 @@ class FlightLog:
         self.transfers.clear()
         self.storage.close()
 
-    def _is_wanted(self, pilot: Autopilot) -> bool:
-        mode, is_armed = pilot.parameter("SDLOG_MODE"), pilot.memory.armed
+    def _is_wanted(self, autopilot: Autopilot) -> bool:
+        mode, is_armed = autopilot.parameter("SDLOG_MODE"), autopilot.memory.armed
         self._has_flown |= self._was_armed and not is_armed
         self._was_armed = is_armed
         if mode == BOOT_UNTIL_DISARM and not self._has_flown:
             return True
         return mode == ALWAYS or (is_armed and mode != DISABLED)
 
-    def _begin(self, pilot: Autopilot) -> None:
-        now_ns = pilot.memory.now_ns
+    def _begin(self, autopilot: Autopilot) -> None:
+        now_ns = autopilot.memory.now_ns
         self._next_ns = [now_ns] * len(_RATES)
         try:
             self.storage.begin(now_ns // 1_000_000_000)
         except OSError as error:
-            self._give_up(pilot, str(error.strerror))
+            self._give_up(autopilot, str(error.strerror))
             return
         self.is_recording = True
-        self._append(pilot, _beginning(pilot))
+        self._append(autopilot, _beginning(autopilot))
 
-    def _sample(self, pilot: Autopilot) -> None:
-        now_ns, next_ns, samples = pilot.memory.now_ns, self._next_ns, b""
+    def _sample(self, autopilot: Autopilot) -> None:
+        now_ns, next_ns, samples = autopilot.memory.now_ns, self._next_ns, b""
         for k, (period_ns, topics) in enumerate(_RATES):
             if now_ns < next_ns[k]:
                 continue
             next_ns[k] = max(next_ns[k] + period_ns, now_ns - period_ns)
-            samples += b"".join(_sample_of(pilot, topic) for topic in topics)
+            samples += b"".join(_sample_of(autopilot, topic) for topic in topics)
         if samples:
-            self._append(pilot, samples)
+            self._append(autopilot, samples)
 
-    def _append(self, pilot: Autopilot, data: bytes) -> None:
+    def _append(self, autopilot: Autopilot, data: bytes) -> None:
         try:
             has_room = self.storage.append(data)
         except OSError as error:
-            self._give_up(pilot, str(error.strerror))
+            self._give_up(autopilot, str(error.strerror))
             return
         if not has_room:
             self.is_recording, self._is_stopped = False, True
-            pilot.say(4, "Flight log is full: logging ends")
+            autopilot.say(4, "Flight log is full: logging ends")
 
-    def _give_up(self, pilot: Autopilot, why: str) -> None:
+    def _give_up(self, autopilot: Autopilot, why: str) -> None:
         self.storage.close()
         self.is_recording, self._is_stopped = False, True
-        pilot.say(4, f"Flight log cannot be written: {why}")
+        autopilot.say(4, f"Flight log cannot be written: {why}")
 
 
-def _sample_of(pilot: Autopilot, logged: LoggedTopic) -> bytes:
-    values = logged.values(pilot)
+def _sample_of(autopilot: Autopilot, logged: LoggedTopic) -> bytes:
+    values = logged.values(autopilot)
     if values is None:
         return b""
     try:
@@ -127,20 +129,20 @@ def _sample_of(pilot: Autopilot, logged: LoggedTopic) -> bytes:
         return b""
 
 
-def _beginning(pilot: Autopilot) -> bytes:
+def _beginning(autopilot: Autopilot) -> bytes:
     """Header, definitions, and the numbers of the topics."""
     patch, minor, major = custom_version()[:3]
     return b"".join(
         (
-            ulog.header(pilot.memory.now_ns // 1000),
+            ulog.header(autopilot.memory.now_ns // 1000),
             ulog.text_info("sys_name", "PX4"),
             ulog.text_info("ver_hw", "VOLERY_SITL"),
             ulog.text_info("ver_sw", f"Volery {own_version()}"),
             ulog.number_info("ver_sw_release", flight_version()),
             ulog.number_info("ver_vendor_sw_release", major << 24 | minor << 16 | patch << 8 | 255),
-            ulog.text_info("sys_mcu", f"simulated {pilot.build.airframe}"),
+            ulog.text_info("sys_mcu", f"simulated {autopilot.build.airframe}"),
             *(entry.topic.definition() for entry in TOPICS),
-            *(ulog.parameter(name, pilot.parameter(name)) for name in NAMES),
+            *(ulog.parameter(name, autopilot.parameter(name)) for name in NAMES),
             *(entry.topic.subscription() for entry in TOPICS),
         )
     )

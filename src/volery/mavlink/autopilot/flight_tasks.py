@@ -26,44 +26,44 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot.vehicle import FlightState
 
 
-def fly(pilot: Autopilot, state: FlightState) -> None:
+def fly(autopilot: Autopilot, state: FlightState) -> None:
     """Go on with the present mode; nothing while it is disarmed or somebody else flies."""
-    memory = pilot.memory
+    memory = autopilot.memory
     if not memory.armed or state.crashed or memory.order.isupper():
         return
-    _FLIGHTS[memory.mode](pilot, state)
+    _FLIGHTS[memory.mode](autopilot, state)
     if memory.order == "land" and state.mode == "LAND":
-        landing.follow(pilot, state)
+        landing.follow(autopilot, state)
 
 
-def _take_off(pilot: Autopilot, state: FlightState) -> None:
-    memory = pilot.memory
+def _take_off(autopilot: Autopilot, state: FlightState) -> None:
+    memory = autopilot.memory
     if state.mode == "LANDED":
         if memory.order != "take_off":
-            mode_transitions.rise(pilot)
+            mode_transitions.rise(autopilot)
         return
-    there = state.mode == "HOLD" if memory.leg is None else fly_leg(pilot, memory.leg)
+    there = state.mode == "HOLD" if memory.leg is None else fly_leg(autopilot, memory.leg)
     if there:
-        wants_mission = pilot.parameter("COM_TAKEOFF_ACT") == 1
-        goes_on = wants_mission and not mode_transitions.obstacle_to(pilot, Mode.MISSION)
+        wants_mission = autopilot.parameter("COM_TAKEOFF_ACT") == 1
+        goes_on = wants_mission and not mode_transitions.obstacle_to(autopilot, Mode.MISSION)
         leg = memory.leg
         if leg is None and memory.take_off_goal is not None:
-            leg = MissionLeg(memory.take_off_goal, None, mode_transitions.cruise(pilot))
-        mode_transitions.enter(pilot, Mode.MISSION if goes_on else Mode.HOLD)
+            leg = MissionLeg(memory.take_off_goal, None, mode_transitions.cruise(autopilot))
+        mode_transitions.enter(autopilot, Mode.MISSION if goes_on else Mode.HOLD)
         memory.leg = None if goes_on else leg
 
 
-def _hold(pilot: Autopilot, state: FlightState) -> None:
-    if pilot.memory.leg is not None and state.mode != "LANDED":
-        fly_leg(pilot, pilot.memory.leg)
+def _hold(autopilot: Autopilot, state: FlightState) -> None:
+    if autopilot.memory.leg is not None and state.mode != "LANDED":
+        fly_leg(autopilot, autopilot.memory.leg)
 
 
-def _land(pilot: Autopilot, state: FlightState) -> None:
-    if state.mode not in ("LANDED", "LAND") and pilot.memory.order != "land":
-        mode_transitions.order(pilot, "land", pilot.vehicle.land())
-    if pilot.memory.target is None:
+def _land(autopilot: Autopilot, state: FlightState) -> None:
+    if state.mode not in ("LANDED", "LAND") and autopilot.memory.order != "land":
+        mode_transitions.order(autopilot, "land", autopilot.vehicle.land())
+    if autopilot.memory.target is None:
         x, y, _ = state.position
-        pilot.memory.target = OffboardSetpoint(position=(x, y, math.nan))
+        autopilot.memory.target = OffboardSetpoint(position=(x, y, math.nan))
 
 
 _FLIGHTS: dict[Mode, Callable[[Autopilot, FlightState], None]] = {

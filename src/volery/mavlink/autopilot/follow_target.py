@@ -33,42 +33,42 @@ _FACED_M = 1.0
 """A target nearer than this along the ground is not faced."""
 
 
-def take(pilot: Autopilot, _source: Source, message: Any) -> None:
+def take(autopilot: Autopilot, _source: Source, message: Any) -> None:
     """Filters the position and the velocity of a FOLLOW_TARGET, in the mode that follows it."""
-    if pilot.memory.mode is not Mode.FOLLOW_TARGET:
+    if autopilot.memory.mode is not Mode.FOLLOW_TARGET:
         return
     latitude, longitude = message.lat * 1e-7, message.lon * 1e-7
     numbers = (latitude, longitude, message.alt)
     if not all(map(math.isfinite, numbers)) or abs(latitude) > 90.0 or abs(longitude) > 180.0:
         return
-    x, y, _ = pilot.earth.place(latitude, longitude, 0.0)
-    measured = x, y, message.alt - pilot.build.origin[2]
+    x, y, _ = autopilot.earth.place(latitude, longitude, 0.0)
+    measured = x, y, message.alt - autopilot.build.origin[2]
     if any(abs(part) > _FARTHEST_M for part in measured):
         return
     vx, vy, vz = message.vel
     velocity = enu_of_ned((vx, vy, vz))
     known = all(math.isfinite(part) and abs(part) < 1e3 for part in velocity)
-    memory, before = pilot.memory, pilot.memory.followed
+    memory, before = autopilot.memory, autopilot.memory.followed
     if before is None:
         start = velocity if known else (0.0, 0.0, 0.0)
         memory.followed = FollowTarget(measured, start, memory.now_ns)
     else:
-        _fuse(pilot, before, measured, velocity if known else None)
+        _fuse(autopilot, before, measured, velocity if known else None)
     target = memory.followed
     if target is not None and math.hypot(*target.velocity[:2]) > _MOVES_M_S:
         target.course = math.atan2(target.velocity[1], target.velocity[0])
 
 
 def _fuse(
-    pilot: Autopilot, target: FollowTarget, measured: Vector, velocity: Vector | None
+    autopilot: Autopilot, target: FollowTarget, measured: Vector, velocity: Vector | None
 ) -> None:
     """Corrects an estimate by a measurement: PX4's filter by FLW_TGT_RS."""
-    share = min(max(float(pilot.parameter("FLW_TGT_RS")), 0.1), 1.0)
+    share = min(max(float(autopilot.parameter("FLW_TGT_RS")), 0.1), 1.0)
     beta = share ** (1.0 / 3.0)
     gain, rate_gain = 1.0 - share, 1.5 * (1.0 - beta) ** 2 * (1.0 + beta)
     velocity_gain = 1.0 - (0.9 * beta) ** 2
-    elapsed_s = min(max((pilot.memory.now_ns - target.time_ns) * 1e-9, 1e-3), 20.0)
-    predicted = _position_now(pilot, target)
+    elapsed_s = min(max((autopilot.memory.now_ns - target.time_ns) * 1e-9, 1e-3), 20.0)
+    predicted = _position_now(autopilot, target)
     off = tuple(here - there for here, there in zip(measured, predicted, strict=True))
     x, y, z = (p + gain * o for p, o in zip(predicted, off, strict=True))
     vx, vy, vz = (v + rate_gain / elapsed_s * o for v, o in zip(target.velocity, off, strict=True))
@@ -77,57 +77,57 @@ def _fuse(
             v + velocity_gain * (told - v) for v, told in zip((vx, vy, vz), velocity, strict=True)
         )
     target.position, target.velocity = (x, y, z), (vx, vy, vz)
-    target.time_ns = pilot.memory.now_ns
+    target.time_ns = autopilot.memory.now_ns
 
 
-def fly(pilot: Autopilot, state: FlightState) -> None:
+def fly(autopilot: Autopilot, state: FlightState) -> None:
     """Flies to the position beside the target, and with it; holds until there is a target."""
-    memory, target = pilot.memory, pilot.memory.followed
+    memory, target = autopilot.memory, autopilot.memory.followed
     if target is None or state.mode == "LANDED":
         return
     if memory.now_ns - memory.ordered_ns < _PERIOD_NS and memory.order == "steer":
         return
-    there = _position_now(pilot, target)
+    there = _position_now(autopilot, target)
     moves = memory.now_ns - target.time_ns < _STALE_NS
     vx, vy, _ = target.velocity if moves else (0.0, 0.0, 0.0)
-    goal = _position_beside(pilot, target, there)
+    goal = _position_beside(autopilot, target, there)
     x, y, z = (wanted - here for wanted, here in zip(goal, state.position, strict=True))
     away = math.hypot(x, y)
     speed = min(
-        approach_speed(away, float(pilot.parameter("MPC_ACC_HOR"))),
-        float(pilot.parameter("FLW_TGT_MAX_VEL")),
+        approach_speed(away, float(autopilot.parameter("MPC_ACC_HOR"))),
+        float(autopilot.parameter("FLW_TGT_MAX_VEL")),
     )
     share = speed / away if away > 1e-6 else 0.0
     level = (vx + share * x, vy + share * y) if abs(z) < _HEIGHT_FIRST_M else (0.0, 0.0)
-    most = float(pilot.parameter("MPC_XY_VEL_MAX"))
+    most = float(autopilot.parameter("MPC_XY_VEL_MAX"))
     reduced = min(1.0, most / max(math.hypot(*level), 1e-6))
-    limit = float(pilot.parameter(f"MPC_Z_V_AUTO_{'UP' if z > 0.0 else 'DN'}"))
-    brake = 0.5 * float(pilot.parameter("MPC_ACC_HOR"))
+    limit = float(autopilot.parameter(f"MPC_Z_V_AUTO_{'UP' if z > 0.0 else 'DN'}"))
+    brake = 0.5 * float(autopilot.parameter("MPC_ACC_HOR"))
     climb = math.copysign(min(limit, approach_speed(abs(z), brake)), z)
     dx, dy = there[0] - state.position[0], there[1] - state.position[1]
     yaw = math.atan2(dy, dx) if math.hypot(dx, dy) > _FACED_M else None
     memory.target = OffboardSetpoint(position=goal, yaw=math.nan if yaw is None else yaw)
-    pilot.vehicle.steer((reduced * level[0], reduced * level[1], climb), yaw, 0.0)
-    mode_transitions.order(pilot, "steer")
+    autopilot.vehicle.steer((reduced * level[0], reduced * level[1], climb), yaw, 0.0)
+    mode_transitions.order(autopilot, "steer")
 
 
-def _position_now(pilot: Autopilot, target: FollowTarget) -> Vector:
+def _position_now(autopilot: Autopilot, target: FollowTarget) -> Vector:
     """Returns the position of the target, moved on by its velocity."""
-    since_s = min(pilot.memory.now_ns - target.time_ns, _STALE_NS) * 1e-9
+    since_s = min(autopilot.memory.now_ns - target.time_ns, _STALE_NS) * 1e-9
     x, y, z = (p + since_s * v for p, v in zip(target.position, target.velocity, strict=True))
     return x, y, z
 
 
-def _position_beside(pilot: Autopilot, target: FollowTarget, there: Vector) -> Vector:
+def _position_beside(autopilot: Autopilot, target: FollowTarget, there: Vector) -> Vector:
     """Returns where the UAV wants to be; beside a target without a course: on its own side."""
     if target.course is None:
-        here = pilot.state.position
+        here = autopilot.state.position
         angle = math.atan2(here[1] - there[1], here[0] - there[0])
     else:
-        angle = target.course - math.radians(float(pilot.parameter("FLW_TGT_FA")))
-    distance, height = (float(pilot.parameter(f"FLW_TGT_{name}")) for name in ("DST", "HT"))
-    follows_height = pilot.parameter("FLW_TGT_ALT_M") == 2
-    base = there[2] if follows_height else (pilot.memory.home or pilot.memory.origin)[2]
+        angle = target.course - math.radians(float(autopilot.parameter("FLW_TGT_FA")))
+    distance, height = (float(autopilot.parameter(f"FLW_TGT_{name}")) for name in ("DST", "HT"))
+    follows_height = autopilot.parameter("FLW_TGT_ALT_M") == 2
+    base = there[2] if follows_height else (autopilot.memory.home or autopilot.memory.origin)[2]
     return (
         there[0] + distance * math.cos(angle),
         there[1] + distance * math.sin(angle),

@@ -12,29 +12,29 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot.vehicle import Vector
 
 
-def breach(pilot: Autopilot, place: Vector) -> str:
+def breach(autopilot: Autopilot, place: Vector) -> str:
     """What a place in the map breaks; empty where it is allowed.
 
     Where there are shapes to stay in, it is enough to be in one of them, as in PX4's polygons.
     """
-    home = pilot.memory.home or pilot.memory.origin
-    farthest = float(pilot.parameter("GF_MAX_HOR_DIST"))
-    highest = float(pilot.parameter("GF_MAX_VER_DIST"))
+    home = autopilot.memory.home or autopilot.memory.origin
+    farthest = float(autopilot.parameter("GF_MAX_HOR_DIST"))
+    highest = float(autopilot.parameter("GF_MAX_VER_DIST"))
     if farthest > 0.0 and math.dist(place[:2], home[:2]) > farthest:
         return "maximum distance from home"
     if highest > 0.0 and place[2] - home[2] > highest:
         return "maximum altitude above home"
     inside: list[bool] = []
-    items = pilot.memory.plans[plans.FENCE]
+    items = autopilot.memory.plans[plans.FENCE]
     k = 0
     while k < len(items):
         item = items[k]
         corners = 1
         if item.command in (plans.CIRCLE_IN, plans.CIRCLE_OUT):
-            held = math.dist(_point(pilot, item), place[:2]) < item.params[0]
+            held = math.dist(_point(autopilot, item), place[:2]) < item.params[0]
         elif item.command in (plans.POLYGON_IN, plans.POLYGON_OUT):
             corners = int(item.params[0])
-            held = _contains([_point(pilot, one) for one in items[k : k + corners]], place)
+            held = _contains([_point(autopilot, one) for one in items[k : k + corners]], place)
         else:
             held = False
         k += corners
@@ -45,8 +45,8 @@ def breach(pilot: Autopilot, place: Vector) -> str:
     return "" if not inside or any(inside) else "the area to stay in"
 
 
-def _point(pilot: Autopilot, item: plans.MissionItem) -> tuple[float, float]:
-    x, y, _ = pilot.earth.place(item.latitude, item.longitude, pilot.build.origin[2])
+def _point(autopilot: Autopilot, item: plans.MissionItem) -> tuple[float, float]:
+    x, y, _ = autopilot.earth.place(item.latitude, item.longitude, autopilot.build.origin[2])
     return x, y
 
 

@@ -18,7 +18,7 @@ from volery.mavlink.autopilot.vehicle import Quaternion as Turn
 
 _TRIGGER = "std_srvs/srv/Trigger"
 _TAKE_OFF_TO = "volery_interfaces/srv/TakeOffTo"
-_GET_BUILD = "volery_interfaces/srv/GetBuild"
+_GET_VEHICLE_INFO = "volery_interfaces/srv/GetVehicleInfo"
 _LANDING_SPEED = "volery_interfaces/srv/SetLandingSpeed"
 _GO_TO = "volery_interfaces/srv/GoTo"
 _SET_TARGET = "volery_interfaces/srv/SetPositionTarget"
@@ -40,7 +40,7 @@ class GraphVehicle:
         self._target = node.create_client(_SET_TARGET, "set_position_target")
         self._attitude = node.create_client(_SET_ATTITUDE, "set_attitude_target")
         self._clients = {
-            name: node.create_client(_TRIGGER, name) for name in ("hold", "land", "stop")
+            name: node.create_client(_TRIGGER, name) for name in ("hold", "land", "kill")
         }
         self._take_off = node.create_client(_TAKE_OFF_TO, "take_off_to")
         self._sink = node.create_client(_LANDING_SPEED, "set_landing_speed")
@@ -71,7 +71,7 @@ class GraphVehicle:
 
     def stop(self) -> str:
         """As `Vehicle`."""
-        return _ask(self._clients["stop"])
+        return _ask(self._clients["kill"])
 
     def go_to(self, position: Vector, yaw: float | None) -> str:
         """As `Vehicle`."""
@@ -161,7 +161,7 @@ def _ask(client: Any, request: Any = None) -> str:
 
 def build_of(node: Node) -> VehicleInfo:
     """What of the UAV never changes. `GraphError` where the graph does not tell."""
-    told = node.create_client(_GET_BUILD, "get_build").call()
+    told = node.create_client(_GET_VEHICLE_INFO, "get_vehicle_info").call()
     if not told.success:
         raise GraphError(told.message)
     return VehicleInfo(

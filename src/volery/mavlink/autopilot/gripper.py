@@ -20,7 +20,7 @@ _ACTIONS = (0, 1)
 """GRIPPER_ACTIONS: release, grab."""
 
 
-def act(_pilot: Autopilot, _source: Source, command: Command) -> int:
+def act(_autopilot: Autopilot, _source: Source, command: Command) -> int:
     """Does DO_GRIPPER's action."""
     action = command.params[1]
     known = math.isfinite(action) and round(action) in _ACTIONS

@@ -12,33 +12,33 @@ _FARTHEST_M, _HIGHEST_M = 1e6, 1e5
 """From the map's origin: beyond, a flat map says nothing (modelling choice; PX4 knows no limit)."""
 
 
-def set_here(pilot: Autopilot) -> None:
+def set_here(autopilot: Autopilot) -> None:
     """Let home be where the UAV is."""
-    pilot.memory.home, pilot.memory.chosen_home = pilot.state.position, None
-    _tell(pilot)
+    autopilot.memory.home, autopilot.memory.chosen_home = autopilot.state.position, None
+    _tell(autopilot)
 
 
-def set_on_arming(pilot: Autopilot) -> None:
+def set_on_arming(autopilot: Autopilot) -> None:
     """Let home be where the UAV is armed; a place that somebody chose stays, as in PX4."""
-    if pilot.memory.chosen_home is None:
-        set_here(pilot)
+    if autopilot.memory.chosen_home is None:
+        set_here(autopilot)
 
 
-def choose(pilot: Autopilot, latitude: float, longitude: float, z: float) -> str:
+def choose(autopilot: Autopilot, latitude: float, longitude: float, z: float) -> str:
     """Let home be a place in degrees and a height in the map, m; why not, empty where it is so."""
-    origin = pilot.build.origin
+    origin = autopilot.build.origin
     if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
         return "Home is not on the earth"
-    place = pilot.earth.place(latitude, longitude, origin[2])
+    place = autopilot.earth.place(latitude, longitude, origin[2])
     if not (math.hypot(*place) <= _FARTHEST_M and abs(z) <= _HIGHEST_M):
         return "Home is too far away"
-    pilot.memory.home = (place[0], place[1], z)
-    pilot.memory.chosen_home = (latitude, longitude, z + origin[2])
-    _tell(pilot)
+    autopilot.memory.home = (place[0], place[1], z)
+    autopilot.memory.chosen_home = (latitude, longitude, z + origin[2])
+    _tell(autopilot)
     return ""
 
 
-def _tell(pilot: Autopilot) -> None:
+def _tell(autopilot: Autopilot) -> None:
     from volery.mavlink.autopilot.telemetry import BUILDERS, HOME_POSITION
 
-    pilot.send(BUILDERS[HOME_POSITION](pilot))
+    autopilot.send(BUILDERS[HOME_POSITION](autopilot))

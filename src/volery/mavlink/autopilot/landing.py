@@ -19,22 +19,22 @@ _STEP_M_S = 0.02
 """Smaller changes are not worth a command."""
 
 
-def follow(pilot: Autopilot, state: FlightState) -> None:
+def follow(autopilot: Autopilot, state: FlightState) -> None:
     """Have the present landing sink as the height asks for."""
-    memory = pilot.memory
+    memory = autopilot.memory
     ground = (memory.home or memory.origin)[2]
-    speed = speed_at(pilot, state.position[2] - ground)
+    speed = speed_at(autopilot, state.position[2] - ground)
     if not abs(speed - memory.sinks) < _STEP_M_S:
         memory.sinks = speed
-        pilot.vehicle.sink(speed)
+        autopilot.vehicle.sink(speed)
 
 
-def speed_at(pilot: Autopilot, height_m: float) -> float:
+def speed_at(autopilot: Autopilot, height_m: float) -> float:
     """m/s at a height above ground."""
     slow, fast, most = (
-        float(pilot.parameter(name))
+        float(autopilot.parameter(name))
         for name in ("MPC_LAND_SPEED", "MPC_Z_VEL_MAX_DN", "MPC_Z_V_AUTO_DN")
     )
-    low = float(pilot.parameter("MPC_LAND_ALT2"))
-    high = max(float(pilot.parameter("MPC_LAND_ALT1")), low)
+    low = float(autopilot.parameter("MPC_LAND_ALT2"))
+    high = max(float(autopilot.parameter("MPC_LAND_ALT1")), low)
     return min(float(np.interp(height_m, (low, high), (slow, fast))), most)

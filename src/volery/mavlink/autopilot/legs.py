@@ -23,34 +23,34 @@ _GAIN = 0.95
 _ARRIVED_M, _ARRIVED_M_S = 0.3, 0.5
 
 
-def fly_leg(pilot: Autopilot, leg: MissionLeg) -> bool:
+def fly_leg(autopilot: Autopilot, leg: MissionLeg) -> bool:
     """Fly on; whether the UAV is there and rests."""
-    state = pilot.state
+    state = autopilot.state
     x, y, z = (goal - here for goal, here in zip(leg.target, state.position, strict=True))
     level, away = math.hypot(x, y), math.hypot(x, y, z)
-    pilot.memory.target = OffboardSetpoint(
+    autopilot.memory.target = OffboardSetpoint(
         position=leg.target, yaw=math.nan if leg.yaw is None else leg.yaw
     )
     if leg.locked:
         return away < _ARRIVED_M and math.hypot(*state.velocity) < _ARRIVED_M_S
     if away < _NEAR_M:
         leg.locked = True
-        mode_transitions.order(pilot, "go_to", pilot.vehicle.go_to(leg.target, leg.yaw))
+        mode_transitions.order(autopilot, "go_to", autopilot.vehicle.go_to(leg.target, leg.yaw))
         return False
-    speed = min(leg.speed, approach_speed(level, float(pilot.parameter("MPC_ACC_HOR"))))
+    speed = min(leg.speed, approach_speed(level, float(autopilot.parameter("MPC_ACC_HOR"))))
     way = "UP" if z > 0.0 else "DN"
-    limit = min(float(pilot.parameter(f"MPC_Z_{kind}_{way}")) for kind in ("V_AUTO", "VEL_MAX"))
-    climb = min(limit, approach_speed(abs(z), 0.5 * float(pilot.parameter("MPC_ACC_HOR"))))
+    limit = min(float(autopilot.parameter(f"MPC_Z_{kind}_{way}")) for kind in ("V_AUTO", "VEL_MAX"))
+    climb = min(limit, approach_speed(abs(z), 0.5 * float(autopilot.parameter("MPC_ACC_HOR"))))
     share = speed / level if level > 1e-6 else 0.0
     velocity = (share * x, share * y, math.copysign(climb, z))
-    pilot.vehicle.steer(velocity, leg.yaw, 0.0)
-    mode_transitions.order(pilot, "steer")
+    autopilot.vehicle.steer(velocity, leg.yaw, 0.0)
+    mode_transitions.order(autopilot, "steer")
     return False
 
 
-def bearing(pilot: Autopilot, target: tuple[float, float, float]) -> float | None:
+def bearing(autopilot: Autopilot, target: tuple[float, float, float]) -> float | None:
     """Rad in the map from the UAV to a place; None where that is right here."""
-    dx, dy = target[0] - pilot.state.position[0], target[1] - pilot.state.position[1]
+    dx, dy = target[0] - autopilot.state.position[0], target[1] - autopilot.state.position[1]
     return math.atan2(dy, dx) if math.hypot(dx, dy) > 1.0 else None
 
 

@@ -52,35 +52,35 @@ class LoggedTopic(NamedTuple):
     values: Callable[[Autopilot], Values | None]
 
 
-def _attitude(pilot: Autopilot) -> Values:
-    x, y, z, w = q_ned_frd_of_enu_flu(pilot.state.attitude)
-    time_us = motion.us(pilot)
+def _attitude(autopilot: Autopilot) -> Values:
+    x, y, z, w = q_ned_frd_of_enu_flu(autopilot.state.attitude)
+    time_us = motion.us(autopilot)
     return time_us, time_us, w, x, y, z
 
 
-def _angular_velocity(pilot: Autopilot) -> Values:
-    time_us = motion.us(pilot)
-    return time_us, time_us, *frd_of_flu(pilot.state.rates)
+def _angular_velocity(autopilot: Autopilot) -> Values:
+    time_us = motion.us(autopilot)
+    return time_us, time_us, *frd_of_flu(autopilot.state.rates)
 
 
-def _acceleration(pilot: Autopilot) -> Values:
-    time_us = motion.us(pilot)
-    return time_us, time_us, *frd_of_flu(motion.specific_force(pilot.state))
+def _acceleration(autopilot: Autopilot) -> Values:
+    time_us = motion.us(autopilot)
+    return time_us, time_us, *frd_of_flu(motion.specific_force(autopilot.state))
 
 
-def _local_position(pilot: Autopilot) -> Values:
-    time_us, memory = motion.us(pilot), pilot.memory
-    place, velocity = motion.local_motion(pilot)
-    heading = math.remainder(0.5 * math.pi - pilot.yaw, 2.0 * math.pi)
+def _local_position(autopilot: Autopilot) -> Values:
+    time_us, memory = motion.us(autopilot), autopilot.memory
+    place, velocity = motion.local_motion(autopilot)
+    heading = math.remainder(0.5 * math.pi - autopilot.yaw, 2.0 * math.pi)
     has_fix = not memory.fix_lost
     return (
         *(time_us, time_us, has_fix, True, has_fix, True),
         *place,
         *velocity,
         velocity[2],
-        *ned_of_enu(pilot.state.acceleration),
+        *ned_of_enu(autopilot.state.acceleration),
         *(heading, True, has_fix, True, 0),
-        *_reference(pilot.earth, memory.origin),
+        *_reference(autopilot.earth, memory.origin),
     )
 
 
@@ -90,15 +90,15 @@ def _reference(earth: GeoReference, origin: Vector) -> Vector:
     return earth.geodetic(origin)
 
 
-def _global_position(pilot: Autopilot) -> Values:
-    time_us = motion.us(pilot)
-    return time_us, time_us, *pilot.geodetic(), not pilot.memory.fix_lost, True
+def _global_position(autopilot: Autopilot) -> Values:
+    time_us = motion.us(autopilot)
+    return time_us, time_us, *autopilot.geodetic(), not autopilot.memory.fix_lost, True
 
 
-def _status(pilot: Autopilot) -> Values:
-    memory, nav_state = pilot.memory, _NAV_STATES[pilot.memory.mode]
+def _status(autopilot: Autopilot) -> Values:
+    memory, nav_state = autopilot.memory, _NAV_STATES[autopilot.memory.mode]
     return (
-        motion.us(pilot),
+        motion.us(autopilot),
         memory.armed_ns // 1000 if memory.armed else 0,
         _ARMED if memory.armed else _DISARMED,
         nav_state,
@@ -106,57 +106,57 @@ def _status(pilot: Autopilot) -> Values:
         _ROTARY_WING,
         memory.failsafe,
         int(memory.parameters["MAV_TYPE"]),
-        pilot.system,
+        autopilot.system,
         1,
     )
 
 
-def _land_detected(pilot: Autopilot) -> Values:
-    return motion.us(pilot), not pilot.state.airborne
+def _land_detected(autopilot: Autopilot) -> Values:
+    return motion.us(autopilot), not autopilot.state.airborne
 
 
-def _battery(pilot: Autopilot) -> Values | None:
-    state = pilot.state
+def _battery(autopilot: Autopilot) -> Values | None:
+    state = autopilot.state
     if not math.isfinite(state.charge):
         return None
-    used_mah = (1.0 - state.charge) * pilot.build.battery_capacity_ah * 1e3
+    used_mah = (1.0 - state.charge) * autopilot.build.battery_capacity_ah * 1e3
     warning = next(
-        (level for name, level in _WARNINGS if state.charge < float(pilot.parameter(name))), 0
+        (level for name, level in _WARNINGS if state.charge < float(autopilot.parameter(name))), 0
     )
-    cells = pilot.build.battery_cells
+    cells = autopilot.build.battery_cells
     return (
-        *(motion.us(pilot), 1, True, state.voltage, state.current, used_mah, state.charge),
+        *(motion.us(autopilot), 1, True, state.voltage, state.current, used_mah, state.charge),
         *(warning, cells),
     )
 
 
-def _motors(pilot: Autopilot) -> Values:
-    time_us = motion.us(pilot)
-    speeds = pilot.state.rotors[:_MOTORS] if pilot.memory.armed else ()
+def _motors(autopilot: Autopilot) -> Values:
+    time_us = motion.us(autopilot)
+    speeds = autopilot.state.rotors[:_MOTORS] if autopilot.memory.armed else ()
     thrusts = [speed * speed for speed in speeds]
     return time_us, time_us, 0, *thrusts, *(_NAN,) * (_MOTORS - len(thrusts))
 
 
-def _trajectory_setpoint(pilot: Autopilot) -> Values | None:
-    parts = motion.target_motion(pilot)
+def _trajectory_setpoint(autopilot: Autopilot) -> Values | None:
+    parts = motion.target_motion(autopilot)
     if parts is None:
         return None
-    return motion.us(pilot), *parts[:9], *(_NAN,) * 3, *parts[9:]
+    return motion.us(autopilot), *parts[:9], *(_NAN,) * 3, *parts[9:]
 
 
-def _attitude_setpoint(pilot: Autopilot) -> Values | None:
-    target = pilot.memory.target
+def _attitude_setpoint(autopilot: Autopilot) -> Values | None:
+    target = autopilot.memory.target
     if target is None or target.attitude is None:
         return None
     x, y, z, w = q_ned_frd_of_enu_flu(target.attitude)
-    return motion.us(pilot), _NAN, w, x, y, z, 0.0, 0.0, -target.thrust
+    return motion.us(autopilot), _NAN, w, x, y, z, 0.0, 0.0, -target.thrust
 
 
-def _rates_setpoint(pilot: Autopilot) -> Values | None:
-    target = pilot.memory.target
+def _rates_setpoint(autopilot: Autopilot) -> Values | None:
+    target = autopilot.memory.target
     if target is None or target.rates is None:
         return None
-    return motion.us(pilot), *frd_of_flu(target.rates), 0.0, 0.0, -target.thrust
+    return motion.us(autopilot), *frd_of_flu(target.rates), 0.0, 0.0, -target.thrust
 
 
 _TIMES = "uint64_t timestamp; uint64_t timestamp_sample"

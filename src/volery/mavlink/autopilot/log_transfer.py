@@ -70,17 +70,19 @@ class LogTransfers:
         self._waiting: deque[int] = deque()
         """Links with something to send, the next one first."""
 
-    def list_logs(self, pilot: Autopilot, link: int, first: int, last: int) -> None:
+    def list_logs(self, autopilot: Autopilot, link: int, first: int, last: int) -> None:
         """Begins to send the entries of the logs `first` to `last`."""
-        listed = tuple(pilot.log.storage.logs)
+        listed = tuple(autopilot.log.storage.logs)
         last = min(last, len(listed) - 1)
         entries = range(min(first, last), last + 1) if listed else range(1)
         self._set(link, _Request(listed, entries))
 
-    def send_data(self, pilot: Autopilot, link: int, number: int, offset: int, count: int) -> None:
+    def send_data(
+        self, autopilot: Autopilot, link: int, number: int, offset: int, count: int
+    ) -> None:
         """Begins to send `count` bytes of a log from `offset` on."""
         before = self._requests.get(link)
-        listed = tuple(pilot.log.storage.logs) if before is None else before.listed
+        listed = tuple(autopilot.log.storage.logs) if before is None else before.listed
         if number < len(listed):
             log = listed[number]
             count = max(0, min(count, log.size - offset))
@@ -97,14 +99,14 @@ class LogTransfers:
         self._requests.clear()
         self._waiting.clear()
 
-    def send_some(self, pilot: Autopilot) -> None:
+    def send_some(self, autopilot: Autopilot) -> None:
         """Goes on with the answers, the links in turn."""
-        num_frames = self.pace.share(pilot.memory.now_ns) if self._waiting else 0
+        num_frames = self.pace.share(autopilot.memory.now_ns) if self._waiting else 0
         while num_frames > 0 and self._waiting:
             link = self._waiting.popleft()
             request, turn = self._requests[link], min(num_frames, _FRAMES_PER_TURN)
             send = _send_entries if request.log is None else _send_data
-            num_sent, is_done = send(pilot, link, request, turn)
+            num_sent, is_done = send(autopilot, link, request, turn)
             num_frames -= num_sent
             if not is_done:
                 self._waiting.append(link)
@@ -115,53 +117,55 @@ class LogTransfers:
             self._waiting.append(link)
 
 
-def _send_entries(pilot: Autopilot, link: int, request: _Request, turn: int) -> tuple[int, bool]:
+def _send_entries(
+    autopilot: Autopilot, link: int, request: _Request, turn: int
+) -> tuple[int, bool]:
     """Sends the next LOG_ENTRY messages; how many, and whether they were the last ones."""
     entry, listed = dialect().MAVLink_log_entry_message, request.listed
     chosen, request.entries = request.entries[:turn], request.entries[turn:]
     for number in chosen:
         if not listed:  # the one that says so
-            pilot.send(entry(0, 0, 0, 0, 0), link)
+            autopilot.send(entry(0, 0, 0, 0, 0), link)
             continue
         log = listed[number]
-        pilot.send(entry(number, len(listed), len(listed) - 1, log.time_s, log.size), link)
+        autopilot.send(entry(number, len(listed), len(listed) - 1, log.time_s, log.size), link)
     return len(chosen), not request.entries
 
 
-def _send_data(pilot: Autopilot, link: int, request: _Request, turn: int) -> tuple[int, bool]:
+def _send_data(autopilot: Autopilot, link: int, request: _Request, turn: int) -> tuple[int, bool]:
     """Sends the next LOG_DATA messages; how many, and whether they were the last ones."""
     assert request.log is not None
     wanted = min(request.remaining, turn * _DATA_BYTES)
     try:
-        data = pilot.log.storage.read(request.log, request.offset, wanted)
+        data = autopilot.log.storage.read(request.log, request.offset, wanted)
     except OSError:
         data = b""
     pieces = [data[k : k + _DATA_BYTES] for k in range(0, len(data), _DATA_BYTES)] or [b""]
     for piece in pieces:
         head = _HEAD.pack(request.offset & 0xFFFFFFFF, request.number, len(piece))
-        pilot.send_payload(_LOG_DATA, head + piece.ljust(_DATA_BYTES, b"\0"), link)
+        autopilot.send_payload(_LOG_DATA, head + piece.ljust(_DATA_BYTES, b"\0"), link)
         request.offset += len(piece)
         request.remaining -= len(piece)
     return len(pieces), len(data) < wanted or request.remaining <= 0
 
 
-def list_logs(pilot: Autopilot, source: Source, message: Any) -> None:
+def list_logs(autopilot: Autopilot, source: Source, message: Any) -> None:
     """Answers a LOG_REQUEST_LIST."""
-    pilot.log.transfers.list_logs(pilot, source[0], message.start, message.end)
+    autopilot.log.transfers.list_logs(autopilot, source[0], message.start, message.end)
 
 
-def send_data(pilot: Autopilot, source: Source, message: Any) -> None:
+def send_data(autopilot: Autopilot, source: Source, message: Any) -> None:
     """Answers a LOG_REQUEST_DATA; of a log that is not there nothing is sent, as by PX4."""
     parts = int(message.id), int(message.ofs), int(message.count)
-    pilot.log.transfers.send_data(pilot, source[0], *parts)
+    autopilot.log.transfers.send_data(autopilot, source[0], *parts)
 
 
-def erase(pilot: Autopilot, _source: Source, _message: Any) -> None:
+def erase(autopilot: Autopilot, _source: Source, _message: Any) -> None:
     """Obeys a LOG_ERASE: erases all logs but that of the present flight."""
-    pilot.log.transfers.clear()
-    pilot.log.storage.erase(keeps_newest=pilot.log.is_recording)
+    autopilot.log.transfers.clear()
+    autopilot.log.storage.erase(keeps_newest=autopilot.log.is_recording)
 
 
-def end(pilot: Autopilot, source: Source, _message: Any) -> None:
+def end(autopilot: Autopilot, source: Source, _message: Any) -> None:
     """Obeys a LOG_REQUEST_END."""
-    pilot.log.transfers.forget(source[0])
+    autopilot.log.transfers.forget(source[0])

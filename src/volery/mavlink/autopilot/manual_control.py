@@ -25,48 +25,50 @@ _LIFT_M = 1.0
 """Height of a start by sticks (modelling choice)."""
 
 
-def take(pilot: Autopilot, _source: object, message: Any) -> None:
+def take(autopilot: Autopilot, _source: object, message: Any) -> None:
     """Hear a MANUAL_CONTROL; parts that are out of range make it unheard."""
-    if message.target not in (0, pilot.system):
+    if message.target not in (0, autopilot.system):
         return
     parts = (message.x, message.y, message.z, message.r)
     if any(abs(part) > 1000 for part in parts):
         return
     x, y, z, r = (part / 1000.0 for part in parts)
-    pilot.memory.sticks = ManualInput(x, y, 2.0 * z - 1.0, r, pilot.memory.now_ns)
+    autopilot.memory.sticks = ManualInput(x, y, 2.0 * z - 1.0, r, autopilot.memory.now_ns)
 
 
-def fly_position(pilot: Autopilot, state: FlightState) -> None:
+def fly_position(autopilot: Autopilot, state: FlightState) -> None:
     """Velocities by the sticks; where they are in the middle, the place is kept."""
-    if not _is_up(pilot, state):
+    if not _is_up(autopilot, state):
         return
-    forward, right, up, turn = _alive(pilot.memory.sticks)
-    memory = pilot.memory
+    forward, right, up, turn = _alive(autopilot.memory.sticks)
+    memory = autopilot.memory
     if forward == right == up == turn == 0.0:
         if memory.order != "hold":
-            mode_transitions.order(pilot, "hold", pilot.vehicle.hold())
+            mode_transitions.order(autopilot, "hold", autopilot.vehicle.hold())
         return
     if memory.now_ns - memory.ordered_ns < 20_000_000 and memory.order == "steer":
         return
-    speed = min(float(pilot.parameter("MPC_VEL_MANUAL")), float(pilot.parameter("MPC_XY_VEL_MAX")))
-    c, s = math.cos(pilot.yaw), math.sin(pilot.yaw)
+    speed = min(
+        float(autopilot.parameter("MPC_VEL_MANUAL")), float(autopilot.parameter("MPC_XY_VEL_MAX"))
+    )
+    c, s = math.cos(autopilot.yaw), math.sin(autopilot.yaw)
     x, y = speed * (c * forward + s * right), speed * (s * forward - c * right)
-    rate = -turn * math.radians(float(pilot.parameter("MPC_MAN_Y_MAX")))
-    pilot.vehicle.steer((x, y, _climb(pilot, up)), None, rate)
-    mode_transitions.order(pilot, "steer")
+    rate = -turn * math.radians(float(autopilot.parameter("MPC_MAN_Y_MAX")))
+    autopilot.vehicle.steer((x, y, _climb(autopilot, up)), None, rate)
+    mode_transitions.order(autopilot, "steer")
 
 
-def fly_altitude(pilot: Autopilot, state: FlightState) -> None:
+def fly_altitude(autopilot: Autopilot, state: FlightState) -> None:
     """Tilts by the sticks; the height is kept, and nothing else."""
-    if not _is_up(pilot, state):
+    if not _is_up(autopilot, state):
         return
-    memory = pilot.memory
+    memory = autopilot.memory
     forward, right, up, turn = _alive(memory.sticks)
     if memory.order != "tilt":
         memory.climb_thrust, memory.altitude_target = 0.0, state.position[2]
     if up != 0.0:
         memory.altitude_target = math.nan
-        wanted = _climb(pilot, up)
+        wanted = _climb(autopilot, up)
     else:
         if math.isnan(memory.altitude_target):
             memory.altitude_target = state.position[2]
@@ -75,27 +77,27 @@ def fly_altitude(pilot: Autopilot, state: FlightState) -> None:
     memory.climb_thrust += _CLIMB_INTEGRAL * error * _TICK_S
     memory.climb_thrust = min(max(memory.climb_thrust, -_MOST_PUSH), _MOST_PUSH)
     push = _CLIMB_GAIN * error + memory.climb_thrust
-    most = math.radians(float(pilot.parameter("MPC_MAN_TILT_MAX")))
+    most = math.radians(float(autopilot.parameter("MPC_MAN_TILT_MAX")))
     roll, pitch = right * most, forward * most
     lean = math.cos(roll) * math.cos(pitch)
-    thrust = pilot.build.hover_thrust * (1.0 + push / _GRAVITY) / max(lean, 0.3)
-    rate = -turn * math.radians(float(pilot.parameter("MPC_MAN_Y_MAX")))
-    x, y, z, w = from_rpy(roll, pitch, pilot.yaw + 0.2 * rate).tolist()
-    pilot.vehicle.tilt((x, y, z, w), min(max(thrust, 0.05), 1.0))
-    mode_transitions.order(pilot, "tilt")
+    thrust = autopilot.build.hover_thrust * (1.0 + push / _GRAVITY) / max(lean, 0.3)
+    rate = -turn * math.radians(float(autopilot.parameter("MPC_MAN_Y_MAX")))
+    x, y, z, w = from_rpy(roll, pitch, autopilot.yaw + 0.2 * rate).tolist()
+    autopilot.vehicle.tilt((x, y, z, w), min(max(thrust, 0.05), 1.0))
+    mode_transitions.order(autopilot, "tilt")
 
 
-def _is_up(pilot: Autopilot, state: FlightState) -> bool:
+def _is_up(autopilot: Autopilot, state: FlightState) -> bool:
     """Whether it flies; from the ground it starts where the stick is pushed up."""
     if state.mode == "LANDED":
-        if pilot.memory.sticks.up > _DEAD and pilot.memory.order != "take_off":
-            mode_transitions.order(pilot, "take_off", pilot.vehicle.take_off(_LIFT_M))
+        if autopilot.memory.sticks.up > _DEAD and autopilot.memory.order != "take_off":
+            mode_transitions.order(autopilot, "take_off", autopilot.vehicle.take_off(_LIFT_M))
         return False
-    return not (pilot.memory.order == "take_off" and state.mode == "TAKE_OFF")
+    return not (autopilot.memory.order == "take_off" and state.mode == "TAKE_OFF")
 
 
-def _climb(pilot: Autopilot, up: float) -> float:
-    return up * float(pilot.parameter("MPC_Z_VEL_MAX_UP" if up > 0.0 else "MPC_Z_VEL_MAX_DN"))
+def _climb(autopilot: Autopilot, up: float) -> float:
+    return up * float(autopilot.parameter("MPC_Z_VEL_MAX_UP" if up > 0.0 else "MPC_Z_VEL_MAX_DN"))
 
 
 def _alive(sticks: ManualInput) -> tuple[float, float, float, float]:

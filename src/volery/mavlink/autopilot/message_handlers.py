@@ -27,47 +27,47 @@ _GROUND_STATION = 6
 """MAV_TYPE_GCS."""
 
 
-def _heartbeat(pilot: Autopilot, _source: Source, message: Any) -> None:
+def _heartbeat(autopilot: Autopilot, _source: Source, message: Any) -> None:
     if message.type == _GROUND_STATION:
-        pilot.memory.ground_heard_ns = pilot.memory.now_ns
+        autopilot.memory.ground_heard_ns = autopilot.memory.now_ns
 
 
-def _ping(pilot: Autopilot, source: Source, message: Any) -> None:
+def _ping(autopilot: Autopilot, source: Source, message: Any) -> None:
     if message.target_system == 0 and message.target_component == 0:
         link, system, component = source
         answer = dialect().MAVLink_ping_message(message.time_usec, message.seq, system, component)
-        pilot.send(answer, link)
+        autopilot.send(answer, link)
 
 
-def _time_sync(pilot: Autopilot, source: Source, message: Any) -> None:
+def _time_sync(autopilot: Autopilot, source: Source, message: Any) -> None:
     """Answer with the simulated time since the start."""
     if message.tc1 == 0:
-        answer = dialect().MAVLink_timesync_message(pilot.memory.now_ns, message.ts1)
-        pilot.send(answer, source[0])
+        answer = dialect().MAVLink_timesync_message(autopilot.memory.now_ns, message.ts1)
+        autopilot.send(answer, source[0])
 
 
-def _command_long(pilot: Autopilot, source: Source, message: Any) -> None:
+def _command_long(autopilot: Autopilot, source: Source, message: Any) -> None:
     params = tuple(float(getattr(message, f"param{k}")) for k in range(1, 8))
-    commands.take(pilot, source, commands.Command(message.command, params, None))
+    commands.take(autopilot, source, commands.Command(message.command, params, None))
 
 
-def _command_int(pilot: Autopilot, source: Source, message: Any) -> None:
+def _command_int(autopilot: Autopilot, source: Source, message: Any) -> None:
     x, y = (
         math.nan if part == 2**31 - 1 or part == -(2**31) else part * 1e-7
         for part in (message.x, message.y)
     )
     params = (message.param1, message.param2, message.param3, message.param4, x, y, message.z)
-    commands.take(pilot, source, commands.Command(message.command, params, int(message.frame)))
+    commands.take(autopilot, source, commands.Command(message.command, params, int(message.frame)))
 
 
-def _set_mode(pilot: Autopilot, source: Source, message: Any) -> None:
+def _set_mode(autopilot: Autopilot, source: Source, message: Any) -> None:
     """The old message: PX4 makes a command of it, and answers that."""
     custom = message.custom_mode
     params = (float(message.base_mode), custom >> 16 & 255, custom >> 24 & 255, *(math.nan,) * 4)
-    commands.take(pilot, source, commands.Command(commands.DO_SET_MODE, params, None))
+    commands.take(autopilot, source, commands.Command(commands.DO_SET_MODE, params, None))
 
 
-def _data_stream(pilot: Autopilot, source: Source, message: Any) -> None:
+def _data_stream(autopilot: Autopilot, source: Source, message: Any) -> None:
     """The old way to ask for streams: what MAVProxy asks for at its start; PX4 does not hear it."""
 
 

@@ -26,45 +26,45 @@ _MOST_STEPS = 2 * plans.MOST_ITEMS[plans.MISSION]
 """Items that are passed at one instant; jumps cannot hang it."""
 
 
-def fly(pilot: Autopilot, state: FlightState) -> None:
+def fly(autopilot: Autopilot, state: FlightState) -> None:
     """Go on with the mission; at its end the place is held."""
-    memory = pilot.memory
+    memory = autopilot.memory
     mission, items = memory.mission, memory.plans[plans.MISSION]
     if mission.complete or not items:
         if memory.leg is not None and state.mode != "LANDED":
-            fly_leg(pilot, memory.leg)
+            fly_leg(autopilot, memory.leg)
         return
     for _ in range(_MOST_STEPS):
         if mission is not memory.mission or mission.complete or memory.mode is not Mode.MISSION:
             return
-        _face_interest(pilot, mission, items[mission.current])
-        if not _do(pilot, mission, items[mission.current], state):
+        _face_interest(autopilot, mission, items[mission.current])
+        if not _do(autopilot, mission, items[mission.current], state):
             return
-        _reach(pilot, mission)
+        _reach(autopilot, mission)
 
 
-def _face_interest(pilot: Autopilot, mission: Mission, item: plans.MissionItem) -> None:
+def _face_interest(autopilot: Autopilot, mission: Mission, item: plans.MissionItem) -> None:
     """On the way to a place look at the region of interest, as PX4's multicopters do."""
-    leg = pilot.memory.leg
+    leg = autopilot.memory.leg
     if mission.interest is None or leg is None or leg.locked or item.command not in _FACING:
         return
     x, y, _ = mission.interest
-    away = math.hypot(x - pilot.state.position[0], y - pilot.state.position[1])
-    if away > float(pilot.parameter("NAV_ACC_RAD")):
-        leg.yaw = bearing(pilot, mission.interest)
+    away = math.hypot(x - autopilot.state.position[0], y - autopilot.state.position[1])
+    if away > float(autopilot.parameter("NAV_ACC_RAD")):
+        leg.yaw = bearing(autopilot, mission.interest)
 
 
-def _reach(pilot: Autopilot, mission: Mission) -> None:
+def _reach(autopilot: Autopilot, mission: Mission) -> None:
     """Tell that the current item is done, and go to the next one."""
     mission.reached = mission.current
-    pilot.send(dialect().MAVLink_mission_item_reached_message(mission.current))
-    items = pilot.memory.plans[plans.MISSION]
+    autopilot.send(dialect().MAVLink_mission_item_reached_message(mission.current))
+    items = autopilot.memory.plans[plans.MISSION]
     _advance(mission, items)
     if mission.complete:
         mission.speed = math.nan
-        if pilot.memory.mode is Mode.MISSION:  # else its last item was the way home
-            landed = pilot.state.mode == "LANDED"
-            pilot.say(6, f"Mission finished, {'landed' if landed else 'loitering'}")
+        if autopilot.memory.mode is Mode.MISSION:  # else its last item was the way home
+            landed = autopilot.state.mode == "LANDED"
+            autopilot.say(6, f"Mission finished, {'landed' if landed else 'loitering'}")
 
 
 def _advance(mission: Mission, items: list[plans.MissionItem]) -> None:
@@ -85,10 +85,12 @@ def _advance(mission: Mission, items: list[plans.MissionItem]) -> None:
         mission.current = following
 
 
-def _do(pilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState) -> bool:
+def _do(
+    autopilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
+) -> bool:
     """Do an item; whether it is done."""
     if state.mode == "LANDED" and item.command != plans.TAKE_OFF:
-        return _do_on_ground(pilot, mission, item, state)
+        return _do_on_ground(autopilot, mission, item, state)
     doing = {
         plans.TAKE_OFF: _take_off,
         plans.WAYPOINT: _waypoint,
@@ -101,188 +103,196 @@ def _do(pilot: Autopilot, mission: Mission, item: plans.MissionItem, state: Flig
         plans.CONDITION_YAW: _face,
     }.get(item.command)
     if doing is not None:
-        return doing(pilot, mission, item, state)
+        return doing(autopilot, mission, item, state)
     if item.command == plans.RETURN_TO_LAUNCH:
-        mode_transitions.enter(pilot, Mode.RETURN)
-    return _set(pilot, mission, item)
+        mode_transitions.enter(autopilot, Mode.RETURN)
+    return _set(autopilot, mission, item)
 
 
 def _do_on_ground(
-    pilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
+    autopilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
 ) -> bool:
     """From the ground it starts by itself where a place is wanted, as PX4 does."""
     if item.command == plans.LAND:
         return True
     if item.command in (plans.DELAY, plans.CONDITION_DELAY):
-        return _delay(pilot, mission, item, state)
+        return _delay(autopilot, mission, item, state)
     if item.placed and item.command in plans.PLACED:
-        if pilot.memory.order != "take_off":
-            mode_transitions.rise(pilot)
+        if autopilot.memory.order != "take_off":
+            mode_transitions.rise(autopilot)
         return False
-    return item.command == plans.RETURN_TO_LAUNCH or _set(pilot, mission, item)
+    return item.command == plans.RETURN_TO_LAUNCH or _set(autopilot, mission, item)
 
 
-def _set(pilot: Autopilot, mission: Mission, item: plans.MissionItem) -> bool:
+def _set(autopilot: Autopilot, mission: Mission, item: plans.MissionItem) -> bool:
     """What takes no time."""
     if item.command == plans.CHANGE_SPEED and item.params[1] > 0.0:
         mission.speed = item.params[1]
     elif item.command in payload_items.INTEREST:
         somewhere = payload_items.is_place_of_interest(item.command)
-        mission.interest = place_of(pilot, item) if somewhere else None
+        mission.interest = place_of(autopilot, item) if somewhere else None
     elif item.command == plans.SET_HOME:
         if item.params[0] == 1.0 or not item.placed:
-            home.set_here(pilot)
+            home.set_here(autopilot)
         else:
-            height = place_of(pilot, item)[2]
-            why = home.choose(pilot, item.latitude, item.longitude, height)
+            height = place_of(autopilot, item)[2]
+            why = home.choose(autopilot, item.latitude, item.longitude, height)
             if why:
-                pilot.say(4, why)
+                autopilot.say(4, why)
     return True
 
 
 def _take_off(
-    pilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
+    autopilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
 ) -> bool:
-    memory = pilot.memory
-    _, _, z = place_of(pilot, item)
+    memory = autopilot.memory
+    _, _, z = place_of(autopilot, item)
     if state.mode == "LANDED":
         if memory.order != "take_off":
             memory.take_off_height = max(z - state.position[2], 0.5)
-            mode_transitions.rise(pilot)
+            mode_transitions.rise(autopilot)
         return False
     if memory.order == "take_off":
-        return state.mode == "HOLD" or _near_height(pilot, z)
+        return state.mode == "HOLD" or _near_height(autopilot, z)
     if not mission.entered:
         mission.entered = True
         x, y, _ = state.position
         memory.leg = MissionLeg(
-            (x, y, max(z, state.position[2])), None, mode_transitions.cruise(pilot)
+            (x, y, max(z, state.position[2])), None, mode_transitions.cruise(autopilot)
         )
-    return memory.leg is None or fly_leg(pilot, memory.leg)
+    return memory.leg is None or fly_leg(autopilot, memory.leg)
 
 
 def _waypoint(
-    pilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
+    autopilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
 ) -> bool:
-    memory = pilot.memory
+    memory = autopilot.memory
     if state.mode == "TAKE_OFF":
         return False
     if not mission.entered or memory.leg is None:
         mission.entered = True
-        target = place_of(pilot, item)
+        target = place_of(autopilot, item)
         # params count clockwise from north
         yaw = 0.5 * math.pi - math.radians(item.params[3])
         turns = math.isfinite(yaw) and item.command != plans.LOITER_TIME  # which says no heading
-        facing = yaw if turns else bearing(pilot, target)
-        memory.leg = MissionLeg(target, facing, mode_transitions.cruise(pilot))
+        facing = yaw if turns else bearing(autopilot, target)
+        memory.leg = MissionLeg(target, facing, mode_transitions.cruise(autopilot))
     leg = memory.leg
-    rests = fly_leg(pilot, leg)
+    rests = fly_leg(autopilot, leg)
     last = mission.current + 1 == len(memory.plans[plans.MISSION])
     wait_s = item.params[0] if item.command != plans.LOITER_UNLIMITED else math.inf
     waits = math.isfinite(wait_s) and wait_s > 0.0
-    if not (rests if last or waits or mission.waiting else _is_near(pilot, item, leg)):
-        return mission.waiting and _has_waited(pilot, mission, wait_s)
+    if not (rests if last or waits or mission.waiting else _is_near(autopilot, item, leg)):
+        return mission.waiting and _has_waited(autopilot, mission, wait_s)
     if item.command == plans.LOITER_UNLIMITED:
         return False
     if not waits:
         return True
     if not mission.waiting:
         mission.waiting, mission.since_ns = True, memory.now_ns
-    return _has_waited(pilot, mission, wait_s)
+    return _has_waited(autopilot, mission, wait_s)
 
 
 def _change_height(
-    pilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
+    autopilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
 ) -> bool:
     """LOITER_TO_ALT: at the present height to within its radius, then to its height."""
-    memory = pilot.memory
+    memory = autopilot.memory
     if state.mode == "TAKE_OFF":
         return False
-    x, y, z = place_of(pilot, item)
+    x, y, z = place_of(autopilot, item)
     if not mission.entered or memory.leg is None:
         mission.entered = True
         target = (x, y, state.position[2])
-        memory.leg = MissionLeg(target, bearing(pilot, target), mode_transitions.cruise(pilot))
+        memory.leg = MissionLeg(
+            target, bearing(autopilot, target), mode_transitions.cruise(autopilot)
+        )
     own = abs(item.params[1])
     radius = own if math.isfinite(own) and own > 0.0 else _LOITER_RADIUS_M
-    radius += float(pilot.parameter("NAV_ACC_RAD"))
+    radius += float(autopilot.parameter("NAV_ACC_RAD"))
     level = math.hypot(x - state.position[0], y - state.position[1])
     if level <= radius and memory.leg.target[2] != z:
         memory.leg = MissionLeg((x, y, z), memory.leg.yaw, memory.leg.speed)
-    fly_leg(pilot, memory.leg)
-    return level <= radius and _near_height(pilot, z)
+    fly_leg(autopilot, memory.leg)
+    return level <= radius and _near_height(autopilot, z)
 
 
-def _is_near(pilot: Autopilot, item: plans.MissionItem, leg: MissionLeg) -> bool:
+def _is_near(autopilot: Autopilot, item: plans.MissionItem, leg: MissionLeg) -> bool:
     """Whether it is within the radius of acceptance, the item's own or NAV_ACC_RAD."""
     own = item.params[1] if item.command == plans.WAYPOINT else 0.0
-    radius = own if math.isfinite(own) and own > 0.0 else float(pilot.parameter("NAV_ACC_RAD"))
-    x, y, _ = pilot.state.position
+    radius = own if math.isfinite(own) and own > 0.0 else float(autopilot.parameter("NAV_ACC_RAD"))
+    x, y, _ = autopilot.state.position
     level = math.hypot(leg.target[0] - x, leg.target[1] - y)
-    return level < radius and _near_height(pilot, leg.target[2])
+    return level < radius and _near_height(autopilot, leg.target[2])
 
 
-def _near_height(pilot: Autopilot, z: float) -> bool:
-    return abs(z - pilot.state.position[2]) < float(pilot.parameter("NAV_MC_ALT_RAD"))
+def _near_height(autopilot: Autopilot, z: float) -> bool:
+    return abs(z - autopilot.state.position[2]) < float(autopilot.parameter("NAV_MC_ALT_RAD"))
 
 
-def _land(pilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState) -> bool:
-    memory = pilot.memory
+def _land(
+    autopilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
+) -> bool:
+    memory = autopilot.memory
     if memory.order == "land":
         return False  # done once it is on the ground
     if not mission.entered:
         mission.entered = True
         x, y, z = state.position
         if item.placed:
-            x, y, _ = place_of(pilot, item)
-        memory.leg = MissionLeg((x, y, z), None, mode_transitions.cruise(pilot))
-    if memory.leg is not None and not fly_leg(pilot, memory.leg):
+            x, y, _ = place_of(autopilot, item)
+        memory.leg = MissionLeg((x, y, z), None, mode_transitions.cruise(autopilot))
+    if memory.leg is not None and not fly_leg(autopilot, memory.leg):
         return False
     memory.leg = None
-    mode_transitions.order(pilot, "land", pilot.vehicle.land())
+    mode_transitions.order(autopilot, "land", autopilot.vehicle.land())
     return False
 
 
-def _delay(pilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState) -> bool:
-    if pilot.memory.leg is not None and state.mode != "LANDED":
-        fly_leg(pilot, pilot.memory.leg)
+def _delay(
+    autopilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
+) -> bool:
+    if autopilot.memory.leg is not None and state.mode != "LANDED":
+        fly_leg(autopilot, autopilot.memory.leg)
     if not mission.waiting:
-        mission.waiting, mission.since_ns = True, pilot.memory.now_ns
-    return _has_waited(pilot, mission, item.params[0])
+        mission.waiting, mission.since_ns = True, autopilot.memory.now_ns
+    return _has_waited(autopilot, mission, item.params[0])
 
 
-def _face(pilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState) -> bool:
+def _face(
+    autopilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
+) -> bool:
     """CONDITION_YAW: turn on the spot, relative or from north clockwise."""
-    memory = pilot.memory
+    memory = autopilot.memory
     if not mission.entered:
         mission.entered = True
         angle = math.radians(item.params[0])
         if item.params[3] == 1.0:
             way = -1.0 if item.params[2] == -1.0 else 1.0
-            yaw = pilot.yaw - way * angle
+            yaw = autopilot.yaw - way * angle
         else:
             yaw = 0.5 * math.pi - angle
         target = state.position if memory.leg is None else memory.leg.target
         memory.leg = MissionLeg(
-            target, math.remainder(yaw, 2.0 * math.pi), mode_transitions.cruise(pilot)
+            target, math.remainder(yaw, 2.0 * math.pi), mode_transitions.cruise(autopilot)
         )
     leg = memory.leg
     if leg is None or leg.yaw is None:
         return True
-    fly_leg(pilot, leg)
-    return abs(math.remainder(leg.yaw - pilot.yaw, 2.0 * math.pi)) < _FACES_RAD
+    fly_leg(autopilot, leg)
+    return abs(math.remainder(leg.yaw - autopilot.yaw, 2.0 * math.pi)) < _FACES_RAD
 
 
-def _has_waited(pilot: Autopilot, mission: Mission, seconds: float) -> bool:
-    return pilot.memory.now_ns - mission.since_ns >= seconds * 1e9
+def _has_waited(autopilot: Autopilot, mission: Mission, seconds: float) -> bool:
+    return autopilot.memory.now_ns - mission.since_ns >= seconds * 1e9
 
 
-def place_of(pilot: Autopilot, item: plans.MissionItem) -> Vector:
+def place_of(autopilot: Autopilot, item: plans.MissionItem) -> Vector:
     """Where an item lies in the map, m; above home or the sea as its frame says."""
-    x, y, _ = pilot.state.position
+    x, y, _ = autopilot.state.position
     if item.placed:
-        x, y, _ = pilot.earth.place(item.latitude, item.longitude, pilot.build.origin[2])
-    base = pilot.memory.home or pilot.memory.origin
+        x, y, _ = autopilot.earth.place(item.latitude, item.longitude, autopilot.build.origin[2])
+    base = autopilot.memory.home or autopilot.memory.origin
     above = item.frame in plans.ABOVE_HOME
-    z = item.altitude + (base[2] if above else -pilot.build.origin[2])
+    z = item.altitude + (base[2] if above else -autopilot.build.origin[2])
     return x, y, z

@@ -20,78 +20,78 @@ RETRY_NS = 250_000_000
 GIVE_UP_NS = 5_000_000_000
 
 
-def begin_upload(pilot: Autopilot, source: Source, message: Any) -> None:
+def begin_upload(autopilot: Autopilot, source: Source, message: Any) -> None:
     """Answer a MISSION_COUNT by asking for the first item."""
     kind, count = int(message.mission_type), int(message.count)
     if kind not in plans.MOST_ITEMS:
-        _answer(pilot, source, plans.UNSUPPORTED, kind)
+        _answer(autopilot, source, plans.UNSUPPORTED, kind)
         return
-    running = pilot.memory.transfers.get(kind)
+    running = autopilot.memory.transfers.get(kind)
     if running is not None and running.source != source and running.upload:
-        _answer(pilot, source, plans.DENIED, kind)
+        _answer(autopilot, source, plans.DENIED, kind)
         return
     if count > plans.MOST_ITEMS[kind]:
-        _answer(pilot, source, plans.NO_SPACE, kind)
+        _answer(autopilot, source, plans.NO_SPACE, kind)
         return
-    now_ns = pilot.memory.now_ns
+    now_ns = autopilot.memory.now_ns
     transfer = MissionTransfer(kind, source, True, count, time_ns=now_ns)
     if count == 0:
-        _take_over(pilot, transfer)
+        _take_over(autopilot, transfer)
         return
-    pilot.memory.transfers[kind] = transfer
-    pilot.memory.last_items.pop(kind, None)
-    _ask(pilot, transfer)
+    autopilot.memory.transfers[kind] = transfer
+    autopilot.memory.last_items.pop(kind, None)
+    _ask(autopilot, transfer)
 
 
-def take_item(pilot: Autopilot, source: Source, message: Any) -> None:
+def take_item(autopilot: Autopilot, source: Source, message: Any) -> None:
     """Take the item that was asked for; the last one of a plan may come again: its ACK was lost."""
     kind, sequence = int(message.mission_type), int(message.seq)
-    transfer = pilot.memory.transfers.get(kind)
+    transfer = autopilot.memory.transfers.get(kind)
     if transfer is None or not transfer.upload or transfer.source != source:
         if transfer is None and kind in plans.MOST_ITEMS:
-            repeated = pilot.memory.last_items.get(kind) == (source, sequence)
-            _answer(pilot, source, plans.ACCEPTED if repeated else plans.ERROR, kind)
+            repeated = autopilot.memory.last_items.get(kind) == (source, sequence)
+            _answer(autopilot, source, plans.ACCEPTED if repeated else plans.ERROR, kind)
         return
-    transfer.time_ns = pilot.memory.now_ns
+    transfer.time_ns = autopilot.memory.now_ns
     if sequence != len(transfer.items):
         return  # early or repeated: what is awaited is asked for again, as PX4 does
     item = plans.item_of(message)
     fault = plans.fault_of(item, kind, transfer.count)
     if fault:
-        _end(pilot, transfer, fault)
+        _end(autopilot, transfer, fault)
         return
     transfer.items.append(item)
     if len(transfer.items) < transfer.count:
-        _ask(pilot, transfer)
+        _ask(autopilot, transfer)
     elif kind == plans.FENCE and not plans.polygons_are_whole(transfer.items):
-        _end(pilot, transfer, plans.INVALID)
+        _end(autopilot, transfer, plans.INVALID)
     elif kind == plans.MISSION and plans.flies_for_ever(transfer.items):
-        pilot.say(2, "Mission rejected: its jumps go round for ever")
-        _end(pilot, transfer, plans.INVALID)
+        autopilot.say(2, "Mission rejected: its jumps go round for ever")
+        _end(autopilot, transfer, plans.INVALID)
     else:
-        _take_over(pilot, transfer)
+        _take_over(autopilot, transfer)
 
 
-def begin_download(pilot: Autopilot, source: Source, message: Any) -> None:
+def begin_download(autopilot: Autopilot, source: Source, message: Any) -> None:
     """Answer a MISSION_REQUEST_LIST with the number of items."""
     kind = int(message.mission_type)
     if kind not in plans.MOST_ITEMS:
-        _answer(pilot, source, plans.UNSUPPORTED, kind)
+        _answer(autopilot, source, plans.UNSUPPORTED, kind)
         return
     link, system, component = source
-    count = len(pilot.memory.plans[kind])
-    pilot.send(dialect().MAVLink_mission_count_message(system, component, count, kind), link)
+    count = len(autopilot.memory.plans[kind])
+    autopilot.send(dialect().MAVLink_mission_count_message(system, component, count, kind), link)
 
 
-def send_item(pilot: Autopilot, source: Source, message: Any) -> None:
+def send_item(autopilot: Autopilot, source: Source, message: Any) -> None:
     """Send one item, in the form that was asked for."""
     kind, sequence = int(message.mission_type), int(message.seq)
-    items = pilot.memory.plans.get(kind)
+    items = autopilot.memory.plans.get(kind)
     if items is None or sequence >= len(items):
-        _answer(pilot, source, plans.INVALID_SEQUENCE, kind)
+        _answer(autopilot, source, plans.INVALID_SEQUENCE, kind)
         return
     link, system, component = source
-    item, current = items[sequence], kind == 0 and sequence == pilot.memory.mission.current
+    item, current = items[sequence], kind == 0 and sequence == autopilot.memory.mission.current
     whole = message.get_type() == "MISSION_REQUEST_INT"
     name = "mission_item_int" if whole else "mission_item"
     places = (item.latitude, item.longitude)
@@ -101,84 +101,84 @@ def send_item(pilot: Autopilot, source: Source, message: Any) -> None:
         x, y = places  # type: ignore[assignment]
     message_class = getattr(dialect(), f"MAVLink_{name}_message")
     head = (system, component, sequence, item.frame, item.command, int(current), int(item.goes_on))
-    pilot.send(message_class(*head, *item.params, x, y, item.altitude, kind), link)
+    autopilot.send(message_class(*head, *item.params, x, y, item.altitude, kind), link)
 
 
-def take_ack(pilot: Autopilot, source: Source, message: Any) -> None:
+def take_ack(autopilot: Autopilot, source: Source, message: Any) -> None:
     """End an upload that its sender cancels; of downloads nothing is kept that could end."""
     kind = int(message.mission_type)
-    transfer = pilot.memory.transfers.get(kind)
+    transfer = autopilot.memory.transfers.get(kind)
     if transfer is None or not transfer.upload or transfer.source != source:
         return
     if int(message.type) == plans.CANCELLED:
-        del pilot.memory.transfers[kind]
+        del autopilot.memory.transfers[kind]
 
 
-def clear(pilot: Autopilot, source: Source, message: Any) -> None:
+def clear(autopilot: Autopilot, source: Source, message: Any) -> None:
     """Forget one plan or all of them."""
     kind = int(message.mission_type)
     kinds = tuple(plans.MOST_ITEMS) if kind == plans.ALL else (kind,)
     if not set(kinds) <= set(plans.MOST_ITEMS):
-        _answer(pilot, source, plans.UNSUPPORTED, kind)
+        _answer(autopilot, source, plans.UNSUPPORTED, kind)
         return
     for one in kinds:
-        pilot.memory.transfers.pop(one, None)
-        _replace(pilot, one, [])
-    _answer(pilot, source, plans.ACCEPTED, kind)
+        autopilot.memory.transfers.pop(one, None)
+        _replace(autopilot, one, [])
+    _answer(autopilot, source, plans.ACCEPTED, kind)
 
 
-def set_current(pilot: Autopilot, _source: Source, message: Any) -> None:
+def set_current(autopilot: Autopilot, _source: Source, message: Any) -> None:
     """Go on with another item of the mission; the old message, which has no answer."""
-    jump_to(pilot, int(message.seq))
+    jump_to(autopilot, int(message.seq))
 
 
-def jump_to(pilot: Autopilot, sequence: int) -> bool:
+def jump_to(autopilot: Autopilot, sequence: int) -> bool:
     """Make an item the current one; whether there is such an item."""
-    if not 0 <= sequence < len(pilot.memory.plans[plans.MISSION]):
+    if not 0 <= sequence < len(autopilot.memory.plans[plans.MISSION]):
         return False
-    speed = pilot.memory.mission.speed
-    pilot.memory.mission = Mission(current=sequence, speed=speed)
-    pilot.memory.leg = None
+    speed = autopilot.memory.mission.speed
+    autopilot.memory.mission = Mission(current=sequence, speed=speed)
+    autopilot.memory.leg = None
     return True
 
 
-def keep_transfers_going(pilot: Autopilot) -> None:
+def keep_transfers_going(autopilot: Autopilot) -> None:
     """Ask again for what has not come, give up on who is gone."""
-    now_ns = pilot.memory.now_ns
-    for transfer in tuple(pilot.memory.transfers.values()):
+    now_ns = autopilot.memory.now_ns
+    for transfer in tuple(autopilot.memory.transfers.values()):
         if now_ns - transfer.time_ns > GIVE_UP_NS:
-            _end(pilot, transfer, plans.CANCELLED)
+            _end(autopilot, transfer, plans.CANCELLED)
         elif now_ns - transfer.asked_ns > RETRY_NS:
-            _ask(pilot, transfer)
+            _ask(autopilot, transfer)
 
 
-def _ask(pilot: Autopilot, transfer: MissionTransfer) -> None:
+def _ask(autopilot: Autopilot, transfer: MissionTransfer) -> None:
     link, system, component = transfer.source
-    transfer.asked_ns = pilot.memory.now_ns
+    transfer.asked_ns = autopilot.memory.now_ns
     request = dialect().MAVLink_mission_request_int_message
-    pilot.send(request(system, component, len(transfer.items), transfer.kind), link)
+    autopilot.send(request(system, component, len(transfer.items), transfer.kind), link)
 
 
-def _end(pilot: Autopilot, transfer: MissionTransfer, result: int) -> None:
-    pilot.memory.transfers.pop(transfer.kind, None)
-    _answer(pilot, transfer.source, result, transfer.kind)
+def _end(autopilot: Autopilot, transfer: MissionTransfer, result: int) -> None:
+    autopilot.memory.transfers.pop(transfer.kind, None)
+    _answer(autopilot, transfer.source, result, transfer.kind)
 
 
-def _take_over(pilot: Autopilot, transfer: MissionTransfer) -> None:
-    _replace(pilot, transfer.kind, transfer.items)
-    pilot.memory.last_items[transfer.kind] = (transfer.source, transfer.count - 1)
-    _end(pilot, transfer, plans.ACCEPTED)
+def _take_over(autopilot: Autopilot, transfer: MissionTransfer) -> None:
+    _replace(autopilot, transfer.kind, transfer.items)
+    autopilot.memory.last_items[transfer.kind] = (transfer.source, transfer.count - 1)
+    _end(autopilot, transfer, plans.ACCEPTED)
     if transfer.kind in (plans.MISSION, plans.FENCE):
-        feasibility.look(pilot)
+        feasibility.look(autopilot)
 
 
-def _replace(pilot: Autopilot, kind: int, items: list[plans.MissionItem]) -> None:
-    pilot.memory.plans[kind] = items
+def _replace(autopilot: Autopilot, kind: int, items: list[plans.MissionItem]) -> None:
+    autopilot.memory.plans[kind] = items
     if kind == plans.MISSION:
-        pilot.memory.mission = Mission()
-        pilot.memory.leg = None
+        autopilot.memory.mission = Mission()
+        autopilot.memory.leg = None
 
 
-def _answer(pilot: Autopilot, source: Source, result: int, kind: int) -> None:
+def _answer(autopilot: Autopilot, source: Source, result: int, kind: int) -> None:
     link, system, component = source
-    pilot.send(dialect().MAVLink_mission_ack_message(system, component, result, kind), link)
+    autopilot.send(dialect().MAVLink_mission_ack_message(system, component, result, kind), link)

@@ -14,33 +14,33 @@ _LEAST_OFFBOARD_HZ = 2.0
 """PX4 enters offboard only where setpoints come more often than that."""
 
 
-def missing(pilot: Autopilot, mode: Mode) -> str:
+def missing(autopilot: Autopilot, mode: Mode) -> str:
     """What of it is not there for a mode; empty where nothing is missing."""
-    if mode.by_sticks and not sticks_are_there(pilot):
+    if mode.by_sticks and not sticks_are_there(autopilot):
         return "no manual control input"
-    if mode is Mode.OFFBOARD and not offboard_is_fresh(pilot):
+    if mode is Mode.OFFBOARD and not offboard_is_fresh(autopilot):
         return "no offboard signal"
-    if mode is Mode.ORBIT and pilot.memory.orbit is None:
+    if mode is Mode.ORBIT and autopilot.memory.orbit is None:
         return "no orbit was asked for"
-    if mode is Mode.MISSION and not pilot.memory.plans[plans.MISSION]:
+    if mode is Mode.MISSION and not autopilot.memory.plans[plans.MISSION]:
         return "no valid mission"
     return ""
 
 
-def sticks_are_there(pilot: Autopilot) -> bool:
+def sticks_are_there(autopilot: Autopilot) -> bool:
     """Whether MANUAL_CONTROL has come within COM_RC_LOSS_T."""
-    age_ns = pilot.memory.now_ns - pilot.memory.sticks.time_ns
-    return age_ns <= float(pilot.parameter("COM_RC_LOSS_T")) * 1e9
+    age_ns = autopilot.memory.now_ns - autopilot.memory.sticks.time_ns
+    return age_ns <= float(autopilot.parameter("COM_RC_LOSS_T")) * 1e9
 
 
-def offboard_is_fresh(pilot: Autopilot) -> bool:
+def offboard_is_fresh(autopilot: Autopilot) -> bool:
     """Whether setpoints come often enough to fly by."""
-    offboard, now_ns = pilot.memory.offboard, pilot.memory.now_ns
+    offboard, now_ns = autopilot.memory.offboard, autopilot.memory.now_ns
     return offboard.setpoint is not None and now_ns - offboard.time_ns < 1e9 / _LEAST_OFFBOARD_HZ
 
 
-def ground_is_there(pilot: Autopilot) -> bool:
+def ground_is_there(autopilot: Autopilot) -> bool:
     """Whether a ground station's heartbeat has come within COM_DL_LOSS_T."""
-    heard_ns = pilot.memory.ground_heard_ns
-    limit_ns = int(pilot.parameter("COM_DL_LOSS_T")) * 1_000_000_000
-    return heard_ns >= 0 and pilot.memory.now_ns - heard_ns <= limit_ns
+    heard_ns = autopilot.memory.ground_heard_ns
+    limit_ns = int(autopilot.parameter("COM_DL_LOSS_T")) * 1_000_000_000
+    return heard_ns >= 0 and autopilot.memory.now_ns - heard_ns <= limit_ns

@@ -37,51 +37,53 @@ _PATIENCE_NS = 50_000_000
 """For this long an order may take to show."""
 
 
-def flies(pilot: Autopilot) -> bool:
+def flies(autopilot: Autopilot) -> bool:
     """Whether the UAV is off the ground, by whomever."""
-    return pilot.state.mode not in ("LANDED", "CRASHED")
+    return autopilot.state.mode not in ("LANDED", "CRASHED")
 
 
-def cruise(pilot: Autopilot) -> float:
+def cruise(autopilot: Autopilot) -> float:
     """m/s of ways to places: of the mission, of a command, of MPC_XY_CRUISE."""
-    memory = pilot.memory
+    memory = autopilot.memory
     asked = (memory.mission.speed if memory.mode is Mode.MISSION else math.nan, memory.cruise)
-    speed = next((s for s in asked if math.isfinite(s)), float(pilot.parameter("MPC_XY_CRUISE")))
-    return min(speed, float(pilot.parameter("MPC_XY_VEL_MAX")))
+    speed = next(
+        (s for s in asked if math.isfinite(s)), float(autopilot.parameter("MPC_XY_CRUISE"))
+    )
+    return min(speed, float(autopilot.parameter("MPC_XY_VEL_MAX")))
 
 
-def go_to(pilot: Autopilot, place: Vector, yaw: float | None) -> None:
+def go_to(autopilot: Autopilot, place: Vector, yaw: float | None) -> None:
     """Fly to a place at cruising speed."""
-    pilot.memory.leg = MissionLeg(place, yaw, cruise(pilot))
+    autopilot.memory.leg = MissionLeg(place, yaw, cruise(autopilot))
 
 
-def obstacle_to(pilot: Autopilot, mode: Mode) -> str:
+def obstacle_to(autopilot: Autopilot, mode: Mode) -> str:
     """Why a mode cannot be entered now; empty where it can."""
-    memory = pilot.memory
-    if pilot.state.crashed:
+    memory = autopilot.memory
+    if autopilot.state.crashed:
         return "the vehicle has crashed"
     if memory.fix_lost and mode not in (Mode.ALTITUDE, Mode.LAND):
         return "no valid position"
     if mode is Mode.MISSION:
-        return feasibility.obstacle(pilot)
-    return mode_requirements.missing(pilot, mode)
+        return feasibility.obstacle(autopilot)
+    return mode_requirements.missing(autopilot, mode)
 
 
-def ask_for(pilot: Autopilot, mode: Mode) -> str:
+def ask_for(autopilot: Autopilot, mode: Mode) -> str:
     """Enter a mode that somebody asks for; why not, empty where it is entered.
 
     A disarmed UAV may be in any: what is missing keeps it from being armed, as in PX4.
     """
-    why = obstacle_to(pilot, mode) if pilot.memory.armed else ""
+    why = obstacle_to(autopilot, mode) if autopilot.memory.armed else ""
     if not why:
-        pilot.memory.failsafe = False
-        enter(pilot, mode)
+        autopilot.memory.failsafe = False
+        enter(autopilot, mode)
     return why
 
 
-def enter(pilot: Autopilot, mode: Mode) -> None:
+def enter(autopilot: Autopilot, mode: Mode) -> None:
     """Fly in a mode from now on."""
-    memory = pilot.memory
+    memory = autopilot.memory
     changed = memory.mode is not mode
     memory.mode = mode
     memory.leg = memory.way_home = memory.target = None
@@ -90,73 +92,73 @@ def enter(pilot: Autopilot, mode: Mode) -> None:
         memory.followed = None
     if mode is not Mode.MISSION:
         memory.mission.entered = False
-    if memory.armed and flies(pilot):
+    if memory.armed and flies(autopilot):
         if mode is Mode.LAND:
-            order(pilot, "land", pilot.vehicle.land())
+            order(autopilot, "land", autopilot.vehicle.land())
         elif mode is Mode.TAKE_OFF:
-            rise(pilot)
+            rise(autopilot)
         elif mode is Mode.OFFBOARD:
             # It continues its motion until the next setpoint; a take-off first reaches the height
             # at which setpoints are flown.
-            order(pilot, "take_off" if pilot.state.mode == "TAKE_OFF" else "steer")
+            order(autopilot, "take_off" if autopilot.state.mode == "TAKE_OFF" else "steer")
         else:
-            order(pilot, "hold", pilot.vehicle.hold())
+            order(autopilot, "hold", autopilot.vehicle.hold())
     if changed:
-        pilot.announce()
+        autopilot.announce()
 
 
-def rise(pilot: Autopilot) -> None:
+def rise(autopilot: Autopilot) -> None:
     """Take off from the ground, or climb as high in the air."""
-    height = pilot.memory.take_off_height
+    height = autopilot.memory.take_off_height
     if not math.isfinite(height):
-        height = float(pilot.parameter("MIS_TAKEOFF_ALT"))
-    x, y, z = pilot.state.position
-    if not flies(pilot):
+        height = float(autopilot.parameter("MIS_TAKEOFF_ALT"))
+    x, y, z = autopilot.state.position
+    if not flies(autopilot):
         height = max(height, 0.1)
-        pilot.memory.take_off_height = math.nan
-        pilot.memory.take_off_goal = x, y, z + height
-        order(pilot, "take_off", pilot.vehicle.take_off(height))
+        autopilot.memory.take_off_height = math.nan
+        autopilot.memory.take_off_goal = x, y, z + height
+        order(autopilot, "take_off", autopilot.vehicle.take_off(height))
         return
-    ground = (pilot.memory.home or pilot.memory.origin)[2]
-    top = z + height if math.isfinite(pilot.memory.take_off_height) else max(z, ground + height)
-    pilot.memory.take_off_height = math.nan
-    go_to(pilot, (x, y, top), None)
+    ground = (autopilot.memory.home or autopilot.memory.origin)[2]
+    top = z + height if math.isfinite(autopilot.memory.take_off_height) else max(z, ground + height)
+    autopilot.memory.take_off_height = math.nan
+    go_to(autopilot, (x, y, top), None)
 
 
-def order(pilot: Autopilot, what: str, why_not: str = "") -> None:
+def order(autopilot: Autopilot, what: str, why_not: str = "") -> None:
     """Note what the UAV was told, and tell people where it did not take it."""
-    pilot.memory.order, pilot.memory.sinks = what, math.nan
-    pilot.memory.ordered_ns = pilot.memory.now_ns
+    autopilot.memory.order, autopilot.memory.sinks = what, math.nan
+    autopilot.memory.ordered_ns = autopilot.memory.now_ns
     if why_not:
-        pilot.memory.order = ""
-        pilot.say(4, why_not)
+        autopilot.memory.order = ""
+        autopilot.say(4, why_not)
 
 
-def follow_vehicle(pilot: Autopilot, state: FlightState) -> None:
+def follow_vehicle(autopilot: Autopilot, state: FlightState) -> None:
     """Notice take-offs, landings, crashes, and others who fly the UAV."""
-    memory = pilot.memory
+    memory = autopilot.memory
     if state.crashed:
         if memory.armed:
-            pilot.say(0, "Crash detected: motors stopped")
-            arming.finish(pilot, "Disarmed")
+            autopilot.say(0, "Crash detected: motors stopped")
+            arming.finish(autopilot, "Disarmed")
         return
     settled = memory.now_ns - memory.ordered_ns > _PATIENCE_NS
     if settled and state.mode not in _FOLLOWS.get(memory.order, {memory.order}):
-        _step_back(pilot, state)
+        _step_back(autopilot, state)
     if state.airborne and not memory.airborne and memory.armed:
         memory.airborne = True
-        pilot.say(6, "Takeoff detected")
+        autopilot.say(6, "Takeoff detected")
     if state.mode == "LANDED" and memory.airborne:
         memory.airborne, memory.landed_ns = False, memory.now_ns
-        pilot.say(6, "Landing detected")
+        autopilot.say(6, "Landing detected")
         memory.order, memory.leg = "", None
-    if memory.armed and state.mode == "LANDED" and not _begins(pilot):
-        _disarm_in_time(pilot)
+    if memory.armed and state.mode == "LANDED" and not _begins(autopilot):
+        _disarm_in_time(autopilot)
 
 
-def _step_back(pilot: Autopilot, state: FlightState) -> None:
+def _step_back(autopilot: Autopilot, state: FlightState) -> None:
     """Somebody else flies it: tell so, and keep the hands off."""
-    memory = pilot.memory
+    memory = autopilot.memory
     memory.order = state.mode if state.mode != "LANDED" else ""
     memory.leg = memory.way_home = None
     if state.mode == "LANDED":
@@ -167,19 +169,24 @@ def _step_back(pilot: Autopilot, state: FlightState) -> None:
     mode = _OUTSIDE.get(state.mode, Mode.HOLD)
     if mode is not memory.mode:
         memory.mode = mode
-    pilot.announce()
+    autopilot.announce()
 
 
-def _begins(pilot: Autopilot) -> bool:
+def _begins(autopilot: Autopilot) -> bool:
     """Whether a take-off is under way that has not left the ground."""
-    return pilot.memory.order == "take_off" and pilot.memory.now_ns - pilot.memory.ordered_ns < 1e9
+    return (
+        autopilot.memory.order == "take_off"
+        and autopilot.memory.now_ns - autopilot.memory.ordered_ns < 1e9
+    )
 
 
-def _disarm_in_time(pilot: Autopilot) -> None:
-    memory = pilot.memory
+def _disarm_in_time(autopilot: Autopilot) -> None:
+    memory = autopilot.memory
     flown = memory.landed_ns > memory.armed_ns
     name = "COM_DISARM_LAND" if flown else "COM_DISARM_PRFLT"
-    limit_s = float(pilot.parameter(name))
+    limit_s = float(autopilot.parameter(name))
     since_ns = memory.landed_ns if flown else memory.armed_ns
     if limit_s > 0.0 and memory.now_ns - since_ns >= limit_s * 1e9:
-        arming.finish(pilot, f"Disarmed by {'landing' if flown else 'auto preflight disarming'}")
+        arming.finish(
+            autopilot, f"Disarmed by {'landing' if flown else 'auto preflight disarming'}"
+        )

@@ -21,19 +21,19 @@ _LOCAL_NED, _BY_AUTOPILOT = 1, 8
 """MAV_FRAME, MAV_ESTIMATOR_TYPE."""
 
 
-def ms(pilot: Autopilot) -> int:
+def ms(autopilot: Autopilot) -> int:
     """Milliseconds since the start."""
-    return pilot.memory.now_ns // 1_000_000 & 0xFFFFFFFF
+    return autopilot.memory.now_ns // 1_000_000 & 0xFFFFFFFF
 
 
-def us(pilot: Autopilot) -> int:
+def us(autopilot: Autopilot) -> int:
     """Microseconds since the start."""
-    return pilot.memory.now_ns // 1_000
+    return autopilot.memory.now_ns // 1_000
 
 
-def local_motion(pilot: Autopilot) -> tuple[Vector, Vector]:
+def local_motion(autopilot: Autopilot) -> tuple[Vector, Vector]:
     """Place from the local origin and velocity, NED."""
-    state, origin = pilot.state, pilot.memory.origin
+    state, origin = autopilot.state, autopilot.memory.origin
     x, y, z = (here - there for here, there in zip(state.position, origin, strict=True))
     return ned_of_enu((x, y, z)), ned_of_enu(state.velocity)
 
@@ -58,21 +58,21 @@ def clipped(value: float, bits: int) -> int:
     return max(-limit, min(limit, round(value)))
 
 
-def _heading_cdeg(pilot: Autopilot) -> int:
-    degrees = 90.0 - math.degrees(pilot.yaw)
+def _heading_cdeg(autopilot: Autopilot) -> int:
+    degrees = 90.0 - math.degrees(autopilot.yaw)
     return round(degrees % 360.0 * 100.0) % 36000
 
 
-def gps_raw_int(pilot: Autopilot) -> Any:
+def gps_raw_int(autopilot: Autopilot) -> Any:
     """As the estimate has it; of a UAV that has lost its fix: none."""
-    place = degrees_e7(pilot.geodetic())
-    north, east, _ = ned_of_enu(pilot.state.velocity)
+    place = degrees_e7(autopilot.geodetic())
+    north, east, _ = ned_of_enu(autopilot.state.velocity)
     speed = math.hypot(north, east)
     course = round(math.degrees(math.atan2(east, north)) % 360.0 * 100.0) % 36000
-    lost = pilot.memory.now_ns - pilot.memory.fix_ns > 1_000_000_000
+    lost = autopilot.memory.now_ns - autopilot.memory.fix_ns > 1_000_000_000
     fix, satellites = (1, 0) if lost else (3, 10)
     return dialect().MAVLink_gps_raw_int_message(
-        us(pilot),
+        us(autopilot),
         fix,
         *place,
         65535 if lost else 80,
@@ -84,40 +84,42 @@ def gps_raw_int(pilot: Autopilot) -> Any:
     )
 
 
-def attitude(pilot: Autopilot) -> Any:
+def attitude(autopilot: Autopilot) -> Any:
     """ATTITUDE."""
-    angles = _roll_pitch_yaw(q_ned_frd_of_enu_flu(pilot.state.attitude))
-    return dialect().MAVLink_attitude_message(ms(pilot), *angles, *frd_of_flu(pilot.state.rates))
+    angles = _roll_pitch_yaw(q_ned_frd_of_enu_flu(autopilot.state.attitude))
+    return dialect().MAVLink_attitude_message(
+        ms(autopilot), *angles, *frd_of_flu(autopilot.state.rates)
+    )
 
 
-def attitude_quaternion(pilot: Autopilot) -> Any:
+def attitude_quaternion(autopilot: Autopilot) -> Any:
     """ATTITUDE_QUATERNION."""
-    x, y, z, w = q_ned_frd_of_enu_flu(pilot.state.attitude)
+    x, y, z, w = q_ned_frd_of_enu_flu(autopilot.state.attitude)
     sign = -1.0 if w < 0.0 else 1.0
     turned = (sign * w, sign * x, sign * y, sign * z)
-    rates = frd_of_flu(pilot.state.rates)
-    return dialect().MAVLink_attitude_quaternion_message(ms(pilot), *turned, *rates)
+    rates = frd_of_flu(autopilot.state.rates)
+    return dialect().MAVLink_attitude_quaternion_message(ms(autopilot), *turned, *rates)
 
 
-def local_position(pilot: Autopilot) -> Any:
+def local_position(autopilot: Autopilot) -> Any:
     """LOCAL_POSITION_NED, from where the vehicle stood at the start."""
-    place, velocity = local_motion(pilot)
-    return dialect().MAVLink_local_position_ned_message(ms(pilot), *place, *velocity)
+    place, velocity = local_motion(autopilot)
+    return dialect().MAVLink_local_position_ned_message(ms(autopilot), *place, *velocity)
 
 
-def odometry(pilot: Autopilot) -> Any:
+def odometry(autopilot: Autopilot) -> Any:
     """ODOMETRY in the local frame, velocities too, as PX4 sends it; covariances are not known."""
-    place, velocity = local_motion(pilot)
-    x, y, z, w = q_ned_frd_of_enu_flu(pilot.state.attitude)
+    place, velocity = local_motion(autopilot)
+    x, y, z, w = q_ned_frd_of_enu_flu(autopilot.state.attitude)
     unknown = [math.nan] + [0.0] * 20
     return dialect().MAVLink_odometry_message(
-        us(pilot),
+        us(autopilot),
         _LOCAL_NED,
         _LOCAL_NED,
         *place,
         [w, x, y, z],
         *velocity,
-        *frd_of_flu(pilot.state.rates),
+        *frd_of_flu(autopilot.state.rates),
         unknown,
         unknown,
         0,
@@ -125,28 +127,28 @@ def odometry(pilot: Autopilot) -> Any:
     )
 
 
-def global_position(pilot: Autopilot) -> Any:
+def global_position(autopilot: Autopilot) -> Any:
     """GLOBAL_POSITION_INT."""
-    state = pilot.state
-    home = pilot.memory.home or pilot.memory.origin
+    state = autopilot.state
+    home = autopilot.memory.home or autopilot.memory.origin
     velocity = (clipped(part * 100.0, 16) for part in ned_of_enu(state.velocity))
     return dialect().MAVLink_global_position_int_message(
-        ms(pilot),
-        *degrees_e7(pilot.geodetic()),
+        ms(autopilot),
+        *degrees_e7(autopilot.geodetic()),
         round((state.position[2] - home[2]) * 1e3),
         *velocity,
-        _heading_cdeg(pilot),
+        _heading_cdeg(autopilot),
     )
 
 
-def highres_imu(pilot: Autopilot) -> Any:
+def highres_imu(autopilot: Autopilot) -> Any:
     """Specific force and rates as the controllers feel them, pressure of the standard air."""
-    state = pilot.state
-    altitude = state.position[2] + pilot.build.origin[2]
+    state = autopilot.state
+    altitude = state.position[2] + autopilot.build.origin[2]
     force = specific_force(state)
     mbar = float(pressure(altitude)) / 100.0
     return dialect().MAVLink_highres_imu_message(
-        us(pilot),
+        us(autopilot),
         *frd_of_flu(force),
         *frd_of_flu(state.rates),
         *(math.nan,) * 3,
@@ -171,81 +173,81 @@ def specific_force(state: FlightState) -> Vector:
     )
 
 
-def scaled_pressure(pilot: Autopilot) -> Any:
+def scaled_pressure(autopilot: Autopilot) -> Any:
     """SCALED_PRESSURE of the barometer; None where there is none."""
-    memory = pilot.memory
+    memory = autopilot.memory
     if not math.isfinite(memory.pressure):
         return None
     warmth = memory.air_temperature if math.isfinite(memory.air_temperature) else 0.0
     return dialect().MAVLink_scaled_pressure_message(
-        ms(pilot), memory.pressure / 100.0, 0.0, clipped(warmth * 100.0, 16)
+        ms(autopilot), memory.pressure / 100.0, 0.0, clipped(warmth * 100.0, 16)
     )
 
 
-def vfr_hud(pilot: Autopilot) -> Any:
+def vfr_hud(autopilot: Autopilot) -> Any:
     """VFR_HUD."""
-    state = pilot.state
+    state = autopilot.state
     speed = math.hypot(*state.velocity[:2])
     throttle = round(100.0 * sum(state.rotors) / max(len(state.rotors), 1))
-    altitude = state.position[2] + pilot.build.origin[2]
+    altitude = state.position[2] + autopilot.build.origin[2]
     return dialect().MAVLink_vfr_hud_message(
-        speed, speed, _heading_cdeg(pilot) // 100, throttle, altitude, state.velocity[2]
+        speed, speed, _heading_cdeg(autopilot) // 100, throttle, altitude, state.velocity[2]
     )
 
 
-def altitude(pilot: Autopilot) -> Any:
+def altitude(autopilot: Autopilot) -> Any:
     """ALTITUDE."""
-    z = pilot.state.position[2]
-    home = pilot.memory.home or pilot.memory.origin
-    amsl = z + pilot.build.origin[2]
-    local = z - pilot.memory.origin[2]
+    z = autopilot.state.position[2]
+    home = autopilot.memory.home or autopilot.memory.origin
+    amsl = z + autopilot.build.origin[2]
+    local = z - autopilot.memory.origin[2]
     return dialect().MAVLink_altitude_message(
-        us(pilot), amsl, amsl, local, z - home[2], math.nan, math.nan
+        us(autopilot), amsl, amsl, local, z - home[2], math.nan, math.nan
     )
 
 
-def target_motion(pilot: Autopilot) -> list[float] | None:
+def target_motion(autopilot: Autopilot) -> list[float] | None:
     """Position from the local origin, velocity and acceleration (NED), yaw and yaw rate aimed at.
 
     nan where something is left open; None where no motion is aimed at.
     """
-    target = pilot.memory.target
+    target = autopilot.memory.target
     if target is None or target.attitude is not None or target.rates is not None:
         return None
-    origin = pilot.memory.origin
+    origin = autopilot.memory.origin
     x, y, z = (part - start for part, start in zip(target.position, origin, strict=True))
     vectors = (ned_of_enu((x, y, z)), ned_of_enu(target.velocity), ned_of_enu(target.acceleration))
     parts = [part for vector in vectors for part in vector]
     return [*parts, 0.5 * math.pi - target.yaw, -target.yaw_rate]
 
 
-def position_target(pilot: Autopilot) -> Any:
+def position_target(autopilot: Autopilot) -> Any:
     """POSITION_TARGET_LOCAL_NED; None where nothing is aimed at."""
-    parts = target_motion(pilot)
+    parts = target_motion(autopilot)
     if parts is None:
         return None
     bits = (1, 2, 4, 8, 16, 32, 64, 128, 256, 1024, 2048)
     mask = sum(bit for bit, part in zip(bits, parts, strict=True) if not math.isfinite(part))
-    return dialect().MAVLink_position_target_local_ned_message(ms(pilot), 1, mask, *parts)
+    return dialect().MAVLink_position_target_local_ned_message(ms(autopilot), 1, mask, *parts)
 
 
-def attitude_target(pilot: Autopilot) -> Any:
+def attitude_target(autopilot: Autopilot) -> Any:
     """ATTITUDE_TARGET; None where no attitude is wanted."""
-    target = pilot.memory.target
+    target = autopilot.memory.target
     if target is None or (target.attitude is None and target.rates is None):
         return None
     x, y, z, w = q_ned_frd_of_enu_flu(target.attitude or (0.0, 0.0, 0.0, 1.0))
     mask = 7 if target.attitude is not None else 128
     rates = frd_of_flu(target.rates or (0.0, 0.0, 0.0))
     return dialect().MAVLink_attitude_target_message(
-        ms(pilot), mask, [w, x, y, z], *rates, target.thrust
+        ms(autopilot), mask, [w, x, y, z], *rates, target.thrust
     )
 
 
-def servo_output(pilot: Autopilot) -> Any:
+def servo_output(autopilot: Autopilot) -> Any:
     """SERVO_OUTPUT_RAW: shares of full speed as pulses of 1000 to 2000 us."""
-    pulses = [round(1000.0 + 1000.0 * min(share, 1.0)) for share in pilot.state.rotors]
+    pulses = [round(1000.0 + 1000.0 * min(share, 1.0)) for share in autopilot.state.rotors]
     pulses = (pulses + [0] * 16)[:16]
     return dialect().MAVLink_servo_output_raw_message(
-        us(pilot) & 0xFFFFFFFF, 0, *pulses[:8], *pulses[8:]
+        us(autopilot) & 0xFFFFFFFF, 0, *pulses[:8], *pulses[8:]
     )

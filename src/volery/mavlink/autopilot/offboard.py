@@ -34,95 +34,97 @@ _LIFTED_M = 0.3
 _ABOVE_HOME = (3, 6, 10, 11)
 
 
-def take_local(pilot: Autopilot, source: Source, message: Any) -> None:
+def take_local(autopilot: Autopilot, source: Source, message: Any) -> None:
     """Hear a SET_POSITION_TARGET_LOCAL_NED."""
-    take(pilot, source, local_setpoint(message, pilot.memory.origin))
+    take(autopilot, source, local_setpoint(message, autopilot.memory.origin))
 
 
-def take_global(pilot: Autopilot, source: Source, message: Any) -> None:
+def take_global(autopilot: Autopilot, source: Source, message: Any) -> None:
     """Hear a SET_POSITION_TARGET_GLOBAL_INT."""
-    x, y, _ = pilot.earth.place(message.lat_int * 1e-7, message.lon_int * 1e-7, 0.0)
+    x, y, _ = autopilot.earth.place(message.lat_int * 1e-7, message.lon_int * 1e-7, 0.0)
     above = message.coordinate_frame in _ABOVE_HOME
-    home = pilot.memory.home or pilot.memory.origin
-    z = message.alt + (home[2] if above else -pilot.build.origin[2])
-    take(pilot, source, global_setpoint(message, (x, y, z)))
+    home = autopilot.memory.home or autopilot.memory.origin
+    z = message.alt + (home[2] if above else -autopilot.build.origin[2])
+    take(autopilot, source, global_setpoint(message, (x, y, z)))
 
 
-def take_attitude(pilot: Autopilot, source: Source, message: Any) -> None:
+def take_attitude(autopilot: Autopilot, source: Source, message: Any) -> None:
     """Hear a SET_ATTITUDE_TARGET."""
-    take(pilot, source, attitude_setpoint(message))
+    take(autopilot, source, attitude_setpoint(message))
 
 
-def take(pilot: Autopilot, source: Source, setpoint: OffboardSetpoint) -> None:
+def take(autopilot: Autopilot, source: Source, setpoint: OffboardSetpoint) -> None:
     """Hear a setpoint; in offboard mode it is flown at once."""
-    memory = pilot.memory
+    memory = autopilot.memory
     offboard, now_ns = memory.offboard, memory.now_ns
     if source != offboard.source:
-        if offboard.source is not None and not _is_lost(pilot):
+        if offboard.source is not None and not _is_lost(autopilot):
             if source not in offboard.refused:
                 offboard.refused.add(source)
-                pilot.say(4, f"Setpoints of {source[1]}/{source[2]} ignored: another one flies")
+                autopilot.say(4, f"Setpoints of {source[1]}/{source[2]} ignored: another one flies")
             return
         offboard.source = source
         offboard.refused.clear()
     offboard.setpoint, offboard.time_ns = setpoint, now_ns
     if memory.mode is Mode.OFFBOARD and memory.armed and memory.state is not None:
-        _fly(pilot, memory.state, setpoint, fresh=True)
+        _fly(autopilot, memory.state, setpoint, fresh=True)
 
 
-def _is_lost(pilot: Autopilot) -> bool:
-    limit_ns = float(pilot.parameter("COM_OF_LOSS_T")) * 1e9
-    return pilot.memory.now_ns - pilot.memory.offboard.time_ns > limit_ns
+def _is_lost(autopilot: Autopilot) -> bool:
+    limit_ns = float(autopilot.parameter("COM_OF_LOSS_T")) * 1e9
+    return autopilot.memory.now_ns - autopilot.memory.offboard.time_ns > limit_ns
 
 
-def fly(pilot: Autopilot, state: FlightState) -> None:
+def fly(autopilot: Autopilot, state: FlightState) -> None:
     """Go on with the newest setpoint; act where none comes any more."""
     from volery.mavlink.autopilot.failsafes import act
 
-    setpoint = pilot.memory.offboard.setpoint
-    if _is_lost(pilot) or setpoint is None:
-        action = int(pilot.parameter("COM_OBL_RC_ACT"))
-        pilot.say(2, "Failsafe: offboard control lost")
-        act(pilot, {3: Mode.RETURN, 4: Mode.LAND}.get(action, Mode.HOLD))
+    setpoint = autopilot.memory.offboard.setpoint
+    if _is_lost(autopilot) or setpoint is None:
+        action = int(autopilot.parameter("COM_OBL_RC_ACT"))
+        autopilot.say(2, "Failsafe: offboard control lost")
+        act(autopilot, {3: Mode.RETURN, 4: Mode.LAND}.get(action, Mode.HOLD))
         return
-    _fly(pilot, state, setpoint, fresh=False)
+    _fly(autopilot, state, setpoint, fresh=False)
 
 
-def _fly(pilot: Autopilot, state: FlightState, setpoint: OffboardSetpoint, *, fresh: bool) -> None:
-    memory = pilot.memory
+def _fly(
+    autopilot: Autopilot, state: FlightState, setpoint: OffboardSetpoint, *, fresh: bool
+) -> None:
+    memory = autopilot.memory
     memory.target = setpoint
     if setpoint.attitude is not None or setpoint.rates is not None:
-        _hold_attitude(pilot, setpoint, fresh=fresh)
+        _hold_attitude(autopilot, setpoint, fresh=fresh)
         return
-    if not _is_up(pilot, state, setpoint):
+    if not _is_up(autopilot, state, setpoint):
         return
     if _is_place(setpoint):
-        _go(pilot, setpoint, fresh=fresh)
+        _go(autopilot, setpoint, fresh=fresh)
     elif _finite(setpoint.position) and _finite(setpoint.velocity):
-        _track(pilot, state, setpoint, fresh=fresh)
+        _track(autopilot, state, setpoint, fresh=fresh)
     elif _finite(setpoint.acceleration) and not any(map(math.isfinite, setpoint.velocity)):
-        _push(pilot, setpoint, fresh=fresh)
+        _push(autopilot, setpoint, fresh=fresh)
     else:
-        _steer(pilot, state, setpoint, fresh=fresh)
+        _steer(autopilot, state, setpoint, fresh=fresh)
 
 
-def _hold_attitude(pilot: Autopilot, setpoint: OffboardSetpoint, *, fresh: bool) -> None:
-    if not fresh and pilot.memory.order in ("tilt", "spin"):
+def _hold_attitude(autopilot: Autopilot, setpoint: OffboardSetpoint, *, fresh: bool) -> None:
+    if not fresh and autopilot.memory.order in ("tilt", "spin"):
         return
     if setpoint.attitude is not None:
-        pilot.vehicle.tilt(setpoint.attitude, setpoint.thrust)
-        mode_transitions.order(pilot, "tilt")
+        autopilot.vehicle.tilt(setpoint.attitude, setpoint.thrust)
+        mode_transitions.order(autopilot, "tilt")
     elif setpoint.rates is not None:
-        pilot.vehicle.spin(setpoint.rates, setpoint.thrust)
-        mode_transitions.order(pilot, "spin")
+        autopilot.vehicle.spin(setpoint.rates, setpoint.thrust)
+        mode_transitions.order(autopilot, "spin")
 
 
-def _is_up(pilot: Autopilot, state: FlightState, setpoint: OffboardSetpoint) -> bool:
+def _is_up(autopilot: Autopilot, state: FlightState, setpoint: OffboardSetpoint) -> bool:
     """Whether it is high enough to follow setpoints; from the ground it starts for those upwards.
 
     Attitudes need no start: their thrust decides.
     """
-    memory = pilot.memory
+    memory = autopilot.memory
     if state.mode == "LANDED":
         upwards = (
             setpoint.position[2] > state.position[2] + 0.2
@@ -130,13 +132,15 @@ def _is_up(pilot: Autopilot, state: FlightState, setpoint: OffboardSetpoint) -> 
             or setpoint.acceleration[2] > 0.1
         )
         if upwards and memory.order != "take_off":
-            mode_transitions.order(pilot, "take_off", pilot.vehicle.take_off(2.0 * _LIFTED_M))
+            mode_transitions.order(
+                autopilot, "take_off", autopilot.vehicle.take_off(2.0 * _LIFTED_M)
+            )
         return False
     if memory.order == "take_off":
         ground = (memory.home or memory.origin)[2]
         if state.mode == "TAKE_OFF" and state.position[2] < ground + _LIFTED_M:
             return False
-        mode_transitions.order(pilot, "hold", pilot.vehicle.hold())
+        mode_transitions.order(autopilot, "hold", autopilot.vehicle.hold())
     return True
 
 
@@ -145,60 +149,62 @@ def _is_place(setpoint: OffboardSetpoint) -> bool:
     return _finite(setpoint.position) and not moves and not math.isfinite(setpoint.yaw_rate)
 
 
-def _go(pilot: Autopilot, setpoint: OffboardSetpoint, *, fresh: bool) -> None:
-    leg = pilot.memory.leg
+def _go(autopilot: Autopilot, setpoint: OffboardSetpoint, *, fresh: bool) -> None:
+    leg = autopilot.memory.leg
     yaw = setpoint.yaw if math.isfinite(setpoint.yaw) else None
     same = leg is not None and (leg.target, leg.yaw) == (setpoint.position, yaw)
-    if same and pilot.memory.order == "go_to":
+    if same and autopilot.memory.order == "go_to":
         return
     if fresh or not same:
         from volery.mavlink.autopilot.state import MissionLeg
 
-        pilot.memory.leg = MissionLeg(setpoint.position, yaw, 0.0, locked=True)
-        mode_transitions.order(pilot, "go_to", pilot.vehicle.go_to(setpoint.position, yaw))
+        autopilot.memory.leg = MissionLeg(setpoint.position, yaw, 0.0, locked=True)
+        mode_transitions.order(autopilot, "go_to", autopilot.vehicle.go_to(setpoint.position, yaw))
 
 
 def _track(
-    pilot: Autopilot, state: FlightState, setpoint: OffboardSetpoint, *, fresh: bool
+    autopilot: Autopilot, state: FlightState, setpoint: OffboardSetpoint, *, fresh: bool
 ) -> None:
     if math.dist(setpoint.position, state.position) > _TRACKED_M:
-        _steer(pilot, state, setpoint, fresh=fresh)
+        _steer(autopilot, state, setpoint, fresh=fresh)
     elif fresh:
         push = setpoint.acceleration if _finite(setpoint.acceleration) else (0.0, 0.0, 0.0)
-        pilot.vehicle.follow(setpoint.position, setpoint.velocity, push, *_turn(setpoint))
-        mode_transitions.order(pilot, "follow")
+        autopilot.vehicle.follow(setpoint.position, setpoint.velocity, push, *_turn(setpoint))
+        mode_transitions.order(autopilot, "follow")
 
 
-def _push(pilot: Autopilot, setpoint: OffboardSetpoint, *, fresh: bool) -> None:
-    if fresh or pilot.memory.order != "push":
+def _push(autopilot: Autopilot, setpoint: OffboardSetpoint, *, fresh: bool) -> None:
+    if fresh or autopilot.memory.order != "push":
         push = (
-            _turned(pilot, setpoint.acceleration) if setpoint.in_heading else setpoint.acceleration
+            _turned(autopilot, setpoint.acceleration)
+            if setpoint.in_heading
+            else setpoint.acceleration
         )
-        pilot.vehicle.push(push, *_turn(setpoint))
-        mode_transitions.order(pilot, "push")
+        autopilot.vehicle.push(push, *_turn(setpoint))
+        mode_transitions.order(autopilot, "push")
 
 
 def _steer(
-    pilot: Autopilot, state: FlightState, setpoint: OffboardSetpoint, *, fresh: bool
+    autopilot: Autopilot, state: FlightState, setpoint: OffboardSetpoint, *, fresh: bool
 ) -> None:
     """Fly velocities; axes that have a place are drawn to it."""
-    age_ns = pilot.memory.now_ns - pilot.memory.ordered_ns
+    age_ns = autopilot.memory.now_ns - autopilot.memory.ordered_ns
     placed = any(map(math.isfinite, setpoint.position)) or setpoint.in_heading
     if not fresh and age_ns < (_FEEDBACK_NS if placed else _REFRESH_NS):
         return
     x, y, z = (v if math.isfinite(v) else 0.0 for v in setpoint.velocity)
     if setpoint.in_heading:
-        x, y, z = _turned(pilot, (x, y, z))
+        x, y, z = _turned(autopilot, (x, y, z))
     x, y, z = (
         v + (_GAIN * (goal - here) if math.isfinite(goal) else 0.0)
         for v, goal, here in zip((x, y, z), setpoint.position, state.position, strict=True)
     )
-    size, most = math.hypot(x, y), float(pilot.parameter("MPC_XY_VEL_MAX"))
+    size, most = math.hypot(x, y), float(autopilot.parameter("MPC_XY_VEL_MAX"))
     if size > most:
         x, y = x * most / size, y * most / size
-    up, down = (float(pilot.parameter(f"MPC_Z_VEL_MAX_{way}")) for way in ("UP", "DN"))
-    pilot.vehicle.steer((x, y, min(max(z, -down), up)), *_turn(setpoint))
-    mode_transitions.order(pilot, "steer")
+    up, down = (float(autopilot.parameter(f"MPC_Z_VEL_MAX_{way}")) for way in ("UP", "DN"))
+    autopilot.vehicle.steer((x, y, min(max(z, -down), up)), *_turn(setpoint))
+    mode_transitions.order(autopilot, "steer")
 
 
 def _turn(setpoint: OffboardSetpoint) -> tuple[float | None, float]:
@@ -206,10 +212,10 @@ def _turn(setpoint: OffboardSetpoint) -> tuple[float | None, float]:
     return (setpoint.yaw if math.isfinite(setpoint.yaw) else None), rate
 
 
-def _turned(pilot: Autopilot, vector: Vector) -> Vector:
+def _turned(autopilot: Autopilot, vector: Vector) -> Vector:
     """From the level heading frame to the map; what is nan counts as nothing."""
     x, y, z = (part if math.isfinite(part) else 0.0 for part in vector)
-    c, s = math.cos(pilot.yaw), math.sin(pilot.yaw)
+    c, s = math.cos(autopilot.yaw), math.sin(autopilot.yaw)
     return c * x - s * y, s * x + c * y, z
 
 

@@ -36,7 +36,7 @@ _ON_CIRCLE_M = 0.5
 _PERIOD_NS = 20_000_000
 
 
-def prepare(pilot: Autopilot, _source: Source, command: Command, height: float) -> int:
+def prepare(autopilot: Autopilot, _source: Source, command: Command, height: float) -> int:
     """Returns the result of DO_ORBIT, whose altitude is `height` in the map (nan: as it is)."""
     if any(math.isinf(param) for param in command.params):
         return DENIED
@@ -44,14 +44,14 @@ def prepare(pilot: Autopilot, _source: Source, command: Command, height: float) 
     placed = math.isfinite(latitude) and math.isfinite(longitude)
     if placed and not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
         return DENIED
-    if not (pilot.memory.armed and mode_transitions.flies(pilot)):
+    if not (autopilot.memory.armed and mode_transitions.flies(autopilot)):
         return TEMPORARILY_REJECTED
-    before = pilot.memory.orbit if pilot.memory.mode is Mode.ORBIT else None
-    x, y, z = before.center if before else pilot.state.position
+    before = autopilot.memory.orbit if autopilot.memory.mode is Mode.ORBIT else None
+    x, y, z = before.center if before else autopilot.state.position
     if placed:
-        x, y, _ = pilot.earth.place(latitude, longitude, pilot.build.origin[2])
-    pilot.memory.orbit = _orbit(
-        command.params, before, (x, y, height if math.isfinite(height) else z), pilot.yaw
+        x, y, _ = autopilot.earth.place(latitude, longitude, autopilot.build.origin[2])
+    autopilot.memory.orbit = _orbit(
+        command.params, before, (x, y, height if math.isfinite(height) else z), autopilot.yaw
     )
     return ACCEPTED
 
@@ -72,57 +72,59 @@ def _orbit(params: tuple[float, ...], before: Orbit | None, center: Vector, yaw:
     return Orbit(center, radius if clockwise else -radius, speed, facing, yaw)
 
 
-def fly(pilot: Autopilot, state: FlightState) -> None:
+def fly(autopilot: Autopilot, state: FlightState) -> None:
     """Flies to the nearest point of the circle, then along it."""
-    memory, orbit = pilot.memory, pilot.memory.orbit
+    memory, orbit = autopilot.memory, autopilot.memory.orbit
     if orbit is None or state.mode == "LANDED":
         return
     x, y, z = (here - there for here, there in zip(state.position, orbit.center, strict=True))
     away = math.hypot(x, y)
     if away < 1e-3:
-        x, y, away = math.cos(pilot.yaw), math.sin(pilot.yaw), 1.0
+        x, y, away = math.cos(autopilot.yaw), math.sin(autopilot.yaw), 1.0
         outside = -abs(orbit.radius)
     else:
         outside = away - abs(orbit.radius)
     outward = x / away, y / away
     if orbit.approaches:
-        orbit.approaches = not _approach(pilot, orbit, outward, abs(outside) + abs(z))
+        orbit.approaches = not _approach(autopilot, orbit, outward, abs(outside) + abs(z))
         return
     if memory.now_ns - memory.ordered_ns < _PERIOD_NS and memory.order == "steer":
         return
     turning = math.copysign(1.0, orbit.radius) * orbit.speed
     along = outward[1] * turning, -outward[0] * turning
     back = _GAIN * outside
-    climb = math.copysign(_climb(pilot, z), -z)
+    climb = math.copysign(_climb(autopilot, z), -z)
     yaw, rate = _facing(orbit, outward, turning)
     velocity = along[0] - back * outward[0], along[1] - back * outward[1], climb
     memory.target = OffboardSetpoint(velocity=velocity, yaw=math.nan if yaw is None else yaw)
-    pilot.vehicle.steer(velocity, yaw, rate)
-    mode_transitions.order(pilot, "steer")
+    autopilot.vehicle.steer(velocity, yaw, rate)
+    mode_transitions.order(autopilot, "steer")
 
 
-def status(pilot: Autopilot) -> Any:
+def status(autopilot: Autopilot) -> Any:
     """Returns ORBIT_EXECUTION_STATUS; None while it does not orbit."""
-    orbit = pilot.memory.orbit
-    if orbit is None or pilot.memory.mode is not Mode.ORBIT:
+    orbit = autopilot.memory.orbit
+    if orbit is None or autopilot.memory.mode is not Mode.ORBIT:
         return None
-    latitude, longitude, _ = degrees_e7(pilot.earth.geodetic(orbit.center))
-    altitude = orbit.center[2] + pilot.build.origin[2]
+    latitude, longitude, _ = degrees_e7(autopilot.earth.geodetic(orbit.center))
+    altitude = orbit.center[2] + autopilot.build.origin[2]
     built = dialect().MAVLink_orbit_execution_status_message
-    return built(us(pilot), orbit.radius, 0, latitude, longitude, altitude)
+    return built(us(autopilot), orbit.radius, 0, latitude, longitude, altitude)
 
 
-def _approach(pilot: Autopilot, orbit: Orbit, outward: tuple[float, float], off_m: float) -> bool:
+def _approach(
+    autopilot: Autopilot, orbit: Orbit, outward: tuple[float, float], off_m: float
+) -> bool:
     """Returns whether the circle is reached."""
-    if pilot.memory.leg is None:
+    if autopilot.memory.leg is None:
         x, y, z = orbit.center
         size = abs(orbit.radius)
         target = x + size * outward[0], y + size * outward[1], z
         yaw, _ = _facing(orbit, outward, 0.0)
-        pilot.memory.leg = MissionLeg(target, yaw, mode_transitions.cruise(pilot))
-    if off_m > _ON_CIRCLE_M and not fly_leg(pilot, pilot.memory.leg):
+        autopilot.memory.leg = MissionLeg(target, yaw, mode_transitions.cruise(autopilot))
+    if off_m > _ON_CIRCLE_M and not fly_leg(autopilot, autopilot.memory.leg):
         return False
-    pilot.memory.leg = None
+    autopilot.memory.leg = None
     return True
 
 
@@ -140,8 +142,8 @@ def _facing(
     return math.atan2(-outward[1], -outward[0]), rate
 
 
-def _climb(pilot: Autopilot, above: float) -> float:
+def _climb(autopilot: Autopilot, above: float) -> float:
     """Returns the speed of the way back to the height, m/s."""
     way = "DN" if above > 0.0 else "UP"
-    limit = float(pilot.parameter(f"MPC_Z_V_AUTO_{way}"))
-    return min(limit, approach_speed(abs(above), 0.5 * float(pilot.parameter("MPC_ACC_HOR"))))
+    limit = float(autopilot.parameter(f"MPC_Z_V_AUTO_{way}"))
+    return min(limit, approach_speed(abs(above), 0.5 * float(autopilot.parameter("MPC_ACC_HOR"))))

@@ -21,53 +21,53 @@ RETIRED = {410: 242, 519: 300, 520: 148}
 """MAV_CMD that MAV_CMD_REQUEST_MESSAGE replaced, and the message that each asked for."""
 
 
-def set_interval(pilot: Autopilot, source: Source, command: Command) -> int:
+def set_interval(autopilot: Autopilot, source: Source, command: Command) -> int:
     """SET_MESSAGE_INTERVAL; what is sent only to others, or in parts, is not there."""
     number, period_us, third, fourth, _, _, target = command.params
     if not (math.isfinite(number) and math.isfinite(period_us)):
         return _DENIED
     if any(math.isfinite(unused) and round(unused) for unused in (third, fourth, target)):
         return _FAILED
-    link = pilot.memory.links[source[0]]
-    return _ACCEPTED if streams.ask_for(pilot, link, round(number), period_us) else _FAILED
+    link = autopilot.memory.links[source[0]]
+    return _ACCEPTED if streams.ask_for(autopilot, link, round(number), period_us) else _FAILED
 
 
-def get_interval(pilot: Autopilot, source: Source, command: Command) -> int:
+def get_interval(autopilot: Autopilot, source: Source, command: Command) -> int:
     """GET_MESSAGE_INTERVAL: answered by a MESSAGE_INTERVAL; -1 of what is not sent."""
-    return _tell_interval(pilot, source, command.params[0])
+    return _tell_interval(autopilot, source, command.params[0])
 
 
-def send(pilot: Autopilot, source: Source, command: Command) -> int:
+def send(autopilot: Autopilot, source: Source, command: Command) -> int:
     """REQUEST_MESSAGE."""
     number, what = command.params[:2]
     if not math.isfinite(number):
         return _DENIED
     if round(number) == telemetry.MESSAGE_INTERVAL:
-        return _tell_interval(pilot, source, what)
+        return _tell_interval(autopilot, source, what)
     if round(number) == dialect_extensions.AvailableModes.id:
-        return _send(pilot, source, dialect_extensions.available_modes(what))
-    return _send_built(pilot, source, round(number))
+        return _send(autopilot, source, dialect_extensions.available_modes(what))
+    return _send_built(autopilot, source, round(number))
 
 
-def send_as_of_old(pilot: Autopilot, source: Source, command: Command) -> int:
+def send_as_of_old(autopilot: Autopilot, source: Source, command: Command) -> int:
     """The commands for a message each."""
-    return _send_built(pilot, source, RETIRED[command.number])
+    return _send_built(autopilot, source, RETIRED[command.number])
 
 
-def _send_built(pilot: Autopilot, source: Source, number: int) -> int:
+def _send_built(autopilot: Autopilot, source: Source, number: int) -> int:
     build = telemetry.BUILDERS.get(number)
-    message = None if build is None else build(pilot)
-    return _send(pilot, source, [] if message is None else [message])
+    message = None if build is None else build(autopilot)
+    return _send(autopilot, source, [] if message is None else [message])
 
 
-def _tell_interval(pilot: Autopilot, source: Source, number: float) -> int:
+def _tell_interval(autopilot: Autopilot, source: Source, number: float) -> int:
     if not (math.isfinite(number) and 0 <= round(number) <= 65535):
         return _DENIED
-    message = streams.interval_of(pilot.memory.links[source[0]], round(number))
-    return _send(pilot, source, [message])
+    message = streams.interval_of(autopilot.memory.links[source[0]], round(number))
+    return _send(autopilot, source, [message])
 
 
-def _send(pilot: Autopilot, source: Source, messages: list[Any]) -> int:
+def _send(autopilot: Autopilot, source: Source, messages: list[Any]) -> int:
     for message in messages:
-        pilot.send(message, source[0])
+        autopilot.send(message, source[0])
     return _ACCEPTED if messages else _DENIED

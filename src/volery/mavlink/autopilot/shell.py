@@ -25,52 +25,54 @@ _HELP = {
 }
 
 
-def take(pilot: Autopilot, source: Source, message: Any) -> None:
+def take(autopilot: Autopilot, source: Source, message: Any) -> None:
     """Runs what a SERIAL_CONTROL completes to a line, and replies where that is asked for.
 
     One line a message: what follows it in the same message is dropped.
     """
-    shells = pilot.memory.shells
-    if message.device != _SHELL_DEVICE or message.flags & _REPLY or pilot.memory.state is None:
+    shells = autopilot.memory.shells
+    if message.device != _SHELL_DEVICE or message.flags & _REPLY or autopilot.memory.state is None:
         return
     text = shells.pop(source, "") + bytes(message.data[: message.count]).decode("ascii", "replace")
     text = text.replace("\r", "\n").replace("\0", "")
     reply = ""
     line, ended, _ = text.partition("\n")
     if ended:
-        reply = f"{_run(pilot, line.split())}{_PROMPT}"
+        reply = f"{_run(autopilot, line.split())}{_PROMPT}"
     elif len(line) <= _MAX_LINE and len(shells) < _MAX_SHELLS:
         shells[source] = line
     if message.flags & _RESPOND:
-        _reply(pilot, source, reply)
+        _reply(autopilot, source, reply)
 
 
-def _run(pilot: Autopilot, words: list[str]) -> str:
+def _run(autopilot: Autopilot, words: list[str]) -> str:
     """Returns what a command prints."""
     if not words:
         return ""
     if words == ["help"]:
         return "Commands:\n" + "".join(f"  {name:<18} {what}\n" for name, what in _HELP.items())
     if words[0] == "ver":
-        return f"HW arch: volery {pilot.build.airframe}\nPX4 version: 1.18.0 (simulated)\n"
+        return f"HW arch: volery {autopilot.build.airframe}\nPX4 version: 1.18.0 (simulated)\n"
     if words[:2] == ["param", "show"] and len(words) <= 3:
         wanted = words[2] if len(words) == 3 else "*"
-        return _parameters(pilot, wanted)
+        return _parameters(autopilot, wanted)
     return f"Invalid command: {' '.join(words)[:40]}\ntype 'help' for a list of commands\n"
 
 
-def _parameters(pilot: Autopilot, wanted: str) -> str:
+def _parameters(autopilot: Autopilot, wanted: str) -> str:
     prefix = wanted.removesuffix("*")
     found = [
         name for name in NAMES if name == wanted or (name.startswith(prefix) and wanted[-1:] == "*")
     ]
-    return "".join(f"  {name}: {pilot.parameter(name):g}\n" for name in found) or "no parameter\n"
+    return (
+        "".join(f"  {name}: {autopilot.parameter(name):g}\n" for name in found) or "no parameter\n"
+    )
 
 
-def _reply(pilot: Autopilot, source: Source, text: str) -> None:
+def _reply(autopilot: Autopilot, source: Source, text: str) -> None:
     raw = text.encode("ascii", "replace")
     control = dialect().MAVLink_serial_control_message
     for k in range(0, len(raw), _CHUNK_BYTES):
         piece = raw[k : k + _CHUNK_BYTES]
         data = list(piece.ljust(_CHUNK_BYTES, b"\0"))
-        pilot.send(control(_SHELL_DEVICE, _REPLY, 0, 0, len(piece), data), source[0])
+        autopilot.send(control(_SHELL_DEVICE, _REPLY, 0, 0, len(piece), data), source[0])

@@ -58,7 +58,7 @@ def begin(link: LinkState, now_ns: int) -> LinkState:
     return link
 
 
-def ask_for(pilot: Autopilot, link: LinkState, number: int, period_us: float) -> bool:
+def ask_for(autopilot: Autopilot, link: LinkState, number: int, period_us: float) -> bool:
     """Send a message each `period_us` on a link: 0 as at its beginning, -1 never.
 
     Whether that can be; no faster than the state of the vehicle comes.
@@ -70,12 +70,12 @@ def ask_for(pilot: Autopilot, link: LinkState, number: int, period_us: float) ->
         return True
     usual = RATES_HZ.get(link.profile, _ALWAYS).get(number)
     if period_us == 0.0 and usual is None:
-        return ask_for(pilot, link, number, -1.0)
+        return ask_for(autopilot, link, number, -1.0)
     wanted = 1e9 / usual if period_us == 0.0 and usual is not None else period_us * 1e3
     link.periods_ns[number] = max(FASTEST_NS, round(min(wanted, 1e15)))
     link.due = [entry for entry in link.due if entry[1] != number]
     heapq.heapify(link.due)
-    heapq.heappush(link.due, (pilot.memory.now_ns, number))
+    heapq.heappush(link.due, (autopilot.memory.now_ns, number))
     return True
 
 
@@ -86,11 +86,11 @@ def interval_of(link: LinkState, number: int) -> Any:
     return dialect().MAVLink_message_interval_message(number, min(period_us, 2**31 - 1))
 
 
-def send_due(pilot: Autopilot) -> None:
+def send_due(autopilot: Autopilot) -> None:
     """Send everything whose time has come; each message is built once for all links."""
-    now_ns = pilot.memory.now_ns
+    now_ns = autopilot.memory.now_ns
     built: dict[int, Any] = {}
-    for link in tuple(pilot.memory.links.values()):
+    for link in tuple(autopilot.memory.links.values()):
         while link.due and link.due[0][0] <= now_ns:
             instant_ns, number = link.due[0]
             period_ns = link.periods_ns.get(number)
@@ -100,8 +100,8 @@ def send_due(pilot: Autopilot) -> None:
             late = (now_ns - instant_ns) // period_ns + 1
             heapq.heapreplace(link.due, (instant_ns + late * period_ns, number))
             if number not in built:
-                built[number] = telemetry.BUILDERS[number](pilot)
+                built[number] = telemetry.BUILDERS[number](autopilot)
             if built[number] is not None:
-                pilot.send(built[number], link.number)
+                autopilot.send(built[number], link.number)
         if link.parameters_to_send:
-            send_some(pilot, link)
+            send_some(autopilot, link)

@@ -36,9 +36,9 @@ _ESTIMATES = 1 | 2 | 4 | 8 | 16 | 32 | 256 | 512
 """ESTIMATOR_STATUS_FLAGS: attitude, velocities, places; without relative ones to terrain."""
 
 
-def HEARTBEAT(pilot: Autopilot) -> Any:  # noqa: N802  (named as the message)
+def HEARTBEAT(autopilot: Autopilot) -> Any:  # noqa: N802  (named as the message)
     """Mode, whether it is armed, how it fares."""
-    memory = pilot.memory
+    memory = autopilot.memory
     base = 1 | memory.mode.flags | (128 if memory.armed else 0)
     status = 4 if memory.armed else 3
     if memory.failsafe:
@@ -49,19 +49,19 @@ def HEARTBEAT(pilot: Autopilot) -> Any:  # noqa: N802  (named as the message)
     return dialect().MAVLink_heartbeat_message(kind, _PX4, base, memory.mode.custom_mode, status, 3)
 
 
-def _sys_status(pilot: Autopilot) -> Any:
-    state = pilot.state
+def _sys_status(autopilot: Autopilot) -> Any:
+    state = autopilot.state
     has_battery = math.isfinite(state.charge)
     present = _GYRO | _ACCEL | _MAG | _PRESSURE | _GPS | _CONTROL | _FENCE | _PREARM
     present |= _BATTERY if has_battery else 0
     health = present
-    if pilot.memory.fix_lost:
+    if autopilot.memory.fix_lost:
         health &= ~_GPS
-    if arming.troubles(pilot):
+    if arming.problems(autopilot):
         health &= ~_PREARM
-    if has_battery and state.charge < float(pilot.parameter("BAT_CRIT_THR")):
+    if has_battery and state.charge < float(autopilot.parameter("BAT_CRIT_THR")):
         health &= ~_BATTERY
-    if "fence" in pilot.memory.warned:
+    if "fence" in autopilot.memory.warned:
         health &= ~_FENCE
     volts, amps, percent = 65535, -1, -1
     if has_battery:
@@ -72,27 +72,27 @@ def _sys_status(pilot: Autopilot) -> Any:
     )
 
 
-def _system_time(pilot: Autopilot) -> Any:
-    return dialect().MAVLink_system_time_message(0, motion.ms(pilot))
+def _system_time(autopilot: Autopilot) -> Any:
+    return dialect().MAVLink_system_time_message(0, motion.ms(autopilot))
 
 
-def _extended_sys_state(pilot: Autopilot) -> Any:
-    landed = {"LANDED": 1, "CRASHED": 1, "TAKE_OFF": 3, "LAND": 4}.get(pilot.state.mode, 2)
+def _extended_sys_state(autopilot: Autopilot) -> Any:
+    landed = {"LANDED": 1, "CRASHED": 1, "TAKE_OFF": 3, "LAND": 4}.get(autopilot.state.mode, 2)
     return dialect().MAVLink_extended_sys_state_message(0, landed)
 
 
-def _battery_status(pilot: Autopilot) -> Any:
-    state = pilot.state
+def _battery_status(autopilot: Autopilot) -> Any:
+    state = autopilot.state
     if not math.isfinite(state.charge):
         return None
-    cells = max(pilot.build.battery_cells, 1)
+    cells = max(autopilot.build.battery_cells, 1)
     each = min(round(state.voltage / cells * 1e3), 65534)
     voltages = [each] * min(cells, 10) + [65535] * max(10 - cells, 0)
     more = [each] * min(max(cells - 10, 0), 4)
-    used = round((1.0 - state.charge) * pilot.build.battery_capacity_ah * 1e3)
+    used = round((1.0 - state.charge) * autopilot.build.battery_capacity_ah * 1e3)
     level = 1
     for name, number in (("LOW", 2), ("CRIT", 3), ("EMERGEN", 4)):
-        if state.charge < float(pilot.parameter(f"BAT_{name}_THR")):
+        if state.charge < float(autopilot.parameter(f"BAT_{name}_THR")):
             level = number
     return dialect().MAVLink_battery_status_message(
         0,
@@ -110,54 +110,54 @@ def _battery_status(pilot: Autopilot) -> Any:
     )
 
 
-def _home_position(pilot: Autopilot) -> Any:
-    home = pilot.memory.home
+def _home_position(autopilot: Autopilot) -> Any:
+    home = autopilot.memory.home
     if home is None:
         return None
-    origin = pilot.memory.origin
+    origin = autopilot.memory.origin
     place = (home[0] - origin[0], home[1] - origin[1], home[2] - origin[2])
     return dialect().MAVLink_home_position_message(
-        *motion.degrees_e7(pilot.memory.chosen_home or pilot.earth.geodetic(home)),
+        *motion.degrees_e7(autopilot.memory.chosen_home or autopilot.earth.geodetic(home)),
         *ned_of_enu(place),
         (math.nan,) * 4,
         *(math.nan,) * 3,
-        motion.us(pilot),
+        motion.us(autopilot),
     )
 
 
-def _global_origin(pilot: Autopilot) -> Any:
-    place = motion.degrees_e7(pilot.earth.geodetic(pilot.memory.origin))
-    return dialect().MAVLink_gps_global_origin_message(*place, motion.us(pilot))
+def _global_origin(autopilot: Autopilot) -> Any:
+    place = motion.degrees_e7(autopilot.earth.geodetic(autopilot.memory.origin))
+    return dialect().MAVLink_gps_global_origin_message(*place, motion.us(autopilot))
 
 
-def _estimator_status(pilot: Autopilot) -> Any:
-    flags = _ESTIMATES & ~(16 | 512) if pilot.memory.fix_lost else _ESTIMATES
+def _estimator_status(autopilot: Autopilot) -> Any:
+    flags = _ESTIMATES & ~(16 | 512) if autopilot.memory.fix_lost else _ESTIMATES
     ratios = (0.0,) * 4
     return dialect().MAVLink_estimator_status_message(
-        motion.us(pilot), flags, *ratios, math.nan, math.nan, math.nan, math.nan
+        motion.us(autopilot), flags, *ratios, math.nan, math.nan, math.nan, math.nan
     )
 
 
-def _mission_current(pilot: Autopilot) -> Any:
-    mission, items = pilot.memory.mission, pilot.memory.plans[plans.MISSION]
+def _mission_current(autopilot: Autopilot) -> Any:
+    mission, items = autopilot.memory.mission, autopilot.memory.plans[plans.MISSION]
     if not items:
         state = 1
     elif mission.complete:
         state = 5
-    elif pilot.memory.mode is Mode.MISSION and pilot.memory.armed:
+    elif autopilot.memory.mode is Mode.MISSION and autopilot.memory.armed:
         state = 3
     else:
         state = 4 if mission.reached >= 0 else 2
     total = len(items) or 65535
-    mode = 1 if pilot.memory.mode is Mode.MISSION else 2
+    mode = 1 if autopilot.memory.mode is Mode.MISSION else 2
     return dialect().MAVLink_mission_current_message(mission.current, total, state, mode)
 
 
-def _timesync(pilot: Autopilot) -> Any:
-    return dialect().MAVLink_timesync_message(0, pilot.memory.now_ns)
+def _timesync(autopilot: Autopilot) -> Any:
+    return dialect().MAVLink_timesync_message(0, autopilot.memory.now_ns)
 
 
-def _autopilot_version(pilot: Autopilot) -> Any:
+def _autopilot_version(autopilot: Autopilot) -> Any:
     return dialect().MAVLink_autopilot_version_message(
         _CAPABILITIES,
         flight_version(),
@@ -169,7 +169,7 @@ def _autopilot_version(pilot: Autopilot) -> Any:
         [0] * 8,
         0,
         0,
-        pilot.system,
+        autopilot.system,
     )
 
 

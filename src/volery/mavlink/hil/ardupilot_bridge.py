@@ -107,7 +107,7 @@ class ArdupilotBridge:
             self._seats.append(seat)
             await self._listen(seat, self._port + PORT_STEP * k)
         self._absence = ConnectionNotice(
-            "ArduPilot", self._missing, self._how_to_start, self._notice_s
+            "ArduAutopilot", self._missing, self._how_to_start, self._notice_s
         )
 
     async def stop(self) -> None:
@@ -177,12 +177,12 @@ class _Seat(asyncio.DatagramProtocol):
     # --------------------------------------------------------------------------------- of meetings
 
     is_in_step = False
-    """As of `Pilot`: asyncio's transport is the loop's."""
+    """As of `Autopilot`: asyncio's transport is the loop's."""
     may_sleep = False
-    """As of `Pilot`: it answers each state, and repeats its question where it heard none."""
+    """As of `Autopilot`: it answers each state, and repeats its question where it heard none."""
 
     def tell(self, time_ns: int, news: News) -> bool:
-        """As of `Pilot`."""
+        """As of `Autopilot`."""
         self._slow.update({name: news[name] for name in _SLOW if name in news})
         state = _state_of({**self._slow, **news})
         if self.peer is None or self._transport is None or state is None:
@@ -194,11 +194,11 @@ class _Seat(asyncio.DatagramProtocol):
         return True
 
     def begin_anew(self) -> None:
-        """As of `Pilot`: an ArduPilot whose simulator's clock goes back flies on where it is."""
+        """See `ExternalAutopilot`; an ArduPilot whose simulator's clock goes back flies on."""
         self._begin_ns = None
 
     def drop(self) -> None:
-        """As of `Pilot`: forget it; it speaks again every second if it lives."""
+        """As of `Autopilot`: forget it; it speaks again every second if it lives."""
         self.peer, self._begin_ns = None, None
         self._meetings.turn_rotors([0.0] * len(self._motors))
 

@@ -81,9 +81,9 @@ class LockStepSession:
     """Joins the lock step for `uav` at once; `close` leaves it.
 
     kind: `px4` or another word for names. topics: message types by topic below the UAV's name.
-    The pilot is told in the loop's thread, or, once it `is_in_step`, by the simulation's own, which
-    need not wake another for that. Both hold `lock` when they tell it or have it begin anew, and so
-    must who reads or changes what these do. All other calls are the loop's.
+    The autopilot is told in the loop's thread, or, once it `is_in_step`, by the simulation's own,
+    which need not wake another for that. Both hold `lock` when they tell it or have it begin anew,
+    and so must who reads or changes what these do. All other calls are the loop's.
     """
 
     def __init__(
@@ -91,14 +91,14 @@ class LockStepSession:
         gateway: Gateway,
         uav: str,
         kind: str,
-        pilot: ExternalAutopilot,
+        autopilot: ExternalAutopilot,
         *,
         period_ns: int,
         topics: Mapping[str, str],
         patience: TimeoutPolicy,
     ) -> None:
         self.lock = threading.RLock()
-        self._uav, self._pilot, self._patience = uav, pilot, patience
+        self._uav, self._autopilot, self._patience = uav, autopilot, patience
         self._loop = asyncio.get_running_loop()
         self._session: Session = gateway.open(f"{kind} of {uav}")
         self._rotors = f"/{uav}/rotor_speeds"
@@ -108,7 +108,7 @@ class LockStepSession:
         self._since_s = 0.0
         """Wall time at which the present meeting began."""
         self._is_unsayable = False
-        """Whether it has been said that the pilot cannot be told something."""
+        """Whether it has been said that the autopilot cannot be told something."""
         self._asleep_since_s: float | None = None
         """Wall time since which time goes on without its answers."""
         self._period_s = period_ns / NS_PER_S
@@ -163,12 +163,12 @@ class LockStepSession:
         request.period_s = period_ns / NS_PER_S
         drops = self._patience.drops
         request.timeout_s = self._patience.timeout_s + (_MARGIN_S if drops else 0.0)
-        request.stop_when_silent = not drops
-        request.restarts = True
+        request.stop_on_timeout = not drops
+        request.supports_reset = True
         self._session.call("/volery/join_lock_step", request, ServiceReply(_answered, _answered))
 
     def _wake(self) -> None:
-        if self._pilot.is_in_step:
+        if self._autopilot.is_in_step:
             self._meet()
             return
         with contextlib.suppress(RuntimeError):  # the loop has ended
@@ -182,14 +182,14 @@ class LockStepSession:
 
     def _meet_at(self, time_ns: int) -> None:
         if time_ns <= self._time_ns:
-            self._pilot.begin_anew()
+            self._autopilot.begin_anew()
         self._time_ns, self._since_s, self._pending = time_ns, time.monotonic(), True
         if not self._tell(time_ns):
             self.go_on()
 
     def _tell(self, time_ns: int) -> bool:
         try:
-            return self._pilot.tell(time_ns, self._news())
+            return self._autopilot.tell(time_ns, self._news())
         except (ArithmeticError, ValueError, struct.error) as error:  # as of an infinite fix
             if not self._is_unsayable:
                 self._is_unsayable = True
@@ -223,7 +223,7 @@ class LockStepSession:
             sleeps = silent_s >= min(_SLEEP_S, 0.2 * timeout_s)
         else:
             sleeps = time.monotonic() - since_s < _LONGEST_SLEEP * timeout_s
-        if sleeps and self._pilot.may_sleep:
+        if sleeps and self._autopilot.may_sleep:
             self._go_on_without()
         elif self._patience.drops and silent_s >= timeout_s:
             self._give_up()
@@ -242,7 +242,7 @@ class LockStepSession:
             self._uav,
             self._patience.timeout_s,
         )
-        self._pilot.drop()
+        self._autopilot.drop()
         self.go_on()
 
     def _asked(self, shares: Sequence[float]) -> Any:

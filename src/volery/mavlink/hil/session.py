@@ -94,12 +94,12 @@ class HilSession:
 
     @property
     def is_in_step(self) -> bool:
-        """As of `Pilot`."""
+        """As of `Autopilot`."""
         way = self._way
         return way is not None and way.is_for_any_thread and self._link.locked
 
     def tell(self, time_ns: int, news: News) -> bool:
-        """As of `Pilot`."""
+        """As of `Autopilot`."""
         sensed = self._sensing.read(news)
         if self._way is None or sensed is None:
             return False
@@ -108,11 +108,11 @@ class HilSession:
 
     @property
     def may_sleep(self) -> bool:
-        """As of `Pilot`: a PX4 in Offboard, disarmed, without setpoints, says nothing for long."""
+        """See `ExternalAutopilot`; a disarmed PX4 in Offboard is silent for long."""
         return self._way is not None and not self._is_armed
 
     def begin_anew(self) -> None:
-        """As of `Pilot`: a PX4 cannot go back in time."""
+        """As of `Autopilot`: a PX4 cannot go back in time."""
         self._end("the simulation was reset, and its PX4 must begin anew")
 
     def give_way(self) -> None:
@@ -120,7 +120,7 @@ class HilSession:
         self._end("what was connected has sent no MAVLink; another connection takes its place")
 
     def drop(self) -> None:
-        """As of `Pilot`."""
+        """As of `Autopilot`."""
         self._end("the connection to its PX4 was closed")
 
     def _end(self, why: str) -> None:

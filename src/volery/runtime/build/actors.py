@@ -21,32 +21,32 @@ _TURN_M = {"person": 0.3, "car": 2.0, "bird": 2.0}
 """How far ahead of a waypoint, and behind it, a thing turns: a modelling choice."""
 
 
-def build_things(scenario: Scenario, terrain: Terrain) -> MovingActors | None:
+def build_actors(scenario: Scenario, terrain: Terrain) -> MovingActors | None:
     """Things of the scenario, None without any."""
-    if not scenario.world.things:
+    if not scenario.world.actors:
         return None
-    shapes = {name: SHAPES[name]() for name in {thing.shape for thing in scenario.world.things}}
+    shapes = {name: SHAPES[name]() for name in {actor.shape for actor in scenario.world.actors}}
 
     def ground(x: float, y: float) -> float:
         return float(terrain.height(x, y))
 
     return MovingActors(
         [
-            MovingActor(thing.name, thing.shape, shapes[thing.shape], _motion(thing, ground))
-            for thing in scenario.world.things
+            MovingActor(actor.name, actor.shape, shapes[actor.shape], _motion(actor, ground))
+            for actor in scenario.world.actors
         ]
     )
 
 
-def _motion(thing: schema.Actor, ground: HeightAt) -> ActorMotion:
-    motion = thing.motion
+def _motion(actor: schema.Actor, ground: HeightAt) -> ActorMotion:
+    motion = actor.motion
     if isinstance(motion, schema.WaypointActor):
         return WaypointMotion(
             motion.waypoints_m,
             motion.speed_m_s,
             motion.at_end,
             start_s=motion.start_s,
-            turn_m=_TURN_M[thing.shape],
+            turn_m=_TURN_M[actor.shape],
             ground=ground if len(motion.waypoints_m[0]) == 2 else None,
         )
     if isinstance(motion, schema.CircleActor):

@@ -59,7 +59,7 @@ def build_estimation(
     terrain = scenario.world.terrain
     setup = EstimationSetup(
         uavs=uavs,
-        flies=np.array([sensor.spec.flies for sensor in wanted]),
+        used_for_control=np.array([sensor.spec.used_for_control for sensor in wanted]),
         listens={
             (aid.id.uav, aid.id.name): e for e, own in enumerate(aids) for aid in own.values()
         },

@@ -34,7 +34,7 @@ def announce_sensors(publisher: GraphPublisher, fitted: Sequence[SensorInstance]
             publisher.announce_camera(camera, sensor.mount)
         else:
             kind, spec = RESULT_OF[sensor.spec.kind], sensor.spec
-            by_a_node = isinstance(spec, EstimateSensor) and spec.pose is not None
+            by_a_node = isinstance(spec, EstimateSensor) and spec.external_odometry is not None
             publisher.announce(sensor.id, kind, sensor.mount, in_map=not by_a_node)
         if sensor.mount.nods:
             publisher.announce(sensor.id, JointAngles, sensor.mount)

@@ -14,8 +14,8 @@ def learn_messages(scenario: Scenario) -> list[str]:
     key and, for a broken definition, its file and line.
     """
     learned = []
-    for k, name in enumerate(scenario.messages):
-        where = f"{scenario.name}: messages[{k}]"
+    for k, name in enumerate(scenario.message_packages):
+        where = f"{scenario.name}: message_packages[{k}]"
         try:
             learned += add_definitions(scenario.access.find_folder(name))
         except (DataFileError, GraphError) as error:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from volery.core.errors import DataFileError, ScenarioError, VoleryError
 from volery.core.geodesy import LocalFrame
 from volery.core.plurals import counted
-from volery.runtime.build.actors import build_things
+from volery.runtime.build.actors import build_actors
 from volery.runtime.build.geometry import Geometry
 from volery.runtime.build.grid_map import starting_blocks
 from volery.runtime.build.user_meshes import mesh_solids
@@ -120,7 +120,7 @@ def _grow(scenario: Scenario, terrain: Terrain) -> Forest | None:
         return forest_from_inventory(
             scenario.access.find_file(forest.file),
             region=forest.region_m,
-            share=forest.share,
+            fraction=forest.fraction,
             species=forest.species,
             species_map=forest.species_map,
             seed=scenario.world_seed,
@@ -163,9 +163,9 @@ def build_scene(
         cover=BARE_GROUND if city is None else city.cover,
         threads=threads,
     )
-    things = build_things(scenario, terrain)
-    if things is not None:
-        scene.set_things(things)
+    actors = build_actors(scenario, terrain)
+    if actors is not None:
+        scene.set_actors(actors)
     return scene
 
 

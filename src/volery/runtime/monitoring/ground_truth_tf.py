@@ -41,12 +41,12 @@ def tell_poses(graph: Graph, engine: Engine) -> LiveTopic:
 
 
 def _message(engine: Engine) -> TFMessage:
-    state, things = engine.fleet.state, engine.things
+    state, actors = engine.fleet.state, engine.actors
     frames = [f"{name}/base_link" for name in engine.names]
     poses = np.hstack([state.position_map, state.attitude])
-    if things is not None:
-        frames += things.names
-        poses = np.vstack([poses, things.poses_at(engine.time_ns)])
+    if actors is not None:
+        frames += actors.names
+        poses = np.vstack([poses, actors.poses_at(engine.time_ns)])
     stamp = header(engine.time_ns, "map")
     transforms: Any = LazyList(len(frames), lambda: _transforms(stamp, frames, poses))
     return TFMessage(transforms)
@@ -59,8 +59,8 @@ def _transforms(stamp: Any, frames: list[str], poses: Array) -> Iterator[Transfo
 
 
 def _content(engine: Engine) -> tuple[Any, ...]:
-    state, things = engine.fleet.state, engine.things
-    moving = b"" if things is None else things.poses_at(engine.time_ns).tobytes()
+    state, actors = engine.fleet.state, engine.actors
+    moving = b"" if actors is None else actors.poses_at(engine.time_ns).tobytes()
     return (
         engine.time_ns,
         engine.names,

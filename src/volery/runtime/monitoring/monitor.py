@@ -20,7 +20,7 @@ class Monitor:
     def __init__(self, simulation: Simulation, engine: Engine, told: StatusSources) -> None:
         self._graph = simulation.graph
         vehicles = VehicleTopic(
-            engine, simulation.uavs, simulation.gateway, simulation.pilots.holder_of
+            engine, simulation.uavs, simulation.gateway, simulation.operators.holder_of
         )
         self._present = (tell_poses(simulation.graph, engine), vehicles.present)
         self._status = Status(simulation, told)

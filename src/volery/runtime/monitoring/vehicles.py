@@ -1,4 +1,4 @@
-"""`/volery/vehicles`: mode, place, battery and pilot of every UAV, for people who watch."""
+"""`/volery/vehicles`: mode, place, battery and operator of every UAV, for people who watch."""
 
 from __future__ import annotations
 

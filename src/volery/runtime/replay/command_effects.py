@@ -36,9 +36,9 @@ _AT_THE_END = {
 CONTINUE_RUN = "/volery/continue_run"
 _AT_THE_END_BY_NAME = {
     CONTINUE_RUN,
-    "/volery/snapshot",
-    "/volery/restore",
-    "/volery/forget_snapshot",
+    "/volery/save_snapshot",
+    "/volery/restore_snapshot",
+    "/volery/delete_snapshot",
 }
 _SETS_PARAMETERS = {"rosapi_msgs/srv/SetParam", "rosapi_msgs/srv/DeleteParam"}
 

@@ -2,7 +2,7 @@
 
     flight = read_flight(Path("flight.mcap"))
     with Simulation(scenario_of(flight.origin, load_scenario("mine.toml"))) as simulation:
-        simulation.repeat(flight)
+        simulation.replay_commands(flight)
         simulation.run()
 
 Pauses, speeds and single steps change no results and are not repeated; the flight goes as fast as

@@ -212,7 +212,7 @@ class LogPlayer:
         self.quitting = True
         self._inbox.wake()
 
-    def be_prompt(self) -> None:
+    def use_low_latency(self) -> None:
         """As of `Simulation`; here what clients ask is done at once anyway."""
 
     # --------------------------------------------------------------------------------- its owner
@@ -368,7 +368,7 @@ class LogPlayer:
             "counts": [topic.messages for topic in topics],
             "refused": list(played.refused),
             "reasons": list(played.refused.values()),
-            "trouble": played.trouble,
+            "problem": played.problem,
             "scenario": "" if self.origin is None else self.origin.name,
             "seed": 0 if self.origin is None else self.origin.seed,
         }

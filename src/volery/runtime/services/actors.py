@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 _PERIOD_S = 0.02
 
 
-def offer_things(simulation: Simulation, things: MovingActors, every: Callable[..., None]) -> None:
-    """Tell of all things on `/tf`, 50 times a second; listen to `/things/NAME/pose`.
+def offer_actors(simulation: Simulation, actors: MovingActors, every: Callable[..., None]) -> None:
+    """Tell of all things on `/tf`, 50 times a second; listen to `/actors/NAME/pose`.
 
     A pose in the map that comes there is that of the thing from now on; a rotation of zeros keeps
     its heading. What is none, or for a thing that goes its own way, is ignored: there is nobody to
@@ -37,23 +37,23 @@ def offer_things(simulation: Simulation, things: MovingActors, every: Callable[.
 
     def tell() -> None:
         stamp = header(simulation.time_ns, "map")
-        poses = things.poses_at(simulation.time_ns).tolist()
+        poses = actors.poses_at(simulation.time_ns).tolist()
         transforms.publish(
             TFMessage(
                 [
                     TransformStamped(
                         stamp, name, Transform(Vector3(*pose[:3]), Quaternion(*pose[3:]))
                     )
-                    for name, pose in zip(things.names, poses, strict=True)
+                    for name, pose in zip(actors.names, poses, strict=True)
                 ]
             )
         )
 
     every(_PERIOD_S, tell, wanted=lambda: transforms.wanted)
-    for thing in things.things:
-        if isinstance(thing.motion, GivenMotion):
-            topic = f"/things/{thing.name}/pose"
-            graph.subscribe(topic, _placing(simulation, thing.name), PoseStamped)
+    for actor in actors.actors:
+        if isinstance(actor.motion, GivenMotion):
+            topic = f"/actors/{actor.name}/pose"
+            graph.subscribe(topic, _placing(simulation, actor.name), PoseStamped)
 
 
 def _placing(simulation: Simulation, name: str) -> Callable[[Published], None]:
@@ -64,7 +64,7 @@ def _placing(simulation: Simulation, name: str) -> Callable[[Published], None]:
         place, turn = message.pose.position, message.pose.orientation
         attitude = [turn.x, turn.y, turn.z, turn.w]
         try:
-            simulation.put_thing(
+            simulation.set_actor_pose(
                 name,
                 [place.x, place.y, place.z],
                 attitude if any(attitude) else None,

@@ -35,7 +35,7 @@ def offer_air_and_faults(simulation: Simulation) -> None:
         simulation.gust_now(amplitude, request.rise, lasts_s)
 
     def inject_fault(request: Any) -> None:
-        simulation.inject(_fault_of(request))
+        simulation.inject_fault(_fault_of(request))
 
     def end_fault(request: Any) -> None:
         simulation.end_fault(_fault_of(request))

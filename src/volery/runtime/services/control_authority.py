@@ -1,4 +1,4 @@
-"""Services by which pilots agree who steers which UAV."""
+"""Services by which operators agree who steers which UAV."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ TAKE, RELEASE, HAND_OVER = (
 )
 
 
-def offer_piloting(graph: Graph, pilots: ControlAuthority) -> None:
+def offer_piloting(graph: Graph, operators: ControlAuthority) -> None:
     """Offer taking, releasing and handing over; see `ControlAuthority`."""
 
     def take(request: Any) -> Fields:
-        pilots.take(request.uav, request.pilot)
-        return {"message": f"{request.pilot} steers {request.uav}"}
+        operators.take(request.uav, request.operator)
+        return {"message": f"{request.operator} steers {request.uav}"}
 
     def release(request: Any) -> Fields:
-        pilots.release(request.uav, request.pilot)
-        return {"message": f"{request.pilot} steers {request.uav or 'nothing'} no more"}
+        operators.release(request.uav, request.operator)
+        return {"message": f"{request.operator} steers {request.uav or 'nothing'} no more"}
 
     def hand_over(request: Any) -> Fields:
-        pilots.hand_over(request.uav, request.pilot, request.to)
+        operators.hand_over(request.uav, request.operator, request.to)
         return {"message": f"{request.to} steers {request.uav}"}
 
     offer_command(graph, TAKE, f"{_OURS}/TakeControl", take)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from volery.core.errors import PlacementError
 from volery.graph.messages import Point, Pose, Quaternion, Twist, Vector3, header, message_type
-from volery.runtime.services.entity_views import Entity, entities_of_things, entity_of_uav
+from volery.runtime.services.entity_views import Entity, entities_of_actors, entity_of_uav
 from volery.runtime.services.filters import (
     BoundsType,
     Category,
@@ -85,7 +85,7 @@ class Entities:
         simulation = self._simulation
         for uav in simulation.uavs.values():
             yield entity_of_uav(uav, simulation.types)
-        yield from entities_of_things(simulation.things, simulation.time_ns)
+        yield from entities_of_actors(simulation.actors, simulation.time_ns)
 
     def _chosen(self, filters: Any) -> list[Entity]:
         """Those that pass all filters."""
@@ -139,14 +139,14 @@ class Entities:
                 reason = f"a twist is up to {_FASTEST:g} m/s or rad/s"
                 raise RefusedError(ResultCode.OPERATION_FAILED, reason)
         if entity.category is not Category.ROBOT:
-            self._set_thing(entity, request)
+            self._set_actor(entity, request)
             return
         if request.set_pose:
             self._place(entity.name, state.pose)
         if request.set_twist:
-            self._simulation.push_uav(entity.name, *twist)
+            self._simulation.set_uav_velocity(entity.name, *twist)
 
-    def _set_thing(self, entity: Entity, request: Any) -> None:
+    def _set_actor(self, entity: Entity, request: Any) -> None:
         position, attitude = entity.position, entity.attitude
         velocity = np.zeros(3)
         if request.set_pose:
@@ -158,13 +158,13 @@ class Entities:
             if any(_numbers(request.state.twist.angular)):
                 raise RefusedError(ResultCode.FEATURE_UNSUPPORTED, "things do not turn by a twist")
             velocity = np.array(_numbers(request.state.twist.linear))
-        self._simulation.put_thing(entity.name, position, attitude, velocity)
+        self._simulation.set_actor_pose(entity.name, position, attitude, velocity)
 
     def _place(self, name: str, pose: Any) -> None:
         turn = pose.orientation
         try:
             attitude = [turn.x, turn.y, turn.z, turn.w]
-            self._simulation.place_uav(name, _numbers(pose.position), attitude)
+            self._simulation.set_uav_pose(name, _numbers(pose.position), attitude)
         except PlacementError as error:
             raise RefusedError(_INVALID_POSE, str(error)) from None
 

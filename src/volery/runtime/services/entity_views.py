@@ -65,27 +65,27 @@ def entity_of_uav(uav: Uav, types: Mapping[str, UavType]) -> Entity:
     )
 
 
-def entities_of_things(things: MovingActors | None, time_ns: int) -> Iterator[Entity]:
+def entities_of_actors(actors: MovingActors | None, time_ns: int) -> Iterator[Entity]:
     """All things, in order."""
-    if things is None:
+    if actors is None:
         return
-    poses, still = things.poses_at(time_ns), np.zeros(3)
-    for row, thing in enumerate(things.things):
+    poses, still = actors.poses_at(time_ns), np.zeros(3)
+    for row, actor in enumerate(actors.actors):
         yield Entity(
-            name=thing.name,
-            category=_CATEGORIES.get(thing.kind, Category.DYNAMIC_OBJECT),
-            description=f"{thing.kind} that moves by itself",
-            tags=("thing", thing.kind),
-            make_shape=partial(_shape_of, thing),
-            radius_m=thing.shape.radius,
+            name=actor.name,
+            category=_CATEGORIES.get(actor.kind, Category.DYNAMIC_OBJECT),
+            description=f"{actor.kind} that moves by itself",
+            tags=("actor", actor.kind),
+            make_shape=partial(_shape_of, actor),
+            radius_m=actor.shape.radius,
             position=poses[row, :3],
             attitude=poses[row, 3:],
-            velocity=things.velocity_at(row, time_ns),
+            velocity=actors.velocity_at(row, time_ns),
             omega=still,
             acceleration=still,
             angular_acceleration=still,
         )
 
 
-def _shape_of(thing: MovingActor) -> BodyShape:
-    return thing.shape
+def _shape_of(actor: MovingActor) -> BodyShape:
+    return actor.shape

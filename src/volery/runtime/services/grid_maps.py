@@ -1,4 +1,4 @@
-"""The grid map on the graph: `/map`, `/map_in` and services that change it."""
+"""The grid map on the graph: `/map`, `/map_command` and services that change it."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _LEVEL = 1e-3
 def offer_grid_maps(
     graph: Graph, world: GridMapManager, settings: GridMapWorld, now_ns: Callable[[], int]
 ) -> None:
-    """Tell of the map on `/map`, latched; take others on `/map_in`; offer the services."""
+    """Tell of the map on `/map`, latched; take others on `/map_command`; offer the services."""
     publisher = graph.advertise("/map", OccupancyGrid, latched=True)
 
     def tell(grid: GridMap) -> None:
@@ -80,7 +80,7 @@ def offer_grid_maps(
     world.tell = tell
     if world.current is not None:
         tell(world.current)
-    graph.subscribe("/map_in", take, OccupancyGrid)
+    graph.subscribe("/map_command", take, OccupancyGrid)
     offer_command(graph, "/volery/set_grid_map", f"{_OURS}/SetGridMap", change)
     offer_command(graph, "/volery/get_grid_map", f"{_OURS}/GetGridMap", get)
 

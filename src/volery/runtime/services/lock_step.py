@@ -52,10 +52,10 @@ class _Meetings:
             name,
             period_s=request.period_s,
             timeout_s=request.timeout_s,
-            on_timeout="stop" if request.stop_when_silent else "leave",
+            on_timeout="stop" if request.stop_on_timeout else "leave",
             on_meeting=self._begin,
             is_there=self._is_there,
-            restarts=request.restarts,
+            supports_reset=request.supports_reset,
             meets_at_start=request.meets_at_start,
         )
         self._go = graph.advertise(f"/volery/lock_step/{name}/go", Clock)

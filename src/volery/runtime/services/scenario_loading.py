@@ -26,7 +26,7 @@ def offer_choices(
     find: Callable[[str], Scenario],
     change: Callable[[WorldRequest], None],
 ) -> None:
-    """Offer `/volery/load_scenario` and `/volery/get_choices`.
+    """Offer `/volery/load_scenario` and `/volery/get_scenario_options`.
 
     names, find: scenarios that can be had. change: has another one flown, or refuses.
     """
@@ -51,7 +51,7 @@ def offer_choices(
         }
 
     offer_command(graph, "/volery/load_scenario", f"{_OURS}/LoadScenario", load)
-    offer_command(graph, "/volery/get_choices", f"{_OURS}/GetChoices", choices)
+    offer_command(graph, "/volery/get_scenario_options", f"{_OURS}/GetScenarioOptions", choices)
 
 
 @cache

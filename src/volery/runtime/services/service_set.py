@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from volery.runtime.services.actors import offer_things
+from volery.runtime.services.actors import offer_actors
 from volery.runtime.services.air_and_faults import offer_air_and_faults
 from volery.runtime.services.control_authority import offer_piloting
 from volery.runtime.services.entities import Entities
@@ -69,12 +69,12 @@ def open_services(
     offer_worlds(graph, simulation.scenario, on_load, shelf)
     offer_named_poses(graph, simulation.starts)
     offer_air_and_faults(simulation)
-    if simulation.things is not None:
-        offer_things(simulation, simulation.things, every)
+    if simulation.actors is not None:
+        offer_actors(simulation, simulation.actors, every)
     if simulation.scenario.world.grid_map is not None:
         settings = simulation.scenario.world.grid_map
         offer_grid_maps(graph, simulation.grid_world, settings, lambda: simulation.time_ns)
-    offer_piloting(graph, simulation.pilots)
+    offer_piloting(graph, simulation.operators)
     SnapshotServices(simulation).offer()
     recording = RecordingServices(graph, recordings, simulation.commands)
     recording.offer()

@@ -18,7 +18,7 @@ _LONGEST_NAME = 100
 
 
 class SnapshotServices:
-    """Offers `/volery/snapshot`, `restore`, `forget_snapshot`, `list_snapshots`, `reset_uav`."""
+    """Offers `/volery/save_snapshot`, `restore_snapshot`, `delete_snapshot` and their kin."""
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
@@ -28,9 +28,9 @@ class SnapshotServices:
         """Offer the services."""
         graph = self._simulation.graph
         for name, handler in (
-            ("snapshot", self._keep),
-            ("restore", self._restore),
-            ("forget_snapshot", self._forget),
+            ("save_snapshot", self._keep),
+            ("restore_snapshot", self._restore),
+            ("delete_snapshot", self._forget),
             ("reset_uav", lambda request: self._simulation.reset_uav(request.name)),
         ):
             offer_command(graph, f"/volery/{name}", f"{_OURS}/ByName", handler)

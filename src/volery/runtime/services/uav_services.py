@@ -23,7 +23,7 @@ def offer_uav_services(graph: Graph, uav: Uav) -> list[Close]:
     services: tuple[tuple[str, str, Handler], ...] = (
         ("arm", _TRIGGER, lambda _request: _arm(uav)),
         ("disarm", _TRIGGER, lambda _request: _disarm(uav)),
-        ("stop", _TRIGGER, lambda _request: uav.stop_rotors()),
+        ("kill", _TRIGGER, lambda _request: uav.stop_rotors()),
         ("take_off_to", f"{_OURS}/TakeOffTo", lambda request: uav.take_off(request.altitude)),
         ("go_to", f"{_OURS}/GoTo", lambda request: _go_to(uav, request)),
         (

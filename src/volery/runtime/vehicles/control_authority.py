@@ -1,4 +1,4 @@
-"""Who steers which UAV, where several pilots are there at once.
+"""Who steers which UAV, where several operators are there at once.
 
 This is an agreement between people, not part of what is simulated: a reset or a snapshot leaves it
 as it is. Programs of bridges, and nodes of the scenario, command UAVs without asking here; clients
@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection
 from volery.core.errors import CommandError
 
 MOST_CHARACTERS = 40
-"""Of a pilot's name."""
+"""Of an operator's name."""
 
 
 def operator_name(text: str) -> str:
@@ -40,7 +40,7 @@ def operator_key(name: str) -> str:
 
 
 class ControlAuthority:
-    """The pilots of one simulation; `names` gives its UAVs.
+    """The operators of one simulation; `names` gives its UAVs.
 
     Any thread may ask; changes are made in the simulation's thread.
     """
@@ -50,57 +50,57 @@ class ControlAuthority:
         self._holders: dict[str, str] = {}
 
     def holder_of(self, uav: str) -> str:
-        """Name of the pilot who holds a UAV; empty: nobody does."""
+        """Name of the operator who holds a UAV; empty: nobody does."""
         return self._holders.get(uav, "")
 
-    def held_by(self, pilot: str) -> tuple[str, ...]:
-        """UAVs that a pilot holds."""
-        return tuple(uav for uav, by in self._holders.items() if same_operator(by, pilot))
+    def held_by(self, operator: str) -> tuple[str, ...]:
+        """UAVs that an operator holds."""
+        return tuple(uav for uav, by in self._holders.items() if same_operator(by, operator))
 
-    def take(self, uav: str, pilot: str) -> None:
-        """Let a pilot hold a UAV that nobody else holds; `CommandError` otherwise."""
-        name = _checked_name(pilot)
+    def take(self, uav: str, operator: str) -> None:
+        """Let an operator hold a UAV that nobody else holds; `CommandError` otherwise."""
+        name = _checked_name(operator)
         self._check_free(uav, name)
         self._holders[uav] = name
 
-    def release(self, uav: str, pilot: str) -> None:
+    def release(self, uav: str, operator: str) -> None:
         """Let go of a UAV, or, where none is named, of all; `CommandError` if it is another's."""
         if not uav:
-            self.leave(pilot)
+            self.leave(operator)
             return
-        self._check_held(uav, pilot)
+        self._check_held(uav, operator)
         del self._holders[uav]
 
-    def hand_over(self, uav: str, pilot: str, to: str) -> None:
-        """Give a UAV that a pilot holds to another pilot; `CommandError` if he does not."""
+    def hand_over(self, uav: str, operator: str, to: str) -> None:
+        """Give a UAV that an operator holds to another operator; `CommandError` if he does not."""
         name = _checked_name(to)
-        self._check_held(uav, pilot)
+        self._check_held(uav, operator)
         self._holders[uav] = name
 
-    def leave(self, pilot: str) -> None:
-        """Let go of everything: the pilot has gone."""
-        for uav in self.held_by(pilot):
+    def leave(self, operator: str) -> None:
+        """Let go of everything: the operator has gone."""
+        for uav in self.held_by(operator):
             del self._holders[uav]
 
-    def _check_free(self, uav: str, pilot: str) -> None:
+    def _check_free(self, uav: str, operator: str) -> None:
         names = self._names()
         if uav not in names:
             raise CommandError(f"there is no UAV '{uav}'; known: {', '.join(names)}")
         holder = self.holder_of(uav)
-        if holder and not same_operator(holder, pilot):
+        if holder and not same_operator(holder, operator):
             raise CommandError(f"{uav} is held by {holder}, who can hand it over")
 
-    def _check_held(self, uav: str, pilot: str) -> None:
-        self._check_free(uav, pilot)
+    def _check_held(self, uav: str, operator: str) -> None:
+        self._check_free(uav, operator)
         if uav not in self._holders:
-            raise CommandError(f"{pilot or 'who has no name'} does not hold {uav}; nobody does")
+            raise CommandError(f"{operator or 'who has no name'} does not hold {uav}; nobody does")
 
 
-def _checked_name(pilot: str) -> str:
-    name = operator_name(pilot)
-    if not name or len(name) > MOST_CHARACTERS or len(pilot) > 4 * MOST_CHARACTERS:
+def _checked_name(operator: str) -> str:
+    name = operator_name(operator)
+    if not name or len(name) > MOST_CHARACTERS or len(operator) > 4 * MOST_CHARACTERS:
         raise CommandError(
-            f"a pilot needs a name of 1 to {MOST_CHARACTERS} printable characters, "
-            f"not {pilot[:60]!r}"
+            f"an operator needs a name of 1 to {MOST_CHARACTERS} printable characters, "
+            f"not {operator[:60]!r}"
         )
     return name

@@ -18,7 +18,7 @@ from volery.engine.events import EventKind
 from volery.graph.graph import Graph
 from volery.graph.messages import Odometry, Published, stamp_of
 from volery.runtime.services.results import Close
-from volery.scenario.schema import EstimateSensor, PoseAid, Sensor
+from volery.scenario.schema import EstimateSensor, ExternalOdometrySource, Sensor
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,11 @@ class ExternalOdometry:
 
     def open(self, uav_name: str, sensors: Iterable[Sensor]) -> list[Close]:
         """Feed the estimator of a UAV with the odometry that its sensor "estimate" names."""
-        aids = [s.pose for s in sensors if isinstance(s, EstimateSensor) and s.pose is not None]
+        aids = [
+            s.external_odometry
+            for s in sensors
+            if isinstance(s, EstimateSensor) and s.external_odometry is not None
+        ]
         closes: list[Close] = []
         for aid in aids:
             topic = f"/{uav_name}/{aid.topic}"
@@ -74,7 +78,9 @@ class ExternalOdometry:
                 engine.note(row, EventKind.FAULT, f"hears no poses on {topic}: its estimate drifts")
 
 
-def _taker(engine: Engine, uav_name: str, aid: PoseAid) -> Callable[[Published], None]:
+def _taker(
+    engine: Engine, uav_name: str, aid: ExternalOdometrySource
+) -> Callable[[Published], None]:
     gap_ns = round(NS_PER_S / aid.rate_hz)
     sigma_rad = math.radians(aid.sigma_deg)
 

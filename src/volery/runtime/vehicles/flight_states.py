@@ -1,4 +1,4 @@
-"""`/uavN/flight_state` and `/uavN/get_build`: what an autopilot on the graph knows of its UAV.
+"""`/uavN/flight_state` and `/uavN/get_vehicle_info`: data for autopilots on the graph.
 
 The state is what the controllers fly on, an estimate where the UAV has one that flies. It comes at
 a fixed rate where a node of the simulation subscribes to it, and who records everything gets it
@@ -25,7 +25,7 @@ from volery.vehicle.airframe import GRAVITY
 PERIOD_S = 0.01
 """As often as the fastest stream of PX4's onboard link (ATTITUDE, 100 Hz)."""
 _TYPE = "volery_interfaces/msg/FlightState"
-_BUILD = "volery_interfaces/srv/GetBuild"
+_BUILD = "volery_interfaces/srv/GetVehicleInfo"
 _NO_BATTERY = (math.nan, math.nan, math.nan)
 _MODES = tuple(FlightMode(k).name for k in range(len(FlightMode)))
 
@@ -53,7 +53,7 @@ class FlightStates:
             publisher.cancel()
 
         offered = offer_command(
-            self._graph, f"/{uav.name}/get_build", _BUILD, lambda _request: self._build(uav)
+            self._graph, f"/{uav.name}/get_vehicle_info", _BUILD, lambda _request: self._build(uav)
         )
         return [close, offered]
 

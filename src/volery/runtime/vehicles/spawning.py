@@ -33,7 +33,7 @@ from volery.world.scene import Scene
 from volery.world.terrain import Terrain
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
-_TAKEN = ("volery", "tf", "tf_static", "clock", "events", "rosapi", "map", "map_in", "things")
+_TAKEN = ("volery", "tf", "tf_static", "clock", "events", "rosapi", "map", "map_command", "actors")
 """What else stands at the root of the graph."""
 
 
@@ -84,8 +84,8 @@ class Spawner:
             )
         if name in self._crew.uavs:
             raise SpawnError(SpawnFault.NAME_TAKEN, f"there is a UAV '{name}' already")
-        things = self._scene.things
-        if things is not None and name in things.names:
+        actors = self._scene.actors
+        if actors is not None and name in actors.names:
             raise SpawnError(SpawnFault.NAME_TAKEN, f"there is a thing '{name}' already")
 
     def _airframe_of(self, kind: str) -> Airframe:

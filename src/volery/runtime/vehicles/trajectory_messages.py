@@ -38,7 +38,9 @@ def follow_message(uav: Uav, message: Any) -> None:
         if len(points) == 1:  # reached from the present motion, and held there
             times, position, yaw = _held(times, position, yaw)
             velocity = acceleration = yaw_rate = None
-        uav.follow(Trajectory.from_samples(times, position, velocity, acceleration, yaw, yaw_rate))
+        uav.follow_trajectory(
+            Trajectory.from_samples(times, position, velocity, acceleration, yaw, yaw_rate)
+        )
         return
     rest = np.zeros((1, 3))
     uav.command_setpoint(

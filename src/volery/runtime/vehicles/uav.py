@@ -151,7 +151,7 @@ class Uav:
             self._check_goal(checked("position", position_map, (3,), MAX_COORDINATE), self.airframe)
         self._fleet.command_position(self._row, position_map, yaw)
 
-    def follow(self, trajectory: Trajectory) -> None:
+    def follow_trajectory(self, trajectory: Trajectory) -> None:
         """Fly along `trajectory`, whose times count from now, then hold at its end."""
         self._fleet.command_trajectory(self._row, trajectory)
 

@@ -15,7 +15,7 @@ from volery.scenario import library
 from volery.scenario.catalog import ScenarioCatalog
 from volery.server.bounded_process import BoundedError, run_bounded
 from volery.server.replies import RefusedError
-from volery.server.request_bodies import check_pilot, save_body
+from volery.server.request_bodies import check_operator, save_body
 from volery.server.server_state import ServerState
 from volery.server.uploads.kinds import BOUNDS, MOST_UPLOADS, kind_of_upload, suffix_of
 
@@ -27,7 +27,7 @@ _MOST_WORDS = 600
 
 async def upload(request: Request) -> Response:
     """Take a file, check it by building its world, answer with the name of its scenario."""
-    check_pilot(request)
+    check_operator(request)
     site: ServerState = request.app.state.site
     kind_name = request.query_params.get("kind", "")
     kind = kind_of_upload(kind_name)

@@ -31,40 +31,40 @@ class MovingActor:
 class MovingActors:
     """All things of a world, in a fixed order."""
 
-    def __init__(self, things: Sequence[MovingActor]) -> None:
-        self._things = tuple(things)
+    def __init__(self, actors: Sequence[MovingActor]) -> None:
+        self._actors = tuple(actors)
 
     def __len__(self) -> int:
-        return len(self._things)
+        return len(self._actors)
 
     @property
-    def things(self) -> tuple[MovingActor, ...]:
+    def actors(self) -> tuple[MovingActor, ...]:
         """In order."""
-        return self._things
+        return self._actors
 
     @property
     def names(self) -> tuple[str, ...]:
         """In order."""
-        return tuple(thing.name for thing in self._things)
+        return tuple(actor.name for actor in self._actors)
 
     @property
     def shapes(self) -> tuple[BodyShape, ...]:
         """In order."""
-        return tuple(thing.shape for thing in self._things)
+        return tuple(actor.shape for actor in self._actors)
 
     @property
     def speeds_m_s(self) -> Array:
         """(T,) none moves faster until something else is said of it."""
-        return np.array([thing.motion.speed_m_s for thing in self._things])
+        return np.array([actor.motion.speed_m_s for actor in self._actors])
 
     def poses_at(self, time_ns: int) -> Array:
         """(T, 7) x y z qx qy qz qw, map from body."""
         time_s = s_from_ns(time_ns)
-        return np.array([thing.motion.pose_at(time_s) for thing in self._things]).reshape(-1, 7)
+        return np.array([actor.motion.pose_at(time_s) for actor in self._actors]).reshape(-1, 7)
 
     def velocity_at(self, row: int, time_ns: int) -> Array:
         """(3,) m/s of one, map: that of the millisecond that begins now."""
-        motion, time_s = self._things[row].motion, s_from_ns(time_ns)
+        motion, time_s = self._actors[row].motion, s_from_ns(time_ns)
         step = motion.pose_at(time_s + _VELOCITY_STEP_S) - motion.pose_at(time_s)
         return np.asarray(step[:3] / _VELOCITY_STEP_S)
 
@@ -73,23 +73,23 @@ class MovingActors:
 
         `CommandError` for one that has a way of its own.
         """
-        thing = self._things[row]
-        if not isinstance(thing.motion, GivenMotion):
+        actor = self._actors[row]
+        if not isinstance(actor.motion, GivenMotion):
             raise CommandError(
-                f"{thing.name} goes its own way; only things whose motion is of kind "
-                '"outside" can be put somewhere'
+                f"{actor.name} goes its own way; only things whose motion is of kind "
+                '"external" can be moved'
             )
-        thing.motion.say(s_from_ns(time_ns), pose, velocity)
+        actor.motion.say(s_from_ns(time_ns), pose, velocity)
 
     def get_state(self) -> list[object]:
         """What a snapshot keeps: what was said from outside."""
         return [
-            thing.motion.get_state() if isinstance(thing.motion, GivenMotion) else None
-            for thing in self._things
+            actor.motion.get_state() if isinstance(actor.motion, GivenMotion) else None
+            for actor in self._actors
         ]
 
     def set_state(self, state: Sequence[object]) -> None:
         """Go back to a kept state."""
-        for thing, kept in zip(self._things, state, strict=True):
-            if isinstance(thing.motion, GivenMotion):
-                thing.motion.set_state(kept)
+        for actor, kept in zip(self._actors, state, strict=True):
+            if isinstance(actor.motion, GivenMotion):
+                actor.motion.set_state(kept)

@@ -3,10 +3,10 @@
 import { order } from "./requests.ts";
 
 /** Takes control of a UAV; returns the operator's name. An empty name: the server chooses one. */
-export async function takeControl(uav: string, pilot: string): Promise<string> {
+export async function takeControl(uav: string, operator: string): Promise<string> {
   const type = "volery_interfaces/srv/TakeControl";
-  const { message } = await order("/volery/take_control", type, { uav, pilot });
-  return message.split(" steers ")[0] ?? pilot;
+  const { message } = await order("/volery/take_control", type, { uav, operator });
+  return message.split(" steers ")[0] ?? operator;
 }
 
 export async function releaseControl(uav: string): Promise<void> {

@@ -10,7 +10,7 @@ export interface Position {
 }
 
 /** Plain services of a UAV, all of `std_srvs/srv/Trigger`. */
-export const FLIGHT_COMMANDS = ["arm", "take_off", "hold", "land", "return_home", "stop"] as const;
+export const FLIGHT_COMMANDS = ["arm", "take_off", "hold", "land", "return_home", "kill"] as const;
 export type FlightCommand = (typeof FLIGHT_COMMANDS)[number];
 
 /** Returns the UAV's response message. */

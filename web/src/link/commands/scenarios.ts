@@ -42,7 +42,11 @@ export async function scenarios(): Promise<ScenarioCard[]> {
 
 /** What `changes` may name. */
 export async function choices(): Promise<Choices> {
-  return await order<Choices>("/volery/get_choices", "volery_interfaces/srv/GetChoices", {});
+  return await order<Choices>(
+    "/volery/get_scenario_options",
+    "volery_interfaces/srv/GetScenarioOptions",
+    {},
+  );
 }
 
 /** What this page has last had flown, and with what. */

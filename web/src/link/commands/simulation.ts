@@ -53,13 +53,18 @@ export async function listSnapshots(): Promise<Snapshot[]> {
 }
 
 export async function saveSnapshot(name: string): Promise<void> {
-  await order("/volery/snapshot", "volery_interfaces/srv/ByName", { name }, RESTORE_TIMEOUT_S);
+  await order("/volery/save_snapshot", "volery_interfaces/srv/ByName", { name }, RESTORE_TIMEOUT_S);
 }
 
 export async function restoreSnapshot(name: string): Promise<void> {
-  await order("/volery/restore", "volery_interfaces/srv/ByName", { name }, RESTORE_TIMEOUT_S);
+  await order(
+    "/volery/restore_snapshot",
+    "volery_interfaces/srv/ByName",
+    { name },
+    RESTORE_TIMEOUT_S,
+  );
 }
 
 export async function deleteSnapshot(name: string): Promise<void> {
-  await order("/volery/forget_snapshot", "volery_interfaces/srv/ByName", { name });
+  await order("/volery/delete_snapshot", "volery_interfaces/srv/ByName", { name });
 }

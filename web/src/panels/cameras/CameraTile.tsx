@@ -15,7 +15,7 @@ const MOST_SHARE = 0.25;
 export function CameraTile({ camera, usual }: { camera: CameraTopic; usual: Tile }) {
   const [canvas, setCanvas] = useState<HTMLCanvasElement | null>(null);
   const width = useLayout((layout) => layout.tiles[camera.name]?.width ?? usual.width);
-  const { aspect, hz, ageS, range, trouble } = useCameraImage(camera, canvas, width >= LARGE_PX);
+  const { aspect, hz, ageS, range, problem } = useCameraImage(camera, canvas, width >= LARGE_PX);
   return (
     <FloatingTile
       name={camera.name}
@@ -26,9 +26,9 @@ export function CameraTile({ camera, usual }: { camera: CameraTopic; usual: Tile
       onClose={() => showPicture(camera.name, false)}
     >
       <canvas ref={setCanvas} className="picture" role="img" aria-label={camera.title} />
-      {trouble !== "" && (
-        <Text size="xs" c="red" className="picture-trouble" role="alert">
-          {trouble}
+      {problem !== "" && (
+        <Text size="xs" c="red" className="picture-problem" role="alert">
+          {problem}
         </Text>
       )}
       <Text size="xs" className="picture-label" aria-label={`${camera.title}: rate and age`}>

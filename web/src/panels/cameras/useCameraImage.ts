@@ -15,10 +15,10 @@ export interface CameraImageState {
   /** Simulated time since the picture was taken, s. */
   ageS: number;
   range: [number, number] | null;
-  trouble: string;
+  problem: string;
 }
 
-const NOTHING: CameraImageState = { aspect: 4 / 3, hz: NaN, ageS: NaN, range: null, trouble: "" };
+const NOTHING: CameraImageState = { aspect: 4 / 3, hz: NaN, ageS: NaN, range: null, problem: "" };
 
 /** Small tiles are content with fewer pictures. */
 const LARGE_MS = 50;
@@ -62,13 +62,13 @@ function receive(
       const aspect = bitmap.width / bitmap.height;
       bitmap.close();
       setState((now) =>
-        now.aspect === aspect && sameRange(now.range, range) && now.trouble === ""
+        now.aspect === aspect && sameRange(now.range, range) && now.problem === ""
           ? now
-          : { ...now, aspect, range, trouble: "" },
+          : { ...now, aspect, range, problem: "" },
       );
     } catch (error) {
-      const trouble = error instanceof Error ? error.message : String(error);
-      setState((now) => ({ ...now, trouble }));
+      const problem = error instanceof Error ? error.message : String(error);
+      setState((now) => ({ ...now, problem }));
     }
     busy = false;
   };

@@ -10,7 +10,7 @@ import { WindDials } from "./WindDials.tsx";
 
 /** Wind, weather, hour of day, and the obstacles of the world. */
 export default function Environment() {
-  const { weather, change, trouble } = useWeather();
+  const { weather, change, problem } = useWeather();
   const whyNot = useWhyNot();
   const disabled = whyNot !== null;
   const dials = { values: weather, change, disabled };
@@ -18,9 +18,9 @@ export default function Environment() {
     <ScrollArea h="100%" type="auto">
       <Stack gap="sm" px="sm" pb="md">
         {whyNot !== null && <Alert p="xs">{whyNot}</Alert>}
-        {trouble !== "" && (
+        {problem !== "" && (
           <Alert color="yellow" p="xs">
-            {trouble}
+            {problem}
           </Alert>
         )}
         <WindDials weather={weather} change={change} disabled={disabled} />

@@ -21,16 +21,16 @@ const SEND_MS = 100;
 /** The weather that the simulation has confirmed, and how to change it. */
 export function useWeather() {
   const [weather, setConfirmed] = useState(CALM);
-  const [trouble, setTrouble] = useState("");
+  const [problem, setProblem] = useState("");
   const open = useConnection(({ state }) => state === "open");
   useEffect(() => {
     if (!open) return;
     getWeather()
       .then((told) => {
         setConfirmed(told);
-        setTrouble("");
+        setProblem("");
       })
-      .catch((error: unknown) => setTrouble(`Weather is unavailable: ${reasonOf(error)}`));
+      .catch((error: unknown) => setProblem(`Weather is unavailable: ${reasonOf(error)}`));
     return link.subscribe("/weather", "volery_interfaces/msg/Weather", ({ message }) =>
       setConfirmed(message),
     );
@@ -47,5 +47,5 @@ export function useWeather() {
       sender.offer();
     };
   }, []);
-  return { weather, change, trouble };
+  return { weather, change, problem };
 }

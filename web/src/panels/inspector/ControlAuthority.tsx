@@ -10,21 +10,21 @@ import { Section } from "./Section.tsx";
 
 /** The operator of this UAV: take control, release it, hand it over. */
 export function ControlAuthority({ uav }: { uav: string }) {
-  const holder = useVehicles(({ list }) => list.find(({ name }) => name === uav)?.holder ?? "");
+  const operator = useVehicles(({ list }) => list.find(({ name }) => name === uav)?.operator ?? "");
   const other = useOtherOperator(uav);
   const volery = useConnection((connection) => connection.volery);
   if (!volery) return null;
   return (
     <Section title="Control">
       <Text size="sm" aria-label="Operator" c={other === "" ? "bright" : "orange"}>
-        {holder === ""
+        {operator === ""
           ? "No operator: every authorized client may command this UAV."
           : other === ""
-            ? `You control this UAV as ${holder}.`
-            : `${holder} controls this UAV: the server refuses your commands.`}
+            ? `You control this UAV as ${operator}.`
+            : `${operator} controls this UAV: the server refuses your commands.`}
       </Text>
-      {holder === "" && <Take uav={uav} />}
-      {holder !== "" && other === "" && <Held uav={uav} />}
+      {operator === "" && <Take uav={uav} />}
+      {operator !== "" && other === "" && <Held uav={uav} />}
     </Section>
   );
 }
@@ -56,7 +56,7 @@ function Take({ uav }: { uav: string }) {
 }
 
 function Held({ uav }: { uav: string }) {
-  const others = useVehicles(({ list }) => list.map(({ holder }) => holder).join("\n"));
+  const others = useVehicles(({ list }) => list.map(({ operator }) => operator).join("\n"));
   const own = useOperator(({ name }) => name);
   const whyNot = useWhyNot();
   const [to, setTo] = useState("");

@@ -74,7 +74,7 @@ export function FlightCommands({ uav }: { uav: string }) {
           </Button>
         </Tooltip>
       ))}
-      <Kill uav={uav} disabled={whyNot !== null} give={() => void give("stop", "Kill")} />
+      <Kill uav={uav} disabled={whyNot !== null} give={() => void give("kill", "Kill")} />
     </SimpleGrid>
   );
 }

@@ -25,12 +25,12 @@ import { Start } from "./Start.tsx";
 export default function Scenarios() {
   const wanted = useWindows((windows) => windows.scenario);
   const [cards, setCards] = useState<ScenarioCard[] | null>(null);
-  const [trouble, setTrouble] = useState("");
+  const [problem, setProblem] = useState("");
   const [chosen, setChosen] = useState(wanted);
   useEffect(() => {
     scenarios()
       .then(setCards)
-      .catch((error: unknown) => setTrouble(reasonOf(error)));
+      .catch((error: unknown) => setProblem(reasonOf(error)));
   }, []);
   const card = cards?.find(({ name }) => name === chosen);
   return (
@@ -40,12 +40,12 @@ export default function Scenarios() {
       size={card === undefined ? 1100 : "lg"}
       title={card === undefined ? "Choose a scenario" : card.name}
     >
-      {trouble !== "" && (
+      {problem !== "" && (
         <Text c="red" role="alert">
-          {trouble}
+          {problem}
         </Text>
       )}
-      {cards === null && trouble === "" && <Loader />}
+      {cards === null && problem === "" && <Loader />}
       {card !== undefined ? (
         <Start key={card.name} card={card} back={() => setChosen("")} />
       ) : (

@@ -30,11 +30,11 @@ const PEEK_BYTES = 4096;
 export default function Upload() {
   const file = useWindows((windows) => windows.file);
   const [kind, setKind] = useState<FileKind | null>(null);
-  const [trouble, setTrouble] = useState("");
+  const [problem, setProblem] = useState("");
   const [busy, setBusy] = useState(false);
   const whyNot = useWhyNotOpen();
   useEffect(() => {
-    setTrouble("");
+    setProblem("");
     if (file === null) return;
     void file
       .slice(0, PEEK_BYTES)
@@ -48,7 +48,7 @@ export default function Upload() {
       if (kind === "log") await sendLog(file);
       else offerScenario(await upload(file, kind));
     } catch (error) {
-      setTrouble(reasonOf(error));
+      setProblem(reasonOf(error));
     }
     setBusy(false);
   };
@@ -78,7 +78,7 @@ export default function Upload() {
             ))}
           </Stack>
         </Radio.Group>
-        {trouble !== "" && (
+        {problem !== "" && (
           <Alert
             color="red"
             role="alert"
@@ -86,7 +86,7 @@ export default function Upload() {
               kind === "log" ? "Cannot upload the log" : "Cannot make a scenario from the file"
             }
           >
-            <span className="reason">{trouble}</span>
+            <span className="reason">{problem}</span>
           </Alert>
         )}
         <SubmitRow whyNot={whyNot} justify="end">

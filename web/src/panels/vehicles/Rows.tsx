@@ -76,7 +76,7 @@ interface RowProps {
 }
 
 const Row = memo(function Row({ vehicle, top, selected, choose }: RowProps) {
-  const { name, airframe, mode, holder, battery } = vehicle;
+  const { name, airframe, mode, operator, battery } = vehicle;
   return (
     <div
       id={`uav-${name}`}
@@ -91,7 +91,7 @@ const Row = memo(function Row({ vehicle, top, selected, choose }: RowProps) {
           {name}
         </Text>
         <Text size="xs" c="dimmed" truncate>
-          {holder === "" ? airframe : `${airframe} · ${holder}`}
+          {operator === "" ? airframe : `${airframe} · ${operator}`}
         </Text>
       </div>
       {Number.isFinite(battery) && (
@@ -116,7 +116,7 @@ function isSame(a: RowProps, b: RowProps): boolean {
     v.name === w.name &&
     v.airframe === w.airframe &&
     v.mode === w.mode &&
-    v.holder === w.holder &&
+    v.operator === w.operator &&
     Object.is(Math.round(100 * v.battery), Math.round(100 * w.battery))
   );
 }

@@ -128,9 +128,9 @@ class DdsServer:
                 self._complaints.tell(name, text)
 
     def _on_request(self, data: bytes, client: int) -> None:
-        trouble = self._clients.trouble(client)
-        if trouble:
-            self.look_at({self._name: trouble})
+        problem = self._clients.problem(client)
+        if problem:
+            self.look_at({self._name: problem})
             return
         header = data[_CDR_HEADER : _CDR_HEADER + _HEADER.size]
 
@@ -174,16 +174,16 @@ class DdsCaller:
     @property
     def ready(self) -> bool:
         """Whether a server is there, both halves of it."""
-        return library.publications(self._reader) > 0 and "" in self._troubles()
+        return library.publications(self._reader) > 0 and "" in self._problems()
 
     @property
-    def trouble(self) -> str:
+    def problem(self) -> str:
         """Why nobody answers though a server is there."""
-        found = self._troubles()
+        found = self._problems()
         return f"its server {found[0]}" if found and all(found) else ""
 
-    def _troubles(self) -> list[str]:
-        return [self._servers.trouble(h) for h in library.readers_of(self._writer)]
+    def _problems(self) -> list[str]:
+        return [self._servers.problem(h) for h in library.readers_of(self._writer)]
 
     def call(self, request: bytes, on_response: TakeMessage, on_loss: Callable[[], None]) -> None:
         """Send a request."""

@@ -51,7 +51,7 @@ class ServicePeers:
         self._look_up = look_up
         self._known: dict[int, str] = {}
 
-    def trouble(self, handle: int) -> str:
+    def problem(self, handle: int) -> str:
         """Why an endpoint is not understood; empty if it is, and for one that has left already."""
         known = self._known.get(handle)
         if known is None:

@@ -100,7 +100,7 @@ class RclCaller:
         return bool(self._client.service_is_ready())
 
     @property
-    def trouble(self) -> str:
+    def problem(self) -> str:
         """All servers are understood."""
         return ""
 

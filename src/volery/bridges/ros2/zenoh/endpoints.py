@@ -168,7 +168,7 @@ class ZenohCaller:
         return self._is_there(self._spec)
 
     @property
-    def trouble(self) -> str:
+    def problem(self) -> str:
         """All servers are understood."""
         return ""
 

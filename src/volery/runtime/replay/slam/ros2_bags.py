@@ -42,18 +42,18 @@ def bag_topics(path: Path) -> dict[str, str]:
 
 
 class BagWalk:
-    """The records of a ROS 2 bag; afterwards `trouble` says what was wrong, if anything."""
+    """The records of a ROS 2 bag; afterwards `problem` says what was wrong, if anything."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self.trouble = ""
+        self.problem = ""
 
     def __iter__(self) -> Iterator[LogRecord]:
         parts = _mcap_parts(self._path)
         for part in parts:
             walk = LogWalk(part)
             yield from walk
-            self.trouble = self.trouble or walk.trouble
+            self.problem = self.problem or walk.problem
         if not parts:
             yield from self._sqlite()
 
@@ -72,7 +72,7 @@ class BagWalk:
         except RecordingError:
             raise
         except Exception as error:  # whatever the reader makes of damaged bytes
-            self.trouble = f"cut off or damaged: {error}"
+            self.problem = f"cut off or damaged: {error}"
 
 
 def _topic(connection: Any) -> LogTopic:

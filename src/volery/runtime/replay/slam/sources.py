@@ -27,12 +27,12 @@ class SlamInput(NamedTuple):
 
 @dataclass
 class LogSource:
-    """A log with messages of types; afterwards `trouble` says what was wrong, if anything."""
+    """A log with messages of types; afterwards `problem` says what was wrong, if anything."""
 
     path: Path
     topics: dict[str, str]
     """Types by topic."""
-    trouble: str = ""
+    problem: str = ""
     refused: int = 0
     """Messages that cannot be read."""
     damage: str = ""
@@ -51,10 +51,10 @@ class LogSource:
                 message = decoder.decode(record).message
             except GraphError as error:
                 self.refused += 1
-                self.trouble = self.trouble or f"{record.topic.topic}: {error}"
+                self.problem = self.problem or f"{record.topic.topic}: {error}"
                 continue
             yield SlamInput(record.topic.topic, record.time_ns, message)
-        self.trouble = self.trouble or getattr(walk, "trouble", "")
+        self.problem = self.problem or getattr(walk, "problem", "")
 
 
 @dataclass
@@ -63,7 +63,7 @@ class TextSource:
 
     path: Path
     layout: TextLayout
-    trouble: str = ""
+    problem: str = ""
     refused: int = 0
     """Lines left out."""
     damage: str = ""
@@ -90,7 +90,7 @@ class TextSource:
                 yield SlamInput(published.topic, published.time_ns, published.message)
         self.refused, self.doubts = scans.left_out, scans.doubts
         if scans.left_out:
-            self.trouble = f"{counted(scans.left_out, 'line')} left out; {scans.trouble}"
+            self.problem = f"{counted(scans.left_out, 'line')} left out; {scans.problem}"
 
 
 def open_source(path: Path, layout: TextLayout | None = None) -> LogSource | TextSource:
@@ -114,4 +114,4 @@ def open_source(path: Path, layout: TextLayout | None = None) -> LogSource | Tex
         raise RecordingError(f"{error}; a scanner's text log needs --layout") from None
     summary = summarize(path)
     topics = {t.topic: t.msgtype for t in summary.topics}
-    return LogSource(path, topics, damage=summary.trouble, _walk=LogWalk)
+    return LogSource(path, topics, damage=summary.problem, _walk=LogWalk)
