@@ -54,8 +54,8 @@ def test_two_share_the_forest_and_repeat_themselves() -> None:
 
         managers = [node for node in simulation.nodes if isinstance(node, TaskManager)]
         assert [str(manager.phase) for manager in managers] == ["search", "search"]
-        assert len({manager.sector for manager in managers}) == 2
-        assert [set(manager.team.mates) for manager in managers] == [{"uav2"}, {"uav1"}]
+        assert len({manager.member.sector for manager in managers}) == 2
+        assert [set(manager.member.team.mates) for manager in managers] == [{"uav2"}, {"uav1"}]
         for start, end in zip(began, places, strict=True):
             assert np.hypot(*(end - start)[:2]) > 1.5
         contacts = {EventKind.COLLISION, EventKind.IMPACT}
@@ -88,7 +88,7 @@ def test_an_operators_hold_holds_until_resume() -> None:
         place = uav.position_map
         simulation.run(3.0)
         assert uav.mode.name == "HOLD"
-        assert (str(manager.phase), manager.sector) == ("hold", -1)
+        assert (str(manager.phase), manager.member.sector) == ("hold", -1)
         assert "held by the operator" in manager.problem
         assert np.linalg.norm(uav.position_map - place) < 0.3
         assert graph.call("/uav2/task_manager/resume").success
@@ -97,5 +97,5 @@ def test_an_operators_hold_holds_until_resume() -> None:
         assert np.linalg.norm(uav.position_map - place) > 1.5
         assert graph.call("/uav2/task_manager/land").success
         simulation.run(8.0)
-        assert (str(manager.phase), manager.sector) == ("done", -1)
+        assert (str(manager.phase), manager.member.sector) == ("done", -1)
         assert manager.problem == "landed by the operator"

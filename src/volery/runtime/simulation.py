@@ -388,10 +388,10 @@ class Simulation:
         self._live.look()
 
     def inject_fault(self, fault: Fault | Mapping[str, Any]) -> None:
-        """Let something go wrong: a fault as in a scenario's `faults`, at once if its time is past.
+        """Injects a fault as in a scenario's `faults`, at once if its time is past.
 
-        `simulation.inject_fault({"kind": "motor", "uav": "uav1", "rotor": 0})`. Raises `CommandError` for
-        one that cannot be.
+        `simulation.inject_fault({"kind": "motor", "uav": "uav1", "rotor": 0})`. Raises
+        `CommandError` for an impossible one.
         """
         self._check_open()
         self._faults.add(parse_fault(fault), client=self.graph.acting_client)

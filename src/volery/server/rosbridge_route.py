@@ -71,7 +71,7 @@ async def serve_rosbridge(websocket: WebSocket) -> None:
 def _gate_of(
     websocket: WebSocket, site: ServerState, world: JoinedWorld
 ) -> Iterator[AccessPolicy | None]:
-    """What the client may do, as long as it is there; an operator who leaves lets go of his UAVs."""
+    """Yields what the client may do; an operator that leaves releases its UAVs."""
     if websocket.state.role is not Role.OPERATOR:
         yield ViewerPolicy()
         return

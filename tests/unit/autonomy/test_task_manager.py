@@ -127,12 +127,12 @@ def test_many_finds_are_told_in_turns_and_broken_ones_not_at_all() -> None:
 def test_three_search_everything_and_come_home() -> None:
     bench = TeamBench(HOMES)
     bench.run(10.0)
-    sectors = [manager.sector for manager in bench.managers.values()]
+    sectors = [manager.member.sector for manager in bench.managers.values()]
     assert len(set(sectors)) == 3
     bench.run(140.0)
     assert set(bench.phases().values()) == {"done"}
     for name, manager in bench.managers.items():
-        assert manager.searched.all()
+        assert manager.member.searched.all()
         np.testing.assert_allclose(bench.uavs[name].place[:2], HOMES[name], atol=2.0)
 
 
@@ -140,7 +140,7 @@ def test_three_are_faster_than_one() -> None:
     times = []
     for homes in (HOMES, {"uav1": HOMES["uav1"]}):
         bench = TeamBench(homes)
-        while not bench.managers["uav1"].searched.all():
+        while not bench.managers["uav1"].member.searched.all():
             bench.run(1.0)
         times.append(bench.clock.now_ns)
     assert times[1] > 2.3 * times[0]
@@ -151,19 +151,19 @@ def test_a_bad_radio_costs_time_and_leaves_nothing_out(lost: float, doubled: flo
     bench = TeamBench(HOMES, lost, doubled)
     bench.run(250.0)
     assert set(bench.phases().values()) == {"done"}
-    assert all(manager.searched.all() for manager in bench.managers.values())
+    assert all(manager.member.searched.all() for manager in bench.managers.values())
 
 
 def test_the_rest_of_a_lost_uav_is_taken_over() -> None:
     bench = TeamBench(HOMES)
     bench.run(10.0)
-    left = bench.managers["uav2"].sector
+    left = bench.managers["uav2"].member.sector
     assert left >= 0
     bench.uavs["uav2"].stuck = True
     bench.hears = lambda one, other: "uav2" not in (one, other)
     bench.run(140.0)
     for name in ("uav1", "uav3"):
-        assert bench.managers[name].searched[left]
+        assert bench.managers[name].member.searched[left]
         assert bench.managers[name].phase == "done"
         assert "silent: uav2" in bench.managers[name].problem
 
@@ -171,11 +171,11 @@ def test_the_rest_of_a_lost_uav_is_taken_over() -> None:
 def test_one_that_gets_nowhere_leaves_its_sector_to_others() -> None:
     bench = TeamBench(HOMES)
     bench.run(10.0)
-    left = bench.managers["uav2"].sector
+    left = bench.managers["uav2"].member.sector
     bench.uavs["uav2"].stuck = True
     bench.run(250.0)
-    assert bench.managers["uav1"].searched.all()
-    assert bench.managers["uav2"].searched[left]
+    assert bench.managers["uav1"].member.searched.all()
+    assert bench.managers["uav2"].member.searched[left]
 
 
 def test_low_battery_brings_one_home_and_the_others_do_its_part() -> None:
@@ -187,27 +187,29 @@ def test_low_battery_brings_one_home_and_the_others_do_its_part() -> None:
     assert "low battery" in bench.managers["uav3"].problem
     bench.run(170.0)
     assert set(bench.phases().values()) == {"done"}
-    assert bench.managers["uav1"].searched.all()
+    assert bench.managers["uav1"].member.searched.all()
 
 
 def test_one_that_is_held_waits_and_others_take_its_sector() -> None:
     bench = TeamBench(HOMES)
     bench.run(10.0)
     uav, manager = bench.uavs["uav2"], bench.managers["uav2"]
-    left, place = manager.sector, uav.place.copy()
+    left, place = manager.member.sector, uav.place.copy()
     assert bench.order("uav2", "hold") == "holds until resume, return or land"
     bench.run(30.0)
     assert uav.asked[-1] == "hold"
-    assert (str(manager.phase), manager.sector) == ("hold", -1)
+    assert (str(manager.phase), manager.member.sector) == ("hold", -1)
     assert manager.problem == "held by the operator"
     np.testing.assert_allclose(uav.place, place, atol=1.0)
-    assert {bench.managers[n].sector for n in ("uav1", "uav3")} & {left} or manager.searched[left]
+    assert {bench.managers[n].member.sector for n in ("uav1", "uav3")} & {
+        left
+    } or manager.member.searched[left]
     bench.order("uav2", "resume")
     bench.run(2.0)
     assert (str(manager.phase), manager.problem, uav.paused) == ("search", "", False)
     bench.run(140.0)
     assert set(bench.phases().values()) == {"done"}
-    assert manager.searched.all()
+    assert manager.member.searched.all()
 
 
 def test_one_that_is_held_in_its_climb_climbs_on_before_it_searches() -> None:
@@ -222,7 +224,7 @@ def test_one_that_is_held_in_its_climb_climbs_on_before_it_searches() -> None:
     assert (str(manager.phase), uav.place[2]) == ("hold", 0.5)
     assert bench.order("uav1", "resume") == "searches"
     bench.run(1.0)
-    assert (str(manager.phase), manager.sector) == ("rise", -1)
+    assert (str(manager.phase), manager.member.sector) == ("rise", -1)
     assert 1.0 < uav.place[2] < 2.0
     bench.run(3.0)
     assert manager.phase == "search"
@@ -262,20 +264,20 @@ def test_one_that_is_landed_gives_its_sector_up_and_may_go_on() -> None:
     bench = TeamBench(HOMES)
     bench.run(10.0)
     uav, manager = bench.uavs["uav1"], bench.managers["uav1"]
-    left = manager.sector
+    left = manager.member.sector
     bench.order("uav1", "land")
     bench.run(3.0)
     assert not uav.flies
-    assert (str(manager.phase), manager.sector) == ("done", -1)
+    assert (str(manager.phase), manager.member.sector) == ("done", -1)
     assert manager.problem == "landed by the operator"
-    while not manager.searched[left]:  # by another one
+    while not manager.member.searched[left]:  # by another one
         bench.run(1.0)
-    assert not manager.searched.all()
+    assert not manager.member.searched.all()
     bench.order("uav1", "resume")
     bench.run(1.0)
     assert uav.flies
     bench.run(1.0)
-    assert manager.sector >= 0
+    assert manager.member.sector >= 0
 
 
 def test_orders_before_the_take_off_keep_it_down() -> None:
@@ -314,18 +316,18 @@ def test_one_that_somebody_landed_says_so_and_gives_its_sector_up() -> None:
     sonar = bench.graph.advertise("/uav3/range", "sensor_msgs/msg/Range")
     bench.run(10.0)
     manager, uav = bench.managers["uav3"], bench.uavs["uav3"]
-    left = manager.sector
+    left = manager.member.sector
     bench.graph.call("/uav3/land")
     for _ in range(30):
         reading = zero_message("sensor_msgs/msg/Range")
         reading.range = -math.inf  # nearer than can be measured
         sonar.publish(reading)
         bench.run(0.1)
-    assert (str(manager.phase), manager.sector) == ("down", -1)
+    assert (str(manager.phase), manager.member.sector) == ("down", -1)
     assert manager.problem == "came down, and not by its mission"
     bench.run(80.0)
     assert not uav.flies
-    assert bench.managers["uav1"].searched[left]
+    assert bench.managers["uav1"].member.searched[left]
 
 
 def test_a_goal_of_the_explorer_that_comes_late_keeps_nobody_from_home() -> None:
@@ -346,14 +348,16 @@ def test_a_network_that_falls_apart_and_comes_together() -> None:
     bench.run(10.0)
     bench.hears = lambda _one, _other: False
     bench.run(40.0)
-    alone = [manager.searched.copy() for manager in bench.managers.values()]
+    alone = [manager.member.searched.copy() for manager in bench.managers.values()]
     assert not np.array_equal(alone[0], alone[2])
     bench.hears = lambda _one, _other: True
     bench.run(1.0)
-    together = [manager.searched.tolist() for manager in bench.managers.values()]
+    together = [manager.member.searched.tolist() for manager in bench.managers.values()]
     assert together[0] == together[1] == together[2]
     assert together[0] == np.logical_or.reduce(alone).tolist()
-    sectors = [manager.sector for manager in bench.managers.values() if manager.sector >= 0]
+    sectors = [
+        manager.member.sector for manager in bench.managers.values() if manager.member.sector >= 0
+    ]
     assert len(set(sectors)) == len(sectors)
 
 
@@ -362,8 +366,8 @@ def test_a_late_comer_takes_its_part() -> None:
     bench.run(30.0)
     bench.add("uav2", (80.0, 60.0))
     bench.run(10.0)
-    assert bench.managers["uav2"].searched.any()
-    assert bench.managers["uav2"].sector not in (-1, bench.managers["uav1"].sector)
+    assert bench.managers["uav2"].member.searched.any()
+    assert bench.managers["uav2"].member.sector not in (-1, bench.managers["uav1"].member.sector)
 
 
 def test_a_target_is_on_every_list_within_a_second() -> None:
@@ -375,7 +379,7 @@ def test_a_target_is_on_every_list_within_a_second() -> None:
     sees.publish(message_type(type_name)(header(bench.clock.now_ns, "map"), [target]))
     bench.run(1.0)
     for manager in bench.managers.values():
-        (found,) = manager.targets.targets()
+        (found,) = manager.member.targets.targets()
         assert (found.finder, found.place[0]) == ("uav2", 33.0)
 
 
@@ -423,7 +427,9 @@ def test_a_kept_state_is_all_that_a_manager_knows() -> None:
     bench, other = TeamBench(HOMES), TeamBench(HOMES, lost=1.0)
     bench.run(30.0)
     other.run(30.0)
-    assert bench.managers["uav1"].searched.sum() > other.managers["uav1"].searched.sum()
+    assert (
+        bench.managers["uav1"].member.searched.sum() > other.managers["uav1"].member.searched.sum()
+    )
     for name, manager in bench.managers.items():
         other.managers[name].set_state(copy.deepcopy(manager.get_state()))
         other.uavs[name].place = bench.uavs[name].place.copy()
@@ -432,8 +438,8 @@ def test_a_kept_state_is_all_that_a_manager_knows() -> None:
     bench.run(20.0)
     other.run(20.0)
     for name, manager in bench.managers.items():
-        assert manager.sector == other.managers[name].sector
-        assert manager.searched.tolist() == other.managers[name].searched.tolist()
+        assert manager.member.sector == other.managers[name].member.sector
+        assert manager.member.searched.tolist() == other.managers[name].member.searched.tolist()
 
 
 def test_who_has_nothing_to_search_waits_and_takes_over() -> None:
@@ -447,7 +453,7 @@ def test_who_has_nothing_to_search_waits_and_takes_over() -> None:
     bench.run(2.0)
     assert bench.phases() == {"uav1": "return", "uav2": "search"}
     assert bench.uavs["uav2"].way
-    bench.managers["uav2"].searched[0] = True  # as if it had heard so
+    bench.managers["uav2"].member.searched[0] = True  # as if it had heard so
     bench.run(0.5)
     assert bench.phases()["uav2"] == "return"
     assert len(bench.uavs["uav2"].way) == 1
@@ -462,11 +468,11 @@ def test_an_explorer_says_when_it_is_through() -> None:
         text = state if state == "{" else json.dumps({"state": state})
         says.publish(String(text))
         bench.run(0.3)
-        sectors.append(manager.sector)
+        sectors.append(manager.member.sector)
     first, second, third = sectors[0], sectors[2], sectors[5]
     assert sectors == [first, first, second, second, second, third, third]
     assert len({first, second, third}) == 3
-    assert manager.searched.nonzero()[0].tolist() == [first]
+    assert manager.member.searched.nonzero()[0].tolist() == [first]
 
 
 def test_a_corrected_pose_is_one_in_the_map() -> None:

@@ -1,6 +1,6 @@
-"""One UAV of a team: what it knows by itself, what it hears from the others, what it tells them.
+"""One UAV of a team: its own state, the others' states by radio, and the reports it publishes.
 
-`task_manager.TaskManager` decides on top of it.
+`task_manager.TaskManager` decides what the UAV does.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.perception.map_frame import UNKNOWN_PLACE, MapFrame
 from volery.autonomy.perception.scan_points import OdometrySample
@@ -35,180 +34,155 @@ from volery.graph.messages import (
 )
 from volery.graph.nodes.node import Node
 
-Array = NDArray[np.float64]
-
-POSE_S = 1.0
-"""Without odometry for so long it does not know where it is. Modelling choice."""
+POSE_TIMEOUT_S = 1.0
+"""Age of the newest pose from which on the position counts as unknown. Modelling choice."""
 _TARGETS_TYPE = "volery_interfaces/msg/Targets"
 _STATUS_TYPE = "volery_interfaces/msg/MissionStatus"
+_STATE = (
+    "phase",
+    "sector",
+    "since_ns",
+    "coverage",
+    "progress_ns",
+    "searched",
+    "given_up",
+    "targets",
+    "team",
+    "pose",
+    "pose_ns",
+    "battery",
+    "heard_ns",
+    "_frame",
+    "_num_reports",
+)
+"""All attributes that change."""
 
 
-class TeamMember(Node):
-    """Hears odometry, battery, finds and `radio/team`; says `team`, `mission` and `targets`."""
+class TeamMember:
+    """Publishes `team`, `mission` and `targets` through its node.
 
-    STATE: tuple[str, ...] = (
-        "phase",
-        "sector",
-        "searched",
-        "targets",
-        "team",
-        "problem",
-        "_pose",
-        "_pose_ns",
-        "_frame",
-        "_since_ns",
-        "_given_up",
-        "_coverage",
-        "_news_ns",
-        "_battery",
-        "_heard_ns",
-        "_reports",
-    )
-    """Everything that changes."""
+    Subscribes to odometry, battery, detections and `radio/team`.
+    """
 
-    def __init__(self, name: str, **options: Any) -> None:
-        super().__init__(name, **options)
-        self.settings = settings = TeamSettings.declare(self)
+    def __init__(self, node: Node, settings: TeamSettings) -> None:
+        self._node, self._settings = node, settings
         count = len(settings.sectors)
         self.phase = MissionPhase.WAIT
         self.sector = -1
-        """The one that it searches, -1: none ..."""
-        self._since_ns = 0
-        """... since when ..."""
-        self._coverage: Coverage | None = None
-        """... and what of it has been in sight."""
-        self._news_ns = 0
-        """When something new was last seen, or home came nearer."""
+        """Index of the sector that the UAV searches; -1: none."""
+        self.since_ns = 0
+        """Time at which it took the sector."""
+        self.coverage: Coverage | None = None
+        """Cells of the sector that have been in sight."""
+        self.progress_ns = 0
+        """Time of the last progress: new cells in sight, or a shorter distance to home."""
         self.searched = np.zeros(count, np.bool_)
-        """(S,) by anybody."""
-        self._given_up = np.zeros(count, np.bool_)
+        """(S,) sectors searched by any UAV."""
+        self.given_up = np.zeros(count, np.bool_)
+        """(S,) sectors that this UAV has given up."""
         self.targets = TargetList(settings.gate_m)
         self.team = TeamState(count)
-        self.problem = ""
+        self.pose: OdometrySample | None = None
+        """In the map."""
+        self.pose_ns = 0
+        self.battery = math.nan
+        """Charge, 0 to 1; NaN: unknown."""
+        self.heard_ns = 0
+        """Time of the last report of another UAV."""
         self._frame = MapFrame()
-        self._pose: OdometrySample | None = None
-        self._pose_ns = 0
-        self._battery = math.nan
-        self._heard_ns = 0
-        """When anybody was heard."""
-        self._reports = 0
-        """How many have been sent."""
+        self._num_reports = 0
 
         self._report_type = message_type(REPORT_TYPE)
         self._targets_type = message_type(_TARGETS_TYPE)
         self._status_type = message_type(_STATUS_TYPE)
-        self._report = self.create_publisher(self._report_type, "team", 1)
-        self._found = self.create_publisher(self._targets_type, "targets", 1, latched=True)
-        self._status = self.create_publisher(self._status_type, "mission", 1)
-        self.create_subscription(Odometry, settings.odometry, self._on_odometry, 5)
-        self.create_subscription(BatteryState, "battery", self._on_battery, 1)
-        self.create_subscription(self._report_type, "radio/team", self._on_report, 20)
-        self.create_subscription(self._targets_type, "target_detection/targets", self._on_finds, 5)
+        self._report = node.create_publisher(self._report_type, "team", 1)
+        self._found = node.create_publisher(self._targets_type, "targets", 1, latched=True)
+        self._status = node.create_publisher(self._status_type, "mission", 1)
+        node.create_subscription(Odometry, settings.odometry, self._on_odometry, 5)
+        node.create_subscription(BatteryState, "battery", self._on_battery, 1)
+        node.create_subscription(self._report_type, "radio/team", self._on_report, 20)
+        node.create_subscription(
+            self._targets_type, "target_detection/targets", self._on_detections, 5
+        )
         if settings.corrected:
-            self.create_subscription(TFMessage, "/tf", self._on_tf, 50)
+            node.create_subscription(TFMessage, "/tf", self._frame.on_tf, 50)
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
-        return save_attributes(self, self.STATE)
+        """Returns the state for a snapshot."""
+        return save_attributes(self, _STATE)
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a state of `get_state`."""
         restore_attributes(self, state)
 
-    @property
-    def now_ns(self) -> int:
-        """Time of the node's clock."""
-        return self.get_clock().now_ns()
+    def workers(self) -> dict[str, Worker]:
+        """Returns the UAVs that share the search, by name: the heard ones and this one."""
+        assert self.pose is not None
+        workers = self.other_workers()
+        workers[self._settings.name] = Worker(
+            self.pose.position[:2], self.sector, self.since_ns, self.given_up
+        )
+        return workers
 
-    def as_worker(self) -> Worker:
-        """What others see of this UAV's work."""
-        assert self._pose is not None
-        return Worker(self._pose.position[:2], self.sector, self._since_ns, self._given_up)
+    def other_workers(self) -> dict[str, Worker]:
+        """Returns the other UAVs that share the search, by name."""
+        return self.team.workers(self._now_ns, self._settings.patience_s)
 
-    # ------------------------------------------------------------------------------ what it hears
+    def take_sector(self, sector: int, coverage: Coverage) -> None:
+        """Claims a sector from now on."""
+        self.sector, self.coverage = sector, coverage
+        self.since_ns = self.progress_ns = self._now_ns
 
-    def _on_tf(self, message: TFMessage) -> None:
-        self._frame.on_tf(message)
+    def leave_sector(self) -> None:
+        """Leaves the sector to others."""
+        self.sector, self.coverage = -1, None
 
-    def _on_odometry(self, message: Odometry) -> None:
-        pose = self._frame.pose_in_map(message)
-        if not np.isfinite([*pose.position, *pose.velocity]).all() or is_stuck(pose, self._pose):
-            return
-        if self._frame.is_lost:
-            return
-        self._pose, self._pose_ns = pose, self.now_ns
-        coverage = self._coverage
-        if coverage is not None and coverage.look(pose.position[:2], self.settings.sight_m):
-            self._news_ns = self._pose_ns
-
-    def _on_battery(self, message: BatteryState) -> None:
-        self._battery = float(message.percentage)
-
-    def _on_report(self, report: Any) -> None:
-        now = self.now_ns
-        if report.name == self.settings.name or not self.team.hear(report, now):
-            return
-        self._heard_ns = now
-        self.searched |= from_bits(report.searched, len(self.searched))
-        if self.targets.take(map(Detection.from_message, report.targets)):
-            self._tell_targets()
-
-    def _on_finds(self, message: Any) -> None:
-        known = len(self.targets.finds)
-        finds = [Detection.from_message(each) for each in message.targets]
-        if self.targets.take(f._replace(finder=self.settings.name) for f in finds):
-            self._tell_targets()
-        if len(self.targets.finds) > known:
-            self.tell_team()  # at once: the others shall know within a second
-
-    # -------------------------------------------------------------------------------- what it says
-
-    def what_is_wrong(self, now: int) -> str:
-        """What people should know, in words; empty: nothing."""
-        wrong = []
-        if now - self._pose_ns > POSE_S * NS_PER_S:
-            wrong.append(UNKNOWN_PLACE if self._frame.is_lost else "no odometry")
+    def problems(self) -> str:
+        """Returns what an operator should know, in words; empty: nothing."""
+        now, found = self._now_ns, []
+        if now - self.pose_ns > POSE_TIMEOUT_S * NS_PER_S:
+            found.append(UNKNOWN_PLACE if self._frame.is_lost else "no odometry")
         silent = sorted(
             name
             for name, mate in self.team.mates.items()
-            if now - mate.heard_ns > self.settings.patience_s * NS_PER_S
+            if now - mate.heard_ns > self._settings.patience_s * NS_PER_S
             and mate.phase not in (MissionPhase.DONE, MissionPhase.DOWN)
         )
         if silent:
-            wrong.append(f"silent: {', '.join(silent)}")
-        if self._battery < self.settings.low_battery:
-            wrong.append("low battery")
+            found.append(f"silent: {', '.join(silent)}")
+        if self.battery < self._settings.low_battery:
+            found.append("low battery")
         if self.team.strangers:
-            wrong.append(f"another search: {', '.join(sorted(self.team.strangers))}")
-        return "; ".join(wrong)
+            found.append(f"another search: {', '.join(sorted(self.team.strangers))}")
+        return "; ".join(found)
 
-    def tell_team(self) -> None:
-        """Tell the others all that it knows."""
-        pose, now = self._pose, self.now_ns
+    def publish_report(self) -> None:
+        """Publishes this UAV's state for the team."""
+        pose, now = self.pose, self._now_ns
         if pose is None:
             return
-        self._reports += 1
+        self._num_reports += 1
         self._report.publish(
             self._report_type(
                 header(now, "map"),
-                self.settings.name,
+                self._settings.name,
                 str(self.phase),
                 Point(*pose.position.tolist()),
                 Vector3(*pose.velocity.tolist()),
-                single(self._battery),
+                single(self.battery),
                 len(self.searched),
                 self.sector,
-                time_from_ns(self._since_ns),
+                time_from_ns(self.since_ns),
                 to_bits(self.searched),
-                to_bits(self._given_up),
-                self.targets.to_tell(self._reports),
+                to_bits(self.given_up),
+                self.targets.to_tell(self._num_reports),
             )
         )
 
-    def tell_status(self) -> None:
-        """Tell whoever watches how the search fares."""
-        now = self.now_ns
-        heard = [name for name, _ in self.team.heard(now, self.settings.patience_s)]
+    def publish_status(self, problem: str) -> None:
+        """Publishes the state of the search for operators."""
+        now = self._now_ns
+        heard = [name for name, _ in self.team.heard(now, self._settings.patience_s)]
         self._status.publish(
             self._status_type(
                 header(now, "map"),
@@ -218,10 +192,45 @@ class TeamMember(Node):
                 len(self.searched),
                 heard,
                 len(self.targets.targets()),
-                self.problem,
+                problem,
             )
         )
 
-    def _tell_targets(self) -> None:
+    @property
+    def _now_ns(self) -> int:
+        return self._node.get_clock().now_ns()
+
+    def _on_odometry(self, message: Odometry) -> None:
+        pose = self._frame.pose_in_map(message)
+        if not np.isfinite([*pose.position, *pose.velocity]).all() or is_stuck(pose, self.pose):
+            return
+        if self._frame.is_lost:
+            return
+        self.pose, self.pose_ns = pose, self._now_ns
+        coverage = self.coverage
+        if coverage is not None and coverage.look(pose.position[:2], self._settings.sight_m):
+            self.progress_ns = self.pose_ns
+
+    def _on_battery(self, message: BatteryState) -> None:
+        self.battery = float(message.percentage)
+
+    def _on_report(self, report: Any) -> None:
+        now = self._now_ns
+        if report.name == self._settings.name or not self.team.hear(report, now):
+            return
+        self.heard_ns = now
+        self.searched |= from_bits(report.searched, len(self.searched))
+        if self.targets.take(map(Detection.from_message, report.targets)):
+            self._publish_targets()
+
+    def _on_detections(self, message: Any) -> None:
+        known = len(self.targets.finds)
+        detections = [Detection.from_message(each) for each in message.targets]
+        if self.targets.take(d._replace(finder=self._settings.name) for d in detections):
+            self._publish_targets()
+        if len(self.targets.finds) > known:
+            self.publish_report()  # at once: the team needs it within a second
+
+    def _publish_targets(self) -> None:
         found = [find.message() for find in self.targets.targets()]
-        self._found.publish(self._targets_type(header(self.now_ns, "map"), found))
+        self._found.publish(self._targets_type(header(self._now_ns, "map"), found))

@@ -1,10 +1,10 @@
 """The task manager: one UAV's part in a search that a team shares out by radio.
 
-Each UAV has one, and none leads. The area is a grid of sectors; a UAV that is free takes the one
-that falls to it by what it has heard (`team.assignment`), has it explored, and tells the others
-several times a second what it does, what has been searched and what has been found. So a report
-that is lost, repeated or late does no harm, a UAV may come late or fall silent, and parts of a team
-that do not hear each other go on, each by itself, until they do again.
+Each UAV has one, and none leads. The area is a grid of sectors. A free UAV takes the sector that
+`team.assignment` gives it by the reports it has received, has it explored, and publishes several
+times a second its own state, the searched sectors and the targets. A lost, repeated or late report
+does no harm, a UAV may join late or fall silent, and parts of a team that lose contact go on by
+themselves until they meet again.
 """
 
 from __future__ import annotations
@@ -12,18 +12,22 @@ from __future__ import annotations
 import contextlib
 import json
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.team.assignment import SectorClaim, assign, must_yield
-from volery.autonomy.team.member import POSE_S, TeamMember
+from volery.autonomy.team.ground_contact import STILL_M_S, GroundContact
+from volery.autonomy.team.member import POSE_TIMEOUT_S, TeamMember
 from volery.autonomy.team.mission_messages import goal_at, polygon_of
 from volery.autonomy.team.sectors import Coverage
+from volery.autonomy.team.settings import TeamSettings
 from volery.autonomy.team.team_state import ALOFT, MissionPhase
 from volery.core.clock import NS_PER_S
 from volery.core.errors import GraphError
+from volery.core.saved_state import restore_attributes, save_attributes
 from volery.core.vectors import norm
 from volery.graph.messages import (
     Bool,
@@ -35,110 +39,109 @@ from volery.graph.messages import (
     Vector3,
     message_type,
 )
+from volery.graph.nodes.node import Node
 from volery.graph.nodes.service_client import Client
 
 _PERIOD_S = 0.2
 _REPEAT_S = 2.0
-"""A take-off or landing that has not begun is asked for again, and the way home."""
-_LOW_M, _SONAR_S = 1.5, 1.0
-"""Lower than this by a sonar heard so lately it climbs before it searches: planners plan nothing
-near the ground."""
+"""Period at which a take-off, a landing or the way home is requested until it begins."""
 _CLIMB_M_S, _CLIMB_END_M = 1.0, 0.3
-"""How fast it climbs then, and how far below its height the speed is asked for no more."""
-_RISE_S = 30.0
-"""A take-off that takes longer has failed."""
-_RETURN_STUCK_S = 60.0
-"""Without coming nearer to home for so long it lands where it is."""
-_LOST_S = 30.0
-"""After so long without knowing where it is it lands."""
+"""Climb rate in the air, and the distance below the altitude at which it ends."""
+_RISE_TIMEOUT_S = 30.0
+"""Duration after which a take-off has failed."""
+_RETURN_TIMEOUT_S = 60.0
+"""Duration without progress towards home after which the UAV lands."""
+_LOST_TIMEOUT_S = 30.0
+"""Duration without a position after which the UAV lands."""
 _HOME_M, _NEARER_M = 1.5, 1.0
-_LANDED_M, _SUNK_M, _STILL_M_S = 0.3, 0.25, 0.2
-_ALOFT_M = 0.6
-"""Farther than this above where it stood last it flies again."""
-_GROUND_M, _GROUND_S = 0.35, 2.0
-"""So near to the ground by its sonar, and still, for so long: it stands on it."""
+_LANDED_M, _SUNK_M = 0.3, 0.25
+_NEVER_NS = -1 << 62
 HELD, LANDED = "held by the operator", "landed by the operator"
 DOWN = "came down, and not by its mission"
-"""All modelling choices."""
+"""All limits are modelling choices."""
+_STATE = (
+    "problem",
+    "_home",
+    "_began_ns",
+    "_phase_ns",
+    "_requested_ns",
+    "_nearest_m",
+    "_highest_m",
+    "_ordered_home",
+    "_order",
+    "_paused",
+    "_has_risen",
+    "_climbs",
+    "_explores",
+)
+"""All attributes that change."""
+_PARTS = ("member", "ground")
 
 
-class TaskManager(TeamMember):
-    """Takes off, has its sectors explored, shares what is found, comes home and lands.
+class TaskManager(Node):
+    """Takes off, has its sectors explored, shares targets, returns home and lands.
 
-    Says `search_area` (where to explore; no corners: nowhere), the goal to fly to on `goal_topic`,
-    `mission`, `targets` and, for the radio, `team`. Hears odometry, `battery`,
+    Publishes `search_area` (area to explore; no corners: none), the goal on `goal_topic`,
+    `mission`, `targets` and, for the radio, `team`. Subscribes to odometry, `battery`, `range`,
     `target_detection/targets` and, from the radio, `radio/team`.
-    People's orders are services: `~/return_home` ends its search, `~/hold` and `~/land` have it
-    wait where it is or land there, its sector left to others, until `~/resume`. While it holds
-    `planning/pause` (std_msgs/Bool) has planners command nothing. One that stands on the ground by
-    its sonar (`range`) though nothing here had it land gives its sector up, too.
-    An explorer may tell on `exploration/status` (JSON with a `state`: searching, then done or
-    blocked) that it is through with an area; else what has been in sight decides.
+    Services: `~/return_home` ends the search; `~/hold` and `~/land` make the UAV hold or land and
+    leave its sector to others, until `~/resume`. While it holds, `planning/pause` (std_msgs/Bool)
+    stops the planners. A UAV that stands on the ground by its sonar without an order to land gives
+    its sector up.
+    An explorer may publish on `exploration/status` (JSON with a `state`: searching, then done or
+    blocked) that it is through with an area; else the cells in sight decide.
 
     Parameters
     ----------
     area_m: [x_min, y_min, x_max, y_max] in the map, the same for the whole team.
-    sector_m: about how long a sector's sides are.
-    altitude_m: height to which it takes off.
-    cell_m, sight_m, enough: a sector is searched when this share of its cells has been in sight.
-    gather_s: how long to listen for the team before the take-off.
-    patience_s: after so long a silence a UAV counts as lost, and its sector is taken over.
-    stuck_s: a sector in which nothing new has been seen for so long is given up.
-    low_battery: charge, 0 to 1, at which it goes home.
-    search_s: how long it searches at most; 0: without an end.
-    alone_s: after so long without hearing anybody, once it has, it goes home; 0: it goes on.
-    gate_m: finds nearer to each other than this are of one thing.
-    odometry: topic of its pose; corrected: whether `/tf` tells where its frame lies in the map.
-    goal_topic: where goals are published. Not `goal_pose`, to which flight modes fly straight on.
+    sector_m: approximate side of a sector.
+    altitude_m: height to which the UAV takes off.
+    cell_m, sight_m, enough: a sector is searched when this fraction of its cells has been in sight.
+    gather_s: duration of listening for the team before the take-off.
+    patience_s: silence after which a UAV counts as lost, and its sector is taken over.
+    stuck_s: duration without new cells in sight after which a sector is given up.
+    low_battery: charge, 0 to 1, at which the UAV returns home.
+    search_s: maximum duration of the search; 0: none.
+    alone_s: silence of all others after which the UAV returns home; 0: it goes on.
+    gate_m: detections closer to each other than this are one target.
+    odometry: topic of the pose; corrected: whether `/tf` transforms its frame into the map.
+    goal_topic: topic of goals. Not `goal_pose`, to which flight modes fly straight.
 
     """
 
-    STATE = (
-        "_home",
-        "_began_ns",
-        "_phase_ns",
-        "_asked_ns",
-        "_nearest_m",
-        "_highest_m",
-        "_ordered_home",
-        "_order",
-        "_paused",
-        "_stands_m",
-        "_low_ns",
-        "_sonar_m",
-        "_sonar_ns",
-        "_has_risen",
-        "_climbs",
-        "_explores",
-        *TeamMember.STATE,
-    )
-
     def __init__(self, **options: Any) -> None:
         super().__init__("task_manager", **options)
+        self.settings = TeamSettings.declare(self)
+        self.problem = ""
+        """What an operator should know; empty: nothing."""
         self._home = np.zeros(3)
         self._began_ns: int | None = None
         self._phase_ns = 0
-        self._asked_ns = -1 << 62
+        self._requested_ns = _NEVER_NS
         self._nearest_m = math.inf
-        """To home, so far."""
+        """Smallest distance to home so far."""
         self._highest_m = -math.inf
-        """Since the landing began."""
+        """Greatest height since the landing began."""
         self._ordered_home = False
         self._order = ""
-        """What an operator has it do, in words; empty: nothing."""
+        """The operator's order, in words; empty: none."""
         self._paused = False
-        self._stands_m = 0.0
-        """Height in the map of the place on which it stood last, and ..."""
-        self._low_ns: int | None = None
-        """... since when its sonar says that it stands on the ground; None: it does not."""
-        self._sonar_m, self._sonar_ns = math.inf, -1 << 62
-        """Height above ground by its sonar, and when it said so."""
         self._has_risen = False
-        """Whether the last climb has come to its end."""
+        """Whether the last climb is complete."""
         self._climbs = False
-        """Whether it rises from a place in the air, which no take-off does."""
+        """Whether the UAV climbs from the air, which no take-off does."""
         self._explores = False
-        """Whether the explorer has taken up the present sector."""
+        """Whether the explorer has begun with the present sector."""
+        self.member = TeamMember(self, self.settings)
+        self.ground = GroundContact()
+        self._phases: dict[MissionPhase, Callable[[OdometrySample, int], None]] = {
+            MissionPhase.WAIT: self._wait,
+            MissionPhase.RISE: self._rise,
+            MissionPhase.SEARCH: self._search,
+            MissionPhase.IDLE: self._choose,
+            MissionPhase.RETURN: self._return,
+            MissionPhase.LAND: self._sink,
+        }
         self._area = self.create_publisher(PolygonStamped, "search_area", 1, latched=True)
         self._goal = self.create_publisher(PoseStamped, self.settings.goal_topic, 1, latched=True)
         self._take_off = self.create_client("volery_interfaces/srv/TakeOffTo", "take_off_to")
@@ -152,28 +155,44 @@ class TaskManager(TeamMember):
         self.create_subscription(String, "exploration/status", self._on_explorer, 5)
         self.create_timer(_PERIOD_S, self._on_timer)
 
+    def get_state(self) -> dict[str, Any]:
+        """Returns the state for a snapshot."""
+        parts = {name: getattr(self, name).get_state() for name in _PARTS}
+        return {"parts": parts, **save_attributes(self, _STATE)}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Restores a state of `get_state`."""
+        for name in _PARTS:
+            getattr(self, name).set_state(state["parts"][name])
+        restore_attributes(self, {name: state[name] for name in _STATE})
+
+    @property
+    def phase(self) -> MissionPhase:
+        """The present phase of the mission."""
+        return self.member.phase
+
+    @property
+    def _now_ns(self) -> int:
+        return self.get_clock().now_ns()
+
+    def _on_range(self, message: Range) -> None:
+        self.ground.on_range(message, self._now_ns)
+
     def _on_explorer(self, message: String) -> None:
-        """An explorer that says when it is done with an area, or cannot get on in it."""
-        now, state = self.now_ns, _state_in(message.data)
+        """Marks the sector by an explorer's state: searched, or given up."""
+        now, state, member = self._now_ns, _state_in(message.data), self.member
         if state == "searching":
             self._explores = True
         elif self._explores and self.phase is MissionPhase.SEARCH and state in ("done", "blocked"):
-            self.searched[self.sector] = state == "done"
-            self._given_up[self.sector] |= state == "blocked"
+            member.searched[member.sector] = state == "done"
+            member.given_up[member.sector] |= state == "blocked"
             self._drop(now)
 
-    def _on_range(self, message: Range) -> None:
-        self._sonar_m, self._sonar_ns = max(float(message.range), 0.0), self.now_ns
-        if not (message.range <= _GROUND_M):  # too near to be measured is -inf
-            self._low_ns = None
-        elif self._low_ns is None:
-            self._low_ns = self.now_ns
-
-    # ------------------------------------------------------------------------------ people's orders
+    # ---------------------------------------------------------------------------- operator's orders
 
     def _on_return_home(self, _request: Any, response: Any) -> Any:
         self._ordered_home = True
-        now, aloft = self.now_ns, self._is_aloft()
+        now, aloft = self._now_ns, self._is_aloft()
         waits = self.phase in (MissionPhase.HOLD, MissionPhase.DONE, MissionPhase.DOWN)
         if (aloft and waits) or self._lands_by_order():
             self._call(self._hold)  # ends what else is flown
@@ -183,7 +202,7 @@ class TaskManager(TeamMember):
     def _on_hold(self, _request: Any, response: Any) -> Any:
         if not self._is_aloft():
             return _answer(response, False, f"it is not in the air ({self.phase})")
-        self._give_way(MissionPhase.HOLD, HELD)
+        self._suspend(MissionPhase.HOLD, HELD)
         self._call(self._hold)
         return _answer(response, True, "holds until resume, return or land")
 
@@ -191,15 +210,16 @@ class TaskManager(TeamMember):
         if not self._is_aloft():
             self._ordered_home = True
             return _answer(response, True, "stays on the ground until resume")
-        self._give_way(MissionPhase.LAND, LANDED)
-        self._asked_ns = -1 << 62  # `land` is asked for with the next tick
+        self._suspend(MissionPhase.LAND, LANDED)
+        self._requested_ns = _NEVER_NS  # `land` is requested with the next tick
         return _answer(response, True, "lands, and stays there until resume")
 
     def _on_resume(self, _request: Any, response: Any) -> Any:
-        if self._pose is None or self._began_ns is None:
+        pose = self.member.pose
+        if pose is None or self._began_ns is None:
             return _answer(response, False, "it does not know where it is")
         self._ordered_home = False
-        if self._must_go_home(self.now_ns):
+        if self._must_go_home(self._now_ns):
             return _answer(response, False, "it must be at home: battery, time or radio")
         if self.phase in (
             MissionPhase.WAIT,
@@ -208,40 +228,40 @@ class TaskManager(TeamMember):
             MissionPhase.IDLE,
         ):
             return _answer(response, True, "searches already")
+        height_m = float(pose.position[2])
         if self._is_aloft():
             if self.phase is not MissionPhase.RETURN:
                 self._call(self._hold)
-            self._search_or_climb(float(self._pose.position[2]))
+            self._search_or_climb(height_m)
         else:
-            self._stands_m = float(self._pose.position[2])
-            self._asked_ns = -1 << 62
+            self.ground.stand_m = height_m
+            self._requested_ns = _NEVER_NS
             self._enter(MissionPhase.RISE)
         self._order = ""
         self._set_pause(False)
         return _answer(response, True, "searches")
 
     def _search_or_climb(self, height_m: float) -> None:
-        """Go on in the air, at a height in the map: first upwards where planners would not plan."""
-        is_low = self.now_ns - self._sonar_ns < _SONAR_S * NS_PER_S and self._sonar_m < _LOW_M
-        if is_low:
-            self._stands_m = height_m - self._sonar_m
+        """Resumes in the air; climbs first where planners plan nothing. height_m: in the map."""
+        is_low = self.ground.is_low(height_m, self._now_ns)
         self._enter(MissionPhase.RISE if is_low or not self._has_risen else MissionPhase.IDLE)
         self._climbs = self.phase is MissionPhase.RISE
 
     def _is_aloft(self) -> bool:
-        """Whether it flies, whoever had it take off."""
-        if self._pose is None or self.phase is MissionPhase.WAIT:
+        """Whether the UAV flies, by this node's order or another's."""
+        pose = self.member.pose
+        if pose is None or self.phase is MissionPhase.WAIT:
             return False
         stands = self.phase in (MissionPhase.DONE, MissionPhase.DOWN)
-        return not stands or self._pose.position[2] > self._stands_m + _ALOFT_M
+        return not stands or self.ground.is_above_stand(pose)
 
     def _lands_by_order(self) -> bool:
         return self.phase is MissionPhase.LAND and bool(self._order)
 
-    def _give_way(self, phase: MissionPhase, order: str) -> None:
-        """Leave the sector to others and have planners command nothing."""
+    def _suspend(self, phase: MissionPhase, order: str) -> None:
+        """Leaves the sector to others and stops the planners."""
         self._order = order
-        self._leave_sector(self.now_ns)
+        self._leave_sector(self._now_ns)
         self._set_pause(True)
         self._enter(phase)
 
@@ -250,142 +270,134 @@ class TaskManager(TeamMember):
             self._paused = paused
             self._pause.publish(Bool(paused))
 
-    def what_is_wrong(self, now: int) -> str:
-        """As of every member of the team, and what an operator has it do."""
-        return "; ".join(filter(None, (self._order, super().what_is_wrong(now))))
-
-    # ------------------------------------------------------------------------------- what it does
+    # -------------------------------------------------------------------------------------- phases
 
     def _on_timer(self) -> None:
-        now, pose = self.now_ns, self._pose
+        now, member = self._now_ns, self.member
+        pose = member.pose
         if pose is None:
             return
         if self._began_ns is None:
-            self._began_ns = self._heard_ns = now
-            self._home = pose.position.copy()
-            self._stands_m = float(self._home[2])
-            self._enter(MissionPhase.WAIT)
-        self.problem = self.what_is_wrong(now)
-        lost_s = (now - self._pose_ns) / NS_PER_S
-        if lost_s > POSE_S and self.phase in ALOFT:
+            self._begin(pose, now)
+        self.problem = "; ".join(filter(None, (self._order, member.problems())))
+        lost_s = (now - member.pose_ns) / NS_PER_S
+        if lost_s > POSE_TIMEOUT_S and self.phase in ALOFT:
             self._wait_or_land(lost_s)
         else:
             self._act(pose, now)
-        self.tell_team()
-        self.tell_status()
+        member.publish_report()
+        member.publish_status(self.problem)
+
+    def _begin(self, pose: OdometrySample, now: int) -> None:
+        self._began_ns = self.member.heard_ns = now
+        self._home = pose.position.copy()
+        self.ground.stand_m = float(self._home[2])
+        self._enter(MissionPhase.WAIT)
 
     def _act(self, pose: OdometrySample, now: int) -> None:
-        if self.phase in ALOFT and self._has_come_down(pose, now):
-            self._give_way(MissionPhase.DOWN, DOWN)
+        if self.phase in ALOFT and self.ground.has_come_down(pose, now):
+            self._suspend(MissionPhase.DOWN, DOWN)
         elif self._turns_home(now):
             self._go_home(now)
-        if self.phase is MissionPhase.WAIT:
-            if now - self._phase_ns >= self.settings.gather_s * NS_PER_S:
-                self._enter(MissionPhase.DONE if self._ordered_home else MissionPhase.RISE)
-        elif self.phase is MissionPhase.RISE:
-            self._rise(pose, now)
-        elif self.phase is MissionPhase.SEARCH:
-            self._search(now)
-        elif self.phase is MissionPhase.IDLE:
-            self._choose(now)
-        elif self.phase is MissionPhase.RETURN:
-            self._return(pose, now)
-        elif self.phase is MissionPhase.LAND:
-            self._sink(pose)
-
-    def _has_come_down(self, pose: OdometrySample, now: int) -> bool:
-        """Whether it has stood on the ground for a while, by its sonar."""
-        if self._low_ns is None or norm(pose.velocity) >= _STILL_M_S:
-            return False
-        return now - self._low_ns > _GROUND_S * NS_PER_S
+        run = self._phases.get(self.phase)
+        if run is not None:
+            run(pose, now)
 
     def _wait_or_land(self, lost_s: float) -> None:
-        """Stay until it knows where it is again; land where that takes too long."""
-        if lost_s < _LOST_S:
-            self._ask_now_and_then(self._hold)
+        """Holds until the position is known again; lands after a timeout."""
+        if lost_s < _LOST_TIMEOUT_S:
+            self._request_at_intervals(self._hold)
             return
         if self.phase is not MissionPhase.LAND:
             self._enter(MissionPhase.LAND)
-        self._ask_now_and_then(self._land)
+        self._request_at_intervals(self._land)
+
+    def _wait(self, _pose: OdometrySample, now: int) -> None:
+        if now - self._phase_ns >= self.settings.gather_s * NS_PER_S:
+            self._enter(MissionPhase.DONE if self._ordered_home else MissionPhase.RISE)
 
     def _rise(self, pose: OdometrySample, now: int) -> None:
-        climbed = pose.position[2] - self._stands_m
-        if climbed > 0.8 * self.settings.altitude_m and abs(pose.velocity[2]) < _STILL_M_S:
+        climbed = pose.position[2] - self.ground.stand_m
+        if climbed > 0.8 * self.settings.altitude_m and abs(pose.velocity[2]) < STILL_M_S:
             self._has_risen = True
             self._enter(MissionPhase.IDLE)
-        elif now - self._phase_ns > _RISE_S * NS_PER_S:
+        elif now - self._phase_ns > _RISE_TIMEOUT_S * NS_PER_S:
             self._enter(MissionPhase.DOWN if climbed < _LANDED_M else MissionPhase.LAND)
         elif self._climbs:
             if climbed < self.settings.altitude_m - _CLIMB_END_M:
                 self._command.publish(Twist(Vector3(0.0, 0.0, _CLIMB_M_S), Vector3(0.0, 0.0, 0.0)))
         elif climbed < _LANDED_M:
             request = message_type("volery_interfaces/srv/TakeOffTo_Request")
-            self._ask_now_and_then(self._take_off, request(self.settings.altitude_m))
+            self._request_at_intervals(self._take_off, request(self.settings.altitude_m))
 
-    def _choose(self, now: int) -> None:
-        """Take the sector that falls to this UAV; go home where none ever will."""
-        workers = self.team.workers(now, self.settings.patience_s)
-        workers[self.settings.name] = self.as_worker()
-        chosen = assign(workers, self.searched, self.settings.sectors.centres())
+    def _choose(self, _pose: OdometrySample, now: int) -> None:
+        """Takes the sector that is assigned to this UAV; returns home where none is left."""
+        member = self.member
+        chosen = assign(member.workers(), member.searched, self.settings.sectors.centres())
         sector = chosen.get(self.settings.name, -1)
         if sector >= 0:
-            self._begin(sector, now)
-        elif (self.searched | self._given_up).all():
+            self._begin_sector(sector, now)
+        elif (member.searched | member.given_up).all():
             self._go_home(now)
 
-    def _begin(self, sector: int, now: int) -> None:
-        self.sector, self._since_ns, self._news_ns = sector, now, now
+    def _begin_sector(self, sector: int, now: int) -> None:
         self._explores = False
         area = self.settings.sectors.of(sector)
-        self._coverage = Coverage(area, self.settings.cell_m)
+        self.member.take_sector(sector, Coverage(area, self.settings.cell_m))
         self._enter(MissionPhase.SEARCH)
         self._area.publish(polygon_of(area, float(self._home[2]), now))
 
-    def _search(self, now: int) -> None:
-        assert self._coverage is not None
-        others = self.team.workers(now, self.settings.patience_s)
-        mine = SectorClaim(self._since_ns, self.settings.name)
-        if self._coverage.share >= self.settings.enough:
-            self.searched[self.sector] = True
+    def _search(self, _pose: OdometrySample, now: int) -> None:
+        member = self.member
+        assert member.coverage is not None
+        claim = SectorClaim(member.since_ns, self.settings.name)
+        if member.coverage.share >= self.settings.enough:
+            member.searched[member.sector] = True
             self._drop(now)
-        elif self.searched[self.sector] or must_yield(mine, self.sector, others):
+        elif member.searched[member.sector] or must_yield(
+            claim, member.sector, member.other_workers()
+        ):
             self._drop(now)
-        elif now - self._news_ns > self._patience_here_ns():
-            self._given_up[self.sector] = True
+        elif now - member.progress_ns > self._sector_timeout_ns():
+            member.given_up[member.sector] = True
             self._drop(now)
 
-    def _patience_here_ns(self) -> int:
-        """How long nothing new need be seen: on the way there, the way is given time too."""
-        assert self._coverage is not None
-        if self._coverage.seen.any() or self._pose is None:
+    def _sector_timeout_ns(self) -> int:
+        """Returns the maximum duration without progress; the flight to the sector counts extra."""
+        member = self.member
+        assert member.coverage is not None
+        if member.coverage.seen.any() or member.pose is None:
             return round(self.settings.stuck_s * NS_PER_S)
-        middle = self.settings.sectors.centres()[self.sector]
-        way = norm(middle - self._pose.position[:2])
-        return round((self.settings.stuck_s + 2.0 * way) * NS_PER_S)
+        centre = self.settings.sectors.centres()[member.sector]
+        distance = norm(centre - member.pose.position[:2])
+        return round((self.settings.stuck_s + 2.0 * distance) * NS_PER_S)
 
     def _drop(self, now: int) -> None:
-        """Search this sector no more, and take the next one."""
-        self.sector, self._coverage = -1, None
+        """Leaves this sector and takes the next one."""
+        member = self.member
+        member.leave_sector()
         self._enter(MissionPhase.IDLE)
-        self._choose(now)
+        assert member.pose is not None
+        self._choose(member.pose, now)
         if self.phase is MissionPhase.IDLE:
             self._area.publish(polygon_of(None, float(self._home[2]), now))
 
     def _turns_home(self, now: int) -> bool:
-        """Whether it goes home now; held by an operator, only for its battery."""
+        """Whether the UAV returns home now; while it is held, only for its battery."""
         if self.phase is MissionPhase.HOLD:
-            return self._battery < self.settings.low_battery
+            return self.member.battery < self.settings.low_battery
         return self.phase in (MissionPhase.SEARCH, MissionPhase.IDLE) and self._must_go_home(now)
 
     def _must_go_home(self, now: int) -> bool:
         assert self._began_ns is not None
-        settings = self.settings
+        settings, member = self.settings, self.member
         over = 0.0 < settings.search_s * NS_PER_S < now - self._began_ns
-        alone = bool(self.team.mates) and (0.0 < settings.alone_s * NS_PER_S < now - self._heard_ns)
-        return self._ordered_home or over or alone or self._battery < settings.low_battery
+        silence_ns = now - member.heard_ns
+        alone = bool(member.team.mates) and (0.0 < settings.alone_s * NS_PER_S < silence_ns)
+        return self._ordered_home or over or alone or member.battery < settings.low_battery
 
     def _go_home(self, now: int) -> None:
-        self._nearest_m, self._news_ns = math.inf, now
+        self._nearest_m, self.member.progress_ns = math.inf, now
         self._order = ""
         self._set_pause(False)
         self._enter(MissionPhase.RETURN)
@@ -393,50 +405,51 @@ class TaskManager(TeamMember):
         self._send_home(now)
 
     def _leave_sector(self, now: int) -> None:
-        self.sector, self._coverage = -1, None
+        self.member.leave_sector()
         self._area.publish(polygon_of(None, float(self._home[2]), now))
 
     def _send_home(self, now: int) -> None:
-        self._asked_ns = now
+        self._requested_ns = now
         z = self._home[2] + self.settings.altitude_m
         self._goal.publish(goal_at(np.array([*self._home[:2], z]), now))
 
     def _return(self, pose: OdometrySample, now: int) -> None:
-        if now - self._asked_ns >= _REPEAT_S * NS_PER_S:
-            self._send_home(now)  # a goal that the explorer chose before may have come since
-        away = norm(pose.position[:2] - self._home[:2])
-        if away < self._nearest_m - _NEARER_M:
-            self._nearest_m, self._news_ns = away, now
-        if away < _HOME_M or now - self._news_ns > _RETURN_STUCK_S * NS_PER_S:
+        if now - self._requested_ns >= _REPEAT_S * NS_PER_S:
+            self._send_home(now)  # the explorer may have published a goal since
+        distance = norm(pose.position[:2] - self._home[:2])
+        if distance < self._nearest_m - _NEARER_M:
+            self._nearest_m, self.member.progress_ns = distance, now
+        timeout_ns = _RETURN_TIMEOUT_S * NS_PER_S
+        if distance < _HOME_M or now - self.member.progress_ns > timeout_ns:
             self._enter(MissionPhase.LAND)
 
-    def _sink(self, pose: OdometrySample) -> None:
+    def _sink(self, pose: OdometrySample, _now: int) -> None:
         self._highest_m = max(self._highest_m, float(pose.position[2]))
-        still = norm(pose.velocity) < _STILL_M_S
+        still = norm(pose.velocity) < STILL_M_S
         if still and pose.position[2] < self._highest_m - _SUNK_M:
             self._enter(MissionPhase.DONE)
         else:
-            self._ask_now_and_then(self._land)
+            self._request_at_intervals(self._land)
 
     def _enter(self, phase: MissionPhase) -> None:
         self._highest_m = -math.inf
         self._climbs = False
+        self.member.phase, self._phase_ns = phase, self._now_ns
         if phase in (MissionPhase.DONE, MissionPhase.DOWN):
             self._has_risen = False
-        self.phase, self._phase_ns = phase, self.now_ns
-        if phase in (MissionPhase.DONE, MissionPhase.DOWN) and self._pose is not None:
-            self._stands_m = float(self._pose.position[2])
+            if self.member.pose is not None:
+                self.ground.stand_m = float(self.member.pose.position[2])
 
-    def _ask_now_and_then(self, client: Client, request: Any | None = None) -> None:
-        """Call a service unless it was called lately."""
-        now = self.now_ns
-        if now - self._asked_ns < _REPEAT_S * NS_PER_S:
+    def _request_at_intervals(self, client: Client, request: Any | None = None) -> None:
+        """Calls a service unless it was called within the last two seconds."""
+        now = self._now_ns
+        if now - self._requested_ns < _REPEAT_S * NS_PER_S:
             return
-        self._asked_ns = now
+        self._requested_ns = now
         self._call(client, request)
 
     def _call(self, client: Client, request: Any | None = None) -> None:
-        """Call a service, where somebody offers it."""
+        """Calls a service if it has a server."""
         with contextlib.suppress(GraphError):
             client.call_async(request)
 
@@ -447,9 +460,9 @@ def _answer(response: Any, success: bool, message: str) -> Any:
 
 
 def _state_in(text: str) -> str:
-    """The `state` of a JSON text; empty where there is none."""
+    """Returns the `state` of a JSON text; empty where there is none."""
     try:
-        told = json.loads(text)
+        status = json.loads(text)
     except json.JSONDecodeError:
         return ""
-    return str(told.get("state", "")) if isinstance(told, dict) else ""
+    return str(status.get("state", "")) if isinstance(status, dict) else ""

@@ -67,11 +67,11 @@ class ParameterMethods:
     ) -> Parameter:
         """Declare a parameter; an override given at start wins over the default `value`.
 
-        Unless it is `read_only` it may be set while the node runs, which then reads
-        `Parameter.value` each time anew. A number with a `min_value` is finite, and at most
-        `max_value`. descriptor: a `ParameterDescriptor`, with a description, bounds and `read_only`. A
-        `ParameterType` in place of a value has the override alone give one. `GraphError` for what
-        does not fit.
+        Unless it is `read_only` it may be set while the node runs; the node reads
+        `Parameter.value` at each use. A number with a `min_value` is finite, and at most
+        `max_value`. descriptor: a `ParameterDescriptor` with description, bounds and `read_only`.
+        With a `ParameterType` as `value` only an override gives the value. Raises `GraphError` for
+        values out of bounds or of another type.
         """
         like = like_of(value) if isinstance(value, ParameterType) else value
         default = None if isinstance(value, ParameterType) else value
