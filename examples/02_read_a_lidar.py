@@ -1,4 +1,4 @@
-"""Listen to a LIDAR on the graph: the nearest thing around each UAV, once a second."""
+"""Subscribes to LIDARs on the graph and prints the nearest range of each UAV once a second."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""A node of your own: climbs when the sonar sees something close below, else flies a circle."""
+"""Runs a custom node that flies a circle, and climbs if the sonar range is short."""
 
 from volery import Simulation
 from volery.graph.messages import Range, Twist, Vector3

@@ -1,4 +1,4 @@
-"""Fly to the same moment twice, and let a motor fail the second time."""
+"""Restores a snapshot to repeat a flight, the second time with a motor fault."""
 
 from volery import Simulation, load_scenario
 

@@ -1,4 +1,4 @@
-"""Drop 256 copies of a UAV into turbulence, each with its own, and see how far they are pushed."""
+"""Runs 256 environments with independent turbulence and prints how far each UAV drifts."""
 
 import numpy as np
 
@@ -16,8 +16,8 @@ with VectorizedSimulation(parse_scenario(SCENARIO), 256) as copies:
     copies.run(10.0)
     away = np.linalg.norm(copies.state().position_map[:, 0] - [0.0, 0.0, 20.0], axis=1)
     print(
-        f"{copies.count} copies: {np.median(away):.2f} m off in the middle, {away.max():.2f} m most"
+        f"{copies.count} environments: {np.median(away):.2f} m median drift, {away.max():.2f} m max"
     )
 
     copies.reset(away > 0.3)
-    print(f"{(copies.age_s == 0.0).sum()} of them begin anew")
+    print(f"{(copies.age_s == 0.0).sum()} environments reset")

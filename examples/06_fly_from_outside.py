@@ -1,4 +1,4 @@
-"""Another program flies a UAV: rosbridge from roslibpy, as to any ROS robot.
+"""Flies a UAV from an external program with roslibpy over rosbridge, like any ROS robot.
 
 volery run hover --seconds 60 --bridge rosbridge
 python examples/06_fly_from_outside.py            # pip install roslibpy
@@ -22,7 +22,7 @@ odometry = roslibpy.Topic(ros, "/uav1/odom", "nav_msgs/msg/Odometry")
 odometry.subscribe(lambda message: places.append(message["pose"]["pose"]["position"]))
 command = roslibpy.Topic(ros, "/uav1/cmd_vel", "geometry_msgs/msg/Twist")
 for x, y in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)):
-    for _ in range(round(10 * side_s)):  # UAVs hold when commands cease
+    for _ in range(round(10 * side_s)):  # without commands the UAV holds
         command.publish(roslibpy.Message({"linear": {"x": x, "y": y}}))
         time.sleep(0.1)
 print(f"flew a square, {max(p['x'] for p in places) - min(p['x'] for p in places):.1f} m wide")

@@ -1,4 +1,4 @@
-"""See a forest with a camera: its picture and its depth, side by side in camera.png."""
+"""Saves a camera's colour image and depth of a forest, side by side, in camera.png."""
 
 import sys
 
@@ -20,8 +20,8 @@ def keep(published):
 
 
 with Simulation(load_scenario("forest_cameras")) as simulation:
-    simulation.run(12.0)  # it takes off and flies on its LIDARs
-    for name in ("image_raw", "depth"):  # pictures are made from now on
+    simulation.run(12.0)  # take-off and flight with the LIDARs
+    for name in ("image_raw", "depth"):  # the camera renders from here on
         simulation.graph.subscribe(f"/uav1/front/{name}", keep)
     simulation.run(0.1)
 

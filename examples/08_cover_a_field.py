@@ -1,4 +1,4 @@
-"""Three UAVs share a small field with a pond between them, fly over all of it, and come back."""
+"""Covers a small field around a pond with three UAVs, which then return."""
 
 import json
 import tempfile

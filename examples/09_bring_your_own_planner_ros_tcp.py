@@ -1,11 +1,12 @@
-"""The same from a plain socket: ROS-TCP, the protocol of Unity's ROS-TCP-Connector.
+"""Flies a UAV with an external planner over ROS-TCP, the protocol of Unity's ROS-TCP-Connector.
 
 volery run plug_in --seconds 600 --bridge ros-tcp
 python examples/09_bring_your_own_planner_ros_tcp.py
 
-Python's own library alone; any language with sockets can do it. A frame is a destination and a
-payload, each with its length before it as a little-endian uint32. Commands go to destinations that
-begin with __ and are JSON; all other payloads are messages in ROS 1's form.
+The program uses the standard library only; any language with sockets works. A frame is a
+destination and a payload, each preceded by its length as a little-endian uint32. Commands have
+destinations that begin with __ and JSON payloads; all other payloads are messages in ROS 1
+serialization.
 """
 
 import json
@@ -32,7 +33,7 @@ def command(name, **fields):
 
 
 def receive():
-    """The next frame: destination and payload."""
+    """Returns the next frame: destination and payload."""
     (length,) = struct.unpack("<I", stream.read(4))
     destination = stream.read(length).decode()
     (length,) = struct.unpack("<I", stream.read(4))
@@ -49,7 +50,7 @@ def wait_for(wanted):
 
 
 def after_header(payload):
-    """Where a message's own fields begin: behind seq, stamp and frame_id."""
+    """Returns the offset of the first field after the header: seq, stamp and frame_id."""
     (length,) = struct.unpack_from("<I", payload, 12)
     return 16 + length
 
@@ -70,7 +71,7 @@ side_m, width, height, x0, y0, *_ = struct.unpack_from("<fII7d", grid, at)
 cells = struct.unpack_from(f"<{count}b", grid, at + 72)
 print(f"map of {width} x {height} cells, {cells.count(0)} free")
 
-# 2. Where the UAV is: behind the header the child frame's name, then x, y, z.
+# 2. The position of the UAV: after the header, the child frame's name, then x, y, z.
 odometry = f"/{uav}/odom"
 command("subscribe", topic=odometry, message_name="nav_msgs/Odometry")
 
@@ -82,7 +83,7 @@ def position():
     return struct.unpack_from("<3d", payload, at + 4 + length)
 
 
-# 3. Your planner: here along the UAV's row, as far as it is free, and back.
+# 3. Your planner. Here: along the UAV's row, as far as it is free, and back.
 x, y, _ = position()
 row, first = int((y - y0) / side_m), int((x - x0) / side_m)
 last = first
@@ -92,7 +93,7 @@ plan = [last, first] * waypoints
 
 # 4. Take off, then one waypoint after the other.
 command("ros_service", topic=f"/{uav}/take_off", message_name="std_srvs/Trigger")
-while position()[2] < 1.0:  # refused while it still lands: say it again until it is up
+while position()[2] < 1.0:  # refused during a landing: repeat until the UAV is airborne
     call_trigger(f"/{uav}/take_off", 101)
     time.sleep(0.5)
 command("publish", topic=f"/{uav}/goal_pose", message_name="geometry_msgs/PoseStamped")
@@ -101,7 +102,7 @@ for column in plan[:waypoints]:
     goal = (x0 + (column + 0.5) * side_m, y0 + (row + 0.5) * side_m, height_m)
     ticks = 0
     while max(abs(a - b) for a, b in zip(position(), goal, strict=True)) > 0.4:
-        if ticks % 25 == 0:  # goals are ignored while it takes off: say it again
+        if ticks % 25 == 0:  # goals are ignored during take-off: repeat
             send(f"/{uav}/goal_pose", header + struct.pack("<7d", *goal, 0.0, 0.0, 0.0, 0.0))
         ticks += 1
     print(f"reached row {row}, column {column}")

@@ -1,4 +1,4 @@
-"""Cross a field of dead trees by what a depth camera sees; `region` flies the simpler way."""
+"""Crosses a field of dead trees with a depth camera; `region` selects the simpler method."""
 
 import sys
 

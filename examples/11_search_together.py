@@ -1,4 +1,4 @@
-"""Three UAVs search a meadow for something red; who finds it calls the others, who come."""
+"""Searches a meadow for a red object with three UAVs that meet at the detected object."""
 
 from volery import Simulation, load_scenario
 

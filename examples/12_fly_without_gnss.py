@@ -1,4 +1,4 @@
-"""A UAV searches a forest without satellite navigation: how far off is what its SLAM believes?"""
+"""Searches a forest without satellite navigation and prints the position error of the SLAM."""
 
 import math
 

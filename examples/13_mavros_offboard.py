@@ -1,4 +1,4 @@
-"""An offboard program for MAVROS, over rosbridge: nothing in it is of Volery.
+"""Flies a UAV with a MAVROS offboard program over rosbridge, without Volery's packages.
 
 volery run plug_in --uavs 1 --bridge mavlink --bridge rosbridge
 python examples/13_mavros_offboard.py            # pip install roslibpy
@@ -31,7 +31,7 @@ def position():
 
 
 def stream(goal, seconds, near_m=0.0):
-    """Publish a setpoint at 20 Hz for so long, or until the UAV is within `near_m` of it."""
+    """Publishes a setpoint at 20 Hz for `seconds`, or until the UAV is within `near_m` of it."""
     setpoint = roslibpy.Message({"pose": {"position": dict(zip("xyz", goal, strict=True))}})
     for _ in range(round(20 * seconds)):
         if math.dist(position(), goal) < near_m:
@@ -43,7 +43,7 @@ def stream(goal, seconds, near_m=0.0):
 while not heard.get("state", {}).get("connected") or "local_position/pose" not in heard:
     time.sleep(0.1)
 x, y, z = position()
-stream((x, y, z + 2.0), 1.0)  # offboard mode needs a stream of setpoints before it begins
+stream((x, y, z + 2.0), 1.0)  # offboard mode requires a stream of setpoints before it starts
 call("set_mode", "mavros_msgs/SetMode", base_mode=0, custom_mode="OFFBOARD")
 call("cmd/arming", "mavros_msgs/CommandBool", value=True)
 stream((x, y, z + 2.0), 60.0, near_m=0.04)
