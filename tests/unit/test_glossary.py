@@ -1,0 +1,78 @@
+"""Names of modules, classes and options keep to docs/glossary.md."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import typer
+
+from volery.cli.app import app
+
+_ROOT = Path(__file__).parents[2]
+_SOURCE = _ROOT / "src" / "volery"
+
+
+def banned_words() -> set[str]:
+    """The words of the last column of the glossary's tables."""
+    words: set[str] = set()
+    for line in (_ROOT / "docs" / "glossary.md").read_text().splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if line.startswith("| ") and len(cells) == 3 and cells[2] != "not":
+            words |= {word.strip() for word in cells[2].split(",")}
+    return words - {""}
+
+
+BANNED = banned_words()
+
+
+def parts_of(name: str) -> list[str]:
+    """The words of a name in snake_case, kebab-case or CamelCase, in lower case."""
+    return [word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z0-9]+", name)]
+
+
+def names() -> Iterator[tuple[str, str]]:
+    """(name, where it is) of all modules and classes."""
+    for path in sorted(_SOURCE.rglob("*.py")):
+        where = path.relative_to(_SOURCE)
+        yield from ((part, str(where)) for part in where.with_suffix("").parts)
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ClassDef):
+                yield node.name, f"{where}: class {node.name}"
+
+
+def options() -> Iterator[tuple[str, str]]:
+    """(option, command) of the whole command line."""
+
+    def of(command: object, path: str) -> Iterator[tuple[str, str]]:
+        for name, inner in getattr(command, "commands", {}).items():
+            yield from of(inner, f"{path} {name}")
+        for parameter in getattr(command, "params", []):
+            for option in parameter.opts + parameter.secondary_opts:
+                if option.startswith("--"):
+                    yield option.removeprefix("--"), path
+
+    yield from of(typer.main.get_command(app), "volery")
+
+
+def test_the_glossary_bans_words() -> None:
+    assert {"door", "crew", "lobby", "told", "thing", "pilot"} <= BANNED
+    assert len(BANNED) > 60
+
+
+def test_modules_and_classes_use_the_words_of_the_glossary() -> None:
+    found = [where for name, where in names() if BANNED & set(parts_of(name))]
+    assert found == []
+
+
+def test_options_use_the_words_of_the_glossary() -> None:
+    found = [(path, option) for option, path in options() if BANNED & set(parts_of(option))]
+    assert found == []
+
+
+@pytest.mark.parametrize("name", ["DoorBridge", "the_lobby", "--drop-crew"])
+def test_a_banned_word_is_found_in_any_spelling(name: str) -> None:
+    assert BANNED & set(parts_of(name))
