@@ -23,7 +23,7 @@ from volery.bridges.sensor_link.server import SensorLink
 from volery.bridges.sensor_link.wire import SensorLinkKind as SensorKind
 from volery.bridges.sensor_link.wire import encode_frame as sensor_frame
 from volery.comms.control_payloads import Hello, encode_hello
-from volery.comms.protocol import SensorLinkKind, encode_frame
+from volery.comms.protocol import StationFrameKind, encode_frame
 from volery.comms.server.tcp import CommsServer
 from volery.core.preamble import Preamble
 from volery.graph import messages as m
@@ -149,7 +149,7 @@ def pose():
 
 def hello():
     return encode_frame(
-        SensorLinkKind.HELLO, 2, 0, payload=encode_hello(Hello(0, 2, 4, "page", ""))
+        StationFrameKind.HELLO, 2, 0, payload=encode_hello(Hello(0, 2, 4, "page", ""))
     )
 
 

@@ -28,7 +28,7 @@ from volery.graph.messages import (
     Vector3,
     header,
 )
-from volery.graph.messages import OdometrySample as PoseMessage
+from volery.graph.messages import Pose as PoseMessage
 from volery.graph.nodes.node import Context
 
 EXACT = PositionUncertainty(0.03, 0.0, 0.0)

@@ -39,12 +39,12 @@ def test_types_of_a_folder_are_known(scenario, tmp_path):
 
 
 def test_a_folder_that_is_not_there_is_named(scenario):
-    with pytest.raises(ScenarioError, match=r"hover: messages\[0\]: no folder 'none'"):
+    with pytest.raises(ScenarioError, match=r"hover: message_packages\[0\]: no folder 'none'"):
         learn_messages(scenario("none"))
 
 
 def test_a_broken_definition_is_named_with_its_line(scenario, tmp_path):
     (tmp_path / "bad_msgs" / "msg").mkdir(parents=True)
     (tmp_path / "bad_msgs" / "msg" / "X.msg").write_text("int32 a\nno_such/Type b\n")
-    with pytest.raises(ScenarioError, match=r"messages\[0\]: .*X\.msg:2: unknown type"):
+    with pytest.raises(ScenarioError, match=r"message_packages\[0\]: .*X\.msg:2: unknown type"):
         learn_messages(scenario("bad_msgs"))

@@ -116,11 +116,11 @@ class CooperativeSearch(TeamFlight):
         """Teammates that are still to be told that the search is over."""
 
         self._found = self.create_publisher(PointStamped, "~/found", 1, latched=True)
-        self._come_clients = {n: self.create_client(JOIN, self._of(n, "come")) for n in self.mates}
+        self._come_clients = {n: self.create_client(JOIN, self._of(n, "join")) for n in self.mates}
         self._finish_clients = {
             n: self.create_client("std_srvs/srv/Trigger", self._of(n, "finish")) for n in self.mates
         }
-        self.create_service(JOIN, "~/come", self.on_call)
+        self.create_service(JOIN, "~/join", self.on_call)
         self.create_service("std_srvs/srv/Trigger", "~/finish", self._on_finish)
         self.create_subscription(Image, f"{settings.camera}/image_raw", self._on_image, 1)
         self._listen_for_intrinsics()

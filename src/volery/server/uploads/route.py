@@ -63,7 +63,7 @@ def name_for(called: str, shelf: ScenarioCatalog) -> str:
 def _check(kind: str, path: Path, name: str, called: str) -> None:
     """Build the world in a process of its own. `RefusedError` tells what is wrong with the file."""
     try:
-        told = run_bounded(f"{__package__}.check", (kind, str(path), name, called), BOUNDS)
+        told = run_bounded(f"{__package__}.validation", (kind, str(path), name, called), BOUNDS)
     except BoundedError as error:
         raise RefusedError(422, str(error)) from None
     if "error" in told:
