@@ -381,7 +381,7 @@ class Session:
         srvtype = self._graph.services().get(service, "")
         self._graph.withdraw(service)
         for reply in tuple(pending):
-            reply.fail(GraphError(f"service '{service}': {self.name} has disconnected"))
+            reply.fail(GraphError(f"service '{service}': {self.name} has left"))
         self.tell("withdraw", service, srvtype)
 
     def _relay(self, service: str, srvtype: str, reply: ServiceReply, request: int) -> ServiceReply:
@@ -459,7 +459,7 @@ class Session:
 
     def _check_open(self) -> None:
         if self._closed:
-            raise GraphError(f"{self.name} has disconnected")
+            raise GraphError(f"{self.name} has left")
 
 
 def _look_away(_what: object) -> None:

@@ -268,7 +268,7 @@ def _describe(match: re.Match[str], package: str) -> Any:
     element: Any
     if base in NUMBERS or base == "string":
         if match["limit"] and base != "string":
-            raise ValueError(f"only a string has a length limit, not {base}")
+            raise ValueError(f"only a string may have a length limit, not {base}")
         element = (Nodetype.BASE, (base, int(match["limit"] or 0)))
     elif base in ("wstring", "wchar", "float128", "long double"):
         raise ValueError(f"{base} is not supported")

@@ -124,7 +124,7 @@ class DefinitionStore(Typestore):
         if self._num_foreign + len(new) > MAX_FOREIGN:
             raise GraphError(
                 f"this process has registered {MAX_FOREIGN} message types from logs, which is the "
-                "limit; restart it"
+                "limit; restart the process"
             )
         self._num_foreign += len(new)
 

@@ -144,7 +144,7 @@ def _aliases(msgtype: str, names: set[str]) -> dict[str, str | None]:
 def _renamed(
     plain: Mapping[Any, Any], names: set[str], aliases: dict[str, str | None]
 ) -> dict[str, Any]:
-    """Plain form with every field under its ROS 2 name."""
+    """Returns the plain form with ROS 2 field names."""
     found = {}
     for name, value in plain.items():
         if name in names:
@@ -215,7 +215,7 @@ def _scalar_decoder(base: str, limit: int) -> Convert:
                     value.encode()
                 except UnicodeEncodeError:
                     raise _Mismatch(
-                        "contains half a surrogate pair, which UTF-8 cannot encode"
+                        "contains half a surrogate pair, not UTF-8"
                     ) from None
             return value
 

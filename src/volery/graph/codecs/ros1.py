@@ -140,13 +140,9 @@ class Ros1Codec:
         return self._sums[msgtype]
 
     def definition_text(self, msgtype: str) -> str:
-        """ROS 1 definition of a message type or a service, followed by all that it nests.
+        """Returns the ROS 1 definition of a message type or service with its nested types.
 
-        Raises
-        ------
-        GraphError
-            The type is unknown.
-
+        Raises `GraphError` if the type is unknown.
         """
         if msgtype in _BASIC:
             return f"{_BASIC[msgtype]} data\n"
