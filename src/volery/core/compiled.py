@@ -156,7 +156,7 @@ def _ignore(*_arguments: Any, **_keywords: Any) -> None:
 
 
 def _decorate(function: F, **options: Any) -> F:
-    # numba takes an option that is not set from the first kernel that requests a part, and applies
+    # numba copies an option that is not set from the first kernel that requests a part, and applies
     # the option to all others: results would depend on the order in which a cache was filled.
     said: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "forceinline": False}
     # Kernels are never passed to C code: entries for C would take a tenth of the time to compile.

@@ -51,7 +51,7 @@ class GraphConnection(Protocol):
         msgtype
             None: the type of the topic; raises `GraphError` if the topic does not exist.
         depth, reliable
-            Length of the queue, and what happens beyond: see `SubscriptionQueue`. The queue starts
+            Length of the queue, and the handling of more messages: see `SubscriptionQueue`. The queue starts
             with the newest message of each latched publisher.
         wake
             Called from a thread of the connection when a message joins an empty queue. It must not

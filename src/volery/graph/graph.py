@@ -154,7 +154,7 @@ class Publisher:
         """Passes a message to the external clients, at once; the simulation does not receive it.
 
         This is for messages that depend on wall time or on the connected clients: nodes, digests
-        and recorders cannot come to depend on them.
+        and recorders must not depend on them.
         """
         if not self.cancelled:
             self._graph.show(self, self._topic, message)

@@ -48,7 +48,7 @@ def message_copier(msgtype: str) -> Copy:
             scope[f"_copy_{name}"] = copier
             values.append(f"_copy_{name}(message.{name})")
     text = f"def copy(message):\n    return _cls({', '.join(values)})"
-    exec(text, scope)  # names of fields alone
+    exec(text, scope)  # field names only
     copy: Copy = scope["copy"]
     return copy
 

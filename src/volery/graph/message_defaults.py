@@ -87,7 +87,7 @@ def _constructor(
             arguments.append(f"{own}=_not_given")
             lines.append(f"    self.{own} = _make_{own}() if {own} is _not_given else {own}")
     text = f"def __init__(self, {', '.join(arguments)}):\n" + "\n".join(lines or ["    pass"])
-    exec(text, scope)  # names of fields alone, as dataclasses do it
+    exec(text, scope)  # field names only, as in dataclasses
     made: Callable[..., None] = scope["__init__"]
     made.__qualname__ = f"{cls.__qualname__}.__init__"
     return made

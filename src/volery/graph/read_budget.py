@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable
 
 MAX_FRACTION = 0.5
-"""Fraction of wall time, where the simulation keeps its real-time factor."""
+"""Fraction of wall time, where the simulation achieves its real-time factor."""
 BUSY_FRACTION = 0.05
 """Fraction where it does not, or runs as fast as possible."""
 WRITE_FRACTION = 0.3

@@ -1,7 +1,7 @@
 """Provides the graph to clients in other threads; every bridge is built on it.
 
-A bridge opens one `Session` for each of its clients. Any thread may call any method of it. What a
-client publishes and calls is posted to the simulation's thread, which processes posts between two
+A bridge opens one `Session` for each of its clients. Its methods are thread-safe. A client's
+publications and calls are posted to the simulation's thread, which processes them between two
 ticks, in the order of arrival; messages for the client wait in a bounded `SubscriptionQueue` of the
 newest. A client that does not read loses its own messages and delays no other client.
 
@@ -211,7 +211,7 @@ class Session:
         """
 
         def act() -> Any:
-            self._taken += 1  # in the simulation's thread alone
+            self._taken += 1  # in the simulation's thread only
             if self._inside:
                 return action()
             with self._graph.on_behalf_of(self.name):

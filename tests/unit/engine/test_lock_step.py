@@ -1,4 +1,4 @@
-"""Lock-step partners: outside programs that the simulation waits for."""
+"""Tests lock-step partners: external programs that the simulation waits for."""
 
 import threading
 import time

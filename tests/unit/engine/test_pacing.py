@@ -1,4 +1,4 @@
-"""Pacing alone: what it allows, how long it waits, what other threads may change."""
+"""Tests pacing alone: number of steps, waiting time, changes by other threads."""
 
 import threading
 

@@ -1,4 +1,4 @@
-"""A state that is not physical ends what computes it, whatever it comes from."""
+"""Tests that a state that is not physical ends the run, whatever the cause."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Definition files: those that ship, a user's own, and broken ones."""
+"""Tests definition files: shipped, user-defined, and broken ones."""
 
 from __future__ import annotations
 

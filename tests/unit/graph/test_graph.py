@@ -1,4 +1,4 @@
-"""Topics and services: typed, ordered, nothing built for nobody."""
+"""Tests topics and services: types, order, and no messages without subscribers."""
 
 from types import SimpleNamespace
 

@@ -1,4 +1,4 @@
-"""Packages of Volery's message types, as colcon builds them."""
+"""Tests the packages of Volery's message types for colcon."""
 
 import re
 from xml.etree import ElementTree

@@ -1,4 +1,4 @@
-"""Messages as plain JSON values and back, and what is refused on the way in."""
+"""Tests messages as plain JSON values, both ways, and the rejection of invalid values."""
 
 from __future__ import annotations
 

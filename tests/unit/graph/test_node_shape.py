@@ -1,4 +1,4 @@
-"""Times, timers, loggers, handles and parameters in rclpy's shape, in a running simulation."""
+"""Tests rclpy's times, timers, loggers, handles and parameters in a running simulation."""
 
 import logging
 

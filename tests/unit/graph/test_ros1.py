@@ -1,4 +1,4 @@
-"""The ROS 1 form of messages, and checked decoding of both wire forms."""
+"""Tests the ROS 1 wire format, and checked decoding of both wire formats."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Clients outside of the simulation's thread: sessions, mailboxes, services both ways."""
+"""Tests clients in other threads: sessions, subscription queues, services both ways."""
 
 from __future__ import annotations
 

@@ -214,9 +214,7 @@ def _scalar_decoder(base: str, limit: int) -> Convert:
                 try:
                     value.encode()
                 except UnicodeEncodeError:
-                    raise _Mismatch(
-                        "contains half a surrogate pair, not UTF-8"
-                    ) from None
+                    raise _Mismatch("contains half a surrogate pair, not UTF-8") from None
             return value
 
         return decode_string
