@@ -51,8 +51,8 @@ class GraphConnection(Protocol):
         msgtype
             None: the type of the topic; raises `GraphError` if the topic does not exist.
         depth, reliable
-            Length of the queue, and the handling of more messages: see `SubscriptionQueue`. The queue starts
-            with the newest message of each latched publisher.
+            Length of the queue, and the handling of more messages: see `SubscriptionQueue`. The
+            queue starts with the newest message of each latched publisher.
         wake
             Called from a thread of the connection when a message joins an empty queue. It must not
             block.
