@@ -111,7 +111,7 @@ def q_ros_from_unity(q: ArrayLike) -> Array:
     return np.concatenate([-ros_from_unity(q[..., :3]), q[..., 3:]], axis=-1)
 
 
-# ------------------------------------------------------------------- - one vehicle, without arrays
+# ---------------------------------------------------------------------- one vehicle, without arrays
 
 
 def ned_of_enu(v: tuple[float, float, float]) -> tuple[float, float, float]:

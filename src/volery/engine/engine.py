@@ -353,7 +353,7 @@ class Engine:
             self.actors.set_state(state["actors"])
         self._new_events[:] = state["new_events"]
 
-    # ------------------------------------------------------------------------------internal
+    # ------------------------------------------------------------------------------------- internal
 
     @property
     def _due(self) -> tuple[Scheduler[Any] | OneShotTimers, ...]:

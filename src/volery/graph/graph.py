@@ -127,7 +127,7 @@ class Publisher:
             raise GraphError(f"topic '{self.topic}' carries {self.msgtype}, not {name}")
 
     def publish_posted(self, message: Any) -> None:
-        """Queues a message that was published before `cancel`, even after `cancel`."""
+        """Queues a message published before `cancel` that arrives later, even after `cancel`."""
         self._graph.enqueue(self, self._topic, message)
 
     @property
@@ -395,7 +395,7 @@ class Graph:
     def _is_endless(
         self, sender: Publisher, topic: _Topic, published: Published, answers: int
     ) -> bool:
-        """Whether nodes respond to each other endlessly; `NodeError` unless a client began it."""
+        """Returns whether nodes respond endlessly; raises `NodeError` unless a client began it."""
         topic.answers = topic.answers + 1 if topic.answer_ns == published.time_ns else 1
         topic.answer_ns = published.time_ns
         if answers > MAX_ANSWERS_IN_A_ROW - _ANSWERS_NAMED:

@@ -19,7 +19,7 @@ class Timers(Deferred, Protocol):
         *,
         wanted: Callable[[], bool] | None = None,
     ) -> None:
-        """Calls `callback` every period, first after one period; skipped unless `wanted()`."""
+        """Calls `callback` every period, from one period on; not while `wanted()` is false."""
 
     def forget(self, callback: Callable[[], None]) -> None:
         """Stops calling a `callback` that was passed to `every`."""
@@ -58,7 +58,7 @@ class Timer:
         self._started_ns = self._last_ns = now_ns()
         timers.every(period_s, self._on_period, wanted=self._keeps_first_phase)
 
-    # ---------------------------------------------------------------------------------- - rclpy's
+    # -------------------------------------------------------------------------------------- rclpy's
 
     @property
     def timer_period_ns(self) -> int:
@@ -97,7 +97,7 @@ class Timer:
         self._destroyed = True
         self._timers.forget(self._on_period)
 
-    # -------------------------------------------------------------------------------------- inside
+    # -------------------------------------------------------------------------------------- internal
 
     def _keeps_first_phase(self) -> bool:
         return self._due_ns is None and not self._cancelled and not self._destroyed
