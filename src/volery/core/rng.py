@@ -111,7 +111,7 @@ def fill_normal(keys: NDArray[np.uint64], counter: int, out: NDArray[np.float64]
 def fill_normal_rows(
     keys: NDArray[np.uint64], counters: NDArray[np.int64], out: NDArray[np.float64]
 ) -> None:
-    """Like `fill_normal` with a counter for each row: row i holds numbers counters[i].. ."""
+    """Fills rows like `fill_normal` with a counter each: row i holds numbers counters[i].. ."""
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             out[i, j] = normal(keys[i], counters[i] + j)

@@ -326,7 +326,7 @@ class Node(ParameterMethods):
             action()
 
     def __later(self) -> Callable[[Callable[[], None]], None] | None:
-        """While the node is being constructed: returns a function that defers to the first tick."""
+        """Returns a function that defers to the first tick during the node's construction."""
         if present_launch() is None:
             return None
         timers, now_ns = self._context.timers, self._context.now_ns

@@ -112,7 +112,7 @@ class Client:
     service_name = srv_name
 
     def service_is_ready(self) -> bool:
-        """Whether the service has a server."""
+        """Returns whether the service has a server."""
         return self._graph.has_service(self.service)
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:

@@ -97,7 +97,7 @@ class Timer:
         self._destroyed = True
         self._timers.forget(self._on_period)
 
-    # -------------------------------------------------------------------------------------- internal
+    # ------------------------------------------------------------------------------------ internal
 
     def _keeps_first_phase(self) -> bool:
         return self._due_ns is None and not self._cancelled and not self._destroyed
