@@ -67,7 +67,7 @@ class Scheduler(Generic[What]):
         heapq.heappush(self._heap, entry)
 
     def remove(self, what: What) -> None:
-        """Removes `what`, even from states saved before."""
+        """Removes `what`; restoring an earlier state does not add it again."""
         self._heap = [entry for entry in self._heap if entry.what != what]
         heapq.heapify(self._heap)
 
