@@ -243,7 +243,7 @@ def test_what_a_client_latches_is_bounded(monkeypatch):
         for _ in range(3):  # the newest alone is kept
             session.publish(f"/kept{k}", text("A" * 2**20))
     session.publish("/passing", text("A" * 2**24))
-    with pytest.raises(GraphError, match="latched messages of client would have more than 4 MiB"):
+    with pytest.raises(GraphError, match="latched messages of client would exceed 4 MiB"):
         session.publish("/kept4", text("A" * 2**20))
     hidden = status(b"0", "A" * 2**20, "", "", [])
     with pytest.raises(GraphError, match="unadvertise"):

@@ -274,7 +274,7 @@ def test_nodes_of_a_log_write_below_the_working_folder_only(
     node = "mapping"
     kind = {"sensors": [], "nodes": [{"node": node, "parameters": {"folder": folder}}]}
     told = content({}, types={"f450": kind})
-    with pytest.raises(ScenarioError, match="below the working folder only"):
+    with pytest.raises(ScenarioError, match="only name folders below the working folder"):
         Simulation(scenario_of(RecordedScenario("stranger", 1, "0", told), folder=own), threads=1)
 
 

@@ -243,7 +243,7 @@ def test_definitions_that_cost_too_much_are_refused(kind, encoding):
 def test_types_learned_from_logs_are_limited(monkeypatch):
     monkeypatch.setattr(definition_store, "MAX_FOREIGN", 0)
     topic = LogTopic("/new", "bombs/msg/Harmless", "bool b\n", "cdr", "ros2msg")
-    with pytest.raises(GraphError, match="takes no more"):
+    with pytest.raises(GraphError, match="is the limit"):
         LogDecoder().type_of(topic)
 
 
@@ -308,8 +308,8 @@ def test_logs_are_looked_into_in_a_process_that_ends(tmp_path, monkeypatch):
 def test_a_child_keeps_to_its_bounds(tmp_path, monkeypatch, program, why):
     module = tmp_path / "greedy_child.py"
     module.write_text(
-        "from volery.server.bounded_process import Bounds, bound_this_process\n"
-        f"bound_this_process(Bounds(2 << 30, 1, 1))\n{program}\n"
+        "from volery.server.bounded_process import ProcessBounds, bound_this_process\n"
+        f"bound_this_process(ProcessBounds(2 << 30, 1, 1))\n{program}\n"
     )
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     with pytest.raises(BoundedError, match=why):

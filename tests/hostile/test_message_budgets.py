@@ -218,7 +218,7 @@ ROS1_BOMBS = {
 @pytest.mark.parametrize("name", ROS1_BOMBS)
 def test_arrays_of_messages_are_counted_before_any_is_made(name):
     msgtype, data = ROS1_BOMBS[name]
-    with pytest.raises(GraphError, match=rf"a {msgtype} with more than {MAX_OBJECTS:,} messages"):
+    with pytest.raises(GraphError, match=rf"a {msgtype} has more than {MAX_OBJECTS:,} messages"):
         check_objects(data, msgtype, ROS1)
     with pytest.raises(GraphError, match="send several messages"):
         check_objects(b"\0\1\0\0" + struct.pack("<I", 50_000), "tf2_msgs/msg/TFMessage", CDR)

@@ -1,1 +1,1 @@
-"""Words everyone uses: errors, clock, frames, rotations, random streams, compiled kernels."""
+"""Provides basics for all packages: errors, clock, frames, rotations, random streams, kernels."""

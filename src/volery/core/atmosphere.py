@@ -1,6 +1,6 @@
-"""The International Standard Atmosphere (ISO 2533) up to the tropopause at 11 km.
+"""Implements the International Standard Atmosphere (ISO 2533) up to the tropopause at 11 km.
 
-Altitudes are taken as geopotential ones, as autopilots do; at 1 km the two differ by 0.16 m.
+Altitudes are treated as geopotential, as autopilots do; at 1 km the difference is 0.16 m.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ PRESSURE_EXPONENT = GRAVITY / (LAPSE_RATE_K_M * GAS_CONSTANT_AIR)
 
 
 def temperature(altitude_m: ArrayLike) -> Array:
-    """Temperature, K, at altitudes above sea level."""
+    """Returns the temperature, K, at altitudes (...) above sea level, m."""
     return np.asarray(SEA_LEVEL_TEMPERATURE_K - LAPSE_RATE_K_M * np.asarray(altitude_m, float))
 
 
 def pressure(altitude_m: ArrayLike) -> Array:
-    """Pressure, Pa, at altitudes above sea level."""
+    """Returns the pressure, Pa, at altitudes (...) above sea level, m."""
     ratio = temperature(altitude_m) / SEA_LEVEL_TEMPERATURE_K
     return np.asarray(SEA_LEVEL_PRESSURE_PA * ratio**PRESSURE_EXPONENT)
 
 
 def altitude(pressure_pa: ArrayLike) -> Array:
-    """Altitude above sea level, m, at which the pressure is `pressure_pa`."""
+    """Returns the altitude above sea level, m, of pressures (...), Pa."""
     ratio = np.asarray(pressure_pa, float) / SEA_LEVEL_PRESSURE_PA
     drop = 1.0 - ratio ** (1.0 / PRESSURE_EXPONENT)
     return np.asarray(SEA_LEVEL_TEMPERATURE_K / LAPSE_RATE_K_M * drop)

@@ -1,4 +1,4 @@
-"""Simulated time: integer nanoseconds since the start of the run."""
+"""Represents simulated time as integer nanoseconds since the start of the run."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ NS_PER_S = 1_000_000_000
 
 
 def ns_from_s(seconds: float) -> int:
-    """Nearest integer nanosecond to `seconds`."""
+    """Returns the nearest integer nanosecond to `seconds`."""
     return round(seconds * NS_PER_S)
 
 
 def s_from_ns(time_ns: int) -> float:
-    """Seconds as a float; exact to a nanosecond below 100 days."""
+    """Returns seconds as a float; exact to a nanosecond below 100 days."""
     return time_ns / NS_PER_S
 
 
 def stamp_from_ns(time_ns: int) -> tuple[int, int]:
-    """ROS stamp (sec, nanosec) of a time."""
+    """Returns the ROS stamp (sec, nanosec) of a time."""
     return divmod(time_ns, NS_PER_S)
 
 
@@ -38,16 +38,16 @@ class Schedule:
 
     @classmethod
     def from_hz(cls, rate_hz: float, phase_ns: int = 0) -> Schedule:
-        """Schedule of a rate given as a float; 30.0 and 29.97 are taken as exact decimals."""
+        """Returns the schedule of a rate; 30.0 and 29.97 are treated as exact decimals."""
         return cls(Fraction(str(rate_hz)), phase_ns)
 
     @property
     def period_ns(self) -> int:
-        """Nearest integer period."""
+        """Nearest integer period, ns."""
         return round(NS_PER_S / self.rate_hz)
 
     def instant_ns(self, k: int) -> int:
-        """Time of the k-th firing."""
+        """Returns the k-th instant, ns."""
         # Integers throughout, rounded half up: this runs once for every measurement.
         above, below = self._ratio
         return self.phase_ns + (k * above + below) // (2 * below)

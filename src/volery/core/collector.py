@@ -1,8 +1,8 @@
-"""Python's garbage collector in a process that serves clients while it simulates.
+"""Configures Python's garbage collector in a process that serves clients while it simulates.
 
-A full collection looks at every object that the process holds. With the modules of Volery and of
-its compiler loaded that takes a fifth of a second, in which neither the simulation nor any client
-gets on, and messages of busy clients bring one about every two seconds.
+A full collection visits every object of the process. With the modules of Volery and of its compiler
+loaded, that takes a fifth of a second, during which simulation and clients stop, and messages of
+busy clients cause one about every two seconds.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 _THRESHOLDS = (700, 10, 100)
-"""Those of Python, but for full collections, which come a tenth as often."""
+"""Python's defaults, but with full collections a tenth as often."""
 
 
 @contextmanager
 def spared_objects() -> Iterator[None]:
-    """Context in which full collections are rare and leave out the objects of its beginning.
+    """Context in which full collections are rare and skip the objects that exist at its start.
 
-    Enter it when a simulation has been built: what there is then lives as long as the simulation.
+    Enter the context when a simulation has been built: its objects live as long as the simulation.
     """
     before = gc.get_threshold()
     gc.collect()

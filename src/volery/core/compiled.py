@@ -1,8 +1,8 @@
-"""The one way to compile a kernel: numba, nogil, cached under a key that cannot go stale.
+"""Compiles kernels with numba: nogil, cached under a key that cannot go stale.
 
-numba notices an edit of the file that holds a kernel, but not of a callee in another file. The
-cache folder is therefore named by a hash of all of Volery's sources that hold kernels, the versions
-of numba and numpy, and the CPU. An edited kernel gets a fresh folder; old ones are swept away.
+numba detects an edit of the file with a kernel, but not of a callee in another file. The cache
+folder is therefore named by a hash of all of Volery's sources with kernels, the versions of numba
+and numpy, and the CPU. An edited kernel gets a new folder; old folders are deleted.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeVar
 
-# libgomp and other OpenMP runtimes spin on shared cores for milliseconds unless told not to.
+# libgomp and other OpenMP runtimes spin on shared cores for milliseconds by default.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 import numba
@@ -58,14 +58,14 @@ def _cache_key() -> str:
 
 
 def cache_root() -> Path:
-    """Folder for what can be made again: VOLERY_CACHE_DIR, XDG_CACHE_HOME or ~/.cache."""
+    """Returns the cache folder: below VOLERY_CACHE_DIR, XDG_CACHE_HOME or ~/.cache."""
     base = os.environ.get("VOLERY_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
     root = Path(base) if base else Path.home() / ".cache"
     return root / "volery"
 
 
 def _sweep(root: Path, keep: Path) -> None:
-    """Remove the compiled kernels of older versions, the newest few excepted."""
+    """Removes the compiled kernels of older versions, except the newest few."""
     others = sorted(
         (p for p in root.iterdir() if p.is_dir() and p != keep),
         key=lambda p: p.stat().st_mtime,
@@ -78,7 +78,7 @@ def _sweep(root: Path, keep: Path) -> None:
 
 @cache
 def cache_dir() -> Path:
-    """Folder of the compiled kernels; a temporary one where the user's cache is not writable."""
+    """Returns the folder of compiled kernels; temporary if the cache is not writable."""
     root = cache_root() / "kernels"
     folder = root / _cache_key()
     try:
@@ -93,7 +93,7 @@ def cache_dir() -> Path:
 
 
 def kernel(function: F, **options: Any) -> F:
-    """Compile `function` at its first call, without Python's lock, cached on disk.
+    """Compiles `function` at its first call, without the GIL, cached on disk.
 
     Division follows numpy (no ZeroDivisionError): a kernel checks its denominators itself.
     `options` are numba's, such as fastmath.
@@ -102,36 +102,36 @@ def kernel(function: F, **options: Any) -> F:
 
 
 def brief_kernel(function: F) -> F:
-    """Compile a kernel of some microseconds, which keeps Python's lock.
+    """Compiles a kernel of some microseconds that holds the GIL.
 
-    Where other threads want the lock, to give it up and to get it back takes longer than such a
-    kernel, for all of them.
+    When other threads want the GIL, releasing and regaining it takes all of them longer than such a
+    kernel.
     """
     return _decorate(function, nogil=False)
 
 
 def inline_kernel(function: F) -> F:
-    """Compile a small helper that both kernels and Python call; LLVM inlines it."""
+    """Compiles a small helper that both kernels and Python call; LLVM inlines it."""
     return brief_kernel(function)
 
 
 def inner_kernel(function: F, **options: Any) -> F:
-    """Compile a part that only kernels call; a call from Python raises TypeError.
+    """Compiles a part that only kernels call; a call from Python raises TypeError.
 
-    Without an entry from Python, whose code for a few dozen arrays outweighs a small function, it
-    compiles in a fraction of the time. Numbers that a caller writes out count as any others: numba
-    would compile the part anew for each of them.
+    The part compiles in a fraction of the time, because a Python entry for a few dozen arrays is
+    larger than a small function. Literal numbers of a caller are treated like other numbers: numba
+    would compile the part again for each literal.
 
-    Its arrays are those of its caller, or views of them: their references are not counted (numba's
-    option `_nrt`), for the counts lie in memory that all threads share, and each change of one
-    is an atomic instruction. For a part that makes arrays: `owning_kernel`.
+    The part's arrays are its caller's, or views of them: their references are not counted (numba's
+    option `_nrt`), because the counts are in memory shared by all threads, and each change of a
+    count is an atomic instruction. For a part that creates arrays, use `owning_kernel`.
     """
     fixed = {"no_cpython_wrapper": True, "_nrt": False, "pipeline_class": PartCompiler}
     choices = {**fixed, **options}
     part: Any = _decorate(function, **choices)
 
     def refuse(*_arguments: Any, **_keywords: Any) -> None:
-        raise TypeError(f"{function.__name__} is a part of a kernel; only kernels can call it")
+        raise TypeError(f"{function.__name__} is an inner kernel; only kernels can call it")
 
     template_of, unliteral = part.get_call_template, _TYPES.unliteral
 
@@ -147,19 +147,19 @@ def inner_kernel(function: F, **options: Any) -> F:
 
 
 def owning_kernel(function: F) -> F:
-    """Compile an `inner_kernel` that makes arrays of its own."""
+    """Compiles an `inner_kernel` that creates arrays."""
     return inner_kernel(function, _nrt=True)
 
 
 def _ignore(*_arguments: Any, **_keywords: Any) -> None:
-    """Do nothing."""
+    """Does nothing."""
 
 
 def _decorate(function: F, **options: Any) -> F:
-    # What is not said numba takes from whichever kernel first asks for a part, and keeps it for all
-    # others: results would depend on the order in which a cache was filled.
+    # numba copies an option that is not set from the first kernel that requests a part, and applies
+    # the option to all others: results would depend on the order in which a cache was filled.
     said: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "forceinline": False}
-    # Nobody hands kernels to C code: entries for it would take a tenth of the time to compile.
+    # Kernels are never passed to C code: entries for C would take a tenth of the time to compile.
     choices = {**said, "nogil": True, "no_cfunc_wrapper": True, **options}
     saved = _CONFIG.CACHE_DIR
     _CONFIG.CACHE_DIR = str(cache_dir())

@@ -1,7 +1,7 @@
 """Limits the connections of all servers of this process together.
 
-Every connection takes a file descriptor, and so do logs, scenarios and compiled kernels. The limit
-leaves a quarter of the descriptors that the system grants (RLIMIT_NOFILE) and 32 more to them.
+Every connection uses a file descriptor, and so do logs, scenarios and compiled kernels. The limit
+leaves them a quarter of the descriptors that the system grants (RLIMIT_NOFILE) and 32 more.
 """
 
 from __future__ import annotations
@@ -12,17 +12,17 @@ import threading
 from collections import Counter
 
 MAX_CONNECTIONS = 2048
-"""Of all servers together, however many descriptors there are (modelling choice)."""
+"""Limit for all servers together, whatever the number of descriptors (modelling choice)."""
 _MIN_CONNECTIONS = 8
 _SPARE_DESCRIPTORS = 32
 
 
 class ConnectionLimits:
-    """Counts open connections by listener and address; safe for any thread.
+    """Counts open connections by listener and address; thread-safe.
 
-    max_connections: of the process; None: from its file descriptors, at each connection anew. One
-    listener gets three quarters of them, and so does one address but those of loopback, which all
-    programs of this machine share.
+    max_connections: limit of the process; None: derived from its file descriptors at each
+    connection. One listener may have three quarters of them, and so may one address except
+    loopback, which all programs of this machine share.
     """
 
     def __init__(self, max_connections: int | None = None) -> None:
@@ -33,19 +33,19 @@ class ConnectionLimits:
 
     @property
     def max_connections(self) -> int:
-        """Connections that the process may have now."""
+        """Current limit of the process's connections."""
         return self._max_connections or connections_for(
             resource.getrlimit(resource.RLIMIT_NOFILE)[0]
         )
 
     @property
     def num_connections(self) -> int:
-        """Connections that are open."""
+        """Number of open connections."""
         with self._lock:
             return self._listeners.total()
 
     def enter(self, listener: str, address: str) -> str | None:
-        """Counts a new connection, or returns why there is no room for it."""
+        """Counts a new connection, or returns the reason why there is no room."""
         most = self.max_connections
         part = most - most // 4
         with self._lock:
@@ -69,7 +69,7 @@ class ConnectionLimits:
 
 
 def connections_for(descriptors: int) -> int:
-    """Returns how many connections a process with so many file descriptors may have."""
+    """Returns the limit of connections for a number of file descriptors."""
     if descriptors < 0:  # RLIM_INFINITY
         return MAX_CONNECTIONS
     wanted = descriptors - descriptors // 4 - _SPARE_DESCRIPTORS
@@ -77,7 +77,7 @@ def connections_for(descriptors: int) -> int:
 
 
 def is_loopback(address: str) -> bool:
-    """Returns whether an address is of this machine's loopback."""
+    """Returns whether an address is a loopback address."""
     try:
         found = ipaddress.ip_address(address.partition("%")[0])
     except ValueError:
@@ -87,4 +87,4 @@ def is_loopback(address: str) -> bool:
 
 
 SHARED = ConnectionLimits()
-"""What all servers of the process share."""
+"""The limits of all servers of the process."""

@@ -1,11 +1,11 @@
-"""Names that installed packages give to their objects, from Python's entry points.
+"""Finds objects that installed packages register by name, as Python entry points.
 
-A package adds its own in its `pyproject.toml`:
+A package registers its own in its `pyproject.toml`:
 
     [project.entry-points."volery.nodes"]
     my_planner = "my_package.planning:Planner"
 
-A name that Volery ships keeps its meaning, whatever else is installed.
+Names that Volery ships cannot be replaced by other packages.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class EntryPoints:
         return None if target is None else target.value
 
     def package(self, name: str) -> str:
-        """Returns the package that adds a name; empty: no such name."""
+        """Returns the package that registers a name; empty: no such name."""
         target = self._targets.get(name)
         return "" if target is None else target.package
 
@@ -61,13 +61,13 @@ class EntryPoints:
 
 
 def _points_of(package: Distribution, group: str) -> Iterable[EntryPoint]:
-    """Returns a package's entry points of a group; logs why they cannot be read, and returns none.
+    """Returns a package's entry points of a group; on an error logs the reason, returns none.
 
     `importlib.metadata.entry_points` would fail for all packages together.
     """
     try:
         return package.entry_points.select(group=group)
-    except Exception as error:  # whatever a damaged file causes there
+    except Exception as error:  # a damaged file may raise anything
         _log.warning("package %s: its entry points cannot be read: %s", _name_of(package), error)
         return ()
 
@@ -75,7 +75,7 @@ def _points_of(package: Distribution, group: str) -> Iterable[EntryPoint]:
 def _name_of(package: Distribution) -> str:
     try:
         name = package.metadata["Name"]
-    except Exception:  # whatever a damaged file causes there
+    except Exception:  # a damaged file may raise anything
         name = None
     return name or f"without a name in {package.locate_file('')}"
 

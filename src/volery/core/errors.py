@@ -1,4 +1,4 @@
-"""The error tree. Whatever a user can cause is a `VoleryError` with one clear sentence."""
+"""Defines the errors: all that a user can cause are `VoleryError`s with one clear sentence."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from enum import Enum
 
 
 class VoleryError(Exception):
-    """Base of all errors that Volery raises on purpose."""
+    """Base class of all errors that Volery raises deliberately."""
 
 
 class ScenarioError(VoleryError):
-    """A scenario cannot be loaded or run; the message names file, key and what is allowed."""
+    """A scenario cannot be loaded or run; the message names file, key and allowed values."""
 
 
 class DataFileError(VoleryError):
@@ -19,7 +19,7 @@ class DataFileError(VoleryError):
 
 
 class SpawnFault(Enum):
-    """Which of a new UAV's terms is at fault."""
+    """Which argument of a new UAV is invalid."""
 
     NAME = "name"
     NAME_TAKEN = "name taken"
@@ -27,7 +27,7 @@ class SpawnFault(Enum):
 
 
 class SpawnError(VoleryError):
-    """A UAV cannot come into being; `fault` says why not."""
+    """A UAV cannot be spawned; `fault` is the reason."""
 
     def __init__(self, fault: SpawnFault, message: str) -> None:
         super().__init__(message)
@@ -35,7 +35,7 @@ class SpawnError(VoleryError):
 
 
 class PlacementError(ScenarioError):
-    """A UAV was placed where it cannot be: inside a tree, under the ground, inside another."""
+    """A UAV's position is impossible: inside a tree, under the ground, inside another UAV."""
 
 
 class RecordingError(VoleryError):
@@ -51,23 +51,23 @@ class BridgeError(VoleryError):
 
 
 class UnreachableError(BridgeError):
-    """Nobody answers where a graph is looked for; somebody may later."""
+    """There is no server at a graph's address; one may start later."""
 
 
 class NodeError(VoleryError):
-    """A node failed: its code raised an exception, or cannot go on."""
+    """A node failed: its code raised an exception, or cannot continue."""
 
     def __init__(self, text: str, *, node: str = "", time_ns: int = 0) -> None:
-        """Take the full name of the node and the time of its failure where they are known."""
+        """Creates the error with the node's full name and the time of its failure, if known."""
         super().__init__(text)
         self.node = node
         self.time_ns = time_ns
         self.is_reported = False
-        """Whether it has been logged as the node's failure."""
+        """Whether the error has been logged as the node's failure."""
 
 
 class CommandError(VoleryError):
-    """A command is refused: not finite, out of range, or impossible in the present mode."""
+    """A command is rejected: not finite, out of range, or impossible in the current mode."""
 
 
 class DivergenceError(VoleryError):
@@ -80,23 +80,23 @@ class DivergenceError(VoleryError):
 
 
 class PatternError(VoleryError):
-    """A text is no regular expression, or one that is too large."""
+    """A text is not a regular expression, or is too large."""
 
 
 class SnapshotError(VoleryError):
-    """A state cannot be kept or taken back: something in the run does not offer its state."""
+    """A state cannot be saved or restored: some part of the run does not support it."""
 
 
 class PartnerError(VoleryError):
-    """A lock-step partner did not answer in time, or spoke out of turn."""
+    """A lock-step partner did not respond in time, or out of order."""
 
 
 class EstimatorError(VoleryError):
-    """An estimator is given what it cannot use: wrong shape, unknown row, wrong order."""
+    """An estimator received invalid input: wrong shape, unknown row, wrong order."""
 
 
 class PlanError(VoleryError):
-    """A plan is refused: a start that cannot be, a map that is too large or has nothing free."""
+    """A plan is rejected: an impossible start, or a map that is too large or has no free space."""
 
 
 class CommsError(VoleryError):
@@ -104,12 +104,12 @@ class CommsError(VoleryError):
 
 
 def reason_of(error: Exception) -> str:
-    """Why something failed, in words for people: an `OSError` without number, names and addresses.
+    """Returns the reason of an error for users: an `OSError` without number, names and addresses.
 
-    asyncio tells of a refused connection as "Connect call failed ('127.0.0.1', 9090)".
+    asyncio reports a refused connection as "Connect call failed ('127.0.0.1', 9090)".
     """
     number = error.errno if isinstance(error, OSError) else None
-    if number is not None and number > 0:  # those of failed look-ups of names are negative
+    if number is not None and number > 0:  # those of failed name look-ups are negative
         return os.strerror(number)
     told = error.strerror if isinstance(error, OSError) else None
     return told or str(error) or type(error).__name__

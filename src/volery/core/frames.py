@@ -1,4 +1,4 @@
-"""The only place where axes change hands (REP-103 inside: ENU world, FLU body).
+"""Converts between axis conventions (inside, REP-103: ENU world, FLU body); no other module does.
 
 - NED world / FRD body: MAVLink's.
 - Optical: z forward, x right, y down; a camera's frames ending in `_optical`.
@@ -31,7 +31,7 @@ for _constant in (Q_NED_ENU, Q_FRD_FLU, Q_BODY_OPTICAL):
 
 
 def ned_from_enu(v: ArrayLike) -> Array:
-    """East-north-up vectors to north-east-down."""
+    """Converts east-north-up vectors (..., 3) to north-east-down."""
     v = np.asarray(v, dtype=np.float64)
     return np.stack([v[..., 1], v[..., 0], -v[..., 2]], axis=-1)
 
@@ -40,7 +40,7 @@ enu_from_ned = ned_from_enu
 
 
 def frd_from_flu(v: ArrayLike) -> Array:
-    """Forward-left-up vectors to forward-right-down."""
+    """Converts forward-left-up vectors (..., 3) to forward-right-down."""
     return np.asarray(np.asarray(v, dtype=np.float64) * np.array([1.0, -1.0, -1.0]))
 
 
@@ -48,74 +48,74 @@ flu_from_frd = frd_from_flu
 
 
 def q_ned_frd_from_enu_flu(q_enu_flu: ArrayLike) -> Array:
-    """Attitude FLU-in-ENU to FRD-in-NED."""
+    """Converts attitudes (..., 4) from FLU-in-ENU to FRD-in-NED."""
     return rotations.multiply(Q_NED_ENU, rotations.multiply(q_enu_flu, Q_FRD_FLU))
 
 
 def q_enu_flu_from_ned_frd(q_ned_frd: ArrayLike) -> Array:
-    """Attitude FRD-in-NED to FLU-in-ENU."""
+    """Converts attitudes (..., 4) from FRD-in-NED to FLU-in-ENU."""
     return rotations.multiply(Q_NED_ENU, rotations.multiply(q_ned_frd, Q_FRD_FLU))
 
 
 def optical_from_flu(v: ArrayLike) -> Array:
-    """Forward-left-up vectors to an optical frame (x right, y down, z forward)."""
+    """Converts forward-left-up vectors to an optical frame (x right, y down, z forward)."""
     v = np.asarray(v, dtype=np.float64)
     return np.stack([-v[..., 1], -v[..., 2], v[..., 0]], axis=-1)
 
 
 def flu_from_optical(v: ArrayLike) -> Array:
-    """Optical-frame vectors to forward-left-up."""
+    """Converts optical-frame vectors (..., 3) to forward-left-up."""
     v = np.asarray(v, dtype=np.float64)
     return np.stack([v[..., 2], -v[..., 0], -v[..., 1]], axis=-1)
 
 
 def gltf_from_enu(v: ArrayLike) -> Array:
-    """East-north-up vectors to glTF's axes (x, z, -y): y up."""
+    """Converts east-north-up vectors to glTF's axes (x, z, -y): y up."""
     v = np.asarray(v, dtype=np.float64)
     return np.stack([v[..., 0], v[..., 2], -v[..., 1]], axis=-1)
 
 
 def enu_from_gltf(v: ArrayLike) -> Array:
-    """Vectors in glTF's axes to east-north-up (x, -z, y)."""
+    """Converts vectors in glTF's axes to east-north-up (x, -z, y)."""
     v = np.asarray(v, dtype=np.float64)
     return np.stack([v[..., 0], -v[..., 2], v[..., 1]], axis=-1)
 
 
 def q_gltf_from_enu(q: ArrayLike) -> Array:
-    """ENU rotation to glTF's axes: both are right-handed, so the axis maps as a vector."""
+    """Converts ENU rotations to glTF's axes: both right-handed, so the axis maps as a vector."""
     q = np.asarray(q, dtype=np.float64)
     return np.concatenate([gltf_from_enu(q[..., :3]), q[..., 3:]], axis=-1)
 
 
 def unity_from_ros(v: ArrayLike) -> Array:
-    """ROS vectors (x, y, z) to Unity (-y, z, x)."""
+    """Converts ROS vectors (x, y, z) to Unity (-y, z, x)."""
     v = np.asarray(v, dtype=np.float64)
     return np.stack([-v[..., 1], v[..., 2], v[..., 0]], axis=-1)
 
 
 def ros_from_unity(v: ArrayLike) -> Array:
-    """Unity vectors (x, y, z) to ROS (z, -x, y)."""
+    """Converts Unity vectors (x, y, z) to ROS (z, -x, y)."""
     v = np.asarray(v, dtype=np.float64)
     return np.stack([v[..., 2], -v[..., 0], v[..., 1]], axis=-1)
 
 
 def q_unity_from_ros(q: ArrayLike) -> Array:
-    """ROS rotation to Unity's: the axis maps as a vector, the sense turns with handedness."""
+    """Converts ROS rotations to Unity: the axis maps as a vector, the sense is inverted."""
     q = np.asarray(q, dtype=np.float64)
     return np.concatenate([-unity_from_ros(q[..., :3]), q[..., 3:]], axis=-1)
 
 
 def q_ros_from_unity(q: ArrayLike) -> Array:
-    """Unity rotation to ROS."""
+    """Converts Unity rotations to ROS."""
     q = np.asarray(q, dtype=np.float64)
     return np.concatenate([-ros_from_unity(q[..., :3]), q[..., 3:]], axis=-1)
 
 
-# ------------------------------------------------------------------- one vehicle's, without arrays
+# ---------------------------------------------------------------------- one vehicle, without arrays
 
 
 def ned_of_enu(v: tuple[float, float, float]) -> tuple[float, float, float]:
-    """`ned_from_enu` of one vector; its own inverse."""
+    """Computes `ned_from_enu` of one vector; its own inverse."""
     return v[1], v[0], -v[2]
 
 
@@ -123,7 +123,7 @@ enu_of_ned = ned_of_enu
 
 
 def frd_of_flu(v: tuple[float, float, float]) -> tuple[float, float, float]:
-    """`frd_from_flu` of one vector; its own inverse."""
+    """Computes `frd_from_flu` of one vector; its own inverse."""
     return v[0], -v[1], -v[2]
 
 
@@ -133,7 +133,7 @@ flu_of_frd = frd_of_flu
 def q_ned_frd_of_enu_flu(
     q: tuple[float, float, float, float],
 ) -> tuple[float, float, float, float]:
-    """`q_ned_frd_from_enu_flu` of one quaternion, multiplied out; its own inverse (up to sign)."""
+    """Computes `q_ned_frd_from_enu_flu` of one quaternion; its own inverse (up to sign)."""
     x, y, z, w = q
     s = 0.7071067811865476
     return s * (x + y), s * (x - y), s * (w - z), s * (w + z)

@@ -1,12 +1,11 @@
-"""Frames in a stream of bytes: found by a sync word, guarded by two CRC-16s.
+"""Finds frames in a stream of bytes by a sync word, and checks them by two CRC-16s.
 
-A frame is a head of fixed size, which begins with the sync word and ends with a CRC of what lies
-between, then a payload whose length the head tells, then a CRC of everything behind the sync word.
-The head's own CRC tells a damaged length before anyone waits for it. CRCs are little-endian u16.
+A frame is a head of fixed size, which starts with the sync word and ends with a CRC of the bytes
+between, then a payload whose length is in the head, then a CRC of everything after the sync word.
+The head's own CRC detects a damaged length before the payload arrives. CRCs are little-endian u16.
 
 The CRC is CRC-16/CCITT-FALSE: polynomial x^16 + x^12 + x^5 + 1 (0x1021), initial value 0xFFFF,
-neither input nor output reflected, nothing xored at the end; of the ASCII text `123456789` it is
-0x29B1.
+neither input nor output reflected, no final XOR; the CRC of the ASCII text `123456789` is 0x29B1.
 """
 
 from __future__ import annotations
@@ -27,15 +26,15 @@ _CRC = struct.Struct("<H")
 _SPARE_WORK_BYTES = 4 << 20
 _MOST_SPARED_BYTES = 256 << 20
 _WORK_PER_BYTE = 4
-"""Bytes checked at most for each byte received, beside the spare ones.
+"""Maximum of bytes checked per byte received, plus the spare bytes.
 
-Frames inside of damaged frames are looked for by checking the same bytes again. Only a peer who
-nests forged heads gets beyond this; damaged frames of his are then passed over whole.
+The scanner searches damaged frames for inner frames by checking the same bytes again. Only a peer
+that nests forged heads exceeds the limit; its damaged frames are then skipped whole.
 """
 
 
 class Flaw(Enum):
-    """Why what stands behind a sync word is no frame."""
+    """Reason why the bytes after a sync word are not a frame."""
 
     HEAD = "damaged head"
     VERSION = "another version"
@@ -45,23 +44,23 @@ class Flaw(Enum):
 
 
 def crc16(data: bytes | bytearray | memoryview, start: int = CRC_START) -> int:
-    """CRC-16/CCITT-FALSE of the bytes; `start`: the CRC of those before them."""
+    """Returns the CRC-16/CCITT-FALSE of the bytes; `start`: the CRC of the bytes before."""
     return crc_hqx(data, start)
 
 
 def crc_bytes(check: int) -> bytes:
-    """A CRC as it stands in a frame."""
+    """Returns a CRC as encoded in a frame."""
     return _CRC.pack(check)
 
 
 class FrameScanner(ABC, Generic[T]):
-    """Finds frames in a stream of bytes, whatever else is in it.
+    """Finds frames in a stream of bytes with arbitrary content between them.
 
-    It keeps no more than the frame in progress, takes time in proportion to what it is fed, and
-    never raises. What is damaged is dropped and counted; the search goes on behind its sync word.
-    A damaged frame whose payload holds whole frames yields those.
+    The scanner stores no more than the current frame, takes time proportional to its input, and
+    never raises. Damaged frames are dropped and counted; the search continues after their sync
+    word. A damaged frame whose payload contains complete frames yields those.
 
-    sync: the sync word. head_bytes: of the head, sync word and CRC included.
+    sync: the sync word. head_bytes: size of the head, sync word and CRC included.
     """
 
     def __init__(self, sync: bytes, head_bytes: int) -> None:
@@ -71,38 +70,38 @@ class FrameScanner(ABC, Generic[T]):
         self._wanted = head_bytes
         self._work_left = _SPARE_WORK_BYTES
         self.frames = 0
-        """Frames found."""
+        """Number of frames found."""
         self.flaws: Counter[Flaw] = Counter()
-        """Sync words behind which no whole frame of our version stood, by reason."""
+        """Number of sync words without a valid frame, by reason."""
         self.noise_bytes = 0
-        """Bytes that belonged to no frame, those of damaged ones included."""
+        """Number of bytes outside of valid frames."""
 
     @abstractmethod
     def payload_bytes(self, head: bytes | bytearray) -> int | Flaw:
-        """Length of the payload behind a head whose CRC is right, sync word left away."""
+        """Returns the payload length given a head with a valid CRC, without its sync word."""
 
     @abstractmethod
     def frame_of(self, view: memoryview) -> T:
-        """The frame of these bytes, all checks passed; the view is void afterwards."""
+        """Returns the frame of valid bytes; the view becomes invalid afterwards."""
 
     @property
     def corrupt(self) -> int:
-        """Damaged frames of every kind."""
+        """Number of damaged frames of every kind."""
         return self.flaws.total()
 
     @property
     def waiting_bytes(self) -> int:
-        """Bytes of a frame in progress."""
+        """Number of bytes of the current frame."""
         return len(self._data)
 
     def feed(self, data: bytes | bytearray | memoryview) -> list[T]:
-        """The frames that are whole with these bytes."""
+        """Returns the frames that these bytes complete."""
         self._data += data
         self._work_left += _WORK_PER_BYTE * len(data)
         return self._parse() if len(self._data) >= self._wanted else []
 
     def finish(self) -> list[T]:
-        """Nothing more will come: the frames hidden in one that will never be whole."""
+        """Ends the stream; returns the frames inside an incomplete frame."""
         frames: list[T] = []
         while len(self._data) >= self._head_bytes:
             frames += self._parse()
@@ -147,7 +146,7 @@ class FrameScanner(ABC, Generic[T]):
         return skipped
 
     def _next_sync(self, position: int) -> int:
-        """Where the next sync word begins, or what may become one at the end."""
+        """Returns the position of the next sync word, or of its possible start at the end."""
         data, sync = self._data, self._sync
         if data.startswith(sync, position):
             return position
@@ -162,7 +161,7 @@ class FrameScanner(ABC, Generic[T]):
         return len(data)
 
     def _size_at(self, position: int) -> int | Flaw:
-        """Bytes of the frame that begins here, or what is wrong with its head."""
+        """Returns the size of the frame that starts here, or its head's flaw."""
         end = position + self._head_bytes - CRC_BYTES
         head = self._data[position + len(self._sync) : end]
         (check,) = _CRC.unpack_from(self._data, end)
@@ -172,7 +171,7 @@ class FrameScanner(ABC, Generic[T]):
         return length if isinstance(length, Flaw) else self._head_bytes + length + CRC_BYTES
 
     def _whole(self, position: int, size: int) -> bool:
-        """Whether the frame that begins here is undamaged."""
+        """Returns whether the frame that starts here is undamaged."""
         end = position + size - CRC_BYTES
         self._work_left = min(self._work_left, _MOST_SPARED_BYTES) - size
         (check,) = _CRC.unpack_from(self._data, end)

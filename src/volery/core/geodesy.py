@@ -1,8 +1,8 @@
-"""WGS-84: geodetic coordinates, earth-centred axes (ECEF) and a local tangent plane (ENU).
+"""Converts between WGS-84 geodetic coordinates, ECEF and a local tangent plane (ENU).
 
 Geodetic arrays are (..., 3): latitude rad, longitude rad, height above the ellipsoid m. ECEF and
-ENU arrays are (..., 3) m. No height of the geoid is modelled: heights above the ellipsoid and above
-sea level are one and the same here.
+ENU arrays are (..., 3) m. The geoid is not modelled: heights above the ellipsoid and above sea
+level are equal here.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 SEMI_MAJOR_M = 6_378_137.0
-"""WGS-84, defining."""
+"""WGS-84 defining parameter."""
 FLATTENING = 1.0 / 298.257223563
-"""WGS-84, defining."""
+"""WGS-84 defining parameter."""
 ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)
 
 
 def ecef_from_geodetic(geodetic: ArrayLike) -> Array:
-    """Earth-centred place of geodetic coordinates."""
+    """Returns the ECEF positions of geodetic coordinates."""
     latitude, longitude, height = _components(geodetic)
     sine = np.sin(latitude)
     normal = SEMI_MAJOR_M / np.sqrt(1.0 - ECCENTRICITY_SQUARED * sine * sine)
@@ -41,18 +41,18 @@ def ecef_from_geodetic(geodetic: ArrayLike) -> Array:
 
 
 def geodetic_from_ecef(ecef: ArrayLike) -> Array:
-    """Geodetic coordinates of earth-centred places more than 43 km from the earth's centre."""
+    """Returns the geodetic coordinates of ECEF positions beyond 43 km from the earth's centre."""
     return np.stack(_geodetic(np, *_components(ecef)), axis=-1)
 
 
 def geodetic_from_ecef_point(x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Returns the same for one point, without arrays, which take about ten times as long."""
+    """Converts one point without arrays, which take about ten times as long."""
     latitude, longitude, height = _geodetic(math, x, y, z)
     return latitude, longitude, height
 
 
 def _geodetic(library: ModuleType, x: Any, y: Any, z: Any) -> tuple[Any, Any, Any]:
-    """Latitude, longitude, height by the functions of a library, `math` or `numpy`.
+    """Returns latitude, longitude, height, computed by `math` or `numpy`.
 
     Closed form, without iterations: H. Vermeille, Direct transformation from geocentric coordinates
     to geodetic coordinates, Journal of Geodesy 76 (2002).
@@ -79,7 +79,7 @@ def _geodetic(library: ModuleType, x: Any, y: Any, z: Any) -> tuple[Any, Any, An
 
 @dataclass(frozen=True)
 class LocalFrame:
-    """East-north-up axes that touch the ellipsoid's parallel surface at an origin: the map."""
+    """East-north-up axes tangent to the ellipsoid at an origin: the map."""
 
     latitude_rad: float
     longitude_rad: float
@@ -87,7 +87,7 @@ class LocalFrame:
 
     @classmethod
     def from_degrees(cls, latitude: float, longitude: float, altitude_m: float) -> LocalFrame:
-        """Frame at a latitude and longitude in degrees."""
+        """Returns the frame at a latitude and longitude in degrees, altitude in m."""
         return cls(float(np.radians(latitude)), float(np.radians(longitude)), altitude_m)
 
     @property
@@ -103,21 +103,21 @@ class LocalFrame:
         return np.array([[-so, co, 0.0], [-sa * co, -sa * so, ca], [ca * co, ca * so, sa]])
 
     def ecef_from_enu(self, enu: ArrayLike) -> Array:
-        """Earth-centred places of local ones."""
+        """Returns the ECEF positions of ENU positions."""
         turned = np.asarray(enu, dtype=np.float64) @ self.enu_from_ecef_matrix
         return np.asarray(turned + ecef_from_geodetic(self.origin_geodetic))
 
     def enu_from_ecef(self, ecef: ArrayLike) -> Array:
-        """Local places of earth-centred ones."""
+        """Returns the ENU positions of ECEF positions."""
         way = np.asarray(ecef, dtype=np.float64) - ecef_from_geodetic(self.origin_geodetic)
         return np.asarray(way @ self.enu_from_ecef_matrix.T)
 
     def geodetic_from_enu(self, enu: ArrayLike) -> Array:
-        """Geodetic coordinates of local places."""
+        """Returns the geodetic coordinates of ENU positions."""
         return geodetic_from_ecef(self.ecef_from_enu(enu))
 
     def enu_from_geodetic(self, geodetic: ArrayLike) -> Array:
-        """Local places of geodetic coordinates."""
+        """Returns the ENU positions of geodetic coordinates."""
         return self.enu_from_ecef(ecef_from_geodetic(geodetic))
 
 

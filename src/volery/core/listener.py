@@ -1,17 +1,17 @@
-"""A listening TCP socket that keeps to limits, for every server over TCP.
+"""Provides a listening TCP socket with limits, for every TCP server.
 
     listener = open_listener("127.0.0.1", 5760, "MAVLink TCP")
     server = await loop.create_server(make_protocol, sock=listener)
     ...
     listener.prove(transport)          # the client has sent a valid first frame
 
-The limits hold where connections are accepted, so asyncio, uvicorn and websockets need no change. A
-connection is unproven until its first valid frame. Where there is no room, the oldest unproven
-connection ends; where there is none, the new one is refused. Both are counted and logged now and
-then. Out of file descriptors, asyncio's own loop would log a traceback for each attempt; here a
-reserved descriptor serves to refuse the client.
+The limits apply where connections are accepted, so asyncio, uvicorn and websockets need no change.
+A connection is unproven until its first valid frame. When there is no room, the oldest unproven
+connection ends; without one, the new connection is refused. Both are counted and logged
+occasionally. Out of file descriptors, asyncio's own loop would log a traceback for each attempt;
+here a reserved descriptor serves to refuse the client.
 
-A server whose clients speak first gets a connection when its first request has come, see `Opening`.
+A server whose clients send first gets a connection with its first request, see `Opening`.
 """
 
 from __future__ import annotations
@@ -30,37 +30,37 @@ from volery.core.rare_log import RareLog
 from volery.core.waiting_room import Look, WaitingConnection, WaitingRoom
 
 MAX_UNPROVEN = 64
-"""Connections to one listener that have sent no valid frame (modelling choice)."""
+"""Limit of one listener's connections without a valid frame (modelling choice)."""
 _BACKLOG = 128
 _REFUSALS_A_TURN = 64
 _READY_A_TURN = 4
-"""New connections that the server gets before those that it has get their turn again."""
+"""New connections passed to the server before its existing ones get their turn again."""
 _EVICTIONS_A_TURN = 16
-"""After so many the server gets its turn, to close what was ended."""
+"""After this number the server gets its turn, to close the ended connections."""
 _NO_DESCRIPTORS = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
 _PAUSE_S = 0.001
-"""Of a server that has no descriptor at all: it would spin otherwise."""
+"""Pause of a server without any descriptor, which would spin otherwise."""
 _log = logging.getLogger(__name__)
 
 
 class Opening(NamedTuple):
-    """How connections begin where clients speak first: they wait until `look` finds them ready."""
+    """How connections start when clients send first: they wait until `look` returns ready."""
 
     look: Callable[[bytes], Look]
-    """What their first bytes show."""
+    """Examines their first bytes."""
     patience_s: float | None = None
-    """How long they may wait; None: as long as there is room."""
+    """Maximum waiting time; None: as long as there is room."""
     greeting: bytes = b""
-    """Sent to each at once."""
+    """Bytes sent to each connection at once."""
 
 
 class Listener(socket.socket):
-    """Accepts connections within limits. All methods belong to the thread of its server.
+    """Accepts connections within limits. All methods are called in the server's thread.
 
-    name: of the server, for logs. limits: what it shares with others. max_connections: of this
-    listener, above which the oldest unproven one gives way; None: those of `limits`. max_unproven:
-    as MAX_UNPROVEN; None: no limit of their own, where clients may listen in silence. opening: how
-    connections begin; None: the server gets them at once.
+    name: of the server, for logs. limits: shared with other servers. max_connections: limit of this
+    listener, beyond which the oldest unproven connection ends; None: that of `limits`.
+    max_unproven: see MAX_UNPROVEN; None: no limit, for servers whose clients may stay silent.
+    opening: how connections start; None: the server gets them at once.
     """
 
     def __init__(
@@ -80,14 +80,14 @@ class Listener(socket.socket):
         self._max_unproven = max_unproven
         self._open: dict[int, _Accepted] = {}
         self._unproven: dict[int, _Accepted] = {}
-        """By file descriptor, the oldest first."""
+        """By file descriptor, oldest first."""
         self._evicted = 0
-        """Connections that have been ended and not yet closed."""
+        """Number of ended connections that are not closed yet."""
         self._num_given = 0
-        """Connections that the server has got in this turn."""
+        """Number of connections that the server has got in this turn."""
         self._reserve: int | None = os.open(os.devnull, os.O_RDONLY)
         self.refusals = RareLog(_log)
-        """What was refused and ended, by reason."""
+        """Refused and ended connections, by reason."""
         self._greeting = b"" if opening is None else opening.greeting
         self._room: WaitingRoom | None = None
         if opening is not None and WaitingRoom.is_available:
@@ -99,17 +99,13 @@ class Listener(socket.socket):
         self._name = f"{self._name}, port {self.getsockname()[1]}"
 
     def fileno(self) -> int:
-        """Returns the descriptor that is readable when `accept` has something to do."""
+        """Returns the descriptor that is readable when `accept` has work to do."""
         return super().fileno() if self._room is None else self._room.fileno()
 
     def accept(self) -> tuple[socket.socket, Any]:
-        """As of `socket.socket`, for a connection that there is room for and that is ready.
+        """Accepts a ready connection within the limits, like `socket.socket.accept`.
 
-        Raises
-        ------
-        BlockingIOError
-            None is ready, or the server shall close some first.
-
+        Raises `BlockingIOError` if no connection is ready, or the server has to close some first.
         """
         accepted = self._next_accepted()
         if accepted is None:
@@ -119,13 +115,13 @@ class Listener(socket.socket):
         return accepted
 
     def prove(self, connection: Any) -> None:
-        """Notes a valid frame of the client of `connection`, a socket or a transport."""
+        """Marks `connection`, a socket or a transport, as proven by a valid frame."""
         self._unproven.pop(_descriptor_of(connection), None)
 
     def make_room_for(self, connection: Any) -> bool:
-        """Ends the oldest unproven connection but this one; returns whether there was one.
+        """Ends the oldest other unproven connection; returns whether there was one.
 
-        For servers with a limit of their own, that tell a client why it is refused.
+        For servers with a limit of their own that send a client the reason for a refusal.
         """
         return self._evict("as many connections as may be", _descriptor_of(connection))
 
@@ -134,11 +130,11 @@ class Listener(socket.socket):
         self._note(f"ends connections that speak {protocol}: a web page, or a wrong port")
 
     def note_slow_client(self) -> None:
-        """Counts a connection that is ended because its request does not come."""
+        """Counts a connection that is ended because its request did not arrive in time."""
         self._note("ends connections whose requests do not come in time")
 
     def close(self) -> None:
-        """Stops listening; connections that the server has got stay open."""
+        """Stops listening; the server's connections stay open."""
         if self._room is not None:
             self._room.close()
         if self._reserve is not None:
@@ -149,7 +145,7 @@ class Listener(socket.socket):
     # ---------------------------------------------------------------------------------- internal
 
     def _next_accepted(self) -> tuple[socket.socket, Any] | None:
-        """Returns the next connection; None: the server shall do something else now."""
+        """Returns the next connection; None: the server must do other work now."""
         with contextlib.suppress(BlockingIOError):
             for _ in range(_REFUSALS_A_TURN):
                 if self._evicted >= _EVICTIONS_A_TURN or self._num_given >= _READY_A_TURN:
@@ -160,7 +156,7 @@ class Listener(socket.socket):
         return None
 
     def _attend(self, room: WaitingRoom) -> tuple[socket.socket, Any] | None:
-        """Does one thing that is to be done; returns a connection that has become ready."""
+        """Handles one event; returns a connection that has become ready."""
         event = room.next_event()
         if event.descriptor not in room:
             accepted = self._accept_one()
@@ -182,7 +178,7 @@ class Listener(socket.socket):
         waiting.sock.close()
 
     def _accept_one(self) -> tuple[socket.socket, Any] | None:
-        """Accepts the next connection; None: it was refused."""
+        """Accepts the next connection; None if the connection was refused."""
         try:
             descriptor, address = self._accept()  # type: ignore[attr-defined]
         except OSError as error:
@@ -197,12 +193,12 @@ class Listener(socket.socket):
             accepted.close()
             return None
         if self._greeting:
-            with contextlib.suppress(OSError):  # gone already
+            with contextlib.suppress(OSError):  # already closed
                 accepted.send(self._greeting)
         return accepted, address
 
     def _enter(self, accepted: _Accepted, address: str) -> str | None:
-        """Makes room for a connection and counts it; or returns why there is none."""
+        """Makes room for a connection and counts it; or returns the reason for a refusal."""
         most, unproven = self._max_connections, self._max_unproven
         if unproven is not None:
             unproven = min(unproven, max(1, self._limits.max_connections // 4))
@@ -214,7 +210,7 @@ class Listener(socket.socket):
                 return full
         reason = self._limits.enter(self._key, address)
         if reason is not None:
-            self._evict(reason)  # room for the next one; this one's would come too late
+            self._evict(reason)  # room for the next connection; too late for this one
             return reason
         accepted.attach(self, address)
         self._open[accepted.fileno()] = self._unproven[accepted.fileno()] = accepted
@@ -232,12 +228,12 @@ class Listener(socket.socket):
             return True
         oldest.is_evicted = True
         self._evicted += 1
-        with contextlib.suppress(OSError):  # its client has left
+        with contextlib.suppress(OSError):  # the client has disconnected
             oldest.shutdown(socket.SHUT_RDWR)  # its server sees the end of the stream
         return True
 
     def _refuse_blindly(self) -> None:
-        """Out of descriptors: gives the reserved one up for a moment to send a client away."""
+        """Refuses a client when out of descriptors, by briefly freeing the reserved one."""
         self._note("refuses connections: out of file descriptors")
         if self._reserve is None:
             time.sleep(_PAUSE_S)
@@ -261,7 +257,7 @@ class Listener(socket.socket):
 
 
 class _Accepted(socket.socket):
-    """A connection that tells its listener when it is closed."""
+    """A connection that notifies its listener when it is closed."""
 
     is_evicted = False
     _listener: Listener | None = None
@@ -289,8 +285,8 @@ def open_listener(
 ) -> Listener:
     """Returns a socket that listens on the first address of `host`; port 0 takes a free one.
 
-    Names such as `localhost` mean IPv4 where they have such an address. The other arguments are
-    those of `Listener`. Raises `OSError` or `OverflowError` where it cannot listen.
+    Names such as `localhost` mean IPv4 if they have such an address. The other arguments are those
+    of `Listener`. Raises `OSError` or `OverflowError` if the socket cannot listen.
     """
     found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
     family, _, _, _, address = min(found, key=lambda entry: entry[0] != socket.AF_INET)
@@ -308,7 +304,7 @@ def open_listener(
 
 
 def _descriptor_of(connection: Any) -> int:
-    """Returns the file descriptor of a socket or of an asyncio transport; -1: it is closed."""
+    """Returns the file descriptor of a socket or asyncio transport; -1 if closed."""
     if hasattr(connection, "get_extra_info"):
         connection = connection.get_extra_info("socket")
     return -1 if connection is None else int(connection.fileno())

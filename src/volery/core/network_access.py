@@ -1,4 +1,4 @@
-"""What all servers and clients over TCP share: where they may listen, who is let in, sockets."""
+"""Controls access over TCP, for all servers and clients: addresses, tokens, socket options."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ from volery.core.errors import BridgeError
 
 LOOPBACK = frozenset({"127.0.0.1", "::1", "localhost"})
 PROBES = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}
-"""The system asks a peer who is silent for 5 s, every 5 s, at most 3 times, whether it lives."""
+"""TCP keepalive: a peer silent for 5 s is probed every 5 s, at most 3 times."""
 
 
 def check_address(host: str, *, anywhere: bool, flag: str) -> None:
-    """`BridgeError` for an address beyond loopback without the explicit consent `anywhere`.
+    """Raises `BridgeError` for an address beyond loopback without the consent `anywhere`.
 
-    flag: how a user gives that consent.
+    flag: the option that gives the consent.
     """
     if host in LOOPBACK or anywhere:
         return
     raise BridgeError(
-        f"{host} can be reached from other machines, and whoever reaches it commands the UAVs; "
+        f"{host} can be reached from other machines, whose clients could command the UAVs; "
         f"allow that with {flag}, or listen on 127.0.0.1"
     )
 
 
 def check_token(host: str, token: str | None) -> None:
-    """`BridgeError` for an address beyond loopback where nobody would have to show a token."""
+    """Raises `BridgeError` for an address beyond loopback without a token."""
     if host not in LOOPBACK and not token:
         raise BridgeError(f"{host} can be reached from other machines: set a --token")
 
 
 def shows_token(given: Any, token: str | None) -> bool:
-    """Whether what was given is the token, told in the same time for every wrong one."""
+    """Returns whether `given` is the token, in constant time."""
     if token is None:
         return True
     return isinstance(given, str) and hmac.compare_digest(
@@ -43,17 +43,17 @@ def shows_token(given: Any, token: str | None) -> bool:
 
 
 def write_while_open(transport: asyncio.WriteTransport, data: bytes) -> None:
-    """Write to a connection that has not ended.
+    """Writes to a connection that has not ended.
 
-    After a failed write asyncio tells its protocol only in the loop's next turn, and meanwhile
-    prints a warning of each further write.
+    After a failed write, asyncio notifies its protocol only in the loop's next turn, and meanwhile
+    prints a warning for each further write.
     """
     if not transport.is_closing():
         transport.write(data)
 
 
 def tend(sock: socket.socket) -> None:
-    """Send small messages at once, and notice a peer that vanished without a word."""
+    """Sends small messages at once, and detects a peer that vanished silently."""
     sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     for option, value in PROBES.items():

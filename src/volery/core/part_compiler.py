@@ -1,8 +1,8 @@
-"""How parts of kernels compile: to what their callers take in, and no further.
+"""Compiles parts of kernels only as far as their callers need.
 
-numba makes of every function what it would need if Python called it: machine code, and arrays out
-of lists. Only other kernels call a part, and they take it in before machine code is made. It is
-optimised as numba would: results are the same to the last bit.
+numba compiles every function for calls from Python: with machine code, and with arrays from lists.
+Only other kernels call a part, and they inline the part before machine code is generated. The part
+is optimised as numba would: results are bit-identical.
 """
 
 from __future__ import annotations
@@ -18,23 +18,23 @@ _COMPILER: Any = compiler.Compiler
 _PASSES: Any = PassManager
 
 _ENVIRONMENT = "_ZN08NumbaEnv"
-"""How numba begins the name of the variable that holds a function's Python surroundings."""
+"""Prefix of numba's variable with a function's Python environment."""
 
 _NEEDED = ("_final_module", "_finalize_dynamic_globals", "_finalize_final_module")
-"""What a library of numba must have: with one that is made otherwise, parts compile as numba's."""
+"""Attributes that numba's library must have; without them, numba compiles parts its own way."""
 
 _MAKING_ARRAYS = ("InlineClosureLikes", "NopythonRewrites")
-"""Passes for local functions, arrays from lists, expressions of whole arrays: what they rewrite
-needs memory of its own, which a part has not unless it counts references."""
+"""Passes for local functions, arrays from lists, expressions of whole arrays: their results need
+memory of their own, which a part lacks unless it counts references."""
 
 
 class PartLibrary(_LIBRARY):  # type: ignore[misc]
-    """The code of a part, for callers to link and inline; without an address of its own."""
+    """Code of a part, which callers link and inline; without an address of its own."""
 
     _final_module: Any
 
     def _finalize_final_module(self) -> None:
-        """Translate the surroundings' variables alone, which numba wants to find in memory."""
+        """Compiles only the environment variables, which numba needs in memory."""
         self._finalize_dynamic_globals()
         whole = self._final_module
         self._final_module = _surroundings_of(whole)
@@ -43,10 +43,10 @@ class PartLibrary(_LIBRARY):  # type: ignore[misc]
 
 
 class PartCompiler(_COMPILER):  # type: ignore[misc]
-    """numba's compiler, as a part of a kernel needs it."""
+    """numba's compiler, configured for parts of kernels."""
 
     def define_pipelines(self) -> list[Any]:
-        """Passes of numba, those left out that would find nothing to do."""
+        """Returns numba's passes without those that have no effect on a part."""
         state = self.state
         library = PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         if all(hasattr(library, name) for name in _NEEDED):

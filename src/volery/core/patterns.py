@@ -1,7 +1,7 @@
-"""Regular expressions of clients, which take no longer than their length times that of a text.
+"""Matches regular expressions of clients in time linear in pattern and text length.
 
-Python's own `re` backtracks: a pattern of twenty characters can keep it busy for longer than the
-universe has existed, and no other thread runs meanwhile. RE2 does not backtrack.
+Python's own `re` backtracks: a pattern of twenty characters can block it practically forever, and
+no other thread runs meanwhile. RE2 does not backtrack.
 """
 
 from __future__ import annotations
@@ -14,25 +14,25 @@ from volery.core.errors import PatternError
 
 MAX_PATTERN_CHARACTERS = 200
 _MAX_PATTERN_MEMORY = 1024 * 1024
-"""Bytes for a compiled pattern and its automaton."""
+"""Limit of the bytes of a compiled pattern and its automaton."""
 _MAX_TEXT_CHARACTERS = 100_000
 
 
 @lru_cache(maxsize=64)
 def posix_search(pattern: str) -> Callable[[str], bool]:
-    r"""Whether a text holds a match of a POSIX extended regular expression.
+    r"""Returns a function that searches a text for a POSIX extended regular expression.
 
-    The classes `\d \s \w` and `\b` are understood as well. Raises `PatternError` for what is none,
-    and for what needs more than its share of memory.
+    The classes `\d \s \w` and `\b` are supported too. Raises `PatternError` if the pattern is
+    invalid, or needs too much memory.
     """
     if len(pattern) > MAX_PATTERN_CHARACTERS:
-        raise PatternError(f"a pattern has at most {MAX_PATTERN_CHARACTERS} characters")
+        raise PatternError(f"a pattern may have at most {MAX_PATTERN_CHARACTERS} characters")
     import re2
 
     try:
         expression = re2.compile(pattern, options=_options())
     except (re2.error, UnicodeEncodeError) as error:
-        raise PatternError(f"'{pattern}' is no regular expression: {_reason(error)}") from None
+        raise PatternError(f"'{pattern}' is not a regular expression: {_reason(error)}") from None
 
     def search(text: str) -> bool:
         readable = text[:_MAX_TEXT_CHARACTERS].encode("utf-8", "replace").decode("utf-8")
@@ -57,6 +57,6 @@ def _options() -> Any:
 
 
 def _reason(error: Exception) -> str:
-    """What RE2 says, which it says in bytes."""
+    """Returns RE2's error message, which is in bytes."""
     said = error.args[0] if error.args else ""
     return said.decode("utf-8", "replace") if isinstance(said, bytes) else str(error)

@@ -1,8 +1,8 @@
-"""Numbers of things in words."""
+"""Formats counts with singular and plural."""
 
 from __future__ import annotations
 
 
 def counted(number: int, thing: str, things: str | None = None) -> str:
-    """`1 scan`, `1,600 scans`; things: the plural that takes more than an s."""
+    """Returns `1 scan`, `1,600 scans`; things: a plural other than with s."""
     return f"{number:,} {thing if number == 1 else things or f'{thing}s'}"

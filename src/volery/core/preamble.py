@@ -1,9 +1,9 @@
-"""Recognizes web browsers on ports that speak a binary protocol.
+"""Detects web browsers on ports that speak a binary protocol.
 
 Any web page that a user opens can send bytes to ports of the user's machine: `fetch` with
 `mode: 'no-cors'` sends a POST whose body the page chooses, and a parser that searches for frames
-finds one behind the HTTP head. The first bytes of a connection give such a client away: a method of
-HTTP, or the ClientHello of TLS.
+finds one after the HTTP head. The first bytes of a connection identify such a client: an HTTP
+method, or the ClientHello of TLS.
 
 Sources: RFC 9110 section 9 and RFC 5789 (methods), RFC 9113 section 3.4 (preface of HTTP/2), RFC
 8446 section 5.1 and appendix D (record type 22, version 3.x).
@@ -29,7 +29,7 @@ _TLS = b"\x16\x03"
 class Preamble:
     """Checks the first bytes of one connection, in pieces of any size.
 
-    `feed` holds bytes back only while they are the beginning of a forbidden preamble, so a binary
+    `feed` withholds bytes only while they may be the start of a forbidden preamble, so a binary
     protocol passes with its first byte.
     """
 
@@ -37,10 +37,10 @@ class Preamble:
         self._held = b""
         self._decided = False
         self.refused: str | None = None
-        """What the client speaks, once the connection must end: `HTTP` or `TLS`."""
+        """Protocol of a client whose connection must end: `HTTP` or `TLS`."""
 
     def feed(self, data: bytes) -> bytes:
-        """Returns what the parser may have: nothing while undecided, and nothing once refused."""
+        """Returns the bytes for the parser: none while undecided or refused."""
         if self._decided:
             return b"" if self.refused else data
         held = self._held + data
@@ -54,12 +54,12 @@ class Preamble:
 
 
 def _protocol_of(first: bytes) -> str | None:
-    """Returns the forbidden protocol that a connection with these first bytes speaks."""
+    """Returns the forbidden protocol of a connection with these first bytes."""
     if first.startswith(_METHODS):
         return "HTTP"
     return "TLS" if first.startswith(_TLS) else None
 
 
 def _may_become_one(first: bytes) -> bool:
-    """Returns whether further bytes can make a forbidden preamble of these."""
+    """Returns whether further bytes can complete a forbidden preamble."""
     return any(preamble.startswith(first) for preamble in (*_METHODS, _TLS))

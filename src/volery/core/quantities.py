@@ -1,8 +1,8 @@
-"""Bounds of physical quantities, declared once: the unit at the end of a key names the quantity.
+"""Defines limits of physical quantities; the unit at the end of a key names the quantity.
 
-`mass_kg`, `drag_area_m2`, `rise_time_s`: whoever checks data (schemas, data files, parameters of
-nodes) asks here what numbers a key can hold. The bounds are generous: whatever is real lies within,
-and what lies beyond is most likely given in another unit.
+All checks of data (schemas, data files, node parameters) get the limits of keys such as `mass_kg`,
+`drag_area_m2`, `rise_time_s` here. The limits are generous: real values are within, and a value
+beyond most likely has another unit.
 """
 
 from __future__ import annotations
@@ -13,23 +13,23 @@ from typing import Any, NamedTuple
 
 
 class Quantity(NamedTuple):
-    """Bounds of the numbers of a quantity."""
+    """Limits of the numbers of a quantity."""
 
     unit: str
     most: float
-    """Largest magnitude."""
+    """Maximum magnitude."""
     least: float = 0.0
-    """Smallest number above 0 of a key that takes none below it: it may be divided by."""
+    """Minimum above 0 for a key that must be positive, because the value may be a divisor."""
     others: Mapping[str, float] = {}
-    """Units that are taken for this one by mistake, as factors of it."""
+    """Units that are often confused with this one, as factors of it."""
     low: float | None = None
-    """Smallest number of what is never below it; None: `-most`."""
+    """Minimum; None: `-most`."""
 
 
 _LARGEST_INT = 2**63
 _MM = {"mm": 1e-3}
 _NUMBER = Quantity("", 1e9, 1e-12)
-"""Of keys without a unit."""
+"""Limits of keys without a unit."""
 _QUANTITIES: dict[str, Quantity] = {
     # space
     "m": Quantity("m", 1e6, 1e-9, _MM),
@@ -69,7 +69,7 @@ _QUANTITIES: dict[str, Quantity] = {
     "fraction": Quantity("", 1.0, low=0.0),
     "share": Quantity("", 1.0, low=0.0),
     "damping": Quantity("", 100.0, 1e-3),
-    # what sensors measure, and their noise
+    # measurements of sensors, and their noise
     "pa": Quantity("Pa", 1e4, 0.0, {"mPa": 1e-3}),
     "t": Quantity("T", 1.0, 0.0, {"uT": 1e-6, "nT": 1e-9}),
     "ut": Quantity("uT", 1e6, 1e-6),
@@ -86,9 +86,9 @@ _QUANTITIES: dict[str, Quantity] = {
 
 
 def quantity_of(key: str, special: Mapping[str, Quantity] | None = None) -> Quantity | None:
-    """The quantity that a key ends with, None without one.
+    """Returns the quantity of a key's ending, None without one.
 
-    The longest ending counts; of two that are alike that of `special`.
+    The longest ending counts; `special` takes precedence for equal endings.
     """
     parts = key.split("_")
     endings = ["_".join(parts[k:]) for k in range(len(parts))]
@@ -107,19 +107,19 @@ def fault_in(
     low: float | None = None,
     positive: bool = False,
 ) -> str | None:
-    """What is wrong with the numbers of `key`, in lists and tables too; None where nothing is.
+    """Returns the problem with the numbers of `key`, in lists and tables too; None without one.
 
-    special: quantities of the keys of one kind of data. low: lower bound where the key has one of
-    its own, for the message. positive: whether it takes only numbers above 0.
+    special: quantities of one kind of data. low: minimum of the key itself, for the message.
+    positive: whether only numbers above 0 are allowed.
     """
     known = quantity_of(key, special)
     quantity = known or _NUMBER
     for place, number in _numbers(value, ""):
         if isinstance(number, int):
             if abs(number) > _LARGEST_INT:
-                return f"{place}a whole number of {number.bit_length()} bits; 64 are allowed"
+                return f"{place}an integer of {number.bit_length()} bits; at most 64 are allowed"
             if known is None:
-                continue  # counts and seeds have bounds of their own
+                continue  # counts and seeds have limits of their own
         elif not math.isfinite(number):
             return f"{place}{number} is not finite"
         tiny = (positive or low == 0.0) and 0 < number < quantity.least
@@ -131,7 +131,7 @@ def fault_in(
 
 
 def _numbers(value: Any, place: str) -> Iterator[tuple[str, int | float]]:
-    """Numbers of a value, each with words for where it stands."""
+    """Yields the numbers of a value, each with a text for its position."""
     if isinstance(value, bool):
         return
     if isinstance(value, int | float):

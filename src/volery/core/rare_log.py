@@ -1,4 +1,4 @@
-"""Logs events that clients can cause without end: once at first, then now and then with a count."""
+"""Logs events that clients can cause endlessly: the first at once, later ones with a count."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from collections import Counter
 from collections.abc import Callable
 
 PERIOD_S = 60.0
-"""Between two lines about the same event."""
+"""Minimum time between two lines about the same event."""
 
 
 class RareLog:
-    """Counts events by their text; safe for any thread.
+    """Counts events by their text; thread-safe.
 
-    logger: where lines go. period_s: wall time between two lines of one text.
+    logger: receives the lines. period_s: wall time between two lines of one text.
     """
 
     def __init__(
@@ -29,12 +29,12 @@ class RareLog:
         self._clock = clock
         self._lock = threading.Lock()
         self._logged: dict[str, tuple[float, int]] = {}
-        """Of each text: when it was logged last, and its count then."""
+        """Time and count of each text when it was last logged."""
         self.counts: Counter[str] = Counter()
-        """Events so far, by text."""
+        """Number of events so far, by text."""
 
     def note(self, text: str) -> None:
-        """Counts an event, and logs it if that is due. The texts must be few."""
+        """Counts an event, and logs it when due. The number of texts must be small."""
         with self._lock:
             self.counts[text] += 1
             count, now_s = self.counts[text], self._clock()
@@ -47,9 +47,9 @@ class RareLog:
 
 
 class RepeatFilter(logging.Filter):
-    """Lets a message of another library pass once a period; repeats are counted, not printed.
+    """Passes a message of another library once per period; repeats are only counted.
 
-    bare: beginnings of messages that are logged without their traceback.
+    bare: prefixes of messages that are logged without their traceback.
     """
 
     def __init__(self, period_s: float = PERIOD_S, bare: tuple[str, ...] = ()) -> None:

@@ -1,8 +1,8 @@
-"""Named random streams, counter based: no hidden state, the same numbers on any thread.
+"""Provides named, counter-based random streams: no hidden state, the same numbers on any thread.
 
 A stream is a 64-bit key made from the run's seed and a name such as `uav1/laser/horizontal`. Its
-k-th number depends on key and k alone, so adding a UAV or a sensor changes nobody else's noise,
-kernels may draw in any order, and a snapshot needs only the counters.
+k-th number depends on key and k only, so adding a UAV or a sensor changes no other noise, kernels
+may draw in any order, and a snapshot needs only the counters.
 
 The generator is SplitMix64's output function (Steele, Lea, Flood, 2014) over `key + k * golden`,
 with the key itself the SHA-256 of seed and name. Normal numbers come from the inverse of the normal
@@ -26,20 +26,20 @@ _TWO_M53 = 1.0 / (1 << 53)
 
 
 def stream_key(seed: int, name: str) -> np.uint64:
-    """Key of the stream `name` in a run with `seed`."""
+    """Returns the key of the stream `name` in a run with `seed`."""
     digest = hashlib.sha256(f"{seed}/{name}".encode()).digest()
     return np.uint64(int.from_bytes(digest[:8], "little"))
 
 
 def generator(seed: int, name: str) -> np.random.Generator:
-    """A numpy generator for work done once, such as growing trees."""
+    """Returns a numpy generator for one-time work, such as growing trees."""
     digest = hashlib.sha256(f"{seed}/{name}".encode()).digest()
     return np.random.Generator(np.random.PCG64(int.from_bytes(digest[:16], "little")))
 
 
 @inline_kernel
 def random_bits(key: np.uint64, counter: int) -> np.uint64:
-    """64 random bits: number `counter` (>= 0) of stream `key`."""
+    """Returns 64 random bits: number `counter` (>= 0) of stream `key`."""
     z = key + (np.uint64(counter) + np.uint64(1)) * _GOLDEN
     z = (z ^ (z >> _S30)) * _MIX_1
     z = (z ^ (z >> _S27)) * _MIX_2
@@ -48,13 +48,13 @@ def random_bits(key: np.uint64, counter: int) -> np.uint64:
 
 @inline_kernel
 def uniform(key: np.uint64, counter: int) -> float:
-    """Uniform number in (0, 1)."""
+    """Returns a uniform number in (0, 1)."""
     return (float(random_bits(key, counter) >> _S11) + 0.5) * _TWO_M53
 
 
 @inline_kernel
 def normal_quantile(p: float) -> float:
-    """Inverse of the standard normal distribution function, p in (0, 1)."""
+    """Computes the inverse of the standard normal distribution function, p in (0, 1)."""
     if 0.02425 <= p <= 0.97575:
         q = p - 0.5
         r = q * q
@@ -95,13 +95,13 @@ def normal_quantile(p: float) -> float:
 
 @inline_kernel
 def normal(key: np.uint64, counter: int) -> float:
-    """Standard normal number `counter` of stream `key`."""
+    """Returns standard normal number `counter` of stream `key`."""
     return normal_quantile(uniform(key, counter))
 
 
 @kernel
 def fill_normal(keys: NDArray[np.uint64], counter: int, out: NDArray[np.float64]) -> None:
-    """Rows of standard normal numbers: row i holds numbers counter.. of stream keys[i]."""
+    """Fills rows with standard normal numbers: row i holds numbers counter.. of keys[i]."""
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             out[i, j] = normal(keys[i], counter + j)
@@ -111,7 +111,7 @@ def fill_normal(keys: NDArray[np.uint64], counter: int, out: NDArray[np.float64]
 def fill_normal_rows(
     keys: NDArray[np.uint64], counters: NDArray[np.int64], out: NDArray[np.float64]
 ) -> None:
-    """As `fill_normal`, each row counted by itself: row i holds numbers counters[i].. ."""
+    """Fills rows like `fill_normal` with a counter each: row i holds numbers counters[i].. ."""
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             out[i, j] = normal(keys[i], counters[i] + j)

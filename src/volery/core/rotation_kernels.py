@@ -1,6 +1,6 @@
-"""Rotations in compiled kernels: of single vectors inside others, of the points of a scan.
+"""Computes rotations in compiled kernels, for single vectors and the points of a scan.
 
-`core.rotations` is the same for arrays of any shape.
+`core.rotations` provides the same for arrays of any shape.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Quaternion = tuple[float, float, float, float]
 def rotate_vector(
     qx: float, qy: float, qz: float, qw: float, vx: float, vy: float, vz: float
 ) -> Vector:
-    """The vector turned by the unit quaternion."""
+    """Rotates the vector by the unit quaternion."""
     tx = 2.0 * (qy * vz - qz * vy)
     ty = 2.0 * (qz * vx - qx * vz)
     tz = 2.0 * (qx * vy - qy * vx)
@@ -34,7 +34,7 @@ def rotate_vector(
 def quaternion_product(
     px: float, py: float, pz: float, pw: float, qx: float, qy: float, qz: float, qw: float
 ) -> Quaternion:
-    """Composition: first q, then p."""
+    """Returns the composition: first q, then p."""
     return (
         pw * qx + px * qw + py * qz - pz * qy,
         pw * qy - px * qz + py * qw + pz * qx,
@@ -45,7 +45,7 @@ def quaternion_product(
 
 @inner_kernel
 def matrix_rows(x: float, y: float, z: float, w: float) -> tuple[Vector, Vector, Vector]:
-    """Rows of the unit quaternion's rotation matrix."""
+    """Returns the rows of the unit quaternion's rotation matrix."""
     return (
         (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)),
         (2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)),
@@ -55,13 +55,13 @@ def matrix_rows(x: float, y: float, z: float, w: float) -> tuple[Vector, Vector,
 
 @inner_kernel
 def cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> Vector:
-    """Cross product a x b."""
+    """Returns the cross product a x b."""
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
 @brief_kernel
 def moved_points(points: Array, attitude: Array, position: Array) -> Array:
-    """Points (K, 3) turned by `attitude` (4,) and shifted by `position` (3,): those of a scan."""
+    """Rotates points (K, 3) by `attitude` (4,) and shifts them by `position` (3,)."""
     x, y, z, w = attitude[0], attitude[1], attitude[2], attitude[3]
     out = np.empty((len(points), 3))
     for k in range(len(points)):

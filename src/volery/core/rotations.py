@@ -1,4 +1,4 @@
-"""Unit quaternions (x, y, z, w), active, Hamilton: `rotate(q_map_body, v_body)` is in the map.
+"""Computes with unit quaternions (x, y, z, w), Hamilton, active: body to map for `q_map_body`.
 
 Functions take arrays whose last axis is the quaternion or vector and broadcast over the rest.
 """
@@ -19,7 +19,7 @@ IDENTITY.flags.writeable = False
 
 
 def _components(array: ArrayLike) -> Sequence[Any]:
-    """Along the last axis; plain numbers of a single one, with which Python is faster."""
+    """Returns components along the last axis; plain numbers for one vector, which are faster."""
     array = np.asarray(array, dtype=np.float64)
     if array.ndim == 1:
         numbers: list[float] = array.tolist()
@@ -28,14 +28,14 @@ def _components(array: ArrayLike) -> Sequence[Any]:
 
 
 def _together(*components: Any) -> Array:
-    """Arrays or numbers along a new last axis."""
+    """Joins arrays or numbers along a new last axis."""
     if all(type(component) is float for component in components):
         return np.array(components)
     return np.stack(components, axis=-1)
 
 
 def multiply(p: ArrayLike, q: ArrayLike) -> Array:
-    """Composition: `rotate(multiply(p, q), v) == rotate(p, rotate(q, v))`. Shapes (..., 4)."""
+    """Returns p q (..., 4): `rotate(multiply(p, q), v) == rotate(p, rotate(q, v))`."""
     px, py, pz, pw = _components(p)
     qx, qy, qz, qw = _components(q)
     return _together(
@@ -47,18 +47,18 @@ def multiply(p: ArrayLike, q: ArrayLike) -> Array:
 
 
 def conjugate(q: ArrayLike) -> Array:
-    """Inverse rotation. Shape (..., 4)."""
+    """Returns the inverse rotation, shape (..., 4)."""
     return np.asarray(np.asarray(q, dtype=np.float64) * np.array([-1.0, -1.0, -1.0, 1.0]))
 
 
 def normalize(q: ArrayLike) -> Array:
-    """Unit quaternion of the same direction. Shape (..., 4)."""
+    """Returns the unit quaternion of the same direction, shape (..., 4)."""
     q = np.asarray(q, dtype=np.float64)
     return np.asarray(q / np.linalg.norm(q, axis=-1, keepdims=True))
 
 
 def rotate(q: ArrayLike, v: ArrayLike) -> Array:
-    """Vectors `v` (..., 3) turned by `q` (..., 4)."""
+    """Rotates vectors `v` (..., 3) by `q` (..., 4)."""
     x, y, z, w = _components(q)
     vx, vy, vz = _components(v)
     tx, ty, tz = 2.0 * (y * vz - z * vy), 2.0 * (z * vx - x * vz), 2.0 * (x * vy - y * vx)
@@ -70,7 +70,7 @@ def rotate(q: ArrayLike, v: ArrayLike) -> Array:
 
 
 def matrix(q: ArrayLike) -> Array:
-    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
+    """Returns the rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
     x, y, z, w = _components(q)
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
@@ -81,7 +81,7 @@ def matrix(q: ArrayLike) -> Array:
 
 
 def from_matrix(rotation: ArrayLike) -> Array:
-    """Quaternion of one (3, 3) rotation matrix, with w >= 0."""
+    """Returns the quaternion of one (3, 3) rotation matrix, with w >= 0."""
     r = np.asarray(rotation, dtype=np.float64)
     four_squares = np.array(
         [
@@ -105,7 +105,7 @@ def from_matrix(rotation: ArrayLike) -> Array:
 
 
 def from_rpy(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> Array:
-    """Quaternion of fixed-axis roll, pitch, yaw (REP-103), rad. Broadcasts to (..., 4)."""
+    """Returns quaternions (..., 4) of fixed-axis roll, pitch, yaw (REP-103), rad."""
     roll, pitch, yaw = np.broadcast_arrays(
         *(np.asarray(a, dtype=np.float64) / 2.0 for a in (roll, pitch, yaw))
     )
@@ -124,7 +124,7 @@ def from_rpy(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> Array:
 
 
 def to_rpy(q: ArrayLike) -> Array:
-    """Roll, pitch, yaw (..., 3), rad; pitch in [-pi/2, pi/2]."""
+    """Returns roll, pitch, yaw (..., 3), rad; pitch in [-pi/2, pi/2]."""
     x, y, z, w = _components(q)
     return np.stack(
         [
@@ -137,13 +137,13 @@ def to_rpy(q: ArrayLike) -> Array:
 
 
 def yaw_of(q: ArrayLike) -> Array:
-    """Heading about the map's z axis, rad. Shape (...)."""
+    """Returns the heading about the map's z axis, rad, shape (...)."""
     x, y, z, w = _components(q)
     return np.asarray(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
 
 
 def exponential(rotation_vector: ArrayLike) -> Array:
-    """Quaternion of a rotation vector (..., 3), rad."""
+    """Returns the quaternion (..., 4) of a rotation vector (..., 3), rad."""
     v = np.asarray(rotation_vector, dtype=np.float64)
     if v.ndim == 1:
         x, y, z = v.tolist()
@@ -157,7 +157,7 @@ def exponential(rotation_vector: ArrayLike) -> Array:
 
 
 def logarithm(q: ArrayLike) -> Array:
-    """Rotation vector (..., 3) of a unit quaternion, angle in [0, pi]."""
+    """Returns the rotation vector (..., 3), rad, of a unit quaternion; angle in [0, pi]."""
     q = np.asarray(q, dtype=np.float64)
     q = np.where(q[..., 3:] < 0.0, -q, q)
     length = np.linalg.norm(q[..., :3], axis=-1, keepdims=True)
@@ -167,6 +167,6 @@ def logarithm(q: ArrayLike) -> Array:
 
 
 def slerp(p: ArrayLike, q: ArrayLike, fraction: ArrayLike) -> Array:
-    """Great-arc interpolation from `p` (fraction 0) to `q` (fraction 1), shapes (..., 4)."""
+    """Interpolates on a great arc from `p` (fraction 0) to `q` (1), shapes (..., 4)."""
     step = logarithm(multiply(conjugate(p), q))
     return multiply(p, exponential(step * np.asarray(fraction, dtype=np.float64)[..., None]))

@@ -1,17 +1,17 @@
-"""Two numbers in one register: SIMD words for kernels, where a compiler would not find them.
+"""Provides SIMD operations on two numbers, for kernels in which LLVM does not find them.
 
-LLVM turns a loop into SIMD code only where it may reorder its sums and knows that what it writes
-is not what it reads. Records of states and tables allow neither, so kernels say it themselves:
+LLVM vectorizes a loop only if it may reorder its sums and knows that outputs do not alias inputs.
+Records of states and tables allow neither, so kernels use these operations explicitly:
 
     w = lanes_at(body.rotor_speed, first)    # elements first and first + 1
     thrust = constant * w * w                # + - * with lanes or a number, element by element
-    a, b = totals(thrust, thrust * px)       # the sum of each one's elements
+    a, b = totals(thrust, thrust * px)       # the sum of the elements of each
 
-Arrays that are read or written so have an even length. Products and sums contract where those of
-the kernel around do.
+Arrays that are read or written this way have an even length. Products and sums contract as in
+the surrounding kernel.
 """
 
-# ruff: noqa: ARG001  numba gives the types of all arguments to whoever asks for one
+# ruff: noqa: ARG001  numba passes the types of all arguments
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ from numba.core.typing.templates import ConcreteTemplate, infer_global, signatur
 from numba.extending import intrinsic, lower_builtin, models, register_model
 
 LANES = 2
-"""Numbers in a register of 128 bits, which every CPU has. For arithmetic in wider ones many server
-CPUs lower their clock: four lanes made all else on a Cascade Lake an eighth slower."""
+"""Numbers in a register of 128 bits, which every CPU has. Many server CPUs lower their clock for
+wider ones: four lanes made everything else on a Cascade Lake an eighth slower."""
 
-# numba's own words have no types
+# numba's functions have no type annotations
 _TYPES: Any = numba.types
 _CGUTILS: Any = cgutils
 _LOWER: Any = lower_builtin
@@ -42,7 +42,7 @@ _PLACE = ir.IntType(32)
 
 
 class _LanesType(_TYPES.Type):  # type: ignore[misc]
-    """numba's type of a register of numbers."""
+    """The numba type of a register of numbers."""
 
     def __init__(self) -> None:
         super().__init__("lanes")
@@ -58,7 +58,7 @@ class _LanesModel(models.PrimitiveModel):
 
 
 def _word(function: Callable[..., Any]) -> Any:
-    """Let kernels call what `function` tells of. They give all its arguments but the first."""
+    """Makes `function` an intrinsic for kernels, which pass all its arguments but the first."""
     return intrinsic(function)
 
 
@@ -68,7 +68,7 @@ def _shuffled(builder: Any, a: Any, b: Any, order: tuple[int, ...]) -> Any:
 
 
 def _spread(builder: Any, value: Any, kind: Any) -> Any:
-    """A number in all lanes; lanes as they are."""
+    """Returns a number in all lanes; returns lanes unchanged."""
     if kind == _LANES:
         return value
     nothing = ir.Constant(_VECTOR, ir.Undefined)
@@ -77,7 +77,7 @@ def _spread(builder: Any, value: Any, kind: Any) -> Any:
 
 
 def _teach(operation: Any, instruction: str) -> None:
-    """Let `operation` work on lanes and numbers."""
+    """Registers `operation` for lanes and numbers."""
     pairs = ((_LANES, _LANES), (_LANES, _FLOAT), (_FLOAT, _LANES))
 
     @_TEACH(operation)
@@ -108,7 +108,7 @@ def _place_of(context: Any, builder: Any, kind: Any, array: Any, first: Any) -> 
 
 @_word
 def lanes_at(_typing: Any, array: Any, first: Any) -> Any:
-    """Elements of a contiguous float64 array, from number `first` on."""
+    """Returns elements of a contiguous float64 array, from index `first`."""
 
     def generate(context: Any, builder: Any, sig: Any, arguments: Any) -> Any:
         return builder.load(_place_of(context, builder, sig.args[0], *arguments), align=8)
@@ -118,7 +118,7 @@ def lanes_at(_typing: Any, array: Any, first: Any) -> Any:
 
 @_word
 def put_lanes(_typing: Any, array: Any, first: Any, lanes: Any) -> Any:
-    """Write elements of a contiguous float64 array, from number `first` on."""
+    """Writes elements of a contiguous float64 array, from index `first`."""
 
     def generate(context: Any, builder: Any, sig: Any, arguments: Any) -> Any:
         array, first, lanes = arguments
@@ -130,7 +130,7 @@ def put_lanes(_typing: Any, array: Any, first: Any, lanes: Any) -> Any:
 
 @_word
 def no_lanes(_typing: Any) -> Any:
-    """Zeros."""
+    """Returns zeros."""
 
     def generate(_context: Any, _builder: Any, _sig: Any, _arguments: Any) -> Any:
         return ir.Constant(_VECTOR, [0.0] * LANES)
@@ -139,7 +139,7 @@ def no_lanes(_typing: Any) -> Any:
 
 
 def _of_each(name: str) -> Callable[..., Any]:
-    """An LLVM intrinsic of one number, for each lane."""
+    """Returns the generator of an LLVM intrinsic, applied to each lane."""
 
     def generate(_context: Any, builder: Any, _sig: Any, arguments: Any) -> Any:
         kind = ir.FunctionType(_VECTOR, [_VECTOR])
@@ -151,19 +151,19 @@ def _of_each(name: str) -> Callable[..., Any]:
 
 @_word
 def roots(_typing: Any, lanes: Any) -> Any:
-    """Square roots."""
+    """Returns the square roots."""
     return _LANES(_LANES), _of_each("llvm.sqrt")
 
 
 @_word
 def magnitudes(_typing: Any, lanes: Any) -> Any:
-    """Absolute values."""
+    """Returns the absolute values."""
     return _LANES(_LANES), _of_each("llvm.fabs")
 
 
 @_word
 def not_negative(_typing: Any, lanes: Any) -> Any:
-    """Each number, or zero where it is below."""
+    """Returns each number, or zero where the number is negative."""
 
     def generate(_context: Any, builder: Any, _sig: Any, arguments: Any) -> Any:
         zero = ir.Constant(_VECTOR, [0.0] * LANES)
@@ -174,7 +174,7 @@ def not_negative(_typing: Any, lanes: Any) -> Any:
 
 @_word
 def where_negative(_typing: Any, lanes: Any, then: Any, other: Any) -> Any:
-    """Elements of `then` where those of `lanes` are below zero, else of `other`."""
+    """Returns elements of `then` where `lanes` are below zero, else of `other`."""
 
     def generate(_context: Any, builder: Any, _sig: Any, arguments: Any) -> Any:
         lanes, then, other = arguments
@@ -186,9 +186,9 @@ def where_negative(_typing: Any, lanes: Any, then: Any, other: Any) -> Any:
 
 @_word
 def any_outside(_typing: Any, lanes: Any, least: Any, most: Any) -> Any:
-    """Whether some number lies below that of `least` (lanes) or above `most` (one number).
+    """Returns whether any number is below `least` (lanes) or above `most` (one number).
 
-    What is not a number counts as outside.
+    NaN counts as outside.
     """
 
     def generate(_context: Any, builder: Any, _sig: Any, arguments: Any) -> Any:
@@ -203,7 +203,7 @@ def any_outside(_typing: Any, lanes: Any, least: Any, most: Any) -> Any:
 
 @_word
 def totals(_typing: Any, a: Any, b: Any) -> Any:
-    """Sums (a, b) over the lanes."""
+    """Returns the sums (a, b) over the lanes."""
 
     def generate(context: Any, builder: Any, sig: Any, arguments: Any) -> Any:
         a, b = arguments

@@ -1,10 +1,10 @@
-"""Limits how many wrong tokens a server is shown in a time, without locking anyone out.
+"""Limits the rate of wrong tokens shown to a server, without locking any client out.
 
-Clients of one address are checked one after the other, in the order in which they came. A right
-token takes no time; a wrong one keeps the next waiting for PENALTY_S, unless its client leaves. At
+Clients of one address are checked one after the other, in order of arrival. A correct token takes
+no time; a wrong token delays the next client for PENALTY_S, unless its own client disconnects. At
 most MAX_PENALTIES addresses do so at once. So an address gets at most 1 / PENALTY_S wrong guesses a
 second and all addresses together MAX_PENALTIES times that, however many connections they open. A
-client with the right token waits at most for those of its own address that came before it.
+client with the correct token waits at most for earlier clients of its own address.
 
     async with guesses.turn(address):
         if not shows_token(given, token):
@@ -21,27 +21,27 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 PENALTY_S = 0.05
 MAX_PENALTIES = 5
 _IPV6_PREFIX = 64
-"""Bits that one customer of a network has in common."""
+"""Length of the prefix that one customer's addresses share, bits."""
 
 
 class TokenGuesses:
-    """The limits of one server; belongs to one event loop. penalty_s: PENALTY_S unless given."""
+    """The limits of one server, used in one event loop. penalty_s: None: PENALTY_S."""
 
     def __init__(self, penalty_s: float | None = None, max_penalties: int = MAX_PENALTIES) -> None:
         self._penalty_s = PENALTY_S if penalty_s is None else penalty_s
         self._penalties = asyncio.Semaphore(max_penalties)
         self._queues: dict[str, _Queue] = {}
         self.num_wrong = 0
-        """Wrong tokens that were shown."""
+        """Number of wrong tokens so far."""
 
     @property
     def num_waiting(self) -> int:
-        """Clients that wait for their turn or have it."""
+        """Number of clients that wait for their turn or have it."""
         return sum(queue.num_clients for queue in self._queues.values())
 
     @contextlib.asynccontextmanager
     async def turn(self, address: str) -> AsyncIterator[None]:
-        """Waits until those of the same address that came before have been checked."""
+        """Waits until earlier clients of the same address have been checked."""
         key = _network_of(address)
         queue = self._queues.setdefault(key, _Queue())
         queue.num_clients += 1
@@ -54,9 +54,9 @@ class TokenGuesses:
                 self._queues.pop(key, None)
 
     async def penalize(self, gone: Callable[[], Awaitable[object]] | None = None) -> None:
-        """Keeps the turn after a wrong token, but not for a client that leaves.
+        """Holds the turn after a wrong token, unless the client disconnects.
 
-        gone: waits until the client has left.
+        gone: waits until the client has disconnected.
         """
         self.num_wrong += 1
         async with self._penalties:
@@ -68,7 +68,7 @@ class TokenGuesses:
 
 
 class _Queue:
-    """Those of one address."""
+    """The clients of one address."""
 
     def __init__(self) -> None:
         self.lock = asyncio.Lock()
@@ -76,7 +76,7 @@ class _Queue:
 
 
 def _network_of(address: str) -> str:
-    """Returns what one guesser has: an IPv4 address, or a network of IPv6 addresses."""
+    """Returns the key of a client: its IPv4 address or its IPv6 network."""
     try:
         found = ipaddress.ip_address(address.partition("%")[0])
     except ValueError:

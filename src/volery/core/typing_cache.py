@@ -1,8 +1,9 @@
-"""What numba works out about types again and again while it compiles a kernel, remembered.
+"""Caches numba's type inference during compilation.
 
-For each `a * b` it asks dozens of candidates, from products of matrices to repeated lists, whether
-they can multiply two float64, and words a refusal for each; each pass over a function writes out
-the fields of its records. That took a fifth of the time, and the answers are always the same.
+For each `a * b`, numba asks dozens of candidates, from matrix products to repeated lists, whether
+they can multiply two float64, and formats a message for each rejection; each pass over a function
+writes out the fields of its records. That took a fifth of the time, and the results are always the
+same.
 """
 
 from __future__ import annotations
@@ -20,10 +21,10 @@ _VALUES: Any = (_TYPES.Number, _TYPES.Boolean, _TYPES.Buffer, _TYPES.BaseTuple)
 
 @contextmanager
 def remembered_types() -> Iterator[None]:
-    """Let numba resolve each of its own functions once for the same arguments, inside the body.
+    """Makes numba resolve each of its own functions once per argument types, in this context.
 
-    Functions that numba compiles for its caller, as `min`, are not remembered: what they compile to
-    depends on the caller's options. A numba that is made otherwise compiles as it would without.
+    Functions that numba compiles for its caller, such as `min`, are not cached: their code depends
+    on the caller's options. A numba with other internals compiles as without this context.
     """
     with (
         _wrapped("BaseFunction", "get_call_type", _remember_signatures),
@@ -62,7 +63,7 @@ def _remember_signatures(resolve: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _question(function: Any, asked: tuple[Any, ...]) -> tuple[Any, ...]:
-    """What the answer depends on: the function, where it is looked up, the types; () if unclear."""
+    """Returns the cache key: function, typing context, argument types; () if unclear."""
     if len(asked) != 3:
         return ()
     context, arguments, keywords = asked
@@ -72,6 +73,6 @@ def _question(function: Any, asked: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 def _is_built_in(function: Any, signature: Any) -> bool:
-    """Whether the code for this signature is numba's own, and not compiled for the caller."""
+    """Returns whether a signature's code is numba's own, not compiled for the caller."""
     codes = getattr(function, "_impl_keys", {})
     return bool(signature) and codes.get(signature.args) is function.typing_key

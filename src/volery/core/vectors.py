@@ -1,7 +1,7 @@
-"""One short vector, without numpy: for a few numbers its calls cost more than their arithmetic.
+"""Computes with one short vector without numpy, whose calls cost more than the arithmetic.
 
-Some of them, `numpy.linalg.norm` among them, also give up Python's lock, which threads then hand to
-each other for nothing.
+Some numpy functions, such as `numpy.linalg.norm`, also release the GIL, which threads then pass on
+needlessly.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 
 def norm(vector: NDArray[Any]) -> float:
-    """Euclidean length of a vector (n,), n small: its squares are summed up in their order."""
+    """Returns the Euclidean length of a vector (n,), n small: squares are summed in order."""
     total = 0.0
     for number in vector.tolist():
         total += number * number

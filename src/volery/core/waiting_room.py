@@ -1,8 +1,8 @@
-"""Accepted connections whose first request has not come yet.
+"""Holds accepted connections until their first request has arrived.
 
-A server spends buffers, tasks and a session on each connection. One that stays silent, or sends
-half a request, waits here instead, as a bare socket, until its first bytes are enough for the
-server. They are looked at and left in the socket, so the server reads them as ever.
+A server spends buffers, tasks and a session on each connection. A connection that stays silent, or
+sends half a request, waits here as a bare socket until its first bytes suffice for the server. The
+bytes are only peeked at, so the server reads them as usual.
 """
 
 from __future__ import annotations
@@ -17,61 +17,61 @@ from typing import Any, NamedTuple
 from volery.core.preamble import Preamble
 
 LOOK_BYTES = 4096
-"""A first request without an end in so many bytes is left to the server."""
+"""A longer first request is passed to the server incomplete."""
 _END_OF_HEAD = (b"\r\n\r\n", b"\n\n")
 _END = select.EPOLLRDHUP | select.EPOLLHUP if hasattr(select, "epoll") else 0
 
 
 class Look(NamedTuple):
-    """What the first bytes of a connection show."""
+    """Result of examining the first bytes of a connection."""
 
     is_ready: bool
-    """Whether the server can make something of them."""
+    """Whether the server can process them."""
     stranger: str | None = None
-    """The forbidden protocol that they speak, see `Preamble`."""
+    """Their forbidden protocol, see `Preamble`."""
 
 
 _NOTHING = Look(is_ready=False)
 
 
 def look_at_http(first: bytes) -> Look:
-    """HTTP and WebSocket servers get connections with a whole head of a request."""
+    """Accepts a complete request head, for HTTP and WebSocket servers."""
     return Look(any(end in first for end in _END_OF_HEAD))
 
 
 def look_at_binary(first: bytes) -> Look:
-    """Servers of binary protocols get all that are not web browsers, with their first bytes."""
+    """Accepts the first bytes of any client but a web browser, for binary protocols."""
     preamble = Preamble()
     is_decided = bool(preamble.feed(first))
     return Look(is_decided, preamble.refused)
 
 
 class Event(NamedTuple):
-    """Something has happened to a socket."""
+    """An event on a socket."""
 
     descriptor: int
-    """The listening one's, or of one that waits."""
+    """Descriptor of the listening socket or a waiting connection."""
     is_end: bool
-    """Whether the client sends no more."""
+    """Whether the client has stopped sending."""
 
 
 class WaitingConnection(NamedTuple):
-    """A connection that waits."""
+    """A waiting connection."""
 
     sock: socket.socket
     address: Any
     since_s: float
-    """Of the loop's clock."""
+    """Start of the wait on the loop's clock, s."""
 
 
 class WaitingRoom:
-    """The connections of one listening socket that wait, and that socket itself.
+    """The waiting connections of one listening socket, and that socket.
 
-    All methods belong to the thread of the server's asyncio loop. Where the system has no epoll
+    All methods are called in the thread of the server's asyncio loop. On a system without epoll
     (`is_available`), servers get connections at once.
 
-    look: what the first bytes of a connection show. patience_s: after which a connection is given
-    to `expire`; None: never.
+    look: examines the first bytes of a connection. patience_s: maximum waiting time, after which a
+    connection is passed to `expire`; None: unlimited.
     """
 
     is_available = hasattr(select, "epoll")
@@ -88,54 +88,47 @@ class WaitingRoom:
         self._patience_s = patience_s
         self._expire = expire
         self._waiting: dict[int, WaitingConnection] = {}
-        """By file descriptor, the oldest first."""
+        """By file descriptor, oldest first."""
         self._timer: asyncio.TimerHandle | None = None
         self._epoll = select.epoll()
         self._epoll.register(listening, select.EPOLLIN)
 
     def fileno(self) -> int:
-        """Returns the descriptor that is readable when `next_event` has something."""
+        """Returns the descriptor that is readable when `next_event` has an event."""
         return -1 if self._epoll.closed else self._epoll.fileno()
 
     def __contains__(self, descriptor: int) -> bool:
         return descriptor in self._waiting
 
     def next_event(self) -> Event:
-        """Returns what has happened next.
-
-        Raises
-        ------
-        BlockingIOError
-            Nothing has happened.
-
-        """
-        for descriptor, flags in self._epoll.poll(0, 1):  # one: the others keep `fileno` readable
+        """Returns the next event. Raises `BlockingIOError` if there is none."""
+        for descriptor, flags in self._epoll.poll(0, 1):  # one; others keep `fileno` readable
             return Event(descriptor, bool(flags & _END))
         raise BlockingIOError(errno.EAGAIN, "no connection is ready")
 
     def admit(self, sock: socket.socket, address: Any) -> None:
-        """Lets a connection wait."""
+        """Adds a connection."""
         loop = asyncio.get_running_loop()
         sock.setblocking(False)
         self._waiting[sock.fileno()] = WaitingConnection(sock, address, loop.time())
-        flags = select.EPOLLIN | select.EPOLLRDHUP | select.EPOLLET  # once for each piece
+        flags = select.EPOLLIN | select.EPOLLRDHUP | select.EPOLLET  # once per piece
         self._epoll.register(sock.fileno(), flags)
         if self._timer is None and self._patience_s is not None:
             self._timer = loop.call_later(self._patience_s, self._end_patience)
 
     def look(self, event: Event) -> Look | None:
-        """Returns what has come of a connection that waits; None: too little, and no more comes."""
+        """Examines a waiting connection; None if incomplete although the client has finished."""
         look = self._look_at(self._waiting[event.descriptor].sock)
         return None if event.is_end and look == _NOTHING else look
 
     def release(self, descriptor: int) -> WaitingConnection:
-        """Returns a connection that waits no longer."""
+        """Removes and returns a waiting connection."""
         waiting = self._waiting.pop(descriptor)
         self._epoll.unregister(descriptor)
         return waiting
 
     def close(self) -> None:
-        """Ends the connections that wait."""
+        """Closes all waiting connections."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
@@ -146,7 +139,7 @@ class WaitingRoom:
     def _look_at(self, sock: socket.socket) -> Look:
         try:
             first = sock.recv(LOOK_BYTES, socket.MSG_PEEK)
-        except OSError:  # nothing yet, or the connection is broken, which is an event of its own
+        except OSError:  # no bytes yet, or broken, which has its own event
             return _NOTHING
         look = self._look(first)
         return look._replace(is_ready=True) if len(first) >= LOOK_BYTES else look

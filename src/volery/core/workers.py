@@ -1,8 +1,8 @@
-"""A few threads over kernels that run without Python's lock, with results nobody can influence.
+"""Runs kernels on several threads without the GIL, with results independent of the threads.
 
-A batch is cut into numbered pieces whose results do not depend on who computes them. Every thread,
-the calling one included, runs the same kernel; inside it each takes the next free number from a
-shared counter until none is left. Nothing waits in a loop.
+A batch is divided into numbered pieces whose results do not depend on the thread. Every thread,
+including the caller's, runs the same kernel, in which each takes the next free number from a shared
+counter until none is left. No thread spins.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 @intrinsic
 def _fetch_add(_context: Any, _address: Any) -> Any:
-    """Add one to the int64 at that address, all threads agreeing on the order; the value before."""
+    """Atomically adds one to the int64 at an address; returns the value before."""
 
     def generate(_ctx: Any, builder: Any, _signature: Any, args: Any) -> Any:
         from llvmlite import ir
@@ -36,20 +36,20 @@ def _fetch_add(_context: Any, _address: Any) -> Any:
 
 
 fetch_add: Any = _fetch_add
-"""`fetch_add(counter.ctypes.data)` inside a kernel: the next free number, counted from 0."""
+"""`fetch_add(counter.ctypes.data)` in a kernel returns the next free number, from 0."""
 
 
 def new_counter() -> NDArray[np.int64]:
-    """Counter of one batch, for `fetch_add`."""
+    """Returns the counter of one batch, for `fetch_add`."""
     return np.zeros(1, dtype=np.int64)
 
 
 class _Elsewhere:
-    """Keeps the pool's threads off the calling thread's core.
+    """Moves the pool's threads off the calling thread's core.
 
-    On virtual machines that hide which cores share a cache, Linux wakes a thread where its waker
-    runs and moves it away only after many milliseconds: two threads then share one core while
-    another idles. Threads that may run anywhere but there spread at once.
+    On virtual machines that hide which cores share a cache, Linux wakes a thread on its waker's
+    core and moves it away only after many milliseconds: two threads then share one core while
+    another idles. Threads with an affinity for the other cores spread at once.
     """
 
     def __init__(self) -> None:
@@ -59,12 +59,12 @@ class _Elsewhere:
         self._avoided = -1
 
     def enter(self) -> None:
-        """Take charge of the calling thread, which has just begun."""
+        """Registers the calling thread, which has just started."""
         self._threads.append(threading.get_native_id())
         self._avoided = -1
 
     def arrange(self) -> None:
-        """Send the threads elsewhere, where there is an elsewhere and they are not there yet."""
+        """Sets the threads' affinity to the other cores, if there are any and it has changed."""
         if self._current_core is None or len(self._allowed) < 2:
             return
         here = self._current_core()
@@ -73,12 +73,12 @@ class _Elsewhere:
         self._avoided = here
         others = self._allowed - {here}
         for thread in self._threads:
-            with contextlib.suppress(OSError):  # it has ended, or cores were taken away
+            with contextlib.suppress(OSError):  # the thread has ended, or cores were removed
                 os.sched_setaffinity(thread, others)
 
 
 class Workers:
-    """`threads` threads: the calling one and a pool of the others."""
+    """Runs functions on `threads` threads: the caller's and a pool of the others."""
 
     def __init__(self, threads: int = 1) -> None:
         if threads < 1:
@@ -94,17 +94,17 @@ class Workers:
         )
 
     def run(self, function: Callable[..., object], *args: object, alone: bool = False) -> None:
-        """Call `function(*args)` on every thread, or with `alone` on this one; wait for all."""
+        """Calls `function(*args)` on every thread, or with `alone` on this one; waits for all."""
         pool = None if alone else self._pool
         if pool is not None:
             self._elsewhere.arrange()
         others = [pool.submit(function, *args) for _ in range(self.threads - 1)] if pool else []
         function(*args)
         for other in others:
-            if not other.cancel():  # not begun yet: there was nothing left to do
+            if not other.cancel():  # not started yet: no work was left
                 other.result()
 
     def close(self) -> None:
-        """End the pool's threads."""
+        """Ends the pool's threads."""
         if self._pool is not None:
             self._pool.shutdown()

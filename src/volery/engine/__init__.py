@@ -1,1 +1,1 @@
-"""The lock-step engine: one integer clock, a tuple of stages, everything deterministic."""
+"""Advances the simulation in lock step on one integer clock, deterministically, in stages."""

@@ -1,8 +1,8 @@
-"""Touches between UAVs and the things that move through the world by themselves.
+"""Detects contacts between UAVs and actors.
 
-As in `collisions`, the gap is shared: a UAV may use up half of it, by its budget, before it asks
-again, and a thing the other half, for which its highest speed gives a time. Where a UAV is within
-the sphere around a thing, which may turn on the spot, the next look is at most 10 ms away.
+As in `collisions`, the gap is shared: a UAV may use half of it, by its budget, before the next
+check, and an actor the other half, for which its maximum speed gives a time. When a UAV is within
+the bounding sphere of an actor, which may turn on the spot, the next check is at most 10 ms away.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ from volery.world.scene_content import BodyShape
 Array = NDArray[np.float64]
 
 _LEAST_GAP_M = 1e-3
-"""While touching, look again after each millimetre."""
+"""In contact, check again after each millimetre."""
 _RELEASE_M = 0.02
-"""Gap at which a touch is over and another one is a new event."""
+"""Gap beyond which a contact has ended, so that another contact is a new event."""
 _NEAR_LOOK_NS = 10_000_000
 _LONGEST_WAIT_S = 1000.0
 _FARTHEST_LOOK_M = 10.0
-"""Larger than any UAV."""
+"""More than the size of any UAV."""
 
 Touch = Callable[[int, int, Array, bool, int], None]
-"""Tells of UAV, thing, (3,) m from its nearest point to the UAV, whether it is new, time in ns."""
+"""Receives UAV, actor, (3,) m from the actor's nearest point to the UAV, is new, time ns."""
 
 
 class ActorShapes:
-    """The things of a world, and looks at their shapes from near by, in their own frames."""
+    """The actors of a world, with distance queries to their shapes, in their own frames."""
 
     def __init__(self, actors: MovingActors) -> None:
         self.actors = actors
@@ -48,9 +48,9 @@ class ActorShapes:
         self._scenes = [by_shape[id(shape)] for shape in actors.shapes]
 
     def from_place(self, k: int, pose: Array, place: Array) -> tuple[Array, float]:
-        """(3,) m, map, from thing `k` at `pose` (7,) out to a place (3,) m, and the distance.
+        """Returns vector (3,) m and distance m from actor `k` at `pose` (7,) to `place` (3,), map.
 
-        Inside, the distance is below zero, and the vector points to the nearest way out.
+        Inside, the distance is negative, and the vector points to the nearest surface.
         """
         point = rotations.rotate(rotations.conjugate(pose[3:]), place - pose[:3])
         found = self._scenes[k].clearance(point[None], self._reach[k], include_terrain=False)
@@ -65,7 +65,7 @@ def _alone(shape: BodyShape) -> Scene:
 
 
 class ActorContacts:
-    """Looks from UAVs at things in time, and tells `touch` of those that meet."""
+    """Checks UAVs against actors at the necessary times, and calls `touch` for contacts."""
 
     def __init__(self, fleet: Fleet, looks: ActorShapes, touch: Touch) -> None:
         actors = looks.actors
@@ -77,17 +77,17 @@ class ActorContacts:
         self._reach = np.array([shape.radius for shape in actors.shapes])
         self._touching = np.zeros((len(self._radius), len(actors)), dtype=bool)
         self._next_ns = np.zeros(len(self._radius), dtype=np.int64)
-        """When each UAV has to look again at the latest."""
+        """Time of the latest next check of each UAV, ns."""
 
     @property
     def next_look_ns(self) -> int:
-        """Time of the next look that does not follow from how UAVs move."""
+        """Time of the next check that does not depend on the UAVs' motion, ns."""
         return int(self._next_ns.min())
 
     def resolve(self, refilled: NDArray[np.int64], time_ns: int) -> None:
-        """Look from UAVs whose budget was filled anew, and from those whose time has come.
+        """Checks UAVs with a new budget, and those whose time has come.
 
-        Their budgets are lowered to what the things leave them.
+        Lowers their budgets to the distances to the actors.
         """
         rows = np.union1d(refilled, np.flatnonzero(self._next_ns <= time_ns))
         if not len(rows):
@@ -101,33 +101,33 @@ class ActorContacts:
             self._next_ns[i] = time_ns + self._wait_ns(half, speeds, is_near)
 
     def look_again(self) -> None:
-        """Look from every UAV at once: a thing was put somewhere."""
+        """Checks every UAV at once, after an actor was teleported."""
         self._next_ns[:] = 0
 
     def forget(self, rows: NDArray[np.int64]) -> None:
-        """Take UAVs as new: they touch nothing, and look around at once."""
+        """Resets UAVs: they are in no contact, and are checked at once."""
         self._touching[rows] = False
         self._next_ns[rows] = 0
 
     def continue_from(
         self, other: ActorContacts, own: NDArray[np.int64], theirs: NDArray[np.int64]
     ) -> None:
-        """Know what UAVs of another fleet touch: own rows and the other's."""
+        """Copies the contacts of another fleet's UAVs: own rows and the other's."""
         self._touching[own] = other._touching[theirs]
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         return {"touching": self._touching.copy(), "next_ns": self._next_ns.copy()}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         self._touching[...] = state["touching"]
         self._next_ns[...] = state["next_ns"]
 
     def _look_around(self, i: int, poses: Array, time_ns: int) -> tuple[Array, bool]:
-        """Gaps (T,) m between UAV `i` and each thing, or less than they are; touches are told.
+        """Returns lower limits of the gaps (T,) m of UAV `i` to all actors; reports contacts.
 
-        The second says whether it is within the sphere around one of them.
+        The second value is whether the UAV is within the bounding sphere of an actor.
         """
         place, radius = self._fleet.state.position_map[i], float(self._radius[i])
         apart = np.linalg.norm(place - poses[:, :3], axis=1)
@@ -144,7 +144,7 @@ class ActorContacts:
         return gaps, bool(near)
 
     def _wait_ns(self, half: Array, speeds: Array, is_near: bool) -> int:
-        """Until the first thing may have used up its half, a whole number of steps."""
+        """Returns the time until an actor may have used its half, a whole number of steps, ns."""
         moves = speeds > 0.0
         wait_s = float((half[moves] / speeds[moves]).min(initial=np.inf))
         wait_ns = int(min(wait_s, _LONGEST_WAIT_S) * NS_PER_S)

@@ -1,8 +1,8 @@
-"""How much of the simulation's thread the calls of external clients may take.
+"""Limits the time that calls of external clients may take of the simulation's thread.
 
-All clients together get a fraction of its time, in equal shares among those that owe something:
-what one has spent and not earned back yet. A client that owes more than its credit waits for its
-turn; the calls of others are not delayed by that.
+All clients together get a fraction of its time, in equal shares among those in debt: that have used
+more than they have earned. A client whose debt exceeds its credit waits for its turn, which does
+not delay the calls of others.
 """
 
 from __future__ import annotations
@@ -11,17 +11,18 @@ import time
 from collections.abc import Callable, Hashable
 
 MAX_FRACTION = 0.05
-"""Of wall time, for all clients together, where the simulation has no time to spare."""
+"""Fraction of wall time for all clients together, when the simulation has no time to spare."""
 _CREDIT_S = 0.05
-"""What clients may spend in advance, in equal shares among those that owe something."""
+"""CPU time that clients may use in advance, in equal shares among those in debt."""
 _MIN_CREDIT_S = 0.002
 _MAX_DEBT_S = 0.05
-"""Beyond the credit: after one long call a client alone waits a second, not minutes."""
+"""Maximum debt beyond the credit: after one long call a single client waits a second, not
+minutes."""
 _PAY_PERIOD_S = 0.002
 
 
 class CallBudget:
-    """What each client owes, in seconds of CPU time; it belongs to the simulation's thread."""
+    """Debt of each client, s of CPU time; used in the simulation's thread."""
 
     def __init__(self, now_s: Callable[[], float] = time.perf_counter) -> None:
         self._now_s = now_s
@@ -29,9 +30,9 @@ class CallBudget:
         self._owed_s: dict[Hashable, float] = {}
 
     def earn(self) -> bool:
-        """Let wall time that has passed pay for what clients owe, in equal shares.
+        """Pays the clients' debts with the wall time that has passed, in equal shares.
 
-        Returns whether it did: not where hardly any has passed.
+        Returns False if too little time has passed to pay.
         """
         now_s = self._now_s()
         if now_s - self._last_s < _PAY_PERIOD_S:
@@ -40,7 +41,7 @@ class CallBudget:
         for left, (client, owed_s) in enumerate(
             sorted(self._owed_s.items(), key=lambda item: item[1]), start=-len(self._owed_s)
         ):
-            share_s = earned_s / -left  # what those that owe less did not need goes to the others
+            share_s = earned_s / -left  # unused shares go to the others
             paid_s = min(share_s, owed_s)
             earned_s -= paid_s
             if paid_s == owed_s:
@@ -50,11 +51,11 @@ class CallBudget:
         return True
 
     def may_spend(self, client: Hashable) -> bool:
-        """Whether the client's next call may run now."""
+        """Returns whether the client's next call may run now."""
         return self._owed_s.get(client, 0.0) < self._credit_s
 
     def spend(self, client: Hashable, cost_s: float) -> None:
-        """Charge a client for CPU time of the simulation's thread, or pay some back."""
+        """Charges a client CPU time of the simulation's thread; a negative cost is refunded."""
         owed_s = min(self._owed_s.get(client, 0.0) + cost_s, self._credit_s + _MAX_DEBT_S)
         if owed_s > 0.0:
             self._owed_s[client] = owed_s

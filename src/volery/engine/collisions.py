@@ -1,11 +1,11 @@
-"""Touches between UAVs and what stands or flies around them, by conservative advancement.
+"""Detects contacts between UAVs and their surroundings, by conservative advancement.
 
-A UAV's body counts as a sphere of its airframe's `collision_radius_m`. A look at the geometry tells
-how far it may move before anything can touch it; the fused dynamics count that distance down and
-come back when it is used up. So nothing is tunnelled at any speed, and looks are rare.
+A UAV's body is a sphere of its airframe's `collision_radius_m`. A distance query gives how far the
+UAV may move before any contact is possible; the fused dynamics count that distance down and return
+when it is used up. So nothing is tunnelled at any speed, and queries are rare.
 
-Between UAVs the distance left is shared: for each pair, the gap is never smaller than the sum of
-both budgets, so no two can touch before one of them asks.
+Between UAVs the remaining distance is shared: for each pair, the gap is never smaller than the sum
+of both budgets, so no contact is possible before a query.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ from volery.world.scene import Scene
 Array = NDArray[np.float64]
 
 _LOOK_REACH_M = 8.0
-"""Nothing further away is looked for; the look is repeated after that distance."""
+"""Maximum distance of a query, which is repeated after that distance."""
 _LEAST_BUDGET_M = 1e-3
-"""While touching, look again after each millimetre."""
+"""In contact, query again after each millimetre."""
 _RELEASE_M = 0.02
-"""Gap at which a touch is over and another one is a new event."""
+"""Gap beyond which a contact has ended, so that another contact is a new event."""
 _FRICTION = 0.4
 
 
 @dataclass(frozen=True)
 class Bounce:
-    """How bodies answer a touch."""
+    """Response of bodies to a contact."""
 
     restitution: float
     crashes: bool
@@ -48,10 +48,10 @@ BOUNCE = Bounce(restitution=0.5, crashes=False)
 
 
 class Collisions:
-    """Keeps the fleet's distance budgets filled and turns touches into events and impulses.
+    """Fills the fleet's distance budgets and turns contacts into events and impulses.
 
-    The fleet may hold several independent copies of a scenario, one after the other in its rows;
-    UAVs meet those of their own copy only.
+    The fleet may hold several independent environments of a scenario, one after the other in its
+    rows; UAVs only collide within their environment.
     """
 
     def __init__(
@@ -74,20 +74,20 @@ class Collisions:
         self._touched_solid = np.full(len(names), -1)
         self._crew = len(names) // copies
         self._touching_uav = np.zeros((len(names), self._crew), dtype=bool)
-        """Who touches whom (row, place of the other in the copy)."""
+        """Pairs in contact: row, index of the other UAV in the environment."""
         self._actors = None if looks is None else ActorContacts(fleet, looks, self._touch_actor)
-        """Touches of things that move by themselves, where there are any."""
+        """Contacts with actors; None without actors."""
         self._moving = None if looks is None else looks.actors
         fleet.state.contact_budget[:] = 0.0
         fleet.state.separation_budget[:] = 0.0
 
     @property
     def next_look_ns(self) -> int | None:
-        """When somebody has to look again at the latest; None where that follows from motion."""
+        """Time of the next necessary query, ns; None if it depends on motion only."""
         return None if self._actors is None else self._actors.next_look_ns
 
     def resolve(self, time_ns: int) -> None:
-        """Look around every UAV whose budget is used up; strike, report, and refill."""
+        """Queries around every UAV whose budget is used up; applies impulses, reports, refills."""
         state = self._fleet.state
         if self._actors is None and not _is_used_up(state.contact_budget, state.separation_budget):
             return
@@ -101,7 +101,7 @@ class Collisions:
             self._actors.resolve(used_up, time_ns)
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps beside the fleet's own budgets: who touches what."""
+        """Returns the contacts, for a snapshot; the fleet saves the budgets."""
         actors = None if self._actors is None else self._actors.get_state()
         return {
             "solid": self._touched_solid.copy(),
@@ -110,7 +110,7 @@ class Collisions:
         }
 
     def forget(self, rows: NDArray[np.int64]) -> None:
-        """Take UAVs as new: they touch nothing, and look around at once."""
+        """Resets UAVs: they are in no contact, and are checked at once."""
         self._touched_solid[rows] = -1
         self._touching_uav[rows] = False
         for row in rows.tolist():
@@ -122,19 +122,19 @@ class Collisions:
         self._fleet.state.separation_budget[rows] = 0.0
 
     def look_again(self, first_instance: int) -> None:
-        """Look around every UAV at once: the world has changed from that instance on."""
+        """Queries around every UAV at once, after a change of the world from that instance on."""
         self._touched_solid[self._touched_solid >= first_instance] = -1
         self._fleet.state.contact_budget[:] = 0.0
 
     def look_at_actors(self) -> None:
-        """Look at once at things, one of which was put somewhere."""
+        """Checks actors at once, after one was teleported."""
         if self._actors is not None:
             self._actors.look_again()
 
     def continue_from(self, other: Collisions, kept: Sequence[tuple[int, int]]) -> None:
-        """Know who touches what of another fleet's UAVs: own row and the other's, for each pair.
+        """Copies the contacts of another fleet's UAVs; pairs of own row and the other's.
 
-        Both are single copies of a scenario.
+        Both fleets are single environments of a scenario.
         """
         own, theirs = np.array(kept, np.int64).reshape(-1, 2).T
         self._touched_solid[own] = other._touched_solid[theirs]
@@ -143,7 +143,7 @@ class Collisions:
             self._actors.continue_from(other._actors, own, theirs)
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         self._touched_solid[...] = state["solid"]
         self._touching_uav[...] = state["uav"]
         if self._actors is not None:
@@ -179,7 +179,7 @@ class Collisions:
     # --------------------------------------------------------------------------------- other UAVs
 
     def _resolve_others(self, i: int, time_ns: int) -> None:
-        """Share the distance to each other UAV of the copy between the two of them."""
+        """Shares the distance to each other UAV of the environment between the two."""
         crew = self._crew_of(i)
         own = i - crew.start
         state = self._fleet.state
@@ -210,10 +210,10 @@ class Collisions:
         if approach > 0.0:
             self._fleet.strike_pair(i, j, normal, self._response.restitution, _FRICTION)
 
-    # ------------------------------------------------------------------------------------- things
+    # ------------------------------------------------------------------------------------- actors
 
     def _touch_actor(self, i: int, k: int, away: Array, is_new: bool, time_ns: int) -> None:
-        """A thing is not moved by what it meets; a UAV is struck as fast as the two approach."""
+        """Strikes a UAV at the approach speed; the actor's motion does not change."""
         assert self._moving is not None
         state, normal = self._fleet.state, _unit(away)
         velocity = self._moving.velocity_at(k, time_ns)
@@ -226,7 +226,7 @@ class Collisions:
             state.velocity_map[i] += velocity
 
     def _crew_of(self, i: int) -> slice:
-        """Rows of the copy that UAV `i` belongs to."""
+        """Returns the rows of UAV `i`'s environment."""
         first = i - i % self._crew
         return slice(first, first + self._crew)
 
@@ -253,7 +253,7 @@ def _unit(vector: Array) -> Array:
 
 @brief_kernel
 def _is_used_up(contact_budget: Array, separation_budget: Array) -> bool:
-    """Whether any UAV's budget (N,) is."""
+    """Returns whether any UAV's budget (N,) is used up."""
     for i in range(len(contact_budget)):
         if contact_budget[i] <= 0.0 or separation_budget[i] <= 0.0:
             return True

@@ -1,4 +1,4 @@
-"""Commands from other threads: taken in between two ticks, never in the middle of one."""
+"""Queues commands of other threads, which the engine executes between two ticks only."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from volery.core.errors import CommandError
 from volery.engine.call_budget import CallBudget
 
 _MAX_ROUND_COMMANDS = 32
-"""Of one client at once, where the engine has no time to spare: what they cause is counted then."""
+"""Limit of one client's commands per round without time to spare: then their effects are
+charged."""
 _MAX_ROUND_S = 0.02
-"""CPU time of clients' commands between two ticks, where the engine has no time to spare."""
+"""Limit of the CPU time of clients' commands between two ticks without time to spare."""
 
 
 class CommandTime(NamedTuple):
-    """When a command is taken, the same however the run is sliced.
+    """Moment of a command, independent of how the run is divided.
 
-    turn: what has been done since the physics step, counted: ticks, meetings with partners, rounds
-    of commands.
+    turn: number of ticks, barriers with partners and rounds of commands since the physics step.
     """
 
     step: int
@@ -32,47 +32,47 @@ class CommandTime(NamedTuple):
 
 
 class Repeats(Protocol):
-    """Recorded commands that are taken again at their moments."""
+    """Replays recorded commands at their moments."""
 
     def next_step(self) -> int | None:
-        """Physics step at which the next one is to be taken, None when no more come."""
+        """Returns the physics step of the next command, None after the last one."""
 
     def take(self) -> bool:
-        """Do what was done at the engine's present moment; whether that was anything."""
+        """Executes the commands of the engine's current moment; returns whether there were any."""
 
 
 class _Command(NamedTuple):
     number: int
-    """Of all posted commands, in the order of arrival."""
+    """Number among all posted commands, in order of arrival."""
     action: Callable[[], Any]
     future: Future[Any]
 
 
 class ClientQueue:
-    """Commands of one external client, taken in their order; `None` names no client: all else."""
+    """Commands of one external client, executed in order; client `None`: all other commands."""
 
     def __init__(self, inbox: CommandQueue, client: Hashable = None) -> None:
         self._inbox = inbox
         self.client = client
         self.commands: deque[_Command] = deque()
         self.is_deferred = False
-        """Whether the client waits for its turn because it has spent its budget."""
+        """Whether the client waits for its turn because its budget is used up."""
         self.after_s = 0.0
-        """CPU time that is expected to follow on a command, for what it published."""
+        """Expected CPU time after a command, for its publications, s."""
 
     def post(self, action: Callable[[], Any]) -> Future[Any]:
-        """Have `action()` called before a tick; the future holds its result or error."""
+        """Runs `action()` before a tick; the future holds its result or error."""
         return self._inbox.put(self, action)
 
 
 class CommandQueue:
-    """What outside clients want done. Any thread may post; the engine's thread works it off.
+    """Executes posted commands in the engine's thread; any thread may post.
 
-    Commands are taken in the order of arrival. Those of an external client (`open_queue`) are
-    charged to it by the CPU time that they take; where the engine has no time to spare, a client
-    that has spent its budget waits for its turn (`engine.call_budget`). Code that runs in the
-    engine's own thread between ticks (nodes, a user's script) commands the fleet directly: that too
-    takes effect with the next physics step.
+    Commands run in order of arrival. Those of an external client (`open_queue`) are charged to the
+    client by CPU time; when the engine has no time to spare, a client whose budget is used up waits
+    for its turn (`engine.call_budget`). Code that runs in the engine's thread between ticks (nodes,
+    a user's script) commands the fleet directly: its commands take effect with the next physics
+    step too.
 
     on_post: called, in the thread that posts, after each command.
     """
@@ -97,18 +97,18 @@ class CommandQueue:
         self._charged: list[tuple[ClientQueue, float]] = []
         self._mark_s = 0.0
         self.is_cut = False
-        """Whether `work_off` stopped early so that what it caused is handed out and counted."""
+        """Whether `work_off` stopped early, so that the effects are delivered and charged first."""
 
     def open_queue(self) -> ClientQueue:
-        """A queue for the commands of one external client."""
+        """Returns a queue for the commands of one external client."""
         return ClientQueue(self, object())
 
     def post(self, action: Callable[[], Any]) -> Future[Any]:
-        """Have `action()` called before the next tick; the future holds its result or error."""
+        """Runs `action()` before the next tick; the future holds its result or error."""
         return self._own.post(action)
 
     def put(self, queue: ClientQueue, action: Callable[[], Any]) -> Future[Any]:
-        """Add a command; used by `ClientQueue`."""
+        """Adds a command; used by `ClientQueue`."""
         future: Future[Any] = Future()
         with self._lock:
             closed = self._closed
@@ -124,7 +124,7 @@ class CommandQueue:
         return future
 
     def close(self, reason: str) -> None:
-        """Take no more commands: those that wait, and later ones, fail with `reason`."""
+        """Rejects waiting and later commands, which fail with `reason`."""
         with self._lock:
             self._closed = reason
             left = [command for queue in self._occupied for command in queue.commands]
@@ -135,24 +135,24 @@ class CommandQueue:
 
     @property
     def has_waiting(self) -> bool:
-        """Whether a command waits, be it for its client's turn."""
+        """Whether any command waits, including clients' deferred ones."""
         return bool(self._occupied)
 
     def wake(self) -> None:
-        """End a `wait` although nothing was posted."""
+        """Ends a `wait` without a command."""
         self._news.set()
 
     def wait(self, timeout_s: float) -> None:
-        """Wait while no command waits, until one is posted or `wake` is called."""
+        """Waits for a command or `wake`; returns at once if a command waits."""
         if not self._occupied:
             self._news.wait(timeout_s)
         self._news.clear()
 
     def serve(self, hand_out: Callable[[], None], idle_s: float = math.inf) -> None:
-        """Call what waits and whose turn it is, with all that follows, in rounds.
+        """Executes the waiting commands whose turn it is, with their effects, in rounds.
 
-        hand_out: delivers what a round has published, at the expense of the round's clients.
-        idle_s: as of `work_off`.
+        hand_out: delivers what a round has published; the round's clients pay for it. idle_s: see
+        `work_off`.
         """
         while self.work_off(idle_s):
             hand_out()
@@ -162,9 +162,9 @@ class CommandQueue:
             idle_s = 0.0
 
     def work_off(self, idle_s: float = math.inf) -> bool:
-        """Call what waits and whose turn it is; whether there was anything.
+        """Executes the waiting commands whose turn it is; returns whether there were any.
 
-        idle_s: wall time that the engine has to spare; what runs in it is charged to no client.
+        idle_s: wall time to spare; commands in this time are charged to no client.
         """
         if not self._occupied:
             return False
@@ -201,7 +201,7 @@ class CommandQueue:
         return worked
 
     def end_round(self) -> None:
-        """Charge the clients whose commands `work_off` called for what has followed since."""
+        """Charges the clients of the last `work_off` for the time that has passed since."""
         charged, self._charged = self._charged, []
         if charged:
             each_s = (self._cpu_s() - self._mark_s) / len(charged)
@@ -210,7 +210,7 @@ class CommandQueue:
                 queue.after_s += 0.5 * (each_s - queue.after_s)
 
     def _pop(self, queue: ClientQueue, limit: int) -> _Command | None:
-        """The next command of a queue that was posted before `limit`."""
+        """Removes and returns a queue's next command posted before `limit`, None without one."""
         with self._lock:
             if not queue.commands or queue.commands[0].number >= limit:
                 return None
@@ -221,13 +221,13 @@ class CommandQueue:
             return command
 
     def _call(self, command: _Command, payer: ClientQueue | None) -> float:
-        """Call a command and charge it to a client, None: to none; CPU time with what follows."""
+        """Runs a command and charges `payer`; returns the CPU time with expected effects, s."""
         if not command.future.set_running_or_notify_cancel():
             return 0.0
         before_s = 0.0 if payer is None else self._cpu_s()
         try:
             command.future.set_result(command.action())
-        except Exception as error:  # the sender's business, not the engine's
+        except Exception as error:  # reported to the sender; the engine continues
             command.future.set_exception(error)
         if payer is None:
             return 0.0
@@ -238,9 +238,9 @@ class CommandQueue:
 
 
 def _head(queue: ClientQueue) -> tuple[bool, int, ClientQueue]:
-    """Order in which queues are served: those that were not deferred first, then by arrival."""
+    """Returns the sort key of queues: those not deferred first, then by arrival."""
     return queue.is_deferred, queue.commands[0].number, queue
 
 
 def _nothing() -> None:
-    """Nobody needs to know of posts."""
+    """Does nothing."""

@@ -1,4 +1,4 @@
-"""The engine: a fleet, its scene and sensors on one integer clock, folded through the stages."""
+"""Advances fleet, scene and sensors on one integer clock, stage by stage."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ if TYPE_CHECKING:
     from volery.engine.estimation import Estimation
 
 _MOST_STEPS_A_TICK = 50
-"""The history of poses holds 64 steps; whoever reads along must not miss one."""
+"""The pose history holds 64 steps; its readers must not miss one."""
 
 
 class SensorBank(Bank, Protocol):
-    """All sensors of one kind, model, rate and phase, as the engine drives them.
+    """All sensors of one kind, model, rate and phase, as used by the engine.
 
-    Besides what `Bank` explains (`sample`, `get_state`, `set_state`, `reset`), its sensors can
-    fail: `faults.set(row, kind, value)` takes effect at the next measurement.
+    Besides the methods of `Bank` (`sample`, `get_state`, `set_state`, `reset`), sensors can fail:
+    `faults.set(row, kind, value)` takes effect at the next measurement.
     """
 
     @property
@@ -52,27 +52,27 @@ class SensorBank(Bank, Protocol):
         """Faults of the sensors, row by row."""
 
     def is_wanted(self) -> bool:
-        """Whether the next measurement is worth making."""
+        """Returns whether the next measurement has receivers."""
 
 
 class Sink(Protocol):
-    """Where measurements and events go."""
+    """Receives samples and events."""
 
     def advanced(self, first_step: int, last_step: int) -> None:
-        """Physics steps first..last have been computed."""
+        """Called when physics steps first..last have been computed."""
 
     def sampled(self, samples: Samples) -> None:
-        """Sensors have measured."""
+        """Called with the samples of a bank."""
 
     def happened(self, event: Event) -> None:
-        """Something happened."""
+        """Called with each event."""
 
     def deliver(self) -> None:
-        """Hand everything out."""
+        """Delivers all queued messages."""
 
 
 class Engine:
-    """Advances everything in lock step; see `stages.STAGES` for the order."""
+    """Advances the simulation in lock step; see `stages.STAGES` for the order."""
 
     def __init__(
         self,
@@ -95,60 +95,61 @@ class Engine:
         self.sink = sink
         self.inbox = CommandQueue(on_post=on_post)
         self.while_waiting: Callable[[], bool] = lambda: True
-        """Called now and then while a lock-step partner is waited for: whether the run goes on."""
+        """Called repeatedly while waiting for a lock-step partner; returns whether the run
+        continues."""
         self.is_broken_off = False
-        """Whether the last meeting with lock-step partners ended because the run does."""
+        """Whether the end of the run aborted the last barrier with lock-step partners."""
         self.repeats: Repeats | None = None
-        """Recorded commands to be taken again."""
+        """Recorded commands to replay."""
         self.turn = 0
-        """Of the present moment; see `CommandTime`."""
+        """Turn of the current moment; see `CommandTime`."""
         self._commanded = False
         self.stands = True
-        """Whether nothing is half done: states may be kept and taken back."""
+        """Whether the state is consistent, so that it can be saved and restored."""
         self.dt_ns = fleet.dt_ns
         self._new_events: list[Event] = []
         self.names = names
-        """Of the UAVs, in fleet order."""
+        """Names of the UAVs, in fleet order."""
         self._response = CRASH if crash_on_contact else BOUNCE
         self.actors = scene.actors
-        """What moves through the world by itself, where there is anything."""
+        """Actors of the world; None without any."""
         self._looks = None if self.actors is None else ActorShapes(self.actors)
         self.collisions = self._new_collisions(copies)
         self.state_check = StateCheck(fleet)
         self.banks = tuple(banks)
         self.estimation = estimation
-        """Estimators that listen to the sensors, where there are any."""
+        """Estimators that use the sensors' measurements; None without any."""
         self.sensor_agenda = self._new_agenda(after_step=-1)
         self.timer_agenda: Scheduler[Callable[[], Any]] = Scheduler(self.dt_ns)
         self.partner_agenda: Scheduler[Partner] = Scheduler(self.dt_ns)
         self.deadlines = OneShotTimers(self.dt_ns)
         self.stage_seconds = {stage.__name__: 0.0 for stage in STAGES}
-        """Wall time spent in each stage so far ..."""
+        """Wall time spent in each stage so far, s ..."""
         self.stage_cpu_s = dict(self.stage_seconds)
-        """... and CPU time of the thread that runs them: workers' is not in it."""
+        """... and CPU time of the thread that runs the stages, without its workers, s."""
 
     @property
     def time_ns(self) -> int:
-        """Simulated time."""
+        """Simulated time, ns."""
         return self.fleet.step * self.dt_ns
 
     @property
     def moment(self) -> CommandTime:
-        """Where between two ticks, or in a meeting, the engine is."""
+        """Current moment, between two ticks or in a barrier."""
         return CommandTime(self.fleet.step, self.turn)
 
     def count_command(self) -> None:
-        """Note that a command which may change results is taken at this moment."""
+        """Counts a command of this moment that may change results."""
         self._commanded = True
 
     def set_weather(self, weather: Weather) -> None:
-        """Let `weather` blow from the next guidance tick on."""
+        """Sets the weather from the next guidance tick on."""
         self.fleet.set_weather(weather)
 
     def gust_now(
         self, amplitude_map: tuple[float, float, float], rise_s: float, lasts_s: float = math.inf
     ) -> None:
-        """Let a 1-cosine gust of `amplitude_map` (3,) m/s begin now, over after `lasts_s`."""
+        """Starts a 1-cosine gust of `amplitude_map` (3,) m/s now, with duration `lasts_s`."""
         now_s = s_from_ns(self.time_ns)
         self.fleet.add_gust(Gust(amplitude_map, now_s, rise_s, now_s + lasts_s))
 
@@ -159,25 +160,25 @@ class Engine:
         *,
         wanted: Callable[[], bool] | None = None,
     ) -> None:
-        """Call `callback` each period of simulated time, first after one period.
+        """Calls `callback` every period of simulated time, first after one period.
 
-        Not where `wanted()` is false: then no tick ends for it.
+        Skips calls while `wanted()` is false, for which no tick ends.
         """
         schedule = self._from_now(period_s)
         self.timer_agenda.add(callback, schedule, after_step=self.fleet.step, wanted=wanted)
 
     def forget(self, callback: Callable[[], Any]) -> None:
-        """Call `callback`, which `every` was given, no more."""
+        """Stops calling a `callback` that was passed to `every`."""
         self.timer_agenda.remove(callback)
 
     def at(self, time_ns: int, action: Callable[[], Any]) -> None:
-        """Call `action` once, at `time_ns` of simulated time or at once if that has passed."""
+        """Calls `action` once at simulated `time_ns`, or at once if that has passed."""
         self.deadlines.add(max(time_ns, self.time_ns), action)
 
     def wait_for(self, partner: Partner, period_s: float) -> None:
-        """Meet `partner` each period of simulated time, first after one period.
+        """Waits for `partner` every period of simulated time, first after one period.
 
-        One that `meets_at_start` is met at time 0 too, where the run has not begun.
+        With `meets_at_start`, the first barrier is at time 0, if the run has not started.
         """
         at_start = partner.meets_at_start and self.fleet.step == 0
         after_step = -1 if at_start else self.fleet.step
@@ -186,12 +187,12 @@ class Engine:
     def advance_to(
         self, step: int, *, until: Callable[[], bool] | None = None, in_pieces: bool = False
     ) -> None:
-        """Run ticks until `step` is reached and everything due there has fired.
+        """Runs ticks up to `step`, including everything due at that step.
 
-        `until` is asked after each tick and ends the run there: the answer must follow from the
-        simulated world alone, so that the end does not depend on how a run is sliced.
-        `in_pieces`: the caller comes again for the rest, so that a tick in which time went back, to
-        a state that was restored, ends the piece: at a pace, the way to `step` is now far.
+        until: called after each tick; ends the run when true. Its result must depend on the
+        simulated world only, so that the end does not depend on how a run is divided. in_pieces:
+        the caller calls again for the rest, so a tick that restored an earlier state ends the
+        piece, because `step` may now be far away.
         """
         while self.fleet.step < step or self._due_step() <= self.fleet.step:
             if until is not None and until():
@@ -202,21 +203,20 @@ class Engine:
                 return
 
     def process_commands(self, idle_s: float = 0.0) -> None:
-        """Do what was posted and hand out what that published; between ticks.
+        """Executes posted commands and delivers what they published; called between ticks.
 
-        idle_s: wall time to spare, in which clients may do more than their budget; see
-        `CommandQueue`.
+        idle_s: wall time to spare, in which clients may exceed their budget; see `CommandQueue`.
         """
         self.inbox.serve(self._hand_out, idle_s)
         self.take_repeats()
 
     def take_repeats(self) -> None:
-        """Take the recorded commands of this moment, round by round as they were taken."""
+        """Replays the recorded commands of this moment, in the recorded rounds."""
         while self.repeats is not None and self.repeats.take():
             self._hand_out()
 
     def _hand_out(self) -> None:
-        """End a round of commands."""
+        """Ends a round of commands."""
         stood, self.stands = self.stands, False
         try:
             self.sink.deliver()
@@ -226,55 +226,55 @@ class Engine:
         self._commanded = False
 
     def wait(self, timeout_s: float) -> None:
-        """Wait for something to take in, or a `wake`, at most `timeout_s` of wall time."""
+        """Waits for commands or a `wake`, at most `timeout_s` of wall time."""
         comes = self.repeats is not None and self.repeats.next_step() == self.fleet.step
         self.inbox.wait(0.0 if comes else timeout_s)
 
     def goes_on(self) -> bool:
-        """Whether the run goes on, asked where a lock-step partner is waited for."""
+        """Returns whether the run continues, while waiting for a lock-step partner."""
         return self.while_waiting()
 
     def wake(self) -> None:
-        """End a `wait`; from any thread."""
+        """Ends a `wait`; callable from any thread."""
         self.inbox.wake()
 
     def horizon(self, step: int) -> int:
-        """How far a tick may go that shall not pass `step`."""
+        """Returns the last step of a tick that must not pass `step`."""
         now = self.fleet.step
         wanted = None if self.repeats is None else self.repeats.next_step()
         step = min(step, self._due_step(), step if wanted is None else wanted)
         return min(max(step, now), now + _MOST_STEPS_A_TICK)
 
     def note(self, uav: int, kind: EventKind, detail: str) -> None:
-        """Let something that happens to a UAV now be an event."""
+        """Adds an event of a UAV, at the current time."""
         x, y, z = self.fleet.state.position_map[uav].tolist()
         self._new_events.append(
             Event(self.time_ns, self.names[uav], kind, (x, y, z), 0.0, detail=detail)
         )
 
     def note_world(self, detail: str) -> None:
-        """Let a change of the world be an event."""
+        """Adds an event about a change of the world."""
         nowhere = (0.0, 0.0, 0.0)
         self._new_events.append(
             Event(self.time_ns, "", EventKind.WORLD, nowhere, 0.0, detail=detail)
         )
 
     def replace_solids(self, solids: Sequence[Solid]) -> None:
-        """Let other solids stand in the world from the next physics step on; see `Scene`."""
+        """Replaces the solids of the world from the next physics step on; see `Scene`."""
         self.collisions.look_again(self.scene.replace_solids(solids))
 
     def set_actor_pose(self, row: int, pose: ArrayLike, velocity: ArrayLike) -> None:
-        """Put a thing at `pose` (7,) from now on, moving on at `velocity` (3,) m/s, map.
+        """Sets an actor's pose (7,) and velocity (3,) m/s, map, from now on.
 
-        `CommandError` for one that has a way of its own.
+        Raises `CommandError` if the actor follows a path of its own.
         """
         if self.actors is None:
-            raise CommandError("there are no things in this world")
+            raise CommandError("this world has no actors")
         self.actors.say(row, self.time_ns, pose, velocity)
         self.collisions.look_at_actors()
 
     def collect_events(self) -> list[Event]:
-        """Events since the last call, oldest first."""
+        """Returns the events since the last call, oldest first."""
         self._new_events += event_collection.drain(self.fleet, self.names)
         events = sorted(self._new_events, key=lambda event: event.time_ns)
         self._new_events.clear()
@@ -283,10 +283,9 @@ class Engine:
     def restart_sensors(
         self, uavs: NDArray[np.int64], keys: Keys
     ) -> list[tuple[Samples, NDArray[np.int64]]]:
-        """Put the sensors of `uavs`, and what is made of them, back to their start.
+        """Restarts the sensors of `uavs`, and the estimates that use them.
 
-        See `engine.sensor_restart`; the random stream of an estimate is found under its sensor's
-        name.
+        See `engine.sensor_restart`; the random stream of an estimate has the key of sensor `odom`.
         """
         if self.estimation is not None:
             self.estimation.restart(
@@ -302,10 +301,10 @@ class Engine:
         estimation: Estimation | None,
         going_on: Collection[str],
     ) -> None:
-        """Go on with a fleet that has more UAVs or fewer; between ticks.
+        """Continues with a fleet that has more or fewer UAVs; called between ticks.
 
-        All parts are new, as at a start. The UAVs `going_on` are as they were, and so are their
-        sensors and estimates; the others, and theirs, begin now.
+        All parts are new, as at a start. The UAVs `going_on` keep their state, and so do their
+        sensors and estimates; the others start now.
         """
         self._new_events += event_collection.drain(self.fleet, self.names)
         kept = common_rows(names, self.names, going_on)
@@ -328,7 +327,7 @@ class Engine:
     # ------------------------------------------------------------------------------ snapshot
 
     def get_state(self) -> dict[str, Any]:
-        """Everything that changes in fleet, collisions, sensors and what is due; between ticks."""
+        """Returns the state of fleet, collisions, sensors and timers; called between ticks."""
         return {
             "fleet": self.fleet.get_state(),
             "collisions": self.collisions.get_state(),
@@ -340,7 +339,7 @@ class Engine:
         }
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state of this engine."""
+        """Restores a saved state of this engine."""
         self.turn = 0
         self.fleet.set_state(state["fleet"])
         self.collisions.set_state(state["collisions"])
@@ -354,7 +353,7 @@ class Engine:
             self.actors.set_state(state["actors"])
         self._new_events[:] = state["new_events"]
 
-    # -------------------------------------------------------------------------------- inside
+    # ------------------------------------------------------------------------------------- internal
 
     @property
     def _due(self) -> tuple[Scheduler[Any] | OneShotTimers, ...]:
@@ -405,7 +404,7 @@ class Engine:
                 self.stage_cpu_s[stage.__name__] += cpu_after - cpu_before
                 before, cpu_before = after, cpu_after
         except (ArithmeticError, ValueError):
-            self.state_check.look()  # NaN breaks what reads it: say what is behind it
+            self.state_check.look()  # NaN breaks its readers: report the cause
             raise
         finally:
             self.stands = True

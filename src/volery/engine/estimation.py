@@ -1,4 +1,4 @@
-"""From what sensors send to what UAVs believe: estimators that listen as measurements come."""
+"""Passes sensor measurements to the UAVs' estimators as they arrive."""
 
 from __future__ import annotations
 
@@ -32,29 +32,29 @@ T = TypeVar("T", bound=np.generic)
 
 @dataclass(frozen=True)
 class EstimationSetup:
-    """How estimators are fed: row e of each array belongs to estimator e."""
+    """Inputs of the estimators: row e of each array belongs to estimator e."""
 
     uavs: Rows
     """(E,) rows of the fleet."""
     used_for_control: NDArray[np.bool_]
-    """(E,) whether the UAV's controllers fly on the estimate."""
+    """(E,) whether the UAV's controllers use the estimate."""
     listens: Mapping[tuple[int, str], int]
-    """Estimator that listens to a sensor, by row of the UAV and name of the sensor."""
+    """Estimator that uses a sensor, by row of the UAV and name of the sensor."""
     gyro_variance: Array
-    """(E,) rad^2/s^2 of one gyroscope reading."""
+    """(E,) rad^2/s^2 of one gyroscope measurement."""
     gnss_drift_variance: Array
-    """(E, 3) m^2 of what a receiver states as noise and the filter estimates as an offset."""
+    """(E, 3) m^2 of a receiver's stated noise that the filter estimates as an offset instead."""
     origin_altitude_m: float
-    """Of the map's z = 0 above sea level."""
+    """Altitude of the map's z = 0 above sea level."""
     ground_height_m: float | None
-    """Height of level ground; None where it is not level, and ranges tell nothing by themselves."""
+    """Height of level ground, m; None if the ground is not level, so that ranges are unusable."""
     start: StartSigmas
-    """How near the truth estimates begin."""
+    """Standard deviations of the initial estimates."""
 
 
 @dataclass(frozen=True)
 class PoseMeasurement:
-    """Of a body in the map at `stamp_ns`, as some node tells it."""
+    """Pose of a body in the map at `stamp_ns`, as measured by a node."""
 
     stamp_ns: int
     position_map: Array
@@ -66,7 +66,7 @@ class PoseMeasurement:
 
 
 class Estimation:
-    """The estimators of all UAVs that have one."""
+    """Holds the estimators of all UAVs that have one."""
 
     def __init__(self, estimator: Estimator, setup: EstimationSetup, fleet: Fleet) -> None:
         self.estimator = estimator
@@ -80,19 +80,19 @@ class Estimation:
 
     @property
     def gyro_variance(self) -> Array:
-        """(E,) rad^2/s^2 of one gyroscope reading."""
+        """(E,) rad^2/s^2 of one gyroscope measurement."""
         return self.setup.gyro_variance
 
     def rows_of(self, uavs: Rows) -> Rows:
-        """Estimators of UAVs, rows of the fleet; each must have one."""
+        """Returns the estimators of UAVs, given by rows of the fleet; each must have one."""
         return np.array([int(np.flatnonzero(self.setup.uavs == uav)[0]) for uav in uavs])
 
     def register(self, sensors: tuple[SensorId, ...]) -> None:
-        """Look up once who listens to a bank whose samples name `sensors`."""
+        """Looks up once the estimators for a bank whose samples name `sensors`."""
         self._known[id(sensors)] = (sensors, *self._look_up(sensors))
 
     def take(self, samples: Samples) -> None:
-        """Feed what a bank's sensors have sent to who listens to them."""
+        """Passes a bank's samples to the estimators that use them."""
         heard, rows = self._listeners(samples.sensors)
         if isinstance(samples, ImuReadings):
             if len(rows):
@@ -123,10 +123,10 @@ class Estimation:
             )
 
     def take_pose(self, uav: int, pose: PoseMeasurement, *, gap_ns: int) -> None:
-        """Feed a pose in the map, such as a SLAM's, to the estimator of a UAV, a row of the fleet.
+        """Passes a pose in the map, such as a SLAM's, to the estimator of fleet row `uav`.
 
-        A pose that is not at least `gap_ns` newer than the last one taken is left out, and so are
-        numbers that are not finite.
+        Ignores a pose that is not at least `gap_ns` newer than the last accepted one, or not
+        finite.
         """
         rows = self.rows_of(np.array([uav]))
         if pose.stamp_ns - self._pose_ns[rows[0]] < gap_ns:
@@ -138,16 +138,16 @@ class Estimation:
         )
 
     def pose_ns(self, uav: int) -> int:
-        """Stamp of the newest pose that was taken for a UAV, a row of the fleet; long ago: none."""
+        """Returns the stamp of a UAV's newest accepted pose, ns; far in the past without one."""
         return int(self._pose_ns[self.rows_of(np.array([uav]))[0]])
 
     def stand_still(self, uav: int, stamp_ns: int) -> None:
-        """Feed what is known of a UAV that stands on the ground: it does not move."""
+        """Passes zero velocity to the estimator of a UAV that is on the ground."""
         rows = self.rows_of(np.array([uav]))
         self.estimator.fuse_velocity(rows, stamp_ns, np.zeros((1, 3)), _STANDING_VARIANCE)
 
     def restart(self, keys: Mapping[int, np.uint64]) -> None:
-        """Begin anew for UAVs that have begun anew, with a random stream for each of their rows."""
+        """Restarts the estimates of restarted UAVs; `keys`: random stream by fleet row."""
         rows = np.array([e for e, uav in enumerate(self.setup.uavs) if int(uav) in keys], np.int64)
         if not len(rows):
             return
@@ -172,7 +172,7 @@ class Estimation:
         self._tell_fleet(rows)
 
     def continue_from(self, other: Estimation, kept: Sequence[tuple[int, int]]) -> None:
-        """Go on with another's estimates: own row of the fleet and the other's, for each pair."""
+        """Copies another's estimates; pairs of own row of the fleet and the other's."""
         theirs = {int(uav): e for e, uav in enumerate(other.setup.uavs)}
         was = dict(kept)
         pairs = [
@@ -185,11 +185,11 @@ class Estimation:
             self._pose_ns[own] = other._pose_ns[row]
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         return {**self.estimator.get_state(), "pose_ns": self._pose_ns.copy()}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state; the fleet keeps the errors that belong to it."""
+        """Restores a saved state; the fleet restores the estimation errors itself."""
         self.estimator.set_state(state)
         self._pose_ns[:] = state["pose_ns"]
 
@@ -215,7 +215,7 @@ class Estimation:
         self.estimator.fuse_pressure_height(rows, samples.stamp_ns, height, variance)
 
     def _tell_fleet(self, rows: Rows | None = None) -> None:
-        """Tell the controllers how far what they fly on is from the truth; `rows` (E,), or all."""
+        """Sets the estimation errors that the fleet's controllers use; `rows` (E,), or all."""
         if not self._is_used_for_control:
             return
         flying, uavs = self._flying
@@ -234,7 +234,7 @@ class Estimation:
         return self._look_up(sensors)
 
     def _look_up(self, sensors: Sequence[SensorId]) -> tuple[Rows | slice, Rows]:
-        """Places in a bank's arrays that are listened to, and the estimators that do."""
+        """Returns the rows of a bank's arrays that are used, and the estimators that use them."""
         listens = self.setup.listens
         pairs = [
             (k, listens[s.uav, s.name]) for k, s in enumerate(sensors) if (s.uav, s.name) in listens
@@ -246,9 +246,9 @@ class Estimation:
 _NEVER_NS = -(10**18)
 
 _STANDING_VARIANCE = np.full(3, 0.02**2)
-"""(m/s)^2, of a landed UAV in the wind; modelling choice."""
+"""(m/s)^2, of a landed UAV in wind; modelling choice."""
 _LEAST_VARIANCE = 1e-4
-"""m^2 and (m/s)^2: no measurement is taken for better than a centimetre."""
+"""m^2 and (m/s)^2: no measurement is treated as better than a centimetre."""
 
 
 @dataclass(frozen=True)
@@ -260,7 +260,7 @@ class _Motions:
 
 
 def _heard(values: NDArray[T], heard: Rows | slice) -> NDArray[T]:
-    """What is listened to, as an array of its own: kernels are compiled for ones to write to."""
+    """Returns the used rows, as a writable array: kernels are compiled for those."""
     return np.array(values[heard])
 
 

@@ -1,4 +1,4 @@
-"""What the compiled steps noted of landings, impacts and modes, as events."""
+"""Converts the landings, impacts and mode changes noted by the compiled steps to events."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ _KINDS = {
 
 
 def drain(fleet: Fleet, names: tuple[str, ...]) -> Iterator[Event]:
-    """Events of the fleet since the last call, oldest first."""
+    """Yields the fleet's events since the last call, oldest first."""
     for noted in fleet.drain_events():
         if noted.kind is FleetEventKind.TOUCH_DOWN and noted.mode is FlightMode.LANDED:
-            continue  # settles where it was put down
+            continue  # settles at its start position
         yield _event(noted, names[noted.uav], fleet.dt_ns)
 
 

@@ -1,4 +1,4 @@
-"""What happened to a UAV, with time and place."""
+"""Defines events of UAVs and of the world."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ class EventKind(StrEnum):
     BATTERY = "battery"
     """Its battery ran low, critical or empty."""
     FAULT = "fault"
-    """Something planned went wrong with it, or is well again."""
+    """A planned fault began or ended."""
     WORLD = "world"
-    """The world was changed, or a change refused; such an event is of no UAV."""
+    """The world was changed, or a change rejected; without UAV."""
 
 
 @dataclass(frozen=True)
 class Event:
-    """One happening; `uav` is empty where it is of none.
+    """One event; `uav` is empty for an event without UAV.
 
-    `partner` names what was touched, `detail` anything else worth saying.
+    `partner` names the object of a contact, `detail` gives other information.
     """
 
     time_ns: int
@@ -42,7 +42,7 @@ class Event:
     detail: str = ""
 
     def describe(self) -> str:
-        """One line for people."""
+        """Returns one line for users."""
         x, y, z = self.position_map
         where = f"at ({x:.1f}, {y:.1f}, {z:.1f}) m"
         time = f"{s_from_ns(self.time_ns):.3f} s"

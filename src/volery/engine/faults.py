@@ -1,4 +1,4 @@
-"""Faults on time: what breaks is told to fleet, sensors and air when its time has come."""
+"""Schedules faults, and applies them to fleet, sensors, radios and wind at their times."""
 
 from __future__ import annotations
 
@@ -38,44 +38,43 @@ class Radios(Protocol):
     """The radios of the UAVs."""
 
     def check(self, name: str) -> None:
-        """`CommandError` where a UAV has none."""
+        """Raises `CommandError` if a UAV has no radio."""
 
     def silence(self, name: str, by: int) -> None:
-        """One fault more (1) or less (-1) keeps a radio from working."""
+        """Adds (1) or removes (-1) a fault of a radio."""
 
     def restore_all(self, name: str) -> None:
-        """A radio begins anew."""
+        """Restores a radio."""
 
 
 class FaultPlan:
-    """Plans faults of an engine's UAVs; planned ones are part of its state.
+    """Schedules faults of an engine's UAVs; the scheduled faults are part of its state.
 
-    UAVs go by their names: rows may change before a fault's time comes, and one that has been
-    deleted meanwhile fails no more.
+    UAVs are identified by name: rows may change before a fault's time, and a deleted UAV no longer
+    fails.
     """
 
     def __init__(self, engine: Engine, radios: Radios | None = None) -> None:
         self._engine = engine
         self._radios = radios
         self._sound: dict[str, Array] = {}
-        """(rotors,) health without faults, by UAV: what wear has left."""
+        """(rotors,) health without faults, by UAV, wear included."""
         self._weak: dict[tuple[str, int], list[float]] = {}
-        """Shares of thrust that the present faults leave, by UAV and rotor."""
+        """Thrust factors of the active faults, by UAV and rotor."""
         self.enlist(engine.names)
 
     def enlist(self, uavs: Collection[str]) -> None:
-        """Take UAVs as they are now for sound ones."""
+        """Records the present rotor health of UAVs as their health without faults."""
         for name in uavs:
             self._sound[name] = self._fleet.state.rotor_health[self._row(name)].copy()
             self.mend(name)
 
     def add(self, fault: Fault, *, client: str = "") -> None:
-        """Let a fault happen when its time comes, or at the next tick if that has passed.
+        """Schedules a fault at its time, or at the next tick if that has passed.
 
-        Raises `CommandError` for a UAV, rotor or sensor that there is not, and for what cannot be
-        in this world. `client`: the external client that wants it. A fault of a client that turns
-        out to be impossible when its time comes changes nothing and is logged; another one ends
-        the run.
+        Raises `CommandError` for an unknown UAV, rotor or sensor, and for a fault that is
+        impossible in this world. client: external client that injects the fault; if its fault turns
+        out to be impossible at its time, it has no effect and is logged; otherwise the run ends.
         """
         begin, end = self._actions(fault)
         uav = getattr(fault, "uav", None)
@@ -87,28 +86,29 @@ class FaultPlan:
             self._at(until_s, action, uav, f"fault over: {fault.kind}", client)
 
     def end(self, fault: Fault, *, client: str = "") -> None:
-        """End a fault that has begun, at the next tick; without such a fault nothing changes.
+        """Ends an active fault at the next tick; has no effect without such a fault.
 
-        Its times do not count. Raises `CommandError` as `add`, and for a gust or a displacement.
+        The fault's times are ignored. Raises `CommandError` as `add`, and for a gust or a
+        displacement.
         """
         _, end = self._actions(fault)
         if end is None:
-            raise CommandError(f"fault: a {fault.kind} cannot be ended: it passes by itself")
+            raise CommandError(f"fault: a {fault.kind} cannot be ended: it ends by itself")
         uav = getattr(fault, "uav", None)
         self._at(0.0, end, uav, f"fault over: {fault.kind}", client)
 
     def mend(self, uav: str) -> None:
-        """Forget what weakens the rotors of a UAV that begins anew, and what silences its radio."""
+        """Clears the rotor faults and radio faults of a UAV that restarts."""
         if self._radios is not None:
             self._radios.restore_all(uav)
         self._weak = {key: shares for key, shares in self._weak.items() if key[0] != uav}
 
     def get_state(self) -> dict[tuple[str, int], list[float]]:
-        """What a snapshot keeps beside what is planned and what fleet and sensors hold."""
+        """Returns the thrust factors, for a snapshot; engine, fleet and sensors save the rest."""
         return {key: list(shares) for key, shares in self._weak.items()}
 
     def set_state(self, state: dict[tuple[str, int], list[float]]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         self._weak = {key: list(shares) for key, shares in state.items()}
 
     @property
@@ -128,14 +128,14 @@ class FaultPlan:
                 if not client:
                     raise
                 told = f"{what} is not possible: {error}"
-                _log.warning("%s (asked for by %s)", told, client)
+                _log.warning("%s (requested by %s)", told, client)
             if uav is not None:
                 self._engine.note(self._row(uav), EventKind.FAULT, told)
 
         self._engine.at(ns_from_s(time_s), act)
 
     def _actions(self, fault: Fault) -> tuple[Callable[[], Any], Callable[[], Any] | None]:
-        """What begins a fault and what ends it; `CommandError` for one that cannot be."""
+        """Returns the actions that begin and end a fault; raises `CommandError` if impossible."""
         if isinstance(fault, GustFault):
             return self._gust(fault), None
         if isinstance(fault, DisplacementFault):
@@ -154,7 +154,7 @@ class FaultPlan:
         if fault.rotor >= rotors:
             raise CommandError(f"{fault.uav} has no rotor {fault.rotor}; 0 to {rotors - 1} exist")
         if not isinstance(self._fleet.plants[i], RigidBody):
-            raise CommandError(f"{fault.uav} has no motors to fail: its plant is no rigid body")
+            raise CommandError(f"{fault.uav} has no motors to fail: its plant is not a rigid body")
         key = fault.uav, fault.rotor
 
         def weaken() -> None:
@@ -169,7 +169,7 @@ class FaultPlan:
         return weaken, mend
 
     def _set_health(self, key: tuple[str, int]) -> None:
-        """The worst of the present faults decides."""
+        """Sets a rotor's health by the worst of its active faults."""
         (uav, rotor), share = key, min(self._weak.get(key, ()), default=1.0)
         sound = float(self._sound[uav][rotor])
         self._fleet.set_rotor_health(self._row(uav), rotor, share * sound)
@@ -178,7 +178,7 @@ class FaultPlan:
         bank, row = self._find(fault.uav, fault.sensor)
         before = bank.faults.get_state()
         try:
-            bank.faults.set(row, fault.effect, fault.bias)  # a bias that does not fit is told now
+            bank.faults.set(row, fault.effect, fault.bias)  # raises now for an invalid bias
         finally:
             bank.faults.set_state(before)
 
@@ -228,7 +228,7 @@ class FaultPlan:
             return Gust(fault.velocity_m_s, start_s, fault.rise_s, end_s)
 
         try:
-            gust_at(fault.at_s)  # one that cannot be is refused now
+            gust_at(fault.at_s)  # raises now for an impossible gust
         except CommandError as error:
             raise CommandError(f"fault: gust: velocity_m_s: {error}") from None
         return lambda: self._fleet.add_gust(gust_at(s_from_ns(self._engine.time_ns)))
@@ -247,17 +247,17 @@ class FaultPlan:
         return displace
 
     def _check_displaced(self, fault: DisplacementFault) -> None:
-        """`CommandError` where a UAV would be displaced out of the world, or into something."""
+        """Raises `CommandError` if a UAV would be displaced out of the world or into a solid."""
         engine = self._engine
         there = self._fleet.state.position_map[self._row(fault.uav)] + fault.offset_m
         at = f"fault: {fault.uav} would be displaced to ({there[0]:g}, {there[1]:g}, {there[2]:g})"
         x0, y0, x1, y1 = engine.ground.bounds
         if not (x0 <= there[0] <= x1 and y0 <= there[1] <= y1):
             reach = f"({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m"
-            raise CommandError(f"{at} m, beyond the terrain, which reaches from {reach}")
+            raise CommandError(f"{at} m, beyond the terrain, which extends from {reach}")
         ground_m = float(engine.ground.height(there[0], there[1]))
         if there[2] < ground_m:
-            raise CommandError(f"{at} m, under the ground, which lies at {ground_m:g} m there")
+            raise CommandError(f"{at} m, under the ground, whose height is {ground_m:g} m there")
         if there[2] > MAX_COORDINATE:
             raise CommandError(f"{at} m, higher than {MAX_COORDINATE:g} m")
         around = int(engine.scene.enclosing(there[None])[0])
@@ -265,7 +265,7 @@ class FaultPlan:
             raise CommandError(f"{at} m, inside {engine.scene.instance_name(around)}")
 
     def _longest_way_m(self) -> float:
-        """Longest displacement along an axis that can stay inside the world."""
+        """Returns the maximum displacement along an axis inside the world, m."""
         x0, y0, x1, y1 = self._engine.ground.bounds
         return float(max(x1 - x0, y1 - y0, MAX_COORDINATE))
 
@@ -289,4 +289,4 @@ class FaultPlan:
 
 
 def _nothing() -> None:
-    """A fault that ends by itself needs nothing to be done."""
+    """Does nothing, for a fault that ends by itself."""

@@ -1,4 +1,4 @@
-"""What goes on when a fleet is replaced by one with more UAVs, or fewer."""
+"""Transfers state to a fleet with more or fewer UAVs."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ import numpy as np
 from volery.sensors.bank import Bank
 
 Pairs = Sequence[tuple[int, int]]
-"""New row and old row of everything that goes on."""
+"""New row and old row of everything that continues."""
 
 
 def common_rows(names: Sequence[str], before: Sequence[str], going_on: Collection[str]) -> Pairs:
-    """Rows in `names`, and in `before`, of what is in both and goes on."""
+    """Returns the rows in `names` and `before` of all common names in `going_on`."""
     rows = {name: row for row, name in enumerate(before) if name in going_on}
     return [(row, rows[name]) for row, name in enumerate(names) if name in rows]
 
 
 def continue_bank(bank: Bank, others: Sequence[Bank], going_on: Collection[str]) -> None:
-    """Let sensors of `bank` go on that were in one of `others`, those of the UAVs `going_on`."""
+    """Copies the states of sensors in `others` that belong to the UAVs `going_on`."""
     paths = [sensor.path for sensor in bank.sensors]
     sensors = {sensor.path for sensor in bank.sensors if sensor.uav_name in going_on}
     for other in others:
@@ -31,7 +31,7 @@ def continue_bank(bank: Bank, others: Sequence[Bank], going_on: Collection[str])
 
 
 def _mixed(fresh: Any, past: Any, kept: Pairs, sizes: tuple[int, int]) -> Any:
-    """State `fresh` with the rows `kept` of every array as in `past`; rows are sensors."""
+    """Returns state `fresh` with the rows `kept` of every array from `past`; rows are sensors."""
     if isinstance(past, Mapping):
         fresh = fresh or {}
         return {key: _mixed(fresh.get(key), past[key], kept, sizes) for key in past}

@@ -1,10 +1,10 @@
-"""Lock-step partners: outside programs that the simulation waits for.
+"""Provides lock-step partners: external programs that the simulation waits for.
 
-A partner meets the engine at each instant of its period: the engine stands still until the partner
-has answered, and applies what it answered before the next physics step. So a run with partners is
-as reproducible as they are. Who lets the engine wait longer than the agreed time ends the run with
-an error, or, where that was agreed, is left behind. Nobody can take a partner back to an earlier
-state; one that begins anew by itself lets the simulation be reset.
+The engine stops at each instant of a partner's period (barrier) until the partner has replied, and
+applies the reply before the next physics step. So a run with partners is as reproducible as they
+are. A partner that exceeds its timeout ends the run with an error or, if so agreed, is dropped. A
+partner cannot be restored to an earlier state; a partner that restarts by itself allows the
+simulation to be reset.
 
     partner = simulation.add_partner("control_state", period_s=0.02, timeout_s=5.0)
 
@@ -27,13 +27,13 @@ from volery.core.errors import CommandError, PartnerError
 Action = Callable[[], Any]
 
 _LOOK_S = 0.1
-"""Wall time between two looks whether a partner is still there."""
+"""Wall time between two checks whether a partner is still connected."""
 _SPARE_S = 0.01
-"""Wall time for what clients want done between two looks whether a partner has answered."""
+"""Wall time for clients' commands between two checks whether a partner has replied."""
 
 
 class Partner:
-    """One partner; `wait`, `reply` and `leave` belong to its own thread."""
+    """One partner; `wait`, `reply` and `leave` are called in its own thread."""
 
     def __init__(
         self,
@@ -47,10 +47,10 @@ class Partner:
         meets_at_start: bool = False,
         period_s: float = 0.0,
     ) -> None:
-        """Take the terms of `add_partner`.
+        """Creates a partner with the terms of `add_partner`.
 
-        `on_meeting(time_ns)` tells the partner, in the engine's thread, that it is waited for;
-        `is_there()` whether it still can answer.
+        `on_meeting(time_ns)` notifies the partner of a barrier, in the engine's thread;
+        `is_there()` returns whether the partner can still reply.
         """
         self.name = name
         self.timeout_s = timeout_s
@@ -68,15 +68,15 @@ class Partner:
 
     @property
     def has_left(self) -> bool:
-        """Whether the engine waits for it no more."""
+        """Whether the engine no longer waits for the partner."""
         return self._left
 
     # ------------------------------------------------------------------------ the partner's thread
 
     def wait(self, timeout_s: float | None = None) -> int | None:
-        """Wait for the next meeting; its simulated time, or None when there will be none.
+        """Waits for the next barrier; returns its simulated time, ns, or None after the last one.
 
-        Raises `PartnerError` when the engine does not come within `timeout_s` of wall time.
+        Raises `PartnerError` if no barrier begins within `timeout_s` of wall time.
         """
         with self._changed:
             came = self._changed.wait_for(
@@ -84,22 +84,22 @@ class Partner:
                 timeout_s,
             )
             if not came:
-                raise PartnerError(f"{self.name}: no meeting within {timeout_s} s of wall time")
+                raise PartnerError(f"{self.name}: no barrier within {timeout_s} s of wall time")
             return None if self._left else self._meeting_ns
 
     def reply(self, *actions: Action) -> None:
-        """Let the engine go on, after it has called `actions` in its own thread, in order."""
+        """Ends the barrier, after the engine has called `actions` in its own thread, in order."""
         with self._changed:
             if self._left:
                 return
             if self._meeting_ns is None or self._actions is not None:
-                raise PartnerError(f"{self.name}: there is no meeting to reply to; wait() first")
+                raise PartnerError(f"{self.name}: no barrier to reply to; call wait() first")
             self._actions = actions
             self._changed.notify_all()
         self._wake()
 
     def leave(self) -> None:
-        """Be waited for no more."""
+        """Leaves: the engine no longer waits for the partner."""
         with self._changed:
             self._left = True
             self._changed.notify_all()
@@ -108,7 +108,7 @@ class Partner:
     # ------------------------------------------------------------------------- the engine's thread
 
     def call(self, time_ns: int, wake: Callable[[], None]) -> None:
-        """Begin the meeting at `time_ns`; `wake` is called when it is over."""
+        """Begins the barrier at `time_ns`; `wake` is called at its end."""
         with self._changed:
             self._wake = wake
             self._meeting_ns, self._actions = time_ns, None
@@ -118,15 +118,15 @@ class Partner:
 
     @property
     def answered(self) -> bool:
-        """Whether the meeting is over."""
+        """Whether the partner has replied or left."""
         if self._is_there is not None and not self._is_there():
             self._left = True
         return self._left or self._actions is not None
 
     def collect(self) -> tuple[Action, ...]:
-        """End the meeting: actions replied, none from a partner that has left.
+        """Ends the barrier; returns the reply's actions, none from a partner that has left.
 
-        Raises `PartnerError` if it has not answered, unless it agreed to be left behind.
+        Raises `PartnerError` if the partner has not replied, unless it agreed to be dropped.
         """
         with self._changed:
             came = self.answered
@@ -145,7 +145,7 @@ class Partner:
 
 
 def check_terms(period_s: float, timeout_s: float, on_timeout: str, dt_ns: int) -> None:
-    """`CommandError` for terms that no partner can be met on, with physics steps of `dt_ns`."""
+    """Raises `CommandError` for invalid terms, with physics steps of `dt_ns`."""
     for value, what in ((period_s, "period_s"), (timeout_s, "timeout_s")):
         if not (math.isfinite(value) and value > 0.0):
             raise CommandError(f"{what} must be finite and positive, not {value}")
@@ -156,25 +156,25 @@ def check_terms(period_s: float, timeout_s: float, on_timeout: str, dt_ns: int) 
 
 
 class PartnerBarrier(Protocol):
-    """How the engine waits: it does meanwhile what others post, the partners' own messages too."""
+    """The engine during a barrier: executes posted commands, including the partners' own."""
 
     def process_commands(self, idle_s: float) -> None:
-        """Do what was posted; `idle_s` of wall time are to spare for it."""
+        """Executes posted commands; `idle_s` of wall time are to spare for them."""
 
     def wait(self, timeout_s: float) -> None:
-        """Wait for a post or a wake."""
+        """Waits for a command or a wake."""
 
     def goes_on(self) -> bool:
-        """Whether the run goes on; asked now and then while a partner is waited for."""
+        """Returns whether the run continues; called repeatedly during the barrier."""
 
     def wake(self) -> None:
-        """End the wait; from any thread."""
+        """Ends the wait; callable from any thread."""
 
 
 def meet(partners: Sequence[Partner], time_ns: int, engine: PartnerBarrier) -> bool:
-    """Meet all `partners` at once; apply their replies in the order given.
+    """Waits for all `partners`; applies their replies in the given order.
 
-    Returns whether it came about: a run that is to end waits for no partner.
+    Returns False if the run ends before all have replied.
     """
     start = time.monotonic()
     waited_for = [partner for partner in partners if not partner.has_left]
@@ -196,4 +196,4 @@ def meet(partners: Sequence[Partner], time_ns: int, engine: PartnerBarrier) -> b
 
 
 def _nothing() -> None:
-    """Do nothing."""
+    """Does nothing."""

@@ -1,8 +1,8 @@
-"""Simulated time against wall time: paused, single steps, real time, any factor, or at full speed.
+"""Controls simulated time relative to wall time: pause, single steps, real-time factor.
 
-The thread that runs a simulation asks its `Pacer` how many steps to make and lets itself be held
-back by it; any thread may pause it, let it go on or change its speed meanwhile. What a run computes
-depends on none of that.
+The thread that runs a simulation gets the number of steps from its `Pacer` and waits in it; any
+thread may pause, resume or change the real-time factor meanwhile. The results of a run do not
+depend on the pacing.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from volery.engine.single_steps import OnSteps, StepQueue, StepRequest
 _SLICE_S = 0.005
 _PROMPT_SLICE_S = 0.001
 _FULL_SPEED_SLICE = 100
-"""Steps between two looks at what other threads want, at full speed or one step after another."""
+"""Steps between two checks for other threads' commands, at full speed or in single steps."""
 _LONGEST_WAIT_S = 0.05
 _LATE_S = 0.05
 _SLACK_S = 0.25
-"""A run that falls behind by more does not rush afterwards to catch up."""
+"""A run that is late by more does not catch up afterwards."""
 
 
 class Pacer:
-    """How fast a simulation runs. What is not for "the thread that runs" may be called anywhere.
+    """Pace of a simulation. Methods not under "the thread that runs" are thread-safe.
 
     Starts unpaused and at full speed.
     """
@@ -35,8 +35,8 @@ class Pacer:
         self._woken = False
         self._paused = False
         self._speed: float | None = None
-        self._steps = StepQueue()  # single ones asked for and not made yet
-        self._in_hand: StepRequest | None = None  # the one whose steps are being made
+        self._steps = StepQueue()  # requested single steps that are pending
+        self._in_hand: StepRequest | None = None  # the request whose steps are being run
         self._reached_ns = 0
         self._wall_start = 0.0  # `_sim_start_ns` was, or is, due at this wall time
         self._sim_start_ns = 0
@@ -47,69 +47,69 @@ class Pacer:
 
     @property
     def paused(self) -> bool:
-        """Whether the run is held where it is."""
+        """Whether the run is paused."""
         return self._paused
 
     @property
     def speed(self) -> float | None:
-        """Factor of real time, None for as fast as possible."""
+        """Real-time factor, None for as fast as possible."""
         return self._speed
 
     @property
     def paused_s(self) -> float:
-        """Wall seconds that runs have been paused in all."""
+        """Total wall time of all pauses, s."""
         return self._paused_s
 
     def pause(self) -> None:
-        """Hold the run after the slice in progress; nothing where it is paused already."""
+        """Pauses the run after the current slice; has no effect when paused."""
         with self._changed:
             self._paused = True
             self._changed.notify()
 
     def resume(self) -> None:
-        """Go on at the speed from before the pause; what was missed is not caught up."""
+        """Resumes at the previous real-time factor; the missed time is not caught up."""
         with self._changed:
             self._paused = False
             self._restart()
-        self.drop_steps("the simulation goes on")
+        self.drop_steps("the simulation continues")
 
     def set_speed(self, speed: float | None) -> None:
-        """Run at `speed` times real time from here on, None for as fast as possible."""
+        """Sets the real-time factor from now on, None for as fast as possible."""
         if speed is not None and not 0.0 < speed < 1e6:
-            raise CommandError(f"speed must be a positive factor of real time, not {speed}")
+            raise CommandError(f"speed must be a positive real-time factor, not {speed}")
         with self._changed:
             if speed != self._speed:
                 self._speed = speed
                 self._restart()
 
     def single_steps(self, steps: int, on_steps: OnSteps | None = None) -> StepRequest:
-        """Let a paused run make that many physics steps more and wait again.
+        """Runs that many physics steps of a paused run, then waits again.
 
-        on_steps: told of each piece that is made and of the end, which may come early.
+        on_steps: called after each part of the steps and at the end, which may come early.
         """
         if steps < 1:
-            raise CommandError(f"a single step is at least 1 step, not {steps}")
+            raise CommandError(f"steps must be at least 1, not {steps}")
         request = StepRequest(steps, on_steps)
         with self._changed:
             if not self._paused:
-                raise CommandError("single steps are made while paused; call pause() first")
+                raise CommandError("single steps need a paused run; call pause() first")
             self._steps.add(request)
             self._changed.notify()
         return request
 
     def drop_steps(self, reason: str, only: StepRequest | None = None) -> None:
-        """Make no more of the single steps asked for, or of `only` one request."""
+        """Drops all pending single steps, or those of `only` one request."""
         with self._changed:
             dropped = self._steps.drop(reason, only)
         for request in dropped:
             request.tell()
 
     def use_low_latency(self) -> None:
-        """Make slices of `_PROMPT_SLICE_S`: what is commanded acts that soon in wall time."""
+        """Reduces slices to `_PROMPT_SLICE_S`, which limits the wall time until commands act."""
         self._slice_s = _PROMPT_SLICE_S
 
     def wake(self) -> None:
-        """End the present `wait`: there is something to do for the thread that runs."""
+        """Ends the current `wait`, because the running thread has work to do."""
         with self._changed:
             self._woken = True
             self._changed.notify()
@@ -117,20 +117,20 @@ class Pacer:
     # ------------------------------------------------------------------- the thread that runs
 
     def begin(self, speed: float | None, time_ns: int) -> None:
-        """Start a run at simulated `time_ns`; a pause stays one."""
+        """Starts a run at simulated `time_ns`; a paused run stays paused."""
         self.set_speed(speed)
         with self._changed:
             self._reached_ns = time_ns
             self._restart()
 
     def jumped(self, time_ns: int) -> None:
-        """Go on from simulated `time_ns`, where another state was restored, at the same speed."""
+        """Continues from simulated `time_ns` of a restored state, at the same real-time factor."""
         with self._changed:
             self._reached_ns = time_ns
             self._restart()
 
     def next_steps(self, dt_ns: int) -> int:
-        """Physics steps of `dt_ns` to make before the next `wait`; 0 while paused."""
+        """Returns the physics steps of `dt_ns` to run before the next `wait`; 0 while paused."""
         with self._changed:
             if self._paused:
                 self._in_hand = self._steps.first
@@ -140,7 +140,7 @@ class Pacer:
             return max(1, round(self._slice_s * self._speed * NS_PER_S) // dt_ns)
 
     def made(self, steps: int) -> None:
-        """Note that the steps of `next_steps` were made, or some of them."""
+        """Records that all or some steps of `next_steps` were run."""
         with self._changed:
             request, self._in_hand = self._in_hand, None
             told = request is not None and self._steps.count(request, steps)
@@ -148,9 +148,9 @@ class Pacer:
             request.tell()
 
     def wait(self, time_ns: int) -> bool:
-        """Hold the run at simulated `time_ns`, at most a moment; whether it must be held further.
+        """Waits at simulated `time_ns`, at most a moment; returns whether to wait further.
 
-        The moments let the caller tell its progress, do what was posted, and a user stop.
+        In between, the caller reports progress, executes commands, and lets a user stop.
         """
         with self._changed:
             self._reached_ns = time_ns
@@ -160,7 +160,7 @@ class Pacer:
             return self._must_wait()
 
     def idle_s(self) -> float:
-        """Wall seconds to spare before the run must go on, at most a moment."""
+        """Returns the wall time to spare before the run must continue, s, at most a moment."""
         with self._changed:
             if self._paused:
                 return 0.0 if self._steps else _LONGEST_WAIT_S
@@ -170,7 +170,7 @@ class Pacer:
 
     @property
     def is_behind(self) -> bool:
-        """Whether the run has no time to spare: it is late, or runs as fast as it can."""
+        """Whether the run has no time to spare: late, or as fast as possible."""
         with self._changed:
             if self._paused:
                 return False
@@ -195,12 +195,12 @@ class Pacer:
                 self._wall_start -= ahead + _SLACK_S
 
     def _ahead_s(self, speed: float) -> float:
-        """Wall seconds until the simulated time that has been reached is due."""
+        """Returns the wall time until the simulated time reached so far is due, s."""
         due = self._wall_start + (self._reached_ns - self._sim_start_ns) / NS_PER_S / speed
         return due - time.perf_counter()
 
     def _restart(self) -> None:
-        """Count due times from here and now."""
+        """Computes due times from the current instant on."""
         self._wall_start = time.perf_counter()
         self._sim_start_ns = self._reached_ns
         self._changed.notify()

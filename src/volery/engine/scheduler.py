@@ -1,4 +1,4 @@
-"""What is due when: sensors and timers on one integer clock."""
+"""Schedules sensors and timers on one integer clock."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class _Entry(Generic[What]):
 
 @dataclass(frozen=True)
 class DueTask(Generic[What]):
-    """A firing: the k-th of its schedule, nominally at `instant_ns`."""
+    """The k-th firing of a schedule, nominally at `instant_ns`."""
 
     what: What
     k: int
@@ -52,10 +52,10 @@ class Scheduler(Generic[What]):
         after_step: int = -1,
         wanted: Callable[[], bool] | None = None,
     ) -> None:
-        """Fire `what` by `schedule`, `lag_ns` late (a sweep must end before it is known).
+        """Schedules `what`, with `lag_ns` of delay (a sweep must end before its result exists).
 
-        Firings at or before `after_step` are skipped, and so are those at which `wanted()` is
-        false: for them no tick needs to end.
+        Skips firings at or before `after_step`, and those while `wanted()` is false, for which no
+        tick ends.
         """
         first = _first_near(schedule, after_step * self._dt_ns - lag_ns)
         entry = _Entry(0, self._added, first, schedule, lag_ns, what, wanted)
@@ -67,19 +67,19 @@ class Scheduler(Generic[What]):
         heapq.heappush(self._heap, entry)
 
     def remove(self, what: What) -> None:
-        """Fire `what` no more, also after the return to a kept state."""
+        """Removes `what`; restoring an earlier state does not add it again."""
         self._heap = [entry for entry in self._heap if entry.what != what]
         heapq.heapify(self._heap)
 
     def next_step(self) -> int | None:
-        """Step of the next firing, None when the agenda is empty."""
+        """Returns the step of the next firing, None without one."""
         if self._heap and ((first := self._heap[0]).wanted is None or first.wanted()):
             return first.due_step
         steps = (e.due_step for e in self._heap if e.wanted is None or e.wanted())
         return min(steps, default=None)
 
     def pop_due(self, step: int) -> list[DueTask[What]]:
-        """All firings due at or before `step`, in order; their next ones are entered."""
+        """Returns all firings due at or before `step`, in order, and schedules the next ones."""
         due = []
         while self._heap and self._heap[0].due_step <= step:
             entry = self._heap[0]
@@ -91,9 +91,9 @@ class Scheduler(Generic[What]):
         return due
 
     def next_after(self, what: What, step: int) -> tuple[int, bool]:
-        """Number of the next firing of `what`, or of its last one where that was at `step`.
+        """Returns the number of the next firing of `what`, or of its last firing if at `step`.
 
-        The second value tells which: whether it has fired at `step`.
+        The second value is whether `what` has fired at `step`.
         """
         entry = next(entry for entry in self._heap if entry.what is what)
         if entry.k and self._step_at(entry, entry.k - 1) == step:
@@ -101,11 +101,11 @@ class Scheduler(Generic[What]):
         return entry.k, False
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         return {"added": self._added, "k": {entry.order: entry.k for entry in self._heap}}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state; what was added since then is dropped."""
+        """Restores a saved state; entries added since then are dropped."""
         counts: dict[int, int] = state["k"]
         self._added = state["added"]
         self._heap = [entry for entry in self._heap if entry.order in counts]
@@ -122,5 +122,5 @@ class Scheduler(Generic[What]):
 
 
 def _first_near(schedule: Schedule, time_ns: int) -> int:
-    """Number of a firing shortly before `time_ns`, 0 where there is none."""
+    """Returns the number of a firing shortly before `time_ns`, or 0."""
     return max(0, (time_ns - schedule.phase_ns) // schedule.period_ns - 2)

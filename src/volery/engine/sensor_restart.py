@@ -1,4 +1,4 @@
-"""Starting the sensors of some UAVs anew while those of the others go on."""
+"""Restarts the sensors of some UAVs while those of the others continue."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ Keys = Mapping[tuple[int, str], np.uint64]
 def restart_sensors(
     agenda: Scheduler[Any], banks: Sequence[Bank], fleet: Fleet, uavs: NDArray[np.int64], keys: Keys
 ) -> list[tuple[Samples, NDArray[np.int64]]]:
-    """Put the sensors of `uavs` back to their start, after the UAVs themselves.
+    """Restarts the sensors of `uavs`, after the UAVs themselves.
 
-    A sensor that measures right now measures the start, as a fresh one does; returned are those
-    samples and which of their rows are new.
+    A sensor that measures at this instant measures the start state, like a new sensor; returns
+    those samples and the new rows in each.
     """
     chosen = set(uavs.tolist())
     fresh = []
@@ -45,7 +45,7 @@ def restart_sensors(
 
 
 def _with_rows(before: Any, after: Any, rows: NDArray[np.int64], count: int) -> Any:
-    """State `before` with `rows`, of `count`, of every array as in `after`."""
+    """Returns state `before` with `rows`, of `count`, of every array from `after`."""
     if isinstance(after, Mapping):
         return {key: _with_rows(before.get(key), after[key], rows, count) for key in after}
     if before is None or not isinstance(after, np.ndarray) or after.shape[:1] != (count,):

@@ -1,61 +1,61 @@
-"""Single steps that somebody asked a paused run for, and how far they have come."""
+"""Manages the requested single steps of a paused run."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 OnSteps = Callable[["StepRequest"], None]
-"""Called after each piece of a request and at its end, in the thread that made or ended it."""
+"""Called after each piece of a request and at its end, in the thread that ran or ended it."""
 
 
 class StepRequest:
-    """`steps` physics steps to be made while paused; read it, but leave the changing to `Pacer`."""
+    """Request of `steps` physics steps while paused; only `Pacer` modifies it."""
 
     def __init__(self, steps: int, on_steps: OnSteps | None = None) -> None:
         self.steps = steps
         self.made = 0
-        """Steps that have been made."""
+        """Number of steps that have been run."""
         self.reason = ""
-        """Why no more will be made although some are left; empty where nothing is wrong."""
+        """Reason why the request ended early; empty otherwise."""
         self._on_steps = on_steps
 
     @property
     def left(self) -> int:
-        """Steps that are still to be made, or were when the request ended early."""
+        """Number of steps that are left, or were at an early end."""
         return self.steps - self.made
 
     @property
     def over(self) -> bool:
-        """Whether nothing more will happen to it."""
+        """Whether the request has ended."""
         return self.left == 0 or bool(self.reason)
 
     def tell(self) -> None:
-        """Tell whoever asked; called without locks held."""
+        """Calls the request's callback; called without locks held."""
         if self._on_steps is not None:
             self._on_steps(self)
 
 
 class StepQueue:
-    """Requests in the order of arrival. Not locked: its owner does that."""
+    """Requests in order of arrival. Not thread-safe: the owner locks."""
 
     def __init__(self) -> None:
         self._waiting: list[StepRequest] = []
 
     def __bool__(self) -> bool:
-        """Whether steps are to be made."""
+        """Returns whether steps are pending."""
         return bool(self._waiting)
 
     def add(self, request: StepRequest) -> None:
-        """Let a request wait for its turn."""
+        """Adds a request."""
         self._waiting.append(request)
 
     @property
     def first(self) -> StepRequest | None:
-        """The request whose turn it is."""
+        """The first request; None without one."""
         return self._waiting[0] if self._waiting else None
 
     def count(self, request: StepRequest, steps: int) -> bool:
-        """Note that `steps` were made for a request; false where it has ended meanwhile."""
+        """Counts `steps` of a request as run; returns False if the request has ended."""
         if request not in self._waiting or steps <= 0:
             return False
         request.made += min(steps, request.left)
@@ -64,7 +64,7 @@ class StepQueue:
         return True
 
     def drop(self, reason: str, only: StepRequest | None = None) -> list[StepRequest]:
-        """End all requests, or `only` that one, early; returns those that must be told."""
+        """Ends all requests, or `only` one, early; returns those whose callbacks are due."""
         dropped = [request for request in self._waiting if only is None or request is only]
         self._waiting = [request for request in self._waiting if request not in dropped]
         for request in dropped:

@@ -1,7 +1,7 @@
-"""The step, as a tuple of stages in the order in which they run.
+"""Defines the step as a tuple of stages in their order.
 
-A tick is the longest piece of time in which nothing is due: `advance_vehicles` fuses its physics
-steps into one compiled call. Where a run is cut into ticks does not change its result.
+A tick is the longest time span in which nothing is due: `advance_vehicles` fuses its physics steps
+into one compiled call. The division of a run into ticks does not change its result.
 """
 
 from __future__ import annotations
@@ -20,23 +20,23 @@ Stage: TypeAlias = "Callable[[Engine, Tick], None]"
 
 @dataclass
 class Tick:
-    """What the stages of one tick share."""
+    """Data shared by the stages of one tick."""
 
     last_step: int
-    """Step at which the run ends; the tick ends earlier where something is due."""
+    """Step at which the run ends; the tick ends earlier if something is due."""
 
 
 def take_commands(engine: Engine, _tick: Tick) -> None:
-    """Do what other threads have posted since the last tick, in the order of arrival.
+    """Executes the commands of other threads since the last tick, in order of arrival.
 
-    Nothing is half done here, so that an action may take the simulation back to an earlier state.
-    What was published is handed out, so that it acts on the physics steps of this very tick.
+    The state is consistent here, so an action may restore an earlier state. Publications are
+    delivered at once, so that they affect the physics steps of this tick.
     """
     engine.process_commands()
 
 
 def advance_vehicles(engine: Engine, tick: Tick) -> None:
-    """Control and dynamics, fused, up to the horizon, an event or a UAV that must look around."""
+    """Runs control and dynamics, fused, until the horizon, an event or a distance query."""
     first = engine.fleet.step
     steps = engine.horizon(tick.last_step) - first
     if steps > 0:
@@ -47,12 +47,12 @@ def advance_vehicles(engine: Engine, tick: Tick) -> None:
 
 
 def resolve_contacts(engine: Engine, _tick: Tick) -> None:
-    """Touches of trees, solids and other UAVs; fresh distances for those that need them."""
+    """Resolves contacts with trees, solids and other UAVs; refills distance budgets."""
     engine.collisions.resolve(engine.time_ns)
 
 
 def sample_sensors(engine: Engine, _tick: Tick) -> None:
-    """All sensors that are due, as batches."""
+    """Samples all sensors that are due, in batches."""
     for due in engine.sensor_agenda.pop_due(engine.fleet.step):
         time_ns = due.instant_ns if due.what.lag_ns else engine.time_ns
         samples = due.what.sample(due.k, time_ns, engine.fleet)
@@ -62,7 +62,7 @@ def sample_sensors(engine: Engine, _tick: Tick) -> None:
 
 
 def raise_events(engine: Engine, _tick: Tick) -> None:
-    """Landings, impacts and mode changes that the compiled steps noted, then all new events."""
+    """Passes the events noted by the compiled steps, and all new ones, to the sink."""
     events = engine.collect_events()
     if events:
         engine.state_check.look()
@@ -71,7 +71,7 @@ def raise_events(engine: Engine, _tick: Tick) -> None:
 
 
 def publish(engine: Engine, _tick: Tick) -> None:
-    """Hand out what was measured, then let due timers speak; nodes answer with commands."""
+    """Delivers the samples' messages, then calls due timers; nodes respond with commands."""
     engine.sink.deliver()
     while (action := engine.deadlines.pop_due(engine.fleet.step)) is not None:
         action()
@@ -79,11 +79,11 @@ def publish(engine: Engine, _tick: Tick) -> None:
     for due in engine.timer_agenda.pop_due(engine.fleet.step):
         due.what()
         engine.sink.deliver()
-    raise_events(engine, _tick)  # what was noted since: faults
+    raise_events(engine, _tick)  # events since then: faults
 
 
 def meet_partners(engine: Engine, _tick: Tick) -> None:
-    """Wait for the lock-step partners whose instant has come, and do what they ask."""
+    """Waits for the lock-step partners that are due, and applies their replies."""
     due = engine.partner_agenda.pop_due(engine.fleet.step)
     if due:
         engine.turn += 1

@@ -1,9 +1,9 @@
 """Ends a run whose state is not physical: not finite, too fast, too far away.
 
-What is computed after that means nothing, and NaN breaks what reads it. The look is cheap: every
-20 ms of simulated time one product of numbers over the newest row of the pose history, which NaN,
-infinity and far places make large; the whole state once a second, where the product is large, and
-before anything that happened is told.
+Results after that have no meaning, and NaN breaks their readers. The check is cheap: every 20 ms of
+simulated time one dot product over the newest row of the pose history, which NaN, infinity and far
+positions make large; the whole state once a second, when the product is large, and before events
+are published.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from volery.control.stability import terms_of
 from volery.core.errors import DivergenceError
 
 MAX_SPEED_M_S = 1e4
-"""Above it, whatever moves so is no UAV."""
+"""Maximum speed of any UAV."""
 _MAX_RATE_RAD_S = 1e5
 _GLANCE_S, _LOOK_S = 0.02, 1.0
 _LARGE = MAX_COORDINATE**2
 _NOTABLE = 0.1
-"""Share of the motion from which a term is named as the likely cause."""
+"""Fraction of the motion from which a term is named as the likely cause."""
 
 
 class StateCheck:
-    """Looks at the state of `fleet` as it advances."""
+    """Checks the state of `fleet` as it advances."""
 
     def __init__(self, fleet: Fleet) -> None:
         self._fleet = fleet
@@ -39,19 +39,19 @@ class StateCheck:
         self._glanced = self._looked = fleet.step
 
     def advanced(self) -> None:
-        """Look, if it is time to; `DivergenceError` for a state that is not physical."""
+        """Checks the state if due; raises `DivergenceError` if it is not physical."""
         if not 0 <= self._fleet.step - self._glanced < self._period:
             self.glance()
 
     def glance(self) -> None:
-        """Look at the positions now, and at everything where they are large or it is time to."""
+        """Checks the positions now, and the whole state if they are large or the check is due."""
         self._glanced = step = self._fleet.step
         row = self._rows[step % len(self._rows)]
         if not row.dot(row) < _LARGE or not 0 <= step - self._looked < self._long:
             self.look()
 
     def look(self) -> None:
-        """Look at the whole state now; `DivergenceError` names UAV, time and likely cause."""
+        """Checks the whole state now; raises `DivergenceError` with UAV, time and likely cause."""
         fleet = self._fleet
         self._looked = fleet.step
         state = fleet.state
@@ -71,8 +71,8 @@ class StateCheck:
         position = state.position_map[row]
         if np.isfinite(position).all() and math.isfinite(speed):
             what = (
-                f"it is at ({', '.join(f'{x:.3g}' for x in position)}) m, moves at {speed:.3g} "
-                f"m/s and turns at {np.linalg.norm(state.omega_body[row]):.3g} rad/s"
+                f"position ({', '.join(f'{x:.3g}' for x in position)}) m, speed {speed:.3g} m/s, "
+                f"angular rate {np.linalg.norm(state.omega_body[row]):.3g} rad/s"
             )
         else:
             what = "its position or velocity is not finite"
@@ -82,7 +82,7 @@ class StateCheck:
         )
 
     def _cause(self, row: int) -> str:
-        """The largest term of the motion at the fastest that the UAV moved of late, in words."""
+        """Describes the largest term of the motion at the UAV's recent maximum speed."""
         fleet = self._fleet
         dt = fleet.dt_ns * 1e-9
         speed = max(self._fastest(row), fleet.airframes[row].limits.speed_m_s)
@@ -95,12 +95,12 @@ class StateCheck:
                 "stable"
             )
         return (
-            "no term of its model is too stiff for the physics step; look at what commands it, at "
-            "its faults, wind and data files"
+            "no term of its model is too stiff for the physics step; check its commands, faults, "
+            "wind and data files"
         )
 
     def _fastest(self, row: int) -> float:
-        """Largest possible speed between two rows of the pose history, m/s."""
+        """Returns the maximum plausible speed between two rows of the pose history, m/s."""
         history, step = self._fleet.history.position, self._fleet.step
         newest = step % len(history)
         path = np.roll(history[:, row], -newest - 1, axis=0)
@@ -111,5 +111,5 @@ class StateCheck:
 
 
 def _within(values: NDArray[np.float64], limit: float) -> NDArray[np.bool_]:
-    """Rows all of whose numbers lie within +-limit; NaN lies nowhere."""
+    """Returns the rows whose numbers are all within +-limit; NaN never is."""
     return np.asarray((np.abs(values) <= limit).all(axis=1))

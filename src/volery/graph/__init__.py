@@ -1,1 +1,1 @@
-"""The ROS graph inside the simulation: messages, topics, services, nodes, transforms."""
+"""Provides the ROS graph of the simulation: messages, topics, services, nodes, transforms."""

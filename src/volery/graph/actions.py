@@ -1,6 +1,6 @@
-"""Actions: goals that take their time, tell how far they are, and may be cancelled.
+"""Provides actions: long-running goals with feedback, which clients may cancel.
 
-Whoever fulfils goals offers an action; bridges that have actions send goals for their clients:
+An action server offers an action; bridges that support actions send goals for their clients:
 
     actions.offer("/simulate_steps", "simulation_interfaces/action/SimulateSteps", take_goal)
     ...
@@ -24,7 +24,7 @@ from volery.graph.messages import message_type
 
 
 class GoalStatus(IntEnum):
-    """How a goal stands, numbered as in `action_msgs/msg/GoalStatus`."""
+    """Status of a goal, numbered as in `action_msgs/msg/GoalStatus`."""
 
     ACCEPTED = 1
     SUCCEEDED = 4
@@ -37,7 +37,7 @@ OnResult = Callable[[GoalStatus, Any], None]
 
 
 class Goal:
-    """One goal on its way; ends once, with a result."""
+    """One active goal; ends once, with a result."""
 
     def __init__(self, request: Any, on_feedback: OnFeedback, on_result: OnResult) -> None:
         self.request = request
@@ -48,33 +48,33 @@ class Goal:
         self._on_cancel: Callable[[], None] | None = None
         self._lock = threading.Lock()
 
-    # ------------------------------------------------------------------- whoever fulfils it
+    # ------------------------------------------------------------------------ action server
 
     def feedback(self, message: Any) -> None:
-        """Tell how far it is, with a `_Feedback` message; nothing after its end."""
+        """Sends a `_Feedback` message; has no effect after the goal's end."""
         if self.status is GoalStatus.ACCEPTED:
             self._on_feedback(message)
 
     def succeed(self, result: Any) -> None:
-        """End it well, with a `_Result` message."""
+        """Ends the goal as succeeded, with a `_Result` message."""
         self._end(GoalStatus.SUCCEEDED, result)
 
     def abort(self, result: Any) -> None:
-        """End it because it cannot be reached."""
+        """Ends the goal as aborted, with a `_Result` message."""
         self._end(GoalStatus.ABORTED, result)
 
     def canceled(self, result: Any) -> None:
-        """End it because that was asked for."""
+        """Ends the goal as cancelled by its client, with a `_Result` message."""
         self._end(GoalStatus.CANCELED, result)
 
     def when_cancelled(self, callback: Callable[[], None]) -> None:
-        """Have `callback` called when somebody wants it cancelled."""
+        """Sets the callback for a request to cancel the goal."""
         self._on_cancel = callback
 
-    # ------------------------------------------------------------------------- whoever sent it
+    # -------------------------------------------------------------------------- action client
 
     def cancel(self) -> bool:
-        """Ask for its end; whether that is possible at all. The result comes as any other."""
+        """Requests cancellation; returns whether that is possible. The result comes later."""
         if self.status is not GoalStatus.ACCEPTED or self._on_cancel is None:
             return False
         self._on_cancel()
@@ -90,23 +90,23 @@ class Goal:
 
 @dataclass(frozen=True)
 class ActionOffer:
-    """An action on offer: `take(goal)` begins with a goal and lets it end later."""
+    """An action server: `take(goal)` starts a goal, and ends it at once or later."""
 
     name: str
     action_type: str
-    """Such as `simulation_interfaces/action/SimulateSteps`."""
+    """Name of the type, such as `simulation_interfaces/action/SimulateSteps`."""
     take: Callable[[Goal], None]
 
 
 class Actions:
-    """All actions of one graph."""
+    """Holds all actions of one graph."""
 
     def __init__(self) -> None:
         self._offers: dict[str, ActionOffer] = {}
         self._lock = threading.Lock()
 
     def offer(self, name: str, action_type: str, take: Callable[[Goal], None]) -> ActionOffer:
-        """Offer an action. `GraphError` for an unknown type or a name that is taken."""
+        """Creates an action server. Raises `GraphError` for an unknown type or a name in use."""
         try:
             message_type(f"{action_type}_Goal")
         except KeyError:
@@ -114,32 +114,33 @@ class Actions:
         offer = ActionOffer(name, action_type, take)
         with self._lock:
             if name in self._offers:
-                raise GraphError(f"action '{name}' is offered already")
+                raise GraphError(f"action '{name}' already has a server")
             self._offers[name] = offer
         return offer
 
     def withdraw(self, name: str) -> None:
-        """Offer an action no more; goals on their way go on."""
+        """Removes an action server; active goals continue."""
         with self._lock:
             self._offers.pop(name, None)
 
     def types(self) -> dict[str, str]:
-        """Names of the actions and their types."""
+        """Returns the names of all actions and their types."""
         with self._lock:
             return {name: offer.action_type for name, offer in sorted(self._offers.items())}
 
     def send(self, name: str, request: Any, on_feedback: OnFeedback, on_result: OnResult) -> Goal:
-        """Send a goal, a `_Goal` message. `GraphError` where nobody offers the action.
+        """Sends a goal, a `_Goal` message.
 
-        on_feedback: gets `_Feedback` messages. on_result: gets the status and a `_Result` message.
+        on_feedback: receives `_Feedback` messages. on_result: receives the status and a `_Result`
+        message. Raises `GraphError` if the action has no server or the message another type.
         """
         with self._lock:
             offer = self._offers.get(name)
         if offer is None:
-            raise GraphError(f"nobody offers action '{name}'")
+            raise GraphError(f"action '{name}' has no server")
         wanted = f"{offer.action_type}_Goal"
         if getattr(request, "__msgtype__", None) != wanted:
-            raise GraphError(f"action '{name}' takes {wanted}")
+            raise GraphError(f"action '{name}' requires a message of type {wanted}")
         goal = Goal(request, on_feedback, on_result)
         offer.take(goal)
         return goal

@@ -1,9 +1,9 @@
-"""What a bridge is, and how a package declares one under a name.
+"""Defines bridges, and how a package registers one under a name.
 
     KIND = BridgeKind(port=9100, make=_make)
 
     def _make(address: Address, options: BridgeOptions) -> Bridge:
-        from my_package.server import MyServer      # late: the name alone loads nothing
+        from my_package.server import MyServer      # late: registration imports nothing
 
         return MyServer(*address, allow_remote=options.allow_remote)
 
@@ -31,17 +31,17 @@ class Bridge(Protocol):
 
     @property
     def name(self) -> str:
-        """Names the bridge and its address for people: `ROS-TCP 127.0.0.1:10000`."""
+        """Name and address of the bridge for users: `ROS-TCP 127.0.0.1:10000`."""
 
     async def start(self, gateway: Gateway) -> None:
-        """Starts to serve, or to connect. `BridgeError` where that is not possible."""
+        """Starts to serve, or to connect. Raises `BridgeError` if that is not possible."""
 
     async def stop(self) -> None:
         """Disconnects all clients and frees everything; also after a start that failed."""
 
 
 class Address(NamedTuple):
-    """Where a bridge listens or connects to; of a serial line: its path and its baud rate."""
+    """Address to listen on or to connect to; for a serial line: its path and baud rate."""
 
     host: str
     port: int
@@ -49,18 +49,18 @@ class Address(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class BridgeOptions:
-    """Options of a run's bridges; each bridge reads those that concern it."""
+    """Options of a run's bridges; each bridge uses its own."""
 
     allow_remote: bool = False
     """Whether bridges may listen beyond loopback."""
     token: str | None = None
-    """Clients show it, where the protocol can carry it."""
+    """Token that clients must send, if the protocol supports one."""
     report: Callable[[str], None] | None = None
-    """Receives lines for people, from any thread: connections begin or end. None: logged."""
+    """Receives lines for users, from any thread: connections begin or end. None: logged."""
     domain_id: int | None = None
     """ROS 2 domain; None: that of ROS_DOMAIN_ID."""
     interfaces: tuple[str, ...] = ()
-    """Network interfaces for ROS 2 over DDS; none: this machine alone."""
+    """Network interfaces for ROS 2 over DDS; empty: this machine only."""
     mavlink_key: Path | None = None
     """File with the text that signs MAVLink; None: frames are not signed."""
     autopilot_timeout_s: float = 10.0
@@ -72,10 +72,10 @@ class BridgeOptions:
 
 
 class BridgeKind(NamedTuple):
-    """A bridge that can be made by name.
+    """A kind of bridge, created by name.
 
-    port: used where the user gives none; of a serial line: the baud rate. make: makes the bridge,
-    and imports only then what it needs. is_serial: its address is PATH[:BAUD], not [HOST:]PORT.
+    port: default port; for a serial line: default baud rate. make: creates the bridge, and imports
+    its dependencies only then. is_serial: the address is PATH[:BAUD], not [HOST:]PORT.
     """
 
     port: int

@@ -1,7 +1,8 @@
-"""Commands of clients as messages: `volery_interfaces/msg/CommandRecord`.
+"""Encodes client commands as messages: `volery_interfaces/msg/CommandRecord`.
 
-A record holds its content twice: shortened JSON for people, and CDR, from which it can be repeated
-to the bit. A large published message is not written twice: its record says that it follows.
+A record holds its content twice: as shortened JSON for readers, and as CDR, from which the command
+can be replayed exactly. A large published message is not written twice: its record says that it
+follows.
 """
 
 from __future__ import annotations
@@ -24,34 +25,34 @@ TOPIC = "/volery/log"
 TYPE = "volery_interfaces/msg/CommandRecord"
 
 _INLINE_BYTES = 4096
-"""A published message that holds more in arrays and texts follows its record (modelling choice)."""
+"""A message with more bytes in arrays and texts follows its record (modelling choice)."""
 _ITEMS_SHOWN = 16
 _CHARACTERS_SHOWN = 400
 _MOST_CHARACTERS = 8000
-"""Of the JSON text."""
+"""Limit of the JSON text."""
 
 _PARTS = {
     "call": "_Request",
     "answer": "_Response",
     "goal": "_Goal",
 }
-"""What is behind the type's name where the content is a part of it."""
+"""Suffixes of the content's type."""
 
 
 def content_type(kind: str, name: str) -> str:
-    """Type of a record's content, from its kind and type."""
+    """Returns the type of a record's content, given the record's kind and type."""
     return name + _PARTS.get(kind, "")
 
 
 def is_large(taken: ClientCommand) -> bool:
-    """Whether a command is a published message that rather follows its record."""
+    """Returns whether a command is a published message too large for its record."""
     if taken.kind != "publish" or not _grows(taken.type):
         return False
     return array_bytes(taken.content) > _INLINE_BYTES
 
 
 def content_bytes(taken: ClientCommand) -> bytes:
-    """The content of a command, exactly. `GraphError` where it does not fit its type."""
+    """Encodes the content of a command. Raises `GraphError` if it does not fit its type."""
     if taken.content is None:
         return b""
     if isinstance(taken.content, str):
@@ -60,7 +61,7 @@ def content_bytes(taken: ClientCommand) -> bytes:
 
 
 def content_of(kind: str, type_name: str, cdr: bytes) -> Any:
-    """The content that `content_bytes` made into bytes. `GraphError` where it is none such."""
+    """Decodes what `content_bytes` encoded. Raises `GraphError` for other bytes."""
     if not cdr:
         return None
     if kind == "failure":
@@ -71,7 +72,7 @@ def content_of(kind: str, type_name: str, cdr: bytes) -> Any:
 def record_of(
     taken: ClientCommand, cdr: bytes | None, *, number: int, time_ns: int, step: int, turn: int
 ) -> Any:
-    """The message that tells of a command; `cdr` as of `content_bytes`, None: it follows."""
+    """Returns the record of a command; `cdr` is from `content_bytes`, None: it follows."""
     return message_type(TYPE)(
         stamp=time_from_ns(time_ns),
         number=number,
@@ -103,7 +104,7 @@ def _for_people(taken: ClientCommand) -> str:
 
 @cache
 def _grows(msgtype: str) -> bool:
-    """Whether messages of a type have no fixed size: whether it holds a sequence or a text."""
+    """Returns whether messages of a type vary in size: the type holds a sequence or text."""
     for _, described in typestore().fielddefs[msgtype][1]:
         kind, detail = cast("tuple[Any, Any]", described)
         if kind == Nodetype.SEQUENCE or (kind == Nodetype.BASE and detail[0] == "string"):
@@ -126,7 +127,7 @@ def _array_for_people(array: NDArray[Any], base: str) -> Any:
 
 
 def _number(value: Any) -> Any:
-    """JSON has no word for what is not finite."""
+    """Returns None for a number that is not finite, which JSON cannot express."""
     return value if not isinstance(value, float) or np.isfinite(value) else None
 
 

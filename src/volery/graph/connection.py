@@ -1,4 +1,4 @@
-"""What a program needs of a graph that lies elsewhere, whoever carries the messages."""
+"""Defines the connection of a program to a graph in another thread or process."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from volery.graph.subscription_queue import SubscriptionQueue, Wake
 
 
 class GraphConnection(Protocol):
-    """One client's connection to a graph; the nearest one is `graph.session.Session`.
+    """One client's connection to a graph; in the same process, `graph.session.Session`.
 
-    This is the contract of all of them; an implementation documents only what it adds. Any thread
-    may call any method; replies and wakes come from a thread of the link. `advertise`, `subscribe`
-    and `offer` raise `GraphError` for a wrong type, and once the link is closed.
+    This protocol is the contract; implementations document only what they add. Any thread may call
+    any method; replies and wakes come from a thread of the connection. `advertise`, `subscribe` and
+    `offer` raise `GraphError` for a wrong type, and after the connection is closed.
     """
 
     name: str
 
     def advertise(self, topic: str, msgtype: str, *, latched: bool = False) -> None:
-        """Announce that this client publishes on `topic`; a second call replaces the type."""
+        """Announces that this client publishes on `topic`; a second call replaces the type."""
 
     def publish(self, topic: str, message: Any) -> None:
-        """Publish a message of the announced type. `GraphError` where none was announced."""
+        """Publishes a message of the advertised type; raises `GraphError` if there is none."""
 
     def unadvertise(self, topic: str) -> None:
-        """Publish on `topic` no more. `GraphError` where it was not announced."""
+        """Stops publishing on `topic`. Raises `GraphError` if it was not advertised."""
 
     def subscribe(
         self,
@@ -42,70 +42,70 @@ class GraphConnection(Protocol):
         reliable: bool = False,
         wake: Wake,
     ) -> SubscriptionQueue:
-        """Receive the messages of `topic` in the mailbox that is returned.
+        """Subscribes to `topic` and returns the queue of its messages.
 
         Parameters
         ----------
         topic
             Absolute name.
         msgtype
-            None: the type that the topic has; `GraphError` where the topic does not exist.
+            None: the type of the topic; raises `GraphError` if the topic does not exist.
         depth, reliable
-            How many messages wait, and what happens to more: see `SubscriptionQueue`. The newest
-            message of each latched publisher is the first.
+            Length of the queue, and the handling of more messages: see `SubscriptionQueue`. The
+            queue starts with the newest message of each latched publisher.
         wake
-            Called from a thread of the link when a message comes to an empty mailbox. It must not
+            Called from a thread of the connection when a message joins an empty queue. It must not
             block.
 
         """
 
     def unsubscribe(self, mailbox: SubscriptionQueue) -> None:
-        """Receive no more; messages that wait can still be taken."""
+        """Ends a subscription; messages in its queue can still be taken."""
 
     def call(self, service: str, request: Any | None, reply: ServiceReply) -> None:
-        """Call a service; `reply` gets the response or a `GraphError`, in another thread.
+        """Calls a service; `reply` gets the response or a `GraphError`, in another thread.
 
-        Without a request the service gets an empty one.
+        Without a request, the service receives an empty one.
         """
 
     def offer(self, service: str, srvtype: str, handler: Handler) -> None:
-        """Serve `service`: `handler(request, reply)` is called in a thread of the link."""
+        """Creates `service`: `handler(request, reply)` is called in a thread of the connection."""
 
     def close(self) -> None:
-        """End all publishers, subscriptions, calls and services of this client."""
+        """Ends all publishers, subscriptions, calls and services of this client."""
 
 
 @runtime_checkable
 class TellsTopics(Protocol):
-    """A link whose own protocol tells what topics there are."""
+    """A connection whose protocol lists the topics."""
 
     def topic_types(self) -> dict[str, str]:
-        """Topics of the graph and their types, by name. `GraphError` where no answer comes."""
+        """Returns the types of all topics by name. Raises `GraphError` without a response."""
 
 
 @runtime_checkable
 class TellsServices(Protocol):
-    """A link whose own protocol tells what services there are."""
+    """A connection whose protocol lists the services."""
 
     def service_types(self) -> dict[str, str]:
-        """Services of the graph and their types, by name. `GraphError` where no answer comes."""
+        """Returns the types of all services by name. Raises `GraphError` without a response."""
 
 
 @runtime_checkable
 class HostsNodes(Protocol):
-    """A link on which a node is seen by its own name, with its parameters."""
+    """A connection on which a node appears under its own name, with its parameters."""
 
     def host_node(self, name: str, parameters: Parameters, post: Callable[[Any], Any]) -> None:
-        """Be this node; parameters are set by what is handed to `post`."""
+        """Makes the connection appear as this node; passes `post` the setting of parameters."""
 
 
 def call_and_wait(
     link: GraphConnection, service: str, request: Any | None, timeout_s: float
 ) -> Any:
-    """Call a service and wait for its response, at most `timeout_s` of wall time.
+    """Calls a service and waits for its response, at most `timeout_s` of wall time.
 
-    Not for the thread from which the link's replies come. `GraphError` with the reason where there
-    is no response.
+    Must not be called in the thread that delivers the connection's replies. Raises `GraphError`
+    with the reason if there is no response.
     """
     come = threading.Event()
     outcome: list[Any] = []
@@ -116,7 +116,7 @@ def call_and_wait(
 
     link.call(service, request, ServiceReply(take, take))
     if not come.wait(timeout_s):
-        raise GraphError(f"service '{service}' did not answer within {timeout_s:g} s")
+        raise GraphError(f"service '{service}' did not respond within {timeout_s:g} s")
     if isinstance(outcome[0], GraphError):
         raise outcome[0]
     return outcome[0]

@@ -1,14 +1,14 @@
-"""Topics and services of one simulation.
+"""Provides the topics and services of one simulation.
 
-Delivery is deterministic: a publication joins a queue, and `deliver` hands queued messages to
-subscribers first come, first served, in the order of subscription. What a callback publishes joins
+Delivery is deterministic: a published message joins a queue, and `deliver` passes queued messages
+to subscribers in the order of publication and subscription. Messages that a callback publishes join
 the end of the queue.
 
-A latched publisher's last message is kept and handed to everyone who subscribes later, as ROS 1
-latches and ROS 2 does with durability TRANSIENT_LOCAL and depth 1.
+The graph stores the last message of a latched publisher and passes it to later subscribers, like a
+latched ROS 1 topic or ROS 2 durability TRANSIENT_LOCAL with depth 1.
 
-Messages are published, and requests handled, in the simulation's thread alone. Who takes part may
-be changed by any thread: `graph.session` does so for clients outside.
+Messages are published, and requests handled, in the simulation's thread only. Any thread may add or
+remove publishers, subscribers and services: `graph.session` does so for external clients.
 """
 
 from __future__ import annotations
@@ -32,24 +32,25 @@ from volery.graph.service_reply import ServiceReply
 
 Callback = Callable[[Published], None]
 AsyncHandler = Callable[[Any, ServiceReply], None]
-"""Takes a request and answers through the reply, at once or later."""
+"""Handles a request and responds through the reply, at once or later."""
 
 _log = logging.getLogger(__name__)
 
 MAX_ANSWERS_IN_A_ROW = 10_000
-"""Messages each published in answer to the one before, at one simulated instant; more are nodes
-that answer each other, or themselves, without end."""
+"""Maximum length of a chain of messages at one simulated instant, each published in response to the
+previous one; a longer chain means that nodes respond to each other, or to themselves, endlessly."""
 _MAX_ANSWERS_AT_ONCE = 1_000_000
-"""Of one topic at one simulated instant: where each message is answered by several."""
+"""Maximum number of responses on one topic at one simulated instant, where several nodes respond to
+each message."""
 _ANSWERS_NAMED = 50
 
 MOST_UNUSED = 1000
-"""Topics that are remembered though nobody takes part in them any more."""
+"""Maximum number of topics stored without publisher or subscriber."""
 
 
 @dataclass(frozen=True)
 class TopicInfo:
-    """What is known of a topic."""
+    """Describes a topic."""
 
     name: str
     msgtype: str
@@ -57,7 +58,7 @@ class TopicInfo:
     subscribers: int
     messages: int
     latched: bool
-    """Whether a publisher's last message awaits those who subscribe later."""
+    """Whether later subscribers receive a publisher's last message."""
 
 
 class _Topic:
@@ -65,41 +66,41 @@ class _Topic:
         self.name = name
         self.msgtype = msgtype
         self.callbacks: list[Callback] = []
-        self.outside: list[Callback] = []  # those of them that other threads have attached
-        self.attached = 0  # how many did so far
+        self.outside: list[Callback] = []  # the callbacks that other threads have attached
+        self.attached = 0  # number of external subscriptions so far
         self.publishers = 0
         self.messages = 0
-        self.answer_ns = -1  # when the last message was published in answer to another one ...
-        self.answers = 0  # ... and how many such there were at that instant
+        self.answer_ns = -1  # time of the last message published in response to another one ...
+        self.answers = 0  # ... and the number of such messages at that instant
         self.latched = False
-        self.kept: dict[Publisher, Published] = {}  # the last delivered one of each latched one
+        self.kept: dict[Publisher, Published] = {}  # last message of each latched publisher
 
     @property
     def used(self) -> bool:
-        """Whether anybody takes part."""
+        """Whether the topic has publishers or subscribers."""
         return bool(self.publishers or self.callbacks)
 
 
 class Publisher:
-    """A right to publish one type on one topic."""
+    """Publishes messages of one type on one topic."""
 
     def __init__(self, graph: Graph, topic: _Topic, *, latched: bool = False) -> None:
         self._graph = graph
         self._topic = topic
         self.latched = latched
         self.owner = ""
-        """Full name of the node that it belongs to; empty: none."""
+        """Full name of the publisher's node; empty: none."""
         self.lasting = False
-        """Whether what it publishes is no part of kept states.
+        """Whether snapshots exclude its messages.
 
-        It comes although another state is restored before its delivery, and never twice.
+        A queued message stays queued when another state is restored, and is delivered once.
         """
         self.cancelled = False
-        """Whether it publishes no more."""
+        """Whether the publisher has been cancelled."""
 
     @property
     def msgtype(self) -> str:
-        """Type of its messages."""
+        """Type of the messages."""
         return self._topic.msgtype
 
     @property
@@ -109,69 +110,69 @@ class Publisher:
 
     @property
     def wanted(self) -> bool:
-        """Whether anybody would receive a message; what is not wanted need not be built."""
+        """Whether a message would be delivered or latched; otherwise it need not be built."""
         return bool(
             self.latched or self._topic.callbacks or self._graph.is_recorded(self._topic.name)
         )
 
     def publish(self, message: Any) -> None:
-        """Queue a message for delivery; nothing after `cancel`."""
+        """Queues a message for delivery; has no effect after `cancel`."""
         if not self.cancelled:
             self._graph.enqueue(self, self._topic, message)
 
     def check(self, message: Any) -> None:
-        """`GraphError` for a message that is not of the topic's type."""
+        """Raises `GraphError` if the message is not of the topic's type."""
         name = getattr(message, "__msgtype__", None)
         if name != self.msgtype:
             raise GraphError(f"topic '{self.topic}' carries {self.msgtype}, not {name}")
 
     def publish_posted(self, message: Any) -> None:
-        """Queue a message that was published before `cancel`, even if it gets here after that."""
+        """Queues a message published before `cancel` that arrives later, even after `cancel`."""
         self._graph.enqueue(self, self._topic, message)
 
     @property
     def subscriptions(self) -> int:
-        """How many subscribe to this very topic."""
+        """Number of subscribers to this topic by name."""
         return len(self._topic.callbacks)
 
     @property
     def heard(self) -> bool:
-        """Whether a node inside subscribes to this very topic: who takes everything is none."""
+        """Whether a node of the simulation subscribes to this topic by name."""
         return len(self._topic.callbacks) > len(self._topic.outside)
 
     @property
     def watched(self) -> bool:
-        """Whether a client outside receives the topic."""
+        """Whether an external client receives the topic."""
         return bool(self._topic.outside)
 
     @property
     def watchers_so_far(self) -> int:
-        """How many clients outside have begun to receive the topic: more means somebody is new."""
+        """Number of external subscriptions so far; a greater number means a new subscriber."""
         return self._topic.attached
 
     def show(self, message: Any) -> None:
-        """Hand a message to the clients outside, at once; nothing in the simulation sees it.
+        """Passes a message to the external clients, at once; the simulation does not receive it.
 
-        What follows wall time, or who is watching, is told like this: nodes, digests and recorders
-        cannot come to depend on it.
+        This is for messages that depend on wall time or on the connected clients: nodes, digests
+        and recorders must not depend on them.
         """
         if not self.cancelled:
             self._graph.show(self, self._topic, message)
 
     @property
     def keeps(self) -> bool:
-        """Whether its last message awaits those who subscribe later."""
+        """Whether later subscribers receive its last message."""
         return self.latched and not self.cancelled
 
     def cancel(self) -> None:
-        """Publish no more; what it latched is forgotten."""
+        """Stops publishing and discards the latched message."""
         if not self.cancelled:
             self.cancelled = True
             self._graph.dismiss(self, self._topic)
 
 
 class Subscription:
-    """A running subscription; `cancel` ends it, and tells `left` so."""
+    """A running subscription; `cancel` ends it and calls `left`."""
 
     def __init__(
         self,
@@ -184,14 +185,14 @@ class Subscription:
         self._left = left
 
     def cancel(self) -> None:
-        """Stop receiving."""
+        """Stops receiving."""
         if self._callback in self._callbacks:
             self._callbacks.remove(self._callback)
             self._left()
 
 
 class _Listener:
-    """A callback for all topics that match."""
+    """A callback for all matching topics."""
 
     def __init__(self, callback: Callback, matches: Callable[[str], bool]) -> None:
         self.matches = matches
@@ -206,21 +207,21 @@ def _match_all(_topic: str) -> bool:
 
 
 class _Letter(NamedTuple):
-    """A message under way; `only` is the late subscriber that a kept one is meant for."""
+    """A queued message; `only` is the late subscriber that a latched message is for."""
 
     topic: _Topic
     published: Published
     sender: Publisher
     only: Callback | None = None
     client: str = ""
-    """The external client whose command caused it."""
+    """External client whose command caused the message."""
     answers: int = 0
-    """How many messages in a row have answered each other, this one included."""
+    """Length of the chain of messages in response to each other, this message included."""
 
 
 @dataclass(frozen=True)
 class _Service:
-    """A service: answered at once by `handler`, or some time by `ask`."""
+    """A service: `handler` responds at once, `ask` at once or later."""
 
     srvtype: str
     handler: Callable[[Any], Any] | None
@@ -228,10 +229,10 @@ class _Service:
 
 
 class Graph:
-    """All topics and services.
+    """Holds all topics and services.
 
-    `now_ns` tells the simulated time of a publication. `post` has a function called in the thread
-    of the simulation: what comes from other threads gets there through it.
+    `now_ns` returns the simulated time of a publication. `post` runs a function in the simulation's
+    thread; it carries everything that comes from other threads.
     """
 
     def __init__(
@@ -245,45 +246,45 @@ class Graph:
         self._unused: dict[str, _Topic] = {}
         self._services: dict[str, _Service] = {}
         self.actions = Actions()
-        """Goals that take their time."""
+        """Action servers."""
         self.parameters = Parameters()
-        """What the nodes have declared."""
+        """Parameters that the nodes have declared."""
         self._to_all: list[_Listener] = []
         self._queue: deque[_Letter] = deque()
-        self._answers = 0  # in a row, that what is published now would be the last of
+        self._answers = 0  # length of the chain that a message published now extends
         self._endless: set[tuple[str, str]] = set()
         self.acting_client = ""
-        """The external client whose command is being carried out; empty: none. A failure of what
-        receives a message that a client caused is logged, and does not end the run."""
+        """External client whose command is being executed; empty: none. A subscriber that fails on
+        a message caused by a client is logged, and does not end the run."""
         self._members = threading.RLock()
-        """Held by whoever changes topics, publishers, subscribers or services."""
+        """Guards changes of topics, publishers, subscribers and services."""
 
     def now_ns(self) -> int:
-        """Simulated time."""
+        """Returns the simulated time, ns."""
         return self._now_ns()
 
     def post(self, action: Callable[[], Any]) -> None:
-        """Have `action()` called in the simulation's thread; `GraphError` where that has none."""
+        """Runs `action()` in the simulation's thread; raises `GraphError` if the graph has none."""
         if self._post is None:
             raise GraphError("this graph has no thread of its own to post to")
         self._post(action)
 
     def enter(self, node: str) -> None:
-        """Note that a node of this full name stands on the graph."""
+        """Registers a node by its full name."""
         self.parameters.enter(node)
 
     # ---------------------------------------------------------------------------------- topics
 
     def is_recorded(self, topic: str) -> bool:
-        """Whether a recorder or digest wants the messages of a topic."""
+        """Returns whether a recorder or digest receives the messages of a topic."""
         return any(listener.matches(topic) for listener in self._to_all)
 
     def advertise(
         self, topic: str, msgtype: str | type[Any], *, latched: bool = False
     ) -> Publisher:
-        """Announce a publisher. `GraphError` if the topic exists with another type.
+        """Adds a publisher. Raises `GraphError` if the topic exists with another type.
 
-        The last message of a `latched` one also goes to those who subscribe after it.
+        latched: later subscribers receive the publisher's last message.
         """
         with self._members:
             found = self._topic(topic, msgtype)
@@ -292,7 +293,7 @@ class Graph:
         return Publisher(self, found, latched=latched)
 
     def dismiss(self, publisher: Publisher, topic: _Topic) -> None:
-        """Strike a publisher off; used by `Publisher`."""
+        """Removes a publisher; used by `Publisher`."""
         with self._members:
             topic.publishers -= 1
             topic.kept.pop(publisher, None)
@@ -306,11 +307,13 @@ class Graph:
         *,
         qos: QoSProfile = DEFAULT_QOS,  # noqa: ARG002
     ) -> Subscription:
-        """Call `callback` with each message of `topic`, which must exist or be given a type.
+        """Calls `callback` with each message of `topic`.
 
-        qos: counts where messages have to wait, which in lock step none ever does. What latched
-        publishers sent before comes first, with the next delivery; its `time_ns` is that of this
-        subscription.
+        Without `msgtype`, the topic must exist.
+
+        qos: affects only messages that have to wait, which never happens in lock step. The next
+        delivery starts with the messages that latched publishers sent before; their `time_ns` is
+        the time of this subscription.
         """
         with self._members:
             found = self._known_topic(topic, msgtype)
@@ -321,9 +324,9 @@ class Graph:
     def attach(
         self, topic: str, put: Callback, msgtype: str | type[Any] | None = None
     ) -> Subscription:
-        """Like `subscribe`, for a `put` that any thread may call: what was latched comes at once.
+        """Like `subscribe`, for a `put` that any thread may call; passes latched messages at once.
 
-        Its order among other subscribers changes nothing in the simulation.
+        The order of `put` among the subscribers does not affect the simulation.
         """
         with self._members:
             found = self._known_topic(topic, msgtype)
@@ -342,12 +345,12 @@ class Graph:
     def subscribe_all(
         self, callback: Callback, matches: Callable[[str], bool] | None = None
     ) -> Subscription:
-        """Call `callback` with every message, before the topics' subscribers.
+        """Calls `callback` with every message, before the subscribers of the topic.
 
-        What latched publishers sent before comes first, as for `subscribe`.
+        Latched messages come first, as for `subscribe`.
 
-        matches: whether a topic is meant, by its name; without it all are. Messages of other topics
-        are not made for it.
+        matches: returns whether to receive a topic, given its name; without it, all topics. No
+        messages are built for it on other topics.
         """
         listener = _Listener(callback, matches or _match_all)
         self._to_all.append(listener)
@@ -356,7 +359,7 @@ class Graph:
         return Subscription(self._to_all, listener)
 
     def topics(self) -> list[TopicInfo]:
-        """All topics, by name."""
+        """Returns all topics, sorted by name."""
         with self._members:
             return [
                 TopicInfo(t.name, t.msgtype, t.publishers, len(t.callbacks), t.messages, t.latched)
@@ -364,22 +367,22 @@ class Graph:
             ]
 
     def publishers(self, topic: str) -> int:
-        """How many publish on a topic."""
+        """Returns the number of publishers of a topic."""
         found = self._topics.get(topic)
         return 0 if found is None else found.publishers
 
     def subscribers(self, topic: str) -> int:
-        """How many subscribe to a topic."""
+        """Returns the number of subscribers to a topic."""
         found = self._topics.get(topic)
         return 0 if found is None else len(found.callbacks)
 
     def topic_type(self, topic: str) -> str | None:
-        """Type of a topic; None where there is no such topic."""
+        """Returns the type of a topic, or None if the topic does not exist."""
         found = self._topics.get(topic)
         return None if found is None else found.msgtype
 
     def enqueue(self, sender: Publisher, topic: _Topic, message: Any) -> None:
-        """Queue a message; used by `Publisher`."""
+        """Queues a message; used by `Publisher`."""
         sender.check(message)
         topic.messages += 1
         if sender.wanted:
@@ -392,7 +395,7 @@ class Graph:
     def _is_endless(
         self, sender: Publisher, topic: _Topic, published: Published, answers: int
     ) -> bool:
-        """Whether nodes answer each other without end; `NodeError` unless a client began it."""
+        """Returns whether nodes respond endlessly; raises `NodeError` unless a client began it."""
         topic.answers = topic.answers + 1 if topic.answer_ns == published.time_ns else 1
         topic.answer_ns = published.time_ns
         if answers > MAX_ANSWERS_IN_A_ROW - _ANSWERS_NAMED:
@@ -404,16 +407,18 @@ class Graph:
         topics = ", ".join(sorted({f"'{name}'" for name, _ in named}))
         nodes = ", ".join(sorted({owner for _, owner in named if owner})) or "callbacks"
         reason = (
-            f"messages answer each other without end at {published.time_ns / 1e9:.3f} s: "
-            f"on {topics}, published by {nodes}; answer at a later time, by a timer, or not at all"
+            f"messages trigger each other endlessly at {published.time_ns / 1e9:.3f} s: "
+            f"on {topics}, published by {nodes}; publish later, from a timer, or not at all"
         )
         if not self.acting_client:
             raise NodeError(reason)
-        _log.warning("%s (begun by %s): the rest is dropped", reason, self.acting_client)
+        _log.warning(
+            "%s (started by %s): the remaining messages are dropped", reason, self.acting_client
+        )
         return True
 
     def show(self, sender: Publisher, topic: _Topic, message: Any) -> None:
-        """Hand a message to clients outside alone; used by `Publisher`."""
+        """Passes a message to external clients only; used by `Publisher`."""
         sender.check(message)
         topic.messages += 1
         published = Published(topic.name, topic.msgtype, self._now_ns(), message)
@@ -421,7 +426,7 @@ class Graph:
             put(published)
 
     def show_to_all(self, sender: Publisher, message: Any) -> None:
-        """Hand a message to recorders and clients outside, at once; for the last words of a run."""
+        """Passes a message to recorders and external clients at once, at the end of a run."""
         published = Published(sender.topic, sender.msgtype, self._now_ns(), message)
         with self._members:
             topic = self._topics.get(sender.topic)
@@ -430,7 +435,7 @@ class Graph:
             put(published)
 
     def show_kept(self) -> None:
-        """Hand everything that is latched to the clients outside again: the world has jumped."""
+        """Sends all latched messages to the external clients again, after the state has jumped."""
         with self._members:
             topics = [(tuple(t.kept.values()), tuple(t.outside)) for t in self._topics.values()]
         for kept, outside in topics:
@@ -439,7 +444,7 @@ class Graph:
                     put(published)
 
     def deliver(self) -> None:
-        """Hand out all queued messages, those published meanwhile included."""
+        """Delivers all queued messages, including those published meanwhile."""
         before = self._answers
         try:
             self._deliver()
@@ -454,7 +459,7 @@ class Graph:
                 if only in topic.callbacks or only in self._to_all:
                     only(published)
                 continue
-            with self._members:  # who attaches meanwhile gets it once
+            with self._members:  # a client that attaches meanwhile receives the message once
                 if sender.keeps:
                     topic.kept[sender] = published
                 watching = [c for c in self._to_all if c.matches(topic.name)]
@@ -470,14 +475,14 @@ class Graph:
     def _hand_on_for(
         self, client: str, callbacks: Iterable[Callback], published: Published
     ) -> None:
-        """Hand out a message that a client caused: what it breaks does not end the run."""
+        """Delivers a message that a client caused; a failing callback does not end the run."""
         with self.on_behalf_of(client):
             for callback in callbacks:
                 try:
                     callback(published)
                 except Exception as error:
                     _log.warning(
-                        "topic '%s': a message caused by %s is not taken: %s",
+                        "topic '%s': a message caused by %s was rejected: %s",
                         published.topic,
                         client,
                         error,
@@ -486,7 +491,7 @@ class Graph:
 
     @contextmanager
     def on_behalf_of(self, client: str) -> Iterator[None]:
-        """Context in which all that is published is caused by an external client."""
+        """Context in which an external client causes everything that is published."""
         before, self.acting_client = self.acting_client, client
         try:
             yield
@@ -494,16 +499,16 @@ class Graph:
             self.acting_client = before
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps: undelivered and latched messages, how many each topic has seen."""
+        """Returns the state for a snapshot: queued and latched messages, message counts."""
         with self._members:
             topics = {name: (t.messages, dict(t.kept)) for name, t in self._topics.items()}
         queue = [letter for letter in self._queue if not letter.sender.lasting]
         return {"queue": queue, "topics": topics}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state; topics, subscribers and services stay as they are.
+        """Restores a saved state; topics, subscribers and services stay as they are.
 
-        What nodes had published that have been destroyed since then is left out.
+        Messages of nodes that have been destroyed since then are left out.
         """
         lasting = [letter for letter in self._queue if letter.sender.lasting]
         kept = [letter for letter in state["queue"] if not _has_gone(letter.sender)]
@@ -516,7 +521,7 @@ class Graph:
 
     @contextmanager
     def in_place_of(self, state: dict[str, Any]) -> Iterator[None]:
-        """Queue what is published meanwhile where `state` has what destroyed nodes published."""
+        """Queues new messages at the position of the destroyed nodes' messages in `state`."""
         queue = state["queue"]
         first = next((k for k, letter in enumerate(queue) if _has_gone(letter.sender)), len(queue))
         behind = sum(not _has_gone(letter.sender) for letter in queue[first:])
@@ -527,7 +532,7 @@ class Graph:
             self._queue.extend(reversed(after))
 
     def _drop_unused(self, topic: _Topic) -> None:
-        """Forget the oldest unused topics where clients have left very many."""
+        """Removes the oldest unused topic when there are more than MOST_UNUSED."""
         with self._members:
             if not topic.used:
                 self._unused[topic.name] = topic
@@ -537,7 +542,7 @@ class Graph:
                     del self._topics[oldest.name]
 
     def _send_kept(self, topics: list[_Topic], callback: Callback) -> None:
-        """Put what was kept before everything under way, which is newer."""
+        """Queues latched messages before all others, which are newer."""
         now_ns = self._now_ns()
         letters = [
             _Letter(topic, replace(published, time_ns=now_ns), sender, callback)
@@ -570,7 +575,7 @@ class Graph:
     # -------------------------------------------------------------------------------- services
 
     def offer(self, service: str, srvtype: str, handler: Callable[[Any], Any]) -> None:
-        """Offer a service: `handler(request)` returns the response message."""
+        """Creates a service: `handler(request)` returns the response message."""
 
         def ask(request: Any, reply: ServiceReply) -> None:
             reply.answer(handler(request))
@@ -578,36 +583,36 @@ class Graph:
         self._add_service(service, _Service(srvtype, handler, ask))
 
     def offer_async(self, service: str, srvtype: str, ask: AsyncHandler) -> None:
-        """Offer a service whose answers come later; only `call_async` can call it."""
+        """Creates a service that may respond later; only `call_async` can call it."""
         self._add_service(service, _Service(srvtype, None, ask))
 
     def withdraw(self, service: str) -> None:
-        """Offer a service no more."""
+        """Destroys a service."""
         with self._members:
             self._services.pop(service, None)
 
     def call(self, service: str, request: Any | None = None) -> Any:
-        """Call a service and return its response. `GraphError` if nobody offers it."""
+        """Calls a service and returns its response. Raises `GraphError` if it has no server."""
         found = self._service(service)
         if found.handler is None:
-            raise GraphError(f"service '{service}' is offered from outside: use call_async")
+            raise GraphError(f"service '{service}' has an external server: use call_async")
         return found.handler(_request(found, request))
 
     def call_async(self, service: str, request: Any | None, reply: ServiceReply) -> None:
-        """Call a service that may take its time. `GraphError` if nobody offers it."""
+        """Calls a service that may respond later. Raises `GraphError` if it has no server."""
         found = self._service(service)
         found.ask(_request(found, request), reply)
 
     def has_service(self, service: str) -> bool:
-        """Whether the service is offered."""
+        """Returns whether the service has a server."""
         return service in self._services
 
     def service_type(self, service: str) -> str:
-        """Type of a service. `GraphError` if nobody offers it."""
+        """Returns the type of a service. Raises `GraphError` if it has no server."""
         return self._service(service).srvtype
 
     def services(self) -> dict[str, str]:
-        """Service names and their types."""
+        """Returns the names of all services and their types."""
         with self._members:
             return {name: s.srvtype for name, s in sorted(self._services.items())}
 
@@ -615,25 +620,25 @@ class Graph:
         _check_name(name)
         with self._members:
             if name in self._services:
-                raise GraphError(f"service '{name}' is offered already")
+                raise GraphError(f"service '{name}' already has a server")
             self._services[name] = service
 
     def _service(self, name: str) -> _Service:
         found = self._services.get(name)
         if found is None:
-            raise GraphError(f"nobody offers service '{name}'")
+            raise GraphError(f"service '{name}' has no server; see `volery service list`")
         return found
 
 
 def _request(service: _Service, request: Any | None) -> Any:
-    """The request, or one of zeros."""
+    """Returns the request, by default one of zeros."""
     if request is None:
         return zero_message(f"{service.srvtype}_Request")
     return request
 
 
 def _has_gone(sender: Publisher) -> bool:
-    """Whether a publisher was of a node that has been destroyed."""
+    """Returns whether a publisher's node has been destroyed."""
     return bool(sender.owner) and sender.cancelled
 
 
@@ -641,11 +646,11 @@ def _check_name(name: str) -> None:
     parts = name.split("/")
     if not name.startswith("/") or not all(p.isidentifier() for p in parts[1:]):
         raise GraphError(
-            f"'{name}' is no valid name: absolute, of letters, digits and _ between slashes"
+            f"invalid name '{name}': use an absolute name of letters, digits and _ between slashes"
         )
 
 
 def check_period(period_s: float) -> None:
-    """Refuse a timer period that is not a positive finite number of seconds."""
+    """Raises `GraphError` unless the period is a positive finite number of seconds."""
     if not (math.isfinite(period_s) and period_s > 0.0):
         raise GraphError(f"a timer period must be a positive number of seconds, not {period_s}")

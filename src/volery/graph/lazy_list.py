@@ -1,4 +1,4 @@
-"""Long lists of parts of a message that are made only where somebody reads them."""
+"""Provides long lists of message parts that are built only when read."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Any, overload
 
 
 class LazyList(Sequence[Any]):
-    """A list of `count` parts that `make()` yields anew each time it is read.
+    """A list of `count` parts that `make()` builds at each access.
 
-    A message with hundreds of parts, of which a slow client drops most, costs next to nothing until
-    it is written to a wire; and its parts are gone at once, where a list of them would have
-    Python's garbage collector look through everything else. `make` must always yield the same.
+    A message with hundreds of parts costs almost nothing until it is encoded, and a slow client
+    drops most such messages. The parts are freed at once, whereas a permanent list of them would
+    burden Python's garbage collector. `make` must always return equal parts.
     """
 
     def __init__(self, count: int, make: Callable[[], Iterable[Any]]) -> None:
@@ -37,7 +37,7 @@ class LazyList(Sequence[Any]):
     __hash__ = None  # type: ignore[assignment]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A pickle or copy is a plain list."""
+        """Pickles and copies as a plain list."""
         return list, (list(self),)
 
     def __repr__(self) -> str:

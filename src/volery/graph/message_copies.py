@@ -1,10 +1,9 @@
-"""Copies of messages at the moment of their publication.
+"""Copies messages at the moment of their publication.
 
-A node may go on with a message that it has published, as with rclpy, which writes it out at once:
-set it anew, append to its lists. So what it hands over is copied: nested messages and lists are
-new, writeable arrays are copied and read-only, read-only ones shared. Sequences of numbers, which a
-node may give as a list, a tuple, bytes or an `array.array`, become numpy arrays of the field's
-type.
+A node may modify a message after publishing it, as with rclpy, which serializes at once. So a
+published message is a copy: nested messages and lists are new, writeable arrays are copied and
+read-only, read-only arrays are shared. Number sequences given as lists, tuples, bytes or
+`array.array` become numpy arrays of the field's type.
 """
 
 from __future__ import annotations
@@ -27,18 +26,18 @@ Copy = Callable[[Any], Any]
 
 
 def copy_message(message: Any) -> Any:
-    """A copy of a message, as subscribers get it. `GraphError` for numbers that do not fit."""
+    """Returns a copy of a message for subscribers. Raises `GraphError` if numbers do not fit."""
     return message_copier(message.__msgtype__)(message)
 
 
 @cache
 def message_copier(msgtype: str) -> Copy:
-    """What copies messages of a type."""
+    """Returns the function that copies messages of a type."""
     store = typestore()
     cls: Any = store.types[msgtype]
     described = dict(store.fielddefs[msgtype][1])
     if not all(is_plain_name(name) for name in described):
-        raise GraphError(f"{msgtype}: a field's name is no name in Python")
+        raise GraphError(f"{msgtype}: a field's name is not a Python identifier")
     scope: dict[str, Any] = {"_cls": cls}
     values = []
     for name in (field.name for field in fields(cls) if field.name in described):
@@ -49,13 +48,13 @@ def message_copier(msgtype: str) -> Copy:
             scope[f"_copy_{name}"] = copier
             values.append(f"_copy_{name}(message.{name})")
     text = f"def copy(message):\n    return _cls({', '.join(values)})"
-    exec(text, scope)  # names of fields alone
+    exec(text, scope)  # field names only
     copy: Copy = scope["copy"]
     return copy
 
 
 def _field_copier(where: str, described: Any) -> Copy | None:
-    """What copies a field; None where its value cannot change."""
+    """Returns the function that copies a field; None where its value is immutable."""
     kind, detail = described
     if kind == Nodetype.BASE:
         return None
@@ -71,7 +70,7 @@ def _field_copier(where: str, described: Any) -> Copy | None:
 
 @cache
 def _holds(msgtype: str) -> bool:
-    """Whether a message holds lists or arrays somewhere."""
+    """Returns whether a message holds lists or arrays at any level."""
     kinds = [described for _, described in typestore().fielddefs[msgtype][1]]
     return any(
         kind in (Nodetype.ARRAY, Nodetype.SEQUENCE) or (kind == Nodetype.NAME and _holds(detail))
@@ -80,7 +79,7 @@ def _holds(msgtype: str) -> bool:
 
 
 def _copy_list(copy: Copy | None, values: Any) -> Any:
-    if not isinstance(values, list | tuple):  # made where it is read, and so unchanging
+    if not isinstance(values, list | tuple):  # built when read, and so immutable
         return values
     return list(values) if copy is None else [copy(value) for value in values]
 
@@ -97,7 +96,7 @@ def _numbers(where: str, dtype: np.dtype[Any], length: int, values: Any) -> NDAr
         except (ValueError, TypeError, OverflowError) as error:
             raise GraphError(f"{where}: {error}") from None
     if length and values.size != length:
-        raise GraphError(f"{where}: {length} numbers, not {values.size}")
+        raise GraphError(f"{where}: must have {length} numbers, not {values.size}")
     values.setflags(write=False)
     array: NDArray[Any] = values
     return array

@@ -1,10 +1,10 @@
-"""Lets message classes be made without arguments: `Twist()`, `Vector3(x=1.0)`.
+"""Lets message classes be constructed without arguments: `Twist()`, `Vector3(x=1.0)`.
 
-The dataclasses of `rosbags` take every field. As in rclpy's generated classes, each argument may
-stay away: a number is then 0, a text empty, a nested message new, a fixed array a new numpy array
-of zeros, a sequence of numbers a new `array.array`, any other sequence a new list, and a default of
-the definition file counts. An unknown name is a `TypeError`. A message that is given all its fields
-is made as fast as before.
+The dataclasses of `rosbags` require every field. As in rclpy's generated classes, each argument is
+optional here: a number defaults to 0, a text to empty, a nested message to a new one, a fixed array
+to a new numpy array of zeros, a sequence of numbers to a new `array.array`, any other sequence to a
+new list; a default in the definition file takes precedence. An unknown name raises `TypeError`. A
+message with all fields given is constructed as fast as before.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from rosbags.interfaces import Nodetype
 
 Maker = Callable[[], Any]
 DefaultOf = Callable[[str, str], Any]
-"""Default of a type's field in its definition file; None where it starts at zero."""
+"""Default of a type's field in its definition file; None: zero."""
 
 _NOT_GIVEN: Any = object()
 _TYPECODES = {
@@ -36,15 +36,15 @@ _TYPECODES = {
     "float32": "f",
     "float64": "d",
 }
-"""Of `array.array`; sequences of other base types start as lists."""
+"""Type codes of `array.array`; sequences of other base types default to lists."""
 
 
 def make_arguments_optional(
     name: str, cls: type[Any], types: Mapping[str, type[Any]], fielddefs: Any, default_of: DefaultOf
 ) -> None:
-    """Give the class of message `name` a constructor whose arguments may stay away.
+    """Gives the class of message `name` a constructor whose arguments are optional.
 
-    It is made when the first message is: most types are never used.
+    The first message compiles the constructor, because most types are never used.
     """
     if not all(is_plain_name(field.name) for field in fields(cls)):
         return
@@ -59,7 +59,7 @@ def make_arguments_optional(
 
 
 def is_plain_name(name: str) -> bool:
-    """Whether a field's name may stand in code that is made."""
+    """Returns whether a field's name may appear in generated code."""
     return name.isidentifier() and not keyword.iskeyword(name)
 
 
@@ -70,11 +70,11 @@ def _constructor(
     types: Mapping[str, type[Any]],
     default_of: DefaultOf,
 ) -> Callable[..., None]:
-    """`__init__` of a class: plain values as defaults, all others made for each message."""
+    """Returns `__init__` of a class: immutable defaults shared, others made for each message."""
     scope: dict[str, Any] = {"_not_given": _NOT_GIVEN}
     arguments, lines = [], []
     for own in (field.name for field in fields(cls)):
-        if own not in described:  # a constant, which the class has; `dataclasses.replace` gives it
+        if own not in described:  # a constant of the class; `dataclasses.replace` passes it
             arguments.append(f"{own}=None")
             continue
         make, is_plain = _maker(described[own], default_of(name, own), types)
@@ -87,14 +87,14 @@ def _constructor(
             arguments.append(f"{own}=_not_given")
             lines.append(f"    self.{own} = _make_{own}() if {own} is _not_given else {own}")
     text = f"def __init__(self, {', '.join(arguments)}):\n" + "\n".join(lines or ["    pass"])
-    exec(text, scope)  # names of fields alone, as dataclasses do it
+    exec(text, scope)  # field names only, as in dataclasses
     made: Callable[..., None] = scope["__init__"]
     made.__qualname__ = f"{cls.__qualname__}.__init__"
     return made
 
 
 def _maker(described: Any, default: Any, types: Mapping[str, type[Any]]) -> tuple[Maker, bool]:
-    """What makes a field's value, and whether one value serves all messages."""
+    """Returns a field's factory, and whether one value serves all messages."""
     kind, detail = described
     if kind == Nodetype.NAME:
         return types[detail], False
@@ -108,7 +108,7 @@ def _maker(described: Any, default: Any, types: Mapping[str, type[Any]]) -> tupl
 def _sequence_maker(
     kind: Nodetype, detail: Any, default: Any, types: Mapping[str, type[Any]]
 ) -> Maker:
-    """What makes an array's or a sequence's value."""
+    """Returns the factory of an array or sequence."""
     (inner, inner_detail), size = detail
     length = size if kind == Nodetype.ARRAY else 0
     if inner == Nodetype.NAME:

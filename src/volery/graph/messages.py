@@ -1,8 +1,8 @@
-"""Messages: the ROS 2 types that Volery speaks, and what a published one carries.
+"""Provides the ROS 2 message types of Volery, and published messages.
 
-Types are plain dataclasses with numpy arrays from `rosbags`; no ROS installation is needed.
-Types that its store lacks come from the definition files in `definitions/`. Every argument of a
-message class may stay away, as in rclpy: see `message_defaults`.
+Types are plain dataclasses with numpy arrays from `rosbags`; no ROS installation is needed. Types
+that `rosbags` lacks come from the definition files in `definitions/`. Every argument of a message
+class is optional, as in rclpy: see `message_defaults`.
 """
 
 from __future__ import annotations
@@ -74,9 +74,9 @@ _DEFINITIONS = Path(__file__).parent / "definitions"
 
 @cache
 def typestore() -> DefinitionStore:
-    """The ROS 2 types (Jazzy) and those of our own definition files.
+    """Returns the ROS 2 types (Jazzy) and those of the definition files in `definitions/`.
 
-    The files are read one by one when a type of theirs is first asked for.
+    Each file is read at the first request for one of its types.
     """
     store = DefinitionStore(get_typestore(Stores.ROS2_JAZZY), __name__)
     store.index_folder(_DEFINITIONS)
@@ -84,7 +84,7 @@ def typestore() -> DefinitionStore:
 
 
 _BASE_DEFAULTS = {("geometry_msgs/msg/Quaternion", "w"): 1.0}
-"""Defaults in the definition files of ROS 2, which the types of `rosbags` do not keep."""
+"""Defaults in the definition files of ROS 2, which the types of `rosbags` lack."""
 
 
 def _base_default(msgtype: str, field: str) -> Any:
@@ -101,24 +101,20 @@ _make_base_arguments_optional()
 
 
 def add_definitions(folder: str | Path, *, foreign: bool = False) -> list[str]:
-    """Register the `.msg`, `.srv` and `.action` files of a folder of packages.
+    """Registers the `.msg`, `.srv` and `.action` files of a folder of packages.
 
     Returns the names of the types, `package/srv/Name_Request` and `_Response` for a service.
-    foreign: they come from a log, which may be a stranger's.
 
-    Raises
-    ------
-    GraphError
-        A definition is broken, too large to be used, names an unknown type or contradicts a type
-        that is known; the message names file and line, and none of the folder's types is
-        registered.
+    foreign: the files come from a log and are not trusted.
 
+    Raises `GraphError` if a definition is broken, too large, names an unknown type or contradicts a
+    known type; the message names file and line, and none of the folder's types is registered.
     """
     return typestore().add_folder(Path(folder), foreign=foreign)
 
 
 def __getattr__(name: str) -> Any:
-    """Classes of our definition files by their Python name, so that messages can be pickled."""
+    """Returns classes of definition files by their Python name, so that messages can be pickled."""
     if "__" in name.strip("_"):
         found = typestore().types.get(name.replace("__", "/"))
         if found is not None:
@@ -127,40 +123,40 @@ def __getattr__(name: str) -> Any:
 
 
 def message_type(name: str) -> type[Any]:
-    """Dataclass of a type name such as `sensor_msgs/msg/LaserScan`; `KeyError` if unknown."""
+    """Returns the dataclass of a type such as `sensor_msgs/msg/LaserScan`, or raises `KeyError`."""
     return typestore().types[name]
 
 
 def type_name(message_class: type[Any]) -> str:
-    """ROS 2 name of a message dataclass."""
+    """Returns the ROS 2 name of a message dataclass."""
     name: str = message_class.__msgtype__
     return name
 
 
 def time_from_ns(time_ns: int) -> Time:
-    """ROS time of a simulated instant."""
+    """Returns a simulated time as ROS time."""
     return Time(*stamp_from_ns(time_ns))
 
 
 def header(time_ns: int, frame_id: str) -> Header:
-    """Header stamped with simulated time."""
+    """Returns a header stamped with simulated time."""
     return Header(time_from_ns(time_ns), frame_id)
 
 
 def single(value: float) -> float:
-    """The value that a float32 field of a message holds: nodes inside get what goes out."""
+    """Returns the value rounded to float32, so that nodes receive what is sent on the wire."""
     return float(np.float32(value))
 
 
 def stamp_of(message: Any) -> int:
-    """Stamp in a message's header, ns; 0 where it has none."""
+    """Returns the stamp of a message's header, ns; 0 without a header."""
     stamp = getattr(getattr(message, "header", None), "stamp", None)
     return 0 if stamp is None else int(stamp.sec * NS_PER_S + stamp.nanosec)
 
 
 @dataclass(frozen=True)
 class Published:
-    """One message on one topic. Its arrays are read-only; its bytes are made once, on demand."""
+    """One message on one topic. Its arrays are read-only; its encodings are cached on demand."""
 
     topic: str
     msgtype: str
@@ -170,12 +166,12 @@ class Published:
 
     @cached_property
     def cdr(self) -> bytes:
-        """The message in CDR, the ROS 2 wire form."""
+        """The message in CDR, the ROS 2 wire format."""
         return bytes(typestore().serialize_cdr(self.message, self.msgtype))
 
     @cached_property
     def ros1(self) -> bytes:
-        """The message in ROS 1's wire form; its headers' `seq` is 0."""
-        from volery.graph.codecs.ros1 import ros1_codec  # it is built upon this module
+        """The message in the ROS 1 wire format; `seq` of headers is 0."""
+        from volery.graph.codecs.ros1 import ros1_codec  # imports this module
 
         return ros1_codec().encode(self.message, self.msgtype)

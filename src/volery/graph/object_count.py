@@ -1,8 +1,8 @@
-"""How many objects the bytes of a message would become, counted before any is made.
+"""Counts the objects that a message's bytes would become, before any object is created.
 
-Arrays of numbers are copied, whatever their length; each message and text inside of an array
-becomes an object of Python, at 1 to 2 us. So what bytes cost shows in the lengths of the arrays of
-messages and texts alone, and types without such arrays are not looked at.
+Arrays of numbers are copied whole, whatever their length; each message and text in an array becomes
+a Python object, at 1 to 2 us. So the lengths of arrays of messages and texts determine the cost of
+decoding, and types without such arrays are not examined.
 
     check_objects(data, "tf2_msgs/msg/TFMessage", ROS1)
 """
@@ -21,7 +21,7 @@ from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.messages import typestore
 
 MAX_OBJECTS = 20_000
-"""Messages and texts in the arrays of one message of a client: 3,300 transforms; 30 to 40 ms."""
+"""Limit of messages and texts in arrays of a client's message: 3,300 transforms; 30 to 40 ms."""
 
 CDR, ROS1 = "cdr", "ros1"
 _CDR_HEADER_BYTES = 4
@@ -34,7 +34,7 @@ _SIZES = {
 
 @dataclass(frozen=True)
 class _Fixed:
-    """Numbers of one size, or all that ROS 1 does not align."""
+    """Numbers of one alignment; ROS 1 aligns none."""
 
     align: int
     size: int
@@ -47,7 +47,7 @@ class _Text:
 
 @dataclass(frozen=True)
 class _Sequence:
-    """A length, and so many elements; align, size: of a number, 0 where it holds none."""
+    """A length, and as many elements; align, size: of a number, 0 where it holds none."""
 
     align: int = 0
     size: int = 0
@@ -56,20 +56,20 @@ class _Sequence:
 
 @dataclass
 class _Plan:
-    """Where the parts of a type lie, its parts that are messages spread out."""
+    """Layout of a type's parts, with nested messages flattened."""
 
     steps: list[_Fixed | _Text | _Sequence] = field(default_factory=list)
     objects: int = 1
-    """Of the message without the elements of its sequences."""
+    """Objects of the message without the elements of its sequences."""
 
     @property
     def grows(self) -> bool:
-        """Whether the bytes tell how many objects there are."""
+        """Whether the number of objects depends on the bytes."""
         return any(isinstance(step, _Sequence) and not step.size for step in self.steps)
 
     @property
     def is_fixed(self) -> bool:
-        """Whether every message has as many bytes, and the next one needs no padding."""
+        """Whether all messages have the same size, and need no padding between them."""
         return (
             len(self.steps) == 1
             and isinstance(self.steps[0], _Fixed)
@@ -85,10 +85,10 @@ class _Plan:
 
 
 def check_objects(data: bytes | bytearray | memoryview, msgtype: str, form: str) -> None:
-    """Raise `GraphError` for bytes that would become more objects than a client may send.
+    """Raises `GraphError` if the bytes would become more objects than a client may send.
 
-    form: `CDR`, with its four bytes of header, or `ROS1`. Bytes that are cut off pass: the decoder
-    ends where they do.
+    form: `CDR`, with its four bytes of header, or `ROS1`. Truncated bytes pass: the decoder rejects
+    them.
     """
     plan = _plan_of(msgtype, form)
     if plan.grows:
@@ -108,17 +108,17 @@ class _Count:
     def check(self, plan: _Plan, msgtype: str) -> None:
         try:
             self._walk(plan)
-        except struct.error:  # cut off
+        except struct.error:  # truncated
             return
         except OverflowError:
             raise GraphError(
-                f"a {msgtype} with more than {MAX_OBJECTS:,} messages and texts in its arrays; "
+                f"a {msgtype} has more than {MAX_OBJECTS:,} messages and texts in its arrays; "
                 "send several messages"
             ) from None
 
     @property
     def position(self) -> int:
-        """Where the walk has come to, behind the header."""
+        """Current position, bytes after the header."""
         return self._position
 
     def _walk(self, plan: _Plan) -> None:
@@ -207,7 +207,7 @@ def _add_base(plan: _Plan, base: str, form: str) -> None:
 
 
 def _add_length(plan: _Plan, form: str) -> None:
-    """Padding before a length: CDR aligns it."""
+    """Adds the padding before a length, which CDR aligns."""
     if form == CDR:
         plan.steps.append(_Fixed(_LENGTH_BYTES, 0))
 

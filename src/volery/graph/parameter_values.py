@@ -1,4 +1,4 @@
-"""Values of parameters as ROS 2 sends them."""
+"""Converts parameter values to and from ROS 2 messages."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _FIELDS = (
     "double_array_value",
     "string_array_value",
 )
-"""By the numbers of rcl_interfaces/msg/ParameterType."""
+"""Indexed by the numbers of rcl_interfaces/msg/ParameterType."""
 _BOOL, _INTEGER, _DOUBLE, _STRING = 1, 2, 3, 4
 _BYTES, _BOOLS, _INTEGERS, _DOUBLES, _STRINGS = 5, 6, 7, 8, 9
 _LONG = 2**63
@@ -31,7 +31,7 @@ _DTYPES = {_BOOLS: np.bool_, _INTEGERS: np.int64, _DOUBLES: np.float64}
 
 
 def type_of(value: Any) -> int:
-    """Number of a value's type; NOT_SET for what ROS 2 has no type for."""
+    """Returns the number of a value's type; NOT_SET if ROS 2 has no type for the value."""
     if isinstance(value, list | tuple | np.ndarray):
         return _type_of_array(list(value))
     if isinstance(value, int | np.integer) and not isinstance(value, bool):
@@ -54,7 +54,7 @@ def _type_of_array(values: list[Any]) -> int:
 
 
 def value_message(value: Any) -> Any:
-    """`rcl_interfaces/msg/ParameterValue` of a value."""
+    """Returns the `rcl_interfaces/msg/ParameterValue` of a value."""
     message = zero_message("rcl_interfaces/msg/ParameterValue")
     kind = message.type = type_of(value)
     if kind == _BYTES:
@@ -69,7 +69,7 @@ def value_message(value: Any) -> Any:
 
 
 def plain_of(message: Any) -> Any:
-    """The value that a message holds, as plain data; None where it is not set."""
+    """Returns the value in a message as plain data; None if it is not set."""
     if not NOT_SET < message.type < len(_FIELDS):
         return None
     value = getattr(message, _FIELDS[message.type])
@@ -77,5 +77,5 @@ def plain_of(message: Any) -> Any:
 
 
 def parameter_message(name: str, value: Any) -> Any:
-    """`rcl_interfaces/msg/Parameter`."""
+    """Returns a `rcl_interfaces/msg/Parameter`."""
     return message_type("rcl_interfaces/msg/Parameter")(name, value_message(value))

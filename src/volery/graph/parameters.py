@@ -1,11 +1,12 @@
-"""Parameters that nodes have declared, by node and name, for who asks from outside.
+"""Provides the declared parameters of all nodes, by node and name.
 
-Numbers are finite, in lists and tables too, and lie within the bounds of the quantity that the name
-tells (`height_m`: see `core.quantities`), besides those that the node declares. A node's own
-defaults are its author's business.
+Numbers are finite, in lists and tables too, and lie within the limits of the quantity that the name
+indicates (`height_m`: see `core.quantities`) and those that the node declares. A node's own
+defaults are not checked against the quantity.
 
-What is set takes effect when the node reads `Parameter.value` next. A node that reads a value only
-once, at its start, declares it read-only, and setting it is refused rather than without effect.
+A new value takes effect when the node next reads `Parameter.value`. A node that reads a value only
+once, at its start, declares the parameter read-only, so that setting it fails instead of having no
+effect.
 """
 
 from __future__ import annotations
@@ -21,17 +22,17 @@ from volery.core.quantities import fault_in
 
 
 class Within(NamedTuple):
-    """Bounds of a number; whatever is not finite lies outside."""
+    """Limits of a number; numbers that are not finite are outside."""
 
     min_value: float
     max_value: float = math.inf
 
     def holds(self, value: Any) -> bool:
-        """Whether a number lies within."""
+        """Returns whether a number is within the limits."""
         return bool(self.min_value <= value <= self.max_value and value < math.inf)
 
     def __str__(self) -> str:
-        """As an error tells it."""
+        """Returns the limits for an error message."""
         return (
             f"{self.min_value:g} to {self.max_value:g}"
             if self.max_value < math.inf
@@ -40,11 +41,11 @@ class Within(NamedTuple):
 
 
 class ParameterNotDeclaredError(GraphError):
-    """A node has no such parameter."""
+    """Raised when a node has no such parameter."""
 
 
 class ParameterAlreadyDeclaredError(GraphError):
-    """A node has declared that parameter before."""
+    """Raised when a node has declared the parameter already."""
 
 
 class ParameterType(IntEnum):
@@ -63,13 +64,13 @@ class ParameterType(IntEnum):
 
     @classmethod
     def from_parameter_value(cls, value: Any) -> ParameterType:
-        """Type of a value; NOT_SET for what ROS 2 has no type for."""
-        from volery.graph.parameter_values import type_of  # it is built upon messages
+        """Returns the type of a value; NOT_SET if ROS 2 has no type for the value."""
+        from volery.graph.parameter_values import type_of  # it imports messages
 
         return cls(type_of(value))
 
     def check(self, value: Any) -> bool:
-        """Whether a value is of this type."""
+        """Returns whether a value is of this type."""
         return self.from_parameter_value(value) is self
 
 
@@ -82,21 +83,21 @@ _LIKE: dict[ParameterType, Any] = {
 
 
 def like_of(kind: ParameterType) -> Any:
-    """A value of a type, for `Parameter`; lists are not looked into."""
+    """Returns an example value of a type, for `Parameter`; elements of lists are not checked."""
     return None if kind is ParameterType.NOT_SET else _LIKE.get(kind, [])
 
 
 class ParameterSetting:
-    """A name with a value, in the shape of `rclpy.parameter.Parameter`.
+    """A name with a value, with the interface of `rclpy.parameter.Parameter`.
 
-    `ValueError` where a type is given and the value is not of it.
+    Raises `ValueError` if a type is given and the value is of another.
     """
 
     Type: ClassVar[type[ParameterType]] = ParameterType
 
     def __init__(self, name: str, type_: ParameterType | None = None, value: Any = None) -> None:
         if type_ is not None and not ParameterType(type_).check(value):
-            raise ValueError(f"parameter '{name}': {value!r} is no {ParameterType(type_).name}")
+            raise ValueError(f"parameter '{name}': {value!r} is not a {ParameterType(type_).name}")
         self.name = name
         self.value = value
 
@@ -106,20 +107,20 @@ class ParameterSetting:
         return ParameterType.from_parameter_value(self.value)
 
     def get_parameter_value(self) -> Any:
-        """`rcl_interfaces/msg/ParameterValue`, as of `.double_value`."""
+        """Returns the value as a `rcl_interfaces/msg/ParameterValue`."""
         from volery.graph.parameter_values import value_message
 
         return value_message(self.value)
 
     def to_parameter_msg(self) -> Any:
-        """`rcl_interfaces/msg/Parameter`."""
+        """Returns the parameter as a `rcl_interfaces/msg/Parameter`."""
         from volery.graph.parameter_values import parameter_message
 
         return parameter_message(self.name, self.value)
 
     @classmethod
     def from_parameter_msg(cls, message: Any) -> ParameterSetting:
-        """Name and value of a `rcl_interfaces/msg/Parameter`."""
+        """Returns the setting in a `rcl_interfaces/msg/Parameter`."""
         from volery.graph.parameter_values import plain_of
 
         return cls(message.name, value=plain_of(message.value))
@@ -131,10 +132,10 @@ class ParameterSetting:
 class Parameter(ParameterSetting):
     """A declared parameter and its value.
 
-    like: a value of the kind that it takes, None where it takes any. within: bounds of a number.
-    read_only: whether the value that it has at the node's start is for good. before_set: called
-    before another value is set. agrees: called with a value that fits, raises `GraphError` with the
-    reason where the node does not take it.
+    like: an example value that determines the accepted kind, None: any. within: limits of a number.
+    read_only: whether the value is fixed after the node's start. before_set: called before another
+    value is set. agrees: called with a value that fits; raises `GraphError` with the reason if the
+    node rejects the value.
     """
 
     def __init__(
@@ -160,7 +161,7 @@ class Parameter(ParameterSetting):
         self.value = self._of_kind(value)
 
     def set(self, value: Any) -> None:
-        """Set another value. `GraphError` if it is read-only, or for a value that does not fit."""
+        """Sets the value. Raises `GraphError` if read-only, or if the value does not fit."""
         self.check(value)
         if self._before_set is not None:
             self._before_set()
@@ -169,15 +170,15 @@ class Parameter(ParameterSetting):
         self.value = self._of_kind(value)
 
     def check(self, value: Any) -> None:
-        """`GraphError` if it is read-only, or for a value that does not fit."""
+        """Raises `GraphError` if the parameter is read-only, or if the value does not fit."""
         if self.read_only:
             raise GraphError(
-                f"parameter '{self.name}' is read-only: its node takes it at its start"
+                f"parameter '{self.name}' is read-only: set it in the scenario before the start"
             )
         self._check(value)
 
     def describe(self) -> Any:
-        """`rcl_interfaces/msg/ParameterDescriptor`."""
+        """Returns the parameter's `rcl_interfaces/msg/ParameterDescriptor`."""
         from volery.graph.messages import message_type
 
         descriptor = message_type("rcl_interfaces/msg/ParameterDescriptor")(
@@ -202,7 +203,7 @@ class Parameter(ParameterSetting):
         return descriptor
 
     def _of_kind(self, value: Any) -> Any:
-        """A whole number as a float where the parameter is one."""
+        """Converts an integer to a float if the parameter is a float."""
         return float(value) if isinstance(self._like, float) else value
 
     def _check(self, value: Any) -> None:
@@ -218,7 +219,7 @@ class Parameter(ParameterSetting):
 
 
 class Parameters:
-    """All parameters of the nodes of a graph. Values are set in the simulation's thread alone."""
+    """Holds all parameters of a graph. Values are set in the simulation's thread only."""
 
     def __init__(self) -> None:
         self._nodes: dict[str, dict[str, Parameter]] = {}
@@ -226,59 +227,59 @@ class Parameters:
         self._lock = threading.Lock()
 
     def enter(self, node: str) -> None:
-        """Note that there is a node of this full name, whether or not it declares any."""
+        """Registers a node by its full name, with or without parameters."""
         with self._lock:
             self._present.add(node)
 
     def nodes(self) -> set[str]:
-        """Full names of all nodes."""
+        """Returns the full names of all nodes."""
         with self._lock:
             return {*self._present, *self._nodes}
 
     def declare(self, node: str, parameter: Parameter) -> None:
-        """Add a parameter of a node named absolutely. `GraphError` if it has one of that name."""
+        """Adds a parameter of a node (full name). Raises `GraphError` if it is declared already."""
         with self._lock:
             declared = self._nodes.setdefault(node, {})
             if parameter.name in declared:
                 raise ParameterAlreadyDeclaredError(
-                    f"node '{node}' has declared parameter '{parameter.name}' already"
+                    f"node '{node}' has already declared parameter '{parameter.name}'"
                 )
             declared[parameter.name] = parameter
 
     def undeclare(self, node: str, name: str) -> None:
-        """Strike off one parameter of a node."""
+        """Removes one parameter of a node."""
         with self._lock:
             self._nodes.get(node, {}).pop(name, None)
 
     def forget(self, node: str) -> None:
-        """Strike off all parameters of a node that has ended."""
+        """Removes a destroyed node and its parameters."""
         with self._lock:
             self._nodes.pop(node, None)
             self._present.discard(node)
 
     def names(self) -> list[tuple[str, str]]:
-        """Nodes and names, sorted."""
+        """Returns all (node, name) pairs, sorted."""
         with self._lock:
             return sorted((node, name) for node, found in self._nodes.items() for name in found)
 
     def has_node(self, node: str) -> bool:
-        """Whether a node has declared any."""
+        """Returns whether a node has declared parameters."""
         return node in self._nodes
 
     def get(self, node: str, name: str) -> Parameter:
-        """A parameter. `GraphError`, with what there is, where there is none such."""
+        """Returns a parameter. Raises `GraphError`, with the known names, if it does not exist."""
         with self._lock:
             declared = self._nodes.get(node)
             if declared is None:
-                raise GraphError(f"no node '{node}' with parameters")
+                raise GraphError(f"no node '{node}' has parameters")
             if name not in declared:
                 known = ", ".join(sorted(declared))
-                raise GraphError(f"node '{node}' has no parameter '{name}'; it has {known}")
+                raise GraphError(f"node '{node}' has no parameter '{name}'; known: {known}")
             return declared[name]
 
 
 def same_kind(value: Any, like: Any) -> bool:
-    """Whether a value may stand where `like` does: a whole number may for any number."""
+    """Returns whether a value is of the kind of `like`; an integer is also a float."""
     if like is None:
         return True
     if isinstance(like, bool) or isinstance(value, bool):

@@ -1,4 +1,4 @@
-"""How messages wait for those who are slow, in the words of rclpy's `qos` module."""
+"""Provides quality-of-service profiles, with the names of rclpy's `qos` module."""
 
 from __future__ import annotations
 
@@ -13,23 +13,24 @@ MOST_DEPTH = 100_000
 
 
 def check_depth(depth: int) -> None:
-    """`GraphError` for a depth that cannot be."""
+    """Raises `GraphError` if a depth is out of range."""
     if not 1 <= depth <= MOST_DEPTH:
         raise GraphError(f"queue depth must be 1 to {MOST_DEPTH}, not {depth}")
 
 
 class ReliabilityPolicy(StrEnum):
-    """What happens where a subscriber is too slow."""
+    """What happens when a subscriber is too slow."""
 
     SYSTEM_DEFAULT = "system_default"
     BEST_EFFORT = "best_effort"
-    """The oldest message goes, and is counted."""
+    """The oldest message is dropped, and counted."""
     RELIABLE = "reliable"
-    """Nothing goes; a subscription that falls behind without end is ended, and told why."""
+    """No message is dropped; the subscription of a client that never catches up ends with a
+    reason."""
 
 
 class DurabilityPolicy(StrEnum):
-    """What those get who subscribe late."""
+    """Which messages late subscribers receive."""
 
     SYSTEM_DEFAULT = "system_default"
     VOLATILE = "volatile"
@@ -38,11 +39,11 @@ class DurabilityPolicy(StrEnum):
 
 
 class HistoryPolicy(StrEnum):
-    """How many messages wait."""
+    """How many messages are queued."""
 
     KEEP_LAST = "keep_last"
     KEEP_ALL = "keep_all"
-    """As many as may wait at all; the depth does not count."""
+    """As many as possible; the depth has no effect."""
     SYSTEM_DEFAULT = "system_default"
 
 
@@ -50,13 +51,14 @@ class HistoryPolicy(StrEnum):
 class QoSProfile:
     """Quality of service of a publisher or subscription.
 
-    Inside the simulation nothing ever waits or is lost; the depth and reliability of a subscription
-    count where it goes through a bridge. Durability counts for publishers alone: every subscription
-    gets what is latched. rclpy's `deadline`, `lifespan` and `liveliness` are without effect.
+    Inside the simulation no message is delayed or lost; depth and reliability of a subscription
+    have an effect only through a bridge. Durability has an effect for publishers only: every
+    subscription receives latched messages. rclpy's `deadline`, `lifespan` and `liveliness` have no
+    effect.
     """
 
     depth: int = DEFAULT_DEPTH
-    """Messages that wait at most with best effort."""
+    """Maximum number of queued messages with best effort."""
     reliability: ReliabilityPolicy = ReliabilityPolicy.BEST_EFFORT
     durability: DurabilityPolicy = DurabilityPolicy.VOLATILE
     history: HistoryPolicy = HistoryPolicy.KEEP_LAST
@@ -73,12 +75,12 @@ class QoSProfile:
 
     @property
     def reliable(self) -> bool:
-        """Whether no message may be lost."""
+        """Whether no message may be dropped."""
         return self.reliability == ReliabilityPolicy.RELIABLE
 
     @property
     def latched(self) -> bool:
-        """Whether a publisher's last message awaits those who subscribe later."""
+        """Whether later subscribers receive a publisher's last message."""
         return self.durability == DurabilityPolicy.TRANSIENT_LOCAL
 
 
@@ -89,7 +91,7 @@ qos_profile_sensor_data = QoSProfile(depth=5)
 
 
 def profile_of(qos: int | QoSProfile) -> QoSProfile:
-    """A profile, or that of a depth. `GraphError` for a depth that cannot be."""
+    """Returns a profile, or the profile of a depth. Raises `GraphError` for a wrong depth."""
     if not isinstance(qos, QoSProfile):
         return QoSProfile(qos)
     check_depth(qos.depth)

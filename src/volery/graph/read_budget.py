@@ -1,11 +1,10 @@
-"""How much time of the simulation's process reading and writing may take for external clients.
+"""Limits the time that reading from and writing to external clients may take.
 
-Decoders hold Python's lock, which the simulation's thread needs, too. So what a client sends is
-charged to it by CPU time, and a client beyond its share is read from no more until time has paid
-for that: its socket fills, and it waits. Where the simulation is late, writing to clients has its
-share, too, and what is published meanwhile waits in bounded queues. All clients together get a
-fraction of wall time, in equal shares among those that are over their credit. A client within its
-share is never held.
+Decoders hold the GIL, which the simulation's thread needs too. So a client is charged the CPU time
+of its messages, and a client beyond its share is not read from until time has paid for it: its
+socket fills, and the client waits. When the simulation is late, writing to clients is limited too,
+and messages wait in bounded queues. All clients together get a fraction of wall time, in equal
+shares among those that are over their credit. A client within its share never waits.
 """
 
 from __future__ import annotations
@@ -14,39 +13,40 @@ import time
 from collections.abc import Callable
 
 MAX_FRACTION = 0.5
-"""Of wall time, where the simulation keeps its pace."""
+"""Fraction of wall time, where the simulation achieves its real-time factor."""
 BUSY_FRACTION = 0.05
-"""Where it does not, or runs as fast as it can."""
+"""Fraction where it does not, or runs as fast as possible."""
 WRITE_FRACTION = 0.3
-"""Where the simulation is late; elsewhere writing is not held."""
+"""Fraction for writing where the simulation is late; otherwise writing is not limited."""
 _NOT_HELD = 100.0
 CREDIT_S = 0.05
-"""What a client may spend in advance."""
+"""CPU time that a client may use in advance."""
 MAX_DEBT_S = 0.1
-"""Beyond the credit; a client alone waits two seconds at most."""
+"""Maximum debt beyond the credit; a single client waits two seconds at most."""
 MAX_WAITING = 100
-"""Commands of one client that the simulation has not taken yet; beyond, it is not read from.
+"""Commands of one client that the simulation has not processed; beyond, the client is not read
+from.
 
-Those of others that come later wait behind them, in the order of arrival.
+Later commands of other clients wait behind them, in the order of arrival.
 """
 MAX_WAITING_BYTES = 32 * 1024 * 1024
-"""Of messages that wait like that, roughly: of all that was read since none waited."""
+"""Approximate bytes of such commands: all that were read since none was waiting."""
 FRAME_S = 50e-6
-"""What a frame costs before it is decoded: waking, cutting, a task's turn."""
+"""Cost of a frame before decoding: wake-up, framing, a task's turn."""
 BYTE_S = 1e-9
-"""What each of its bytes costs there: about four copies."""
+"""Cost of each byte before decoding: about four copies."""
 
 _LONGEST_PAUSE_S = 0.25
-"""After which the pace is looked at anew."""
+"""After this time the rate is evaluated again."""
 _FULL_PAUSE_S = 0.005
-"""Between two looks whether the simulation has taken enough."""
+"""Between two checks whether the simulation has processed enough."""
 
 
 class ReadBudgets:
     """Shares of all clients of a gateway.
 
-    is_busy: whether the simulation has no time to spare at present; called from any thread.
-    fraction, busy_fraction: of wall time, for all clients together, and where it is busy.
+    is_busy: returns whether the simulation has no time to spare; called from any thread. fraction,
+    busy_fraction: of wall time, for all clients together, and when busy.
     """
 
     def __init__(
@@ -64,12 +64,12 @@ class ReadBudgets:
         self._over: set[ReadBudget] = set()
 
     def open(self) -> ReadBudget:
-        """Returns the budget of one more client."""
+        """Returns the budget of another client."""
         return ReadBudget(self)
 
     @property
     def now_s(self) -> float:
-        """Wall time."""
+        """Wall time, s."""
         return self._now_s()
 
     @property
@@ -79,20 +79,20 @@ class ReadBudgets:
         return fraction / max(1, len(self._over))
 
     def note(self, budget: ReadBudget, *, is_over: bool) -> None:
-        """Remember which clients have spent more than their credit."""
+        """Records whether a client has used more than its credit."""
         (self._over.add if is_over else self._over.discard)(budget)
 
 
 def write_budgets(is_late: Callable[[], bool]) -> ReadBudgets:
-    """Returns the shares of writing to clients.
+    """Returns the shares for writing to clients.
 
-    is_late: whether the simulation does not keep its pace.
+    is_late: returns whether the simulation is behind its real-time factor.
     """
     return ReadBudgets(is_late, fraction=_NOT_HELD, busy_fraction=WRITE_FRACTION)
 
 
 class ReadBudget:
-    """What one client owes. It belongs to the thread that reads from the client."""
+    """Debt of one client. Belongs to the thread that reads from the client."""
 
     def __init__(self, budgets: ReadBudgets) -> None:
         self._budgets = budgets
@@ -100,14 +100,14 @@ class ReadBudget:
         self._last_s = budgets.now_s
 
     def charge(self, cost_s: float) -> None:
-        """Note CPU time that the client's message took."""
+        """Charges the CPU time of a message."""
         self._earn()
         self._owed_s = min(self._owed_s + cost_s, CREDIT_S + MAX_DEBT_S)
         if self._owed_s > CREDIT_S:
             self._budgets.note(self, is_over=True)
 
     def pause_s(self) -> float:
-        """Returns for how long not to read from the client; 0: read on. Ask again afterwards."""
+        """Returns how long not to read from the client, s; 0: continue. Check again afterwards."""
         self._earn()
         over_s = self._owed_s - CREDIT_S
         if over_s <= 0.0:
@@ -116,7 +116,7 @@ class ReadBudget:
         return min(over_s / self._budgets.rate, _LONGEST_PAUSE_S)
 
     def close(self) -> None:
-        """The client has left."""
+        """Clears the debt of a client that has disconnected."""
         self._owed_s = 0.0
         self._budgets.note(self, is_over=False)
 
@@ -128,9 +128,9 @@ class ReadBudget:
 
 
 class Reading:
-    """What a bridge asks before it reads on from a client; see `Session.reading`.
+    """Budget that a bridge checks before it reads on from a client; see `Session.reading`.
 
-    waiting: how many of the client's commands the simulation has not taken yet.
+    waiting: returns the number of the client's commands that the simulation has not processed yet.
     """
 
     def __init__(self, budget: ReadBudget, waiting: Callable[[], int]) -> None:
@@ -140,11 +140,11 @@ class Reading:
         self._unsettled_bytes = 0
 
     def begin(self) -> None:
-        """Decoding begins, in the thread that goes on with it until `end`."""
+        """Starts measuring decoding, in the thread that continues until `end`."""
         self._began_s = time.thread_time()
 
     def end(self, frames: int, size: int) -> float:
-        """Charge the client for what began, and for taking so many frames and bytes in.
+        """Charges the client for the time since `begin`, and for the given frames and bytes.
 
         Returns the charge in s.
         """
@@ -155,7 +155,7 @@ class Reading:
         return cost_s
 
     def pause_s(self) -> float:
-        """Returns for how long not to read from the client; 0: read on. Ask again afterwards."""
+        """Returns how long not to read from the client, s; 0: continue. Check again afterwards."""
         waiting = self._waiting()
         if not waiting:
             self._unsettled_bytes = 0
@@ -164,5 +164,5 @@ class Reading:
         return self._budget.pause_s()
 
     def close(self) -> None:
-        """The client has left."""
+        """Clears the debt of a client that has disconnected."""
         self._budget.close()

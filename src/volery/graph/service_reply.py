@@ -1,4 +1,4 @@
-"""The answer to a service request, on its way."""
+"""Provides the pending response to a service request."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from volery.core.errors import GraphError
 
 
 class ServiceReply:
-    """One answer: a response or a failure, once, from any thread.
+    """One pending response: settled once, by a response or a failure, from any thread.
 
-    Whoever waits for it is told in the thread that answers.
+    The callbacks run in the thread that settles it.
     """
 
     def __init__(
@@ -26,21 +26,21 @@ class ServiceReply:
 
     @property
     def done(self) -> bool:
-        """Whether it has been answered."""
+        """Whether the reply has been settled."""
         return self._done
 
     def answer(self, response: Any) -> None:
-        """Give the response; nothing happens if there was an answer before."""
+        """Gives the response; has no effect on a settled reply."""
         if self._finish():
             self._on_response(response)
 
     def fail(self, error: GraphError) -> None:
-        """Say that there will be no response; nothing happens if there was an answer before."""
+        """Gives a failure; has no effect on a settled reply."""
         if self._finish():
             self._on_failure(error)
 
     def when_done(self, callback: Callable[[], None]) -> None:
-        """Call `callback` before the answer is handed out; at once if it has been."""
+        """Calls `callback` before the response is passed on; at once if it has been."""
         with self._lock:
             if not self._done:
                 self._afterwards.append(callback)

@@ -1,9 +1,9 @@
-"""The graph for programs outside of the simulation's thread: what every bridge stands on.
+"""Provides the graph to clients in other threads; every bridge is built on it.
 
-A bridge opens one `Session` for each of its clients. All its methods may be called by any thread.
-What a client publishes and calls is posted to the simulation's thread, which takes it in between
-two ticks, in the order of arrival; what it receives waits in a bounded `SubscriptionQueue` that
-keeps the newest. A client that does not read loses messages of its own and delays nobody.
+A bridge opens one `Session` for each of its clients. Its methods are thread-safe. A client's
+publications and calls are posted to the simulation's thread, which processes them between two
+ticks, in the order of arrival; messages for the client wait in a bounded `SubscriptionQueue` of the
+newest. A client that does not read loses its own messages and delays no other client.
 
     session = gateway.open("rosbridge 127.0.0.1:51234")
     mailbox = session.subscribe("/uav1/odom", "nav_msgs/msg/Odometry", wake=loop_wakes_up)
@@ -38,23 +38,23 @@ from volery.graph.subscription_queue import (
 )
 
 Post = Callable[[Callable[[], Any]], "Future[Any]"]
-"""Has a function called by the simulation's thread; the future holds its result or error."""
+"""Runs a function in the simulation's thread; the future holds its result or error."""
 Handler = Callable[[Any, ServiceReply], None]
-"""Takes a request in the simulation's thread, at once, and answers through the reply later."""
+"""Receives a request in the simulation's thread, must not block, and responds through the reply."""
 
 _log = logging.getLogger(__name__)
 
 _MAX_FAILURES_LOGGED = 20
-"""Of topics and services of one client; each is logged once."""
+"""Topics and services of one client; each is logged once."""
 
 MAX_LATCHED_BYTES = 128 * 1024 * 1024
-"""Of the latched messages of one client, which the graph keeps for late subscribers."""
+"""Limit of the latched messages of one client, which the graph stores for late subscribers."""
 _MOST_NAMES = 20_000
-"""Of UAVs that are remembered as commanded; more than any fleet has."""
+"""Limit of the stored names of commanded UAVs; more than any fleet has."""
 
 
 class ClientCommand(NamedTuple):
-    """What a client did, told in the simulation's thread just before it takes effect.
+    """Describes a client's command, in the simulation's thread just before it takes effect.
 
     kind: `call`, `publish`, `advertise`, ... as in `volery_interfaces/msg/CommandRecord`.
     """
@@ -67,16 +67,16 @@ class ClientCommand(NamedTuple):
     """The message, request or response; the reason of a failure."""
     latched: bool = False
     request: int = 0
-    """Which request to that service is answered."""
+    """Number of the request to the service that is responded to."""
 
 
 Watch = Callable[[ClientCommand], None]
-"""Is told what clients do; the `GraphError` that it raises refuses it."""
+"""Receives the commands of clients; raises `GraphError` to refuse a command."""
 
 
 @dataclass(frozen=True)
 class SessionInfo:
-    """Who is connected, and to what."""
+    """Describes one client session."""
 
     name: str
     publishes: tuple[str, ...]
@@ -85,7 +85,7 @@ class SessionInfo:
 
 
 class Gateway:
-    """Where bridges open sessions for their clients; `watch` is told what those do."""
+    """Opens sessions for the clients of bridges; `watch` receives the clients' commands."""
 
     def __init__(
         self,
@@ -98,13 +98,13 @@ class Gateway:
         is_late: Callable[[], bool] = lambda: False,
         rotor_layouts: Callable[[], Mapping[str, RotorLayout]] = dict,
     ) -> None:
-        """Take how sessions post: `open_queue()` is asked for each client, else all use `post`.
+        """Configures how sessions post: each through an `open_queue()`, else through `post`.
 
-        What one client posts through its queue is done in its order, at its own expense: a client
-        that costs the simulation's thread too much time waits for its turn. `is_busy()` tells
-        whether the simulation has no time to spare for reading from clients, `is_late()` whether it
-        does not keep its pace; see `read_budget`. `rotor_layouts()` returns the rotors of each
-        UAV by its name, in any thread.
+        Actions of one queue run in order and within the client's share of time: a client that uses
+        too much of the simulation's thread has to wait. `is_busy()` returns whether the simulation
+        has no time to spare for reading from clients, `is_late()` whether it is behind its
+        real-time factor; see `read_budget`. `rotor_layouts()` returns the rotors of each UAV by its
+        name, in any thread.
         """
         self.read_budgets = ReadBudgets(is_busy)
         self.write_budgets = write_budgets(is_late)
@@ -117,14 +117,14 @@ class Gateway:
         self._lock = threading.Lock()
         self._lost = 0
         self.commands = 0
-        """How often somebody outside has published or called something below a name."""
+        """Number of external publications and calls on names within a namespace."""
         self.commanded_ns: dict[str, int] = {}
-        """When that was last the case, by the name, such as a UAV's."""
+        """Simulated time, ns, of the last such command by namespace, such as a UAV's name."""
 
     def open(self, name: str, *, inside: bool = False) -> Session:
-        """Begin the session of one client; `name` tells people who it is.
+        """Opens the session of one client; `name` identifies the client to users.
 
-        inside: it is no client but a part of Volery, whose doings follow from those of clients.
+        inside: the session belongs to a part of Volery whose commands follow from those of clients.
         """
         post = self._post if inside or self._open_queue is None else self._open_queue()
         session = Session(self, name, None if inside else self.watch, post)
@@ -133,47 +133,47 @@ class Gateway:
         return session
 
     def sessions(self) -> list[SessionInfo]:
-        """Everybody who is connected, in the order of arrival."""
+        """Returns all open sessions, in the order of opening."""
         with self._lock:
             return [session.info for session in self._sessions]
 
     @property
     def dropped(self) -> int:
-        """Messages that clients have lost because they were too slow, those that left included."""
+        """Number of messages dropped because clients were too slow, closed sessions included."""
         present = (box.dropped for session in self.sessions() for box in session.mailboxes)
         return self._lost + sum(present)
 
     def post(self, action: Callable[[], Any]) -> Future[Any]:
-        """Have `action()` called by the simulation's thread."""
+        """Runs `action()` in the simulation's thread."""
         return self._post(action)
 
     def note_command(self, name: str) -> None:
-        """Note that a topic or service of a UAV is used from outside; in the simulation's thread.
+        """Counts an external use of a topic or service of a UAV; in the simulation's thread.
 
-        Names outside of any namespace are nobody's.
+        Names without a namespace are not counted.
         """
         uav, below, _ = name[1:].partition("/")
         if below:
             self.commands += 1
-            self.commanded_ns.pop(uav, None)  # the newest last
+            self.commanded_ns.pop(uav, None)  # newest last
             self.commanded_ns[uav] = self.graph.now_ns()
             if len(self.commanded_ns) > _MOST_NAMES:
                 del self.commanded_ns[next(iter(self.commanded_ns))]
 
     def note_lost(self, messages: int) -> None:
-        """Remember what a subscription that ends has lost; used by `Session`."""
+        """Adds the dropped messages of a subscription that ends; used by `Session`."""
         with self._lock:
             self._lost += messages
 
     def forget(self, session: Session) -> None:
-        """Strike a session that has ended off the list; used by `Session`."""
+        """Removes a session that has ended; used by `Session`."""
         with self._lock:
             if session in self._sessions:
                 self._sessions.remove(session)
 
 
 class Session:
-    """One outside client's part in the graph; `close` takes everything back."""
+    """One external client of the graph; `close` ends all its publishers, queues and services."""
 
     def __init__(self, gateway: Gateway, name: str, watch: Watch | None, post: Post) -> None:
         self.name = name
@@ -182,9 +182,9 @@ class Session:
         self._last_posted = 0
         self._taken = 0
         self.reading = Reading(gateway.read_budgets.open(), lambda: self.waiting)
-        """What a bridge asks before it reads on from the client."""
+        """Budget that a bridge checks before it continues to read from the client."""
         self.writing = Reading(gateway.write_budgets.open(), lambda: 0)
-        """What it asks before it writes on."""
+        """Budget that a bridge checks before it continues to write to the client."""
         self._latched_bytes: dict[str, int] = {}
         self._watch = watch or _look_away
         self._inside = watch is None
@@ -200,18 +200,18 @@ class Session:
 
     @property
     def graph(self) -> Graph:
-        """The graph, for questions about topics and services."""
+        """The graph, for queries about topics and services."""
         return self._graph
 
     def post(self, action: Callable[[], Any]) -> Future[Any]:
-        """Have `action()` called by the simulation's thread, in the order of the client's posts.
+        """Runs `action()` in the simulation's thread, in the order of the client's posts.
 
-        It may have to wait for the client's turn (`waiting`); whatever a client causes there is
-        posted like this.
+        The action may have to wait for the client's turn (`waiting`). Everything that a client
+        causes is posted this way.
         """
 
         def act() -> Any:
-            self._taken += 1  # in the simulation's thread alone
+            self._taken += 1  # in the simulation's thread only
             if self._inside:
                 return action()
             with self._graph.on_behalf_of(self.name):
@@ -222,18 +222,19 @@ class Session:
 
     @property
     def waiting(self) -> int:
-        """How much the client has posted that the simulation has not taken yet.
+        """Number of the client's posts that the simulation has not processed yet.
 
-        A bridge that reads no more of a client while this is large bounds the client's memory.
+        A bridge bounds the client's memory by not reading from the client while this number is
+        large.
         """
         return max(0, self._last_posted - self._taken)
 
     # ------------------------------------------------------------------------------------ topics
 
     def advertise(self, topic: str, msgtype: str, *, latched: bool = False) -> None:
-        """Announce that the client will publish on `topic`. `GraphError` for a wrong type.
+        """Announces that the client publishes on `topic`. Raises `GraphError` for a wrong type.
 
-        Again with the same type: nothing changes.
+        A second call with the same type has no effect.
         """
         with self._lock:
             self._check_open()
@@ -246,7 +247,7 @@ class Session:
         self.tell("advertise", topic, msgtype, latched=latched)
 
     def unadvertise(self, topic: str) -> None:
-        """Publish on `topic` no more. `GraphError` if it did not."""
+        """Stops publishing on `topic`. Raises `GraphError` if the client has not advertised it."""
         with self._lock:
             publisher = self._publishers.pop(topic, None)
             self._latched_bytes.pop(topic, None)
@@ -256,16 +257,16 @@ class Session:
         publisher.cancel()
 
     def published_type(self, topic: str) -> str | None:
-        """Type that the client has announced for `topic`; None if it has not."""
+        """Returns the type that the client has advertised for `topic`, or None."""
         publisher = self._publishers.get(topic)
         return None if publisher is None else publisher.msgtype
 
     def publish(self, topic: str, message: Any) -> None:
-        """Publish a message of the announced type; its arrays must not be written to any more."""
+        """Publishes a message of the advertised type; its arrays must not be modified later."""
         self.publish_all(((topic, message),))
 
     def publish_all(self, messages: Sequence[tuple[str, Any]]) -> None:
-        """Like `publish`, of messages by topic that are taken in together, in their order."""
+        """Publishes (topic, message) pairs in one post, in their order; see `publish`."""
         known = [(self._publisher(topic), message) for topic, message in messages]
         for publisher, message in known:
             if publisher.latched and not self._inside:
@@ -284,14 +285,14 @@ class Session:
             self.post(publish).add_done_callback(lambda done: self._log_failure(done, topics))
 
     def _count_latched(self, topic: str, message: Any) -> None:
-        """Bound what the graph keeps for late subscribers; `GraphError` where it is too much."""
+        """Limits the bytes that the graph latches for the client; raises `GraphError` beyond."""
         size = message_bytes(message)
         with self._lock:
             others = sum(self._latched_bytes.values()) - self._latched_bytes.get(topic, 0)
             if others + size > MAX_LATCHED_BYTES:
                 raise GraphError(
-                    f"'{topic}': the latched messages of {self.name} would have more than "
-                    f"{MAX_LATCHED_BYTES >> 20} MiB; unadvertise topics that are done with"
+                    f"'{topic}': the latched messages of {self.name} would exceed "
+                    f"{MAX_LATCHED_BYTES >> 20} MiB; unadvertise topics that are no longer used"
                 )
             self._latched_bytes[topic] = size
 
@@ -310,7 +311,7 @@ class Session:
         reliable: bool = False,
         wake: Wake,
     ) -> SubscriptionQueue:
-        """As `graph.connection.Link.subscribe`; `wake` is called from the simulation's thread."""
+        """Like `GraphConnection.subscribe`; `wake` is called from the simulation's thread."""
         check_depth(depth)
         mailbox = SubscriptionQueue(topic, depth, wake, reliable=reliable)
         with self._lock:
@@ -319,7 +320,7 @@ class Session:
         return mailbox
 
     def unsubscribe(self, mailbox: SubscriptionQueue) -> None:
-        """Receive no more; what waits can still be taken."""
+        """Ends a subscription; messages in its queue can still be taken."""
         with self._lock:
             subscription = self._mailboxes.pop(mailbox, None)
         if subscription is not None:
@@ -329,7 +330,7 @@ class Session:
     # ---------------------------------------------------------------------------------- services
 
     def call(self, service: str, request: Any | None, reply: ServiceReply) -> None:
-        """Call a service; `reply` gets the response or a `GraphError`, in some other thread."""
+        """Calls a service; `reply` gets the response or a `GraphError`, in another thread."""
 
         def ask() -> None:
             self._note(service)
@@ -348,16 +349,16 @@ class Session:
         )
 
     def offer(self, service: str, srvtype: str, handler: Handler) -> None:
-        """Offer a service. `GraphError` if somebody does so already.
+        """Creates a service. Raises `GraphError` if the service already has a server.
 
         `handler(request, reply)` is called in the simulation's thread and must not block. Requests
-        not answered when the client leaves fail.
+        that are pending when the client disconnects fail.
         """
         message_type(f"{srvtype}_Request")
         with self._lock:
             self._check_open()
             if service in self._offers:
-                raise GraphError(f"{self.name} offers service '{service}' already")
+                raise GraphError(f"{self.name} already serves '{service}'")
             pending: set[ServiceReply] = set()
             numbers = itertools.count()
 
@@ -372,11 +373,11 @@ class Session:
         self.tell("offer", service, srvtype)
 
     def withdraw(self, service: str) -> None:
-        """Offer a service no more; its open requests fail. `GraphError` if it was not offered."""
+        """Destroys a service; pending requests fail. Raises `GraphError` if it does not exist."""
         with self._lock:
             pending = self._offers.pop(service, None)
         if pending is None:
-            raise GraphError(f"{self.name} does not offer service '{service}'")
+            raise GraphError(f"{self.name} does not serve '{service}'")
         srvtype = self._graph.services().get(service, "")
         self._graph.withdraw(service)
         for reply in tuple(pending):
@@ -384,9 +385,9 @@ class Session:
         self.tell("withdraw", service, srvtype)
 
     def _relay(self, service: str, srvtype: str, reply: ServiceReply, request: int) -> ServiceReply:
-        """A reply whose answer reaches `reply` between two ticks, as all that comes from outside.
+        """Returns a reply that passes the response to `reply` between two ticks.
 
-        One that is given in the simulation's thread at once, as inside, goes on at once.
+        A response given at once, in the simulation's thread, is passed on at once.
         """
         here = threading.get_ident()
 
@@ -412,13 +413,13 @@ class Session:
     def tell(
         self, kind: str, name: str, msgtype: str, content: Any = None, *, latched: bool = False
     ) -> None:
-        """Have the watch told what the client does, where that is not posted anyway."""
+        """Passes a command to the watch, where the command itself is not posted."""
         self.post(
             lambda: self._watch(ClientCommand(self.name, kind, name, msgtype, content, latched))
         )
 
     def close(self) -> None:
-        """Take back everything; a second time nothing happens."""
+        """Ends all publishers, subscriptions and services; a second call has no effect."""
         with self._lock:
             self._closed = True
             topics, mailboxes = tuple(self._publishers), tuple(self._mailboxes)
@@ -435,26 +436,26 @@ class Session:
 
     @property
     def mailboxes(self) -> tuple[SubscriptionQueueInfo, ...]:
-        """How its subscriptions fare."""
+        """Counts of the client's subscription queues."""
         with self._lock:
             return tuple(mailbox.info for mailbox in self._mailboxes)
 
     @property
     def info(self) -> SessionInfo:
-        """What the client does at present."""
+        """The client's current publishers, subscriptions and services."""
         with self._lock:
             publishes, offers = tuple(self._publishers), tuple(self._offers)
             return SessionInfo(self.name, publishes, self.mailboxes, offers)
 
     def _log_failure(self, done: Future[Any], name: str) -> None:
-        """Log what became of a publication or an answer that nothing waits for."""
+        """Logs the failure of a publication or response that nothing waits for."""
         error = None if done.cancelled() else done.exception()
         known = name in self._failed or len(self._failed) >= _MAX_FAILURES_LOGGED
         if error is None or self._closed or known:
             return
         self._failed.add(name)
         ours = None if isinstance(error, VoleryError) else error
-        _log.warning("'%s' from %s is not taken: %s", name, self.name, error, exc_info=ours)
+        _log.warning("'%s' from %s was rejected: %s", name, self.name, error, exc_info=ours)
 
     def _check_open(self) -> None:
         if self._closed:
@@ -462,11 +463,11 @@ class Session:
 
 
 def _look_away(_what: object) -> None:
-    """Watch nothing."""
+    """Ignores its argument."""
 
 
 def _tell_failure(asked: Future[Any], reply: ServiceReply, service: str, client: str) -> None:
-    """Answer a caller whose question was never asked, or broke in the asking."""
+    """Fails the reply of a call that was never made, or that failed."""
     if asked.cancelled():
         reply.fail(GraphError("the simulation has ended"))
         return
@@ -475,4 +476,4 @@ def _tell_failure(asked: Future[Any], reply: ServiceReply, service: str, client:
         reply.fail(GraphError(str(error)))
     elif error is not None:
         _log.error("service '%s', called by %s, failed", service, client, exc_info=error)
-        reply.fail(GraphError(f"service '{service}' failed; the simulation's log says why"))
+        reply.fail(GraphError(f"service '{service}' failed; see the simulation's log"))

@@ -1,4 +1,4 @@
-"""Where messages of one topic wait for one client of another thread."""
+"""Provides the queue of one topic's messages for one client of another thread."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from volery.graph.messages import Published
 from volery.graph.qos import MOST_DEPTH
 
 Wake = Callable[[], None]
-"""Called in the simulation's thread when there is something to take; must not block."""
+"""Called in the simulation's thread when messages are available; must not block."""
 
 MOST_RELIABLE_BYTES = 256 * 1024 * 1024
-"""What may wait for a reliable subscriber, in arrays; beyond, its subscription ends."""
+"""Limit of the bytes queued for a reliable subscriber; beyond, its subscription ends."""
 
 _PART_BYTES = 100
 _NUMBER_BYTES = 8
@@ -30,7 +30,7 @@ _arrivals = itertools.count()
 
 @dataclass(frozen=True)
 class SubscriptionQueueInfo:
-    """How a subscription of an outside client fares."""
+    """Counts of a subscription of an external client."""
 
     topic: str
     received: int
@@ -39,11 +39,11 @@ class SubscriptionQueueInfo:
 
 
 class SubscriptionQueue:
-    """Messages of one topic that await one client.
+    """Queues messages of one topic for one client.
 
-    With best effort the newest `depth` of them. A `reliable` one loses none, up to MOST_DEPTH
+    With best effort, the newest `depth` messages. A `reliable` queue drops none, up to MOST_DEPTH
     messages or MOST_RELIABLE_BYTES: a client that is farther behind will never catch up, so the
-    mailbox then empties, takes no more and says in `failure` why.
+    queue then empties, accepts no more and gives the reason in `failure`.
     """
 
     def __init__(self, topic: str, depth: int, wake: Wake, *, reliable: bool = False) -> None:
@@ -60,11 +60,11 @@ class SubscriptionQueue:
 
     @property
     def failure(self) -> str | None:
-        """Why nothing comes any more; None while all is well."""
+        """Reason why the subscription has ended; None while it is active."""
         return self._failure
 
     def put(self, published: Published) -> None:
-        """Add a message; where there is no room the oldest one goes, or all if reliable."""
+        """Adds a message; a full queue drops its oldest one, or ends if it is reliable."""
         with self._lock:
             if self._failure is not None:
                 return
@@ -87,18 +87,18 @@ class SubscriptionQueue:
         self._failure = (
             f"reliable subscription of '{self.topic}' ended: "
             f"{counted(len(self._waiting), 'message')} ({size:.0f} MB) waited for a client "
-            "that is too slow"
+            "that is too slow; receive fewer topics or use best effort"
         )
         self._dropped += len(self._waiting) + 1
         self._waiting.clear()
         self._bytes = 0
 
     def take(self, most: int | None = None) -> list[Published]:
-        """Remove and return what waits, oldest first, at most `most` messages."""
+        """Removes and returns the queued messages, oldest first, at most `most`."""
         return [published for _, published in self.take_numbered(most)]
 
     def take_numbered(self, most: int | None = None) -> list[tuple[int, Published]]:
-        """Like `take`, with numbers that tell the order of arrival among all mailboxes."""
+        """Like `take`, with numbers that give the order of arrival across all queues."""
         with self._lock:
             count = len(self._waiting) if most is None else min(most, len(self._waiting))
             taken = [self._waiting.popleft() for _ in range(count)]
@@ -108,13 +108,13 @@ class SubscriptionQueue:
 
     @property
     def next_number(self) -> int | None:
-        """Number, as of `take_numbered`, of the message to be taken next; None if none waits."""
+        """Number, as in `take_numbered`, of the next message; None if the queue is empty."""
         with self._lock:
             return self._waiting[0][0] if self._waiting else None
 
     @property
     def info(self) -> SubscriptionQueueInfo:
-        """Counts so far."""
+        """The counts so far."""
         with self._lock:
             return SubscriptionQueueInfo(
                 self.topic, self._received, self._dropped, len(self._waiting)
@@ -122,9 +122,9 @@ class SubscriptionQueue:
 
 
 def array_bytes(message: Any) -> int:
-    """Bytes of the arrays and texts that a message holds at its first two levels.
+    """Returns the bytes of the arrays and texts in the first two levels of a message.
 
-    What makes messages large lies there; the rest is small beside the limit.
+    Deeper levels are small compared to the limit.
     """
     size = 0
     for name, value in vars(message).items():
@@ -139,9 +139,9 @@ def array_bytes(message: Any) -> int:
 
 
 def message_bytes(message: Any) -> int:
-    """Bytes of all arrays and texts of a message, and some for each of its parts.
+    """Returns the bytes of all arrays and texts of a message, plus some for each part.
 
-    It looks at every part, so it is for messages that are published rarely.
+    Visits every part, so this is for messages that are published rarely.
     """
     if isinstance(message, np.ndarray):
         return int(message.nbytes)

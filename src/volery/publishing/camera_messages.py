@@ -1,10 +1,10 @@
-"""Pictures as messages, by the conventions of sensor_msgs, cv_bridge and image_transport.
+"""Converts images to messages, by the conventions of sensor_msgs, cv_bridge and image_transport.
 
-Colour is `rgb8`; depth `32FC1`, metres along the optical axis, NaN where nothing is known, -inf too
-near, inf too far, or `16UC1`, millimetres, 0 where nothing is known; labels `32SC1` (instance of
-the scene, -1 for none) and `mono8` (`Material`). The frame is the optical one: z forward, x right,
-y down. Colour and intrinsics of both cameras of a stereo pair are in that of the left one, as
-image_geometry's StereoCameraModel demands; depth, points and labels are in the camera's own.
+Colour is `rgb8`; depth `32FC1`, metres along the optical axis, NaN for unknown, -inf too near, inf
+too far, or `16UC1`, millimetres, 0 for unknown; labels `32SC1` (instance of the scene, -1 for none)
+and `mono8` (`Material`). The frame is the optical one: z forward, x right, y down. Colour and
+intrinsics of both cameras of a stereo pair are in the frame of the left camera, as image_geometry's
+StereoCameraModel requires; depth, points and labels are in the camera's own.
 """
 
 from __future__ import annotations
@@ -30,37 +30,37 @@ from volery.sensors.cameras.cloud import COLOURED, organised_points
 from volery.sensors.samples import CameraFrames, SensorId
 
 OPTICAL_ATTITUDE = np.array([-0.5, 0.5, -0.5, 0.5])
-"""(4,) x y z w: the sensor's axes (x forward, y left, z up) from the optical ones."""
+"""(4,) x y z w: attitude of the optical frame in the sensor's frame (x forward, y left, z up)."""
 _FIELDS = [PointField(name, 4 * k, PointField.FLOAT32, 1) for k, name in enumerate(COLOURED)]
 
 
 class Camera(NamedTuple):
-    """A camera as its messages tell of it."""
+    """Description of a camera for its messages."""
 
     sensor: SensorId
     settings: CameraSensor
     left: SensorId | None = None
-    """The left camera of a stereo pair, of which this is the right one."""
+    """Left camera of the stereo pair if this camera is the right one."""
 
     @property
     def baseline_m(self) -> float:
-        """From the left camera of the pair to this, which is the right one; else 0."""
+        """Distance to the left camera of the pair if this is the right one, m; else 0."""
         stereo = self.settings.stereo
         return 0.0 if self.left is None or stereo is None else stereo.baseline_m
 
 
 def optical_frame(sensor: SensorId) -> str:
-    """Frame of a camera's pictures."""
+    """Returns the frame of a camera's images."""
     return f"{sensor.path}_optical"
 
 
 def colour(frames: CameraFrames, row: int, camera: Camera) -> Image:
-    """`rgb8`."""
+    """Returns the colour image, `rgb8`."""
     return _image(_pair_header(frames, camera), frames.colour[row], "rgb8")
 
 
 def compressed(frames: CameraFrames, row: int, camera: Camera) -> CompressedImage:
-    """JPEG or PNG; `format` tells encoding, codec, and what OpenCV makes of it."""
+    """Returns JPEG or PNG; `format` gives encoding, codec, and OpenCV's decoded encoding."""
     codec, picture = camera.settings.compressed, frames.colour[row]
     quality = camera.settings.jpeg_quality
     data = codecs.jpeg(picture, quality) if codec == "jpeg" else codecs.png(picture)
@@ -69,14 +69,14 @@ def compressed(frames: CameraFrames, row: int, camera: Camera) -> CompressedImag
 
 
 def depth(frames: CameraFrames, row: int, camera: Camera) -> Image:
-    """`32FC1` or `16UC1`."""
+    """Returns the depth image, `32FC1` or `16UC1`."""
     encoding, seen = camera.settings.depth_encoding, frames.depth[row]
     picture = seen if encoding == "32FC1" else codecs.millimetres(seen)
     return _image(_header(frames, camera), picture, encoding)
 
 
 def compressed_depth(frames: CameraFrames, row: int, camera: Camera) -> CompressedImage:
-    """PNG of 16 bits after a header of 12 bytes."""
+    """Returns compressed depth: a 12-byte header and a 16-bit PNG."""
     encoding, seen = camera.settings.depth_encoding, frames.depth[row]
     data = (
         codecs.packed_metres(seen, frames.model.far_m)
@@ -88,7 +88,7 @@ def compressed_depth(frames: CameraFrames, row: int, camera: Camera) -> Compress
 
 
 def points(frames: CameraFrames, row: int, camera: Camera) -> PointCloud2:
-    """A point a pixel, in rows and columns; NaN where nothing is seen."""
+    """Returns an organized cloud with one point per pixel; NaN for unknown depth."""
     own_colour = frames.colour[row] if camera.settings.points == "xyzrgb" else None
     cloud = organised_points(frames.model, frames.depth[row], own_colour)
     height, width, fields = cloud.shape
@@ -101,22 +101,22 @@ def points(frames: CameraFrames, row: int, camera: Camera) -> PointCloud2:
         cloud.itemsize * fields,
         cloud.itemsize * fields * width,
         _bytes(cloud),
-        False,  # not dense: NaN stands for nothing
+        False,  # not dense: NaN for unknown depth
     )
 
 
 def instance(frames: CameraFrames, row: int, camera: Camera) -> Image:
-    """`32SC1`."""
+    """Returns the instance labels, `32SC1`."""
     return _image(_header(frames, camera), frames.instance[row], "32SC1")
 
 
 def material(frames: CameraFrames, row: int, camera: Camera) -> Image:
-    """`mono8`."""
+    """Returns the material labels, `mono8`."""
     return _image(_header(frames, camera), frames.material[row], "mono8")
 
 
 def camera_info(frames: CameraFrames, row: int, camera: Camera) -> CameraInfo:  # noqa: ARG001
-    """Intrinsics; P is K, but for the right camera's place in a pair: P[0, 3] = -fx baseline."""
+    """Returns the intrinsics; P is K, with P[0, 3] = -fx baseline for a right camera."""
     model = frames.model
     k = model.matrix
     beside = np.array([[-model.focal_px * camera.baseline_m], [0.0], [0.0]])
@@ -150,7 +150,7 @@ def _pair_header(frames: CameraFrames, camera: Camera) -> Header:
 
 
 def _bytes(array: NDArray[Any]) -> NDArray[np.uint8]:
-    """The array's memory, in its order."""
+    """Returns the array's memory as bytes, in C order."""
     return _read_only(np.ascontiguousarray(array).view(np.uint8).reshape(-1))
 
 

@@ -1,4 +1,4 @@
-"""The topics of cameras: what each needs of a picture, and who is told."""
+"""Publishes camera images; makes only the parts of images that have subscribers."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from volery.sensors.samples import CameraFrames, SensorId
 
 
 class _CameraTopic(NamedTuple):
-    """One of the topics of a camera."""
+    """A topic of a camera."""
 
     suffix: str
     message_class: type[Any]
     message: Callable[[CameraFrames, int, Camera], Any]
     parts: Callable[[CameraSensor], tuple[Part, ...]]
-    """What of a picture must be made for it; nothing: the camera does not offer it."""
+    """Parts of an image that the message needs; empty: the camera lacks the topic."""
 
 
 def _always(*parts: Part) -> Callable[[CameraSensor], tuple[Part, ...]]:
@@ -63,7 +63,7 @@ _TOPICS = (
 
 
 class _Outlet(NamedTuple):
-    """A topic that a camera offers."""
+    """An advertised topic of a camera."""
 
     publisher: Publisher
     message: Callable[[CameraFrames, int, Camera], Any]
@@ -71,7 +71,7 @@ class _Outlet(NamedTuple):
 
 
 class CameraPublisher:
-    """Publishes the pictures of all cameras."""
+    """Publishes the images of all cameras."""
 
     def __init__(self, graph: Graph) -> None:
         self._graph = graph
@@ -80,7 +80,7 @@ class CameraPublisher:
         self._pixels: dict[str, int] = {}
 
     def announce(self, camera: Camera) -> None:
-        """Advertise what a camera publishes."""
+        """Advertises a camera's topics."""
         sensor = camera.sensor
         self._cameras[sensor.path] = camera
         self._outlets[sensor.path] = [
@@ -94,11 +94,11 @@ class CameraPublisher:
         ]
 
     def set_size(self, cameras: Sequence[SensorId], pixels: int) -> None:
-        """Learn how many pixels the pictures of these cameras have."""
+        """Sets the number of pixels of these cameras' images."""
         self._pixels.update((sensor.path, pixels) for sensor in cameras)
 
     def log_rates(self) -> dict[str, float]:
-        """Returns about how many bytes a second of simulated time each topic takes in a log."""
+        """Returns the approximate log size of each topic, bytes per second of simulated time."""
         return {
             f"/{path}{end}": size * camera.settings.rate_hz
             for path, camera in self._cameras.items()
@@ -106,14 +106,14 @@ class CameraPublisher:
         }
 
     def retire(self, uav_name: str) -> None:
-        """Publish no more for the cameras of a UAV."""
+        """Ends the publishers of a UAV's cameras."""
         for path in [path for path in self._cameras if path.startswith(f"{uav_name}/")]:
             del self._cameras[path]
             for outlet in self._outlets.pop(path):
                 outlet.publisher.cancel()
 
     def wanted_parts(self, cameras: Sequence[SensorId]) -> set[Part]:
-        """What of the pictures of these cameras somebody would receive."""
+        """Returns the parts of these cameras' images that have subscribers."""
         return {
             part
             for sensor in cameras
@@ -123,9 +123,9 @@ class CameraPublisher:
         }
 
     def publish(self, frames: CameraFrames) -> None:
-        """Queue the messages of one picture of each camera, where somebody receives them.
+        """Queues the messages of one image of each camera, for topics with subscribers.
 
-        Who has come since the picture was made gets the next one.
+        A client that has subscribed since the image was made receives the next one.
         """
         made = {
             "colour": frames.colour.size > 0,

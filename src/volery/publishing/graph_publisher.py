@@ -1,6 +1,6 @@
-"""From sensor samples and events to messages on the graph.
+"""Publishes sensor samples and events as messages on the graph.
 
-A message is built only where somebody receives it. Its arrays are read-only and its own.
+Messages are built only for topics with subscribers. Their arrays are read-only and not shared.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ from volery.vehicle.battery import BatteryLevel
 Array = NDArray[np.float64]
 
 SENSOR_TOPICS: dict[type[Any], tuple[SensorTopic, ...]] = {**NAVIGATION_TOPICS}
-"""Topics of each kind of samples whose messages are made row by row."""
+"""Topics of each kind of samples with one message per row."""
 
 _NO_EFFORT = np.zeros(0)
 _UNKNOWN_ORIENTATION = np.full(9, 0.0)
@@ -81,7 +81,7 @@ class GraphPublisher:
         self._publishers: dict[str, Publisher] = {}
         self._lidars = LidarPublisher(graph)
         self.cameras = CameraPublisher(graph)
-        """Tells what of pictures is wanted."""
+        """Publisher of the cameras; returns which parts of images have subscribers."""
         self._mounts: dict[str, Mount] = {}
         self._clock = graph.advertise("/clock", Clock)
         self._tf = graph.advertise("/tf", TFMessage)
@@ -103,9 +103,10 @@ class GraphPublisher:
     def announce(
         self, sensor: SensorId, kind: type[Any], mount: Mount, *, in_map: bool = True
     ) -> None:
-        """Advertise a sensor's topic and place its frame.
+        """Advertises a sensor's topics and adds its static transform.
 
-        in_map: the frame of odometry is the map; else a node tells on `/tf` where it lies there.
+        in_map: the odometry frame is fixed to the map; otherwise a node publishes its pose on
+        `/tf`.
         """
         self._static_sent = False
         self._mounts[sensor.path] = mount
@@ -128,7 +129,7 @@ class GraphPublisher:
             self._static.append(_mount_transform(base, sensor.path, mount))
 
     def announce_camera(self, camera: Camera, mount: Mount) -> None:
-        """Advertise what a camera publishes, and place its frame and that of its pictures."""
+        """Advertises a camera's topics, and adds the static transforms of its two frames."""
         self._static_sent = False
         self.cameras.announce(camera)
         sensor, optical = camera.sensor, make_mount(attitude_body=OPTICAL_ATTITUDE)
@@ -137,7 +138,7 @@ class GraphPublisher:
         self._static.append(_mount_transform(sensor.path, optical_frame(sensor), optical))
 
     def announce_lidar(self, sensor: SensorId, model: LidarModel, topic: str, mount: Mount) -> None:
-        """Advertise what a LIDAR publishes and place its frame."""
+        """Advertises a LIDAR's topics and adds its static transform."""
         self._static_sent = False
         self._mounts[sensor.path] = mount
         self._lidars.announce(sensor, model, topic, mount)
@@ -146,12 +147,12 @@ class GraphPublisher:
             self._static.append(_mount_transform(base, laser_frame(sensor), mount))
 
     def arrange(self, uav_names: Sequence[str]) -> None:
-        """Tell of fixed frames in this order of UAVs."""
+        """Sorts the static transforms by this order of UAVs."""
         rows = {name: row for row, name in enumerate(uav_names)}
         self._static.sort(key=lambda t: rows[t.child_frame_id.split("/")[0]])
 
     def retire(self, uav_name: str) -> None:
-        """Publish no more for the sensors of a UAV, and forget its frames."""
+        """Ends the publishers of a UAV's sensors, and removes its static transforms."""
         below = f"/{uav_name}/"
         for topic in [topic for topic in self._publishers if topic.startswith(below)]:
             self._publishers.pop(topic).cancel()
@@ -162,31 +163,31 @@ class GraphPublisher:
         self._static_sent = False
 
     def publish(self, samples: Samples) -> None:
-        """Queue the messages of one batch of samples; before the first, the fixed transforms."""
+        """Queues the messages of one batch of samples; static transforms before the first."""
         if not self._static_sent:
             self._publish_static()
         self._by_kind[type(samples)](samples)
 
     def get_state(self) -> bool:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         return self._static_sent
 
     def set_state(self, state: bool) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         self._static_sent = state
 
     def publish_event(self, event: Event) -> None:
-        """Queue an event as JSON text on `/events`."""
+        """Queues an event as JSON text on `/events`."""
         if self._events.wanted:
             self._events.publish(String(json.dumps(asdict(event))))
 
     @property
     def clock_wanted(self) -> bool:
-        """Whether anybody listens to `/clock`."""
+        """Whether `/clock` has subscribers."""
         return self._clock.wanted
 
     def publish_clock(self, time_ns: int) -> None:
-        """Queue `/clock`."""
+        """Queues a message on `/clock`."""
         if self._clock.wanted:
             self._clock.publish(Clock(time_from_ns(time_ns)))
 
@@ -318,7 +319,7 @@ class GraphPublisher:
 
 
 def _battery_state(readings: BatteryReadings, i: int) -> BatteryState:
-    """By the rules of sensor_msgs: current below 0 while it discharges, NaN for what is unknown."""
+    """Returns a BatteryState: current below 0 while discharging, NaN for unknown values."""
     cells = int(readings.cells[i])
     voltage, share = float(readings.voltage[i]), float(readings.charge[i])
     capacity = float(readings.capacity_ah[i])

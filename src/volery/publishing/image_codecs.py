@@ -1,7 +1,7 @@
-"""Pictures as bytes: JPEG, PNG, and depth as image_transport's `compressedDepth` packs it.
+"""Encodes images as JPEG, PNG, and depth as image_transport's `compressedDepth`.
 
-What stands here follows `compressed_image_transport` and `compressed_depth_image_transport`
-(image_transport_plugins, ros-perception): their subscribers turn it back into pictures.
+The formats are those of `compressed_image_transport` and `compressed_depth_image_transport`
+(image_transport_plugins, ros-perception), whose subscribers decode them.
 """
 
 from __future__ import annotations
@@ -14,27 +14,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 _PNG_LEVEL = 3
-"""image_transport's and OpenCV's default."""
+"""Compression level; default of image_transport and OpenCV."""
 _QUANTIZATION = 100.0
-"""m: depth at which a step of the coded depth is 1 m; image_transport's default."""
+"""m: depth at which a step of the encoded depth is 1 m; image_transport's default."""
 _INVERSE_DEPTH = 0
 _HEADER = struct.Struct("<i2f")
-"""Kind of coding and its two numbers, as the plugin's memory holds them: 12 bytes."""
+"""Encoding and its two parameters, as in the plugin's memory: 12 bytes."""
 _MOST = 65535
 
 
 def jpeg(picture: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
-    """JPEG of (height, width, 3) sRGB; quality 1 to 100 on libjpeg's scale."""
+    """Encodes (height, width, 3) sRGB as JPEG; quality 1 to 100 on libjpeg's scale."""
     return _encoded(picture, format="JPEG", quality=quality)
 
 
 def png(picture: NDArray[Any]) -> NDArray[np.uint8]:
-    """PNG of (height, width, 3) sRGB, or of (height, width) 16-bit greys."""
+    """Encodes (height, width, 3) sRGB, or (height, width) 16-bit grey, as PNG."""
     return _encoded(picture, format="PNG", compress_level=_PNG_LEVEL)
 
 
 def millimetres(depth: NDArray[np.float32]) -> NDArray[np.uint16]:
-    """Depth (height, width) m in whole mm (REP 118); 0: not known, or beyond 65.535 m."""
+    """Converts depth (height, width), m, to mm (REP 118); 0: unknown, or beyond 65.535 m."""
     with np.errstate(invalid="ignore"):
         scaled = np.rint(depth * np.float32(1000.0))
         known = (scaled > 0.0) & (scaled <= _MOST)
@@ -42,15 +42,15 @@ def millimetres(depth: NDArray[np.float32]) -> NDArray[np.uint16]:
 
 
 def packed_millimetres(depth: NDArray[np.uint16]) -> NDArray[np.uint8]:
-    """`compressedDepth` of depth in mm: nothing is lost."""
+    """Encodes depth (height, width), mm, as lossless `compressedDepth`."""
     return _with_header(0.0, 0.0, depth)
 
 
 def packed_metres(depth: NDArray[np.float32], far_m: float) -> NDArray[np.uint8]:
-    """`compressedDepth` of depth in m, of which it keeps `A / depth + B` in 16 bits.
+    """Encodes depth (height, width), m, as `compressedDepth`: `A / depth + B` in 16 bits.
 
-    A = q (q + 1) and B = 1 - A / far with q = 100 m: steps are z^2 / A, 1 cm at 10 m. What is not
-    known, beyond `far_m`, or nearer than the 16 bits reach (.15 m) is 0, which comes back as NaN.
+    A = q (q + 1) and B = 1 - A / far with q = 100 m: steps are z^2 / A, 1 cm at 10 m. Depth that is
+    unknown, beyond `far_m`, or below the range of 16 bits (.15 m) is 0, which is decoded as NaN.
     """
     a = _QUANTIZATION * (_QUANTIZATION + 1.0)
     b = 1.0 - a / far_m

@@ -1,4 +1,4 @@
-"""How much room a camera's messages take in a log."""
+"""Estimates the log size of a camera's messages."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ _RAW_COLOUR, _PNG_COLOUR, _JPEG_COLOUR = 3.0, 1.8, 0.5
 _RAW_DEPTH = {"32FC1": 3.8, "16UC1": 1.0}
 _COMPRESSED_DEPTH = 1.2
 _POINTS = 15.0
-"""Bytes a pixel after the LZ4 of a log, of a forest by day: measured on `forest_cameras`."""
+"""Bytes per pixel after LZ4 in a log, for a forest by day: measured on `forest_cameras`."""
 
 
 def bytes_per_image(settings: CameraSensor, pixels: int) -> dict[str, float]:
-    """Returns about how many bytes of a log each topic takes a picture, by the topic's end.
+    """Returns the approximate log size of an image in bytes, by topic suffix.
 
-    pixels: number of them in a picture.
+    pixels: number of pixels of an image.
     """
     compressed = _JPEG_COLOUR if settings.compressed == "jpeg" else _PNG_COLOUR
     each = {

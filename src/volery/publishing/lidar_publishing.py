@@ -1,8 +1,8 @@
-"""LIDAR scans as messages: LaserScan, MultiEchoLaserScan, PointCloud2.
+"""Publishes LIDAR scans as LaserScan, MultiEchoLaserScan or PointCloud2.
 
-A planar scanner publishes `sensor_msgs/LaserScan`, one that tells several echoes apart a
-`sensor_msgs/MultiEchoLaserScan` besides; every other scanner publishes `sensor_msgs/PointCloud2`
-with the fields of `sensors.point_cloud.POINT`. Arrays are read-only views of the scans' own.
+A planar scanner publishes `sensor_msgs/LaserScan`, and with several echoes also
+`sensor_msgs/MultiEchoLaserScan`; every other scanner publishes `sensor_msgs/PointCloud2` with the
+fields of `sensors.point_cloud.POINT`. Arrays are read-only views of the scans' arrays.
 """
 
 from __future__ import annotations
@@ -40,19 +40,19 @@ _FIELDS = [
 
 
 def laser_frame(sensor: SensorId) -> str:
-    """Frame of a LIDAR."""
+    """Returns the frame of a LIDAR."""
     return f"{sensor.uav_name}/laser_{sensor.name}"
 
 
 def lidar_topic(sensor: SensorId, model: LidarModel, topic: str | None = None) -> str:
-    """Topic of a LIDAR's scans or points; `topic` is the scenario's choice below the UAV's name."""
+    """Returns the topic of a LIDAR's scans or points; `topic`: the scenario's relative name."""
     if topic is None:
         topic = f"laser/{sensor.name}/scan" if isinstance(model.scan, PlanarScan) else "points"
     return f"/{sensor.uav_name}/{topic}"
 
 
 def cloud_points(message: Any) -> NDArray[Any]:
-    """Points of one of our own PointCloud2s, (N,) of `POINT`; a view."""
+    """Returns the points of a PointCloud2 made by Volery, (N,) of `POINT`; a view."""
     points: NDArray[Any] = np.asarray(message.data).view(POINT)
     return points
 
@@ -68,7 +68,7 @@ class LidarPublisher:
         self._returns = ReturnsPublisher(graph)
 
     def announce(self, sensor: SensorId, model: LidarModel, topic: str, mount: Mount) -> None:
-        """Advertise what a LIDAR publishes; all echoes go to `echoes` beside a scan's topic."""
+        """Advertises a LIDAR's topics; all echoes go to `echoes`, in the scan topic's namespace."""
         self._returns.announce(sensor, mount, topic)
         if not isinstance(model.scan, PlanarScan):
             self._clouds[sensor.path] = self._graph.advertise(topic, PointCloud2)
@@ -79,14 +79,14 @@ class LidarPublisher:
             self._echoes[sensor.path] = self._graph.advertise(beside, MultiEchoLaserScan)
 
     def retire(self, uav_name: str) -> None:
-        """Publish no more for the LIDARs of a UAV."""
+        """Ends the publishers of a UAV's LIDARs."""
         self._returns.retire(uav_name)
         for publishers in (self._scans, self._echoes, self._clouds):
             for path in [path for path in publishers if path.startswith(f"{uav_name}/")]:
                 publishers.pop(path).cancel()
 
     def publish(self, scans: LidarScans) -> None:
-        """Queue the messages of one sweep of a bank, where somebody receives them."""
+        """Queues the messages of one sweep of a bank, for topics with subscribers."""
         self._returns.publish(scans)
         if not isinstance(scans.model.scan, PlanarScan):
             self._publish_clouds(scans)
@@ -127,7 +127,7 @@ def _scan_message(scans: LidarScans, pattern: PlanarScan, row: int) -> LaserScan
 
 
 def _echo_message(scans: LidarScans, pattern: PlanarScan, row: int) -> MultiEchoLaserScan:
-    """All echoes; a beam without any has its first range alone, +-inf."""
+    """Returns all echoes; a beam without echoes has its first range only, +-inf."""
     ranges = np.ascontiguousarray(scans.echoes[row].T)
     count = np.maximum(np.isfinite(ranges).sum(axis=1), 1).tolist()
     intensities = np.ascontiguousarray(scans.intensities[row].T)

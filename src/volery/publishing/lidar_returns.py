@@ -1,8 +1,8 @@
-"""What LIDARs saw, for people who watch: `/uavN/laser/NAME/points`.
+"""Publishes LIDAR returns for display: `/uavN/laser/NAME/points`.
 
-A few hundred returns of each sweep in the frame of the UAV, with the nodding of the mount worked
-in, so that a page that knows where the UAV is can draw them. Only clients outside are shown them:
-whoever measures with a LIDAR reads its scans or points.
+A few hundred returns of each sweep in the frame of the UAV, corrected for a nodding mount, so that
+a page that knows the UAV's pose can draw them. Only external clients receive them: nodes use the
+LIDAR's scans or points.
 """
 
 from __future__ import annotations
@@ -22,36 +22,36 @@ from volery.sensors.scan_patterns import PlanarScan, ScanPattern
 Array = NDArray[np.float64]
 
 MOST_RETURNS = 360
-"""Of a planar sweep that are shown: one a degree of the horizon ..."""
+"""Maximum returns of a planar sweep: one per degree of the horizon ..."""
 MOST_RETURNS_OF_VOLUMES = 2048
-"""... and of a scanner that sees the third dimension."""
+"""... and of a three-dimensional scanner."""
 _KNOTS = 5
-"""Instants of a sweep between which a nodding mount turns evenly."""
+"""Instants of a sweep between which the nodding angle is interpolated linearly."""
 _FIELDS = [PointField(name, 4 * k, PointField.FLOAT32, 1) for k, name in enumerate("xyz")]
 _STEP = 12
 
 
 class ReturnsPublisher:
-    """Shows the returns of all LIDARs that somebody watches."""
+    """Publishes the returns of all LIDARs with external subscribers."""
 
     def __init__(self, graph: Graph) -> None:
         self._graph = graph
         self._lidars: dict[str, tuple[Publisher, Mount]] = {}
 
     def announce(self, sensor: SensorId, mount: Mount, topic: str) -> None:
-        """Advertise the returns of a LIDAR; not where its own points go by that name."""
+        """Advertises a LIDAR's returns, unless its own points have that topic."""
         if topic != returns_topic(sensor):
             publisher = self._graph.advertise(returns_topic(sensor), PointCloud2)
             self._lidars[sensor.path] = publisher, mount
 
     def retire(self, uav_name: str) -> None:
-        """Show no more of the LIDARs of a UAV."""
+        """Ends the publishers of a UAV's LIDARs."""
         for path in [path for path in self._lidars if path.startswith(f"{uav_name}/")]:
             publisher, _mount = self._lidars.pop(path)
             publisher.cancel()
 
     def publish(self, scans: LidarScans) -> None:
-        """Show one sweep of a bank."""
+        """Publishes one sweep of a bank."""
         for row, sensor in enumerate(scans.sensors):
             publisher, mount = self._lidars.get(sensor.path, (None, None))
             if publisher is not None and mount is not None and publisher.watched:
@@ -59,15 +59,15 @@ class ReturnsPublisher:
 
 
 def returns_topic(sensor: SensorId) -> str:
-    """Topic of the returns of a LIDAR."""
+    """Returns the topic of a LIDAR's returns."""
     return f"/{sensor.uav_name}/laser/{sensor.name}/points"
 
 
 def returns_message(scans: LidarScans, row: int, mount: Mount) -> PointCloud2:
-    """First echoes of evenly chosen beams of one sensor, x y z (float32) in the UAV's base frame.
+    """Returns first echoes of evenly spaced beams of a sensor, x y z (float32), in the UAV's frame.
 
-    Every beam is turned by the mount as it stood when it was fired. The stamp is the middle of the
-    sweep: the UAV's own motion during it is left in.
+    Every beam is rotated by the mount's angle at its own time. The stamp is the middle of the
+    sweep; the UAV's own motion during the sweep is not corrected.
     """
     pattern = scans.model.scan
     ranges = scans.ranges[row]
@@ -93,7 +93,7 @@ def returns_message(scans: LidarScans, row: int, mount: Mount) -> PointCloud2:
 
 
 def _chosen_beams(pattern: ScanPattern) -> NDArray[np.int64]:
-    """Evenly spaced numbers of beams; of a scanner with rings, of all rings in turn."""
+    """Returns evenly spaced beam numbers; for a scanner with rings, from all rings in turn."""
     planar = isinstance(pattern, PlanarScan)
     step = -(-pattern.beam_count // (MOST_RETURNS if planar else MOST_RETURNS_OF_VOLUMES))
     while math.gcd(step, pattern.stride) > 1:
@@ -102,7 +102,7 @@ def _chosen_beams(pattern: ScanPattern) -> NDArray[np.int64]:
 
 
 def _in_body(along: Array, time_ns: NDArray[np.int64], scans: LidarScans, mount: Mount) -> Array:
-    """Points (n, 3) from the sensor's frame, each at its own time, to the body."""
+    """Transforms points (n, 3) from the sensor's frame, each at its own time, to the body."""
     if mount.nods:
         knots = np.linspace(0, scans.model.sweep_duration_ns, _KNOTS).astype(np.int64)
         angles = [nodding_angle_at(mount, scans.stamp_ns + int(knot)) for knot in knots]

@@ -1,4 +1,4 @@
-"""Messages of navigation sensors: one sensor's row of a batch as a ROS message."""
+"""Converts samples of navigation sensors to ROS messages, row by row."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ Array = NDArray[np.float64]
 
 _ZERO_CELSIUS_K = 273.15
 _NOT_MEASURED = -1.0
-"""Variance of a quantity that the message holds and the sensor does not know (sensor_msgs/Imu)."""
+"""Variance of a quantity of the message that the sensor does not measure (sensor_msgs/Imu)."""
 
 
 def fix(readings: GnssReadings, row: int) -> NavSatFix:
-    """Position; without a fix it is nan and its covariance unknown."""
+    """Returns the position; without a fix, NaN with unknown covariance."""
     latitude, longitude, altitude = readings.frame.geodetic_from_enu(readings.position_map[row])
     has_fix = bool(readings.has_fix[row])
     status = NavSatStatus.STATUS_FIX if has_fix else NavSatStatus.STATUS_NO_FIX
@@ -48,7 +48,7 @@ def fix(readings: GnssReadings, row: int) -> NavSatFix:
 
 
 def fix_velocity(readings: GnssReadings, row: int) -> TwistWithCovarianceStamped | None:
-    """Velocity along the map's axes; None without a fix."""
+    """Returns the velocity along the map's axes; None without a fix."""
     if not readings.has_fix[row]:
         return None
     variance = np.concatenate([readings.velocity_variance[row], np.full(3, _NOT_MEASURED)])
@@ -62,7 +62,7 @@ def fix_velocity(readings: GnssReadings, row: int) -> TwistWithCovarianceStamped
 
 
 def pressure(readings: PressureReadings, row: int) -> FluidPressure:
-    """Static pressure, Pa."""
+    """Returns the static pressure, Pa."""
     return FluidPressure(
         header(readings.stamp_ns, _frame(readings.sensors[row])),
         float(readings.pressure[row]),
@@ -71,7 +71,7 @@ def pressure(readings: PressureReadings, row: int) -> FluidPressure:
 
 
 def temperature(readings: PressureReadings, row: int) -> Temperature:
-    """Temperature of the air, degrees Celsius."""
+    """Returns the temperature of the air, degrees Celsius."""
     return Temperature(
         header(readings.stamp_ns, _frame(readings.sensors[row])),
         float(readings.temperature[row]) - _ZERO_CELSIUS_K,
@@ -80,7 +80,7 @@ def temperature(readings: PressureReadings, row: int) -> Temperature:
 
 
 def magnetic_field(readings: MagneticReadings, row: int) -> MagneticField:
-    """Flux density in the sensor's frame, T."""
+    """Returns the magnetic flux density in the sensor's frame, T."""
     return MagneticField(
         header(readings.stamp_ns, _frame(readings.sensors[row])),
         Vector3(*readings.field[row].tolist()),

@@ -1,4 +1,4 @@
-"""The topics of a sensor, `/UAV/SENSOR` and a suffix, and how to make their messages."""
+"""Defines the topics of a sensor, `/UAV/SENSOR` and a suffix, and their messages."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from volery.sensors.samples import SensorId
 
 
 class SensorTopic(NamedTuple):
-    """One of the topics of a sensor."""
+    """A topic of a sensor."""
 
     suffix: str
     message_class: type[Any]
     message: Callable[[Any, int], Any]
-    """(samples, row) -> message, or None where the sensor has no value to publish."""
+    """Returns the message of (samples, row), or None if the sensor has no value to publish."""
 
     def name_of(self, sensor: SensorId) -> str:
         """Returns the topic's name for one sensor."""

@@ -43,4 +43,4 @@ def test_a_service_whose_client_left_fails_at_once(bench, client, how):
     getattr(client, how)()
     failed = come.get(timeout=60.0)
     assert isinstance(failed, GraphError)
-    assert "did not answer" not in str(failed)
+    assert "did not respond" not in str(failed)

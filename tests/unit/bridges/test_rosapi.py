@@ -153,7 +153,7 @@ def test_parameters_of_nodes_are_set_or_refused(ask):
         ("/uav1/flier:height_m", '"high"'): "must be like 3.0",
         ("/uav1/flier:height_m", "true"): "must be like 3.0",
         ("/uav1/flier:height_m", "NaN"): "JSON",
-        ("/uav1/flier:hight_m", "2"): "no parameter 'hight_m'; it has far_m, height_m, route",
+        ("/uav1/flier:hight_m", "2"): "no parameter 'hight_m'; known: far_m, height_m, route",
         ("/uav1/flier/hight_m", "2"): "no parameter 'hight_m'",
         ("/uav3/flier:height_m", "2"): "no node '/uav3/flier'",
     }

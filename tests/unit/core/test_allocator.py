@@ -1,4 +1,4 @@
-"""Memory of large blocks goes back to the system."""
+"""Tests that large memory blocks are returned to the system."""
 
 import subprocess
 import sys

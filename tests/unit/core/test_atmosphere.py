@@ -1,4 +1,4 @@
-"""The standard atmosphere against the tables of ISO 2533."""
+"""Tests the standard atmosphere against the tables of ISO 2533."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Simulated time never drifts."""
+"""Tests that simulated time does not drift."""
 
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,4 +1,4 @@
-"""Full collections while a simulation serves clients."""
+"""Tests that full garbage collections are rare while a simulation serves clients."""
 
 import gc
 

@@ -1,4 +1,4 @@
-"""Compiled kernels are cached, and an edited kernel never meets a stale cache."""
+"""Tests that compiled kernels are cached, and that an edited kernel gets a new cache."""
 
 import os
 import subprocess

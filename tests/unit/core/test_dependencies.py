@@ -1,4 +1,4 @@
-"""Each package that the source imports is declared, and not only brought along by another one."""
+"""Tests that each imported package is a declared dependency, not only a transitive one."""
 
 import ast
 import re

@@ -1,4 +1,4 @@
-"""Names that installed packages register."""
+"""Tests the names that installed packages register."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What lacks a package says which command installs it; README and docs list all extras."""
+"""Tests that errors about missing packages name the command; README and docs list all extras."""
 
 import re
 import sys

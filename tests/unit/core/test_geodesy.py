@@ -1,4 +1,4 @@
-"""WGS-84 against the ellipsoid's own definition, textbook lengths, and back again."""
+"""Tests WGS-84 against the ellipsoid's definition, textbook lengths, and round trips."""
 
 import numpy as np
 import pytest

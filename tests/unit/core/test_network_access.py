@@ -1,4 +1,4 @@
-"""Writing to connections that break."""
+"""Tests writing to connections that break."""
 
 import asyncio
 import socket

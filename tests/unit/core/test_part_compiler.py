@@ -1,4 +1,4 @@
-"""Parts of kernels have no machine code of their own, and link as well from the cache."""
+"""Tests that inner kernels have no machine code of their own, and link from the cache too."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""Numbers of things in words."""
+"""Tests counts with singular and plural."""
 
 import pytest
 

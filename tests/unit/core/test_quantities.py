@@ -1,4 +1,4 @@
-"""Bounds of quantities: found by the unit in a key, with the likely other unit in the message."""
+"""Tests limits of quantities: by the unit in a key, with the likely other unit in the message."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Random streams: named, independent, of the promised distribution."""
+"""Tests that random streams are named, independent, and of the documented distribution."""
 
 import numpy as np
 from scipy import stats

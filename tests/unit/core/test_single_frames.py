@@ -1,4 +1,4 @@
-"""The conversions of one vehicle against those of arrays."""
+"""Tests the conversions of one vehicle against those of arrays."""
 
 import numpy as np
 import pytest

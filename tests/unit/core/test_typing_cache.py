@@ -1,4 +1,4 @@
-"""numba finds the same types where its answers are remembered, and asks less for them."""
+"""Tests that numba infers the same types with the typing cache, with fewer queries."""
 
 import operator
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""Connections reach their server when their first request has come."""
+"""Tests that connections reach their server with their first request."""
 
 import asyncio
 import contextlib

@@ -1,4 +1,4 @@
-"""What external clients may cost the simulation's thread, with clocks that the tests turn."""
+"""Tests the limits of external clients' time in the simulation's thread, with fake clocks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Looks are rare, touches are never missed: conservative advancement against brute force."""
+"""Tests conservative advancement against brute force: rare queries, no missed contact."""
 
 import numpy as np
 import pytest

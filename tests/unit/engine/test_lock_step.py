@@ -1,4 +1,4 @@
-"""Lock-step partners: outside programs that the simulation waits for."""
+"""Tests lock-step partners: external programs that the simulation waits for."""
 
 import threading
 import time
@@ -102,9 +102,9 @@ def test_leaving_lets_the_run_go_on(simulate, flat_data):
 def test_speaking_out_of_turn_is_refused(simulate, flat_data):
     simulation = airborne(simulate, flat_data)
     partner = simulation.add_partner("guest", period_s=0.01)
-    with pytest.raises(PartnerError, match="no meeting to reply to"):
+    with pytest.raises(PartnerError, match="no barrier to reply to"):
         partner.reply()
-    with pytest.raises(PartnerError, match=r"no meeting within 0\.01 s"):
+    with pytest.raises(PartnerError, match=r"no barrier within 0\.01 s"):
         partner.wait(0.01)
 
 

@@ -1,4 +1,4 @@
-"""Pacing alone: what it allows, how long it waits, what other threads may change."""
+"""Tests pacing alone: number of steps, waiting time, changes by other threads."""
 
 import threading
 
@@ -116,9 +116,9 @@ def test_pauses_are_measured(pacer):
 
 def test_refusals(pacer):
     for speed in (0.0, -1.0, float("nan"), 1e6):
-        with pytest.raises(CommandError, match="positive factor"):
+        with pytest.raises(CommandError, match="positive real-time factor"):
             pacer.set_speed(speed)
-    with pytest.raises(CommandError, match="while paused"):
+    with pytest.raises(CommandError, match="paused run"):
         pacer.single_steps(1)
     pacer.pause()
     with pytest.raises(CommandError, match="at least 1"):

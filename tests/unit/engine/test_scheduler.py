@@ -1,4 +1,4 @@
-"""Firings: at the right step, in a fixed order, without drift."""
+"""Tests that tasks fire at the right step, in a fixed order, without drift."""
 
 from volery.core.clock import Schedule
 from volery.engine.scheduler import Scheduler

@@ -1,4 +1,4 @@
-"""A state that is not physical ends what computes it, whatever it comes from."""
+"""Tests that a state that is not physical ends the run, whatever the cause."""
 
 import math
 
@@ -36,7 +36,7 @@ def test_a_run_ends_with_uav_and_time(flying, part, number):
 
 def test_what_is_fast_but_finite_is_found_at_the_end_of_a_run(flying):
     flying._engine.fleet.state.velocity_map[0, 2] = 5e4
-    with pytest.raises(DivergenceError, match=r"uav1.*m/s and turns"):
+    with pytest.raises(DivergenceError, match=r"uav1.*m/s, angular rate"):
         flying.run(0.002)
 
 

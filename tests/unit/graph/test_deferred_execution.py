@@ -1,4 +1,4 @@
-"""Nodes that take simulated time to think."""
+"""Tests nodes with a computation latency."""
 
 import threading
 import time

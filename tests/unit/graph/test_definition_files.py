@@ -1,4 +1,4 @@
-"""Definition files: those that ship, a user's own, and broken ones."""
+"""Tests definition files: shipped, user-defined, and broken ones."""
 
 from __future__ import annotations
 
@@ -194,10 +194,10 @@ BROKEN = {
     "wstring is not supported": "\nwstring w\n",
     "fixed array": "\nint8[0] w\n",
     "fixed array of float64": "\nfloat64[99999999999] w\n",
-    "only a string has a length limit": "\nint8<=3 w\n",
+    "only a string may have a length limit": "\nint8<=3 w\n",
     "must be a number, a bool or a string": "\nint8[] X=3\n",
     "cannot have a default": "\ngeometry_msgs/Point p 3\n",
-    "the default of an array is a list": "\nint8[] p 3\n",
+    "the default of an array must be a list": "\nint8[] p 3\n",
     "the default has 1 element, the array 2": "\nint8[2] p [3]\n",
     "not the name of a type": "\na/b/c/d p\n",
 }
@@ -218,10 +218,10 @@ def test_broken_definitions_name_file_and_line(
     ("files", "text"),
     [
         ({"farm__srv__S": "int8 a\n"}, "1 line"),
-        ({"farm__srv__S": "---\n---\n"}, r"S\.srv:2: .*1 line '---', and this is one more"),
+        ({"farm__srv__S": "---\n---\n"}, r"S\.srv:2: .*1 line '---'; this line is one too many"),
         ({"farm__action__A": "---\n"}, "2 line"),
         ({"farm__msg__A": "B b\n", "farm__msg__B": "A[] a\n"}, "contains itself"),
-        ({"std_msgs__msg__String": "int8 data\n"}, "known already with other fields"),
+        ({"std_msgs__msg__String": "int8 data\n"}, "already known with other fields"),
         ({"far-m__msg__A": "int8 a\n"}, "name of a ROS package"),
         ({"farm__msg__A-B": "int8 a\n"}, "name of a ROS type"),
     ],
@@ -236,14 +236,14 @@ def test_folders_that_do_not_fit(
 def test_duplicates_in_one_folder(tmp_path: Path, store: DefinitionStore) -> None:
     write(tmp_path / "a", farm__msg__A="int8 a\n")
     write(tmp_path / "b", farm__msg__A="int8 a\n")
-    with pytest.raises(GraphError, match=r"is defined in .* too"):
+    with pytest.raises(GraphError, match=r"is also defined in "):
         store.add_folder(tmp_path)
 
 
 def test_missing_empty_and_misplaced(tmp_path: Path, store: DefinitionStore) -> None:
-    with pytest.raises(GraphError, match="no such folder"):
+    with pytest.raises(GraphError, match="does not exist"):
         store.add_folder(tmp_path / "none")
-    with pytest.raises(GraphError, match=r"holds no \.msg"):
+    with pytest.raises(GraphError, match=r"contains no \.msg"):
         store.add_folder(tmp_path)
     (tmp_path / "farm" / "msg").mkdir(parents=True)
     (tmp_path / "farm" / "msg" / "S.srv").write_text("---")

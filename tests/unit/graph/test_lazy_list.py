@@ -1,4 +1,4 @@
-"""Lists that are made when they are read go over every wire like others."""
+"""Tests that lazy lists are encoded like other lists in every wire format."""
 
 import pickle
 

@@ -1,4 +1,4 @@
-"""The node contract: names, parameters, timers, services as rclpy users expect them."""
+"""Tests the node interface: names, parameters, timers and services as in rclpy."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Nodes count the CPU time of their callbacks."""
+"""Tests that nodes measure the CPU time of their callbacks."""
 
 from __future__ import annotations
 

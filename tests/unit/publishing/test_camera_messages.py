@@ -1,4 +1,4 @@
-"""What cameras send, read as cv_bridge, image_transport and OpenCV read it."""
+"""Tests camera messages as decoded by cv_bridge, image_transport and OpenCV."""
 
 import struct
 

@@ -1,4 +1,4 @@
-"""What sensors tell nodes inside is what goes out: no wire form changes a message."""
+"""Tests that nodes receive what is sent on the wire: no wire format changes a message."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""LIDAR messages as other programs read them: bytes by their fields, logs, topics."""
+"""Tests LIDAR messages as other programs read them: bytes by field, logs, topics."""
 
 import copy
 

@@ -1,4 +1,4 @@
-"""Returns for drawing: few, in the UAV's frame, with nodding and mounts worked in."""
+"""Tests returns for display: few, in the UAV's frame, corrected for mount and nodding."""
 
 import copy
 import math

@@ -151,12 +151,12 @@ def test_a_pause_from_on_progress(simulate, flat_data):
 
 def test_refusals(simulate, flat_data):
     simulation = simulate(flat_data)
-    with pytest.raises(CommandError, match="while paused"):
+    with pytest.raises(CommandError, match="paused run"):
         simulation.single_step()
     simulation.pause()
     with pytest.raises(CommandError, match="at least 1"):
         simulation.single_step(0)
-    with pytest.raises(CommandError, match="positive factor"):
+    with pytest.raises(CommandError, match="positive real-time factor"):
         simulation.set_speed(-1.0)
     simulation.step(3)  # the caller's own steps ask nobody
     assert simulation.time_ns == 3_000_000

@@ -1,4 +1,4 @@
-"""Messages as CDR, the wire form of ROS 2: encoding and checked decoding."""
+"""Encodes and decodes messages as CDR, the wire format of ROS 2; decoding checks the bytes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _HEADER_BYTES = 4
 _BIG_ENDIAN = b"\x00\x00"
 _LITTLE_ENDIAN = b"\x00\x01"
 _ALIGNMENT_BYTES = 3
-"""Most bytes of padding behind a message: writers fill up to a multiple of four."""
+"""Maximum padding after a message: writers fill up to a multiple of four."""
 
 CODING_ERRORS = (
     SerdeError,
@@ -32,17 +32,13 @@ CODING_ERRORS = (
     IndexError,
     OverflowError,
 )
-"""What the generated coders raise for a message or bytes that do not fit the type."""
+"""Exceptions of the generated coders for a message or bytes that do not fit the type."""
 
 
 def encode_cdr(message: Any, msgtype: str) -> bytes:
-    """CDR of a message, little-endian, with its four bytes of header.
+    """Encodes a message as little-endian CDR with its four bytes of header.
 
-    Raises
-    ------
-    GraphError
-        The type is unknown, or the message does not fit it.
-
+    Raises `GraphError` if the type is unknown or the message does not fit the type.
     """
     known(msgtype)
     try:
@@ -52,16 +48,11 @@ def encode_cdr(message: Any, msgtype: str) -> bytes:
 
 
 def decode_cdr(data: bytes | bytearray | memoryview, msgtype: str) -> Any:
-    """Message read from CDR (version 1, either byte order) with its four bytes of header.
+    """Decodes CDR (version 1, either byte order) with its four bytes of header.
 
-    Its arrays are read-only and independent of `data`.
-
-    Raises
-    ------
-    GraphError
-        The type is unknown, or the bytes are not one message of that type: too short, too long,
-        a length that lies, text that is not UTF-8.
-
+    The message's arrays are read-only and independent of `data`. Raises `GraphError` if the type is
+    unknown or the bytes are not one message of that type: too short, too long, a wrong length, text
+    that is not UTF-8.
     """
     known(msgtype)
     view = memoryview(data).cast("B")
@@ -70,14 +61,16 @@ def decode_cdr(data: bytes | bytearray | memoryview, msgtype: str) -> Any:
         raise GraphError(f"{msgtype}: not CDR of version 1 (header {bytes(view[:4]).hex()})")
     store = typestore()
     definition = store.get_msgdef(msgtype)
-    # A copy that begins behind the header: arrays in it are aligned and nobody else's.
+    # A copy of the bytes after the header: arrays in it are aligned and owned by the message.
     body = bytes(view[_HEADER_BYTES:])
     little = kind == _LITTLE_ENDIAN
     decode = definition.deserialize_cdr_le if little else definition.deserialize_cdr_be
     try:
         message, end = decode(body, 0, definition.cls, store)
     except CODING_ERRORS as error:
-        raise GraphError(f"{msgtype}: {len(view)} bytes are not such a message: {error}") from None
+        raise GraphError(
+            f"{msgtype}: {len(view)} bytes are not a message of this type: {error}"
+        ) from None
     if not end <= len(body) <= end + _ALIGNMENT_BYTES:
         raise GraphError(
             f"{msgtype}: the message has {end + _HEADER_BYTES} bytes, {len(view)} were given"
@@ -88,13 +81,13 @@ def decode_cdr(data: bytes | bytearray | memoryview, msgtype: str) -> Any:
 
 
 def known(msgtype: str) -> None:
-    """Raise `GraphError` unless the graph knows the type."""
+    """Raises `GraphError` unless the graph knows the type."""
     if msgtype not in typestore().types:
-        raise GraphError(f"message type '{msgtype}' is not known")
+        raise GraphError(f"unknown message type '{msgtype}'")
 
 
 def own_array(values: NDArray[Any]) -> NDArray[Any]:
-    """The array aligned and read-only, its bools 0 or 1; copied only where that needs it."""
+    """Returns the array aligned and read-only, bools as 0 or 1; copied only if necessary."""
     if values.dtype == np.bool_:
         values = values.view(np.uint8) != 0
     elif not values.flags.aligned:
@@ -104,7 +97,7 @@ def own_array(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def is_number_array(described: Any) -> bool:
-    """Whether a field is an array of numbers, which messages hold as a numpy array."""
+    """Returns whether a field is an array of numbers, which is a numpy array in messages."""
     kind, detail = described
     if kind not in (Nodetype.ARRAY, Nodetype.SEQUENCE):
         return False
@@ -114,7 +107,7 @@ def is_number_array(described: Any) -> bool:
 
 @cache
 def _has_bools(msgtype: str) -> bool:
-    """Whether a type, or one it is made of, holds an array of bools."""
+    """Returns whether a type, or a nested type, contains an array of bools."""
     for _, described in typestore().fielddefs[msgtype][1]:
         if is_number_array(described) and described[1][0][1][0] == "bool":
             return True

@@ -1,7 +1,7 @@
-"""Bounds on what message definitions cost: code that is made of them, and messages full of zeros.
+"""Limits the cost of message definitions: generated code, and messages full of zeros.
 
-Coders are made of a definition with a line or more for each element of an array of messages, and a
-message is made whole with all its fixed arrays. A few lines of text must not cost gigabytes.
+Generated coders have a line or more for each element of an array of messages, and a message is
+created with all its fixed arrays. A few lines of text must not cost gigabytes.
 """
 
 from __future__ import annotations
@@ -15,27 +15,28 @@ from volery.core.errors import GraphError
 from volery.graph.codecs.definition_files import NUMBERS, Definition
 
 EMPTY_MEMBER = "structure_needs_at_least_one_member"
-"""The byte that a message without fields has in ROS 2, and only there."""
+"""The byte of a message without fields, in ROS 2 only."""
 MAX_UNROLLED = 1 << 16
-"""Elements in the fixed arrays of messages and strings of one type."""
+"""Limit of elements in the fixed arrays of messages and strings of one type."""
 MAX_ELEMENTS = 1 << 24
-"""Numbers and strings in one message of a type, with all that it nests and empty sequences."""
+"""Limit of numbers and strings in one message of a type, nested messages included, with empty
+sequences."""
 MAX_DEPTH = 64
-"""Of types within types."""
+"""Limit of the nesting of types."""
 
 Lookup = Callable[[str], Any]
-"""The fields of a known type by its name."""
+"""Returns the fields of a known type by its name."""
 
 
 def check_definitions(found: Mapping[str, Definition], known: Lookup) -> None:
-    """Refuse definitions of messages that are too large or too deep.
+    """Raises `GraphError` for definitions of messages that are too large or nested too deep.
 
-    found: new types, none of which contains itself. Raises `GraphError`.
+    found: new types, none containing itself.
     """
     sizes: dict[str, tuple[int, int]] = {}
 
     def measure(name: str, depth: int) -> tuple[int, int]:
-        """Elements and depth of a type."""
+        """Returns the elements and depth of a type."""
         if name in sizes:
             return sizes[name]
         if depth > MAX_DEPTH:
@@ -56,7 +57,7 @@ def check_definitions(found: Mapping[str, Definition], known: Lookup) -> None:
         if elements > MAX_ELEMENTS or deepest > MAX_DEPTH:
             raise GraphError(
                 f"{name}: a message holds {elements} numbers and strings, nested {deepest} deep; "
-                f"at most {MAX_ELEMENTS} and {MAX_DEPTH} are possible"
+                f"limits: {MAX_ELEMENTS} and {MAX_DEPTH}"
             )
         return sizes[name]
 
@@ -66,10 +67,7 @@ def check_definitions(found: Mapping[str, Definition], known: Lookup) -> None:
 
 
 def check_foreign(found: Mapping[str, Definition], known: Lookup) -> None:
-    """Refuse sequences of messages without content: some bytes would claim any number of them.
-
-    Raises `GraphError`.
-    """
+    """Raises `GraphError` for sequences of empty messages, which a few bytes could make endless."""
     empty: dict[str, bool] = {}
 
     def is_empty(name: str) -> bool:
@@ -88,9 +86,7 @@ def check_foreign(found: Mapping[str, Definition], known: Lookup) -> None:
         for field, described in definition.fields:
             inner = _element(described)
             if described[0] == Nodetype.SEQUENCE and inner is not None and is_empty(inner):
-                raise GraphError(
-                    f"{definition.name}: '{field}' is a sequence of messages without content"
-                )
+                raise GraphError(f"{definition.name}: '{field}' is a sequence of empty messages")
 
 
 def _check_code(definition: Definition) -> None:
@@ -103,12 +99,12 @@ def _check_code(definition: Definition) -> None:
     if unrolled > MAX_UNROLLED:
         raise GraphError(
             f"{definition.source}: {definition.name} has {unrolled} strings and messages in fixed "
-            f"arrays; at most {MAX_UNROLLED} are possible"
+            f"arrays; limit: {MAX_UNROLLED}"
         )
 
 
 def _element(described: Any) -> str | None:
-    """Message type of a field, or of its elements; None for numbers and strings."""
+    """Returns the message type of a field or its elements; None for numbers and strings."""
     kind, detail = described
     if kind == Nodetype.NAME:
         return str(detail)

@@ -1,9 +1,9 @@
-"""Message, service and action definitions read from `.msg`, `.srv` and `.action` files.
+"""Reads message, service and action definitions from `.msg`, `.srv` and `.action` files.
 
-A folder holds packages, each with its files in `msg/`, `srv/` and `action/`, as ROS lays them out;
-files without such a folder belong to the package named by the folder they lie in. Definitions of
-both ROS generations are understood: `time`, `duration` and `Header` of ROS 1, bounds and default
-values of ROS 2.
+A folder holds packages, each with its files in `msg/`, `srv/` and `action/`, as in ROS; files
+outside such a folder belong to the package named after their own folder. Definitions of both ROS
+generations are supported: `time`, `duration` and `Header` of ROS 1, limits and default values of
+ROS 2.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ INTEGER_RANGES = {
     **{f"int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)},
     **{f"uint{bits}": (0, 2**bits - 1) for bits in (8, 16, 32, 64)},
 }
-"""Least and greatest value of each integer type."""
+"""Minimum and maximum of each integer type."""
 NUMBERS = {"bool", "float32", "float64", *INTEGER_RANGES}
 
 _ROS1_BUILTIN = {
@@ -41,7 +41,7 @@ _ACTION_NESTED = {
 _PACKAGE = re.compile(r"[A-Za-z]\w*", re.ASCII)
 _TYPE_NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
 _FILE_NAME = re.compile(r"[A-Z][A-Za-z0-9]*")
-"""Of a type, as ROS 2 has it: CamelCase."""
+"""Name of a type, as in ROS 2: CamelCase."""
 _LINE = re.compile(
     r"(?P<type>[A-Za-z][\w/]*)(?:<=(?P<limit>\d+))?"
     r"(?P<array>\[(?:(?P<size>\d+)|<=(?P<bound>\d+))?\])?"
@@ -49,11 +49,11 @@ _LINE = re.compile(
     r"(?:\s*=\s*(?P<constant>.*)|\s+(?P<default>[^\s=].*))?",
     re.ASCII,
 )
-# Fixed arrays are made whole for every message, so a slip of the pen must not cost gigabytes.
+# Fixed arrays are allocated for every message, so a typing error must not cost gigabytes.
 _MOST_NUMBERS = 1 << 24
 _MOST_PARTS = 4096
 MAX_FIELDS = 4096
-"""Fields and constants of one type."""
+"""Limit of the fields and constants of one type."""
 
 _KINDS = {".msg": "msg", ".srv": "srv", ".action": "action"}
 _PARTS = {
@@ -80,22 +80,22 @@ class Definition:
     name: str
     """ROS 2 name, such as `std_srvs/srv/Trigger_Response`."""
     source: str
-    """File it came from, for error messages."""
+    """The definition's file, for error messages."""
     fields: list[tuple[str, Any]] = field(default_factory=list)
-    """Names and types, the latter as `rosbags` describes them."""
+    """Names and types; types as `rosbags` describes them."""
     constants: list[tuple[str, Any, Any]] = field(default_factory=list)
     """Name, type and value."""
     constant_texts: dict[str, str] = field(default_factory=dict)
-    """Values as written: ROS 1 takes its md5 sums from the text."""
+    """Values as written: ROS 1 computes its md5 sums from the text."""
     defaults: dict[str, Any] = field(default_factory=dict)
-    """Values of fields that do not start at zero."""
+    """Default values of fields, where not zero."""
     nested: list[tuple[str, int]] = field(default_factory=list)
-    """Types that it is made of, each with its line."""
+    """Nested types, each with its line."""
 
 
 @dataclass(frozen=True)
 class DefinitionFile:
-    """A definition file, not yet read."""
+    """A definition file that has not been read yet."""
 
     path: Path
     package: str
@@ -109,22 +109,18 @@ class DefinitionFile:
 
     @property
     def names(self) -> list[str]:
-        """Names of the types that the file defines."""
+        """Names of the types in the file."""
         return [f"{self.base}{part}" for part in _PARTS[self.kind]]
 
 
 def find_definition_files(folder: Path) -> list[DefinitionFile]:
-    """All definition files below a folder, sorted by path.
+    """Returns all definition files below a folder, sorted by path.
 
-    Raises
-    ------
-    GraphError
-        There is no such folder, it holds no definition, or a file or package has a name that ROS
-        does not allow.
-
+    Raises `GraphError` if the folder does not exist, contains no definition, or a file or package
+    has an invalid ROS name.
     """
     if not folder.is_dir():
-        raise GraphError(f"{folder}: there is no such folder of message definitions")
+        raise GraphError(f"{folder}: this folder of message definitions does not exist")
     found = []
     for where, inner, names in os.walk(folder):
         inner.sort()
@@ -141,25 +137,22 @@ def find_definition_files(folder: Path) -> list[DefinitionFile]:
                 raise GraphError(f"{path}: a {suffix} file belongs in a folder {kind}/")
             if not _FILE_NAME.fullmatch(stem):
                 raise GraphError(
-                    f"{path}: '{stem}' cannot be the name of a ROS type: those are CamelCase, "
-                    "letters and digits after a capital"
+                    f"{path}: '{stem}' is not a valid name of a ROS type: use CamelCase, "
+                    "a capital followed by letters and digits"
                 )
             if not _PACKAGE.fullmatch(package):
-                raise GraphError(f"{path}: '{package}' cannot be the name of a ROS package")
+                raise GraphError(f"{path}: '{package}' is not a valid name of a ROS package")
             found.append(DefinitionFile(path, package, kind))
     if not found:
-        raise GraphError(f"{folder}: holds no .msg, .srv or .action file")
+        raise GraphError(f"{folder}: contains no .msg, .srv or .action file")
     return found
 
 
 def read_definition_file(file: DefinitionFile) -> list[Definition]:
-    """The types of a file.
+    """Returns the types of a file.
 
-    Raises
-    ------
-    GraphError
-        It cannot be read or does not follow the format; the message names file and line.
-
+    Raises `GraphError` if the file cannot be read or does not follow the format; the message names
+    file and line.
     """
     try:
         text = file.path.read_text(encoding="utf-8")
@@ -171,17 +164,11 @@ def read_definition_file(file: DefinitionFile) -> list[Definition]:
 
 
 def parse_definition(text: str, name: str, source: str) -> list[Definition]:
-    """The types that a text defines.
+    """Returns the types that a text defines.
 
-    Parameters
-    ----------
-    text
-        Content of a definition file.
-    name
-        `package/msg/Name`, `package/srv/Name` or `package/action/Name`.
-    source
-        What to call the text in errors, usually its path.
-
+    Parameters: `text` is the content of a definition file, `name` is `package/msg/Name`,
+    `package/srv/Name` or `package/action/Name`, `source` names the text in errors, usually its
+    path. Raises `GraphError` as `read_definition_file` does.
     """
     package, kind, _ = name.split("/")
     parts = [Definition(f"{name}{part}", source) for part in _PARTS[kind]]
@@ -191,7 +178,7 @@ def parse_definition(text: str, name: str, source: str) -> list[Definition]:
         if stripped == "---" and _SECTIONS[kind] > 1:
             section += 1
             if section == _SECTIONS[kind]:
-                raise GraphError(f"{source}:{number}: {_dashes(kind)}, and this is one more")
+                raise GraphError(f"{source}:{number}: {_dashes(kind)}; this line is one too many")
         elif stripped and not stripped.startswith("#"):
             try:
                 _read_line(parts[section], stripped, package, number)
@@ -210,7 +197,7 @@ def _dashes(kind: str) -> str:
 
 
 def _complete_action(parts: list[Definition], name: str) -> None:
-    """The messages that carry an action in ROS 2."""
+    """Adds the fields of the messages that implement an action in ROS 2."""
 
     def fill(definition: Definition, **fields: str) -> None:
         for field_name, typename in fields.items():
@@ -230,8 +217,8 @@ def _complete_action(parts: list[Definition], name: str) -> None:
 
 
 def _read_line(definition: Definition, line: str, package: str, number: int) -> None:
-    """Add one field or constant; ValueError says what is wrong with the line."""
-    # A text constant of ROS 1 reaches to the end of its line, '#' included.
+    """Adds one field or constant; raises ValueError with the line's problem."""
+    # A string constant of ROS 1 extends to the end of its line, '#' included.
     text_constant = re.match(r"string(<=\d+)?\s+\w+\s*=", line)
     if not text_constant:
         line = _without_comment(line)
@@ -263,7 +250,7 @@ def _read_line(definition: Definition, line: str, package: str, number: int) -> 
 
 
 def _without_comment(line: str) -> str:
-    """The line without a comment; a '#' in quotes is none."""
+    """Returns the line without its comment; a '#' in quotes starts none."""
     quote = ""
     for index, letter in enumerate(line):
         if quote:
@@ -276,18 +263,18 @@ def _without_comment(line: str) -> str:
 
 
 def _describe(match: re.Match[str], package: str) -> Any:
-    """The type of a field in rosbags' form."""
+    """Returns the type of a field as `rosbags` describes it."""
     base = match["type"]
     element: Any
     if base in NUMBERS or base == "string":
         if match["limit"] and base != "string":
-            raise ValueError(f"only a string has a length limit, not {base}")
+            raise ValueError(f"only a string may have a length limit, not {base}")
         element = (Nodetype.BASE, (base, int(match["limit"] or 0)))
     elif base in ("wstring", "wchar", "float128", "long double"):
         raise ValueError(f"{base} is not supported")
     else:
         if match["limit"]:
-            raise ValueError(f"only a string has a length limit, not {base}")
+            raise ValueError(f"only a string may have a length limit, not {base}")
         element = (Nodetype.NAME, _nested_name(base, package))
     if match["array"] is None:
         return element
@@ -295,10 +282,10 @@ def _describe(match: re.Match[str], package: str) -> Any:
     if match["size"] is not None:
         most = _MOST_NUMBERS if base in NUMBERS else _MOST_PARTS
         if not 1 <= size <= most:
-            raise ValueError(f"a fixed array of {base} has 1 to {most} elements, not {size}")
+            raise ValueError(f"a fixed array of {base} must have 1 to {most} elements, not {size}")
         return (Nodetype.ARRAY, (element, size))
     if match["bound"] is not None and size < 1:
-        raise ValueError("a bounded array holds at least 1 element")
+        raise ValueError("a bounded array must allow at least 1 element")
     return (Nodetype.SEQUENCE, (element, size))
 
 
@@ -322,7 +309,7 @@ def _text_value(text: str) -> str:
 
 
 def _number_value(text: str, base: str) -> bool | int | float:
-    """Value of a literal for a field of type `base`."""
+    """Returns the value of a literal for a field of type `base`."""
     if base == "bool":
         if text.lower() in ("true", "1", "false", "0"):
             return text.lower() in ("true", "1")
@@ -339,12 +326,12 @@ def _number_value(text: str, base: str) -> bool | int | float:
 
 
 def _integer(text: str) -> int:
-    # 017 is seventeen to ROS 1 and ROS 2 alike; Python refuses it as a literal.
+    # ROS 1 and ROS 2 both read 017 as seventeen; Python rejects it as a literal.
     return int(text) if text.lstrip("+-").isdigit() else int(text, 0)
 
 
 def _default(text: str, described: Any) -> Any:
-    """Value of a default as written behind a field."""
+    """Returns the default value written after a field."""
     kind, detail = described
     text = text.strip()
     if kind == Nodetype.NAME:
@@ -355,7 +342,7 @@ def _default(text: str, described: Any) -> Any:
     if inner == Nodetype.NAME:
         raise ValueError("an array of messages cannot have a default value")
     if not (text.startswith("[") and text.endswith("]")):
-        raise ValueError(f"the default of an array is a list, not '{text}'")
+        raise ValueError(f"the default of an array must be a list, not '{text}'")
     base = inner_detail[0]
     if base == "string":
         try:

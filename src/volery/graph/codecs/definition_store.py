@@ -1,7 +1,7 @@
-"""A typestore that learns types from definition files, each when it is first asked for.
+"""Provides a typestore that loads types from definition files on demand.
 
-Making a dataclass takes about half a millisecond, so of the types in a folder only those in use
-are made: `store.types["std_srvs/srv/Trigger_Request"]` reads the file that defines it.
+Creating a dataclass takes about half a millisecond, so only the types in use are created:
+`store.types["std_srvs/srv/Trigger_Request"]` reads the file that defines the type.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from volery.graph.codecs.definition_files import (
 from volery.graph.message_defaults import make_arguments_optional
 
 EMPTY_MEMBER = definition_budget.EMPTY_MEMBER
-"""The byte that a message without fields has in ROS 2, and only there."""
+"""The byte of a message without fields, in ROS 2 only."""
 MAX_FOREIGN = 5000
-"""Types that one process learns from logs."""
+"""Limit of the types that one process registers from logs."""
 
 
 class _LazyDict(dict[str, Any]):
-    """A dict that loads a pending type before it answers for it."""
+    """A dict that loads a pending type at its first lookup."""
 
     def __init__(self, present: dict[str, Any], pending: Callable[[str], bool]) -> None:
         super().__init__(present)
@@ -55,7 +55,7 @@ class _LazyDict(dict[str, Any]):
 
 
 class DefinitionStore(Typestore):
-    """Types of a store and of folders of definition files. Safe to use from several threads."""
+    """Holds the types of a store and of folders of definition files. Thread-safe."""
 
     def __init__(self, base: Typestore, module: str) -> None:
         super().__init__()
@@ -69,38 +69,35 @@ class DefinitionStore(Typestore):
         self.fielddefs = _LazyDict(dict(base.fielddefs), self._load)
 
     def names(self) -> list[str]:
-        """Names of all types, loaded or not, sorted."""
+        """Returns the names of all types, loaded or not, sorted."""
         return sorted({*self.fielddefs, *self._files})
 
     def default_of(self, msgtype: str, field: str) -> Any:
-        """Value that a definition file gives a field; None where it starts at zero."""
+        """Returns a field's default in its definition file; None: zero."""
         definition = self._definitions.get(msgtype)
         return None if definition is None else definition.defaults.get(field)
 
     def constant_text(self, msgtype: str, constant: str) -> str | None:
-        """A constant as its file writes it; None where the type is from no file."""
+        """Returns a constant as written in its file; None for a type without file."""
         definition = self._definitions.get(msgtype)
         return None if definition is None else definition.constant_texts.get(constant)
 
     def index_folder(self, folder: Path) -> None:
-        """Make the types of a folder known unread; a broken file is an error on first use."""
+        """Registers a folder's types without reading the files; errors appear at first use."""
         for file in find_definition_files(folder):
             for name in file.names:
                 if not dict.__contains__(self.fielddefs, name):
                     self._files.setdefault(name, file)
 
     def add_folder(self, folder: Path, *, foreign: bool = False) -> list[str]:
-        """Read a folder and register its types, all or none. Returns their names.
+        """Reads a folder and registers its types, all or none. Returns their names.
 
-        A type that is known already with the same fields is passed over. Types of a stranger's log
-        (`foreign`) are held to more: a process learns at most `MAX_FOREIGN` of them.
+        A known type with the same fields is skipped. Types of an untrusted log (`foreign`) have
+        more limits: a process registers at most `MAX_FOREIGN` of them.
 
-        Raises
-        ------
-        GraphError
-            A file is broken, names an unknown type, repeats a type of another file, or defines a
-            known type with other fields; a type contains itself, or is too large to be used.
-
+        Raises `GraphError` if a file is broken, names an unknown type, repeats a type of another
+        file, or defines a known type with other fields, or if a type contains itself or is too
+        large.
         """
         found: dict[str, Definition] = {}
         for file in find_definition_files(folder):
@@ -108,7 +105,7 @@ class DefinitionStore(Typestore):
                 other = found.get(definition.name)
                 if other is not None:
                     raise GraphError(
-                        f"{definition.source}: {definition.name} is defined in {other.source} too"
+                        f"{definition.source}: {definition.name} is also defined in {other.source}"
                     )
                 found[definition.name] = definition
         with self._lock:
@@ -126,8 +123,8 @@ class DefinitionStore(Typestore):
         check_foreign(new, self.fielddefs.__getitem__)
         if self._num_foreign + len(new) > MAX_FOREIGN:
             raise GraphError(
-                f"{MAX_FOREIGN} message types were learned from logs, and this process takes no "
-                "more; start it again"
+                f"this process has registered {MAX_FOREIGN} message types from logs, which is the "
+                "limit; restart the process"
             )
         self._num_foreign += len(new)
 
@@ -138,10 +135,10 @@ class DefinitionStore(Typestore):
                 raise GraphError(f"{definition.source}:{line}: unknown type '{nested}'")
         known = self.fielddefs.get(name)
         if known is not None and _shape(known[1]) != _shape(definition.fields):
-            raise GraphError(f"{definition.source}: {name} is known already with other fields")
+            raise GraphError(f"{definition.source}: {name} is already known with other fields")
 
     def _load(self, name: str) -> bool:
-        """Register a pending type; False where none of that name is pending."""
+        """Registers a pending type; returns False if the name is not pending."""
         with self._lock:
             if dict.__contains__(self.types, name):
                 return True  # another thread was faster
@@ -173,7 +170,7 @@ class DefinitionStore(Typestore):
             source = next(iter(new.values())).source
             raise GraphError(f"{source}: {error}") from None
         for name in new:
-            # Where pickle finds the class again; rosbags' own module holds the newest type only.
+            # Lets pickle find the class again; rosbags' own module holds only the newest type.
             self.types[name].__module__ = self._module
         self._definitions.update(new)
         for name in new:
@@ -187,7 +184,7 @@ def _shape(fields: Any) -> Any:
 
 
 def _check_cycles(found: dict[str, Definition]) -> None:
-    """No type may contain itself: its messages would never end."""
+    """Raises `GraphError` if a type contains itself."""
     done: set[str] = set()
 
     def visit(name: str, above: tuple[str, ...]) -> None:
@@ -207,7 +204,7 @@ def _check_cycles(found: dict[str, Definition]) -> None:
 
 
 def element_type(described: Any) -> str | None:
-    """Message type of a field, or of its elements; None for numbers and strings."""
+    """Returns the message type of a field or its elements; None for numbers and strings."""
     kind, detail = described
     if kind == Nodetype.NAME:
         return str(detail)

@@ -1,7 +1,8 @@
-"""Writes the message types that come with Volery as packages of ROS 2, or of ROS 1.
+"""Writes Volery's message types as ROS 2 or ROS 1 packages.
 
-With them built and sourced, ROS's own tools know those types. colcon builds those of ROS 2, catkin
-those of ROS 1; without catkin, `generate_python.py` beside them makes their Python modules.
+After building and sourcing them, ROS's own tools know the types. colcon builds the ROS 2 packages,
+catkin the ROS 1 packages; without catkin, `generate_python.py` next to them creates their Python
+modules.
 """
 
 from __future__ import annotations
@@ -19,22 +20,22 @@ from volery.graph.codecs.definition_files import (
 )
 
 OWN = "volery_interfaces"
-"""The package that nobody else has."""
+"""The package that only Volery provides."""
 DEFINITIONS = Path(__file__).parents[1] / "definitions"
 _ROS2_ALONE = ("action_msgs", "rcl_interfaces")
 _ACTIONS_NEED = "action_msgs"
-"""What rosidl adds to packages with actions."""
+"""Dependency that rosidl adds to packages with actions."""
 
 
 def packages() -> list[str]:
-    """Packages of which definitions come with Volery."""
+    """Returns the packages whose definitions come with Volery."""
     return sorted(folder.name for folder in DEFINITIONS.iterdir() if folder.is_dir())
 
 
 def needs(package: str, *, ros1: bool = False) -> list[str]:
-    """Other packages that a package's definitions name, sorted. `GraphError` where it is none.
+    """Returns the other packages that a package's definitions use, sorted.
 
-    ros1: as ROS 1 has them.
+    ros1: the packages' names in ROS 1. Raises `GraphError` if the package does not exist.
     """
     files = _files(package)
     if ros1:
@@ -53,30 +54,20 @@ def needs(package: str, *, ros1: bool = False) -> list[str]:
 def write_package(
     package: str, folder: Path, *, overwrite: bool = False, ros1: bool = False
 ) -> Path:
-    """Write a package into a new folder of its name below `folder`, and return that.
+    """Writes a package into a new folder of its name below `folder`; returns the new folder.
 
-    Parameters
-    ----------
-    package, folder
-        Which, and where to; `folder` exists.
-    overwrite
-        Replaces an older package.
-    ros1
-        Writes it for ROS 1: without actions, in the spelling of that generation.
+    `folder` must exist. overwrite: replaces an older package. ros1: writes a ROS 1 package: without
+    actions, in the spelling of ROS 1.
 
-    Raises
-    ------
-    GraphError
-        There is no such package, or its folder exists and holds anything that is not to be
-        replaced, or it cannot be written.
-
+    Raises `GraphError` if the package does not exist, its folder exists and must not be replaced,
+    or the folder cannot be written.
     """
     contents = _ros1_contents(package) if ros1 else _ros2_contents(package)
     target = folder / (ros1_package.package_name(package) if ros1 else package)
     if target.exists() and not overwrite:
-        raise GraphError(f"{target}: exists already; --overwrite replaces it")
+        raise GraphError(f"{target}: already exists; --overwrite replaces it")
     if target.exists() and not (target / "package.xml").is_file():
-        raise GraphError(f"{target}: is no package that could be replaced")
+        raise GraphError(f"{target}: is not a package, and is not replaced; choose another folder")
     try:
         if target.exists():
             shutil.rmtree(target)
@@ -89,9 +80,9 @@ def write_package(
 
 
 def write_generator(folder: Path) -> Path:
-    """Write the program that makes Python modules of the ROS 1 packages in `folder`; return it.
+    """Writes the program that creates Python modules of the ROS 1 packages in `folder`.
 
-    `GraphError` where it cannot be written.
+    Returns its path. Raises `GraphError` if the program cannot be written.
     """
     target = folder / "generate_python.py"
     try:
@@ -102,7 +93,7 @@ def write_generator(folder: Path) -> Path:
 
 
 def _ros2_contents(package: str) -> dict[str, str]:
-    """Texts of a ROS 2 package's files, by their paths in it."""
+    """Returns the texts of a ROS 2 package's files by their relative paths."""
     files, others = _files(package), needs(package)
     return {
         **{f"{file.kind}/{file.path.name}": file.path.read_text("utf-8") for file in files},
@@ -113,20 +104,20 @@ def _ros2_contents(package: str) -> dict[str, str]:
 
 def _ros1_contents(package: str) -> dict[str, str]:
     if package in _ROS2_ALONE:
-        raise GraphError(f"{package} is a package of ROS 2 alone: leave out --ros1")
+        raise GraphError(f"{package} exists only in ROS 2: omit --ros1")
     return ros1_package.contents(package, _files(package), version("volery"))
 
 
 def _files(package: str) -> list[DefinitionFile]:
     if package not in packages():
         raise GraphError(
-            f"no package '{package}' comes with Volery; there are {', '.join(packages())}"
+            f"no package '{package}' comes with Volery; known packages: {', '.join(packages())}"
         )
     return find_definition_files(DEFINITIONS / package)
 
 
 def _manifest(package: str, others: list[str]) -> str:
-    """package.xml, in format 3 (REP 149)."""
+    """Returns package.xml, in format 3 (REP 149)."""
     depends = "".join(f"  <depend>{name}</depend>\n" for name in others)
     return f"""<?xml version="1.0"?>
 <package format="3">
@@ -149,7 +140,7 @@ def _manifest(package: str, others: list[str]) -> str:
 
 
 def _build(package: str, files: list[DefinitionFile], others: list[str]) -> str:
-    """CMakeLists.txt, as rosidl wants it."""
+    """Returns CMakeLists.txt for rosidl."""
     found = "".join(f"find_package({name} REQUIRED)\n" for name in others)
     listed = "".join(f'  "{file.kind}/{file.path.name}"\n' for file in files)
     needed = f"  DEPENDENCIES {' '.join(others)}\n" if others else ""

@@ -1,11 +1,11 @@
-"""Messages as plain dicts, lists, numbers and strings: the form that rosbridge speaks.
+"""Converts messages to and from plain dicts, lists, numbers and strings, the form of rosbridge.
 
-    form = JsonForm()
+    form = JsonCodec()
     form.encode(twist, "geometry_msgs/msg/Twist")  # {"linear": {"x": 1.0, ...}, ...}
     form.decode({"linear": {"x": 1.0}}, "geometry_msgs/msg/Twist")
 
-Arrays of bytes become base64 text, other arrays lists. A `JsonCodec` with a hook for arrays keeps
-them as numpy arrays instead, for CBOR. Converters are built once a type and form.
+Arrays of bytes become base64 text, other arrays lists. A `JsonCodec` with a hook for arrays leaves
+them as numpy arrays instead, for CBOR. Converters are built once per type and codec.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.codecs.zero import DTYPES
 
 ArrayHook = Callable[[NDArray[Any], str], Any]
-"""Array of numbers, shape (n,), little-endian, and its ROS type, to what stands in the dict."""
+"""Converts an array of numbers, shape (n,), little-endian, and its ROS type to the plain value."""
 
 
 class JsonCodec:
@@ -44,14 +44,14 @@ class JsonCodec:
     Parameters
     ----------
     non_finite_as_null
-        NaN and infinite numbers become None, as JSON has no word for them; else they stay floats.
-        None is read as NaN either way.
+        NaN and infinite numbers become None, as JSON cannot express them; otherwise they stay
+        floats. None is always read as NaN.
     ros1_names
-        Emit ROS 1 field names (`secs`, `nsecs`, a header's `seq`, `K` for `k`) and fields. Both
-        spellings are read either way.
+        Writes ROS 1 field names (`secs`, `nsecs`, a header's `seq`, `K` for `k`) and fields. Both
+        spellings are always read.
     arrays
-        What an array of numbers (bools apart) becomes; without it base64 text for bytes and a list
-        for others. Given a hook, `non_finite_as_null` does not touch arrays.
+        Converts an array of numbers (not bools); without it, bytes become base64 text and other
+        arrays lists. With a hook, `non_finite_as_null` does not affect arrays.
 
     """
 
@@ -68,13 +68,9 @@ class JsonCodec:
         self._encoders: dict[str, Convert] = {}
 
     def encode(self, message: Any, msgtype: str) -> dict[str, Any]:
-        """Plain form of a message.
+        """Returns the plain form of a message.
 
-        Raises
-        ------
-        GraphError
-            The type is unknown, or the message does not fit it.
-
+        Raises `GraphError` if the type is unknown or the message does not fit the type.
         """
         encoder = self._encoders.get(msgtype) or self._encoder(msgtype)
         try:
@@ -84,7 +80,7 @@ class JsonCodec:
         return plain
 
     def decode(self, plain: Any, msgtype: str) -> Any:
-        """Message of a plain form: `decode_plain`, whatever the options of this form."""
+        """Returns the message of a plain form, see `decode_plain`; ignores the codec's options."""
         return decode_plain(plain, msgtype)
 
     def _encoder(self, msgtype: str) -> Convert:
@@ -117,7 +113,7 @@ class JsonCodec:
         return self._encoders[msgtype]
 
     def _value_encoder(self, described: Any) -> Convert | None:
-        """Converter of a field; None where its value stays as it is."""
+        """Returns the converter of a field; None where the value stays as it is."""
         kind, detail = described
         if kind == Nodetype.NAME:
             return self._encoder(detail)

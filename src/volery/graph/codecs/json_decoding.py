@@ -1,6 +1,6 @@
-"""Plain dicts, lists, numbers and strings as messages: what a client sent, checked.
+"""Converts plain dicts, lists, numbers and strings of clients to messages, and checks them.
 
-Decoders are built once a type.
+Decoders are built once per type.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from volery.graph.messages import single, typestore
 Convert = Callable[[Any], Any]
 
 BYTES = {"uint8", "char", "byte"}
-"""Types whose arrays travel as base64 text."""
+"""Types whose arrays are encoded as base64 text."""
 HEADER = "std_msgs/msg/Header"
 TIMES = {"builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"}
 ROS1_TIME = {"sec": "secs", "nanosec": "nsecs"}
-"""Fields of a time as rosbridge names them in ROS 1."""
+"""Names of a time's fields in rosbridge for ROS 1."""
 _LARGEST_FLOAT32 = float(np.finfo(np.float32).max)
 _SHOWN_LETTERS = 40
 
 
 class _Mismatch(Exception):  # noqa: N818 - becomes a GraphError once its path is known
-    """A value that does not fit; the path to it grows on the way out."""
+    """Raised for a value that does not fit; callers prepend the path to the value."""
 
     def __init__(self, text: str) -> None:
         super().__init__(text)
@@ -49,17 +49,14 @@ class _Mismatch(Exception):  # noqa: N818 - becomes a GraphError once its path i
 
 
 def decode_plain(plain: Any, msgtype: str) -> Any:
-    """Message of a plain form, such as parsed JSON or CBOR. Its arrays are read-only.
+    """Returns the message of a plain form, such as parsed JSON or CBOR. Its arrays are read-only.
 
-    Fields that are left out are zero, or at the default of their definition file. Arrays may be
-    lists or numpy arrays of one dimension, arrays of bytes also base64 text or bytes. Times may be
-    {sec, nanosec} or {secs, nsecs}; a header's `seq` is passed over.
+    Omitted fields are zero, or have the default of their definition file. Arrays may be lists or
+    one-dimensional numpy arrays, arrays of bytes also base64 text or bytes. Times may be {sec,
+    nanosec} or {secs, nsecs}; a header's `seq` is ignored.
 
-    Raises
-    ------
-    GraphError
-        The type is unknown, or a value does not fit: "linear.x must be a number, not 'abc'".
-
+    Raises `GraphError` if the type is unknown, or a value does not fit: "linear.x must be a number,
+    not 'abc'".
     """
     decoder = _decoders.get(msgtype) or _decoder(msgtype)
     try:
@@ -73,10 +70,10 @@ _decoders: dict[str, Convert] = {}
 
 
 def plain_fields(msgtype: str) -> list[tuple[str, Any]]:
-    """Names and types of a type's fields; `GraphError` if it is not known."""
+    """Returns the names and types of a type's fields; raises `GraphError` if it is unknown."""
     store = typestore()
     if msgtype not in store.fielddefs:
-        raise GraphError(f"message type '{msgtype}' is not known")
+        raise GraphError(f"unknown message type '{msgtype}'")
     return [(name, kind) for name, kind in store.fielddefs[msgtype][1] if name != EMPTY_MEMBER]
 
 
@@ -89,14 +86,14 @@ _KINDS: list[tuple[Any, str]] = [
 
 
 def _shown(value: Any) -> str:
-    """A value, or what it is, as an error names it."""
+    """Returns a value, or its kind, for an error message."""
     for kind, name in _KINDS:
         if isinstance(value, kind):
             return name
     if isinstance(value, np.ndarray):
         return f"an array of {value.dtype} of shape {value.shape}"
     if isinstance(value, int) and value.bit_length() > 128:
-        return "a number of many digits"  # str() refuses to write it out
+        return "a number of many digits"  # str() raises an exception
     text = str(value).lower() if isinstance(value, bool) else repr(value)
     return text if len(text) <= _SHOWN_LETTERS else text[: _SHOWN_LETTERS - 3] + "..."
 
@@ -133,7 +130,7 @@ def _decoder(msgtype: str) -> Convert:
 
 
 def _aliases(msgtype: str, names: set[str]) -> dict[str, str | None]:
-    """Other spellings of fields; None for what ROS 1 has and ROS 2 dropped."""
+    """Returns other spellings of fields; None for fields that ROS 2 dropped."""
     aliases: dict[str, str | None] = {name.upper(): name for name in names if len(name) == 1}
     if msgtype in TIMES:
         aliases |= {old: new for new, old in ROS1_TIME.items()}
@@ -147,7 +144,7 @@ def _aliases(msgtype: str, names: set[str]) -> dict[str, str | None]:
 def _renamed(
     plain: Mapping[Any, Any], names: set[str], aliases: dict[str, str | None]
 ) -> dict[str, Any]:
-    """Plain form with every field under its ROS 2 name."""
+    """Returns the plain form with ROS 2 field names."""
     found = {}
     for name, value in plain.items():
         if name in names:
@@ -156,7 +153,7 @@ def _renamed(
             new = aliases[name]
             if new is not None:
                 if new in plain:
-                    raise _Mismatch(f"is given as '{new}' too").inside(name)
+                    raise _Mismatch(f"is also given as '{new}'").inside(name)
                 found[new] = value
         else:
             known = ", ".join(sorted(names)) or "none"
@@ -217,7 +214,7 @@ def _scalar_decoder(base: str, limit: int) -> Convert:
                 try:
                     value.encode()
                 except UnicodeEncodeError:
-                    raise _Mismatch("holds half of a character that UTF-8 cannot write") from None
+                    raise _Mismatch("contains half a surrogate pair, not UTF-8") from None
             return value
 
         return decode_string
@@ -260,7 +257,7 @@ def _integer_decoder(base: str) -> Convert:
 
     def decode(value: Any) -> int:
         if type(value) is not int:
-            # JavaScript and CBOR know one kind of number: 5.0 is the integer 5 there
+            # JavaScript and CBOR have one kind of number: 5.0 may be the integer 5
             whole = isinstance(value, (float, np.floating)) and float(value).is_integer()
             if not whole and not isinstance(value, np.integer):
                 raise _Mismatch(f"must be an integer, not {_shown(value)}")
@@ -273,7 +270,7 @@ def _integer_decoder(base: str) -> Convert:
 
 
 def _array_decoder(base: str, check: Callable[[int], None]) -> Convert:
-    """Decoder of an array of numbers to a read-only numpy array."""
+    """Returns the decoder of an array of numbers to a read-only numpy array."""
     dtype = DTYPES[base]
     one = _scalar_decoder(base, 0)
     is_float = base.startswith("float")

@@ -1,8 +1,8 @@
-"""The graph's ROS 2 messages as ROS 1 bytes, and back.
+"""Encodes the graph's ROS 2 messages as ROS 1 bytes, and decodes them.
 
 The two generations share most definitions. They differ in the header's `seq`, in a few fields that
 ROS 2 added (`Range.variance`) or renamed (`CameraInfo.D` became `d`), and in packages that moved
-(`rosapi`). A ROS 1 coder of each type is compiled once; it reads and makes ROS 2 messages directly:
+(`rosapi`). A ROS 1 coder is compiled once per type; it reads and creates ROS 2 messages directly:
 
     codec = Ros1Codec()
     data = codec.encode(scan, "sensor_msgs/msg/LaserScan", seq=7)
@@ -40,15 +40,15 @@ __all__ = ["Ros1Codec", "ros1_codec", "ros1_name", "ros2_name"]
 HEADER = "std_msgs/msg/Header"
 _BASIC = {"builtin_interfaces/msg/Time": "time", "builtin_interfaces/msg/Duration": "duration"}
 _OLD_FIELDS = {"default": "default_value"}
-"""Fields that ROS 2 renamed by more than their case."""
+"""Fields that ROS 2 renamed other than in case."""
 _SPARE_ELEMENTS = 1024
-"""Elements that an array may have beyond the bytes of its message: those without any content."""
+"""Elements that an array may have beyond the bytes of its message: empty messages."""
 
 _STAMP_AND_SEQ = struct.Struct("<IiII")
 
 
 class _Call:
-    """What generated coders find as their typestore during one call."""
+    """The typestore of the generated coders during one call."""
 
     __slots__ = ("get_msgdef", "max_sequence_length", "seq")
 
@@ -59,7 +59,7 @@ class _Call:
 
 
 class Ros1Codec:
-    """Codes messages of the graph for ROS 1. Safe to use from several threads."""
+    """Encodes and decodes messages of the graph for ROS 1. Thread-safe."""
 
     def __init__(self, ros2: DefinitionStore | None = None) -> None:
         self._ros2 = typestore() if ros2 is None else ros2
@@ -69,22 +69,11 @@ class Ros1Codec:
         self._lock = threading.RLock()
 
     def encode(self, message: Any, msgtype: str, seq: int = 0) -> bytes:
-        """ROS 1 bytes of a message.
+        """Encodes a message as ROS 1 bytes.
 
-        Parameters
-        ----------
-        message
-            Message of the graph.
-        msgtype
-            Its ROS 2 name; parts of services are named `std_srvs/srv/SetBool_Request`.
-        seq
-            Becomes the `seq` of its headers, modulo 2**32.
-
-        Raises
-        ------
-        GraphError
-            The type is unknown, or the message does not fit it.
-
+        msgtype: ROS 2 name; parts of services are named `std_srvs/srv/SetBool_Request`. seq: the
+        `seq` of all headers, modulo 2**32. Raises `GraphError` if the type is unknown or the
+        message does not fit the type.
         """
         coder = self._coder(msgtype)
         call: Any = _Call(self._coder, 0, seq & 0xFFFFFFFF)
@@ -99,16 +88,11 @@ class Ros1Codec:
         return bytes(data)
 
     def decode(self, data: bytes | bytearray | memoryview, msgtype: str) -> Any:
-        """Message of the graph read from ROS 1 bytes.
+        """Decodes a message from ROS 1 bytes.
 
-        Its arrays are read-only and independent of `data`. Fields that ROS 1 lacks are zero.
-
-        Raises
-        ------
-        GraphError
-            The type is unknown, or the bytes are not one message of that type: too short, too
-            long, a length that lies, text that is not UTF-8.
-
+        The message's arrays are read-only and independent of `data`. Fields that ROS 1 lacks are
+        zero. Raises `GraphError` if the type is unknown or the bytes are not one message of that
+        type: too short, too long, a wrong length, text that is not UTF-8.
         """
         coder = self._coder(msgtype)
         owned = data if type(data) is bytes else bytes(data)
@@ -117,18 +101,18 @@ class Ros1Codec:
             message, end = coder.deserialize_ros1(owned, 0, coder.cls, call)
         except CODING_ERRORS as error:
             raise GraphError(
-                f"{msgtype}: {len(owned)} bytes are not such a message: {error}"
+                f"{msgtype}: {len(owned)} bytes are not a message of this type: {error}"
             ) from None
         if end != len(owned):
             raise GraphError(f"{msgtype}: the message has {end} bytes, {len(owned)} were given")
         return message
 
     def learn(self, msgtype: str) -> None:
-        """Compile the coder of a type now, some milliseconds; `GraphError` if it is unknown."""
+        """Compiles the coder of a type, some milliseconds; raises `GraphError` if unknown."""
         self._coder(msgtype)
 
     def fields(self, msgtype: str) -> list[tuple[str, str | None]]:
-        """Fields of the ROS 1 type in order, each with its ROS 2 name, None where it has none."""
+        """Returns the ROS 1 fields in order, each with its ROS 2 name, None without one."""
         new = {name.lower(): name for name, _ in self._ros2.fielddefs[msgtype][1]}
         return [
             (name, new.get(name.lower()) or new.get(_OLD_FIELDS.get(name, name)))
@@ -136,24 +120,16 @@ class Ros1Codec:
         ]
 
     def described(self, msgtype: str) -> list[Any]:
-        """Kinds of the fields of the ROS 1 type in order, as `rosbags` describes them.
+        """Returns the types of the ROS 1 fields in order, as `rosbags` describes them.
 
-        Raises
-        ------
-        GraphError
-            The type is unknown.
-
+        Raises `GraphError` if the type is unknown.
         """
         return [described for _, described in self._ros1_fields(msgtype)]
 
     def md5(self, msgtype: str) -> str:
-        """ROS 1 md5 sum of a message type or of a service (`std_srvs/srv/SetBool`).
+        """Returns the ROS 1 md5 sum of a message type or service (`std_srvs/srv/SetBool`).
 
-        Raises
-        ------
-        GraphError
-            The type is unknown.
-
+        Raises `GraphError` if the type is unknown.
         """
         if msgtype not in self._sums:
             if msgtype in _BASIC:
@@ -164,13 +140,9 @@ class Ros1Codec:
         return self._sums[msgtype]
 
     def definition_text(self, msgtype: str) -> str:
-        """ROS 1 definition of a message type or a service, followed by all that it nests.
+        """Returns the ROS 1 definition of a message type or service with its nested types.
 
-        Raises
-        ------
-        GraphError
-            The type is unknown.
-
+        Raises `GraphError` if the type is unknown.
         """
         if msgtype in _BASIC:
             return f"{_BASIC[msgtype]} data\n"
@@ -181,36 +153,36 @@ class Ros1Codec:
         return self.own_definition_text(msgtype) + "".join(others)
 
     def own_definition_text(self, msgtype: str) -> str:
-        """Returns the ROS 1 definition of a type without what it nests: that of its file.
+        """Returns the ROS 1 definition of a type without its nested types, as in its file.
 
-        `GraphError` where the type is unknown.
+        Raises `GraphError` if the type is unknown.
         """
         return "---\n".join(_ended(self._text(part)) for part in self._parts(msgtype))
 
     def nested_types(self, msgtype: str) -> list[str]:
-        """Returns the ROS 2 names of all message types in a type. `GraphError` as above."""
+        """Returns the ROS 2 names of all nested types. Raises `GraphError` for an unknown type."""
         nested: list[str] = []
         for part in self._parts(msgtype):
             self._collect(part, nested)
         return nested
 
     def _parts(self, msgtype: str) -> list[str]:
-        """The message types behind a name: the type itself, or a service's two."""
+        """Returns the message types of a name: the type itself, or a service's two."""
         if msgtype in self._ros2.fielddefs:
             return [msgtype]
         parts = [f"{msgtype}_Request", f"{msgtype}_Response"]
         if all(part in self._ros2.fielddefs for part in parts):
             return parts
-        raise GraphError(f"type '{msgtype}' is not known")
+        raise GraphError(f"unknown type '{msgtype}'")
 
     def _definition(self, msgtype: str) -> tuple[str, Any]:
-        """Name and definition that a type has in ROS 1."""
+        """Returns a type's name and definition in ROS 1."""
         if msgtype in self._ros1.fielddefs:
             return msgtype, self._ros1.fielddefs[msgtype]
         if msgtype not in self._ros2.fielddefs:
-            raise GraphError(f"message type '{msgtype}' is not known")
+            raise GraphError(f"unknown message type '{msgtype}'")
         package, kind, name = msgtype.split("/")
-        # A package that moved may have files under its old name, for what changed in the move.
+        # A moved package may have files under its old name, for types that the move changed.
         old_package, _ = ros1_name(msgtype).split("/")
         old = f"{old_package}/{kind}/{name}"
         found = old if package != old_package and old in self._ros2.fielddefs else msgtype
@@ -221,7 +193,7 @@ class Ros1Codec:
         return [(name, described) for name, described in fields if name != EMPTY_MEMBER]
 
     def _text(self, msgtype: str, *, summed: bool = False) -> str:
-        """Definition of a type in normal form, nested types as names or as their md5 sums."""
+        """Returns a type's definition in normal form, nested types as names or md5 sums."""
         found, (constants, _) = self._definition(msgtype)
         lines = []
         for name, base, value in constants:
@@ -263,7 +235,7 @@ class Ros1Codec:
 
     def _compile(self, msgtype: str) -> Msgdef[Any]:
         if msgtype not in self._ros2.fielddefs:
-            raise GraphError(f"message type '{msgtype}' is not known")
+            raise GraphError(f"unknown message type '{msgtype}'")
         fields = self._ros1_fields(msgtype)
         names = self.fields(msgtype)
         entries: Any = []
@@ -303,7 +275,7 @@ class Ros1Codec:
     def _maker(
         self, msgtype: str, fields: list[tuple[str, Any]], names: list[tuple[str, str | None]]
     ) -> Any:
-        """What makes the ROS 2 message from the values of the ROS 1 fields."""
+        """Returns a function that creates the ROS 2 message from the ROS 1 field values."""
         cls: Any = self._ros2.types[msgtype]
         position = {new: k for k, (_, new) in enumerate(names) if new is not None}
         arrays = [k for k, (_, described) in enumerate(fields) if is_number_array(described)]
@@ -334,7 +306,7 @@ class Ros1Codec:
 
 @cache
 def ros1_codec() -> Ros1Codec:
-    """The process's codec: compiled coders are shared."""
+    """Returns the codec of the process, so that compiled coders are shared."""
     return Ros1Codec()
 
 
@@ -357,4 +329,4 @@ def _serialize_header(data: memoryview, position: int, header: Any, call: Any) -
 
 
 def _unused(*_: Any) -> Any:
-    raise NotImplementedError("coders for ROS 1 know no CDR")
+    raise NotImplementedError("ROS 1 coders do not support CDR")

@@ -1,4 +1,4 @@
-"""Names of types in the two generations of ROS."""
+"""Converts type names between ROS 1 and ROS 2."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _TYPES = {
     "builtin_interfaces/msg/Time": "std_msgs/Time",
     "builtin_interfaces/msg/Duration": "std_msgs/Duration",
 }
-"""ROS 1 has these two as basic types, and messages that hold nothing but one of them."""
+"""Basic types of ROS 1, and their message types with nothing but that field."""
 _OLD_TYPES = {
     **{old: new for new, old in _TYPES.items()},
     **{old.replace("/", "/msg/"): new for new, old in _TYPES.items()},
@@ -24,16 +24,11 @@ _PART = re.compile(r"(.+)_(Request|Response|Goal|Result|Feedback)")
 
 
 def ros1_name(msgtype: str) -> str:
-    """ROS 1 name of a type: `std_msgs/msg/String` is `std_msgs/String` there.
+    """Returns the ROS 1 name of a type: `std_msgs/msg/String` becomes `std_msgs/String`.
 
-    Parts of a service lose their underscore: `std_srvs/srv/SetBool_Request` is
-    `std_srvs/SetBoolRequest`. A name in ROS 1 form is returned as it is.
-
-    Raises
-    ------
-    GraphError
-        The text is not the name of a type.
-
+    Parts of a service lose their underscore: `std_srvs/srv/SetBool_Request` becomes
+    `std_srvs/SetBoolRequest`. A name in ROS 1 form is returned unchanged. Raises `GraphError` if
+    the text is not the name of a type.
     """
     if msgtype in _TYPES:
         return _TYPES[msgtype]
@@ -45,20 +40,10 @@ def ros1_name(msgtype: str) -> str:
 
 
 def ros2_name(name: str, kind: Literal["msg", "srv", "action"] = "msg") -> str:
-    """ROS 2 name of a type given in either spelling.
+    """Returns the ROS 2 name of a type given in either spelling.
 
-    Parameters
-    ----------
-    name
-        `std_msgs/String` or `std_msgs/msg/String`.
-    kind
-        What a name of two parts names.
-
-    Raises
-    ------
-    GraphError
-        The text is not the name of a type, or names another kind.
-
+    name: `std_msgs/String` or `std_msgs/msg/String`. kind: the kind of a name with two parts.
+    Raises `GraphError` if the text is not the name of a type, or names another kind.
     """
     if name in _OLD_TYPES:
         return _OLD_TYPES[name]

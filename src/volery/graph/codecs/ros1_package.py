@@ -1,4 +1,4 @@
-"""The files of a ROS 1 package with message types that come with Volery, for catkin or genpy."""
+"""Creates the files of a ROS 1 package with Volery's message types, for catkin or genpy."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from volery.graph.codecs.definition_files import DefinitionFile
 from volery.graph.codecs.ros1 import Ros1Codec, ros1_codec, ros1_name
 
 GENERATOR = Path(__file__).with_name("ros1_python_generator.py")
-"""What makes Python modules of such packages; it runs by itself, with ROS 1's own Python."""
+"""Program that creates Python modules of such packages; runs alone, with ROS 1's own Python."""
 _KINDS = ("msg", "srv")
 _BASIC = "builtin_interfaces/"
-"""Package of which the types are basic ones in ROS 1."""
+"""Package whose types are basic types in ROS 1."""
 _NAME = re.compile(r"[A-Za-z][\w/]*(?:<=\d+)?(?:\[[^\]]*\])?\s+(?P<name>[A-Za-z]\w*)", re.ASCII)
 _MARK = "---"
 
@@ -24,7 +24,7 @@ def package_name(package: str) -> str:
 
 
 def needs(files: Sequence[DefinitionFile]) -> list[str]:
-    """Returns the other packages that the definitions of one package name, sorted."""
+    """Returns the other packages that the definitions of one package use, sorted."""
     codec = ros1_codec()
     nested = {
         ros1_name(name).partition("/")[0]
@@ -36,7 +36,7 @@ def needs(files: Sequence[DefinitionFile]) -> list[str]:
 
 
 def contents(package: str, files: Sequence[DefinitionFile], version: str) -> dict[str, str]:
-    """Returns the texts of the package's files by their paths in it. Actions are left out."""
+    """Returns the texts of the package's files by their relative paths, without actions."""
     name, others, known = package_name(package), needs(files), _known(files)
     codec = ros1_codec()
     return {
@@ -47,9 +47,9 @@ def contents(package: str, files: Sequence[DefinitionFile], version: str) -> dic
 
 
 def definition(file: DefinitionFile, codec: Ros1Codec) -> str:
-    """Returns a definition in ROS 1's spelling, with the comments that have lines of their own.
+    """Returns a definition in ROS 1's spelling, with the comments on lines of their own.
 
-    Where ROS 1 has other fields than the file, it is ROS 1's definition without comments.
+    If ROS 1 has other fields than the file, returns ROS 1's definition without comments.
     """
     plain = codec.own_definition_text(file.base)
     parts = [_lines_by_name(part) for part in _sections(plain.splitlines())]
@@ -77,7 +77,7 @@ def _known(files: Sequence[DefinitionFile]) -> list[DefinitionFile]:
 
 
 def _sections(lines: Sequence[str]) -> Iterator[list[str]]:
-    """What stands before, between and after the marks of a service."""
+    """Yields the lines before, between and after the marks of a service."""
     section: list[str] = []
     for line in lines:
         if line.strip() == _MARK:
@@ -94,7 +94,7 @@ def _lines_by_name(lines: Sequence[str]) -> dict[str, str]:
 
 
 def _manifest(package: str, others: Sequence[str], version: str) -> str:
-    """package.xml, in format 2 (REP 140)."""
+    """Returns package.xml, in format 2 (REP 140)."""
     depends = "".join(f"  <depend>{name}</depend>\n" for name in others)
     return f"""<?xml version="1.0"?>
 <package format="2">
@@ -112,7 +112,7 @@ def _manifest(package: str, others: Sequence[str], version: str) -> str:
 
 
 def _build(package: str, files: Sequence[DefinitionFile], others: Sequence[str]) -> str:
-    """CMakeLists.txt, as catkin wants it."""
+    """Returns CMakeLists.txt for catkin."""
     needed = " ".join(others)
     adding = ""
     for kind, command in (("msg", "add_message_files"), ("srv", "add_service_files")):

@@ -1,10 +1,10 @@
-"""Makes Python modules of the ROS 1 packages beside this file, without catkin.
+"""Creates Python modules of the ROS 1 packages next to this file, without catkin.
 
     python3 generate_python.py
 
-needs Debian's python3-genpy and the definitions that the packages name (ros-std-msgs,
-ros-geometry-msgs), and writes into the folder `python`. Afterwards the paths that it prints let
-rostopic, rosservice and rospy know the types.
+The program needs Debian's python3-genpy and the definitions that the packages use (ros-std-msgs,
+ros-geometry-msgs), and writes into the folder `python`. With the paths that it prints, rostopic,
+rosservice and rospy know the types.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ def main(folder: Path) -> None:
             except (genmsg.InvalidMsgSpec, genmsg.MsgGenerationException) as error:
                 sys.exit(f"{name}: {error}")
             if failed:
-                sys.exit(f"{name}: genpy cannot make its {kind} modules")
+                sys.exit(f"{name}: genpy cannot create its {kind} modules")
             initpy.write_modules(str(out))
     sys.stdout.write(f"export PYTHONPATH={folder / 'python'}:$PYTHONPATH\n")
     sys.stdout.write(f"export ROS_PACKAGE_PATH={folder}:/usr/share\n")
 
 
 def _installed() -> dict[str, Path]:
-    """Folders of the installed packages by their names."""
+    """Returns the folders of the installed packages by name."""
     rospack: Any = importlib.import_module("rospkg").RosPack()
     return {name: Path(rospack.get_path(name)) for name in rospack.list()}
 

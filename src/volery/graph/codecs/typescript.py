@@ -1,10 +1,10 @@
-"""Message types for TypeScript, written from the one definition of each type.
+"""Generates TypeScript message types from the message definitions.
 
     python -m volery.graph.codecs.typescript > web/src/messages/generated.ts
 
-Interfaces are named `package_Type`, with `_Request` and `_Response` for services. Integers of 64
-bits come as `number` or, beyond 2^53, as `bigint`; arrays of numbers as typed arrays where the
-transport carries them so (CBOR), else as plain ones; bytes as `Uint8Array`, or base64 in JSON.
+Interfaces are named `package_Type`, with `_Request` and `_Response` for services. 64-bit integers
+are `number` or, beyond 2^53, `bigint`; arrays of numbers are typed arrays where the transport
+supports them (CBOR), else plain arrays; bytes are `Uint8Array`, or base64 in JSON.
 """
 
 from __future__ import annotations
@@ -55,11 +55,11 @@ _PACKAGES = frozenset(
         "volery_interfaces",
     }
 )
-"""What the page speaks; other types it reads by their own descriptions (rosapi)."""
+"""Packages that the page uses; it reads other types by their rosapi descriptions."""
 
 
 def declarations() -> str:
-    """The whole file."""
+    """Returns the text of the generated file."""
     store = typestore()
     names = [name for name in store.names() if name.split("/")[0] in _PACKAGES]
     lines = [_HEAD]

@@ -1,4 +1,4 @@
-"""Messages whose every field is zero, empty or at the default of its definition file."""
+"""Creates messages with each field zero, empty or at its definition file's default."""
 
 from __future__ import annotations
 
@@ -25,25 +25,26 @@ DTYPES: dict[str, np.dtype[Any]] = {
         for bits in (8, 16, 32, 64)
     },
 }
-"""numpy's form of each number type, as decoders hand it out."""
+"""numpy dtype of each number type, as decoders return it."""
 
 Maker = Callable[[], Any]
 
 
 def zero_message(msgtype: str) -> Any:
-    """A new message of zeros, empty strings and empty arrays; fixed arrays have their length.
+    """Returns a new message of zeros, empty strings and arrays; fixed arrays have their length.
 
-    Arrays are read-only: replace them, do not write into them. GraphError if the type is unknown.
+    Arrays are read-only: replace them, do not write into them. Raises `GraphError` if the type is
+    unknown.
     """
     return message_maker(msgtype)()
 
 
 @cache
 def message_maker(msgtype: str) -> Maker:
-    """What makes messages of zeros of a type."""
+    """Returns a function that creates zero messages of a type."""
     store = typestore()
     if msgtype not in store.types:
-        raise GraphError(f"message type '{msgtype}' is not known")
+        raise GraphError(f"unknown message type '{msgtype}'")
     cls: Any = store.types[msgtype]
     makers = [
         value_maker(described, store.default_of(msgtype, name))
@@ -54,7 +55,7 @@ def message_maker(msgtype: str) -> Maker:
 
 
 def value_maker(described: Any, default: Any = None) -> Maker:
-    """What makes the zero, or the default, of a field."""
+    """Returns a function that creates a field's zero or default."""
     kind, detail = described
     if kind == Nodetype.NAME:
         return message_maker(detail)

@@ -1,4 +1,4 @@
-"""What a node consists of: logger, clock, timers, parameters, publishers; in rclpy's shape."""
+"""Provides the parts of a node, like rclpy's: logger, clock, timers, parameters, publishers."""
 
 PYTHON_LOGGER = "volery.nodes"
-"""Logger of Python's `logging` above those of all nodes."""
+"""Parent logger of all nodes in Python's `logging`."""

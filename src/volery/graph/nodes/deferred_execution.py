@@ -1,10 +1,10 @@
-"""Time to think: a node's callbacks on a worker, their output held back by a declared latency.
+"""Runs a node's callbacks on a worker and delays their output by a declared latency.
 
-A callback's input is taken at simulated time t; what it publishes and asks for is released at
-t + latency. Meanwhile the engine runs on, and waits for the worker only when t + latency has come:
-a heavy node uses another core, its delay is that of a real computer, and the run stays as
-reproducible as without. Callbacks of one node run one after the other, in the order of their input;
-inputs do not wait for earlier outputs.
+A callback receives its input at simulated time t; its publications and requests are released at t +
+latency. The engine continues meanwhile, and waits for the worker only at t + latency: a heavy node
+uses another core, has the delay of a real computer, and the run stays reproducible. Callbacks of
+one node run one after the other, in the order of their input; inputs do not wait for earlier
+outputs.
 """
 
 from __future__ import annotations
@@ -23,26 +23,26 @@ Action = Callable[[], Any]
 
 
 class Deferred(Protocol):
-    """Whoever can do something at a simulated time."""
+    """Runs functions at simulated times."""
 
     def at(self, time_ns: int, action: Action) -> None:
-        """Call `action` once, at `time_ns`."""
+        """Calls `action` once, at `time_ns`."""
 
 
 @dataclass
 class _Thought:
-    """The callbacks of one instant: when their input was taken, and what they want done later."""
+    """The callbacks of one instant: time of their input, their work and their delayed output."""
 
     time_ns: int
     work: list[Action] = field(default_factory=list)
     output: list[Action] = field(default_factory=list)
     batch: _Batch | None = None
-    """With which it is worked on; None before."""
+    """Batch that contains the callbacks; None before they are handed over."""
     error: BaseException | None = None
 
 
 class _Batch:
-    """Thoughts that the worker takes up together."""
+    """Callbacks that the worker receives together."""
 
     def __init__(self, thoughts: list[_Thought]) -> None:
         self.thoughts = thoughts
@@ -52,20 +52,20 @@ class _Batch:
             thought.batch = self
 
     def finish(self) -> None:
-        """Let those go on who wait for it."""
+        """Wakes the threads that wait for the batch."""
         self._busy.release()
 
     def wait(self) -> None:
-        """Until it has been worked on."""
+        """Waits until the batch is done."""
         with self._busy:
             return
 
 
 class DeferredExecutor:
-    """The worker of one node. All methods but `now_ns` and `hold_back` belong to the engine.
+    """The worker of one node. All methods but `now_ns` and `hold_back` are called by the engine.
 
-    Waking a thread takes longer than most callbacks: they are handed over some at a time, when the
-    first of them is a third of the latency old, or with one that is said to be heavy.
+    Waking a thread takes longer than most callbacks, so callbacks are handed over in batches: when
+    the oldest has waited a third of the latency, or with a callback marked as heavy.
     """
 
     def __init__(
@@ -75,19 +75,19 @@ class DeferredExecutor:
         self._deferring = deferring
         self._engine_now_ns = now_ns
         self._waiting: list[_Thought] = []
-        """Not yet handed over, in the order of their time."""
+        """Not yet handed over, in order of time."""
         self._inbox: SimpleQueue[_Batch | None] = SimpleQueue()
         self._here: _Thought | None = None
-        """What the worker works on."""
+        """Callbacks that the worker is running."""
         self._last: _Batch | None = None
         self._closed = False
         self.busy_s = 0.0
-        """CPU time of the worker so far."""
+        """CPU time of the worker so far, s."""
         self._thread = threading.Thread(target=self._run, name=f"volery-{name}", daemon=True)
         self._thread.start()
 
     def think(self, work: Action, *, heavy: bool = False) -> None:
-        """Do `work()` on the worker; its output is released after the latency."""
+        """Runs `work()` on the worker; its output is released after the latency."""
         if self._closed:
             return
         now = self._engine_now_ns()
@@ -100,24 +100,24 @@ class DeferredExecutor:
             self._hand_over()
 
     def answer(self, work: Action) -> Any:
-        """Do `work()` after all that came before it, and wait for what it returns."""
+        """Runs `work()` after all earlier work, waits for it and returns its result."""
         result: list[Any] = []
         self.think(lambda: result.append(work()), heavy=True)
         batch = self._last
         if batch is None or self._closed:
-            raise GraphError("the node has ended")
+            raise GraphError("the node has been destroyed")
         batch.wait()
         if not result:
-            raise batch.thoughts[-1].error or GraphError("the node has ended")
+            raise batch.thoughts[-1].error or GraphError("the node has been destroyed")
         return result[0]
 
     def now_ns(self) -> int:
-        """Time of the input that is being worked on; in the engine's thread, the engine's time."""
+        """Returns the input's time on the worker, the engine's time on other threads, ns."""
         thought = self._thought()
         return self._engine_now_ns() if thought is None else thought.time_ns
 
     def hold_back(self, action: Action) -> bool:
-        """Keep `action` for the release of the callback that runs here; False if none does."""
+        """Delays `action` to the release of the running callback; returns False without one."""
         thought = self._thought()
         if thought is None:
             return False
@@ -125,7 +125,7 @@ class DeferredExecutor:
         return True
 
     def join(self) -> None:
-        """Have everything worked on, and wait for it; on the worker itself do nothing."""
+        """Hands over all work and waits for it; has no effect on the worker itself."""
         if self._thought() is not None:
             return
         self._hand_over()
@@ -133,7 +133,7 @@ class DeferredExecutor:
             self._last.wait()
 
     def close(self) -> None:
-        """End the worker; what has not been begun is dropped."""
+        """Ends the worker; callbacks that have not started are dropped."""
         self._closed = True
         self._inbox.put(None)
         if threading.current_thread() is not self._thread:
@@ -146,7 +146,7 @@ class DeferredExecutor:
             self._inbox.put(self._last)
 
     def _release(self, thought: _Thought) -> None:
-        """The time of a thought is up: wait for it and do what it wants done."""
+        """Releases the output of the callbacks whose latency has passed; waits for them."""
         if self._closed:
             return
         if thought.batch is None:
@@ -176,7 +176,7 @@ class DeferredExecutor:
         try:
             while thought.work and not self._closed:
                 thought.work.pop(0)()
-        except BaseException as error:  # told by the engine when the time of the thought is up
+        except BaseException as error:  # raised by the engine at the release
             thought.error = error
         finally:
             self.busy_s += time.thread_time() - before

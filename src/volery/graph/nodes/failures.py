@@ -1,7 +1,7 @@
-"""Exceptions in the code of nodes: where they happened, in the user's own lines.
+"""Locates exceptions in the code of nodes, in the user's own lines.
 
 An error gets a note (PEP 678) with the frames of the node's file, without those of Volery: the
-command line prints it below the error, `--traceback` prints all frames.
+command line prints the note below the error, and `--traceback` prints all frames.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ _PATHS = sysconfig.get_paths()
 _PYTHON = (_PATHS["stdlib"], "<frozen", "<string")
 _INSTALLED = (_PATHS["purelib"], _PATHS["platlib"])
 _MACHINERY = tuple(str(Path(_PACKAGE, "graph", name)) for name in ("nodes", "node.py"))
-"""Frames that lead to a callback."""
+"""Frames between the engine and a callback."""
 
 
 def user_frames(error: BaseException) -> list[traceback.FrameSummary]:
-    """The frames of an error in files of the user's own.
+    """Returns the frames of an error in the user's files.
 
-    Where there are none, those in installed packages; of a node of Volery its own ones, but for
-    what Volery says of wrong input.
+    Without such frames, those in installed packages; for a node of Volery its own frames, unless
+    the error is a `VoleryError`.
     """
     frames = list(traceback.extract_tb(error.__traceback__))
     others = [f for f in frames if not f.filename.startswith((_PACKAGE, *_INSTALLED, *_PYTHON))]
@@ -52,7 +52,7 @@ def user_frames(error: BaseException) -> list[traceback.FrameSummary]:
 
 
 def place_of(error: BaseException) -> str:
-    """` (FILE:LINE)` of the last of the user's frames; nothing where there is none."""
+    """Returns ` (FILE:LINE)` of the last user frame; empty without one."""
     if isinstance(error, SyntaxError) and error.filename:
         return f" ({Path(error.filename).name}:{error.lineno})"
     frames = user_frames(error)
@@ -60,24 +60,24 @@ def place_of(error: BaseException) -> str:
 
 
 def frames_text(error: BaseException) -> str:
-    """The user's frames as Python prints them, with full names of files; may be empty."""
+    """Returns the user's frames as Python prints them, with full file names; may be empty."""
     if isinstance(error, SyntaxError):
         return "".join(traceback.format_exception_only(error)[:-1]).rstrip()
     return "".join(traceback.format_list(user_frames(error))).rstrip()
 
 
 def add_frames(error: BaseException, cause: BaseException) -> None:
-    """Note on `error` where in the user's code its cause happened."""
+    """Adds a note to `error` with the user's frames of its cause."""
     text = frames_text(cause)
     if text:
         error.add_note(text)
 
 
 def report_failure(graph: Graph, error: NodeError, *, is_raised: bool = True) -> None:
-    """Log a node's failure as FATAL on `/rosout`, at once; once for each error.
+    """Logs a node's failure as FATAL on `/rosout`, at once; once for each error.
 
-    Where it is not raised to a caller that shows it, Python's `logging` has it too. What waits for
-    delivery on the graph stays there.
+    An error that is not raised to a caller also goes to Python's `logging`. Queued messages of the
+    graph stay queued.
     """
     if error.is_reported or not error.node:
         return
@@ -98,7 +98,7 @@ def report_failure(graph: Graph, error: NodeError, *, is_raised: bool = True) ->
 
 @contextmanager
 def reported_failures(graph: Graph) -> Iterator[None]:
-    """Report a node's failure that ends what is done here, and raise it on."""
+    """Reports a node's failure that ends the context, and raises it again."""
     try:
         yield
     except NodeError as error:

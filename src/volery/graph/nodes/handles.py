@@ -1,4 +1,4 @@
-"""What a node holds on a graph, in the shape of rclpy's handles."""
+"""Provides a node's publishers, subscriptions and services, with the interface of rclpy."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from volery.graph.nodes.deferred_execution import DeferredExecutor
 
 
 class NodePublisher(Publisher):
-    """Publishes copies: the node may go on with a message, as after rclpy has written it out.
+    """Publishes copies of messages, so that the node may change a message after publishing it.
 
-    What a node with a latency publishes in a callback leaves when the callback's time is up.
+    Messages that a node with a latency publishes in a callback leave when the latency has passed.
     """
 
     def __init__(self, publisher: Publisher, thinker: DeferredExecutor | None) -> None:
@@ -34,20 +34,20 @@ class NodePublisher(Publisher):
 
     @property
     def msgtype(self) -> str:
-        """Type of its messages."""
+        """Type of the messages."""
         return self._publisher.msgtype
 
     @property
     def wanted(self) -> bool:
-        """Whether anybody would receive a message; what is not wanted need not be built."""
+        """Whether a message would be delivered or latched; otherwise it need not be built."""
         return self._publisher.wanted
 
     def get_subscription_count(self) -> int:
-        """How many subscribe to the topic."""
+        """Returns the number of subscribers to the topic."""
         return self._publisher.subscriptions
 
     def publish(self, message: Any) -> None:
-        """Publish a message. `GraphError` for one of another type."""
+        """Publishes a message. Raises `GraphError` if its type is not the topic's."""
         publisher = self._publisher
         if publisher.wanted:
             publisher.check(message)
@@ -56,11 +56,11 @@ class NodePublisher(Publisher):
             publisher.publish(message)
 
     def cancel(self) -> None:
-        """Publish no more."""
+        """Stops publishing."""
         self._publisher.cancel()
 
     def destroy(self) -> None:
-        """Publish no more."""
+        """Stops publishing."""
         self._publisher.cancel()
 
 
@@ -80,16 +80,16 @@ class NodeSubscription:
         return self.topic
 
     def cancel(self) -> None:
-        """Stop receiving."""
+        """Stops receiving."""
         self._subscription.cancel()
 
     def destroy(self) -> None:
-        """Stop receiving."""
+        """Stops receiving."""
         self._subscription.cancel()
 
 
 class NodeService:
-    """A service that a node offers."""
+    """A service of a node."""
 
     def __init__(self, name: str, srv_type: str, withdraw: Callable[[], None]) -> None:
         self.srv_name = self.service_name = name
@@ -97,5 +97,5 @@ class NodeService:
         self._withdraw = withdraw
 
     def destroy(self) -> None:
-        """Offer it no more."""
+        """Destroys the service."""
         self._withdraw()

@@ -1,10 +1,10 @@
-"""Stand-ins for ROS's Python packages, so that a node file of ROS 2 runs where no ROS is sourced.
+"""Provides stand-ins for ROS's Python packages, so that ROS 2 node files run without ROS.
 
 `from geometry_msgs.msg import Twist`, `from std_srvs.srv import Trigger` and `from rclpy.node
-import Node` work once `provide_ros_imports` was called, which loading a node does. A sourced ROS 2
-comes first; without one the stand-ins do, also where ROS 1 is installed: its packages have the same
+import Node` work after `provide_ros_imports`, which loading a node calls. A sourced ROS 2 takes
+precedence; otherwise the stand-ins do, even where ROS 1 is installed: its packages have the same
 names, and no node can publish its messages. Code that loads a real ROS later calls
-`withdraw_ros_imports` before that.
+`withdraw_ros_imports` first.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _KINDS = ("msg", "srv", "action")
 
 
 class _Finder(MetaPathFinder):
-    """Finds `rclpy`, its modules, and the packages of all message types that are known."""
+    """Finds `rclpy`, its modules, and the packages of all known message types."""
 
     def find_spec(
         self,
@@ -32,7 +32,7 @@ class _Finder(MetaPathFinder):
         path: Sequence[str] | None,
         target: ModuleType | None = None,  # noqa: ARG002
     ) -> ModuleSpec | None:
-        """As of `MetaPathFinder`; below a package that is none of ours nothing is found."""
+        """Implements `MetaPathFinder`; returns None below packages that are not stand-ins."""
         package, _, rest = fullname.partition(".")
         if rest and getattr(path, "stand_in", None) is None:
             return None
@@ -43,23 +43,23 @@ class _Finder(MetaPathFinder):
 
 
 class _Path(list[str]):
-    """`__path__` of a stand-in, by which its parts are known."""
+    """`__path__` of a stand-in, which identifies its submodules."""
 
     stand_in = True
 
 
 class _Loader(Loader):
-    """Fills a module."""
+    """Creates the contents of a module."""
 
     def __init__(self, fill: Callable[[ModuleType], None]) -> None:
         self._fill = fill
 
     def create_module(self, spec: ModuleSpec) -> ModuleType | None:  # noqa: ARG002
-        """None: an ordinary module."""
+        """Returns None: the default module."""
         return None
 
     def exec_module(self, module: ModuleType) -> None:
-        """Give the module its contents."""
+        """Fills the module."""
         if hasattr(module, "__path__"):
             module.__path__ = _Path()
         self._fill(module)
@@ -69,14 +69,14 @@ _FINDER = _Finder()
 
 
 def provide_ros_imports() -> None:
-    """Lets imports find the stand-ins from now on: after a sourced ROS 2, before all else."""
+    """Adds the stand-ins to the import path: after a sourced ROS 2, else first."""
     if _FINDER not in sys.meta_path:
         has_ros2 = PathFinder.find_spec("rclpy") is not None
         sys.meta_path.insert(len(sys.meta_path) if has_ros2 else 0, _FINDER)
 
 
 def withdraw_ros_imports() -> None:
-    """Let imports find real packages alone; who has imported a stand-in keeps it."""
+    """Removes the stand-ins from the import path; imported stand-ins remain usable."""
     if _FINDER in sys.meta_path:
         sys.meta_path.remove(_FINDER)
     for name, module in list(sys.modules.items()):
@@ -85,9 +85,9 @@ def withdraw_ros_imports() -> None:
 
 
 def forget_message_packages(names: Iterable[str]) -> None:
-    """Has the next import of those of these modules that hold ROS messages look for them anew.
+    """Removes modules that hold ROS messages, so that the next import searches again.
 
-    For packages of ROS 1, once what needs them has imported them.
+    For packages of ROS 1, after their users have imported them.
     """
     packages = {name.partition("/")[0] for name in typestore().names()}
     for name in names:
@@ -96,7 +96,7 @@ def forget_message_packages(names: Iterable[str]) -> None:
 
 
 def _filler(package: str, rest: str) -> Callable[[ModuleType], None] | None:
-    """What fills a module; None where it is none of ours."""
+    """Returns the function that fills a module; None for other modules."""
     if package == "rclpy":
         name = f"rclpy.{rest}" if rest else "rclpy"
         return (lambda module: vars(module).update(_rclpy()[name])) if name in _rclpy() else None
@@ -111,7 +111,7 @@ def _filler(package: str, rest: str) -> Callable[[ModuleType], None] | None:
 
 @cache
 def _rclpy() -> dict[str, dict[str, Any]]:
-    from volery.graph.nodes.rclpy_modules import contents  # it needs the node itself
+    from volery.graph.nodes.rclpy_modules import contents  # imports the node
 
     return contents()
 
@@ -138,7 +138,7 @@ def _fill_types(module: ModuleType, package: str, kind: str, names: list[str]) -
 
 @cache
 def _type(package: str, kind: str, name: str) -> Any:
-    """Class of a message, or one that holds the messages of a service or action."""
+    """Returns the class of a message, or a class with the messages of a service or action."""
     full = f"{package}/{kind}/{name}"
     if kind == "msg":
         return message_type(full)

@@ -1,7 +1,7 @@
-"""How a node learns what it stands on: a graph, timers, a clock, a namespace, its parameters.
+"""Passes a node its graph, timers, clock, namespace and parameters.
 
-A node of rclpy takes no such arguments: `super().__init__("name")` finds them here, where they are
-while `making` a node. One that accepts `context`, or any keyword, is given them as arguments too.
+An rclpy node takes no such arguments: `super().__init__("name")` finds them here while `make_node`
+constructs it. A node that accepts `context`, or any keyword, also receives them as arguments.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ def _allows_every_folder(_folder: str) -> bool:
 
 @dataclass(frozen=True)
 class Context:
-    """What a node stands on: a graph, timers, a clock, and the simulated time it takes to think.
+    """A node's environment: graph, timers, clock and computation latency.
 
-    With `latency_ns` above 0 the node's callbacks run on a worker and what they publish is
+    With `latency_ns` above 0, the node's callbacks run on a worker and their publications are
     released that much later; see `graph.nodes.deferred_execution`.
     """
 
@@ -33,14 +33,14 @@ class Context:
     now_ns: Callable[[], int]
     latency_ns: int = 0
     remap: Mapping[str, str] = field(default_factory=dict)
-    """Other names for topics and services: absolute name of the node's to that of the graph."""
+    """Remapped topics and services: absolute name in the node to absolute name in the graph."""
     allows_folder: Callable[[str], bool] = _allows_every_folder
-    """Whether the node may write into a folder of this name."""
+    """Returns whether the node may write into a folder of this name."""
 
 
 @dataclass(frozen=True)
 class Launch:
-    """What a node is made with."""
+    """The arguments of a node's constructor."""
 
     context: Context
     namespace: str
@@ -51,12 +51,12 @@ _present: ContextVar[Launch | None] = ContextVar("volery_node_launch", default=N
 
 
 def present_launch() -> Launch | None:
-    """With what a node is being made at present; None where none is."""
+    """Returns the launch of the node under construction; None without one."""
     return _present.get()
 
 
 def make_node(node_class: type[Any], launch: Launch) -> Any:
-    """Make a node; what its constructor raises is raised."""
+    """Constructs a node; passes on exceptions of its constructor."""
     options = {
         "context": launch.context,
         "namespace": launch.namespace,

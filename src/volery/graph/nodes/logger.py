@@ -1,8 +1,8 @@
-"""Loggers in the shape of rclpy's: levels, `once`, `throttle_duration_sec`, `skip_first`.
+"""Provides loggers like rclpy's: levels, `once`, `throttle_duration_sec`, `skip_first`.
 
-What a node logs goes to Python's `logging`, as logger `volery.nodes.NAME` (the command line shows
-it at the terminal), and to `/rosout`, from where it reaches recordings and clients. Times are the
-node's: simulated ones in a simulation. File and line tell one statement from another.
+A node's lines go to Python's `logging`, as logger `volery.nodes.NAME` (the command line prints
+them), and to `/rosout`, which recordings and clients receive. Times are the node's: simulated in a
+simulation. File and line identify a statement.
 """
 
 from __future__ import annotations
@@ -52,59 +52,59 @@ class NodeLogger:
         self._parent = parent
         self._level = LoggingSeverity.UNSET
         self._last_ns: dict[Place, int] = {}
-        """When each throttled or only once wanted statement was last logged."""
+        """Time of the last line of each statement that is throttled or logged once."""
         self._seen: set[Place] = set()
-        """Statements that skip their first time and have had it."""
+        """Statements with `skip_first` that have been skipped."""
         self._python = logging.getLogger(f"{PYTHON_LOGGER}.{name}")
 
     # ------------------------------------------------------------------------------------ levels
 
     def set_level(self, level: LoggingSeverity | int) -> None:
-        """Log nothing below `level`; UNSET: that of the parent, INFO without one."""
+        """Sets the lowest logged level; UNSET: the parent's, or INFO without parent."""
         self._level = LoggingSeverity(level)
 
     def get_effective_level(self) -> LoggingSeverity:
-        """The least level that is logged."""
+        """Returns the lowest logged level."""
         if self._level:
             return self._level
         return LoggingSeverity.INFO if self._parent is None else self._parent.get_effective_level()
 
     def is_enabled_for(self, severity: LoggingSeverity | int) -> bool:
-        """Whether that level is logged."""
+        """Returns whether that level is logged."""
         return severity >= self.get_effective_level()
 
     def get_child(self, name: str) -> NodeLogger:
-        """Logger of a part of the node, named below this one."""
+        """Returns the logger of a part of the node, named below this one."""
         return NodeLogger(f"{self.name}.{name}", self._now_ns, self._publish, self)
 
     # ------------------------------------------------------------------------------------ logging
 
     def debug(self, message: str, **options: Any) -> bool:
-        """Log at level DEBUG; whether that was done."""
+        """Logs at level DEBUG; returns whether the line was logged."""
         return self._log(message, LoggingSeverity.DEBUG, options)
 
     def info(self, message: str, **options: Any) -> bool:
-        """Log at level INFO; whether that was done."""
+        """Logs at level INFO; returns whether the line was logged."""
         return self._log(message, LoggingSeverity.INFO, options)
 
     def warning(self, message: str, **options: Any) -> bool:
-        """Log at level WARN; whether that was done."""
+        """Logs at level WARN; returns whether the line was logged."""
         return self._log(message, LoggingSeverity.WARN, options)
 
     def warn(self, message: str, **options: Any) -> bool:
-        """Log at level WARN; whether that was done."""
+        """Logs at level WARN; returns whether the line was logged."""
         return self._log(message, LoggingSeverity.WARN, options)
 
     def error(self, message: str, **options: Any) -> bool:
-        """Log at level ERROR; whether that was done."""
+        """Logs at level ERROR; returns whether the line was logged."""
         return self._log(message, LoggingSeverity.ERROR, options)
 
     def fatal(self, message: str, **options: Any) -> bool:
-        """Log at level FATAL; whether that was done."""
+        """Logs at level FATAL; returns whether the line was logged."""
         return self._log(message, LoggingSeverity.FATAL, options)
 
     def log(self, message: str, severity: LoggingSeverity | int, **options: Any) -> bool:
-        """Log at a level; whether that was done."""
+        """Logs at the given level; returns whether the line was logged."""
         return self._log(message, LoggingSeverity(severity), options)
 
     def _log(self, message: str, severity: LoggingSeverity, options: dict[str, Any]) -> bool:
@@ -128,13 +128,13 @@ class NodeLogger:
         once: bool = False,
         throttle_duration_sec: float | None = None,
         skip_first: bool = False,
-        throttle_time_source_type: Any = None,  # noqa: ARG002  # simulated time always
+        throttle_time_source_type: Any = None,  # noqa: ARG002  # always simulated time
     ) -> bool:
         if skip_first and place not in self._seen:
             self._seen.add(place)
             return False
         last_ns = self._last_ns.get(place)
-        if last_ns is not None and last_ns <= now_ns:  # later ones are of before a reset
+        if last_ns is not None and last_ns <= now_ns:  # later times are from before a reset
             if once:
                 return False
             if throttle_duration_sec and now_ns - last_ns < ns_from_s(throttle_duration_sec):
@@ -144,16 +144,16 @@ class NodeLogger:
         return True
 
     def get_state(self) -> Any:
-        """Which statements have been logged when."""
+        """Returns the times and statements of the lines logged so far."""
         return dict(self._last_ns), set(self._seen)
 
     def set_state(self, state: Any) -> None:
-        """Go back to a state that `get_state` gave."""
+        """Restores what `get_state` returned."""
         self._last_ns, self._seen = dict(state[0]), set(state[1])
 
 
 def log_message(name: str, time_ns: int, severity: LoggingSeverity, text: str, place: Place) -> Any:
-    """`rcl_interfaces/msg/Log`; of the file its name, which is the same on every machine."""
+    """Returns a `rcl_interfaces/msg/Log`; its file name has no folder, which varies."""
     file, function, line = place
     stamp = time_from_ns(time_ns)
     log: type[Any] = message_type(LOG_TYPE)
@@ -163,7 +163,7 @@ def log_message(name: str, time_ns: int, severity: LoggingSeverity, text: str, p
 def python_log(
     logger: logging.Logger, name: str, time_ns: int, severity: LoggingSeverity, text: str
 ) -> None:
-    """Hand a line to Python's `logging`, with the node and its time beside it."""
+    """Passes a line to Python's `logging`, with the node's name and time."""
     seconds, rest = divmod(time_ns, NS_PER_S)
     extra = {"node": name, "node_time": f"{seconds}.{rest:09d}"}
     logger.log(int(severity), "%s", text, extra=extra)

@@ -1,7 +1,7 @@
-"""The node contract: the shape of an rclpy node, run in lock step inside the simulation.
+"""Provides `Node`: an rclpy node's interface, run in lock step inside the simulation.
 
-A node is a class with subscriptions, publishers, timers and parameters. It never asks whether it is
-in a simulation:
+A node is a class with subscriptions, publishers, timers and parameters. The same class runs in and
+outside of a simulation:
 
     class Watcher(Node):
         def __init__(self):
@@ -9,9 +9,9 @@ in a simulation:
             self.publisher = self.create_publisher(Twist, "cmd_vel", 10)
             self.create_subscription(LaserScan, "laser/horizontal/scan", self.on_scan, 5)
 
-Relative names live below the node's namespace (`/uav1`), names that start with `/` are absolute,
-names that start with `~/` belong to the node. Where no ROS is sourced the class may be imported as
-`rclpy.node.Node`: see `graph.nodes.imports`.
+Relative names resolve in the node's namespace (`/uav1`), names that start with `/` are absolute,
+names that start with `~/` are private to the node. Without a sourced ROS, the class may be imported
+as `rclpy.node.Node`: see `graph.nodes.imports`.
 """
 
 from __future__ import annotations
@@ -44,10 +44,10 @@ _log = logging.getLogger(__name__)
 
 
 class Node(ParameterMethods):
-    """Base of all nodes.
+    """Base class of all nodes.
 
-    `context`, `namespace` and `parameter_overrides` come from the launch and need not be passed on;
-    the other arguments are those of rclpy. Of these `enable_rosout`, `allow_undeclared_parameters`
+    The launch provides `context`, `namespace` and `parameter_overrides`, which need not be passed
+    on; the other arguments are those of rclpy. Only `enable_rosout`, `allow_undeclared_parameters`
     and `automatically_declare_parameters_from_overrides` have an effect.
     """
 
@@ -70,8 +70,8 @@ class Node(ParameterMethods):
             launch = present_launch()
             if launch is None:
                 raise GraphError(
-                    f"node {node_name}: nothing launches it; name its class in a scenario, run it "
-                    "with `volery node`, or give a context"
+                    f"node {node_name}: it has no context; name its class in a scenario, run it "
+                    "with `volery node`, or pass a context"
                 )
             context, namespace = launch.context, launch.namespace or namespace
             parameter_overrides = _joined(parameter_overrides, launch.parameters)
@@ -79,12 +79,12 @@ class Node(ParameterMethods):
         self.__name = node_name
         self.__namespace = ("/" + namespace.strip("/")).rstrip("/") if namespace else ""
         self.__held: dict[Any, Callable[[], None]] = {}
-        """What the node has made, and what gives it back."""
+        """Handles that the node has created, and the functions that release them."""
         self.__timers: list[Timer] = []
         self.__destroyed = False
         self.__busy_s = 0.0
         self.__last_client = ""
-        """External client whose message was taken last, and its topic."""
+        """External client and topic of the last message that a client caused."""
         self.__thinker = (
             DeferredExecutor(node_name, context.latency_ns, context.timers, context.now_ns)
             if context.latency_ns
@@ -110,22 +110,23 @@ class Node(ParameterMethods):
 
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Functions that let the numba code compile that the node calls, each some of it.
+        """Returns functions that compile the numba code that the node calls, each a part of it.
 
-        A node with such code overrides it. The functions are a module's, not made on the spot, and
-        call what the node calls, with input made up for it, whose arrays have the types and layouts
-        of the real ones. They are called before the clock of a run starts, in any order and maybe
-        in another process, for what is compiled later stops the flight; those of Volery's own nodes
-        once after an installation, for all is kept on disk, others at each start.
+        A node with numba code overrides this method. The functions belong to a module (no closures)
+        and call the node's kernels with synthetic input whose arrays have the types and layouts of
+        the real ones. They run before the clock of a run starts, in any order and possibly in
+        another process, because later compilation would stall the flight. Those of Volery's own
+        nodes run once after an installation, because the result is cached on disk; others run at
+        each start.
         """
         return ()
 
     def get_name(self) -> str:
-        """Name without namespace."""
+        """Returns the name without namespace."""
         return self.__name
 
     def get_namespace(self) -> str:
-        """Namespace, such as `/uav1`."""
+        """Returns the namespace, such as `/uav1`."""
         return self.__namespace or "/"
 
     @property
@@ -134,15 +135,15 @@ class Node(ParameterMethods):
         return f"{self.__namespace}/{self.__name}"
 
     def get_fully_qualified_name(self) -> str:
-        """Name with namespace, such as `/uav1/gap_following`."""
+        """Returns the name with namespace, such as `/uav1/gap_following`."""
         return self.full_name
 
     def get_clock(self) -> Clock:
-        """The clock that stamps are compared with."""
+        """Returns the clock, to compare with the stamps of messages."""
         return Clock(self.__now_ns)
 
     def get_logger(self) -> NodeLogger:
-        """The node's logger."""
+        """Returns the node's logger."""
         return self.__logger
 
     def create_publisher(
@@ -154,10 +155,9 @@ class Node(ParameterMethods):
         latched: bool = False,
         **_options: Any,
     ) -> NodePublisher:
-        """Publish `msg_type` on `topic`; each subscriber decides how messages wait for it.
+        """Creates a publisher of `msg_type` on `topic`; subscribers choose their queue depth.
 
-        `latched`, or durability TRANSIENT_LOCAL, hands the last message to those who subscribe
-        later.
+        `latched`, or durability TRANSIENT_LOCAL: later subscribers receive the last message.
         """
         latched = profile_of(qos_profile).latched or latched
         publisher = self._context.graph.advertise(self.resolve(topic), msg_type, latched=latched)
@@ -174,10 +174,11 @@ class Node(ParameterMethods):
         qos_profile: int | QoSProfile = DEFAULT_DEPTH,
         **_options: Any,
     ) -> NodeSubscription:
-        """Call `callback(message)` for each message of `topic`.
+        """Calls `callback(message)` for each message of `topic`.
 
-        qos_profile: what happens where messages come faster than they are taken, which can only be
-        in a process of its own. A depth keeps the newest so many; see `graph.qos.QoSProfile`.
+        qos_profile: has an effect where messages arrive faster than the node processes them, which
+        is possible only in a process of its own. A depth keeps that many of the newest; see
+        `graph.qos.QoSProfile`.
         """
         name = self.resolve(topic)
         occasion = f"message on {name}{_name_of(callback)}"
@@ -203,7 +204,7 @@ class Node(ParameterMethods):
         clock: Any = None,  # noqa: ARG002
         autostart: bool = True,
     ) -> Timer:
-        """Call `callback` each `timer_period_sec` of simulated time."""
+        """Calls `callback` every `timer_period_sec` of simulated time."""
         check_period(timer_period_sec)
         occasion = f"timer{_name_of(callback)}"
         timer = Timer(
@@ -226,7 +227,7 @@ class Node(ParameterMethods):
         callback: Callable[[Any, Any], Any],
         **_options: Any,
     ) -> NodeService:
-        """Offer a service: `callback(request, response)` returns the response, at once.
+        """Creates a service: `callback(request, response)` returns the response, at once.
 
         srv_type: a class such as `std_srvs.srv.Trigger`, or its name, `std_srvs/srv/Trigger`.
         """
@@ -251,7 +252,7 @@ class Node(ParameterMethods):
         return service
 
     def create_client(self, srv_type: str | type[Any], srv_name: str, **_options: Any) -> Client:
-        """Client of a service of a type as `create_service` takes it."""
+        """Creates a client of a service; `srv_type` is as for `create_service`."""
         kind = service_type(srv_type)
         message_type(f"{kind}_Request")
         return Client(
@@ -264,44 +265,44 @@ class Node(ParameterMethods):
         )
 
     def destroy_publisher(self, publisher: NodePublisher) -> bool:
-        """Publish no more; whether the node had it."""
+        """Destroys a publisher; returns whether it belonged to the node."""
         return self.__give_back(publisher)
 
     def destroy_subscription(self, subscription: NodeSubscription) -> bool:
-        """Receive no more; whether the node had it."""
+        """Destroys a subscription; returns whether it belonged to the node."""
         return self.__give_back(subscription)
 
     def declare_folder(self, name: str, default: str) -> str:
-        """Declare a read-only parameter that names a folder of the node's files; its value.
+        """Declares a read-only parameter that names a folder; returns its value.
 
-        `NodeError` where the scenario comes from a log or an upload and the folder does not lie
-        below the working folder.
+        Raises `NodeError` if the scenario comes from a log or an upload and the folder is not below
+        the working folder.
         """
         folder = str(self.declare_parameter(name, default).value)
         if not self._context.allows_folder(folder):
             raise NodeError(
-                f"node {self.full_name}: parameter {name}: a scenario of a log or of an upload may "
-                "name folders below the working folder only"
+                f"node {self.full_name}: parameter {name}: a scenario from a log or an upload may "
+                "only name folders below the working folder"
             )
         return folder
 
     def destroy_timer(self, timer: Timer) -> bool:
-        """End a timer for good; whether the node had it."""
+        """Destroys a timer; returns whether it belonged to the node."""
         if timer in self.__timers:
             self.__timers.remove(timer)
         return self.__give_back(timer)
 
     def destroy_service(self, service: NodeService) -> bool:
-        """Offer a service no more; whether the node had it."""
+        """Destroys a service; returns whether it belonged to the node."""
         return self.__give_back(service)
 
     def destroy_client(self, client: Client) -> bool:
-        """Nothing is held by a client; True."""
+        """Destroys a client; returns True."""
         client.destroy()
         return True
 
     def destroy_node(self) -> None:
-        """Give back what the node holds; nothing of it runs afterwards."""
+        """Destroys the node's publishers, subscriptions, timers, services and parameters."""
         self._context.graph.parameters.forget(self.full_name)
         if self.__thinker is not None:
             self.__thinker.close()
@@ -312,7 +313,7 @@ class Node(ParameterMethods):
     # ----------------------------------------------------------------------------------- helpers
 
     def join(self) -> None:
-        """Wait until no callback of the node is running."""
+        """Waits until no callback of the node is running."""
         if self.__thinker is not None:
             self.__thinker.join()
 
@@ -320,12 +321,12 @@ class Node(ParameterMethods):
         return self._context.now_ns() if self.__thinker is None else self.__thinker.now_ns()
 
     def __defer(self, action: Callable[[], Any]) -> None:
-        """Do something at once, or when the output of the present callback is released."""
+        """Runs `action` at once, or when the output of the current callback is released."""
         if self.__thinker is None or not self.__thinker.hold_back(action):
             action()
 
     def __later(self) -> Callable[[Callable[[], None]], None] | None:
-        """While a node is being made: has something done at the run's first tick."""
+        """Returns a function that defers to the first tick during the node's construction."""
         if present_launch() is None:
             return None
         timers, now_ns = self._context.timers, self._context.now_ns
@@ -352,10 +353,10 @@ class Node(ParameterMethods):
             self.__thinker.think(work, heavy=heavy)
 
     def __guarded(self, callback: Callable[[], Any], occasion: str, client: str = "") -> None:
-        """Call back; a failure becomes a `NodeError` that names node, callback, time and line.
+        """Runs a callback; a failure becomes a `NodeError` with node, callback, time and line.
 
-        client: the external client that caused it, where this runs later than its command; then
-        the failure is logged, and does not end the run.
+        client: the external client that caused the call, if it runs later than the client's
+        command; a failure is then logged, and does not end the run.
         """
         try:
             callback()
@@ -371,7 +372,7 @@ class Node(ParameterMethods):
     def __guarded_service(
         self, callback: Callable[[], Any], occasion: str, response_type: type[Any]
     ) -> Any:
-        """Respond; what a service refuses with an error of Volery's is the caller's to know."""
+        """Returns the response; passes a `VoleryError` of the service on to the caller."""
         try:
             response = callback()
             if not isinstance(response, response_type):
@@ -396,7 +397,7 @@ class Node(ParameterMethods):
         return failure
 
     def resolve(self, name: str) -> str:
-        """Absolute name of a topic or service, as the launch profile wants it."""
+        """Returns the absolute, remapped name of a topic or service."""
         if name.startswith("~/"):
             name = f"{self.__namespace}/{self.__name}/{name[2:]}"
         elif not name.startswith("/"):
@@ -404,30 +405,30 @@ class Node(ParameterMethods):
         return self._context.remap.get(name, name)
 
     def resolve_topic_name(self, topic: str, *, only_expand: bool = False) -> str:  # noqa: ARG002
-        """Absolute name of a topic."""
+        """Returns the absolute name of a topic."""
         return self.resolve(topic)
 
     def resolve_service_name(self, service: str, *, only_expand: bool = False) -> str:  # noqa: ARG002
-        """Absolute name of a service."""
+        """Returns the absolute name of a service."""
         return self.resolve(service)
 
     @property
     def busy_s(self) -> float:
-        """CPU time that its callbacks have taken so far."""
+        """CPU time that the node's callbacks have used so far, s."""
         return self.__busy_s if self.__thinker is None else self.__thinker.busy_s
 
     @property
     def has_worker(self) -> bool:
-        """Whether its callbacks run on a thread of its own."""
+        """Whether the node's callbacks run on a thread of their own."""
         return self.__thinker is not None
 
     def save_base_state(self) -> Any:
-        """What a snapshot holds beside the node's own state: parameters, timers, logger."""
+        """Returns the state that every node saves in a snapshot: parameters, timers, logger."""
         timers = [timer.get_state() for timer in self.__timers]
         return self.parameter_values(), timers, self.__logger.get_state()
 
     def restore_base_state(self, state: Any) -> None:
-        """Go back to what `save_base_state` gave."""
+        """Restores what `save_base_state` returned."""
         values, timers, logger = state
         self.put_back_parameters(values)
         for timer, kept in zip(self.__timers, timers, strict=False):
@@ -436,17 +437,19 @@ class Node(ParameterMethods):
 
 
 def service_type(srv_type: str | type[Any]) -> str:
-    """Name of a service type, `std_srvs/srv/Trigger`, of a class or a name."""
+    """Returns the name of a service type, `std_srvs/srv/Trigger`, given its class or name."""
     if isinstance(srv_type, str):
         return srv_type
     name = getattr(srv_type, "__srvtype__", None)
     if name is None:
-        raise GraphError(f"{srv_type!r} is no service type of Volery's; import it from PACKAGE.srv")
+        raise GraphError(
+            f"{srv_type!r} is not a service type of Volery; import it from PACKAGE.srv"
+        )
     return str(name)
 
 
 def _name_of(callback: Callable[..., Any]) -> str:
-    """` (NAME)` of a callback that has one."""
+    """Returns ` (NAME)` of a callback that has a name."""
     name = getattr(callback, "__name__", "")
     return f" ({name})" if name and name != "<lambda>" else ""
 
@@ -454,6 +457,6 @@ def _name_of(callback: Callable[..., Any]) -> str:
 def _joined(
     own: Mapping[str, Any] | Iterable[ParameterSetting] | None, launched: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Overrides in the node's code and those of its launch, which win."""
+    """Returns the overrides of the node's code and of its launch, which take precedence."""
     given = own if isinstance(own, Mapping) else {s.name: s.value for s in own or ()}
     return {**given, **launched}

@@ -1,4 +1,4 @@
-"""The parameters of a node, in the shape of rclpy's `Node`."""
+"""Provides the parameter methods of a node, as in rclpy's `Node`."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from volery.graph.parameters import (
 )
 
 OnSet = Callable[[list[ParameterSetting]], Any]
-"""Gets what is to be set, returns a `SetParametersResult`."""
+"""Receives the values to set, returns a `SetParametersResult`."""
 
 
 class ParameterMethods:
-    """What `Node` offers for its parameters.
+    """The parameter methods of `Node`.
 
-    Unless its declaration says otherwise, a parameter of a class with `settable_parameters` may be
-    set while the node runs, as with rclpy; else it keeps its value from the node's start.
+    By default, a parameter of a class with `settable_parameters` may be set while the node runs, as
+    with rclpy; otherwise its value is fixed at the node's start.
     """
 
     settable_parameters: ClassVar[bool] = False
@@ -50,7 +50,7 @@ class ParameterMethods:
         self.__before_set = before_set
         self.__allow_undeclared = allow_undeclared
         self.__asks = True
-        """Whether the callbacks are asked; not for several at once, which were asked together."""
+        """Whether to call the callbacks for one parameter; False while several are set together."""
 
     # ---------------------------------------------------------------------------------- declaring
 
@@ -65,13 +65,13 @@ class ParameterMethods:
         min_value: float | None = None,
         max_value: float = math.inf,
     ) -> Parameter:
-        """Declare a parameter; an override given at start wins over the default `value`.
+        """Declares a parameter; an override given at the start takes precedence over `value`.
 
-        Unless it is `read_only` it may be set while the node runs; the node reads
+        A parameter that is not `read_only` may be set while the node runs; the node then reads
         `Parameter.value` at each use. A number with a `min_value` is finite, and at most
-        `max_value`. descriptor: a `ParameterDescriptor` with description, bounds and `read_only`.
-        With a `ParameterType` as `value` only an override gives the value. Raises `GraphError` for
-        values out of bounds or of another type.
+        `max_value`. descriptor: a `ParameterDescriptor`, with description, limits and `read_only`.
+        With a `ParameterType` as `value`, only an override gives a value. Raises `GraphError` if
+        the value does not fit.
         """
         like = like_of(value) if isinstance(value, ParameterType) else value
         default = None if isinstance(value, ParameterType) else value
@@ -103,7 +103,7 @@ class ParameterMethods:
     def declare_parameters(
         self, namespace: str, parameters: Sequence[tuple[Any, ...]], ignore_override: bool = False
     ) -> list[Parameter]:
-        """Declare several: (name,), (name, value) or (name, value, descriptor), below a prefix."""
+        """Declares tuples (name,), (name, value) or (name, value, descriptor), with a prefix."""
         prefix = f"{namespace}." if namespace else ""
         padded = [(*entry, None, None)[:3] for entry in parameters]
         return [
@@ -112,12 +112,12 @@ class ParameterMethods:
         ]
 
     def declare_overrides(self) -> None:
-        """Declare whatever was given at the node's start."""
+        """Declares all overrides given at the node's start."""
         for name, value in list(self.__overrides.items()):
             self.declare_parameter(name, value)
 
     def undeclare_parameter(self, name: str) -> None:
-        """Have a parameter no more. `GraphError` for one that is read-only, or not there."""
+        """Removes a parameter. Raises `GraphError` if it is read-only or not declared."""
         if self.__find(name).read_only:
             raise GraphError(f"node {self.__name}: parameter '{name}' is read-only")
         self.__declared.undeclare(self.__full_name, name)
@@ -126,71 +126,71 @@ class ParameterMethods:
     # ------------------------------------------------------------------------------------ reading
 
     def has_parameter(self, name: str) -> bool:
-        """Whether a parameter is declared."""
+        """Returns whether a parameter is declared."""
         return name in self.__parameters
 
     def get_parameter(self, name: str) -> Parameter:
-        """A declared parameter. `ParameterNotDeclaredError` where there is none."""
+        """Returns a parameter. Raises `ParameterNotDeclaredError` if it is not declared."""
         if self.__allow_undeclared and name not in self.__parameters:
             return Parameter(name, None)
         return self.__find(name)
 
     def get_parameters(self, names: Sequence[str]) -> list[Parameter]:
-        """Declared parameters, in the order of the names."""
+        """Returns parameters in the order of `names`."""
         return [self.get_parameter(name) for name in names]
 
     def get_parameter_or(self, name: str, alternative_value: Any = None) -> Any:
-        """A declared parameter, or the alternative."""
+        """Returns a declared parameter, or the alternative."""
         if name in self.__parameters:
             return self.__parameters[name]
         return Parameter(name, None) if alternative_value is None else alternative_value
 
     def get_parameters_by_prefix(self, prefix: str) -> dict[str, Parameter]:
-        """Parameters whose names begin with `prefix` and a dot, by the rest of the name."""
+        """Returns parameters named `prefix`.NAME, by NAME."""
         start = f"{prefix}." if prefix else ""
         found = self.__parameters.items()
         return {name[len(start) :]: one for name, one in found if name.startswith(start)}
 
     def describe_parameter(self, name: str) -> Any:
-        """`rcl_interfaces/msg/ParameterDescriptor` of a parameter."""
+        """Returns the `rcl_interfaces/msg/ParameterDescriptor` of a parameter."""
         return self.__find(name).describe()
 
     def describe_parameters(self, names: Sequence[str]) -> list[Any]:
-        """Descriptors, in the order of the names."""
+        """Returns descriptors in the order of `names`."""
         return [self.describe_parameter(name) for name in names]
 
     def get_parameter_type(self, name: str) -> ParameterType:
-        """Type of a parameter's value."""
+        """Returns the type of a parameter's value."""
         return self.__find(name).type_
 
     def declared_parameters(self) -> list[str]:
-        """Names of all declared parameters."""
+        """Returns the names of all declared parameters."""
         return sorted(self.__parameters)
 
     def unused_overrides(self) -> list[str]:
-        """Overrides that no `declare_parameter` asked for: most likely misspelt."""
+        """Returns the overrides that no declaration used: most likely misspelt."""
         return [] if self.__allow_undeclared else sorted(self.__overrides)
 
     # ------------------------------------------------------------------------------------ setting
 
     def set_parameters(self, parameter_list: Sequence[ParameterSetting]) -> list[Any]:
-        """Set parameters one by one; for each a `SetParametersResult` with the reason."""
+        """Sets parameters one by one; returns a `SetParametersResult` with a reason for each."""
         return [self.__set([setting]) for setting in parameter_list]
 
     def set_parameters_atomically(self, parameter_list: Sequence[ParameterSetting]) -> Any:
-        """Set all parameters or none; one `SetParametersResult`."""
+        """Sets all parameters or none; returns one `SetParametersResult`."""
         return self.__set(parameter_list)
 
     def add_on_set_parameters_callback(self, callback: OnSet) -> OnSet:
-        """Ask `callback` before parameters are set, which its result allows or refuses.
+        """Adds a callback that accepts or rejects values before they are set.
 
-        The one that was added last is asked first.
+        The callback that was added last is called first.
         """
         self.__on_set.insert(0, callback)
         return callback
 
     def remove_on_set_parameters_callback(self, callback: OnSet) -> None:
-        """Ask `callback` no more."""
+        """Removes a callback."""
         self.__on_set.remove(callback)
 
     def __set(self, settings: Sequence[ParameterSetting]) -> Any:
@@ -226,7 +226,7 @@ class ParameterMethods:
             answer = callback(list(settings))
             if not answer.successful:
                 names = ", ".join(setting.name for setting in settings)
-                raise GraphError(answer.reason or f"{names}: the node refuses the value")
+                raise GraphError(answer.reason or f"{names}: the node rejected the value")
 
     def __find(self, name: str) -> Parameter:
         try:
@@ -239,18 +239,18 @@ class ParameterMethods:
     # ---------------------------------------------------------------------------------- snapshots
 
     def parameter_values(self) -> dict[str, Any]:
-        """Values of the parameters that may be set while the node runs, by name."""
+        """Returns the values of the settable parameters, by name."""
         return {k: p.value for k, p in self.__parameters.items() if not p.read_only}
 
     def put_back_parameters(self, values: Mapping[str, Any]) -> None:
-        """Set what `parameter_values` gave."""
+        """Restores what `parameter_values` returned."""
         for name, value in values.items():
             if name in self.__parameters:
                 self.__parameters[name].value = value
 
 
 def _bounds(descriptor: Any) -> Within | None:
-    """Bounds in a descriptor."""
+    """Returns the limits in a descriptor."""
     if descriptor is None:
         return None
     for ranges in (descriptor.floating_point_range, descriptor.integer_range):

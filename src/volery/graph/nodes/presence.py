@@ -1,7 +1,7 @@
-"""Which nodes in processes of their own take part in a graph.
+"""Lists the nodes in processes of their own that have joined a graph.
 
-Each announces itself, when it is ready, by advertising a topic that carries nothing. So it is known
-over every connection, and gone when its connection is.
+Each node announces itself, when it is ready, by advertising a topic without messages. So every
+connection can list the nodes, and a node disappears with its connection.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ TYPE = "std_msgs/msg/Empty"
 
 
 def presence_topic(node: str) -> str:
-    """The topic that a node of this full name advertises."""
+    """Returns the topic that a node of this full name advertises."""
     return f"{PREFIX}{node}"
 
 
 def outside_nodes(graph: Graph) -> list[str]:
-    """Full names of the nodes that have announced themselves."""
+    """Returns the full names of the announced nodes."""
     return [
         topic.name.removeprefix(PREFIX)
         for topic in graph.topics()

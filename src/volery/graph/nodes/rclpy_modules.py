@@ -1,4 +1,4 @@
-"""What `rclpy` and its modules hold for a node file where no ROS is sourced."""
+"""Provides the contents of the stand-ins for `rclpy` and its modules."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from volery.graph.nodes.timer import Timer
 
 
 class Node(VoleryNode):
-    """Node as of `rclpy.node`: unless declared read-only, parameters may be set while it runs."""
+    """`rclpy.node.Node`: parameters may be set at run time unless declared read-only."""
 
     settable_parameters = True
 
 
 class CallbackGroup:
-    """Callbacks of a node run one after the other, whatever their group."""
+    """A group has no effect: callbacks of a node run one after the other."""
 
 
 class MutuallyExclusiveCallbackGroup(CallbackGroup):
-    """As of `rclpy.callback_groups`."""
+    """See `rclpy.callback_groups`."""
 
 
 class ReentrantCallbackGroup(CallbackGroup):
-    """As of `rclpy.callback_groups`."""
+    """See `rclpy.callback_groups`."""
 
 
-class ExternalShutdownException(Exception):  # noqa: N818  # the name that rclpy gives it
+class ExternalShutdownException(Exception):  # noqa: N818  # rclpy's name
     """Never raised: Volery ends nodes by `destroy_node`."""
 
 
@@ -42,7 +42,7 @@ class ROSInterruptException(Exception):  # noqa: N818
 
 
 class LivelinessPolicy(StrEnum):
-    """Without effect."""
+    """Has no effect."""
 
     AUTOMATIC = "automatic"
     MANUAL_BY_TOPIC = "manual_by_topic"
@@ -50,26 +50,26 @@ class LivelinessPolicy(StrEnum):
 
 
 class _Init:
-    """What `rclpy.init()` returns; it may be a `with` statement's."""
+    """Returned by `rclpy.init()`; a context manager."""
 
     def __enter__(self) -> _Init:
         return self
 
     def __exit__(self, *_exception: object) -> None:
-        """Do nothing."""
+        """Does nothing."""
 
 
 def _init(*_arguments: Any, **_options: Any) -> _Init:
-    """Do nothing: Volery has begun."""
+    """Does nothing: Volery is already running."""
     return _Init()
 
 
 def _shutdown(*_arguments: Any, **_options: Any) -> None:
-    """Do nothing: Volery ends nodes."""
+    """Does nothing: Volery destroys nodes."""
 
 
 def _ok(*_arguments: Any, **_options: Any) -> bool:
-    """Whether nodes run: True."""
+    """Returns True: nodes are running."""
     return True
 
 
@@ -81,14 +81,14 @@ def _spin(*_arguments: Any, **_options: Any) -> None:
 
 
 class Executor:
-    """An executor, which Volery's nodes have no use for."""
+    """Refuses construction: Volery itself spins its nodes."""
 
     def __init__(self, *_arguments: Any, **_options: Any) -> None:
         _spin()
 
 
 def contents() -> dict[str, dict[str, Any]]:
-    """Names and values of each module."""
+    """Returns the names and values of each module."""
     descriptor = message_type("rcl_interfaces/msg/ParameterDescriptor")
     result = message_type("rcl_interfaces/msg/SetParametersResult")
     policies = {
@@ -178,7 +178,7 @@ def contents() -> dict[str, dict[str, Any]]:
 
 
 def _free_logger(name: str) -> logger.NodeLogger:
-    """A logger of no node, with the computer's time and without `/rosout`."""
+    """Returns a logger without node, with wall time and without `/rosout`."""
     import time
 
     return logger.NodeLogger(name, time.time_ns, None)

@@ -1,4 +1,4 @@
-"""Times, durations and clocks in the shape of `rclpy.time`, `rclpy.duration` and `rclpy.clock`."""
+"""Provides the classes of `rclpy.time`, `rclpy.duration` and `rclpy.clock`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _LONGEST_NS = 2**63
 
 
 class ClockType(IntEnum):
-    """What a clock counts."""
+    """Kind of a clock."""
 
     ROS_TIME = 1
     SYSTEM_TIME = 2
@@ -24,12 +24,12 @@ class ClockType(IntEnum):
 
 @total_ordering
 class Duration:
-    """A span of time, which may be negative."""
+    """A duration, which may be negative."""
 
     def __init__(self, *, seconds: float = 0, nanoseconds: int = 0) -> None:
         self._ns = int(seconds * NS_PER_S) + int(nanoseconds)
         if not -_LONGEST_NS <= self._ns < _LONGEST_NS:
-            raise OverflowError("a duration has 64 bits of nanoseconds")
+            raise OverflowError("a duration must fit in 64 bits of nanoseconds")
 
     @property
     def nanoseconds(self) -> int:
@@ -37,12 +37,12 @@ class Duration:
         return self._ns
 
     def to_msg(self) -> Any:
-        """`builtin_interfaces/msg/Duration`."""
+        """Returns a `builtin_interfaces/msg/Duration`."""
         return message_type("builtin_interfaces/msg/Duration")(*divmod(self._ns, NS_PER_S))
 
     @classmethod
     def from_msg(cls, msg: Any) -> Duration:
-        """Duration of a message."""
+        """Returns the duration in a message."""
         return cls(seconds=msg.sec, nanoseconds=msg.nanosec)
 
     def __eq__(self, other: object) -> bool:
@@ -79,10 +79,10 @@ class Time:
         clock_type: ClockType = ClockType.SYSTEM_TIME,
     ) -> None:
         if seconds < 0 or nanoseconds < 0:
-            raise ValueError("a time is not negative")
+            raise ValueError("a time must not be negative")
         self._ns = int(seconds * NS_PER_S) + int(nanoseconds)
         if self._ns >= _LONGEST_NS:
-            raise OverflowError("a time has 63 bits of nanoseconds")
+            raise OverflowError("a time must fit in 63 bits of nanoseconds")
         self._clock_type = clock_type
 
     @property
@@ -91,21 +91,21 @@ class Time:
         return self._ns
 
     def seconds_nanoseconds(self) -> tuple[int, int]:
-        """Whole seconds, and the rest in ns."""
+        """Returns whole seconds and the remainder in ns."""
         return divmod(self._ns, NS_PER_S)
 
     @property
     def clock_type(self) -> ClockType:
-        """The kind of its clock."""
+        """Kind of the clock."""
         return self._clock_type
 
     def to_msg(self) -> TimeMessage:
-        """`builtin_interfaces/msg/Time`."""
+        """Returns a `builtin_interfaces/msg/Time`."""
         return TimeMessage(*divmod(self._ns, NS_PER_S))
 
     @classmethod
     def from_msg(cls, msg: Any, clock_type: ClockType = ClockType.ROS_TIME) -> Time:
-        """Time of a message, such as a header's stamp."""
+        """Returns the time in a message, such as a header's stamp."""
         return cls(seconds=msg.sec, nanoseconds=msg.nanosec, clock_type=clock_type)
 
     def __add__(self, other: Duration) -> Time:
@@ -116,7 +116,7 @@ class Time:
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> Any:
-        """The duration since another time of the same clock, or an earlier time."""
+        """Returns the duration since another time of the same clock, or an earlier time."""
         if isinstance(other, Time):
             return Duration(nanoseconds=self._ns - self._comparable(other))
         if isinstance(other, Duration):
@@ -153,7 +153,7 @@ class Time:
 
 
 class Clock:
-    """A node's clock: simulated time inside a simulation and where the graph has a `/clock`."""
+    """A node's clock: simulated time in a simulation or where the graph has a `/clock`."""
 
     def __init__(
         self, now_ns: Callable[[], int], *, clock_type: ClockType = ClockType.ROS_TIME
@@ -167,9 +167,9 @@ class Clock:
         return self._clock_type
 
     def now(self) -> Time:
-        """The present time."""
+        """Returns the current time."""
         return Time(nanoseconds=self._now_ns(), clock_type=self._clock_type)
 
     def now_ns(self) -> int:
-        """The present time as nanoseconds since the start of the run."""
+        """Returns the current time, ns since the start of the run."""
         return self._now_ns()

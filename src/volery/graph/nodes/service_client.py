@@ -1,4 +1,4 @@
-"""Calling services: at once, or with the response as a later input."""
+"""Calls services: with the response at once, or as a later input."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from volery.graph.service_reply import ServiceReply
 Later = Callable[[Callable[[], None]], None]
 
 _MOST_LOOKS = 1000
-"""Waits for a service at one simulated time before they are taken for an endless loop."""
+"""Limit of waits for a service at one simulated time; more are an endless loop."""
 
 
 class Future:
-    """A response that may still be on its way, in the shape of `rclpy.task.Future`."""
+    """A pending response, with the interface of `rclpy.task.Future`."""
 
     def __init__(self) -> None:
         self._response: Any = None
@@ -30,42 +30,42 @@ class Future:
         self._callbacks: list[Callable[[Future], None]] = []
 
     def done(self) -> bool:
-        """Whether the response is there, or will never be."""
+        """Returns whether the response has arrived, failed or been cancelled."""
         return self._done or self._cancelled
 
     def cancelled(self) -> bool:
-        """Whether it was cancelled."""
+        """Returns whether the future was cancelled."""
         return self._cancelled
 
     def cancel(self) -> None:
-        """Wait for it no more; the callbacks are called."""
+        """Cancels the future and calls its callbacks."""
         if not self.done():
             self._cancelled = True
             self._call_back()
 
     def exception(self) -> BaseException | None:
-        """Why there is no response; None where there is one, or may still be."""
+        """Returns the reason why there is no response; None with or before a response."""
         return self._error
 
     def result(self) -> Any:
-        """The response; None while it is not there. Raises the reason where there is none."""
+        """Returns the response, None while it is pending. Raises the reason of a failure."""
         if self._error is not None:
             raise self._error
         return self._response
 
     def add_done_callback(self, callback: Callable[[Future], None]) -> None:
-        """Call `callback(future)` with the response, at once if it is there."""
+        """Calls `callback(future)` when the future is done, at once if it is."""
         if self.done():
             callback(self)
         else:
             self._callbacks.append(callback)
 
     def set_result(self, result: Any) -> None:
-        """Set the response and call back."""
+        """Sets the response and calls the callbacks."""
         self._finish(result, None)
 
     def set_exception(self, exception: BaseException) -> None:
-        """Say that there will be no response, and call back."""
+        """Sets the failure and calls the callbacks."""
         self._finish(None, exception)
 
     def _finish(self, response: Any, error: BaseException | None) -> None:
@@ -80,10 +80,10 @@ class Future:
 
 
 class Client:
-    """Calls one service; without a request with one of zeros and empty texts.
+    """Calls one service; the default request has zeros and empty texts.
 
-    later: gives what does something at the run's first tick, while the node is being made; None
-    after that. run: calls back in the node's name.
+    later: while the node is being constructed, returns a function that defers to the run's first
+    tick; None afterwards. run: runs a callback of the node.
     """
 
     def __init__(
@@ -101,7 +101,7 @@ class Client:
         self._later = later
         self._run = run
         self._request_type = f"{srvtype}_Request"
-        self._looks = (0, 0)  # how often it has been waited for, and when
+        self._looks = (0, 0)  # number of waits, and their time
         self.service = service
 
     @property
@@ -112,14 +112,14 @@ class Client:
     service_name = srv_name
 
     def service_is_ready(self) -> bool:
-        """Whether the service has a server."""
+        """Returns whether the service has a server."""
         return self._graph.has_service(self.service)
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
-        """Whether the service has a server; simulated time cannot pass in here.
+        """Returns whether the service has a server; simulated time cannot pass meanwhile.
 
-        While a node is being made this is true: servers that start later are there when the clock
-        starts, when calls are made. `GraphError` where a callback goes on asking.
+        During the node's construction returns True: calls are then made when the clock starts, and
+        servers that start later exist by then. Raises `GraphError` if a callback waits endlessly.
         """
         if self.service_is_ready() or self._later() is not None:
             return True
@@ -128,13 +128,13 @@ class Client:
         self._looks = (count + 1 if last_ns == now_ns else 1, now_ns)
         if timeout_sec is None or count >= _MOST_LOOKS:
             raise GraphError(
-                f"service '{self.service}' has no server, and no time passes while a callback waits"
-                " for one; ask service_is_ready() in a timer"
+                f"service '{self.service}' has no server, and a callback cannot wait for one; "
+                "check service_is_ready() in a timer"
             )
         return False
 
     def call(self, request: Any | None = None, timeout_sec: float | None = None) -> Any:  # noqa: ARG002
-        """Call and return the response, which comes at once; not for a node with a latency."""
+        """Calls and returns the response; raises `GraphError` for a node with a latency."""
         if self._thinker is not None:
             raise GraphError(
                 f"a node with a latency cannot wait for service '{self.service}': use call_async"
@@ -142,9 +142,9 @@ class Client:
         return self._graph.call(self.service, self._filled(request))
 
     def call_async(self, request: Any | None = None) -> Future:
-        """Call; the response comes at once, or later from a service outside.
+        """Calls; the response comes at once, or later from an external server.
 
-        For a node with a latency it is input of a callback of its own.
+        For a node with a latency, the response is the input of a callback of its own.
         """
         future = Future()
         filled = self._filled(request)
@@ -156,11 +156,11 @@ class Client:
         return future
 
     def remove_pending_request(self, future: Future) -> None:
-        """Wait for a response no more."""
+        """Cancels a pending response."""
         future.cancel()
 
     def destroy(self) -> None:
-        """Nothing is held."""
+        """Does nothing: a client holds no resources."""
 
     def _ask(self, request: Any, future: Future) -> None:
         occasion = f"response of {self.service}"
@@ -171,7 +171,7 @@ class Client:
             elif self._thinker is not None:
                 self._run(how, occasion)
             else:
-                how()  # inside the callback that asked
+                how()  # in the callback that called
 
         def ask() -> None:
             here = threading.get_ident()

@@ -1,4 +1,4 @@
-"""Timers in the shape of rclpy's: they can be cancelled, restarted and destroyed."""
+"""Provides timers like rclpy's, which can be cancelled, restarted and destroyed."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from volery.graph.nodes.deferred_execution import Deferred
 
 
 class Timers(Deferred, Protocol):
-    """Calls back at simulated times."""
+    """Calls functions at simulated times."""
 
     def every(
         self,
@@ -19,16 +19,16 @@ class Timers(Deferred, Protocol):
         *,
         wanted: Callable[[], bool] | None = None,
     ) -> None:
-        """Call `callback` each period, first after one period; not where `wanted()` is false."""
+        """Calls `callback` every period, from one period on; not while `wanted()` is false."""
 
     def forget(self, callback: Callable[[], None]) -> None:
-        """Call `callback`, which `every` was given, no more."""
+        """Stops calling a `callback` that was passed to `every`."""
 
 
 class Timer:
-    """Calls back each period of the node's time; made by `Node.create_timer`.
+    """Calls a function every period of the node's time; created by `Node.create_timer`.
 
-    `cancel` stops it, `reset` starts its period anew.
+    `cancel` stops the timer, `reset` restarts its period.
     """
 
     def __init__(
@@ -42,7 +42,7 @@ class Timer:
         *,
         autostart: bool = True,
     ) -> None:
-        """Take what the node knows: `ring()` calls back; `defer` does a change when it may act."""
+        """Creates the timer; `ring()` runs the callback; `defer` delays changes to the release."""
         self.callback = callback
         self._ring = ring
         self._timers = timers
@@ -52,13 +52,13 @@ class Timer:
         self._cancelled = not autostart
         self._destroyed = False
         self._due_ns: int | None = None
-        """After a restart: when it rings next; None: it still keeps the phase it began with."""
+        """After a restart: time of the next call; None: the timer still has its first phase."""
         self._is_armed = False
-        """Whether the next ring after a restart has been asked for."""
+        """Whether the next call after a restart is scheduled."""
         self._started_ns = self._last_ns = now_ns()
         timers.every(period_s, self._on_period, wanted=self._keeps_first_phase)
 
-    # ---------------------------------------------------------------------------------- as of rclpy
+    # -------------------------------------------------------------------------------------- rclpy's
 
     @property
     def timer_period_ns(self) -> int:
@@ -66,38 +66,38 @@ class Timer:
         return self._period_ns
 
     def cancel(self) -> None:
-        """Call back no more, until `reset`."""
+        """Stops the timer until `reset`."""
         self._defer(lambda: self._set_cancelled(now=True))
 
     def is_canceled(self) -> bool:
-        """Whether it is cancelled."""
+        """Returns whether the timer is cancelled."""
         return self._cancelled
 
     def reset(self) -> None:
-        """Begin the period anew, also after `cancel`: the next call comes one period from now."""
+        """Restarts the period, also after `cancel`: the next call comes one period from now."""
         self._defer(self._restart)
 
     def is_ready(self) -> bool:
-        """Whether the next call is due."""
+        """Returns whether the next call is due."""
         return not self._cancelled and self.time_until_next_call() <= 0
 
     def time_since_last_call(self) -> int:
-        """Since the last call, or its start, ns."""
+        """Returns the time since the last call or the start, ns."""
         return self._now_ns() - self._last_ns
 
     def time_until_next_call(self) -> int:
-        """Until the next call, ns."""
+        """Returns the time until the next call, ns."""
         now_ns = self._now_ns()
         if self._due_ns is not None:
             return self._due_ns - now_ns
         return self._period_ns - (now_ns - self._started_ns) % self._period_ns
 
     def destroy(self) -> None:
-        """End it for good."""
+        """Destroys the timer."""
         self._destroyed = True
         self._timers.forget(self._on_period)
 
-    # -------------------------------------------------------------------------------------- inside
+    # ------------------------------------------------------------------------------------ internal
 
     def _keeps_first_phase(self) -> bool:
         return self._due_ns is None and not self._cancelled and not self._destroyed
@@ -126,7 +126,7 @@ class Timer:
         self._is_armed = False
         if self._due_ns is None or self._cancelled or self._destroyed:
             return
-        if self._now_ns() >= self._due_ns:  # else it was restarted meanwhile
+        if self._now_ns() >= self._due_ns:  # else the timer was restarted meanwhile
             self._due_ns += self._period_ns
             self._arm()
             self._on_period()
@@ -134,9 +134,9 @@ class Timer:
             self._arm()
 
     def get_state(self) -> Any:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         return self._cancelled, self._due_ns, self._is_armed, self._last_ns
 
     def set_state(self, state: Any) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         self._cancelled, self._due_ns, self._is_armed, self._last_ns = state
