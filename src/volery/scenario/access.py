@@ -51,8 +51,8 @@ class ScenarioAccess:
         """
         if not self._is_free(name):
             raise DataFileError(
-                f"no readable folder '{name[:80]}': a scenario of a log or an upload "
-                "may not read folders"
+                f"no folder '{name[:80]}' that may be read: a scenario of a log or an upload "
+                "reads no folders"
             )
         return self._find(name, None, Path.is_dir, "folder")
 
@@ -61,7 +61,7 @@ class ScenarioAccess:
         return str(self._find(name, None, Path.is_file, "file")) if name.endswith(".toml") else name
 
     def allows_work_folder(self, name: str) -> bool:
-        """Returns whether a node may write to a folder: if confined, only below the working folder."""
+        """Returns whether a node may write to a folder; confined, below the working folder only."""
         return self._is_free(name) or (_is_inner(name) and _is_below(Path(name), Path()))
 
     def _is_free(self, name: str) -> bool:
@@ -71,7 +71,7 @@ class ScenarioAccess:
         self, name: str, shipped: Path | None, exists: Callable[[Path], bool], what: str
     ) -> Path:
         if "\0" in name:
-            raise DataFileError(f"the name of a {what} must not contain NUL")
+            raise DataFileError(f"the name of a {what} that may be read must not contain NUL")
         folders = [] if self.folder is None else [self.folder]
         folders += [Path()] if self._is_free(name) else []
         folders += [] if shipped is None else [shipped]
@@ -84,8 +84,8 @@ class ScenarioAccess:
                 return place
         if not self._is_free(name):
             raise DataFileError(
-                f"no readable {what} '{name[:80]}': a scenario of a log or an upload "
-                "may read only below its own folder and shipped data"
+                f"no {what} '{name[:80]}' that may be read: a scenario of a log or an upload "
+                "reads only below its own folder and among shipped data"
             )
         looked = (
             [Path(name).parent]

@@ -57,8 +57,7 @@ class ScenarioCatalog:
         return tuple(sorted(n for n in found if n not in shipped and not n.startswith(".")))
 
     def load(self, name: str) -> Scenario:
-        """Returns a scenario by its name; raises `ScenarioError` if it does not exist or is
-        invalid."""
+        """Returns a scenario by its name; raises `ScenarioError` for a missing or invalid one."""
         if name in library.names():
             return load_scenario(name)
         for given in self.given():

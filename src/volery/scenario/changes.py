@@ -76,8 +76,7 @@ def parse_changes(text: str) -> Changes:
 
 
 def apply(scenario: Scenario, changes: Changes) -> Scenario:
-    """Returns the scenario with the changes, validated; raises `ScenarioError` if a change is
-    invalid."""
+    """Returns the scenario with the changes, validated; raises `ScenarioError` for invalid ones."""
     data: dict[str, Any] = scenario.model_dump(exclude_unset=True)
     if changes.seconds is not None:
         data["duration_s"] = changes.seconds

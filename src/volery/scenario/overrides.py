@@ -27,7 +27,7 @@ def apply(
     data: dict[str, Any] = scenario.model_dump(exclude_unset=True)
     if seconds is not None:
         if not 0.0 < seconds < math.inf:
-            raise ScenarioError(f"--seconds: must be above 0 s (found {seconds:g})")
+            raise ScenarioError(f"--seconds: a run lasts longer than 0 s (found {seconds:g})")
         data["duration_s"] = seconds
     if seed is not None:
         data["seed"] = seed

@@ -432,7 +432,7 @@ class Scenario(Data):
 
     @property
     def has_seeded_world(self) -> bool:
-        """Whether the scenario's seed affects trees or a city: there are some, and no `world.seed`."""
+        """Whether the scenario's seed affects trees or a city, for lack of `world.seed`."""
         world = self.world
         return world.seed is None and (world.forest is not None or world.city is not None)
 

@@ -239,8 +239,8 @@ class TableScan(Pattern):
             path = access.find_file(self.file, shipped=None)
         except DataFileError:
             raise DataFileError(
-                f"{self._folder / self.file}: cannot be read; put the beam table in the folder "
-                "of its model file or below it"
+                f"{self._folder / self.file}: cannot be read; a beam table lies in the folder of "
+                "its model file or below it"
             ) from None
         return read_beams(path, 1.0 / self.rate_hz, MOST_BEAMS)
 

@@ -91,7 +91,7 @@ class Battery(Table):
     @model_validator(mode="after")
     def _is_a_battery(self) -> Self:
         if (np.diff(self.open_circuit_v) < 0.0).any():
-            raise ValueError("open_circuit_v must not decrease from empty to full")
+            raise ValueError("open_circuit_v must not fall from empty to full")
         if not self.critical < self.low:
             raise ValueError(f"critical = {self.critical} must be below low = {self.low}")
         return self

@@ -95,7 +95,10 @@ def run_together(rays: NDArray[np.float32], p: int, lanes: int) -> bool:
 def cast_block(
     scene: SceneHandle, block: RayBlock, count: int, reach: float, near_count: int
 ) -> None:
-    """Finds the closest hits of the block's first `count` rays on static geometry and near bodies."""
+    """Finds the closest hits of the block's first `count` rays, on static and moving geometry.
+
+    One call handles many packets, because passing so many arrays costs as much as a ray.
+    """
     rays, words, valid = block.rays, block.words, block.valid
     instance, material = block.instance, block.material
     rays_address, valid_address = rays.ctypes.data, valid.ctypes.data
