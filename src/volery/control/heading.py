@@ -40,7 +40,7 @@ def turn_heading(control_state: Any, estimate: Any, gains: Any, rate: float) -> 
         if c * gc + s * gs < 0.0:
             step = math.copysign(1.0, step)
         step = min(max(gains.tick * (gains.yaw * step + rate), -most), most)
-    # a turn by the small angle `step`, up to step^3 / 6, kept to unit length by a Newton step
+    # a turn by the small angle `step`, up to step^3 / 6, normalised by a Newton step
     turn = 1.0 - 0.5 * step * step
     c, s = c * turn - s * step, s * turn + c * step
     n = 1.5 - 0.5 * (c * c + s * s)

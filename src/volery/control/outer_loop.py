@@ -127,7 +127,7 @@ def _point_thrust(
     """Computes thrust and attitude: z axis (ax, ay, az), az > 0, and the heading setpoint."""
     k = 1.0 / math.sqrt(ax * ax + ay * ay + az * az)
     zx, zy, zz = ax * k, ay * k, az * k
-    # shortest turn that takes the map's z to (zx, zy, zz)
+    # shortest rotation from the map's z to (zx, zy, zz)
     k = 1.0 / math.sqrt(2.0 * (1.0 + zz))
     px, py, pw = -zy * k, zx * k, (1.0 + zz) * k
     # turn about z after which the x axis, seen from above, points along the heading
@@ -148,7 +148,7 @@ def _point_thrust(
     control_state.attitude[1] = py * hw - px * hz
     control_state.attitude[2] = pw * hz
     control_state.attitude[3] = pw * hw
-    # thrust: the part of the wanted acceleration that the present thrust axis can give
+    # thrust: the component of the desired acceleration along the present thrust axis
     qx, qy, qz, qw = four(estimate.attitude)
     along = (
         ax * 2.0 * (qx * qz + qy * qw)

@@ -77,8 +77,8 @@ CONTROL_STATE = np.dtype(
         ("yaw_rate_target", "f8"),  # rad/s
         ("heading", "f8", 2),  # setpoint moving towards its target, cosine and sine
         ("position", "f8", 3),  # m, map: reference of the outer loop, moving towards its target
-        ("velocity", "f8", 3),  # m/s, map: likewise
-        ("acceleration", "f8", 3),  # m/s^2, map: likewise
+        ("velocity", "f8", 3),  # m/s, map: of the reference
+        ("acceleration", "f8", 3),  # m/s^2, map: of the reference
         ("velocity_integral", "f8", 3),  # m/s^2, map: against steady disturbances
         ("attitude", "f8", 4),  # map from body
         ("rotor_target", "f8", MAX_ROTORS),  # rad/s, where speeds are commanded

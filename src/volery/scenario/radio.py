@@ -22,7 +22,7 @@ class RelayedTopic(Data):
 
 
 class Radio(Data):
-    """A packet radio on every UAV whose type has one; all share one channel.
+    """A packet radio on every UAV of a type with `radio`; all use one channel.
 
     The defaults are those of a small 2.4 GHz module at the lowest rate of IEEE 802.11a/g: 6 Mbit/s
     of BPSK in 20 MHz at 100 mW; values without a source are modelling choices.

@@ -68,7 +68,7 @@ def sensor_frame(batch: RayBatch, scan: int, history: PoseHistory, time_ns: int)
     qx, qy, qz, qw = nodded(base[row, 0], base[row, 1], base[row, 2], base[row, 3], angle)
     mx, my, mz = rotate_vector(px, py, pz, pw, place[row, 0], place[row, 1], place[row, 2])
     ax, ay, az, aw = quaternion_product(px, py, pz, pw, qx, qy, qz, qw)
-    a, b, c = matrix_rows(ax, ay, az, aw)  # whose columns are the sensor's axes
+    a, b, c = matrix_rows(ax, ay, az, aw)  # the columns are the sensor's axes
     return x + mx, y + my, z + mz, a[0], b[0], c[0], a[1], b[1], c[1], a[2], b[2], c[2]
 
 

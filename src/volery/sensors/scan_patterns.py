@@ -74,7 +74,7 @@ class PlanarScan(Pattern):
         return (duration * np.arange(self.beams) / (self.beams - 1)).astype(np.int64)
 
     def _aim(self, sweep: int) -> Array:  # noqa: ARG002 - all sweeps are alike
-        """(3, beams)."""
+        """Returns directions (3, beams)."""
         return np.stack([np.cos(self.angles), np.sin(self.angles), np.zeros(self.beams)])
 
     @cached_property
@@ -133,17 +133,17 @@ class RingScan(Pattern):
 
     @cached_property
     def ring(self) -> NDArray[np.uint16]:
-        """(beams,)."""
+        """(beams,) see `Pattern`."""
         return np.tile(np.arange(self.stride, dtype=np.uint16), self.columns)
 
     @cached_property
     def time_ns(self) -> NDArray[np.int64]:
-        """(beams,)."""
+        """(beams,) see `Pattern`."""
         seconds = np.arange(self.columns)[:, None] * self.column_period_s + self._firing_offset
         return np.round(seconds * NS_PER_S).astype(np.int64).reshape(-1)
 
     def _aim(self, sweep: int) -> Array:  # noqa: ARG002 - all sweeps are alike
-        """(3, beams)."""
+        """Returns directions (3, beams)."""
         column = np.arange(self.columns)[:, None] + self._firing_offset / self.column_period_s
         offset = np.array(self.azimuth_offset_deg or [0.0] * self.stride)
         azimuth = np.radians(self.azimuth_start_deg + self.azimuth_step_deg * column + offset)
@@ -200,11 +200,11 @@ class RosetteScan(Pattern):
 
     @cached_property
     def time_ns(self) -> NDArray[np.int64]:
-        """(points,)."""
+        """(points,) ns after the start of the sweep."""
         return np.round(np.arange(self.points) * self.point_period_s * NS_PER_S).astype(np.int64)
 
     def _aim(self, sweep: int) -> Array:
-        """(3, points)."""
+        """Returns directions (3, points)."""
         start_s = sweep / self.rate_hz
         bent = np.zeros(self.points, dtype=np.complex128)
         for path, rpm in zip(self._paths, self.prism_rpm, strict=True):
@@ -251,16 +251,16 @@ class TableScan(Pattern):
 
     @property
     def time_ns(self) -> NDArray[np.int64]:
-        """(beams,)."""
+        """(beams,) see `Pattern`."""
         return self._list.time_ns
 
     @property
     def ring(self) -> NDArray[np.uint16]:
-        """(beams,)."""
+        """(beams,) see `Pattern`."""
         return self._list.ring
 
     def _aim(self, sweep: int) -> Array:  # noqa: ARG002 - all sweeps are alike
-        """(3, beams)."""
+        """Returns directions (3, beams)."""
         return self._list.direction
 
 

@@ -82,7 +82,7 @@ class Battery(Table):
     """Efficiency from the battery to the rotors' shafts: speed controllers and motors."""
     avionics_w: NotNegative
     rated_v: Positive
-    """Voltage of the pack under load at which rotors reach `max_speed_rad_s`."""
+    """Voltage of the loaded pack at which rotors reach `max_speed_rad_s`."""
     power_torque_m: Positive | None = None
     """k_P, torque over thrust for the rotors' power; default: `rotors.torque_m`."""
     low: Share = 0.25

@@ -34,7 +34,7 @@ BODY = np.dtype(
             "f8",
             3,
         ),  # on the ground: acceleration_map without contact ...
-        ("free_angular_acceleration", "f8", 3),  # ... and likewise
+        ("free_angular_acceleration", "f8", 3),  # ... and the angular one
         # fields of every step, adjacent for the cache
         ("rotor_speed", "f8", MAX_ROTORS),
         ("position_map", "f8", 3),

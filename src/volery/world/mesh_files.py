@@ -137,7 +137,7 @@ class _Materials:
         return self.get(name)
 
     def get(self, name: str) -> bytes:
-        """Content of a material file; `OSError` for any other."""
+        """Returns the content of a material file; raises `OSError` for any other."""
         path = (self._folder / name).resolve()
         is_material = path.suffix.lower() == ".mtl" and path.is_file()
         if not (is_material and path.is_relative_to(self._folder.resolve())):

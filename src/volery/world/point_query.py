@@ -264,7 +264,7 @@ def nearest_points(
             state[_POINT + j] = points[i, j]
             state[_NEAREST + j] = points[i, j]
         query[3] = 0.0
-        # The query's own point is rounded to 32 bits: look a little further than that.
+        # The query's own point is rounded to 32 bits: the radius includes that error.
         query[QUERY_RADIUS] = limit * (1.0 + 1e-6) + 1e-4
         state[_SQUARED] = limit * limit
         state[_INSTANCE] = -1.0

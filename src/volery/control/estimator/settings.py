@@ -97,8 +97,8 @@ class Mounting:
 class StartSigmas:
     """Standard deviations of the initial state (modelling choices).
 
-    With `aligned` the attitude comes from `align_at_rest`: its errors then follow from those of
-    accelerometer and magnetometer; `tilt_rad` and `heading_rad` are the contribution of averaged
+    With `aligned` the attitude comes from `align_at_rest`: its errors then follow from the errors
+    of accelerometer and magnetometer; `tilt_rad` and `heading_rad` are the contribution of averaged
     noise.
     """
 

@@ -66,7 +66,7 @@ def take(
     shots, pixels = len(batch.uav), model.width * model.height
     colour, depth, labels = (pixels if part in parts else 0 for part in EVERY_PART)
     if colour and falling:
-        depth = pixels  # which hides what falls behind it
+        depth = pixels  # hides particles behind surfaces
     frames = Frames(
         np.empty((shots, colour, 3), np.uint8),
         np.empty((shots, depth), np.float32),

@@ -65,7 +65,7 @@ class WaypointMotion:
         self.speed_m_s = speed_m_s
 
     def pose_at(self, time_s: float) -> Array:
-        """See `ActorMotion`."""
+        """Returns the pose (7,) at a time; see `ActorMotion`."""
         way = self.speed_m_s * max(time_s - self._start_s, 0.0)
         if self._at_end == "stop":
             way = min(way, self._way[-1])
@@ -117,7 +117,7 @@ class CircleMotion:
         self.speed_m_s = speed_m_s
 
     def pose_at(self, time_s: float) -> Array:
-        """See `ActorMotion`."""
+        """Returns the pose (7,) at a time; see `ActorMotion`."""
         turned = self.speed_m_s / self._radius * max(time_s, 0.0)
         angle = self._start + self._sense * turned
         x, y, z = self._centre
@@ -157,7 +157,7 @@ class GivenMotion:
         self._said = (*older, *recent, word)
 
     def pose_at(self, time_s: float) -> Array:
-        """See `ActorMotion`."""
+        """Returns the pose (7,) at a time; see `ActorMotion`."""
         since, pose, velocity = next(
             (said for said in reversed(self._said) if said[0] <= time_s), self._said[0]
         )

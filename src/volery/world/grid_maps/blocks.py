@@ -37,7 +37,7 @@ def block_mesh(grid: GridMap, bottom_m: float, top_m: float) -> Mesh:
     Raises `CommandError` if the map is so irregular that its mesh would be too large.
     """
     edges = _walls(grid.blocked)
-    _check_faces(grid, sum(_run_count(cells) for cells in edges))  # before memory is taken
+    _check_faces(grid, sum(_run_count(cells) for cells in edges))  # before memory is allocated
     walls = [_runs(cells) for cells in edges]
     tops = _runs(grid.blocked)
     corners = [_top_corners(*_merged(tops))]

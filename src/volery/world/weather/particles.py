@@ -4,7 +4,7 @@ Extinction is that of single scattering, the sum of all kinds; a is per metre, t
 left after r metres is exp(-a r) (Beer and Lambert):
 
 - rain: Marshall and Palmer 1948, drops of diameter D in numbers N0 exp(-s D), N0 = 8000 /m^3/mm,
-  s = 4.1 R^-0.21 /mm, each of which takes away twice its cross-section: a = pi N0 / s^3, that is
+  s = 4.1 R^-0.21 /mm, each with an extinction of twice its cross-section: a = pi N0 / s^3, that is
   0.365 R^0.63 /km, which is also ITU-R P.1817-1's law of rain (1.58 R^0.63 dB/km, Japan).
 - snow: ITU-R P.1817-1, dry snow: (5.42e-5 L + 5.4958776) S^1.38 dB/km, L the wavelength in nm.
 - fog: ln(20) / V at 550 nm by the definition of the meteorological optical range V (WMO-No. 8, a
