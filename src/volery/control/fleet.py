@@ -236,7 +236,7 @@ class Fleet(FleetCommands):
         self._weather = weather
 
     def add_gust(self, gust: Gust) -> None:
-        """Adds a gust, which begins now, to the weather."""
+        """Adds a gust to the weather."""
         self.set_weather(self._weather.with_gust(gust, s_from_ns(self.time_ns)))
 
     def set_rotor_health(self, i: int, rotor: int, factor: float) -> None:

@@ -2,8 +2,7 @@
 
 The rotors' lag bounds everything: the rate loop gets 0.4 / lag (a damping near 0.8), and each layer
 above about a third of the bandwidth of the layer below. An airframe file may override each
-bandwidth. Torques are angular accelerations times inertia, so gains do not depend on the vehicle's
-size.
+bandwidth. Torques are angular accelerations times inertia, so gains do not contain the inertia.
 """
 
 from __future__ import annotations

@@ -28,7 +28,8 @@ Array = NDArray[np.float64]
 
 FOREVER_NS = np.iinfo(np.int64).max
 _LONGEST_DELAY_NS = KEPT_NS - 6_000_000
-"""A fix reads poses of the delay ago, up to one physics step, and of another for the velocity."""
+"""A fix reads poses as old as the delay plus up to two physics steps, one of them for the velocity.
+"""
 
 
 class GnssModel(SensorModel):

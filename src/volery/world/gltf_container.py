@@ -47,7 +47,7 @@ def entry(holder: dict[str, Any], key: str, number: Any) -> dict[str, Any]:
         )
     found = entries[number]
     if not isinstance(found, dict):
-        raise ValueError(f"'{key}' {number} is no object")
+        raise ValueError(f"'{key}' {number} is not an object")
     return found
 
 
@@ -66,7 +66,7 @@ class Container:
             data = self._unpack(data)
         document = json.loads(data.decode("utf-8-sig"))
         if not isinstance(document, dict):
-            raise ValueError("its JSON is no object")
+            raise ValueError("its JSON is not an object")
         version = field(field(document, "asset", dict), "version", str)
         if version.split(".")[0] != "2":
             raise ValueError(f"glTF 2 is read, this is version '{version[:20]}'")
@@ -139,7 +139,7 @@ class Container:
             try:
                 return base64.b64decode(code, validate=True)
             except binascii.Error as error:
-                raise ValueError(f"a buffer is no base64: {error}") from None
+                raise ValueError(f"a buffer is not base64: {error}") from None
         path = (self._folder / unquote(uri)).resolve()
         if not path.is_relative_to(self._folder.resolve()):
             raise ValueError(f"buffer '{uri[:80]}' lies outside of the file's folder")

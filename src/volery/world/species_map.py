@@ -41,7 +41,7 @@ def shipped_species(
         name.strip() for name, key in zip(names, keys, strict=True) if key and key not in chosen
     )
     if unknown:
-        _warn(f"{where}: {_told(unknown)} stand as {fallback}; map them in {_TABLE}")
+        _warn(f"{where}: {_told(unknown)} become {fallback}; map them in {_TABLE}")
     present = set(keys)
     unused = sorted(name for name in species_map if _key(name) not in present)
     if unused:
