@@ -58,7 +58,7 @@ MODEL = np.dtype(
         ("gains", GAINS),
         ("identified", IDENTIFIED),
         ("kinematic", KINEMATIC),
-        ("kind", "i8"),  # vehicle.plants: RIGID_BODY, IDENTIFIED_LOOPS, KINEMATIC_MOTION
+        ("kind", "i8"),  # vehicle.plant_types: RIGID_BODY, IDENTIFIED_LOOPS, KINEMATIC_MOTION
     ],
     align=True,
 )
