@@ -58,8 +58,8 @@ def check_stability(airframe: Airframe, plant: Plant, dt: float) -> None:
             raise DataFileError(
                 f"{term.owner}: {term.key} cannot be computed with a physics step of "
                 f"{1e3 * dt:g} ms: it removes {term.share:.3g} of the motion in each step, and "
-                f"less than {STABLE_BELOW:g} is stable; use a smaller {term.key} or, if it is right, "
-                "a higher physics.rate_hz"
+                f"less than {STABLE_BELOW:g} is stable; use a smaller {term.key} or, if it "
+                "is right, a higher physics.rate_hz"
             )
 
 
