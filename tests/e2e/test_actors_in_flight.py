@@ -318,7 +318,7 @@ def test_they_are_put_by_a_topic_and_told_on_tf(simulate, actors_data):
 @pytest.mark.parametrize(
     ("actors", "words"),
     [
-        ([outside("uav7")], "name of UAVs"),
+        ([outside("uav7")], "UAV's name"),
         ([outside(), outside()], "used twice: van"),
         ([{**outside(), "shape": "boat"}], "person"),
         ([outside(place=(1.0,))], "position_m"),
@@ -334,7 +334,7 @@ def test_they_are_put_by_a_topic_and_told_on_tf(simulate, actors_data):
                     },
                 }
             ],
-            "two at least must differ",
+            "at least two must differ",
         ),
     ],
 )

@@ -1,1 +1,1 @@
-"""Control: from a place to go to down to rotor speeds, in layers that can each be commanded."""
+"""Control: from position setpoints down to rotor speeds, in layers that each accept commands."""

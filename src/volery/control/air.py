@@ -1,4 +1,4 @@
-"""The air around the UAVs, and its rain, looked up anew at each guidance tick."""
+"""The air around the UAVs and its rain, computed at each guidance tick."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ def refresh_air(
     tick: int,
     period: float,
 ) -> None:
-    """Set `air_velocity_map` of a `UAV` record; it keeps that until the next tick.
+    """Sets `air_velocity_map` (m/s, map) of a `UAV` record until the next tick.
 
-    downwash: m/s of the air that other UAVs push down. air, nodes: the weather, see
+    downwash: downward m/s of the air below other UAVs. air, nodes: the weather, see
     `world.weather.table`. tick: number of this guidance tick since the start. period: s of a tick.
     """
     body = uav.body
@@ -50,12 +50,12 @@ def refresh_air(
 
 @inner_kernel
 def feel_rain(body: Any, plant: Any, air: Any, period: float) -> None:
-    """Let the rain of a tick push a `BODY`: drops lose their momentum on it.
+    """Adds the push of one tick's rain to a `BODY`: drops lose their momentum on it.
 
-    Water of density W that comes with velocity u pushes an area A with W |u| u A; A is taken to be
-    the area that the body's drag counts by vertically (modelling choice). A push each tick, which
-    accelerometers do not feel: at 50 mm/h it is 5 mN on an F450. Who stands on the ground is held
-    by that.
+    Water of density W with relative velocity u pushes an area A with W |u| u A; A is the area that
+    the body's vertical drag counts (modelling choice). The velocity changes once per tick, which
+    accelerometers do not measure: at 50 mm/h the force is 5 mN on an F450. Contact holds UAVs on
+    the ground.
     """
     if body.on_ground:
         return

@@ -1,4 +1,4 @@
-"""Commands to many UAVs at once, as arrays: what `control.commands` does one by one."""
+"""Commands to many UAVs at once, as arrays; `control.commands` commands single UAVs."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ def command_velocities(
     velocity: Array,
     yaw_rate: Array,
 ) -> None:
-    """Let all that fly follow `velocity` (N, 3) m/s in the level heading frame and `yaw_rate` (N,).
+    """Sets velocity setpoints of all flying UAVs, as `FleetCommands.command_velocity_body` does.
 
-    bodies, control_states: (N,) rows of `BODY` and `CONTROL_STATE`. As
-    `FleetCommands.command_velocity_body`, but UAVs on the ground, wrecks and those that take off
-    are passed over.
+    bodies, control_states: (N,) rows of `BODY` and `CONTROL_STATE`. velocity: (N, 3) m/s in the
+    level heading frame; yaw_rate: (N,) rad/s. UAVs that are on the ground, crashed or taking off
+    are skipped.
     """
     hears = ~np.isin(control_states["mode"], [int(mode) for mode in _DEAF])
     bodies["still_steps"][hears] = 0

@@ -1,4 +1,4 @@
-"""The commands of a fleet: checked, then written into the rows that the compiled step reads."""
+"""The commands of a fleet: validated, then written into the rows that the compiled step reads."""
 
 from __future__ import annotations
 
@@ -33,10 +33,12 @@ DEFAULT_RETURN_HEIGHT_M = 10.0
 
 
 class FleetCommands:
-    """What UAVs can be told; `Fleet` adds time and state.
+    """Commands to UAVs; `Fleet` adds time and state.
 
-    airframes, plants, names: one a UAV. uavs: (N,) rows of `step.UAV`. dt: physics step, s. A
-    command acts from the next step; one that is refused changes nothing.
+    airframes, plants, names: one per UAV. uavs: (N,) rows of `fused_step.UAV`. dt: physics step, s.
+    A command acts from the next step. Commands raise `CommandError`, and change nothing, if the UAV
+    does not exist or has crashed, if its plant or flight mode does not support the command, or if a
+    value has the wrong shape, is not finite or is out of range.
     """
 
     def __init__(
@@ -62,32 +64,34 @@ class FleetCommands:
         return len(self._uavs)
 
     def mode(self, i: int) -> FlightMode:
-        """Flight mode of UAV `i`."""
+        """Returns the flight mode of UAV `i`."""
         return FlightMode(int(self._control_states["mode"][i]))
 
     @property
     def modes(self) -> NDArray[np.int64]:
-        """(N,) flight modes, as numbers."""
+        """(N,) flight modes, as integers."""
         modes: NDArray[np.int64] = self._control_states["mode"].copy()
         return modes
 
     def set_command_timeout(self, seconds: float, i: int | None = None) -> None:
-        """Time without a velocity or trajectory setpoint after which UAV `i` (None: all) holds.
+        """Sets the time without setpoints after which UAV `i` (None: all) holds.
 
-        s, up to 60.
+        It counts from the last velocity or trajectory setpoint. seconds: above 0, up to 60.
         """
         if not 0.0 < seconds <= 60.0:
-            raise CommandError(f"time-out = {seconds} s is out of range; up to 60 s is allowed")
+            raise CommandError(
+                f"timeout = {seconds} s is out of range; it must be above 0 and up to 60 s"
+            )
         rows = slice(None) if i is None else i
         self._control_states["timeout_steps"][rows] = max(1, round(seconds / self._dt))
 
     def rotor_reference(self, i: int) -> Array:
-        """(R,) rad/s: what the controllers of UAV `i` asked of its rotors in the last step."""
+        """Returns the rotor speed setpoints (R,) rad/s of UAV `i` in the last step."""
         rotors = len(self.airframes[i].rotors.places)
         return np.array(self._control_states["rotor_reference"][i, :rotors])
 
     def command_rotor_speeds(self, i: int, speeds: ArrayLike) -> None:
-        """Turn the rotors of UAV `i` at `speeds` (R,) rad/s, if its battery lets them."""
+        """Sets the rotor speeds (R,) rad/s of UAV `i`, within what its battery allows."""
         self._refuse_plants(i, "rotor speeds", IdentifiedModel, Kinematic)
         rotors = self.airframes[i].rotors
         shape = (len(rotors.places),)
@@ -96,16 +100,16 @@ class FleetCommands:
         control_state["rotor_target"][: len(speeds)] = speeds
 
     def stop_rotors(self, i: int) -> None:
-        """Stop the rotors of UAV `i` at once, wherever it is; in the air a flight mode starts them.
+        """Stops the rotors of UAV `i` at once; in the air a flight mode restarts them.
 
-        A kinematic UAV, which has none, stands still in the air.
+        A kinematic UAV, which has no rotors, hovers in place.
         """
         control_state = self._enter_low_level(i, ControlLevel.STOPPED)
         control_state["rotor_target"] = 0.0
         control_state["thrust"] = 0.0
 
     def command_rates(self, i: int, omega_body: ArrayLike, thrust: float) -> None:
-        """Turn UAV `i` at `omega_body` (3,) rad/s, FLU, with `thrust` N along its z axis."""
+        """Sets body rates (3,) rad/s, FLU, and `thrust` N along the z axis of UAV `i`."""
         self._refuse_plants(i, "rates", IdentifiedModel, Kinematic)
         limit = 4.0 * math.radians(self.airframes[i].limits.rate_deg_s)
         omega_body = checked("rates", omega_body, (3,), limit)
@@ -115,7 +119,7 @@ class FleetCommands:
         control_state["thrust"] = thrust
 
     def command_attitude(self, i: int, attitude: ArrayLike, thrust: float) -> None:
-        """Hold UAV `i` at `attitude` (4,), map from body, with `thrust` N along its z axis."""
+        """Sets the attitude (4,), map from body, and `thrust` N along the z axis of UAV `i`."""
         self._refuse_plants(i, "attitudes", Kinematic)
         attitude = checked_attitude(attitude)
         thrust = self._checked_thrust(i, thrust)
@@ -125,21 +129,21 @@ class FleetCommands:
         control_state["yaw_rate"] = 0.0
 
     def command_velocity_body(self, i: int, velocity: ArrayLike, yaw_rate: float = 0.0) -> None:
-        """Fly UAV `i` at `velocity` (3,) m/s in its level heading frame (x forward, y left, z up).
+        """Sets the velocity (3,) m/s of UAV `i` in its level heading frame.
 
-        A ROS Twist: the velocity turns with the vehicle, yaw_rate is in rad/s. It holds until the
-        time-out, then the UAV brakes and holds its place. Beyond the airframe's limits it flies at
-        the limit.
+        The frame has x forward, y left, z up. As a ROS Twist: the velocity turns with the vehicle,
+        yaw_rate is in rad/s. The setpoint holds until the timeout, then the UAV brakes and holds
+        its position. Velocities beyond the airframe's limits are limited.
         """
         rate = checked("yaw rate", yaw_rate, (), 100.0)
         self._command_velocity(i, velocity, in_heading=True)
         self._turn(i, rate)
 
     def command_velocities(self, velocity: Array, yaw_rate: Array) -> None:
-        """Fly all UAVs at `velocity` (N, 3) m/s in their level heading frames, turning at (N,).
+        """Sets velocities (N, 3) m/s in level heading frames, and yaw rates (N,) rad/s.
 
-        As `command_velocity_body` for each, but those on the ground, wrecks and those that take off
-        are passed over.
+        As `command_velocity_body` for each UAV, but UAVs that are on the ground, crashed or taking
+        off are skipped.
         """
         velocity = checked("velocity", velocity, (len(self), 3), 1e3)
         rate = checked("yaw rate", yaw_rate, (len(self),), 100.0)
@@ -150,7 +154,7 @@ class FleetCommands:
     def command_velocity_map(
         self, i: int, velocity: ArrayLike, yaw_rate: float = 0.0, *, yaw: float | None = None
     ) -> None:
-        """Fly UAV `i` at `velocity` (3,) m/s, map, turning at `yaw_rate` rad/s or to `yaw` rad."""
+        """Sets the velocity (3,) m/s, map, of UAV `i`, with `yaw_rate` rad/s or `yaw` rad."""
         rate = checked("yaw rate", yaw_rate, (), 100.0)
         angle = None if yaw is None else checked("yaw", yaw, (), 1e4)
         self._command_velocity(i, velocity, in_heading=False)
@@ -160,7 +164,7 @@ class FleetCommands:
             self._face(i, float(angle))
 
     def command_position(self, i: int, position: ArrayLike, yaw: float | None = None) -> None:
-        """Fly UAV `i` to `position` (3,) m, map, with heading `yaw` rad (None: as it is); hold."""
+        """Sends UAV `i` to `position` (3,) m, map, with heading `yaw` rad (None: unchanged)."""
         position = checked("position", position, (3,), MAX_COORDINATE)
         angle = None if yaw is None else float(checked("yaw", yaw, (), 1e4))
         control_state = self._enter_guided(i, FlightMode.GO_TO)
@@ -177,11 +181,11 @@ class FleetCommands:
         yaw: float | None = None,
         yaw_rate: float = 0.0,
     ) -> None:
-        """Have UAV `i` at `position` (3,) m now, moving with `velocity` and `acceleration`, map.
+        """Sets the present trajectory point of UAV `i`: position, velocity, acceleration (3,), map.
 
-        A point of a trajectory that someone else computes (m, m/s, m/s^2; yaw in rad, None: as it
-        is, turning at yaw_rate rad/s). It moves on by itself until the next one comes, or, after
-        the time-out, until the UAV holds. Far goals are for `command_position`.
+        For trajectories that a client computes (m, m/s, m/s^2; yaw in rad, None: unchanged, turning
+        at yaw_rate rad/s). The setpoint moves on with its velocity and acceleration until the next
+        one arrives or, after the timeout, the UAV holds. For distant goals use `command_position`.
         """
         position = checked("position", position, (3,), MAX_COORDINATE)
         velocity = checked("velocity", velocity, (3,), 1e3)
@@ -204,11 +208,11 @@ class FleetCommands:
             control_state["yaw_rate_target"] = 0.0
 
     def command_trajectory(self, i: int, trajectory: Trajectory) -> None:
-        """Fly UAV `i` along `trajectory` from now on, then hold.
+        """Sends UAV `i` along `trajectory` from now on, then holds.
 
-        Its times count from this step. One that begins later than at 0 s is reached from the
-        present motion by a segment of its own. Places are those of the map: a UAV that is
-        elsewhere approaches at about 1 m/s beside the motion asked for.
+        Times count from this step. If the trajectory begins later than at 0 s, an additional
+        segment leads to it from the present motion. Positions are in the map frame: a UAV that is
+        elsewhere approaches at about 1 m/s in addition to the commanded motion.
         """
         self._refuse_wreck(i)
         motion = self._believed(i)
@@ -228,10 +232,11 @@ class FleetCommands:
         velocity: ArrayLike = (0.0, 0.0, 0.0),
         omega_body: ArrayLike = (0.0, 0.0, 0.0),
     ) -> None:
-        """Put the kinematic UAV `i` at a pose (m, map; (4,) map from body) with the next step.
+        """Sets the pose of the kinematic UAV `i` from the next step on.
 
-        velocity: (3,) m/s, map, and omega_body: (3,) rad/s, FLU, are what its sensors feel; it
-        stays there until the next command.
+        position: (3,) m, map; attitude: (4,), map from body. velocity: (3,) m/s, map, and
+        omega_body: (3,) rad/s, FLU, are the motion that its sensors measure. The pose holds until
+        the next command.
         """
         self._refuse_plants(i, "poses", RigidBody, IdentifiedModel)
         position = checked("position", position, (3,), MAX_COORDINATE)
@@ -245,40 +250,42 @@ class FleetCommands:
         control_state["rates"] = omega_body
 
     def take_off(self, i: int, altitude_m: float = 2.5) -> None:
-        """Let UAV `i`, landed, climb to `altitude_m` above its place and hold."""
+        """Starts the take-off of the landed UAV `i` to `altitude_m` above its position."""
         if not (math.isfinite(altitude_m) and 0.0 < altitude_m <= MAX_COORDINATE):
-            raise CommandError(f"take-off altitude = {altitude_m} m is not a height above ground")
+            raise CommandError(f"take-off altitude = {altitude_m} m must be a height above ground")
         self._refuse_wreck(i)
         if self.mode(i) is not FlightMode.LANDED:
-            raise CommandError(f"{self.names[i]} cannot take off: it flies ({self.mode(i).name})")
+            raise CommandError(
+                f"{self.names[i]} cannot take off: it is flying ({self.mode(i).name})"
+            )
         place = self._believed(i).position
         self._control_states["home"][i] = place
         control_state = self._enter_guided(i, FlightMode.TAKE_OFF, from_ground=True)
         control_state["position_target"] = place + np.array([0.0, 0.0, altitude_m])
 
     def hold(self, i: int) -> None:
-        """Let UAV `i` stop and stay where it comes to rest."""
+        """Stops UAV `i` and holds the position at which it comes to rest."""
         control_state = self._enter_guided(i, FlightMode.HOLD)
         control_state["braking"] = control_state["hurried"] = True
 
     def land(self, i: int) -> None:
-        """Let UAV `i` stop, descend straight down and stop its rotors on the ground."""
+        """Stops UAV `i`, lands it straight below and stops its rotors on the ground."""
         control_state = self._enter_guided(i, FlightMode.LAND)
         control_state["braking"] = True
         control_state["sink"] = 0.0
 
     def set_landing_speed(self, i: int, speed_m_s: float) -> None:
-        """Let the present landing of UAV `i` sink at a speed other than its airframe's own."""
+        """Sets the descent speed of the present landing of UAV `i`, instead of its airframe's."""
         if not (math.isfinite(speed_m_s) and speed_m_s > 0.0):
-            raise CommandError(f"landing speed = {speed_m_s} m/s is not above 0")
+            raise CommandError(f"landing speed = {speed_m_s} m/s must be above 0")
         if self.mode(i) is not FlightMode.LAND:
-            raise CommandError(f"{self.names[i]} does not land ({self.mode(i).name})")
+            raise CommandError(f"{self.names[i]} is not landing ({self.mode(i).name})")
         self._control_states["sink"][i] = speed_m_s
 
     def return_home(self, i: int, height_m: float = DEFAULT_RETURN_HEIGHT_M) -> None:
-        """Let UAV `i` fly back at least `height_m` above its home, and land there."""
+        """Returns UAV `i` to its home, at least `height_m` above it, and lands it there."""
         if not (math.isfinite(height_m) and 0.0 < height_m <= MAX_COORDINATE):
-            raise CommandError(f"return height = {height_m} m is not a height above home")
+            raise CommandError(f"return height = {height_m} m must be a height above home")
         control_state = self._enter_guided(i, FlightMode.RETURN)
         control_state["braking"] = True
         control_state["phase"] = 0
@@ -295,11 +302,12 @@ class FleetCommands:
         yaw: float | None = None,
         yaw_rate: float = 0.0,
     ) -> None:
-        """Accelerate UAV `i` by `acceleration` (3,) m/s^2, map, facing `yaw` rad (None: as it is).
+        """Sets the acceleration (3,) m/s^2, map, of UAV `i`, with heading `yaw` rad.
 
-        The thrust points along what gravity and acceleration need together, tilted no farther than
-        the airframe's limit; drag and wind are not made up for. It turns at `yaw_rate` rad/s
-        besides. Like attitudes it holds until the next command.
+        With `yaw` None the heading is unchanged; the UAV also turns at `yaw_rate` rad/s. The thrust
+        points along the sum that gravity and acceleration require, with a tilt up to the airframe's
+        limit; drag and wind are not compensated. Like an attitude, the setpoint holds until the
+        next command.
         """
         acceleration = checked("acceleration", acceleration, (3,), 1e3)
         angle = None if yaw is None else float(checked("yaw", yaw, (), 1e4))
@@ -321,7 +329,7 @@ class FleetCommands:
         control_state = self._enter_low_level(i, ControlLevel.ATTITUDE)
         up = np.array([-level[1], level[0], 0.0, math.hypot(*level, lift) + lift])
         facing = [0.0, 0.0, math.sin(0.5 * angle), math.cos(0.5 * angle)]
-        upright = bool(up.any())  # else it falls freely: any attitude will do, so this one
+        upright = bool(up.any())  # else free fall, at any attitude
         control_state["attitude"] = (
             rotations.multiply(rotations.normalize(up), facing) if upright else facing
         )
@@ -329,7 +337,7 @@ class FleetCommands:
         control_state["yaw_rate"] = rate
 
     def set_home(self, i: int, position: ArrayLike) -> None:
-        """Place (3,) m, map, to which UAV `i` returns; else that of its last take-off."""
+        """Sets the home (3,) m, map, of UAV `i`; by default its last take-off position."""
         self._control_states["home"][i] = checked("home", position, (3,), MAX_COORDINATE)
 
     # -------------------------------------------------------------------------------- inside
@@ -344,7 +352,7 @@ class FleetCommands:
         self._refuse_wreck(i)
         if isinstance(self.plants[i], plants):
             kind = type(self.plants[i]).__name__
-            raise CommandError(f"{self.names[i]} takes no {what}: its plant is a {kind}")
+            raise CommandError(f"{self.names[i]} does not accept {what}: its plant is a {kind}")
 
     def _checked_thrust(self, i: int, thrust: float) -> float:
         airframe = self.airframes[i]
@@ -353,22 +361,22 @@ class FleetCommands:
 
     def _wake(self, i: int) -> None:
         if self._bodies["on_ground"][i] or self._bodies["asleep"][i]:
-            self._bodies["last_contact_step"][i] = self.step  # it stands: no new touch
+            self._bodies["last_contact_step"][i] = self.step  # at rest: no new contact
         self._bodies["asleep"][i] = False
         self._bodies["still_steps"][i] = 0
         self._bodies["ground_budget"][i] = 0.0
         self._bodies["downwash_budget"][i] = 0.0
 
     def believed(self, rows: NDArray[np.int64]) -> tuple[EstimatedState, Array]:
-        """What the controllers of the UAVs `rows` take for their motion, a row each.
+        """Returns the motion of the UAVs `rows` (n,) that their controllers use, a row each.
 
-        And their body rates (n, 3) rad/s, FLU.
+        The second value are their body rates (n, 3) rad/s, FLU.
         """
         rates = self._bodies["omega_body"][rows] + self._uavs["belief"]["rate_error"][rows]
         return self._believed(rows), rates
 
     def _believed(self, i: int | NDArray[np.int64]) -> EstimatedState:
-        """What the controllers of UAV `i` take for its motion now."""
+        """Returns the present motion of UAV `i` that its controllers use."""
         body, belief = self._bodies[i], self._uavs["belief"][i]
         return EstimatedState(
             body["position_map"] + belief["position_error"],
@@ -386,7 +394,7 @@ class FleetCommands:
     def _enter_guided(self, i: int, mode: FlightMode, *, from_ground: bool = False) -> Any:
         self._refuse_wreck(i)
         if self.mode(i) is FlightMode.LANDED and not from_ground:
-            raise CommandError(f"{self.names[i]} stands on the ground; it must take off first")
+            raise CommandError(f"{self.names[i]} is on the ground; it must take off first")
         self._wake(i)
         control_state: Any = self._control_states[i]
         if control_state["level"] != ControlLevel.GUIDED:

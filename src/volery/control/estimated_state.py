@@ -1,8 +1,8 @@
-"""What controllers take for the motion of their UAV: the truth, or an estimate that errs.
+"""The motion that controllers use: ground truth, or an estimate with errors.
 
-An estimator speaks some 200 times a second, control runs at every step. What an estimate is off by
-changes slowly, so the error of the last estimate is held and added to the true motion: the estimate
-moves on between two readings as the integrated IMU of a real autopilot does.
+An estimator runs at about 200 Hz, control at every step. The error of an estimate changes slowly,
+so the last error is held and added to the true motion: between two estimates the state continues as
+with the integrated IMU of a real autopilot.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ BELIEF = np.dtype(
 
 
 class EstimatedState(NamedTuple):
-    """Position (3,) m, velocity (3,) m/s, attitude (4,) of one UAV, map."""
+    """Position (3,) m, velocity (3,) m/s, attitude (4,) of one UAV, map frame."""
 
     position: Array
     velocity: Array
@@ -41,7 +41,7 @@ class EstimatedState(NamedTuple):
 
 
 def new_beliefs(count: int) -> NDArray[np.void]:
-    """Beliefs (N,) of UAVs that know the truth."""
+    """Returns the estimated states (N,) of UAVs without estimation error."""
     rows = np.zeros(count, BELIEF)
     rows["rotation_error"][:, 3] = 1.0
     return rows
@@ -49,7 +49,7 @@ def new_beliefs(count: int) -> NDArray[np.void]:
 
 @inner_kernel
 def believed_rates(belief: Any, body: Any, errs: bool) -> tuple[float, float, float]:
-    """Body rates believed, rad/s; `errs` spares a look at `belief` where it is the truth."""
+    """Returns the estimated body rates, rad/s; `errs` false skips reading `belief`."""
     x, y, z = three(body.omega_body)
     if errs:
         ex, ey, ez = three(belief.rate_error)
@@ -59,7 +59,7 @@ def believed_rates(belief: Any, body: Any, errs: bool) -> tuple[float, float, fl
 
 @inner_kernel
 def believe_attitude(belief: Any, body: Any, errs: bool) -> None:
-    """Bring the believed attitude up to date."""
+    """Updates the estimated attitude."""
     x, y, z, w = four(body.attitude)
     if errs:
         ex, ey, ez, ew = four(belief.rotation_error)
@@ -70,7 +70,7 @@ def believe_attitude(belief: Any, body: Any, errs: bool) -> None:
 
 @inner_kernel
 def believe_place(belief: Any, body: Any) -> None:
-    """Bring the believed position and velocity up to date."""
+    """Updates the estimated position and velocity."""
     for k in range(3):
         belief.position_map[k] = body.position_map[k] + belief.position_error[k]
         belief.velocity_map[k] = body.velocity_map[k] + belief.velocity_error[k]

@@ -1,8 +1,8 @@
-"""A fleet of UAVs: give commands, advance time, read the state, collect what happened.
+"""A fleet of UAVs: accepts commands, advances time, holds the state and collects events.
 
-`Fleet` owns all state of plants and controllers as rows of arrays; the compiled step
-(`control.fused_step`) does the work. It knows the ground and the air; trees and other UAVs are the
-engine's business, which looks up clearances, fills the budgets and calls `strike`.
+`Fleet` owns all state of plants and controllers as rows of arrays, which the compiled step
+(`control.fused_step`) updates. The step handles ground and air; the engine handles trees and other
+UAVs: it computes clearances, fills the budgets and calls `strike`.
 """
 
 from __future__ import annotations
@@ -60,24 +60,25 @@ from volery.world.weather.wind_field import nodes_of
 Array = NDArray[np.float64]
 
 DEFAULT_TIMEOUT_S = 0.5
-"""s after which a velocity command without successor ends in HOLD."""
+"""Time after which a velocity command without successor ends in HOLD, s."""
 _MAX_STEP_NS = 5_000_000
 
 
 class Fleet(FleetCommands):
-    """N UAVs that fly in lock step.
+    """N UAVs that are simulated in lock step.
 
-    airframes: one a UAV. position_map: (N, 3) m. attitude: (N, 4) unit quaternions, map from body.
-    dt_ns: physics step. on_contact: what an impact does, "crash" (rotors stop, it falls and rests)
-    or "bounce" (it rebounds and flies on). mode: `HOLD` starts in the air with rotors turning,
-    `LANDED` on the ground with rotors stopped; one for all or one a UAV. names: for messages and,
-    with `seed`, the streams of what is random. control: how often its layers run. plants: what
-    turns commands into motion (`vehicle.plant_types`), one for all or one a UAV. weather: the air;
-    `set_weather` changes it. wear: of the rotors, one a rotor, for each UAV; an empty one means
-    new. battery_charge: shares from 0 to 1, one for all or one a UAV. copies: (N,) whole numbers;
-    UAVs of different copies of a scenario do not feel each other's air.
+    airframes: one per UAV. position_map: (N, 3) m. attitude: (N, 4) unit quaternions, map from
+    body. dt_ns: physics step. on_contact: effect of an impact, "crash" (rotors stop, the UAV falls
+    and rests) or "bounce" (the UAV rebounds and flies on). mode: `HOLD` starts in the air with
+    rotors turning, `LANDED` on the ground with rotors stopped; one for all or one per UAV. names:
+    for messages and, with `seed`, the random streams. control: rates of the control layers. plants:
+    models of motion (`vehicle.plant_types`), one for all or one per UAV. weather: the initial
+    weather; `set_weather` changes it. wear: of each rotor, for each UAV; empty means new.
+    battery_charge: fractions from 0 to 1, one for all or one per UAV. copies: (N,) integers; UAVs
+    of different copies of a scenario do not affect each other's air.
 
-    Rows are numbered from 0. After `advance` the state belongs to time `step * dt_ns`.
+    Rows are numbered from 0. After `advance` the state belongs to time `step * dt_ns`. Raises
+    `CommandError` for invalid arguments and `DataFileError` if `dt_ns` is too long for a vehicle.
     """
 
     def __init__(
@@ -140,21 +141,21 @@ class Fleet(FleetCommands):
 
     @property
     def dt_ns(self) -> int:
-        """Physics step."""
+        """Physics step, ns."""
         return self._dt_ns
 
     @property
     def guidance_period_ns(self) -> int:
-        """From one look at the air, which is at a guidance tick, to the next."""
+        """Period of updates of the air, a multiple of the guidance tick, ns."""
         return self._periods[2] * self._dt_ns
 
     @property
     def time_ns(self) -> int:
-        """Time since the start."""
+        """Time since the start, ns."""
         return self.step * self._dt_ns
 
     def rotor_turns(self) -> RotorTurns:
-        """Where the rotors are, for some milliseconds around now."""
+        """Returns rotor angles and speeds, valid for some milliseconds around the present."""
         ticks = -(-self.step // self._periods[0])  # angles are those of the end of the tick
         angle, speed = self.state.rotor_angle.copy(), self.state.rotor_speed.copy()
         return RotorTurns(angle, speed, ticks * self._periods[0] * self._dt_ns)
@@ -168,11 +169,10 @@ class Fleet(FleetCommands):
         *,
         event_ends: bool = False,
     ) -> int:
-        """Run up to `steps` physics steps; returns how many were done.
+        """Runs up to `steps` physics steps; returns the number done.
 
-        Fewer are done, all of them whole, when some UAV has used up its `contact_budget` or
-        `separation_budget`, or, with `event_ends`, when something happened. `advance(0, ...)`
-        compiles the step.
+        The number is smaller when a UAV has used up its `contact_budget` or `separation_budget`,
+        or, with `event_ends`, after an event. `advance(0, ...)` compiles the step.
         """
         if terrain is not self._grid or self._ground is None:
             self._ground = self._ground_of(terrain)
@@ -205,7 +205,7 @@ class Fleet(FleetCommands):
                 return done
 
     def drain_events(self) -> list[FleetEvent]:
-        """What happened since the last call, in order of step, then row."""
+        """Returns the events since the last call, in order of step, then row."""
         events, self._drained = self._drained, []
         return events
 
@@ -213,7 +213,7 @@ class Fleet(FleetCommands):
         self._grid = terrain
         self._bodies["ground_budget"] = 0.0
         return (
-            # a copy: numba is quicker to tell the type of an array that may be written
+            # a copy: numba determines the type of a writable array faster
             np.array(terrain.heights, dtype=np.float64, order="C"),
             float(terrain.origin_x),
             float(terrain.origin_y),
@@ -225,24 +225,25 @@ class Fleet(FleetCommands):
 
     @property
     def weather(self) -> Weather:
-        """The air around the UAVs."""
+        """Weather around the UAVs."""
         return self._weather
 
     def set_weather(self, weather: Weather) -> None:
-        """Let `weather` blow from the next guidance tick on (125 Hz)."""
+        """Sets the weather from the next guidance tick on (125 Hz)."""
         if weather.field is not self._weather.field:
             self._air_nodes = nodes_of(weather.field)
         self._air = air_of(weather)
         self._weather = weather
 
     def add_gust(self, gust: Gust) -> None:
-        """Let a gust blow besides."""
+        """Adds a gust to the weather."""
         self.set_weather(self._weather.with_gust(gust, s_from_ns(self.time_ns)))
 
     def set_rotor_health(self, i: int, rotor: int, factor: float) -> None:
-        """Let rotor number `rotor` of UAV `i` give `factor` of a new one's thrust from now on.
+        """Sets the thrust of rotor number `rotor` of UAV `i` to `factor` of a new one's.
 
-        From 0 to 1; 0 is a lost motor, which stops. Controllers are not told.
+        From 0 to 1; 0 is a failed motor, which stops. Controllers do not know the factor. Raises
+        `CommandError` for an unknown UAV or rotor, or a factor out of range.
         """
         if not 0 <= i < len(self):
             raise CommandError(f"there is no UAV {i}; rows 0 to {len(self) - 1} exist")
@@ -255,7 +256,7 @@ class Fleet(FleetCommands):
         self._bodies["ground_budget"][i] = 0.0
 
     def set_estimation_error(self, rows: Rows | slice, error: EstimationError) -> None:
-        """Let the controllers of the UAVs `rows` fly on estimates that are off by `error`."""
+        """Sets the estimation errors with which the controllers of the UAVs `rows` fly."""
         belief = self._uavs["belief"]
         belief["position_error"][rows] = error.position_map
         belief["velocity_error"][rows] = error.velocity_map
@@ -264,7 +265,7 @@ class Fleet(FleetCommands):
         self._control_states["errs"][rows] = True
 
     def displace(self, i: int, offset: ArrayLike) -> None:
-        """Put UAV `i` elsewhere at once, by `offset` (3,) m, map; its motion goes on there."""
+        """Shifts UAV `i` by `offset` (3,) m, map, at once; its motion is unchanged."""
         offset = checked("offset", offset, (3,), MAX_COORDINATE)
         self._bodies["position_map"][i] += offset
         self._bodies["contact_budget"][i] = 0.0
@@ -272,10 +273,10 @@ class Fleet(FleetCommands):
         self._wake(i)
 
     def put(self, i: int, position: ArrayLike, attitude: ArrayLike, *, in_air: bool = True) -> None:
-        """Put UAV `i` at a pose at once: (3,) m, map; (4,) map from body. Its motion goes on there.
+        """Sets the pose of UAV `i`: (3,) m, map; (4,) map from body. Its motion is unchanged.
 
-        If it flies it holds there; if it stood and this is `in_air`, its rotors turn and it hovers.
-        A wreck stays one.
+        A flying UAV then holds there; a landed one hovers if `in_air`. A crashed UAV remains
+        crashed.
         """
         position = checked("position", position, (3,), MAX_COORDINATE)
         attitude = checked_attitude(attitude)
@@ -288,9 +289,9 @@ class Fleet(FleetCommands):
             self._bodies["on_ground"][i] = False
 
     def push(self, i: int, velocity: ArrayLike, omega_body: ArrayLike) -> None:
-        """Let UAV `i` move at (3,) m/s, map, and turn at (3,) rad/s, FLU, at once.
+        """Sets the velocity (3,) m/s, map, and rates (3,) rad/s, FLU, of UAV `i`.
 
-        If it flies it brakes from there, and holds.
+        A flying UAV then brakes and holds.
         """
         velocity = checked("velocity", velocity, (3,), 100.0)
         omega_body = checked("rates", omega_body, (3,), 100.0)
@@ -301,7 +302,7 @@ class Fleet(FleetCommands):
     # ------------------------------------------------------------------------------ contacts
 
     def crash(self, i: int) -> None:
-        """Stop the rotors of UAV `i` for good."""
+        """Marks UAV `i` as crashed and stops its rotors for good."""
         self._bodies["crashed"][i] = True
         self._wake(i)
         control_state: Any = self._control_states[i]
@@ -321,10 +322,10 @@ class Fleet(FleetCommands):
         *,
         point_map: ArrayLike | None = None,
     ) -> float:
-        """Impulse on UAV `i` from something fixed that it touches; returns its size in N s.
+        """Applies the impulse of a contact with a fixed object to UAV `i`; returns its size, N s.
 
-        normal_map: (3,) unit vector out of what was touched. point_map: (3,) m, where; without it
-        the impulse goes through the centre of mass. Nothing happens when the two part already.
+        normal_map: (3,) unit vector out of the object. point_map: (3,) m, the contact; None: the
+        impulse acts at the centre of mass. The impulse is 0 if the two already separate.
         """
         return self._collide(i, None, normal_map, restitution, friction, point_map)
 
@@ -338,13 +339,16 @@ class Fleet(FleetCommands):
         *,
         point_map: ArrayLike | None = None,
     ) -> float:
-        """Equal and opposite impulses on UAVs `i` and `j`; normal_map (3,) points from j to i."""
+        """Applies opposite impulses to UAVs `i` and `j`; normal_map (3,) points from j to i.
+
+        Returns the size, N s; see `strike`.
+        """
         return self._collide(i, j, normal_map, restitution, friction, point_map)
 
     # ------------------------------------------------------------------------------ snapshot
 
     def get_state(self) -> dict[str, Any]:
-        """Copy of everything that changes: UAVs, history, step, weather, events not yet drained."""
+        """Returns copies of all variable state: UAVs, history, step, weather, pending events."""
         return {
             "uavs": self._uavs.copy(),
             "position": self.history.position.copy(),
@@ -357,7 +361,7 @@ class Fleet(FleetCommands):
         }
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a `get_state` of this fleet; views handed out before stay valid."""
+        """Restores a `get_state` of this fleet; existing views remain valid."""
         self._uavs[...] = state["uavs"]
         self.history.position[...] = state["position"]
         self.history.attitude[...] = state["attitude"]
@@ -368,7 +372,7 @@ class Fleet(FleetCommands):
         self._drained = list(state["events"])
 
     def seed_turbulence(self, seed: int, rows: NDArray[np.int64], names: Sequence[str]) -> None:
-        """Give the UAVs `rows` the turbulence of UAVs called `names` in a run of `seed`."""
+        """Gives the UAVs `rows` the turbulence of UAVs with `names` in a run with `seed`."""
         self._uavs["turbulence"]["key"][rows] = new_turbulence(seed, names)["key"]
 
     def restart(
@@ -377,11 +381,11 @@ class Fleet(FleetCommands):
         rows: NDArray[np.int64],
         start_rows: NDArray[np.int64] | None = None,
     ) -> None:
-        """Put the UAVs `rows` back to what they were in `start`, a state at step 0, as of now.
+        """Resets the UAVs `rows` (K,) to their state in `start`, a state at step 0.
 
-        A UAV's own time, which wind and time-outs go by, begins anew; it keeps its turbulence's
-        random stream. start_rows: theirs in `start`, None for the same. Models may be numbered
-        otherwise there.
+        A UAV's own time, which wind and timeouts use, restarts; the random stream of its turbulence
+        is unchanged. start_rows: (K,) rows in `start`, None for the same. Model numbers may differ
+        there.
         """
         start_rows = rows if start_rows is None else start_rows
         air_tick = self.step // self._periods[2]
@@ -395,9 +399,10 @@ class Fleet(FleetCommands):
             self._references[rows, :] = start["references"][start_rows, :1]
 
     def continue_from(self, other: Fleet, kept: Sequence[tuple[int, int]]) -> None:
-        """Go on where another fleet is, with UAVs of it and new ones; this one has not moved yet.
+        """Continues from another fleet, with UAVs of it and new ones.
 
-        kept: own row and the other's of each UAV that goes on; all others begin now.
+        This fleet must not have advanced yet. kept: own row and the other's of each UAV that
+        continues; all others start now.
         """
         start = self.get_state()
         self.step = other.step
@@ -407,7 +412,7 @@ class Fleet(FleetCommands):
         going_on = other._uavs[theirs].copy()
         going_on["model"] = self._uavs["model"][own]
         self._uavs[own] = going_on
-        self._bodies["downwash_budget"] = 0.0  # who may be over whom is looked up anew
+        self._bodies["downwash_budget"] = 0.0  # downwash pairs are searched again
         self.history.position[:, own] = other.history.position[:, theirs]
         self.history.attitude[:, own] = other.history.attitude[:, theirs]
         self._paths.continue_from(other._paths, kept)
@@ -417,7 +422,7 @@ class Fleet(FleetCommands):
     # -------------------------------------------------------------------------------- inside
 
     def _fit_out(self, worn: Sequence[tuple[RotorWear, ...]], charge: Array) -> None:
-        """Rotors as worn as they are, batteries as charged as they are."""
+        """Applies the wear of rotors and the charge of batteries."""
         for i, row in enumerate(self._uavs["model"]):
             plant = self._models["plant"][row]
             health = [rotor.thrust for rotor in worn[i]] or np.ones(int(plant["rotors"]))
@@ -426,7 +431,7 @@ class Fleet(FleetCommands):
             self._control_states["full_thrust"][i] = self.airframes[i].max_rotor_thrust
 
     def _begin(self, modes: Sequence[FlightMode]) -> None:
-        """Let UAVs be in their first modes where they are, which is their home."""
+        """Sets the first modes and the homes of the UAVs at their positions."""
         flying = np.array([mode is FlightMode.HOLD for mode in modes])
         weight = np.array([airframe.weight for airframe in self.airframes])
         attitude = self._bodies["attitude"]
@@ -437,7 +442,7 @@ class Fleet(FleetCommands):
             self._start_in_air(int(i))
 
     def _begin_anew(self, i: int, in_air: bool) -> None:
-        """Let the controllers of UAV `i` begin from its present motion."""
+        """Restarts the controllers of UAV `i` from its present motion."""
         self._wake(i)
         if self._bodies["crashed"][i]:
             return

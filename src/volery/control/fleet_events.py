@@ -1,4 +1,4 @@
-"""What happened to the UAVs of a fleet, as the compiled step noted it."""
+"""Events of a fleet's UAVs, recorded by the compiled step."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ class FleetEventKind(StrEnum):
     """Kinds of events."""
 
     TOUCH_DOWN = "touch_down"
-    """Touched the ground as a landing may."""
+    """Touched the ground within the limits of a landing."""
     IMPACT = "impact"
     """Touched the ground faster than the landing limit or tilted beyond 60 degrees."""
     MODE = "mode"
-    """Changed its flight mode by itself."""
+    """Changed its flight mode without a command."""
     BATTERY = "battery"
-    """Its battery fell to a lower level."""
+    """The battery level fell."""
 
 
 _KINDS = {
@@ -35,25 +35,25 @@ _KINDS = {
 
 @dataclass(frozen=True, slots=True)
 class FleetEvent:
-    """One happening."""
+    """One event."""
 
     kind: FleetEventKind
     step: int
-    """Physics step at whose end it happened."""
+    """Physics step at the end of which it happened."""
     uav: int
-    """Row."""
+    """Row of the UAV in the fleet."""
     position_map: tuple[float, float, float]
-    """m."""
+    """Position, m, map frame."""
     speed_m_s: float
-    """Of the centre of mass just before a touch; 0 for a change of mode."""
+    """Speed of the centre of mass just before a contact; 0 for a change of mode."""
     mode: FlightMode
-    """Mode after a change, mode in which a touch happened."""
+    """Mode after a change, or during a contact."""
     battery_level: BatteryLevel = BatteryLevel.NORMAL
-    """At the time."""
+    """Battery level at that time."""
 
 
 def event_of(row: Any) -> FleetEvent:
-    """An `EVENT` row."""
+    """Returns the event of an `EVENT` row."""
     x, y, z = row["position"].tolist()
     return FleetEvent(
         _KINDS[int(row["kind"])],

@@ -1,4 +1,4 @@
-"""The rows of a fleet: what it is told, checked, and its UAVs as they begin, or begin anew."""
+"""The rows of a fleet: validation of arguments, initial and reset states."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ Array = NDArray[np.float64]
 
 
 def one_each(value: ArrayLike, count: int) -> ArrayLike:
-    """One value a UAV, where one stands for all."""
+    """Returns one value per UAV, repeating a scalar `count` times."""
     return value if np.ndim(value) else np.full(count, value)
 
 
 def checked_modes(mode: FlightMode | Sequence[FlightMode], count: int) -> list[FlightMode]:
-    """One mode a UAV, HOLD or LANDED. CommandError for others."""
+    """Returns one mode per UAV; raises `CommandError` for others than HOLD and LANDED."""
     modes = [mode] * count if isinstance(mode, FlightMode) else list(mode)
     if len(modes) != count or not set(modes) <= {FlightMode.HOLD, FlightMode.LANDED}:
         raise CommandError("a UAV starts in HOLD or LANDED, one mode for all or one for each")
@@ -34,7 +34,7 @@ def checked_modes(mode: FlightMode | Sequence[FlightMode], count: int) -> list[F
 
 
 def checked_plants(plants: Plant | Sequence[Plant], count: int) -> tuple[Plant, ...]:
-    """One plant a UAV. CommandError where there are more or fewer."""
+    """Returns one plant per UAV; raises `CommandError` if their number is not `count`."""
     plants = tuple(plants) if isinstance(plants, Sequence) else (plants,) * count
     if len(plants) != count:
         raise CommandError(f"{counted(len(plants), 'plant')} for {counted(count, 'UAV')}")
@@ -49,10 +49,10 @@ def new_uavs(
     seed: int,
     names: Sequence[str],
 ) -> NDArray[np.void]:
-    """Rows (N,) of `step.UAV` that stand still at `position` (N, 3), `attitude` (N, 4).
+    """Returns rows (N,) of `fused_step.UAV` at rest at `position` (N, 3), `attitude` (N, 4).
 
-    They know the truth. model_rows: of each in the table of models. copies: (N,) or one for all.
-    seed and names: of the turbulence around them.
+    Their estimates have no error. model_rows: of each in the table of models. copies: (N,) or one
+    for all. seed and names: of the turbulence around them.
     """
     count = len(position)
     uavs = np.zeros(count, UAV)
@@ -66,9 +66,9 @@ def new_uavs(
 
 
 def begun_anew(start: NDArray[np.void], step: int, air_tick: int) -> NDArray[np.void]:
-    """Rows `start` (K,), which are of step 0, as if that had been `step`.
+    """Returns the rows `start` (K,) of step 0, with times shifted to `step`.
 
-    air_tick: number of the look at the air from which their turbulence begins.
+    air_tick: number of the air update at which their turbulence begins.
     """
     fresh = start.copy()
     fresh["turbulence"]["first_tick"] = air_tick

@@ -1,7 +1,7 @@
-"""Flight modes: what a UAV does on its own between two commands.
+"""Flight modes: autonomous behaviour between two commands.
 
-They run at guidance ticks inside the compiled step and count in steps, so that what happens does
-not depend on how a run is sliced. ROS services and MAVLink ask for the same modes.
+Modes run at guidance ticks inside the compiled step and count in steps, so that results do not
+depend on the slicing of a run. ROS services and MAVLink request the same modes.
 
     LANDED --take_off--> TAKE_OFF --arrived--> HOLD
     any flying mode --command--> GO_TO --arrived--> HOLD
@@ -34,28 +34,28 @@ from volery.vehicle.rotation_math import three
 
 
 class FlightMode(IntEnum):
-    """What a UAV is doing."""
+    """Flight mode of a UAV."""
 
     LANDED = 0
-    """Stands with its rotors stopped, waits for a take-off."""
+    """On the ground with its rotors stopped; waits for a take-off."""
     TAKE_OFF = 1
-    """Climbs straight up to a height over its starting place."""
+    """Climbs vertically to a height above its start position."""
     HOLD = 2
-    """Stops and stays where it is."""
+    """Stops and holds its position."""
     GO_TO = 3
     """Flies to a position and holds there."""
     VELOCITY = 4
-    """Follows velocity commands; holds when they cease."""
+    """Follows velocity commands; holds after a timeout."""
     LAND = 5
-    """Descends until the ground carries it, then stops its rotors."""
+    """Descends until the ground supports it, then stops its rotors."""
     RETURN = 6
-    """Climbs, flies to where it took off, lands there."""
+    """Climbs, flies to its home and lands there."""
     LOW_LEVEL = 7
-    """Follows rotor speeds, body rates or attitudes given from outside; has no time-out."""
+    """Follows external rotor speeds, body rates or attitudes; has no timeout."""
     CRASHED = 8
     """Hit something; rotors stopped for good."""
     TRAJECTORY = 9
-    """Follows a trajectory, or trajectory setpoints; holds when it is flown or when they cease."""
+    """Follows a trajectory or trajectory setpoints; holds at the end or after a timeout."""
 
 
 LANDED = int(FlightMode.LANDED)
@@ -75,18 +75,19 @@ _GUIDED = int(ControlLevel.GUIDED)
 _ARRIVED_M = 0.25
 _ARRIVED_M_S = 0.4
 _STOPPED_M_S = 0.3
-"""Speed below which braking ends and the place is locked."""
+"""Speed below which braking ends and the position is locked."""
 _RETURN_LOW_M = 3.0
 """Height above home at which a return becomes a landing."""
 _CARRIED_THRUST, _FALLING_THRUST = 0.7, 0.5
-"""Shares of the weight: with less thrust than the first a UAV that lands is carried by the ground,
-with less than the second it would fall."""
+"""Fractions of the weight: with less thrust than the first, the ground supports a landing UAV; with
+less than the second it would fall in the air."""
 _GROUND_THRUST = 0.8
-"""Share of the weight: less thrust than this without sinking means that the ground carries ..."""
+"""Fraction of the weight: less thrust than this without descent means that the ground supports ...
+"""
 _GROUND_M_S = 0.15
 _GROUND_S, _SURE, _LIKELY = 0.3, 10, 3
-"""... when it lasts so long. Thrust with which it would fall counts three tenths of that, whatever
-the estimate of its speed."""
+"""... the UAV if it lasts this long. Thrust with which it would fall counts three tenths of that,
+whatever the estimate of its speed."""
 
 CLIMBING, CROSSING, DESCENDING = 0, 1, 2
 
@@ -122,9 +123,9 @@ def guide(control_state: Any, estimate: Any, gains: Any, paths: Any, step: int, 
 def plan(
     control_state: Any, estimate: Any, gains: Any, paths: Any, step: int, dt: float
 ) -> tuple[float, float, float]:
-    """Change modes and choose how the reference moves; the acceleration to feed forward.
+    """Changes modes and chooses the motion of the reference; returns the feedforward acceleration.
 
-    The reference is that of this tick already.
+    The reference already belongs to this tick.
     """
     _end_what_ended(control_state, estimate, gains, paths, step, dt)
     if control_state.mode == TRAJECTORY:
@@ -164,7 +165,7 @@ def plan(
 def _end_what_ended(
     control_state: Any, estimate: Any, gains: Any, paths: Any, step: int, dt: float
 ) -> None:
-    """Time-outs, trajectories that are flown, places that are reached."""
+    """Ends modes by timeouts, completed trajectories and reached positions."""
     following = control_state.mode == TRAJECTORY and control_state.path_last >= 0
     if following:
         if path_is_flown(control_state, paths, step, dt):
@@ -174,7 +175,7 @@ def _end_what_ended(
         control_state.braking = True
     if control_state.mode in (VELOCITY, TRAJECTORY):
         return
-    if control_state.turning:  # stop where it looks
+    if control_state.turning:  # stop at the present heading
         control_state.turning = False
         control_state.heading_target[0], control_state.heading_target[1] = (
             control_state.heading[0],
@@ -190,7 +191,7 @@ def _end_what_ended(
 
 @inner_kernel
 def wanted_velocity(control_state: Any, estimate: Any, gains: Any) -> tuple[float, float, float]:
-    """The velocity commanded (m/s, map), within the airframe's limits."""
+    """Returns the commanded velocity (m/s, map), within the airframe's limits."""
     tx, ty, tz = three(control_state.velocity_target)
     if control_state.velocity_in_heading:
         c, s = heading_of(estimate)
@@ -204,7 +205,7 @@ def wanted_velocity(control_state: Any, estimate: Any, gains: Any) -> tuple[floa
 
 @inner_kernel
 def _lock_place(control_state: Any, estimate: Any, gains: Any) -> None:
-    """Hold the place at which it will come to rest."""
+    """Sets the position target to the point at which the UAV will come to rest."""
     control_state.braking = False
     for k in range(3):
         way = estimate.velocity_map[k] / gains.ease
@@ -215,7 +216,7 @@ def _lock_place(control_state: Any, estimate: Any, gains: Any) -> None:
 
 @inner_kernel
 def _change_mode(control_state: Any, estimate: Any) -> None:
-    """End what has arrived: TAKE_OFF and GO_TO hold, RETURN goes on to its next phase."""
+    """Ends completed modes: TAKE_OFF and GO_TO hold, RETURN enters its next phase."""
     dx = control_state.position_target[0] - estimate.position_map[0]
     dy = control_state.position_target[1] - estimate.position_map[1]
     dz = control_state.position_target[2] - estimate.position_map[2]
@@ -243,10 +244,10 @@ def _change_mode(control_state: Any, estimate: Any) -> None:
 
 @inner_kernel
 def _settle(control_state: Any, gains: Any) -> None:
-    """Stay level while the ground carries it.
+    """Levels the UAV while the ground supports it.
 
-    The shock of the touch-down leaves estimates of the speed off by a metre a second, and who leans
-    against that tips over.
+    The shock of the touch-down causes errors of a metre per second in the estimated velocity, and a
+    UAV that tilts against them tips over.
     """
     if control_state.thrust < _CARRIED_THRUST * gains.weight:
         half = 0.5 * math.atan2(control_state.heading[1], control_state.heading[0])
@@ -256,7 +257,7 @@ def _settle(control_state: Any, gains: Any) -> None:
 
 @inner_kernel
 def _feel_ground(control_state: Any, gains: Any, vz: float) -> None:
-    """Stop the rotors once the ground has carried part of the weight for a while."""
+    """Stops the rotors once the ground has supported part of the weight for a while."""
     carried = control_state.thrust < _GROUND_THRUST * gains.weight and abs(vz) < _GROUND_M_S
     if carried:
         control_state.calm_ticks += _SURE
@@ -271,7 +272,7 @@ def _feel_ground(control_state: Any, gains: Any, vz: float) -> None:
 
 @inner_kernel
 def stop(control_state: Any) -> None:
-    """Rotors off, controllers at rest."""
+    """Stops the rotors and resets the controllers."""
     control_state.level = _STOPPED
     control_state.thrust = 0.0
     control_state.yaw_rate = 0.0

@@ -49,16 +49,16 @@ UAV = np.dtype(
     ],
     align=True,
 )
-"""One UAV: its plant, the row of its model, the copy of the scenario that it flies in (UAVs of
-different copies never meet), its control, what that knows of its motion, the turbulence around it.
-What every step touches lies together in the middle: the order matters to the cache."""
+"""One UAV: its plant, the row of its model, the copy of the scenario (UAVs of different copies
+never meet), its control, its estimated state, the turbulence around it. Fields of every step are
+adjacent in the middle: the order matters to the cache."""
 MODEL = np.dtype(
     [
         ("plant", PLANT),
         ("gains", GAINS),
         ("identified", IDENTIFIED),
         ("kinematic", KINEMATIC),
-        ("kind", "i8"),  # vehicle.plants: RIGID_BODY, IDENTIFIED_LOOPS, KINEMATIC_MOTION
+        ("kind", "i8"),  # vehicle.plant_types: RIGID_BODY, IDENTIFIED_LOOPS, KINEMATIC_MOTION
     ],
     align=True,
 )
@@ -76,11 +76,11 @@ EVENT = np.dtype(
     ],
     align=True,
 )
-"""One happening; `kind` is `TOUCH_DOWN`, `IMPACT`, `MODE_CHANGE` or `BATTERY_FELL`."""
+"""One event; `kind` is `TOUCH_DOWN`, `IMPACT`, `MODE_CHANGE` or `BATTERY_FELL`."""
 MODE_CHANGE = 3
 BATTERY_FELL = 4
 EVENTS_A_STEP = 4
-"""At most, of one UAV."""
+"""Maximum number of events of one UAV in a step."""
 _REACH_M = 0.1
 
 
@@ -110,19 +110,18 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
     bounce: bool,
     event_ends: bool,
 ) -> tuple[int, int, bool]:
-    """Move all UAVs on by up to `steps` steps of `dt` s, from step number `step`.
+    """Advances all UAVs by up to `steps` steps of `dt` s, from step number `step`.
 
-    paths: segments of trajectories, see `control.trajectory_kernels`. references: None where all
-    plants are rigid bodies: the other plants are then not compiled at all. Else (N, L, 6), commands
-    of the last L steps where identified plants have dead times, or of any size. jets: room for the
-    search of neighbours (`new_jets`).
+    paths: segments of trajectories, see `control.trajectory_kernels`. references: None if all
+    plants are rigid bodies: the other plants are then not compiled at all. Otherwise (N, L, 6),
+    commands of the last L steps where identified plants have dead times, or of any size. jets:
+    memory for the search of neighbours (`new_jets`).
 
-    A UAV that was told to stop is guided out of turn, with the first of the steps.
-
-    Ends early after a step in which a budget ran out, the events' buffer grew full or, with
-    `event_ends`, anything was noted. The air around the UAVs is looked up each `air_steps`, a
-    multiple of `guidance_steps`. Returns the steps done, the events written, and whether a
-    budget ran out.
+    A UAV with a new stop command is guided in the first step, without waiting for a tick. The call
+    ends early after a step in which a budget ran out, the event buffer grew full or, with
+    `event_ends`, an event occurred. The air around the UAVs is updated every `air_steps`, a
+    multiple of `guidance_steps`. Returns the steps done, the events written, and whether a budget
+    ran out.
     """
     grid = TerrainGrid(heights, origin_x, origin_y, spacing)
     scratch = np.empty(SCRATCH_SHAPE)
@@ -131,15 +130,15 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
     written = 0
     spent = False
     calm = False  # whether nothing can happen before the next guidance tick
-    look = True  # whether someone may meet the jet of another since the last look
+    look = True  # whether a UAV may have met another's jet since the last search
     done = 0
     room = events.shape[0] - EVENTS_A_STEP * count
     while done < steps and not spent and written <= (0 if event_ends else room):
         guiding = step % guidance_steps == 0
         draining = step % (guidance_steps * BATTERY_TICKS) == 0
         to_tick = guidance_steps - step % guidance_steps
-        # One step for all, or, where nobody needs the others, all steps to the tick for each in
-        # turn, while his data are in the nearest cache.
+        # One step for all, or, where UAVs are independent, all steps to the tick for each in turn,
+        # while its data are in the nearest cache.
         together = min(to_tick, steps - done) if calm and not guiding else 1
         airing = step % air_steps == 0
         if airing and look:
@@ -252,10 +251,10 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
 
 @inner_kernel
 def _is_far(body: Any, seconds: float) -> bool:
-    """Whether a UAV can reach nothing, neither ground nor solid nor other UAV, within `seconds`.
+    """Returns whether ground, solids and other UAVs are out of range for `seconds`.
 
-    Twice its way at the present speed and `_REACH_M` are surely more than it flies: in the 8 ms of
-    a guidance tick it would need 3,000 m/s^2 to go farther.
+    Twice the distance at the present speed plus `_REACH_M` is a safe bound: to exceed it in the 8
+    ms of a guidance tick a UAV would need 3,000 m/s^2.
     """
     vx, vy, vz = three(body.velocity_map)
     way = 2.0 * (abs(vx) + abs(vy) + abs(vz)) * seconds + _REACH_M

@@ -1,8 +1,8 @@
 """Gains of the control layers, derived from an airframe.
 
 The rotors' lag bounds everything: the rate loop gets 0.4 / lag (a damping near 0.8), and each layer
-above a third or so of the bandwidth of the layer below. An airframe file may override each
-bandwidth. Torques are angular accelerations times inertia, so gains need no unit of the vehicle.
+above about a third of the bandwidth of the layer below. An airframe file may override each
+bandwidth. Torques are angular accelerations times inertia, so gains do not contain the inertia.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from volery.vehicle.airframe import (
 from volery.vehicle.drag import drag_acceleration, hover_rotor_drags
 
 _AIR_PERIOD_S = 0.008
-"""Least time between two looks at the air; eddies and jets that matter to a vehicle last longer."""
+"""Minimum time between updates of the air; eddies and jets that affect a vehicle last longer."""
 _THRUST_RESERVE = 0.9
-"""Share of the full thrust that guidance may ask for; the rest steers."""
+"""Fraction of the full thrust that guidance may use; the rest is for attitude control."""
 _LEAST_THRUST = 0.15
-"""Share of the weight that guidance keeps, so that attitude stays in hand."""
+"""Minimum thrust of guidance as a fraction of the weight, which preserves attitude control."""
 _LEAST_INTEGRAL, _MOST_INTEGRAL = 0.5, 0.8
-"""Bounds of what the integrals may ask for, in g. Flying 2 m below its like an F450 needs 0.4 g; a
-vehicle with much drag needs more in wind."""
+"""Bounds of the integrals, in g. Flying 2 m below a similar UAV an F450 needs 0.4 g; a vehicle with
+much drag needs more in wind."""
 _IDLE_SPEED = 0.1
-"""Idle speed of a rotor, share of its hover speed."""
+"""Idle speed of a rotor, as a fraction of its hover speed."""
 
 GAINS = np.dtype(
     [
@@ -94,28 +94,28 @@ GAINS = np.dtype(
     ],
     align=True,
 )
-"""One airframe's control as kernels read it: SI, FLU."""
+"""Control parameters of one airframe, for kernels: SI, FLU."""
 
 
 @dataclass(frozen=True)
 class ControlRates:
-    """How often the layers run, Hz, in whole physics steps; rates are held at every step."""
+    """Rates of the layers, Hz, in whole physics steps; rates are controlled at every step."""
 
     guidance_hz: float = 125.0
-    """Flight modes, trajectories, the outer loop."""
+    """Rate of flight modes, trajectories and the outer loop."""
     attitude_hz: float = 250.0
 
     def guidance_steps(self, dt: float) -> int:
-        """Physics steps of `dt` s from one guidance tick to the next."""
+        """Returns the physics steps of `dt` s between guidance ticks."""
         return max(1, round(1.0 / (self.guidance_hz * dt)))
 
     def air_steps(self, dt: float) -> int:
-        """Physics steps from one look at the air around to the next: guidance ticks, some 8 ms."""
+        """Returns the physics steps between updates of the air: guidance ticks, about 8 ms."""
         steps = self.guidance_steps(dt)
         return steps * max(1, round(_AIR_PERIOD_S / (steps * dt)))
 
     def attitude_steps(self, dt: float) -> int:
-        """Physics steps of `dt` s from one attitude tick to the next."""
+        """Returns the physics steps of `dt` s between attitude ticks."""
         return max(1, round(1.0 / (self.attitude_hz * dt)))
 
 
@@ -125,7 +125,7 @@ STANDARD_RATES = ControlRates()
 def gains_of(  # noqa: PLR0915
     airframe: Airframe, dt: float, control: ControlRates = STANDARD_RATES
 ) -> NDArray[np.void]:
-    """The (1,) `GAINS` row of an airframe stepped by `dt` s."""
+    """Returns the (1,) `GAINS` row of an airframe stepped by `dt` s."""
     row = np.zeros(1, GAINS)
     rotors, limits, wish = airframe.rotors, airframe.limits, airframe.control
     count = len(rotors.places)
@@ -167,7 +167,7 @@ def gains_of(  # noqa: PLR0915
     drags = hover_rotor_drags(airframe)
     row["drag"] = drags.sum() / airframe.body.mass_kg
     row["rate_drag"] = _rate_drag(airframe, drags) / inertia
-    # a steady wind as fast as the vehicle flies must be answered
+    # compensates for a steady wind as fast as the vehicle flies
     wind = drag_acceleration(airframe, limits.speed_m_s)
     row["integral_limit"] = min(max(_LEAST_INTEGRAL * GRAVITY, wind), _MOST_INTEGRAL * GRAVITY)
     row["position"] = position
@@ -204,7 +204,7 @@ def gains_of(  # noqa: PLR0915
 
 
 def _rate_drag(airframe: Airframe, drags: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Torque (3,) against each body axis per rad/s about it, from the rotors' in-plane drag."""
+    """Returns the torque (3,) about each body axis per rad/s, from the rotors' in-plane drag."""
     torque = np.zeros(3)
     for place, drag in zip(airframe.rotors.places, drags, strict=True):
         arm, axis = np.array(place.position_m), np.array(place.axis)
@@ -215,7 +215,7 @@ def _rate_drag(airframe: Airframe, drags: NDArray[np.float64]) -> NDArray[np.flo
 
 
 def _authority(airframe: Airframe) -> NDArray[np.float64]:
-    """Torque (3,) about each axis that is left to the rotors in hover, N m."""
+    """Returns the torque (3,) about each axis available to the rotors in hover, N m."""
     trim, allocation = hover_thrusts(airframe), np.abs(allocation_matrix(airframe)[:, 1:])
     room = np.minimum(trim, airframe.max_rotor_thrust - trim)
     return np.asarray((room[:, None] / np.maximum(allocation, 1e-12)).min(axis=0))

@@ -1,4 +1,4 @@
-"""The heading setpoint: where the x axis shall point, seen from above."""
+"""The heading setpoint: direction of the x axis, seen from above."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from volery.vehicle.rotation_math import four
 
 @inner_kernel
 def heading_of(estimate: Any) -> tuple[float, float]:
-    """Cosine and sine of the present heading; (0, 0) where the x axis points straight up."""
+    """Returns cosine and sine of the present heading; (0, 0) if the x axis is vertical."""
     x, y, z, w = four(estimate.attitude)
     c, s = 1.0 - 2.0 * (y * y + z * z), 2.0 * (w * z + x * y)
     n = math.sqrt(c * c + s * s)
@@ -22,7 +22,7 @@ def heading_of(estimate: Any) -> tuple[float, float]:
 
 @inner_kernel
 def turn_heading(control_state: Any, estimate: Any, gains: Any, rate: float) -> None:
-    """Move the heading setpoint by its rate, or towards its target; set the rate fed forward.
+    """Moves the heading setpoint by its rate, or towards its target; sets the feedforward rate.
 
     rate: rad/s at which the target itself turns.
     """
@@ -40,7 +40,7 @@ def turn_heading(control_state: Any, estimate: Any, gains: Any, rate: float) -> 
         if c * gc + s * gs < 0.0:
             step = math.copysign(1.0, step)
         step = min(max(gains.tick * (gains.yaw * step + rate), -most), most)
-    # a turn by the small angle `step`, up to step^3 / 6, kept to unit length by a Newton step
+    # a turn by the small angle `step`, up to step^3 / 6, normalised by a Newton step
     turn = 1.0 - 0.5 * step * step
     c, s = c * turn - s * step, s * turn + c * step
     n = 1.5 - 0.5 * (c * c + s * s)

@@ -1,8 +1,8 @@
 """Identification: fits the identified plant to flights of the rigid body.
 
-The rigid body flies steps, doublets and chirps of one input at a time; the loops' numbers are those
-with the least squares of the difference. How good they are is told on other flights, in which all
-inputs move at once (`validate`). Needs scipy: the extra `volery[identify]`.
+The rigid body flies steps, doublets and chirps of one input at a time; the loops' parameters
+minimise the squared difference. Other flights, in which all inputs move at once, measure the error
+(`validate`). Needs scipy: the extra `volery[identify]`.
 """
 
 from __future__ import annotations
@@ -40,7 +40,10 @@ _MOST_DEAD_TIME_S = 0.1
 
 
 def identify(airframe: Airframe, order: Literal[1, 2] = 2) -> IdentifiedModel:
-    """The model of an airframe's closed loops; roll and pitch of first or second order."""
+    """Identifies the closed loops of an airframe; roll and pitch of first or second order.
+
+    Raises `VoleryError` if scipy is not installed.
+    """
     optimize = _scipy("optimize")
     flights = [chirps_of_attitude(airframe, axis) for axis in range(3)]
     tilts = flights[:2]
@@ -88,7 +91,7 @@ def identify(airframe: Airframe, order: Literal[1, 2] = 2) -> IdentifiedModel:
 
 
 def validate(model: IdentifiedModel, airframe: Airframe) -> FitError:
-    """Root mean square differences from the rigid body on flights that no fit has seen."""
+    """Returns root mean square differences from the rigid body on flights not used for the fit."""
     truth = everything_at_once(airframe, RigidBody())
     shown = everything_at_once(airframe, model)
     tilt = np.hypot(*(shown.angles - truth.angles)[:, :2].T)
@@ -101,7 +104,7 @@ def validate(model: IdentifiedModel, airframe: Airframe) -> FitError:
 
 
 def to_toml(model: IdentifiedModel) -> str:
-    """The model as the text of a data file."""
+    """Returns the model as the text of a data file."""
     order = " --order 1" if model.roll.kind == "first_order" else ""
     lines = [
         f"# Closed loops of the airframe '{model.name}' from wanted to true attitude and thrust.",
@@ -121,7 +124,7 @@ def to_toml(model: IdentifiedModel) -> str:
 
 
 def _fit_heave(optimize: Any, airframe: Airframe) -> tuple[Heave, float]:
-    """Lag, gain and dead time of the thrust, and the drag (1/s) along the body's z."""
+    """Fits lag, gain and dead time of the thrust, and the drag (1/s) along the body's z."""
     flight = chirps_of_thrust(airframe)
     per_mass = flight.thrust / airframe.body.mass_kg
 
@@ -140,19 +143,19 @@ def _fit_heave(optimize: Any, airframe: Airframe) -> tuple[Heave, float]:
 
 
 def _fit_drag(airframe: Airframe) -> Array:
-    """Drag (2,) 1/s along the body's x and y, from forces felt and velocities in cruise."""
+    """Fits the drag (2,) 1/s along body x and y to specific forces and velocities in cruise."""
     force, velocity = cruises(airframe)
     return np.asarray(-(force * velocity).sum(axis=0) / (velocity**2).sum(axis=0))[:2]
 
 
 def _answer(loop: FirstOrder | SecondOrder, dead_time: float, wanted: Array) -> Array:
-    """What a loop makes of an input (K,), held from sample to sample, beginning at rest."""
+    """Returns the response of a loop, at rest at first, to an input (K,) held between samples."""
     lfilter = _scipy("signal").lfilter
 
     whole = int(dead_time / SAMPLE_S)
     part = dead_time / SAMPLE_S - whole
     late = np.concatenate([np.zeros(whole + 1), wanted])[: len(wanted) + 1]
-    # late[k] is the input of the sample before the one that the whole steps lead back to
+    # late[k] is the input one sample before that of the whole delay
     delayed = (1.0 - part) * late[1:] + part * late[:-1]
     a, b, c, d = transition(loop, SAMPLE_S)
     # (angle to go, rate) move on by [[a, b], [c, d]]; as a filter from input to angle
@@ -194,7 +197,7 @@ def _shown(value: Any) -> str:
 
 
 def _scipy(part: str) -> Any:
-    """A module of scipy. `VoleryError` where it is not installed."""
+    """Returns a module of scipy; raises `VoleryError` if scipy is not installed."""
     try:
         return import_module(f"scipy.{part}")
     except ImportError:

@@ -1,4 +1,4 @@
-"""The flights from which a vehicle is identified, and those on which the result is checked."""
+"""The flights used for identification and for validation."""
 
 from __future__ import annotations
 
@@ -18,30 +18,30 @@ from volery.world.terrain import Terrain
 Array = NDArray[np.float64]
 
 SAMPLE_S = 0.002
-"""s between two samples; two physics steps."""
+"""Time between two samples, s; two physics steps."""
 _COMMAND_SAMPLES = 4
 """Samples between two commands: those of a guidance tick."""
 _AIR = Terrain.flat(1e5, -1e4, (-5e4, -5e4)).grid
 _TILT, _TURN = math.radians(6.0), math.radians(8.0)
-"""Amplitudes of the inputs: small enough that no limit is met."""
+"""Amplitudes of the inputs: small enough to stay within all limits."""
 
 _CLIMB_FEEDBACK = 0.15
-"""Share of the weight per m/s of climb that is taken off the thrust: rotors lose thrust with the
-speed along their axis, up or down, so that a steady thrust would end in a fall."""
+"""Fraction of the weight per m/s of climb that is subtracted from the thrust: rotors lose thrust
+with the speed along their axis, up or down, so that a constant thrust would end in a fall."""
 
 Inputs = Callable[[float], tuple[float, float, float, float]]
-"""Roll, pitch, yaw (rad) and thrust (share of the weight) at a time (s)."""
+"""Returns roll, pitch, yaw (rad) and thrust (fraction of the weight) at a time (s)."""
 
 
 class IdentificationFlight(NamedTuple):
-    """What was wanted and what came of it, K samples."""
+    """Setpoints and motion, K samples."""
 
     wanted: Array
-    """(K, 3) roll, pitch, yaw, rad: held from each sample to the next."""
+    """(K, 3) setpoints of roll, pitch, yaw, rad: held between samples."""
     thrust: Array
-    """(K,) N, wanted."""
+    """(K,) setpoints of the thrust, N."""
     angles: Array
-    """(K, 3) rad, at the samples."""
+    """(K, 3) roll, pitch, yaw, rad, at the samples."""
     velocity: Array
     """(K, 3) m/s, map."""
     acceleration: Array
@@ -49,7 +49,7 @@ class IdentificationFlight(NamedTuple):
 
 
 def chirps_of_attitude(airframe: Airframe, axis: int) -> IdentificationFlight:
-    """Doublets, then a chirp, about one axis: 0 roll, 1 pitch, 2 yaw."""
+    """Flies doublets, then a chirp, about one axis: 0 roll, 1 pitch, 2 yaw."""
     amplitude, fastest = (_TURN, 1.5) if axis == 2 else (_TILT, 3.0)
 
     def inputs(t: float) -> tuple[float, float, float, float]:
@@ -61,14 +61,14 @@ def chirps_of_attitude(airframe: Airframe, axis: int) -> IdentificationFlight:
 
 
 def chirps_of_thrust(airframe: Airframe) -> IdentificationFlight:
-    """Doublets and a chirp of the thrust, a tenth of the weight up and down."""
+    """Flies doublets and a chirp of the thrust, a tenth of the weight up and down."""
     return _fly(
         airframe, RigidBody(), lambda t: (0.0, 0.0, 0.0, 1.0 + 0.1 * _test_signal(t, 4.0)), 16.0
     )
 
 
 def everything_at_once(airframe: Airframe, plant: Plant) -> IdentificationFlight:
-    """Another flight: sums of sines about all axes and along the thrust, and steps on top."""
+    """Flies sums of sines about all axes and along the thrust, with steps added."""
 
     def inputs(t: float) -> tuple[float, float, float, float]:
         roll = 0.10 * math.sin(2.3 * t) + 0.06 * math.sin(7.1 * t) + (0.08 if t % 3 > 2 else 0.0)
@@ -81,7 +81,7 @@ def everything_at_once(airframe: Airframe, plant: Plant) -> IdentificationFlight
 
 
 def cruises(airframe: Airframe) -> tuple[Array, Array]:
-    """Force per mass felt and velocity, both (K, 3) along the body's axes, at several speeds."""
+    """Returns specific force and velocity in cruise, (K, 3) each, body axes, several speeds."""
     top = 0.6 * airframe.limits.speed_m_s
     ways = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (0.7, 0.7)]
     speeds = (0.25 * top, 0.5 * top, top)
@@ -101,7 +101,7 @@ def cruises(airframe: Airframe) -> tuple[Array, Array]:
 
 
 def velocity_errors(airframe: Airframe, plant: Plant) -> Array:
-    """Differences (K,) m/s between the velocities of the rigid body and of `plant`, guided."""
+    """Returns velocity differences (K,) m/s of the rigid body and `plant` in guided flight."""
     pair = [_fleet(airframe, each) for each in (RigidBody(), plant)]
     errors = []
     for velocity in ((2, 0, 0), (0, 3, 1), (-2, -2, -0.5), (0, 0, 0)):
@@ -117,7 +117,7 @@ def velocity_errors(airframe: Airframe, plant: Plant) -> Array:
 
 
 def _test_signal(t: float, fastest_hz: float) -> float:
-    """Doublets of 1 s and of 0.5 s, then a chirp from 0.2 Hz up, within +-1."""
+    """Returns doublets of 1 s and of 0.5 s, then a chirp from 0.2 Hz up, within +-1."""
     if t < 0.5:
         return 0.0
     if t < 2.5:

@@ -1,4 +1,4 @@
-"""Impulses between UAVs and what they touch, trees and each other."""
+"""Contact impulses between UAVs, and between UAVs and obstacles."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ def collide(
     friction: float,
     point_map: ArrayLike | None,
 ) -> float:
-    """Change the motion of UAV `i`, and of `j` where it is one, by an impulse; its size in N s.
+    """Applies a contact impulse to UAV `i`, and to `j` unless None; returns its size, N s.
 
-    normal_map: (3,) unit vector into `i`, out of `j` or of what stands fixed. point_map: (3,) m,
-    where they touch; without it the impulse goes through the centres of mass. Friction is
-    Coulomb's. Nothing happens, and 0 is returned, when the two part already.
+    normal_map: (3,) unit vector into `i`, out of `j` or the fixed object. point_map: (3,) m, the
+    contact; None: the impulse acts at the centres of mass. Friction is Coulomb's. The impulse is 0
+    if the two already separate.
     """
     normal = checked("normal", normal_map, (3,), 1.1)
     normal = normal / norm(normal)

@@ -1,4 +1,4 @@
-"""How a kinematic UAV flies its modes: it is where its reference is."""
+"""Flight modes of kinematic UAVs, which follow their reference exactly."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def fly_kinematic(
     guiding: bool,
     dt: float,
 ) -> int:
-    """One step of a kinematic UAV, control and motion; what its ground contact is, if any.
+    """Computes control and motion of a kinematic UAV for one step; returns its ground contact.
 
     model: a `KINEMATIC` row. guiding: whether this step begins with a guidance tick.
     """
@@ -79,7 +79,7 @@ def fly_kinematic(
 
 @inner_kernel
 def _rest(body: Any, plant: Any) -> None:
-    """Stay where it is, to be computed again when it is commanded."""
+    """Stops the UAV and puts it to sleep until the next command."""
     for k in range(3):
         body.velocity_map[k] = body.omega_body[k] = 0.0
         body.acceleration_map[k] = body.angular_acceleration_body[k] = 0.0
@@ -102,7 +102,7 @@ def _take_pose(body: Any, control_state: Any, dt: float) -> None:
 
 @inner_kernel
 def _follow_velocity(body: Any, control_state: Any, model: Any, gains: Any, dt: float) -> None:
-    """The velocity commanded, at once or with a lag; the reference goes along."""
+    """Follows the commanded velocity, at once or with a lag, and moves the reference along."""
     if model.limited:
         tx, ty, tz = wanted_velocity(control_state, body, gains)
     else:
@@ -132,7 +132,7 @@ def _follow_velocity(body: Any, control_state: Any, model: Any, gains: Any, dt: 
 
 @inner_kernel
 def _follow_trajectory(body: Any, control_state: Any, paths: Any, step: int, dt: float) -> None:
-    """Where the trajectory, or the setpoint that moves on by itself, is at the step's end."""
+    """Moves the UAV to the trajectory or the moving setpoint at the step's end."""
     t = path_time(control_state, step + 1, dt)
     if control_state.path_last < 0:
         p, v, a = (

@@ -1,11 +1,12 @@
-"""From thrust and angular acceleration to rotor speeds; what gives way at the rotors' limits.
+"""Mixer: rotor speeds from thrust and angular acceleration, with priorities at the rotors' limits.
 
-Thrusts are `allocation_matrix` times (thrust, torques); the gains' `by_thrust` and so on hold it
-with the inertia multiplied in. Where that leaves a rotor's range, the vehicle keeps its attitude
-first: roll and pitch are scaled only where they alone exceed the range, thrust then moves to where
-roll and pitch fit, and yaw gets what room is left.
-A battery that sags leaves the rotors less: the mixer shares out `control_state.full_thrust`, as an
-autopilot does whose outputs are shares of the present full throttle.
+Thrusts are `allocation_matrix` times (thrust, torques); the gains' `by_thrust` and so on contain it
+multiplied by the inertia. Where a thrust leaves a rotor's range, attitude has priority: roll and
+pitch are scaled only where they alone exceed the range, then thrust is moved to where roll and
+pitch fit, and yaw uses the rest.
+
+A low battery reduces the rotors' thrust: the mixer distributes `control_state.full_thrust`, like an
+autopilot with outputs relative to the present full throttle.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from volery.vehicle.compiled import inner_kernel
 
 @inner_kernel
 def mix(gains: Any, thrust: float, ax: float, ay: float, az: float, control_state: Any) -> None:
-    """Rotor speeds into `control_state.rotor_reference`, rad/s.
+    """Writes rotor speeds to `control_state.rotor_reference`, rad/s.
 
     thrust: N. (ax, ay, az): angular acceleration by the rotors' torque, rad/s^2, FLU.
     """
@@ -31,7 +32,7 @@ def mix(gains: Any, thrust: float, ax: float, ay: float, az: float, control_stat
             + lanes_at(gains.by_pitch, first) * ay
             + lanes_at(gains.by_yaw, first) * az
         )
-        # where a thrust is below zero it is done again below
+        # thrusts below zero are recomputed below
         speed = roots(magnitudes(f) * gains.inverse_thrust_constant)
         put_lanes(control_state.rotor_reference, first, speed)
         beyond |= any_outside(f, lanes_at(gains.least_thrusts, first), control_state.full_thrust)
@@ -42,9 +43,9 @@ def mix(gains: Any, thrust: float, ax: float, ay: float, az: float, control_stat
 
 @inner_kernel
 def _share(gains: Any, thrust: float, ax: float, ay: float, az: float, control_state: Any) -> None:
-    """Like `mix` where a rotor's range is exceeded."""
+    """Mixes where a rotor's range is exceeded; see `mix`."""
     low, high = gains.idle_thrust, control_state.full_thrust
-    # the largest share of roll and pitch for which some collective thrust keeps all rotors in range
+    # the largest fraction of roll and pitch at which a collective thrust keeps all rotors in range
     share = 1.0
     for a in range(gains.rotors):
         for b in range(gains.rotors):

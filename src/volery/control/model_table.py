@@ -1,4 +1,4 @@
-"""The table of the distinct models of a fleet, as the compiled step reads it."""
+"""The table of a fleet's distinct models, for the compiled step."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ def model_table(
     dt: float,
     control: ControlRates,
 ) -> tuple[NDArray[np.void], list[int]]:
-    """Distinct airframes, plants and wears as `MODEL` rows, and each UAV's row.
+    """Returns distinct airframes, plants and wears as `MODEL` rows, and each UAV's row.
 
-    Gains are those of the new vehicle: controllers know nothing of wear. Raises `DataFileError`
-    where a vehicle's motion cannot be computed with steps of `dt` s.
+    Gains are those of the new vehicle: controllers do not know the wear. Raises `DataFileError` if
+    a vehicle's motion cannot be computed with steps of `dt` s.
     """
     numbers: dict[tuple[str, Plant, tuple[RotorWear, ...]], int] = {}
     distinct: list[tuple[Airframe, Plant, tuple[RotorWear, ...]]] = []
@@ -63,7 +63,10 @@ def checked_wear(
     airframes: Sequence[Airframe],
     wear: Sequence[Sequence[RotorWear]] | None,
 ) -> list[tuple[RotorWear, ...]]:
-    """Wear of each UAV's rotors, an empty one where all are new. CommandError if it fits none."""
+    """Returns the wear of each UAV's rotors, empty if all are new.
+
+    Raises `CommandError` if the numbers of UAVs or rotors do not match.
+    """
     worn = [tuple(one) for one in wear or [()] * len(airframes)]
     if len(worn) != len(airframes):
         raise CommandError(f"wear is given for {counted(len(worn), 'UAV')}, not {len(airframes)}")
@@ -77,9 +80,10 @@ def checked_wear(
 
 
 def new_references(models: NDArray[np.void], attitude: Array, thrust: Array) -> Array:
-    """Past commands (N, L, 6) of UAVs that have held `attitude` (N, 4) with `thrust` (N,) N.
+    """Returns past commands (N, L, 6) of UAVs at rest.
 
-    As long as the longest dead time needs; of no UAV where no plant has any.
+    They have held `attitude` (N, 4), map from body, with `thrust` (N,) N. L follows from the
+    longest dead time; (1, 1, 6) if no plant has any.
     """
     identified = models["kind"] == IDENTIFIED_LOOPS
     if not identified.any():
@@ -92,9 +96,9 @@ def new_references(models: NDArray[np.void], attitude: Array, thrust: Array) -> 
 
 
 def copy_references(past: Array, references: Array, rows: NDArray[np.int64], step: int) -> None:
-    """Write commands (K, L, 6) of UAVs up to `step` into `rows` (K,) of another ring's (N, M, 6).
+    """Writes commands (K, L, 6) of UAVs up to `step` to `rows` (K,) of another ring (N, M, 6).
 
-    What the other ring could hold but `past` did not is the oldest that is known.
+    Commands older than those in `past` repeat the oldest known one.
     """
     length, room = past.shape[1], references.shape[1]
     for ago in range(room):

@@ -1,13 +1,13 @@
-"""The outer loop, run at guidance ticks: a reference becomes attitude and thrust.
+"""The outer loop, run at guidance ticks: attitude and thrust from a reference.
 
-Where places count, the law is robust and perfect tracking (`control.rpt`); where only velocities
-do, it is the same law without its share of the position. What the airframe's rotors drag at hover
-speed is fed forward with the acceleration (M. Faessler et al., arXiv 1712.02402). Height has
-priority: where thrust or tilt are at their limits the horizontal acceleration gives way. Integrals
-are accelerations that answer what pushes steadily: they stop where they would push further into a
-limit, are bounded, and pass from one law to the other as they are. Farther than its leash from the
-reference's place a vehicle shall come back at a steady speed: there the integrals learn from what
-is missing to that speed, since the distance would wind them up.
+Where positions count, the law is robust and perfect tracking (`control.rpt`); where only velocities
+count, the same law without its position term. The airframe's rotor drag at hover speed is fed
+forward with the acceleration (M. Faessler et al., arXiv 1712.02402). Height has priority: at the
+limits of thrust or tilt the horizontal acceleration is reduced. Integrals are accelerations that
+compensate for steady disturbances: they stop where they would push further into a limit, are
+bounded, and pass unchanged from one law to the other. A vehicle farther than its leash from the
+reference's position returns at a steady speed: there the integrals use the velocity error, since
+the distance would wind them up.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from volery.vehicle.compiled import inner_kernel
 from volery.vehicle.rotation_math import four, three
 
 _FAR = 0.999
-"""Share of the leash from which a reference counts as at its end."""
+"""Fraction of the leash beyond which a reference counts as at its end."""
 
 
 @inner_kernel
@@ -34,10 +34,10 @@ def track(
     fy: float,
     fz: float,
 ) -> None:
-    """Attitude and thrust setpoints that keep the vehicle at its reference.
+    """Computes attitude and thrust setpoints that track the reference.
 
-    level_placed, height_placed: whether places count, horizontally and vertically. (fx, fy, fz):
-    acceleration fed forward, m/s^2, map.
+    level_placed, height_placed: whether positions count, horizontally and vertically. (fx, fy, fz):
+    feedforward acceleration, m/s^2, map.
     """
     ex, ey, ez = _velocity_error(control_state, estimate)
     ix, iy, iz = three(control_state.velocity_integral)
@@ -101,7 +101,7 @@ def _velocity_error(control_state: Any, estimate: Any) -> tuple[float, float, fl
 
 @inner_kernel
 def _level_error(control_state: Any, estimate: Any, gains: Any) -> tuple[float, float, bool]:
-    """Way (m) to the reference's place, no longer than the leash; whether it is at its end."""
+    """Returns the vector (m) to the reference, limited by the leash; whether it is at its end."""
     ex = control_state.position[0] - estimate.position_map[0]
     ey = control_state.position[1] - estimate.position_map[1]
     square = ex * ex + ey * ey
@@ -114,7 +114,7 @@ def _level_error(control_state: Any, estimate: Any, gains: Any) -> tuple[float, 
 
 @inner_kernel
 def _height_error(control_state: Any, estimate: Any, gains: Any) -> tuple[float, bool]:
-    """Like `_level_error`, upwards."""
+    """Returns the vertical error, as `_level_error`."""
     ez = control_state.position[2] - estimate.position_map[2]
     limit = gains.height_leash
     return min(max(ez, -limit), limit), abs(ez) > _FAR * limit
@@ -124,10 +124,10 @@ def _height_error(control_state: Any, estimate: Any, gains: Any) -> tuple[float,
 def _point_thrust(
     control_state: Any, estimate: Any, gains: Any, ax: float, ay: float, az: float
 ) -> None:
-    """Attitude whose z axis lies along (ax, ay, az), az > 0, with the heading setpoint; thrust."""
+    """Computes thrust and attitude: z axis (ax, ay, az), az > 0, and the heading setpoint."""
     k = 1.0 / math.sqrt(ax * ax + ay * ay + az * az)
     zx, zy, zz = ax * k, ay * k, az * k
-    # shortest turn that takes the map's z to (zx, zy, zz)
+    # shortest rotation from the map's z to (zx, zy, zz)
     k = 1.0 / math.sqrt(2.0 * (1.0 + zz))
     px, py, pw = -zy * k, zx * k, (1.0 + zz) * k
     # turn about z after which the x axis, seen from above, points along the heading
@@ -148,7 +148,7 @@ def _point_thrust(
     control_state.attitude[1] = py * hw - px * hz
     control_state.attitude[2] = pw * hz
     control_state.attitude[3] = pw * hw
-    # thrust: the part of the wanted acceleration that the present thrust axis can give
+    # thrust: the component of the desired acceleration along the present thrust axis
     qx, qy, qz, qw = four(estimate.attitude)
     along = (
         ax * 2.0 * (qx * qz + qy * qw)

@@ -35,9 +35,9 @@ def fly_otherwise(
     guiding: bool,
     dt: float,
 ) -> int:
-    """Control and motion of an identified or kinematic plant; how it touched the ground.
+    """Computes control and motion of an identified or kinematic plant; returns its ground contact.
 
-    model: a `step.MODEL` row. references, i, now: see `vehicle.identified`.
+    model: a `fused_step.MODEL` row. references, i, now: see `vehicle.identified`.
     """
     plant, gains = model.plant, model.gains
     if model.kind == KINEMATIC_MOTION:

@@ -24,7 +24,7 @@ _ATTITUDE = int(ControlLevel.ATTITUDE)
 
 @inner_kernel
 def hold_rates(control_state: Any, ox: float, oy: float, oz: float, gains: Any, dt: float) -> None:
-    """Rotor speeds from the rates setpoint and thrust of a `CONTROL_STATE`; (ox, oy, oz): rad/s."""
+    """Computes rotor speeds from rates setpoint and thrust; (ox, oy, oz): body rates, rad/s."""
     if control_state.level <= _ROTORS:
         most = 0.0 if control_state.level == _STOPPED else _full_speed(control_state, gains)
         for r in range(gains.rotors):
@@ -39,7 +39,7 @@ def hold_rates(control_state: Any, ox: float, oy: float, oz: float, gains: Any, 
 
 @inner_kernel
 def _full_speed(control_state: Any, gains: Any) -> float:
-    """Speed of a rotor that gives all it can, rad/s."""
+    """Returns the speed of a rotor at full thrust, rad/s."""
     return math.sqrt(control_state.full_thrust * gains.inverse_thrust_constant)
 
 
@@ -62,7 +62,7 @@ def _angular_acceleration(
 
 @inner_kernel
 def hold_attitude(control_state: Any, estimate: Any, gains: Any) -> None:
-    """Body rates of a `CONTROL_STATE` that turn the present attitude into the wanted one.
+    """Computes body rates that turn the present attitude into the setpoint.
 
     estimate: a record with `attitude`.
     """
@@ -84,7 +84,7 @@ def hold_attitude(control_state: Any, estimate: Any, gains: Any) -> None:
         turn = k * gains.yaw * ez
         if ew < 0.0:
             turn = -turn
-    else:  # upside down: any way round is as short
+    else:  # upside down: all directions are equally short
         px, py, turn = 2.0 * gains.attitude, 0.0, 0.0
     limit = gains.rate_limit
     size = px * px + py * py
@@ -92,7 +92,7 @@ def hold_attitude(control_state: Any, estimate: Any, gains: Any) -> None:
         k = limit / math.sqrt(size)
         px *= k
         py *= k
-    # the commanded turn is about the map's z: its share about the body's axes
+    # the commanded turn is about the map's z: its components about the body's axes
     up_x, up_y = 2.0 * (x * z - y * w), 2.0 * (y * z + x * w)
     up_z = 1.0 - 2.0 * (x * x + y * y)
     limit = gains.yaw_rate_limit

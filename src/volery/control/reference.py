@@ -1,10 +1,10 @@
-"""The reference that the outer loop tracks: a place, a velocity and an acceleration that agree.
+"""The reference of the outer loop: consistent position, velocity and acceleration.
 
-At each guidance tick the reference moves on by the acceleration chosen at the last one, then a new
-acceleration is chosen. Towards a place it follows a braking profile (proportional near the goal,
-the square root of the distance farther out); acceleration and its change are limited, so that the
-vehicle can follow. A vehicle that is held back keeps its reference on a leash: it lies no farther
-ahead than where the position's share of the law asks for the whole acceleration.
+At each guidance tick the reference advances by the acceleration of the last one, then a new
+acceleration is chosen. Towards a position it follows a braking profile (proportional near the goal,
+the square root of the distance farther out); acceleration and jerk are limited, so that the vehicle
+can follow. A leash limits the distance of the reference from a vehicle that is held back: to that
+at which the position term of the law requires the whole acceleration.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from volery.vehicle.compiled import inner_kernel
 
 @inner_kernel
 def move_on(control_state: Any, gains: Any) -> None:
-    """Take the reference of a `CONTROL_STATE` from the last guidance tick to this one."""
+    """Advances the reference of a `CONTROL_STATE` from the last guidance tick to this one."""
     tick = gains.tick
     for k in range(3):
         change = tick * control_state.acceleration[k]
@@ -29,10 +29,10 @@ def move_on(control_state: Any, gains: Any) -> None:
 def approach(
     distance: float, gain: float, brake: float, linear: float, limit: float
 ) -> tuple[float, float]:
-    """Speed (m/s) towards a goal `distance` m away, and how it changes with the distance (1/s).
+    """Returns the speed (m/s) at `distance` m from a goal, and its derivative by distance (1/s).
 
-    From it `brake` (m/s^2) still stops; within `linear` = brake / gain^2 of the goal it is
-    proportional.
+    `brake` (m/s^2) stops from that speed; within `linear` = brake / gain^2 of the goal the speed is
+    proportional to the distance.
     """
     if distance <= linear:
         speed, slope = gain * distance, gain
@@ -44,7 +44,7 @@ def approach(
 
 @inner_kernel
 def lead_level(control_state: Any, estimate: Any, gains: Any, speed: float) -> None:
-    """Choose the horizontal acceleration that leads to `position_target` at up to `speed` m/s."""
+    """Chooses the horizontal acceleration to reach `position_target` at up to `speed` m/s."""
     dx = control_state.position[0] - estimate.position_map[0]
     dy = control_state.position[1] - estimate.position_map[1]
     square = dx * dx + dy * dy
@@ -62,7 +62,7 @@ def lead_level(control_state: Any, estimate: Any, gains: Any, speed: float) -> N
         inverse = 1.0 / distance
         nx, ny = inverse * dx, inverse * dy
         along = nx * vx + ny * vy
-        # how the wanted velocity changes on the way, and what is missing to it
+        # the change of the desired velocity along the path, and the error to it
         turn = inverse * wanted
         ahead = (turn - slope) * along
         ax += (gains.ease * wanted + ahead) * nx - turn * vx
@@ -74,7 +74,7 @@ def lead_level(control_state: Any, estimate: Any, gains: Any, speed: float) -> N
 def lead_height(
     control_state: Any, estimate: Any, gains: Any, climb: float, descent: float
 ) -> None:
-    """Choose the vertical acceleration that leads to `position_target`, limits in m/s."""
+    """Chooses the vertical acceleration to reach `position_target`, limits in m/s."""
     ahead = control_state.position[2] - estimate.position_map[2]
     ahead = min(max(ahead, -gains.height_leash), gains.height_leash)
     control_state.position[2] = estimate.position_map[2] + ahead
@@ -90,9 +90,9 @@ def lead_height(
 
 @inner_kernel
 def steer_level(control_state: Any, estimate: Any, gains: Any, tx: float, ty: float) -> None:
-    """Choose the horizontal acceleration that brings the velocity to (tx, ty) m/s.
+    """Chooses the horizontal acceleration to reach the velocity (tx, ty) m/s.
 
-    The reference's place is the vehicle's own: places do not count.
+    The position of the reference is the vehicle's own: positions do not count.
     """
     rate = gains.inverse_tick
     ax, ay = rate * (tx - control_state.velocity[0]), rate * (ty - control_state.velocity[1])
@@ -103,7 +103,7 @@ def steer_level(control_state: Any, estimate: Any, gains: Any, tx: float, ty: fl
 
 @inner_kernel
 def steer_height(control_state: Any, estimate: Any, gains: Any, tz: float) -> None:
-    """Like `steer_level`, for the vertical velocity tz."""
+    """Chooses the vertical acceleration for velocity tz, as `steer_level`."""
     _choose_height(
         control_state, gains, gains.inverse_tick * (tz - control_state.velocity[2]), math.inf
     )
@@ -112,7 +112,7 @@ def steer_height(control_state: Any, estimate: Any, gains: Any, tz: float) -> No
 
 @inner_kernel
 def brake_level(control_state: Any, estimate: Any, gains: Any) -> None:
-    """Choose the horizontal acceleration that ends in rest, gently; places do not count."""
+    """Chooses the horizontal acceleration of gentle braking to rest; positions do not count."""
     ax, ay = -gains.ease * control_state.velocity[0], -gains.ease * control_state.velocity[1]
     _choose_level(control_state, gains, ax, ay, gains.acceleration * gains.ease * gains.tick)
     control_state.position[0] = estimate.position_map[0]
@@ -121,7 +121,7 @@ def brake_level(control_state: Any, estimate: Any, gains: Any) -> None:
 
 @inner_kernel
 def brake_height(control_state: Any, estimate: Any, gains: Any) -> None:
-    """Like `brake_level`, vertically."""
+    """Brakes vertically, as `brake_level`."""
     az = -gains.ease * control_state.velocity[2]
     _choose_height(control_state, gains, az, gains.climb_acceleration * gains.ease * gains.tick)
     control_state.position[2] = estimate.position_map[2]

@@ -1,11 +1,11 @@
-"""Robust and perfect tracking: the gains of the outer loop from where its poles shall lie.
+"""Robust and perfect tracking: gains of the outer loop from its poles.
 
-For each axis the vehicle is seen as p'' = a. With a reference (p_r, v_r, a_r) the law
+For each axis the model of the vehicle is p'' = a. With a reference (p_r, v_r, a_r) the law
 
     a = a_r + Fv (v_r - v) + Fp (p_r - p) + Fi integral(p_r - p)
 
 gives the closed loop (e^2 s^2 + 2 zeta wn e s + wn^2)(e s + ki) / e^3: poles of natural frequency
-wn / e and damping zeta, and one at -ki / e for what pushes steadily. The smaller e, the tighter the
+wn / e and damping zeta, and one at -ki / e for steady disturbances. The smaller e, the tighter the
 tracking; the bandwidth of the loop below bounds it (G. Cai, B. M. Chen, T. H. Lee, "Unmanned
 Rotorcraft Systems", 2011). `outer_loop.track` is the law itself, with its limits.
 """
@@ -17,15 +17,15 @@ from typing import NamedTuple
 from volery.vehicle.airframe import TrackingPoles
 
 _SHARE_OF_ATTITUDE = 0.25
-"""wn / e of the horizontal axes, share of the attitude loop's bandwidth: a third to a fifth is the
-rule."""
+"""wn / e of the horizontal axes, fraction of the attitude loop's bandwidth: a third to a fifth is
+the rule."""
 _SHARE_OF_RATE = 0.14
-"""wn / e of height, share of the rate loop's bandwidth. Modelling choice: the rotors alone would
-allow more, but thrust acts through the attitude, and noise of the estimate acts through it."""
+"""wn / e of height, fraction of the rate loop's bandwidth. Modelling choice: the rotors alone would
+allow more, but thrust acts through the attitude, and so does noise of the estimate."""
 _DAMPING = 0.9
-"""Modelling choice; the loop below takes part of it away."""
+"""Damping zeta (modelling choice); the loop below reduces it."""
 _INTEGRAL_SHARE = 0.25
-"""ki, share of wn (modelling choice): what pushes steadily is learnt four times slower."""
+"""ki, fraction of wn (modelling choice): steady disturbances are compensated four times slower."""
 
 
 class TrackingGains(NamedTuple):
@@ -40,7 +40,7 @@ class TrackingGains(NamedTuple):
 
 
 def tracking_gains(wn: float, zeta: float, ki: float, epsilon: float) -> TrackingGains:
-    """Gains that put the poles of p'' = a where the formula above says; ki = 0: no integral."""
+    """Returns gains for the poles of p'' = a by the formula above; ki = 0: no integral."""
     return TrackingGains(
         (wn * wn + 2.0 * zeta * wn * ki) / epsilon**2,
         (2.0 * zeta * wn + ki) / epsilon,
@@ -49,12 +49,12 @@ def tracking_gains(wn: float, zeta: float, ki: float, epsilon: float) -> Trackin
 
 
 def level_gains(wish: TrackingPoles, attitude: float) -> TrackingGains:
-    """Gains of both horizontal axes over an attitude loop of bandwidth `attitude` rad/s."""
+    """Returns gains of both horizontal axes over an attitude loop of bandwidth `attitude` rad/s."""
     return _gains(wish, _SHARE_OF_ATTITUDE * attitude)
 
 
 def height_gains(wish: TrackingPoles, rate: float) -> TrackingGains:
-    """Gains of the vertical axis over a rate loop of bandwidth `rate` rad/s."""
+    """Returns gains of the vertical axis over a rate loop of bandwidth `rate` rad/s."""
     return _gains(wish, _SHARE_OF_RATE * rate)
 
 

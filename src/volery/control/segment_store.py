@@ -1,4 +1,4 @@
-"""The segments of all trajectories that are being flown, in one array for the fused step."""
+"""The segments of all active trajectories, in one array for the fused step."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ _LEAST_ROWS = 64
 
 
 class SegmentStore:
-    """Blocks of rows; control_states (N,) of `setpoints.CONTROL_STATE` know which block is theirs.
+    """Stores trajectories as blocks of rows.
 
-    A block is free as soon as its control_state flies something else. Room is made by moving the
-    blocks together, and doubled where they fill more than half of it.
+    control_states (N,) of `setpoints.CONTROL_STATE` refer to their blocks. A block is free as soon
+    as its control_state leaves the trajectory. Compaction makes space; the array doubles when
+    blocks fill more than half of it.
     """
 
     def __init__(self, control_states: NDArray[np.void]) -> None:
@@ -29,7 +30,7 @@ class SegmentStore:
         self.rows: Array = np.zeros((_LEAST_ROWS, SEGMENT_COLUMNS))
 
     def put(self, i: int, segments: Array) -> None:
-        """Store the trajectory of control_state `i` in place of what it had."""
+        """Stores the trajectory `segments` (S, SEGMENT_COLUMNS) of control_state `i`."""
         control_state: Any = self._control_states[i]
         control_state["path_last"] = -1
         if self._used + len(segments) > len(self.rows):
@@ -41,7 +42,7 @@ class SegmentStore:
         control_state["path_last"] = self._used - 1
 
     def continue_from(self, other: SegmentStore, kept: Sequence[tuple[int, int]]) -> None:
-        """Store what control_states of another store fly: for each pair, own row and the other's.
+        """Copies active trajectories of another store: own row and the other's for each pair.
 
         The control_states' records have been copied already.
         """
@@ -58,11 +59,11 @@ class SegmentStore:
                 )
 
     def get_state(self) -> Array:
-        """What a snapshot keeps."""
+        """Returns a copy of the used rows."""
         return self.rows[: self._used].copy()
 
     def set_state(self, state: Array) -> None:
-        """Go back to a `get_state`; the control_states' rows are theirs to bring back."""
+        """Restores a `get_state`; the caller restores the control_states."""
         self._used = len(state)
         self.rows = np.zeros((max(_LEAST_ROWS, len(state)), SEGMENT_COLUMNS))
         self.rows[: self._used] = state

@@ -1,7 +1,7 @@
-"""What the controllers are told: one record a UAV, from flight mode down to rotor speeds.
+"""Setpoints of the controllers: one record per UAV, from flight mode down to rotor speeds.
 
-Each layer reads its setpoint and writes that of the layer below. A command enters at the layer it
-is meant for; `ControlLevel` says which one, and layers above it are silent.
+Each layer reads its setpoint and writes that of the layer below. A command enters at its own layer,
+which `ControlLevel` names; the layers above are inactive.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from volery.vehicle.airframe import MAX_ROTORS
 Array = NDArray[np.float64]
 
 MAX_COORDINATE = 1e6
-"""m; no position farther from the map's origin is accepted."""
+"""Maximum distance of positions from the map's origin, m."""
 
 
 class ControlLevel(IntEnum):
-    """The layer at which a UAV is commanded."""
+    """The layer at which a UAV receives commands."""
 
     STOPPED = 0
-    """Rotors stand still."""
+    """Rotors are stopped."""
     ROTORS = 1
     """Speeds of the rotors."""
     RATES = 2
@@ -36,29 +36,29 @@ class ControlLevel(IntEnum):
     GUIDED = 4
     """Velocity, position, trajectory or a flight mode."""
     POSE = 5
-    """Pose of a kinematic UAV, moved from outside."""
+    """Pose of a kinematic UAV, set externally."""
 
 
 CONTROL_STATE = np.dtype(
     [
-        # what every step reads or writes, close together for the cache
+        # fields of every step, adjacent for the cache
         ("mode", "i8"),  # flight_modes.FlightMode
         ("level", "i8"),  # ControlLevel
         ("velocity_in_heading", "?"),  # velocity_target turns with the vehicle's heading
-        ("braking", "?"),  # HOLD and LAND: stop first, then lock the place
+        ("braking", "?"),  # HOLD and LAND: stop first, then lock the position
         ("turning", "?"),  # heading follows yaw_rate_target instead of heading_target
-        ("saturated", "?"),  # the rotors could not give the torque wanted last
+        ("saturated", "?"),  # the rotors could not provide the last torque
         ("path_faces", "?"),  # the trajectory has headings
-        ("errs", "?"),  # controllers fly on an estimate, see control.belief
-        ("hurried", "?"),  # told to stop: guided with the next step, not with the next tick
+        ("errs", "?"),  # controllers use an estimate, see control.estimated_state
+        ("hurried", "?"),  # stop command: guided with the next step instead of the next tick
         ("spare", "u1", 1),  # no hidden padding: equal states are equal bytes
         ("thrust", "f8"),  # N along the body's z
         ("yaw_rate", "f8"),  # rad/s, fed forward to the rates
-        ("full_thrust", "f8"),  # N: the most that one rotor gives at the battery's present voltage
+        ("full_thrust", "f8"),  # N: maximum of one rotor at the battery's present voltage
         ("rates", "f8", 3),  # rad/s, FLU
         ("rate_integral", "f8", 3),  # rad/s^2
         ("rotor_reference", "f8", MAX_ROTORS),  # rad/s
-        # what guidance and attitude keep
+        # state of guidance and attitude
         ("phase", "i8"),  # of a flight mode that has several
         ("calm_ticks", "i8"),  # guidance ticks for which a condition of the mode has held
         ("deadline_step", "i8"),  # a velocity or trajectory setpoint holds until this step
@@ -67,7 +67,7 @@ CONTROL_STATE = np.dtype(
         ("path_first", "i8"),  # rows of the trajectory's segments; of none: 0, -1
         ("path_last", "i8"),
         ("path_row", "i8"),  # the segment flown now
-        ("home", "f8", 3),  # m, map: where the last take-off began
+        ("home", "f8", 3),  # m, map: start of the last take-off
         ("return_height", "f8"),  # m, map
         ("sink", "f8"),  # m/s at which LAND descends; 0: the airframe's own speed
         ("position_target", "f8", 3),  # m, map
@@ -77,19 +77,19 @@ CONTROL_STATE = np.dtype(
         ("yaw_rate_target", "f8"),  # rad/s
         ("heading", "f8", 2),  # setpoint moving towards its target, cosine and sine
         ("position", "f8", 3),  # m, map: reference of the outer loop, moving towards its target
-        ("velocity", "f8", 3),  # m/s, map: likewise
-        ("acceleration", "f8", 3),  # m/s^2, map: likewise
-        ("velocity_integral", "f8", 3),  # m/s^2, map: answers what pushes steadily
+        ("velocity", "f8", 3),  # m/s, map: of the reference
+        ("acceleration", "f8", 3),  # m/s^2, map: of the reference
+        ("velocity_integral", "f8", 3),  # m/s^2, map: against steady disturbances
         ("attitude", "f8", 4),  # map from body
         ("rotor_target", "f8", MAX_ROTORS),  # rad/s, where speeds are commanded
     ],
     align=True,
 )
-"""Commands, setpoints and controller states of one UAV; what every step needs lies together."""
+"""Commands, setpoints and controller states of one UAV; fields of every step are adjacent."""
 
 
 def new_control_states(attitude: Array) -> NDArray[np.void]:
-    """Control states (N,) of UAVs that stand still with `attitude` (N, 4)."""
+    """Returns control states (N,) of UAVs at rest with `attitude` (N, 4)."""
     control_states = np.zeros(len(attitude), CONTROL_STATE)
     control_states["path_last"] = -1
     control_states["attitude"] = attitude
@@ -102,7 +102,7 @@ def new_control_states(attitude: Array) -> NDArray[np.void]:
 
 
 def checked(what: str, value: ArrayLike, shape: tuple[int, ...], limit: float) -> Array:
-    """`value` as finite floats of `shape` within +-`limit`, or a CommandError that says why not."""
+    """Returns `value` as finite floats of `shape` within +-`limit`, or raises `CommandError`."""
     try:
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
@@ -117,10 +117,10 @@ def checked(what: str, value: ArrayLike, shape: tuple[int, ...], limit: float) -
 
 
 def checked_within(what: str, value: ArrayLike, shape: tuple[int, ...], high: float) -> Array:
-    """Like `checked`, for numbers from 0 to `high`."""
+    """Returns numbers from 0 to `high`, checked as by `checked`."""
     if isinstance(value, np.ndarray) and value.dtype == np.float64 and value.shape == shape:
         low, top = value.min(initial=0.0), value.max(initial=0.0)
-        if low >= 0.0 and top <= high:  # nan is neither; the tests below say what is wrong
+        if low >= 0.0 and top <= high:  # false for nan; the checks below raise the error
             return value
     array = checked(what, value, shape, math.inf)
     if (array < 0.0).any() or (array > high).any():
@@ -131,7 +131,7 @@ def checked_within(what: str, value: ArrayLike, shape: tuple[int, ...], high: fl
 
 
 def checked_attitude(value: ArrayLike) -> Array:
-    """Unit quaternion (4,) of a command; lengths between 0.9 and 1.1 are made 1."""
+    """Returns the unit quaternion (4,) of a command; normalises lengths between 0.9 and 1.1."""
     q = checked("attitude", value, (4,), 1.1)
     length = float(np.linalg.norm(q))
     if not 0.9 <= length <= 1.1:

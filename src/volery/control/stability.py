@@ -1,8 +1,8 @@
-"""Whether a vehicle's motion can be computed with a physics step: how stiff its terms are.
+"""Numerical stability of a vehicle's motion with a physics step: stiffness of its terms.
 
 Rotors and identified loops are stepped by their exact solutions, whatever their times. Forces of
-the air are taken explicitly, once a step, at velocities extrapolated to mid-step from the last
-acceleration. A force that takes a share z of the motion in a step, v' = -z/dt v, then maps
+the air are integrated explicitly, once a step, at velocities extrapolated to mid-step from the last
+acceleration. A force that removes a fraction z of the motion in a step, v' = -z/dt v, then maps
 (v, dt a) by [[1 - z, -z/2], [-z, -z/2]], whose eigenvalues lie in the unit circle for z < 1:
 
     determinant -z/2, trace 1 - 3z/2;  |trace| < 1 + determinant  <=>  0 < z < 1
@@ -31,15 +31,15 @@ class StabilityTerm(NamedTuple):
     """A term of the motion that is stepped explicitly."""
 
     key: str
-    """The number of the data file that it follows from."""
+    """The number of the data file that determines it."""
     owner: str
-    """Whose number it is, such as `airframe 'f450'`."""
+    """The data file's subject, such as `airframe 'f450'`."""
     share: float
-    """Of the motion, what the term takes away in a step."""
+    """Fraction of the motion that the term removes in a step."""
 
 
 def terms_of(airframe: Airframe, plant: Plant, dt: float, speed_m_s: float) -> list[StabilityTerm]:
-    """The explicit terms of a vehicle at a speed through the air, the stiffest first."""
+    """Returns the explicit terms of a vehicle at a speed through the air, the stiffest first."""
     if isinstance(plant, Kinematic):
         return []
     if isinstance(plant, IdentifiedModel):
@@ -52,19 +52,19 @@ def terms_of(airframe: Airframe, plant: Plant, dt: float, speed_m_s: float) -> l
 
 
 def check_stability(airframe: Airframe, plant: Plant, dt: float) -> None:
-    """`DataFileError` where a term is too stiff for a physics step of `dt` s at usual speeds."""
+    """Raises `DataFileError` if a term is too stiff for a step of `dt` s at usual speeds."""
     for term in terms_of(airframe, plant, dt, airframe.limits.speed_m_s + MAX_WIND_M_S):
         if not term.share < STABLE_BELOW:
             raise DataFileError(
                 f"{term.owner}: {term.key} cannot be computed with a physics step of "
-                f"{1e3 * dt:g} ms: it takes {term.share:.3g} of the motion in each step, and less "
-                f"than {STABLE_BELOW:g} is stable; give a smaller {term.key}, or, if it is right, "
-                "a higher physics.rate_hz"
+                f"{1e3 * dt:g} ms: it removes {term.share:.3g} of the motion in each step, and "
+                f"less than {STABLE_BELOW:g} is stable; use a smaller {term.key} or, if it "
+                "is right, a higher physics.rate_hz"
             )
 
 
 def _rigid_body(airframe: Airframe, speed_m_s: float) -> dict[str, float]:
-    """Rates, 1/s, at which each number brakes the motion."""
+    """Returns the rates, 1/s, at which each number brakes the motion."""
     body, rotors = airframe.body, airframe.rotors
     count, full = len(rotors.places), rotors.max_speed_rad_s
     arms = np.array([math.hypot(*place.position_m) for place in rotors.places])

@@ -1,4 +1,4 @@
-"""Trajectories: where to be when, as polynomial segments that the fused step evaluates itself."""
+"""Trajectories: polynomial segments over time that the fused step evaluates."""
 
 from __future__ import annotations
 
@@ -19,32 +19,32 @@ Array = NDArray[np.float64]
 _MAX_SEGMENTS = 100_000
 _MAX_DURATION_S = 1e6
 _GAP_M = 1e-3
-"""Polynomial segments may miss each other by no more."""
+"""Maximum gap between polynomial segments."""
 
 
 class TrajectoryPoint(NamedTuple):
-    """A trajectory at one time."""
+    """State of a trajectory at one time."""
 
     position_map: Array
-    """(3,) m."""
+    """(3,) m, map frame."""
     velocity_map: Array
-    """(3,) m/s."""
+    """(3,) m/s, map frame."""
     acceleration_map: Array
-    """(3,) m/s^2."""
+    """(3,) m/s^2, map frame."""
     yaw: float
-    """rad; 0 where the trajectory has no headings."""
+    """rad; 0 if the trajectory has no headings."""
     yaw_rate: float
     """rad/s."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
-    """Polynomial segments of degree five or less, one after the other in time."""
+    """Polynomial segments of degree up to five, consecutive in time."""
 
     segments: Array
-    """(S, `follow.SEGMENT_COLUMNS`)."""
+    """(S, `trajectory_kernels.SEGMENT_COLUMNS`)."""
     faces: bool
-    """Whether it has headings; without, a UAV keeps the one it has."""
+    """Whether the trajectory has headings; otherwise a UAV's heading is unchanged."""
 
     @classmethod
     def from_samples(
@@ -56,20 +56,21 @@ class Trajectory:
         yaw: ArrayLike | None = None,
         yaw_rate: ArrayLike | None = None,
     ) -> Trajectory:
-        """Through samples, exactly: quintic Hermite polynomials, cubic without accelerations.
+        """Returns an interpolating trajectory of quintic Hermite polynomials.
 
-        times: (K,) s, growing, K > 1. position: (K, 3) m, map; velocity: (K, 3) m/s; acceleration:
-        (K, 3) m/s^2, only beside velocities; yaw: (K,) rad, turning the short way from sample to
-        sample; yaw_rate: (K,) rad/s, only beside yaws. Velocities left out are those of the
-        parabola through three neighbours, and zero at both ends. Raises CommandError.
+        Without accelerations they are cubic. times: (K,) s, increasing, K > 1. position: (K, 3) m,
+        map; velocity: (K, 3) m/s; acceleration: (K, 3) m/s^2, only with velocities; yaw: (K,) rad,
+        turning the shorter way between samples; yaw_rate: (K,) rad/s, only with yaws. Default
+        velocities are those of the parabola through three neighbours, and zero at both ends. Raises
+        `CommandError` for other arrays.
         """
         t = _checked_times(times)
         count = len(t)
         p = checked("position", position, (count, 3), MAX_COORDINATE)
         if velocity is None and acceleration is not None:
-            raise CommandError("accelerations of a trajectory need velocities beside them")
+            raise CommandError("accelerations of a trajectory need velocities as well")
         if yaw is None and yaw_rate is not None:
-            raise CommandError("yaw rates of a trajectory need yaws beside them")
+            raise CommandError("yaw rates of a trajectory need yaws as well")
         v = _slopes(t, p) if velocity is None else checked("velocity", velocity, (count, 3), 1e3)
         a = None
         if acceleration is not None:
@@ -92,10 +93,10 @@ class Trajectory:
     def from_polynomials(
         cls, durations: ArrayLike, position: ArrayLike, yaw: ArrayLike | None = None
     ) -> Trajectory:
-        """From coefficients in rising powers of the time since each segment's begin.
+        """Returns a trajectory from coefficients in rising powers of the segment's time.
 
-        durations: (S,) s. position: (S, 3, D) and yaw: (S, D) with D up to 6. Raises CommandError,
-        also where a segment does not begin where the one before it ends.
+        durations: (S,) s. position: (S, 3, D) and yaw: (S, D) with D up to 6. Raises `CommandError`
+        for other arrays, or if a segment does not begin where the previous one ends.
         """
         ends = np.cumsum(np.atleast_1d(np.asarray(durations, dtype=np.float64)))
         t = _checked_times(np.concatenate([[0.0], ends]))
@@ -125,21 +126,21 @@ class Trajectory:
 
     @property
     def begin_s(self) -> float:
-        """Time of the first sample."""
+        """Time of the first sample, s."""
         return float(self.segments[0, BEGIN])
 
     @property
     def end_s(self) -> float:
-        """Time of the last sample."""
+        """Time of the last sample, s."""
         return float(self.segments[-1, END])
 
     def at(self, time: float) -> TrajectoryPoint:
-        """Where it is at `time` s; before its begin and after its end as at these."""
+        """Returns the point at `time` s, limited to the times of first and last sample."""
         row = bisect_right(self.segments[:, BEGIN], time) - 1
         return self._in_segment(max(row, 0), min(max(time, self.begin_s), self.end_s))
 
     def led_in_from(self, position: Array, velocity: Array, yaw: float) -> Trajectory:
-        """The same with a segment before it that starts at time 0 from a motion (map, SI)."""
+        """Returns the trajectory with a leading segment from a motion (map, SI) at time 0."""
         if self.begin_s <= 0.0:
             return self
         first = self.at(self.begin_s)
@@ -183,7 +184,7 @@ def _checked_times(times: ArrayLike) -> Array:
         )
     t = checked("times", t, t.shape, _MAX_DURATION_S)
     if t[0] < 0.0 or (np.diff(t) <= 0.0).any():
-        raise CommandError("times of a trajectory must grow and not be negative")
+        raise CommandError("times of a trajectory must increase and not be negative")
     return t
 
 
@@ -192,7 +193,7 @@ def _columns(axis: int) -> slice:
 
 
 def _slopes(t: Array, p: Array) -> Array:
-    """Slopes (K, D) of samples (K, D): of the parabola through three neighbours, zero at ends."""
+    """Returns slopes (K, D) of samples (K, D): of parabolas through neighbours, zero at ends."""
     v = np.zeros_like(p)
     if len(t) > 2:
         h = np.diff(t)[:, None]
@@ -202,7 +203,7 @@ def _slopes(t: Array, p: Array) -> Array:
 
 
 def _hermite(t: Array, p: Array, v: Array, a: Array | None) -> Array:
-    """Coefficients (K - 1, 6) of the polynomials through samples (K,) with these derivatives."""
+    """Returns coefficients (K - 1, 6) of polynomials through samples (K,) and derivatives."""
     h = np.diff(t)
     way = p[1:] - p[:-1] - h * v[:-1]
     turn = (v[1:] - v[:-1]) * h

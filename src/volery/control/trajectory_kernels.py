@@ -1,8 +1,8 @@
-"""Trajectories as the fused step flies them: segments of polynomials, evaluated at guidance ticks.
+"""Compiled trajectories: segments of polynomials, evaluated at guidance ticks.
 
 A segment is a row of numbers: its begin and end, s after the trajectory's start, then the six
-coefficients of x, y, z (m) and yaw (rad), in powers of the time since its begin. What is fed
-forward is looked up one lag of the attitude loop ahead, since that is when it will act.
+coefficients of x, y, z (m) and yaw (rad), in powers of the time since its begin. Feedforward is
+evaluated one lag of the attitude loop ahead, the time at which it acts.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ ORDER = 6
 """Coefficients of a polynomial."""
 SEGMENT_COLUMNS = FIRST + 4 * ORDER
 _AT_REST_M_S = 0.05
-"""A trajectory that ends slower than this is held where it ends, else the UAV brakes first."""
+"""Final speed below which a UAV holds a trajectory's end; above it brakes first."""
 
 
 @inner_kernel
 def polynomial(segments: Any, row: int, axis: int, t: float) -> tuple[float, float, float]:
-    """Value and two derivatives of an axis (0 to 3: x, y, z, yaw), `t` s after the row's begin."""
+    """Returns value and two derivatives of axis 0 to 3 (x, y, z, yaw), `t` s after its begin."""
     p, v, a = 0.0, 0.0, 0.0
     for k in range(ORDER - 1, -1, -1):
         a = a * t + v
@@ -34,7 +34,7 @@ def polynomial(segments: Any, row: int, axis: int, t: float) -> tuple[float, flo
 
 @inner_kernel
 def segment_at(segments: Any, row: int, last: int, t: float) -> int:
-    """The row, from `row` to `last`, in which `t` lies; a common end belongs to the later one."""
+    """Returns the row, `row` to `last`, that contains `t`; a common end counts as the later's."""
     while row < last and t >= segments[row, END]:
         row += 1
     return row
@@ -42,14 +42,14 @@ def segment_at(segments: Any, row: int, last: int, t: float) -> int:
 
 @inner_kernel
 def path_time(control_state: Any, step: int, dt: float) -> float:
-    """Time (s) since the start of what is followed."""
+    """Returns the time (s) since the start of the trajectory or setpoint."""
     time: float = (step - control_state.start_step) * dt
     return time
 
 
 @inner_kernel
 def path_is_flown(control_state: Any, paths: Any, step: int, dt: float) -> bool:
-    """Whether a trajectory has ended; if so, what is held from now on is set."""
+    """Returns whether a trajectory has ended; if so, sets the state to hold."""
     end = paths[control_state.path_last, END]
     if path_time(control_state, step, dt) < end:
         return False
@@ -70,7 +70,7 @@ def path_is_flown(control_state: Any, paths: Any, step: int, dt: float) -> bool:
 def follow_path(
     control_state: Any, gains: Any, paths: Any, step: int, dt: float
 ) -> tuple[float, float, float, float]:
-    """Put the reference where the trajectory is now; the yaw rate and acceleration to feed."""
+    """Moves the reference along the trajectory; returns feedforward yaw rate and acceleration."""
     t = path_time(control_state, step, dt)
     last = control_state.path_last
     row = segment_at(paths, control_state.path_row, last, t)
@@ -92,7 +92,7 @@ def follow_path(
     t -= paths[row, BEGIN]
     _, vx, ax = polynomial(paths, row, 0, t)
     _, vy, ay = polynomial(paths, row, 1, t)
-    az = control_state.acceleration[2]  # thrust answers at once
+    az = control_state.acceleration[2]  # thrust acts at once
     return rate, ax + gains.drag * vx, ay + gains.drag * vy, az
 
 
@@ -100,7 +100,7 @@ def follow_path(
 def follow_setpoint(
     control_state: Any, gains: Any, step: int, dt: float
 ) -> tuple[float, float, float, float]:
-    """Like `follow_path` for a single setpoint, which moves on by its velocity and acceleration."""
+    """Follows a single setpoint, which moves with its velocity, as `follow_path`."""
     t = path_time(control_state, step, dt)
     for k in range(3):
         a = control_state.acceleration_target[k]

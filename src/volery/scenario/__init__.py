@@ -1,1 +1,1 @@
-"""What to simulate, as data: the schema, the loader, the scenarios that ship."""
+"""Scenarios as data: the schema, the loader, the shipped scenarios."""

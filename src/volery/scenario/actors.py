@@ -14,43 +14,43 @@ _UAV_NAME = re.compile(r"uav\d+")
 
 
 class WaypointActor(Data):
-    """Along straight lines from one waypoint to the next."""
+    """Moves along straight lines from waypoint to waypoint."""
 
     kind: Literal["waypoints"]
     waypoints_m: Annotated[
         tuple[Annotated[tuple[float, ...], Field(min_length=2, max_length=3)], ...],
         Field(min_length=2, max_length=10_000),
     ]
-    """Each x, y (on the ground) or x, y, z in the map; all have as many numbers."""
+    """Each x, y (on the ground) or x, y, z in the map; all with the same dimension."""
     speed_m_s: Speed
     at_end: Literal["loop", "back", "stop"] = "loop"
-    """Goes on to the first one, turns back, or stays."""
+    """Continues to the first waypoint, reverses, or stops."""
     start_s: NonNegative = 0.0
-    """Until then it stands at the first."""
+    """Time at the first waypoint before the motion begins."""
 
     @model_validator(mode="after")
     def _waypoints_lead_somewhere(self) -> Self:
         if len({len(point) for point in self.waypoints_m}) != 1:
-            raise ValueError("waypoints_m have two numbers each, or three each")
+            raise ValueError("waypoints_m must have two numbers each, or three each")
         if len(set(self.waypoints_m)) == 1:
-            raise ValueError("waypoints_m are all the same place; two at least must differ")
+            raise ValueError("waypoints_m are all equal; at least two must differ")
         return self
 
 
 class CircleActor(Data):
-    """Round and round at one height, leaning into the turn as what flies does."""
+    """Circles at one height, banked like an aircraft."""
 
     kind: Literal["circle"]
     centre_m: Vector3
     radius_m: Annotated[float, Field(gt=0.0, le=10_000.0)]
     speed_m_s: Speed
     start_deg: float = 0.0
-    """Where on the circle it begins, counter-clockwise from x."""
+    """Start angle on the circle, counter-clockwise from x."""
     clockwise: bool = False
 
 
 class ExternalActor(Data):
-    """Takes its pose from `/actors/NAME/pose` or `/set_entity_state`."""
+    """Receives its pose from `/actors/NAME/pose` or `/set_entity_state`."""
 
     kind: Literal["external", "outside"]
     position_m: Annotated[tuple[float, ...], Field(min_length=2, max_length=3)]
@@ -75,7 +75,7 @@ class Actor(Data):
     @model_validator(mode="after")
     def _is_no_uav(self) -> Self:
         if _UAV_NAME.fullmatch(self.name):
-            raise ValueError(f"'{self.name}' is a name of UAVs; give the actor another name")
+            raise ValueError(f"'{self.name}' is a UAV's name; give the actor another name")
         return self
 
 
@@ -83,7 +83,7 @@ Actors = Annotated[tuple[Actor, ...], Field(max_length=1000)]
 
 
 def check_actors(actors: tuple[Actor, ...]) -> None:
-    """Raises ValueError where two actors have one name."""
+    """Raises `ValueError` if two actors have the same name."""
     names = [actor.name for actor in actors]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:

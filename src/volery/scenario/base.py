@@ -29,15 +29,15 @@ Rate = Annotated[float, Field(gt=0.0, le=1000.0)]
 
 
 class Bounded(BaseModel):
-    """Frozen data whose numbers lie within the bounds of the quantities that their keys name.
+    """Frozen data whose numbers are within the bounds of the quantities that their keys name.
 
-    Unknown keys and numbers that are not finite are refused. See `core.quantities`.
+    Unknown keys and numbers that are not finite are rejected. See `core.quantities`.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     quantities: ClassVar[Mapping[str, Quantity]] = {}
-    """Bounds that hold for the keys of this kind of data instead of the common ones."""
+    """Bounds for the keys of this data, instead of the common ones."""
 
     @field_validator("*")
     @classmethod
@@ -49,9 +49,9 @@ class Bounded(BaseModel):
 
 
 def implausible(data: BaseModel, place: str = "") -> tuple[str, str] | None:
-    """The first key of data of any model, and what is wrong with its number; None: nothing is.
+    """Returns the first key with an invalid number, and the error; None: all are valid.
 
-    For models that are not `Bounded`, which refuse such numbers themselves.
+    For models that are not `Bounded`, which validate such numbers themselves.
     """
     for key in type(data).model_fields:
         value, where = getattr(data, key), f"{place}.{key}" if place else key
@@ -74,7 +74,7 @@ def _fault_of(model: type[BaseModel], key: str, value: Any) -> str | None:
 
 @cache
 def _lower_bound(model: type[BaseModel], key: str) -> tuple[float | None, bool]:
-    """The lower bound that a key's type states, and whether it takes only numbers above it."""
+    """Returns the lower bound of a key's type, and whether it is exclusive."""
     field = model.model_fields[key]
     for word in (*field.metadata, *_metadata(field.annotation)):
         if isinstance(word, Gt) and word.gt == 0:
@@ -85,7 +85,7 @@ def _lower_bound(model: type[BaseModel], key: str) -> tuple[float | None, bool]:
 
 
 def _metadata(annotation: Any) -> list[Any]:
-    """What is said of the numbers of a type, in lists and unions too."""
+    """Returns the metadata of a type's numbers, also in lists and unions."""
     found = list(getattr(annotation, "__metadata__", ()))
     for word in tuple(found):
         found += getattr(word, "metadata", ())
@@ -100,7 +100,8 @@ class Data(Bounded):
     model_config = ConfigDict(str_strip_whitespace=True)
 
     former_keys: ClassVar[Mapping[str, str]] = {}
-    """Keys that recorded logs still hold, with today's names; each raises a DeprecationWarning."""
+    """Former keys, which recorded logs contain, with present names; each raises a
+    DeprecationWarning."""
 
     @model_validator(mode="before")
     @classmethod
@@ -113,36 +114,36 @@ class Data(Bounded):
         for old, new in former.items():
             warn_of_former_word(f"key '{old}'", new)
             if new in data:
-                raise ValueError(f"keys '{old}' and '{new}' are one; keep '{new}'")
+                raise ValueError(f"keys '{old}' and '{new}' are the same; use only '{new}'")
         return {former.get(key, key): value for key, value in data.items()}
 
 
 def warn_of_former_word(what: str, new: str) -> None:
-    """Warns that a scenario uses a word that has been renamed."""
+    """Warns that a scenario uses a renamed word."""
     warnings.warn(f"{what} of scenarios is named '{new}' now", DeprecationWarning, stacklevel=2)
 
 
 class SensorData(Data):
-    """What every sensor states."""
+    """Common keys of all sensors."""
 
     phase_s: NonNegative = 0.0
     """Time of the first measurement."""
 
 
 class MountedSensor(SensorData):
-    """A sensor with a place on the UAV."""
+    """A sensor with a mount on the UAV."""
 
     quantities: ClassVar[Mapping[str, Quantity]] = {
         "position_m": Quantity("m", 100.0, 0.0, {"mm": 1e-3})
     }
 
     position_m: Vector3 = (0.0, 0.0, 0.0)
-    """Place of the sensor frame in the body, FLU."""
+    """Position of the sensor frame in the body, FLU."""
     rpy_deg: Vector3 = (0.0, 0.0, 0.0)
     noise: bool = True
 
 
 def check_rectangle(region: tuple[float, float, float, float] | None) -> None:
-    """ValueError unless `region` is x_min, y_min, x_max, y_max, or None."""
+    """Raises `ValueError` unless `region` is x_min, y_min, x_max, y_max, or None."""
     if region is not None and not (region[0] < region[2] and region[1] < region[3]):
         raise ValueError("region_m must be [x_min, y_min, x_max, y_max] with min < max")

@@ -1,4 +1,4 @@
-"""Scenarios and logs that can be asked for by name."""
+"""Scenarios and logs by name."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from volery.scenario.load import load_scenario
 from volery.scenario.schema import Scenario
 
 _LOG_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_. -]{0,99}\.(mcap|bag)")
-"""No folder, no file that hides."""
+"""Excludes folders and hidden files."""
 
 _MAX_LOADED = 1_000
 
 
 class ScenarioCatalog:
-    """The library and, where there is one, a folder with more: `FOLDER/NAME/scenario.toml`.
+    """The library and, optionally, a folder with more: `FOLDER/NAME/scenario.toml`.
 
-    Names of the library come first. A shipped scenario cannot be hidden by one of the folder.
-    `logs` is the folder of recorded logs that may be played; None: none. `given` is a scenario that
-    lies elsewhere, such as that of the command line; neither can it hide another one.
+    Names of the library come first: a scenario of the folder cannot hide a shipped one. `logs` is
+    the folder of recorded logs that may be played; None: none. `given` is a scenario from
+    elsewhere, such as the command line; it cannot hide others either.
     """
 
     FILE = "scenario.toml"
@@ -38,18 +38,18 @@ class ScenarioCatalog:
         self._loaded: dict[Path, tuple[tuple[int, int, int], Scenario]] = {}
 
     def names(self) -> tuple[str, ...]:
-        """All names that can be loaded."""
+        """Returns all names that can be loaded."""
         return (*library.names(), *self.added(), *(each.name for each in self.given()))
 
     def given(self) -> tuple[Scenario, ...]:
-        """The scenario that lies elsewhere, if there is one of that name nowhere else."""
+        """Returns the given scenario, unless another one has its name."""
         given = self._given
         if given is None or given.name in (*library.names(), *self.added()):
             return ()
         return (given,)
 
     def added(self) -> tuple[str, ...]:
-        """Names of the folder's scenarios, sorted."""
+        """Returns the names of the folder's scenarios, sorted."""
         if self.folder is None or not self.folder.is_dir():
             return ()
         found = (path.parent.name for path in self.folder.glob(f"*/{self.FILE}"))
@@ -57,7 +57,7 @@ class ScenarioCatalog:
         return tuple(sorted(n for n in found if n not in shipped and not n.startswith(".")))
 
     def load(self, name: str) -> Scenario:
-        """A scenario by its name. `ScenarioError` where there is none, or it is broken."""
+        """Returns a scenario by its name; raises `ScenarioError` for a missing or invalid one."""
         if name in library.names():
             return load_scenario(name)
         for given in self.given():
@@ -68,7 +68,7 @@ class ScenarioCatalog:
         return self._load_added(self.folder / name / self.FILE)
 
     def _load_added(self, path: Path) -> Scenario:
-        """A scenario of the folder, read again only where its file has changed."""
+        """Returns a scenario of the folder, read again only if its file has changed."""
         try:
             status = path.stat()
         except OSError:
@@ -82,9 +82,9 @@ class ScenarioCatalog:
         return known[1]
 
     def log(self, name: str) -> Path:
-        """A log by the name of its file. `RecordingError` where there is none."""
+        """Returns a log by the name of its file; raises `RecordingError` if it does not exist."""
         if self._logs is None:
-            raise RecordingError("this process keeps no folder of recordings")
+            raise RecordingError("this process has no folder of recordings")
         path = self._logs / name
         if not _LOG_NAME.fullmatch(name) or path.is_symlink() or not path.is_file():
             raise RecordingError(f"there is no recording '{name[:100]}'")

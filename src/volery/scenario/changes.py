@@ -1,4 +1,4 @@
-"""What a client may have otherwise in a scenario that it loads."""
+"""Changes that a client may make to a scenario when loading it."""
 
 from __future__ import annotations
 
@@ -18,32 +18,32 @@ from volery.scenario.sensor_sets import SensorSet, fit
 
 _WHERE = "changes"
 _APART_M = 3.0
-"""Between UAVs that are added to a scenario of one; their rotors' air stays apart."""
+"""Distance between UAVs that are added to a scenario of one, which separates their rotors' air."""
 _M2_A_HA = 1e4
 
 
 class Changes(Data):
-    """Changes to a scenario; what is None stays as it is."""
+    """Changes to a scenario; None leaves a value unchanged."""
 
     uavs: Annotated[int, Field(ge=1, le=10_000)] | None = None
-    """How many fly, of the scenario's only group."""
+    """Number of UAVs in the scenario's only group."""
     airframe: Annotated[str, Field(min_length=1, max_length=200)] | None = None
-    """Of all types: the name of a shipped one."""
+    """Airframe of all types: a shipped name."""
     sensors: tuple[SensorSet, ...] | None = None
-    """Sets that all types carry; see `sensor_sets.fit`."""
+    """Sensor sets of all types; see `sensor_sets.fit`."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] | None = None
     seconds: Annotated[float, Field(gt=0.0, le=1_000_000.0)] | None = None
     tree_density_per_ha: NonNegative | None = None
-    """Of a procedural forest."""
+    """Tree density of a procedural forest."""
     tree_share: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
-    """Of the trees of an inventory."""
+    """Fraction of the trees of an inventory."""
     speed: Annotated[float, Field(ge=0.0, lt=1e6)] | None = None
-    """Factor of real time at which it is flown; 0: as fast as possible."""
+    """Real-time factor; 0: as fast as possible."""
 
 
 @dataclass(frozen=True)
 class WorldRequest:
-    """A scenario that a client wants to see flown."""
+    """Request of a client to load a scenario."""
 
     name: str
     changes: Changes = field(default_factory=Changes)
@@ -51,13 +51,16 @@ class WorldRequest:
 
 @dataclass(frozen=True)
 class LogRequest:
-    """A recorded log that a client wants to see played."""
+    """Request of a client to play a recorded log."""
 
     path: Path
 
 
 def parse_changes(text: str) -> Changes:
-    """Changes as JSON; empty: none. `ScenarioError` names what is wrong and what is allowed."""
+    """Parses changes from JSON; empty: none.
+
+    Raises `ScenarioError`, naming error and allowed values, for invalid changes.
+    """
     if not text.strip():
         return Changes()
     try:
@@ -73,7 +76,7 @@ def parse_changes(text: str) -> Changes:
 
 
 def apply(scenario: Scenario, changes: Changes) -> Scenario:
-    """The scenario with the changes, checked anew. Raises `ScenarioError` where one cannot be."""
+    """Returns the scenario with the changes, validated; raises `ScenarioError` for invalid ones."""
     data: dict[str, Any] = scenario.model_dump(exclude_unset=True)
     if changes.seconds is not None:
         data["duration_s"] = changes.seconds
@@ -91,17 +94,17 @@ def apply(scenario: Scenario, changes: Changes) -> Scenario:
 
 
 def _groups(scenario: Scenario, groups: Any, uavs: int) -> list[Any]:
-    """The only group with another count.
+    """Returns the only group with another count.
 
-    More of them stand on the old line, each where it finds room beside it; in the air, on a line of
-    their own.
+    Additional UAVs on the ground are placed on the existing line, each at the nearest free
+    position; in the air, on a new line.
     """
     if uavs == scenario.uav_count:
         return list(groups)
     if len(groups) > 1:
         raise ScenarioError(
             f"{_WHERE}: key 'uavs': scenario '{scenario.name}' has {len(groups)} groups of UAVs, "
-            f"{scenario.uav_count} in all, and says itself how many fly"
+            f"{scenario.uav_count} in all, whose numbers are fixed"
         )
     group, first = {**groups[0], "count": uavs}, scenario.uavs[0]
     if uavs < first.count or uavs == 1:
@@ -117,14 +120,14 @@ def _type(scenario: Scenario, name: str, data: Any, changes: Changes) -> dict[st
     changed = dict(data)
     if changes.airframe is not None and changes.airframe != scenario.types[name].airframe:
         changed["airframe"] = changes.airframe
-        changed.pop("wear", None)  # of the rotors of the other one
+        changed.pop("wear", None)  # the wear of the previous airframe's rotors
     if changes.sensors is not None:
         changed["sensors"] = fit(scenario.types[name], data, changes.sensors)
     return changed
 
 
 def _forest(scenario: Scenario, changes: Changes) -> dict[str, Any]:
-    """What is set in the table of the forest."""
+    """Returns the keys to set in the forest's table."""
     forest, density = scenario.world.forest, changes.tree_density_per_ha
     if density is not None:
         if not isinstance(forest, ProceduralForest):

@@ -13,18 +13,18 @@ Length = Annotated[float, Field(ge=0.5, le=1000.0)]
 
 
 class Streets(Data):
-    """How the gaps between buildings become streets, and what stands in them."""
+    """Streets in the gaps between buildings, and their furniture."""
 
     widest_m: Annotated[float, Field(ge=4.0, le=200.0)] = 32.0
-    """Wider gaps are no streets: they keep the ground's own look."""
+    """Wider gaps are not streets: they have the ground's own material."""
     pavement_m: Annotated[float, Field(ge=0.5, le=20.0)] = 3.0
-    """From the walls to the kerb."""
+    """Width from the walls to the kerb."""
     lamp_spacing_m: NonNegative = 28.0
-    """Along the kerb; 0: no lamps."""
+    """Spacing along the kerb; 0: no lamps."""
     tree_spacing_m: NonNegative = 11.0
-    """Along the kerb of streets with room for trees; 0: none."""
+    """Spacing along the kerb of streets with room for trees; 0: none."""
     tree_share: Share = 0.6
-    """Of the places for trees that have one."""
+    """Fraction of the tree positions that have a tree."""
     tree_species: str = "broadleaf"
 
 
@@ -33,11 +33,12 @@ class City(Data):
 
     file: str
     region_m: tuple[float, float, float, float] | None = None
-    """x_min, y_min, x_max, y_max; buildings whose middle lies in it are kept. None keeps all."""
+    """x_min, y_min, x_max, y_max; only buildings whose centre lies in it are used. None uses all.
+    """
     storey_m: Annotated[float, Field(ge=2.0, le=10.0)] = 3.2
     """Height of a storey where only the number of levels is known."""
     default_height_m: Length = 16.0
-    """Of buildings of which the file says nothing: five storeys."""
+    """Height of buildings without data in the file: five storeys."""
     streets: Streets = Streets()
 
     @model_validator(mode="after")

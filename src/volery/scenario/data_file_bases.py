@@ -1,6 +1,6 @@
-"""Data files that change another one: `base` names a shipped part or a file in the same folder.
+"""Data files that modify another one: `base` names a shipped part or a file in the same folder.
 
-A file reaches nothing outside its own folder and the shipped parts, whoever it comes from.
+A file can refer only to its own folder and the shipped parts, whatever its origin.
 """
 
 from __future__ import annotations
@@ -17,32 +17,32 @@ from volery.scenario.merging import merged
 
 _KEY = "base"
 _TEXTS = ("title", "source")
-"""Where a part says in words what it is; its `name` is a word then."""
+"""Keys of a part's description; if present, its `name` is an identifier."""
 _MAX_FILES = 10
-"""In a chain of bases."""
+"""Maximum length of a chain of bases."""
 _MAX_SHOWN = 60
-"""Letters of a base's name in an error."""
+"""Maximum length of a base's name in an error."""
 
 
 @dataclass(frozen=True)
 class FileData:
-    """What a data file says, together with its bases."""
+    """Content of a data file with its bases."""
 
     data: dict[str, Any]
-    """Of the file, laid over that of its bases; without the key `base`."""
+    """Data of the file, merged over that of its bases; without the key `base`."""
     files: tuple[Path, ...]
-    """The file, its base, the base of that, and so on."""
+    """The file, its base, the base's base, and so on."""
 
     @property
     def where(self) -> str:
-        """The files, as errors name them."""
+        """File names for errors."""
         path, *bases = self.files
         shown = ", ".join(f"'{base.name}'" for base in bases)
         return f"{path} (base {shown})" if bases else str(path)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """Tables of a TOML file. Raises `DataFileError` naming the file."""
+    """Returns the tables of a TOML file; raises `DataFileError` naming the file."""
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
@@ -52,17 +52,17 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def read_with_bases(path: Path, shipped: Path) -> FileData:
-    """Read a data file and its bases; parts of `shipped` may be named without `.toml`.
+    """Reads a data file and its bases; parts of `shipped` may be named without `.toml`.
 
-    A file with a base has a name of its own, which says that it is changed where the file gives
-    none. Raises `DataFileError` naming the file whose base does not exist or leads back to it.
+    A file with a base has its own name; if the file gives none, the name says that it is changed.
+    Raises `DataFileError`, naming the file, if a base does not exist or the chain is circular.
     """
     files, contents = [path], [read_toml(path)]
     while _KEY in contents[-1]:
         base = _path_of_base(files[-1], contents[-1].pop(_KEY), shipped)
         if base.resolve() in [file.resolve() for file in files]:
             chain = " -> ".join(file.name for file in (*files, base))
-            raise DataFileError(f"{files[-1]}: key '{_KEY}': the bases go in a circle: {chain}")
+            raise DataFileError(f"{files[-1]}: key '{_KEY}': the bases form a circle: {chain}")
         if len(files) == _MAX_FILES:
             raise DataFileError(f"{path}: key '{_KEY}': at most {_MAX_FILES} files in a chain")
         files.append(base)
@@ -74,7 +74,7 @@ def read_with_bases(path: Path, shipped: Path) -> FileData:
 
 
 def _path_of_base(path: Path, name: Any, shipped: Path) -> Path:
-    """Path of the base that the file `path` names."""
+    """Returns the path of the base that the file `path` names."""
     fault = f"{path}: key '{_KEY}':"
     known = sorted(file.stem for file in shipped.glob("*.toml"))
     allowed = f"{', '.join(known)}, or a .toml file in the same folder"
@@ -86,7 +86,7 @@ def _path_of_base(path: Path, name: Any, shipped: Path) -> Path:
     if not name.endswith(".toml"):
         near = difflib.get_close_matches(name, known, n=1)
         hint = f"; did you mean '{near[0]}'?" if near else "."
-        raise DataFileError(f"{fault} no '{shown}' ships{hint} Allowed: {allowed}")
+        raise DataFileError(f"{fault} no shipped '{shown}'{hint} Allowed: {allowed}")
     if Path(name).name != name:
         raise DataFileError(f"{fault} '{shown}' lies in another folder. Allowed: {allowed}")
     base = path.parent / name
@@ -96,7 +96,7 @@ def _path_of_base(path: Path, name: Any, shipped: Path) -> Path:
 
 
 def _is_file_in(path: Path, folder: Path) -> bool:
-    """Whether it is a file of the folder itself, not a link to another place."""
+    """Returns whether a path is a file in the folder itself, not a link to elsewhere."""
     try:
         return path.is_file() and path.resolve().parent == folder.resolve()
     except (OSError, RuntimeError, ValueError):  # too long, a circle of links, or no path at all
@@ -104,7 +104,7 @@ def _is_file_in(path: Path, folder: Path) -> bool:
 
 
 def _with_names(changes: dict[str, Any], data: dict[str, Any], file: Path) -> dict[str, Any]:
-    """The changes with what tells the part from its base, where the file itself does not say it."""
+    """Returns the changes with a name of their own, unless the file defines one."""
     origin = f"changed in {file.name}"
     texts = [key for key in _TEXTS if key in data]
     if not texts:

@@ -17,10 +17,11 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 def load_data_file(path: Path, model: type[Model], bases: Path | None = None) -> Model:
-    """Read `path` into `model`. Raises `DataFileError` naming file, key and what is allowed.
+    """Reads `path` into `model`.
 
-    bases: folder of the shipped parts of this kind, which the file may change (`base = "vlp_16"`);
-    None: the file stands alone.
+    Raises `DataFileError`, naming file, key and allowed values, for an invalid file. bases: folder
+    of the shipped parts of this kind, which the file may modify (`base = "vlp_16"`); None: no
+    bases.
     """
     file = FileData(read_toml(path), (path,)) if bases is None else read_with_bases(path, bases)
     try:
@@ -35,10 +36,10 @@ def load_data_file(path: Path, model: type[Model], bases: Path | None = None) ->
 
 
 def find_data_file(name: str, shipped: Path, what: str, folder: Path | None = None) -> Path:
-    """Path of a part: a `.toml` path (in `folder` or as given) or a shipped name.
+    """Returns the path of a part: a `.toml` path (in `folder` or as given) or a shipped name.
 
-    Names that a scenario gives pass through its `ScenarioAccess.find_model` first. Raises
-    `DataFileError` listing the shipped names.
+    Names from a scenario pass through its `ScenarioAccess.find_model` first. Raises
+    `DataFileError`, listing the shipped names, if there is no such part.
     """
     if name.endswith(".toml"):
         for place in ((folder or Path()) / name, Path(name)):

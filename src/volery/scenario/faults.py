@@ -1,4 +1,4 @@
-"""What goes wrong in a run: faults as timed entries of a scenario, or injected while it runs."""
+"""Faults: timed entries of a scenario, or injected during a run."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from volery.core.errors import CommandError
 from volery.scenario.base import Data, Vector3
 
 SimulatedTime = Annotated[float, Field(ge=0.0, le=1e8)]
-"""s; the bound is three years, far inside what integer nanoseconds hold."""
+"""Time in s; the bound is three years, far within integer nanoseconds."""
 
 
 class _Fault(Data):
     at_s: SimulatedTime = 0.0
-    """Simulated time at which it begins; one that has passed means at once."""
+    """Simulated time at which the fault begins; a past time means at once."""
 
 
 class _UavFault(_Fault):
     """A fault of one UAV."""
 
     uav: str
-    """Its name, such as `uav1`."""
+    """Name of the UAV, such as `uav1`."""
 
 
 class _Passing(_UavFault):
-    """A fault that may end by itself."""
+    """A fault that may end."""
 
     until_s: SimulatedTime | None = None
-    """Simulated time at which all is well again; None: it stays."""
+    """Simulated time at which the fault ends; None: it is permanent."""
 
     @model_validator(mode="after")
     def _ends_after_it_begins(self) -> Self:
@@ -40,24 +40,24 @@ class _Passing(_UavFault):
 
 
 class MotorFault(_Passing):
-    """A rotor gives part of its thrust, or none."""
+    """A rotor produces part of its thrust, or none."""
 
     kind: Literal["motor"]
     rotor: Annotated[int, Field(ge=0)]
     """Number of the rotor in the airframe's file, from 0."""
     thrust_factor: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
-    """Share of its thrust that is left; 0 stops it."""
+    """Remaining fraction of its thrust; 0 stops the rotor."""
 
 
 class SensorFault(_Passing):
-    """A sensor is silent, repeats itself, or measures wrong."""
+    """A sensor sends nothing, repeats its last measurement, or has a bias."""
 
     kind: Literal["sensor"]
     sensor: str
     """Name of the sensor, such as `imu`."""
     effect: Literal["dropped", "stuck", "biased"]
     bias: Annotated[tuple[float, ...], Field(min_length=1)] | None = None
-    """What a biased sensor adds: a number for each that it measures, in their units."""
+    """Bias: a number for each measured component, in its unit."""
 
     @model_validator(mode="after")
     def _bias_belongs_to_biased(self) -> Self:
@@ -79,23 +79,23 @@ class RadioFault(_Passing):
 
 
 class GustFault(_Fault):
-    """A 1-cosine gust that reaches all places at once."""
+    """A 1-cosine gust that reaches all positions at once."""
 
     kind: Literal["gust"]
     velocity_m_s: Vector3
-    """Wind added at its height, map."""
+    """Maximum wind of the gust, map."""
     rise_s: Annotated[float, Field(ge=0.01, le=60.0)] = 0.5
-    """Time from nothing to the full gust, and back."""
+    """Time from zero to the full gust, and back."""
     hold_s: Annotated[float, Field(ge=0.0, le=600.0)] = 1.0
     """Time at full strength."""
 
 
 class DisplacementFault(_UavFault):
-    """A UAV is somewhere else from one step to the next."""
+    """A UAV changes its position from one step to the next."""
 
     kind: Literal["displacement"]
     offset_m: Vector3
-    """Added to its position, map."""
+    """Offset of the position, map."""
 
 
 Fault: TypeAlias = Annotated[
@@ -115,7 +115,7 @@ _KINDS: dict[Any, type[_Fault]] = {
 
 
 def parse_fault(data: Fault | Mapping[str, Any]) -> Fault:
-    """Fault from plain data, as in a scenario. `CommandError` says what is wrong with it."""
+    """Returns a fault from plain data, as in a scenario; raises `CommandError` for invalid data."""
     if isinstance(data, _Fault):
         return data
     if not isinstance(data, Mapping):

@@ -11,7 +11,7 @@ from volery.scenario.base import Data, Vector2
 
 MapName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=80)]
 RECEIVED = "map_command"
-"""Name of the map that came over the graph last."""
+"""Name of the latest map received over the graph."""
 Side = Annotated[float, Field(ge=0.001, le=1000.0)]
 
 
@@ -20,29 +20,29 @@ class GridMapFile(Data):
 
     file: str
     name: MapName | None = None
-    """What it is called; None: the file's name without its suffix."""
+    """Name of the map; None: the file's name without its suffix."""
     threshold: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
     """Darkness above which a pixel is blocked, from 0 (white) to 1 (black)."""
 
     @model_validator(mode="after")
     def _has_a_name(self) -> Self:
         if not self.called:
-            raise ValueError("name is needed where the file's name has no letter to begin with")
+            raise ValueError("name is needed if the file's name does not begin with a letter")
         return self
 
     @property
     def called(self) -> str:
-        """Its name."""
+        """Name of the map."""
         return self.name if self.name is not None else PurePosixPath(self.file).stem
 
 
 class GridMapWorld(Data):
-    """Maps to choose from, and how large the world is that is made of one."""
+    """Maps to choose from, and the size of their blocks."""
 
     maps: tuple[GridMapFile, ...] = ()
-    """None: there are no blocks until a map comes over the graph."""
+    """Empty: no blocks until a map is received over the graph."""
     map: str | None = None
-    """The one at the start; None: the first."""
+    """Name of the map at the start; None: the first."""
     cell_size_m: Side = 1.0
     block_height_m: Side = 5.0
     origin_m: Vector2 = (0.0, 0.0)
@@ -58,7 +58,7 @@ class GridMapWorld(Data):
             raise ValueError(f"names of maps must differ; used twice: {', '.join(twice)}")
         if RECEIVED in names:
             raise ValueError(
-                f"'{RECEIVED}' is the map that comes over the graph; name it otherwise"
+                f"'{RECEIVED}' is reserved for the map received over the graph; choose another name"
             )
         if self.map is not None and self.map not in names:
             known = ", ".join(names) or "none"

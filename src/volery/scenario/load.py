@@ -1,4 +1,4 @@
-"""From a TOML file to a `Scenario`, with errors that name file, key and what is allowed."""
+"""Loads a `Scenario` from a TOML file, with errors that name file, key and allowed values."""
 
 from __future__ import annotations
 
@@ -21,13 +21,12 @@ _MOST_SHOWN = 60
 def load_scenario(
     name_or_path: str | Path, *, trust: bool = False, confined: bool = False
 ) -> Scenario:
-    """Load a scenario by its name in the library or by the path of a TOML file.
+    """Loads a scenario by its name in the library or by the path of a TOML file.
 
-    trust: whether nodes may be modules that lie beside the file or in the working folder; without
-    it nodes come from Volery and from installed packages. confined: the file is another person's:
-    it reads only below its own folder and among shipped data, and starts shipped nodes only.
-
-    Raises `ScenarioError` naming file, key and what is allowed.
+    trust: whether nodes may be modules in the file's folder or the working folder; otherwise nodes
+    come from Volery and from installed packages. confined: whether the file is another person's:
+    then it reads only below its own folder and among shipped data, and starts shipped nodes only.
+    Raises `ScenarioError`, naming file, key and allowed values, for an invalid file.
     """
     path = _find(name_or_path)
     try:
@@ -48,10 +47,11 @@ def parse_scenario(
     where: str = "scenario",
     access: ScenarioAccess = ScenarioAccess(),  # noqa: B008 - frozen
 ) -> Scenario:
-    """Check plain data against the schema.
+    """Returns the scenario of plain data, validated against the schema.
 
-    where: names the source in errors. access: what the scenario may reach; unless given that of a
-    program which makes a scenario itself. `ScenarioError` names key and what is allowed.
+    where: names the source in errors. access: files and code that the scenario may use; the default
+    is for scenarios that a program makes. Raises `ScenarioError`, naming key and allowed values,
+    for invalid data.
     """
     try:
         scenario = Scenario.model_validate(data)
@@ -63,13 +63,13 @@ def parse_scenario(
 def describe_validation_error(
     error: ValidationError, where: str, model: type[BaseModel], data: Any
 ) -> str:
-    """One line a fault: file, key, what was found and what is allowed.
+    """Returns one line per fault: file, key, found value and allowed values.
 
-    `data` is the checked input; it tells real keys from pydantic's names of union branches.
+    `data` is the validated input, which distinguishes keys from pydantic's names of union branches.
     """
     faults = error.errors()
     inner = [f["loc"] for f in faults]
-    # A list whose item is at fault is also reported as too short: that says nothing new.
+    # A list with an invalid item is also reported as too short, which is redundant.
     faults = [
         f
         for f in faults
@@ -105,7 +105,7 @@ def _describe(fault: Any, model: type[BaseModel], data: Any) -> str:
 
 
 def _short(value: str | float) -> str:
-    """A value as an error shows it: a token, not the text of a file."""
+    """Returns a value for an error: a token, not the text of a file."""
     text = repr(value)
     return text if len(text) <= _MOST_SHOWN else f"{text[:_MOST_SHOWN]}..."
 
@@ -115,7 +115,7 @@ def _key(location: tuple[int | str, ...], data: Any, *, keep_last: bool) -> str:
     tagged: Any = None
     for position, part in enumerate(location):
         if isinstance(data, dict) and data.get("kind") == part and data is not tagged:
-            tagged = data  # the name of a union branch, even where a key is called like it
+            tagged = data  # the name of a union branch, even if a key has the same name
             continue
         is_key = isinstance(part, int) or (isinstance(data, dict) and part in data)
         if not is_key and not (keep_last and position == len(location) - 1):
@@ -129,7 +129,7 @@ def _key(location: tuple[int | str, ...], data: Any, *, keep_last: bool) -> str:
 
 
 def _names_tables(model: type[BaseModel], location: tuple[int | str, ...]) -> bool:
-    """Whether the key is the header of an array of tables."""
+    """Returns whether the key is the header of an array of tables."""
     schema = model.model_json_schema()
     node: Any = schema
     for part in location:
@@ -140,7 +140,7 @@ def _names_tables(model: type[BaseModel], location: tuple[int | str, ...]) -> bo
 
 
 def _sibling_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
-    """Keys allowed where the unknown key stands, read from the JSON schema."""
+    """Returns the keys allowed at the position of the unknown key, from the JSON schema."""
     schema = model.model_json_schema()
     node: Any = schema
     for part in location[:-1]:

@@ -1,4 +1,4 @@
-"""Lays changes over data that consists of nested tables."""
+"""Merges changes into nested tables."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import Any
 
 
 def merged(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return `data` with `changes`: tables merge key by key, all else (lists too) is replaced.
+    """Returns `data` with `changes`: tables merge key by key, all else (lists too) is replaced.
 
-    A table of another `kind` replaces the whole table: its keys are others.
+    A table of another `kind` replaces the whole table, because its keys differ.
     """
     result = dict(data)
     for key, change in changes.items():

@@ -1,4 +1,4 @@
-"""Scenario data of navigation: the map's place on the earth and the sensors that refer to it."""
+"""Scenario data of navigation: the map's position on the earth and its sensors."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from volery.scenario.base import Data, MountedSensor, Name, Rate, Vector2, check
 
 
 class Origin(Data):
-    """Where on the earth (WGS-84) the map's origin lies; x points east, y north.
+    """Position of the map's origin on the earth (WGS-84); x points east, y north.
 
     The default is that of PX4's simulations: Zurich, Irchel Park.
     """
@@ -20,23 +20,23 @@ class Origin(Data):
     latitude_deg: Annotated[float, Field(ge=-90.0, le=90.0)] = 47.397742
     longitude_deg: Annotated[float, Field(ge=-180.0, le=180.0)] = 8.545594
     altitude_m: Annotated[float, Field(ge=-500.0, le=9000.0)] = 488.0
-    """Height above the ellipsoid, and above sea level: the geoid is left out."""
+    """Height above the ellipsoid and above sea level: the geoid is ignored."""
 
 
 class MagneticField(Data):
-    """The earth's field; what is left out follows from the origin (IGRF-14)."""
+    """The earth's magnetic field; omitted values follow from the origin (IGRF-14)."""
 
     declination_deg: Annotated[float, Field(ge=-180.0, le=180.0)] | None = None
-    """East of true north."""
+    """Declination east of true north."""
     inclination_deg: Annotated[float, Field(ge=-90.0, le=90.0)] | None = None
-    """Below the horizon."""
+    """Inclination below the horizon."""
     strength_ut: Annotated[float, Field(gt=0.0, le=1000.0)] | None = None
     """Microtesla."""
 
 
 class _DeniedArea(Data):
     height_m: Vector2 | None = None
-    """Lowest and highest z in the map; left out: all."""
+    """Minimum and maximum z in the map; omitted: all."""
 
     @model_validator(mode="after")
     def _height_is_a_range(self) -> Self:
@@ -59,7 +59,7 @@ class DeniedBox(_DeniedArea):
 
     @property
     def corners_m(self) -> tuple[Vector2, ...]:
-        """Corners in order around."""
+        """Corners of the rectangle, in order around."""
         x0, y0, x1, y1 = self.region_m
         return ((x0, y0), (x1, y0), (x1, y1), (x0, y1))
 
@@ -69,7 +69,7 @@ class DeniedPolygon(_DeniedArea):
 
     kind: Literal["polygon"]
     corners_m: Annotated[tuple[Vector2, ...], Field(min_length=3)]
-    """In order around; the last is joined to the first."""
+    """Corners in order around; the last connects to the first."""
 
     @model_validator(mode="after")
     def _covers_ground(self) -> Self:
@@ -85,7 +85,7 @@ DeniedArea: TypeAlias = Annotated[DeniedBox | DeniedPolygon, Field(discriminator
 
 
 class GnssSensor(MountedSensor):
-    """Satellite navigation receiver; its antenna sits at `position_m`."""
+    """GNSS receiver; its antenna is at `position_m`."""
 
     kind: Literal["gnss"]
     name: Name = "fix"

@@ -1,4 +1,4 @@
-"""Names of nodes: `slam`, which an installed package registers, or `my_package.planning:Planner`.
+"""Names of nodes: `slam`, registered by an installed package, or `my_package.planning:Planner`.
 
 Packages register their nodes as entry points of the group `volery.nodes`; Volery registers its own
 in `pyproject.toml`.
@@ -13,7 +13,7 @@ from volery.core.entry_points import EntryPoints
 from volery.core.errors import ScenarioError
 
 NODE_PATTERN = r"^(\w[\w-]*|[\w.]+:\w+)$"
-"""What scenarios, profiles and the command line take: a registered name or `module:Class`."""
+"""Pattern of node names: a registered name or `module:Class`."""
 
 _REGISTERED = EntryPoints("volery.nodes")
 _FORMER_PATHS = {
@@ -35,7 +35,7 @@ _FORMER_PATHS = {
     "volery.comms.radio_node:RadioNode": "radio",
     "volery.mavlink.node:AutopilotNode": "mavlink_autopilot",
 }
-"""Names by the paths that recorded logs hold, from before nodes had names."""
+"""Names by former paths, which recorded logs contain."""
 
 
 def registered_nodes() -> dict[str, str]:
@@ -46,8 +46,8 @@ def registered_nodes() -> dict[str, str]:
 def node_path(node: str) -> str:
     """Returns a node's `module:Class`. Imports nothing.
 
-    Raises `ScenarioError` for a name that no installed package registers. Warns of a path
-    that a node has no longer.
+    Raises `ScenarioError` for a name that no installed package registers. Warns of a node's
+    former path.
     """
     if node in _FORMER_PATHS:
         return _moved(node)
@@ -65,7 +65,7 @@ def node_path(node: str) -> str:
 
 
 def _moved(node: str) -> str:
-    """Returns where a node is now that had this path when nodes got names."""
+    """Returns the present path of a node with this former path."""
     name = _FORMER_PATHS[node]
     path = node_path(name)
     if path != node:
@@ -74,7 +74,7 @@ def _moved(node: str) -> str:
 
 
 def is_same_node(one: str, other: str) -> bool:
-    """Returns whether two names stand for one class; False for unknown names."""
+    """Returns whether two names refer to the same class; False for unknown names."""
     try:
         return node_path(one) == node_path(other)
     except ScenarioError:

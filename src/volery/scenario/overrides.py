@@ -1,4 +1,4 @@
-"""Changes to a loaded scenario that a command line asks for."""
+"""Overrides of a loaded scenario from the command line."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ def apply(
     seed: int | None = None,
     nodes: bool = True,
 ) -> Scenario:
-    """Return the scenario with another fleet size, duration or seed, checked anew.
+    """Returns the scenario with another fleet size, duration or seed, validated.
 
-    `uavs` sets the count of a scenario's only group; a scenario with several groups says itself
-    how many fly, and asking for another number raises `ScenarioError`. `nodes`: False: none of
-    its nodes, because they run elsewhere.
+    `uavs` sets the count of a scenario's only group. `nodes`: False removes its nodes, for nodes
+    that run elsewhere. Raises `ScenarioError` for invalid values, or if `uavs` is given for a
+    scenario with several groups.
     """
     data: dict[str, Any] = scenario.model_dump(exclude_unset=True)
     if seconds is not None:

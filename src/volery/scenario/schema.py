@@ -1,6 +1,6 @@
-"""The scenario: frozen data that says what to simulate, checked on construction.
+"""The scenario: frozen data that defines a simulation, validated on construction.
 
-Keys carry their units (`_m`, `_deg`, `_hz`, ...). A TOML file maps onto `Scenario` one to one;
+Keys contain their units (`_m`, `_deg`, `_hz`, ...). A TOML file maps onto `Scenario` one to one;
 docs/scenarios.md explains it and `Scenario.model_json_schema()` serves editors.
 """
 
@@ -40,7 +40,7 @@ from volery.scenario.wind import Wind
 
 
 class FlatTerrain(Data):
-    """Level ground from -extent_m to extent_m in x and y."""
+    """Horizontal ground from -extent_m to extent_m in x and y."""
 
     kind: Literal["flat"] = "flat"
     extent_m: Positive = 500.0
@@ -57,18 +57,20 @@ class GridTerrain(Data):
 
 
 class InventoryForest(Data):
-    """Trees at surveyed places: CSV with `x_m,y_m[,dbh_cm,height_m,species]`."""
+    """Trees at surveyed positions: CSV with `x_m,y_m[,dbh_cm,height_m,species]`."""
 
     kind: Literal["inventory"]
     file: str
     species: str
-    """Of trees for which the inventory names none, or one that neither ships nor is mapped."""
+    """Species of trees without one in the inventory, or with one that is neither shipped nor
+    mapped."""
     species_map: Annotated[dict[str, str], Field(max_length=10_000)] = Field(default_factory=dict)
-    """The inventory's names of species to names of shipped ones."""
+    """Shipped species by the inventory's names of species."""
     region_m: tuple[float, float, float, float] | None = None
-    """x_min, y_min, x_max, y_max; trees with x_min <= x < x_max are kept. None keeps all."""
+    """x_min, y_min, x_max, y_max; only trees with x_min <= x < x_max (y alike) are used. None uses
+    all."""
     fraction: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
-    """Of the trees, at random; the trees of a smaller fraction are among those of a larger one."""
+    """Fraction of the trees, at random; a smaller fraction is a subset of a larger one."""
 
     former_keys: ClassVar[Mapping[str, str]] = {"share": "fraction"}
 
@@ -79,14 +81,14 @@ class InventoryForest(Data):
 
 
 class ProceduralForest(Data):
-    """Trees thrown at random with a minimum spacing."""
+    """Trees at random positions with a minimum spacing."""
 
     kind: Literal["procedural"]
     region_m: tuple[float, float, float, float]
     trees: Annotated[int, Field(ge=0, le=200_000)]
     minimum_spacing_m: NonNegative = 1.0
     species: Annotated[dict[str, Positive], Field(min_length=1)]
-    """Species name to its share; shares are normalised."""
+    """Fractions by species; they are normalised."""
 
     @model_validator(mode="after")
     def _region_is_a_rectangle(self) -> Self:
@@ -100,13 +102,13 @@ class World(Data):
     former_keys: ClassVar[Mapping[str, str]] = {"things": "actors"}
 
     seed: Annotated[int, Field(ge=0, lt=2**63)] | None = None
-    """Seed of what stands in the world alone; None: the scenario's seed grows it too."""
+    """Seed of the world alone; None: the scenario's seed is used."""
     terrain: Annotated[FlatTerrain | GridTerrain, Field(discriminator="kind")] = FlatTerrain()
     forest: Annotated[InventoryForest | ProceduralForest | None, Field(discriminator="kind")] = None
     city: City | None = None
     grid_map: GridMapWorld | None = None
     meshes: Annotated[tuple[UserMesh, ...], Field(max_length=1000)] = ()
-    """Files of the user's own that stand in the world."""
+    """Mesh files of the user."""
     actors: Actors = ()
     wind: Wind = Wind()
     weather: Weather = Weather()
@@ -114,7 +116,7 @@ class World(Data):
     origin: Origin = Origin()
     magnetic_field: MagneticField = MagneticField()
     gnss_denied: bool = False
-    """No satellite signals anywhere, for the whole run."""
+    """Whether satellite signals are denied everywhere, for the whole run."""
     gnss_denied_areas: tuple[DeniedArea, ...] = ()
 
     @model_validator(mode="after")
@@ -127,7 +129,7 @@ class World(Data):
 
 
 class Nodding(Data):
-    """Sinusoidal tilt of a mount about the sensor's y axis (positive looks down)."""
+    """Sinusoidal tilt of a mount about the sensor's y axis (positive tilts downward)."""
 
     amplitude_deg: Annotated[float, Field(gt=0.0, le=90.0)] = 45.0
     period_s: Annotated[float, Field(ge=0.1, le=60.0)] = 2.0
@@ -136,15 +138,15 @@ class Nodding(Data):
 
 
 class LidarSensor(MountedSensor):
-    """A scanning range finder of a named model: planar, with many rings, or with a rosette."""
+    """A LIDAR of a named model: planar, with many rings, or with a rosette."""
 
     kind: Literal["lidar"]
     name: Name = "horizontal"
     model: str = "utm_30lx"
     topic: Topic | None = None
-    """Below the UAV's name; None: `laser/NAME/scan` of a planar scanner, else `points`."""
+    """Topic below the UAV's name; None: `laser/NAME/scan` for a planar scanner, else `points`."""
     intensities: bool | None = None
-    """Whether echoes carry their strength; None: as the model says."""
+    """Whether echoes have intensities; None: the model's default."""
     nodding: Nodding | None = None
 
 
@@ -158,7 +160,7 @@ class ImuSensor(MountedSensor):
 
 
 class SonarSensor(MountedSensor):
-    """Ultrasonic range finder looking down."""
+    """Downward ultrasonic range finder."""
 
     kind: Literal["sonar"]
     name: Name = "range"
@@ -167,7 +169,7 @@ class SonarSensor(MountedSensor):
 
 
 class OdometrySensor(SensorData):
-    """Pose and velocity as an odometry source gives them: true motion plus a stated drift."""
+    """Pose and velocity from an odometry source: true motion plus a modelled drift."""
 
     kind: Literal["odometry"]
     name: Literal["odom"] = "odom"
@@ -177,22 +179,22 @@ class OdometrySensor(SensorData):
 
 
 class ExternalOdometrySource(Data):
-    """Odometry of a node, such as a SLAM's, that aids an estimator; taken for one in the map.
+    """Odometry of a node, such as a SLAM's, that aids an estimator; assumed to be in the map frame.
 
-    What such odometry states is how far it has drifted from the map. The UAV flies in the frame
-    of the odometry, where its errors are those of one pose beside the next: `sigma_m`, `sigma_deg`.
+    Covariances of such odometry state its drift from the map. The UAV flies in the frame of the
+    odometry, where its errors are those of one pose relative to the next: `sigma_m`, `sigma_deg`.
     """
 
     topic: Topic
-    """nav_msgs/Odometry, below the UAV's name."""
+    """Topic of type nav_msgs/Odometry, below the UAV's name."""
     sigma_m: Annotated[float, Field(gt=0.0, le=100.0)] = 0.05
     sigma_deg: Annotated[float, Field(gt=0.0, le=180.0)] = 1.0
     rate_hz: Rate = 10.0
-    """The most poses a second that are taken: closer ones repeat each other's errors."""
+    """Maximum rate of poses: closer ones repeat each other's errors."""
 
 
 class EstimateSensor(SensorData):
-    """What the UAV's estimator makes of its other sensors, as odometry; it needs an IMU."""
+    """Output of the UAV's estimator, as odometry; it needs an IMU."""
 
     kind: Literal["estimate"]
     name: Literal["odom"] = "odom"
@@ -216,7 +218,7 @@ class GroundTruthSensor(SensorData):
 
 
 class BatterySensor(SensorData):
-    """Voltage, current and charge of the battery, if the airframe has one."""
+    """Battery monitor: voltage, current and charge, if the airframe has a battery."""
 
     kind: Literal["battery"]
     name: Literal["battery"] = "battery"
@@ -257,23 +259,23 @@ _TAKEN_NAMES = (
     "take_off",
     "trajectory",
 )
-"""Frames, topics and services of a UAV that no sensor may take ..."""
+"""Frames, topics and services of a UAV that sensors cannot use as names ..."""
 _OWN_NAMES = ("lidar", "odometry", "estimate", "ground_truth", "battery")
-"""... but for kinds whose name is given, and LIDARs, whose topics have a word before it."""
+"""... except for kinds with a fixed name, and LIDARs, whose topics have a prefix."""
 
 
 class Flight(Data):
-    """How the flight modes fly this type of UAV."""
+    """Parameters of the flight modes of this type of UAV."""
 
     take_off_altitude_m: Annotated[float, Field(ge=0.3, le=500.0)] = 2.5
-    """Height above the place of take-off."""
+    """Height above the take-off position."""
     return_altitude_m: Annotated[float, Field(ge=0.3, le=500.0)] = 10.0
     command_timeout_s: Annotated[float, Field(ge=0.05, le=60.0)] = 0.5
-    """Without a new velocity command for this long the UAV holds its place."""
+    """Time without a velocity command after which the UAV holds its position."""
 
 
 class NodeEntry(Data):
-    """A node that runs inside the simulation, in lock step: beside a UAV, or for all of them."""
+    """A node that runs inside the simulation, in lock step: for one UAV, or for all of them."""
 
     node: Annotated[str, Field(pattern=NODE_PATTERN)]
     """A registered name, such as `slam`, or `module:Class`, a `volery.graph.nodes.node.Node`."""
@@ -283,43 +285,43 @@ class NodeEntry(Data):
 
 
 class RotorWear(Data):
-    """What use has made of a rotor and its motor, as factors of a new one's numbers."""
+    """Wear of a rotor and its motor, as factors of a new one's numbers."""
 
     thrust: Annotated[float, Field(ge=0.0, le=1.0)] = 1.0
-    """0: a lost motor, which stands still."""
+    """Thrust; 0: a failed motor, which is stopped."""
     torque: Annotated[float, Field(ge=0.1, le=10.0)] = 1.0
-    """Of the reaction torque and so of the power."""
+    """Reaction torque, and so the power."""
     lag: Annotated[float, Field(ge=0.1, le=10.0)] = 1.0
-    """Of the times in which it speeds up and slows down."""
+    """Times of speeding up and slowing down."""
 
 
 class KinematicMotion(Data):
-    """How a kinematic UAV answers velocity commands."""
+    """Response of a kinematic UAV to velocity commands."""
 
     time_constant_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.0
     """First-order lag of velocity and yaw rate; 0: at once."""
     limited: bool = False
-    """Whether the airframe's limits of speed, climb, descent and yaw rate bind it."""
+    """Whether the airframe's limits of speed, climb, descent and yaw rate apply."""
 
 
 class UavType(Data):
-    """What a UAV is made of and what runs on it."""
+    """A type of UAV: airframe, plant, sensors and nodes."""
 
     airframe: str = "f450"
     plant: Literal["rigid_body", "identified", "kinematic"] = "rigid_body"
-    """What turns commands into motion; the airframe gives size and limits to all of them."""
+    """Model of motion; the airframe defines size and limits for all of them."""
     identified_model: str | None = None
     """Model of an identified plant: a shipped name or a .toml path; None: the airframe's name."""
     kinematic: KinematicMotion = KinematicMotion()
     wear: tuple[RotorWear, ...] = ()
-    """One a rotor, in the order of the airframe; none: all are new."""
+    """One entry per rotor, in the order of the airframe; empty: all are new."""
     battery_charge: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
-    """Share of the capacity at the start, if the airframe has a battery."""
+    """Fraction of the capacity at the start, if the airframe has a battery."""
     flight: Flight = Flight()
     sensors: tuple[Sensor, ...] = ()
     nodes: tuple[NodeEntry, ...] = ()
     radio: bool = True
-    """Whether it has one, where the scenario has `[radio]`."""
+    """Whether the UAV has a radio, if the scenario has `[radio]`."""
 
     @model_validator(mode="after")
     def _settings_are_of_the_plant(self) -> Self:
@@ -348,7 +350,7 @@ class UavType(Data):
             if sensor.kind not in _OWN_NAMES and taken:
                 raise ValueError(
                     f"'{sensor.name}' is no name for a sensor of kind {sensor.kind}: names that "
-                    f"begin with laser are taken, and {', '.join(_TAKEN_NAMES)}"
+                    f"begin with laser are reserved, and {', '.join(_TAKEN_NAMES)}"
                 )
         return self
 
@@ -359,11 +361,11 @@ class UavGroup(Data):
     type: str
     count: Annotated[int, Field(ge=1, le=10_000)] = 1
     position_m: Annotated[tuple[float, ...], Field(min_length=2, max_length=3)]
-    """x, y (standing on the ground) or x, y, z in the map."""
+    """x, y (on the ground) or x, y, z in the map."""
     last_position_m: Vector2 | None = None
     yaw_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 0.0
     placement: Literal["exact", "nearest_free"] = "exact"
-    """`nearest_free` looks around each place for one with room to stand and to climb."""
+    """`nearest_free` searches around each position for one with free space to take off."""
     on_start: Literal["wait", "take_off"] = "wait"
 
     @model_validator(mode="after")
@@ -377,16 +379,17 @@ class UavGroup(Data):
 
 
 class Physics(Data):
-    """The inner step and what a touch does."""
+    """Physics step and effect of contacts."""
 
     rate_hz: Annotated[int, Field(ge=200, le=4000)] = 1000
     guidance_rate_hz: Annotated[int, Field(ge=25, le=1000)] = 125
-    """Flight modes and outer loop, in whole physics steps; attitude runs at 250 Hz or as often."""
+    """Rate of flight modes and outer loop, in whole physics steps; attitude control runs at 250 Hz
+    or at this rate, if higher."""
     on_contact: Literal["crash", "bounce"] = "crash"
 
 
 class Scenario(Data):
-    """Everything a run needs, as data."""
+    """A complete simulation, as data."""
 
     name: Name
     description: str = ""
@@ -399,7 +402,7 @@ class Scenario(Data):
     types: Annotated[dict[Name, UavType], Field(min_length=1)]
     uavs: Annotated[tuple[UavGroup, ...], Field(min_length=1)]
     nodes: tuple[NodeEntry, ...] = ()
-    """Nodes of the whole system, one of each; their relative names begin at the root."""
+    """Nodes of the whole system, one of each; their relative names start at the root."""
     faults: tuple[Fault, ...] = ()
     message_packages: tuple[str, ...] = ()
     """Folders of ROS packages whose `.msg`, `.srv` and `.action` files the nodes use."""
@@ -424,22 +427,23 @@ class Scenario(Data):
 
     @property
     def world_seed(self) -> int:
-        """Seed that grows the world."""
+        """Seed of the world."""
         return self.seed if self.world.seed is None else self.world.seed
 
     @property
     def has_seeded_world(self) -> bool:
-        """Whether its seed grows trees or a city: there are some, and no `world.seed`."""
+        """Whether the scenario's seed affects trees or a city, for lack of `world.seed`."""
         world = self.world
         return world.seed is None and (world.forest is not None or world.city is not None)
 
     def with_(self, **changes: Any) -> Scenario:
-        """Return a copy with other values of its keys, checked as a file is.
+        """Returns a copy with other values of its keys, validated like a file.
 
         Tables merge key by key, all else is replaced; `with_(seed=7, world={"seed": 1})` leaves the
-        rest of the world as it is. Raises `ScenarioError` naming key and what is allowed.
+        rest of the world unchanged. Raises `ScenarioError`, naming key and allowed values, for
+        invalid values.
         """
-        from volery.scenario.load import parse_scenario  # it needs this class
+        from volery.scenario.load import parse_scenario  # imports this class
         from volery.scenario.merging import merged
 
         data = merged(self.model_dump(exclude_unset=True), changes)
@@ -447,18 +451,18 @@ class Scenario(Data):
 
     @property
     def access(self) -> ScenarioAccess:
-        """Where its files may lie and which code it may start; see `load_scenario`."""
+        """Access to files and code; see `load_scenario`."""
         return self._access
 
     def with_access(self, access: ScenarioAccess) -> Scenario:
-        """Return the same scenario with another access."""
+        """Returns the same scenario with another access."""
         changed = self.model_copy()
         changed._access = access
         return changed
 
     @property
     def node_entries(self) -> tuple[NodeEntry, ...]:
-        """All entries of nodes: those beside the UAVs, then those of the whole system."""
+        """All entries of nodes: those of UAV types, then those of the whole system."""
         return (*(entry for kind in self.types.values() for entry in kind.nodes), *self.nodes)
 
     @property

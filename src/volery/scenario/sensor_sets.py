@@ -1,4 +1,4 @@
-"""Ready-made sets of sensors that any type of UAV can be given."""
+"""Predefined sets of sensors for any type of UAV."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ SENSOR_SETS: tuple[SensorSet, ...] = get_args(SensorSet)
 
 @dataclass(frozen=True)
 class _Set:
-    """Sensors as plain data, and what they are."""
+    """Sensors as plain data, with a description."""
 
     description: str
     sensors: tuple[dict[str, Any], ...]
 
     @property
     def kinds(self) -> set[str]:
-        """Kinds of its sensors."""
+        """Kinds of the sensors."""
         return {sensor["kind"] for sensor in self.sensors}
 
 
-# Places are those of the shipped scenarios on an F450: a level scanner on top, the others below.
+# Positions of the shipped scenarios on an F450: a horizontal scanner on top, the others below.
 _SETS: dict[SensorSet, _Set] = {
     "lidar": _Set(
         "a horizontal and a nodding UTM-30LX LIDAR",
@@ -63,21 +63,22 @@ _SETS: dict[SensorSet, _Set] = {
 
 
 def describe(name: SensorSet) -> str:
-    """What is in a set."""
+    """Returns the description of a set."""
     return _SETS[name].description
 
 
 def sets_of(kind: UavType) -> tuple[SensorSet, ...]:
-    """The sets of which a type of UAV has something."""
+    """Returns the sets that a type of UAV has sensors of."""
     present = {sensor.kind for sensor in kind.sensors}
     return tuple(name for name in SENSOR_SETS if _SETS[name].kinds & present)
 
 
 def fit(kind: UavType, data: dict[str, Any], chosen: Collection[SensorSet]) -> list[dict[str, Any]]:
-    """The sensors, as plain data, of a type given as `kind` and as `data`, with the `chosen` sets.
+    """Returns the sensors of a type, as plain data, with the `chosen` sets.
 
-    Of a chosen set it keeps what it has and gets what it lacks altogether; of the others it loses
-    everything. What belongs to no set stays, and so does what its estimator lives on.
+    The type is given as `kind` and as `data`. Sensors of chosen sets remain, and missing chosen
+    sets are added; sensors of other sets are removed. Sensors outside all sets remain, and so do
+    those that the type's estimator needs.
     """
     present = set(sets_of(kind))
     wanted = set(chosen)

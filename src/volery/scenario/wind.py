@@ -9,9 +9,9 @@ from pydantic import Field, model_validator
 from volery.scenario.base import Data, Positive, Vector3
 
 MAX_WIND_M_S = 60.0
-"""Largest component of any wind, gust or node of a field."""
+"""Maximum component of any wind, gust or node of a field."""
 MAX_GUSTS = 64
-"""Gusts that a weather may hold at once."""
+"""Maximum number of gusts in a weather."""
 
 _Height = Annotated[float, Field(ge=0.1, le=304.8)]
 
@@ -21,7 +21,7 @@ class LogProfile(Data):
 
     kind: Literal["log"]
     reference_height_m: _Height = 10.0
-    """Height at which velocity_m_s blows."""
+    """Height of velocity_m_s."""
     roughness_m: Annotated[float, Field(ge=1e-6, le=10.0)] = 0.03
 
     @model_validator(mode="after")
@@ -40,15 +40,15 @@ class PowerProfile(Data):
 
 
 class Gust(Data):
-    """A 1-cosine gust that rises, stays, and falls again; its end is when it is over."""
+    """A 1-cosine gust that rises, holds, and falls to its end."""
 
     amplitude_m_s: Vector3
     start_s: Annotated[float, Field(ge=0.0, le=1e6)]
     rise_s: Annotated[float, Field(ge=1e-3, le=1e6)] | None = None
     rise_m: Annotated[float, Field(ge=1.0, le=1e5)] | None = None
-    """Instead of rise_s: length of the rise in a front that the steady wind carries."""
+    """Instead of rise_s: length of the rise in a front that moves with the steady wind."""
     end_s: Positive | None = None
-    """None: the gust stays."""
+    """End of the fall; None: the gust is permanent."""
 
     @model_validator(mode="after")
     def _rises_one_way(self) -> Self:
@@ -81,7 +81,7 @@ class Wind(Data):
     @model_validator(mode="after")
     def _is_told_once(self) -> Self:
         if self.field is not None and (self.profile is not None or any(self.velocity_m_s)):
-            raise ValueError("a field takes the place of velocity_m_s and profile; leave them out")
+            raise ValueError("a field replaces velocity_m_s and profile; leave them out")
         if self.w20_m_s is not None and self.turbulence != "none":
             raise ValueError("turbulence and w20_m_s exclude each other; leave one out")
         return self
@@ -101,7 +101,7 @@ class Wind(Data):
 
     @property
     def speed_m_s(self) -> float:
-        """Of the steady wind."""
+        """Speed of the steady wind."""
         x, y, z = self.velocity_m_s
         return float((x * x + y * y + z * z) ** 0.5)
 

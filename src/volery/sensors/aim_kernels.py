@@ -1,7 +1,7 @@
-"""Compiled aiming of LIDARs: each ray from the pose that its sensor had at the ray's own time.
+"""Compiled aiming of LIDARs: each ray starts from the sensor's pose at the ray's own time.
 
-The sensor's pose is looked up in the fleet's history at the knots of each packet of rays; between
-them origin and axes are interpolated.
+The sensor's pose is read from the fleet's history at the knots of each packet of rays; between the
+knots, origin and axes are interpolated.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from volery.vehicle.pose_history import PoseHistory, pose_at
 from volery.world.embree import DIRECTION, LANES, ORIGIN, PACKET_ROWS
 
 _LONGEST_CHORD_NS = 2_000_000
-"""Packets that last longer have the pose looked up for every ray.
+"""For longer packets the pose is read for every ray.
 
-In 2 ms a UAV that turns at 10 rad/s turns by .02 rad, and the mean of two axes is short by 5e-5 at
-most, which one Newton step for 1 / sqrt sets right.
+In 2 ms a UAV that turns at 10 rad/s turns by .02 rad, and the mean of two axes is too short by at
+most 5e-5, which one Newton step for 1 / sqrt corrects.
 """
 
 Frame: TypeAlias = tuple[
@@ -31,25 +31,25 @@ Frame: TypeAlias = tuple[
 
 
 class MountTable(NamedTuple):
-    """Mounts in rows; see `Mount`."""
+    """Mounts of M sensors, one row each; see `Mount`."""
 
     position_body: NDArray[np.float64]
-    """(M, 3)."""
+    """(M, 3) m, body frame FLU."""
     attitude_body: NDArray[np.float64]
-    """(M, 4)."""
+    """(M, 4) unit quaternions x y z w, body from sensor."""
     nodding: NDArray[np.float64]
-    """(M, 4) amplitude_rad, period_s, offset_rad, phase_rad."""
+    """(M, 4): amplitude_rad, period_s, offset_rad, phase_rad."""
 
 
 class RayBatch(NamedTuple):
-    """S scans to be made at once."""
+    """S scans that are computed together."""
 
     uav: NDArray[np.int64]
-    """(S,) row of the UAV in history and scene."""
+    """(S,) row of the UAV in the pose history and in the scene."""
     mount: NDArray[np.int64]
     """(S,) row in `mounts`."""
     sweep_start_ns: NDArray[np.int64]
-    """(S,) time of the first beam."""
+    """(S,) time of the first beam, ns."""
     key: NDArray[np.uint64]
     """(S,) stream key of the sensor (core.rng.stream_key)."""
     scan_number: NDArray[np.int64]
@@ -59,8 +59,8 @@ class RayBatch(NamedTuple):
 
 @inner_kernel
 def sensor_frame(batch: RayBatch, scan: int, history: PoseHistory, time_ns: int) -> Frame:
-    """Origin, x axis, y axis and z axis of the sensor in the map at a time."""
-    # Number by number: slices of arrays would be counted in memory that threads share.
+    """Returns the sensor's origin (m) and its x, y and z axes in the map frame at a time."""
+    # Scalars only: slices would change reference counts in memory that threads share.
     row = batch.mount[scan]
     place, base, nods = batch.mounts
     x, y, z, px, py, pz, pw = pose_at(history, batch.uav[scan], time_ns)
@@ -68,7 +68,7 @@ def sensor_frame(batch: RayBatch, scan: int, history: PoseHistory, time_ns: int)
     qx, qy, qz, qw = nodded(base[row, 0], base[row, 1], base[row, 2], base[row, 3], angle)
     mx, my, mz = rotate_vector(px, py, pz, pw, place[row, 0], place[row, 1], place[row, 2])
     ax, ay, az, aw = quaternion_product(px, py, pz, pw, qx, qy, qz, qw)
-    a, b, c = matrix_rows(ax, ay, az, aw)  # whose columns are the sensor's axes
+    a, b, c = matrix_rows(ax, ay, az, aw)  # the columns are the sensor's axes
     return x + mx, y + my, z + mz, a[0], b[0], c[0], a[1], b[1], c[1], a[2], b[2], c[2]
 
 
@@ -82,13 +82,13 @@ def aim_packets(
     count: int,
     rays: NDArray[np.float32],
 ) -> None:
-    """Fill packets (P, PACKET_ROWS, LANES) with `count` packets of a scan from packet `first` on.
+    """Fills packets (P, PACKET_ROWS, LANES) with `count` packets of a scan, from packet `first` on.
 
-    Neighbouring packets often share knots; what is known already is not looked up again.
+    Neighbouring packets often share knots; the pose of a shared knot is read once.
     """
     start = batch.sweep_start_ns[scan]
-    # Flat slices with constant offsets: only so the compiler sees that nothing overlaps, and makes
-    # vectors of the loop over the lanes.
+    # Flat slices with constant offsets show the compiler that nothing overlaps, so that it
+    # vectorizes the loop over the lanes.
     aims, out = table.lanes.reshape(table.lanes.size), rays.reshape(rays.size)
     knot_ns = table.knot_ns
     a_ns = b_ns = knot_ns[first, 0]
@@ -134,7 +134,7 @@ def _aim_one_by_one(
     rays: NDArray[np.float32],
     p: int,
 ) -> None:
-    """Fill packet `p` of `rays`, looking the pose up for every ray."""
+    """Fills packet `p` of `rays`, reading the pose for every ray."""
     start, end = table.knot_ns[packet, 0], table.knot_ns[packet, 1]
     aim = table.lanes
     for k in range(LANES):
@@ -156,7 +156,7 @@ def sweep_rays(
     rays: NDArray[np.float32],
     times_ns: NDArray[np.int64],
 ) -> None:
-    """Beams of one scan (6, beams) and when they see the others, for a caster in Python."""
+    """Fills `rays` (6, beams) and the times at which they see other UAVs, for callers in Python."""
     aim_packets(table, batch, scan, history, 0, packets.shape[0], packets)
     for r in range(table.rays):
         i = table.beam[r]
@@ -173,7 +173,7 @@ def poses_at(
     position: NDArray[np.float64],
     attitude: NDArray[np.float64],
 ) -> None:
-    """Poses (N, 3), (N, 4) of all UAVs at a time."""
+    """Fills `position` (N, 3) m and `attitude` (N, 4) with all UAVs' poses at a time, map frame."""
     for i in range(position.shape[0]):
         x, y, z, qx, qy, qz, qw = pose_at(history, i, time_ns)
         position[i, 0], position[i, 1], position[i, 2] = x, y, z

@@ -1,4 +1,4 @@
-"""What every bank of sensors offers, and the little that banks share."""
+"""Interface of sensor banks, and code that banks share."""
 
 from __future__ import annotations
 
@@ -15,36 +15,43 @@ from volery.sensors.samples import Samples, SensorId
 
 
 class Bank(Protocol):
-    """All sensors of one kind, model, rate and phase: sampled together.
+    """Samples all sensors of one kind, model, rate and phase together.
 
-    Measurements are numbered from k = 0 at the schedule's phase. A bank's result depends on k, time
-    and the fleet alone: not on how a run is sliced, nor on which other UAVs fly.
+    Measurements are numbered from k = 0 at the schedule's phase. The result depends on k, the time
+    and the fleet alone: it does not change with the slicing of a run or with other UAVs.
     """
 
     @property
     def name(self) -> str:
-        """Kind of the sensors."""
+        """Kind of the sensors, such as `imu`."""
 
     @property
     def schedule(self) -> Schedule:
-        """When they measure."""
+        """Rate and phase of the measurements."""
 
     @property
     def lag_ns(self) -> int:
-        """How long after its instant a measurement is known: a LIDAR's sweep, a GNSS's delay."""
+        """Delay until a measurement is available, ns: a LIDAR's sweep, a GNSS's delay."""
 
     @property
     def sensors(self) -> tuple[SensorId, ...]:
-        """Which they are, row by row."""
+        """Sensors of the bank; row i of every sample array belongs to `sensors[i]`."""
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> Samples:
-        """Measurement number k."""
+        """Returns measurement number `k` of all S sensors of the bank.
+
+        `time_ns` is the time of the measurement (of the first beam or image row, for sweeps), ns on
+        the simulation's clock; the call follows `lag_ns` later. `fleet` holds the present state and
+        the pose history. The arrays of the result have one row per sensor, in the order of
+        `sensors`, are new and read-only; units and frames are those of the classes in `samples`. A
+        bank with noise that drifts expects increasing `k`.
+        """
 
     def get_state(self) -> dict[str, Any]:
-        """Everything that changes, as plain data: arrays and dicts of them, all of them copies."""
+        """Returns all variable state as plain data: dictionaries of copied arrays."""
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state; the same measurements follow."""
+        """Restores a state of `get_state`; the same measurements follow."""
 
     def reset(
         self,
@@ -53,25 +60,25 @@ class Bank(Protocol):
         time_ns: int,
         k: int,
     ) -> None:
-        """Put the sensors of some UAVs back to their start, after the fleet has been put back.
+        """Resets the sensors of some UAVs, after the fleet has been reset.
 
-        `uavs` are rows of the fleet, None means all. `keys` hold one noise stream for each sensor
-        put back, in the order of `sensors`; None keeps the streams, and a bank without noise
-        ignores them. From `time_ns` on, with measurement number `k` as their first, the sensors
-        measure as those of a fresh bank do from its first measurement. What follows from the clock
-        alone, such as the angle of a nodding mount, goes on.
+        `uavs` (U,) are rows of the fleet; None means all. `keys` hold one noise stream for each
+        reset sensor, in the order of `sensors`; None leaves the streams unchanged, and a bank
+        without noise ignores them. From `time_ns` on, with measurement number `k` as their first,
+        the sensors measure like those of a new bank. Quantities that depend on the clock alone,
+        such as the angle of a nodding mount, continue.
         """
 
 
 class Memoryless:
-    """A bank whose measurements follow from the fleet's state alone: nothing to keep or reset."""
+    """A bank whose measurements depend on the fleet's state alone: without state of its own."""
 
     def get_state(self) -> dict[str, Any]:
-        """Nothing."""
+        """Returns an empty state."""
         return {}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Nothing to go back to."""
+        """Does nothing: the bank has no state."""
 
     def reset(
         self,
@@ -80,15 +87,15 @@ class Memoryless:
         time_ns: int,
         k: int,
     ) -> None:
-        """Nothing to put back."""
+        """Does nothing: the bank has no state."""
 
 
 class NoisyBank:
-    """A bank whose sensors have noise streams, and may remember something between measurements.
+    """A bank whose sensors have noise streams, and may have state between measurements.
 
     `keys` (S,) are the streams, or None for sensors without noise; `NoiseStreams` explains
-    `at_start` and `per_measurement`. What the sensors remember is arrays (S, ...), attributes that
-    a bank names in `_KEPT` and puts back in `_switch_on`: keeping, restoring and resetting follow.
+    `at_start` and `per_measurement`. State is held in arrays (S, ...), attributes that a subclass
+    names in `_KEPT` and resets in `_switch_on`; saving, restoring and resetting follow from these.
     """
 
     _KEPT: ClassVar[tuple[str, ...]] = ()
@@ -110,15 +117,15 @@ class NoisyBank:
         )
 
     def _switch_on(self, rows: NDArray[np.int64], time_ns: int) -> None:
-        """Put what the sensors `rows` remember back to what it is at their start, `time_ns`."""
+        """Resets the state of the sensors `rows` (R,) to that at their start, `time_ns`."""
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps: noise streams, and copies of what the sensors remember."""
+        """Returns the noise streams and copies of the sensors' state."""
         kept = {name.lstrip("_"): getattr(self, name).copy() for name in self._KEPT}
         return {"noise": self._noise.get_state(), **kept}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a state of `get_state`."""
         self._noise.set_state(state["noise"])
         for name in self._KEPT:
             setattr(self, name, np.array(state[name.lstrip("_")]))
@@ -130,19 +137,19 @@ class NoisyBank:
         time_ns: int,
         k: int,
     ) -> None:
-        """Give the sensors of some UAVs fresh noise and switch them on; see `Bank.reset`."""
+        """Resets noise and state of the sensors of some UAVs; see `Bank.reset`."""
         rows = rows_of(self._rows, uavs)
         self._noise.restart(rows, keys, k)
         self._switch_on(rows, time_ns)
 
 
 def uav_rows(sensors: Sequence[SensorId]) -> NDArray[np.int64]:
-    """The UAV of each sensor (S,), as rows of the fleet."""
+    """Returns the UAV of each sensor, (S,) rows of the fleet."""
     return np.array([sensor.uav for sensor in sensors], dtype=np.int64)
 
 
 def rows_of(uav_of_row: NDArray[np.int64], uavs: NDArray[np.int64] | None) -> NDArray[np.int64]:
-    """Rows of a bank that belong to `uavs`, in order; all for None."""
+    """Returns the rows of a bank that belong to `uavs`, in order; all rows for None."""
     if uavs is None:
         return np.arange(len(uav_of_row))
     return np.flatnonzero(np.isin(uav_of_row, uavs))

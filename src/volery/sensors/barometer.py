@@ -1,7 +1,7 @@
 """Barometers: pressure of the standard atmosphere at the sensor's altitude, noise and drift.
 
-The air lies in level layers over the map, as its gravity does: the altitude above sea level is that
-of the scenario's origin plus z.
+Layers of air are parallel to the map's x-y plane, as gravity is normal to it: the altitude above
+sea level is that of the scenario's origin plus z.
 """
 
 from __future__ import annotations
@@ -24,26 +24,26 @@ Array = NDArray[np.float64]
 
 
 class BarometerModel(SensorModel):
-    """Noise and drift; see the data files in `models/`."""
+    """Noise and drift in Pa; see the data files in `models/`."""
 
     name: str
     noise_pa: NonNegativeFloat
     drift_pa: NonNegativeFloat
-    """Standard deviation of the drift in the long run."""
+    """Long-run standard deviation of the drift, Pa."""
     drift_correlation_s: PositiveFloat
 
 
 def load_barometer_model(name: str, folder: Path | None = None) -> BarometerModel:
-    """Model by shipped name or `.toml` path."""
+    """Returns the model by shipped name or `.toml` path, also relative to `folder`."""
     return load_model(BarometerModel, "barometer", name, folder)
 
 
 class BarometerBank(NoisyBank):
     """All barometers of one model, rate and phase.
 
-    `position_body` (S, 3) m places each sensor in its body (FLU); `keys` (S,) are the noise
-    streams, or None for sensors without noise; `origin_altitude_m` is the map's height above sea
-    level.
+    `position_body` (S, 3) m is each sensor's position in the body frame (FLU); `keys` (S,) are the
+    noise streams, or None for sensors without noise; `origin_altitude_m` is the map's height above
+    sea level.
     """
 
     name = "barometer"
@@ -69,7 +69,7 @@ class BarometerBank(NoisyBank):
         self._drift = self._wander.sigma * self._noise.start()[:, 0]
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> PressureReadings:
-        """Reading number k (counted from 0) of all sensors of the bank."""
+        """Returns pressures (S,) Pa and temperatures (S,) K of measurement `k`; see `Bank`."""
         lever = rotations.rotate(fleet.state.attitude[self._rows], self._position_body)
         z = fleet.state.position_map[self._rows, 2] + lever[:, 2]
         pressure = atmosphere.pressure(self._origin_altitude + z)
@@ -85,5 +85,5 @@ class BarometerBank(NoisyBank):
         )
 
     def _switch_on(self, rows: NDArray[np.int64], time_ns: int) -> None:  # noqa: ARG002
-        """With a drift drawn afresh."""
+        """Draws a new drift."""
         self._drift[rows] = self._wander.sigma * self._noise.start()[rows, 0]

@@ -1,4 +1,4 @@
-"""Battery monitors: voltage, current and charge as they are."""
+"""Battery monitors: exact voltage, current and charge."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from volery.sensors.samples import BatteryReadings, SensorId, owned
 
 
 class BatteryBank(Memoryless):
-    """The battery monitors of all UAVs of one rate and phase.
+    """All battery monitors of one rate and phase.
 
-    Raises `DataFileError` where an airframe has no battery.
+    Raises `DataFileError` if an airframe has no battery.
     """
 
     name = "battery"
@@ -37,7 +37,7 @@ class BatteryBank(Memoryless):
         self._cells = owned(np.array([pack.cells for pack in packs]))
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> BatteryReadings:  # noqa: ARG002
-        """Reading number k (counted from 0) of all monitors of the bank."""
+        """Returns voltages, currents and charges (S,) of measurement `k`; see `Bank`."""
         state, rows = fleet.state, self._rows
         return BatteryReadings(
             self.sensors,

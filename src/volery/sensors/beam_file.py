@@ -1,4 +1,4 @@
-"""Reads a user's own beam pattern from a CSV file."""
+"""Reads a user-defined beam pattern from a CSV file."""
 
 from __future__ import annotations
 
@@ -18,21 +18,22 @@ _MOST_RINGS = 65535
 
 
 class BeamList(NamedTuple):
-    """Beams in the order of the file."""
+    """N beams in the order of the file."""
 
     direction: NDArray[np.float64]
     """(3, N) unit vectors in the sensor frame, FLU."""
     time_ns: NDArray[np.int64]
-    """(N,) after the start of the sweep."""
+    """(N,) ns after the start of the sweep."""
     ring: NDArray[np.uint16]
-    """(N,)."""
+    """(N,) ring number of each beam."""
 
 
 def read_beams(path: Path, longest_s: float, most: int) -> BeamList:
-    """Beams of a CSV file with the columns azimuth_deg, elevation_deg, time_s and perhaps ring.
+    """Reads a CSV file with the columns azimuth_deg, elevation_deg, time_s and optionally ring.
 
-    Times must begin at 0 or later, never decrease and not exceed `longest_s`; there may be from 2
-    to `most` beams. Raises `DataFileError` naming file, line and what is allowed.
+    Times must begin at 0 or later, never decrease and not exceed `longest_s`; the file may have
+    from 2 to `most` beams. Raises `DataFileError`, naming file, line and allowed values, if the
+    file violates this.
     """
     try:
         with path.open(encoding="utf-8", newline="") as file:
@@ -40,7 +41,7 @@ def read_beams(path: Path, longest_s: float, most: int) -> BeamList:
             columns = tuple(reader.fieldnames or ())
             if not set(_NEEDED) <= set(columns) <= {*_NEEDED, "ring"}:
                 raise DataFileError(
-                    f"{path}: row 1 must name the columns {', '.join(_NEEDED)} and perhaps ring"
+                    f"{path}: row 1 must name the columns {', '.join(_NEEDED)} and optionally ring"
                 )
             rows = [_row(row, path, reader.line_num) for row in reader]
     except (OSError, UnicodeDecodeError, csv.Error) as error:

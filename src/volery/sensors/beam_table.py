@@ -1,7 +1,7 @@
-"""The beams of one sweep as kernels take them: directions, times, and the order of casting.
+"""Beams of one sweep for kernels: directions, times, and the order of casting.
 
-Beams are numbered as messages list them. They are cast in packets of LANES neighbours, whatever
-their number, because rays that run close together cost half as much.
+Beams are numbered in the order of the messages. They are cast in packets of LANES neighbours,
+whatever their number, because rays with similar directions cost half as much.
 """
 
 from __future__ import annotations
@@ -18,47 +18,47 @@ Array = NDArray[np.float64]
 
 TABLE_ROWS = 4
 KNOTS_APART_NS = 1_000_000
-"""Within a millisecond, the usual step of the physics, a UAV's pose changes evenly.
+"""Largest time between knots.
 
-At 10 m/s^2 and 10 rad/s^2 the middle is off by a micrometre and a microradian.
+Within a millisecond, the usual step of the physics, the pose interpolates linearly: at 10 m/s^2 and
+10 rad/s^2 the midpoint is off by a micrometre and a microradian.
 """
 
 
 class BeamTable(NamedTuple):
-    """The rays of a sweep in the order in which they are cast, L = P LANES lanes in P packets.
+    """The rays of a sweep in casting order, L = P LANES lanes in P packets.
 
-    The sensor's pose is looked up at the two knots of a packet and interpolated between. Lanes past
-    the last ray repeat it, so that kernels treat all packets alike.
+    The sensor's pose is read at the two knots of a packet and interpolated between them. Lanes
+    beyond the last ray repeat it, so that kernels treat all packets alike.
     """
 
     rays: int
-    """Number of rays, one a beam."""
+    """Number of rays, one per beam."""
     lanes: Array
     """(P, TABLE_ROWS, LANES): unit vector x, y, z in the sensor frame, FLU, and the time of the ray
     between its packet's knots, 0..1."""
     knot_ns: NDArray[np.int64]
-    """(P, 2) after the start of the sweep."""
+    """(P, 2) ns after the start of the sweep."""
     seen_ns: NDArray[np.int64]
-    """(P,) when a packet sees the other UAVs, after the start of the sweep."""
+    """(P,) time at which a packet sees the other UAVs, ns after the start of the sweep."""
     beam: NDArray[np.uint32]
-    """(L,) number of a ray's beam; lanes past the last ray have numbers past the last beam.
-
-    Unsigned, so that kernels need not test for negative indices.
-    """
+    """(L,) number of each ray's beam; lanes beyond the last ray have numbers beyond the last beam.
+    Unsigned, so that kernels need no test for negative indices."""
     in_order: bool
-    """Whether rays are cast in the order of their beams."""
+    """Whether the casting order is the order of the beams."""
 
 
 def packets_of(rays: int) -> int:
-    """Packets that hold so many rays."""
+    """Returns the number of packets that `rays` rays need."""
     return (rays + LANES - 1) // LANES
 
 
 def row_table(direction: Array, time_ns: NDArray[np.int64]) -> BeamTable:
-    """Table of a planar sweep: evenly timed beams, cast in their own order.
+    """Returns the table of a planar sweep: evenly timed beams, cast in order.
 
-    As many packets as fit in KNOTS_APART_NS share their knots: the first beam of theirs and that
-    of the packet after them, so that each pose is looked up once.
+    `direction` (3, R) are unit vectors in the sensor frame, `time_ns` (R,) times after the start of
+    the sweep. Packets that fit in KNOTS_APART_NS share their knots: their first beam and that of
+    the packet after them, so that each pose is read once.
     """
     beams = len(time_ns)
     packets = packets_of(beams)
@@ -84,10 +84,11 @@ def block_table(
     order: NDArray[np.int64],
     block: NDArray[np.int64],
 ) -> BeamTable:
-    """Table of beams cast in `order` (R,), a permutation of their numbers.
+    """Returns the table of beams cast in `order` (R,), a permutation of their numbers.
 
-    `block` (R,) names groups of beams that are close in time, in beam order: all packets of a block
-    share their knots, which saves looking poses up.
+    `direction` (3, R) are unit vectors in the sensor frame, `time_ns` (R,) times after the start of
+    the sweep. `block` (R,) numbers groups of beams that are close in time, in beam order: all
+    packets of a block share their knots, which saves reading poses.
     """
     start = np.full(int(block.max()) + 1, np.iinfo(np.int64).max)
     end = np.zeros_like(start)
@@ -113,7 +114,7 @@ def block_table(
 
 
 def in_packets(direction: Array, fraction: Array) -> Array:
-    """Lanes (P, TABLE_ROWS, LANES) of rays (3, R), (R,) in casting order."""
+    """Returns lanes (P, TABLE_ROWS, LANES) of rays (3, R) and fractions (R,) in casting order."""
     count = len(fraction)
     ray = np.minimum(np.arange(packets_of(count) * LANES), count - 1)
     rows = np.vstack([direction, fraction])[:, ray]
@@ -121,6 +122,6 @@ def in_packets(direction: Array, fraction: Array) -> Array:
 
 
 def _padded(order: NDArray[np.int64]) -> NDArray[np.uint32]:
-    """The order, continued by numbers of its own up to whole packets."""
+    """Returns the order, padded with unused numbers to whole packets."""
     rest = np.arange(len(order), packets_of(len(order)) * LANES)
     return np.concatenate([order, rest]).astype(np.uint32)

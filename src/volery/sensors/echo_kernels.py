@@ -1,7 +1,7 @@
-"""What becomes of one echo of a LIDAR: mixing at edges, noise, dropout, strength; compiled.
+"""Compiled model of one LIDAR echo: mixing at edges, noise, dropout, intensity.
 
-All random numbers come from the scan's stream, numbered by scan and beam, so a scan does not depend
-on its batch.
+All random numbers come from the scan's stream, numbered by scan and beam, so that a scan does not
+depend on its batch.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from volery.core.compiled import inner_kernel
 from volery.core.rng import normal, uniform
 
 MOST_ECHOES = 3
-"""A beam's own surface and those beyond its two edges."""
+"""Maximum echoes of a beam: its own surface and those beyond its two edges."""
 DRAWS = 4
-"""Random numbers reserved for a beam: range, dropout, edge, intensity."""
+"""Random numbers reserved per beam: range, dropout, edge, intensity."""
 
 
 class LidarConstants(NamedTuple):
     """A LIDAR model for kernels."""
 
     stride: int
-    """A beam's neighbours along the sweep are so many numbers before and after it."""
+    """Distance in beam numbers between neighbours along the sweep."""
     sweep_ns: int
     range_min: float
     range_max: float
@@ -42,7 +42,7 @@ class LidarConstants(NamedTuple):
     warm_up_bias: float
     warm_up_s: float
     brightness: NDArray[np.float64]
-    """(materials,) intensity head on at the reference range."""
+    """(materials,) intensity at normal incidence and the reference range."""
     incidence_exponent: float
     range_exponent: float
     reference_range: float
@@ -52,28 +52,28 @@ class LidarConstants(NamedTuple):
 
 
 class Surfaces(NamedTuple):
-    """What the beams of scans met; S rows."""
+    """Surfaces that the beams of S scans hit."""
 
     distance: NDArray[np.float32]
-    """(S, B) m; inf where nothing was met. B is the number of beams or more."""
+    """(S, B) m; inf without a hit. B is the number of beams or more."""
     cosine: NDArray[np.float32]
-    """(S, B) of the angle of incidence, 0..1."""
+    """(S, B) cosine of the angle of incidence, 0..1."""
     material: NDArray[np.uint8]
-    """(S, B)."""
+    """(S, B) `Material`."""
 
 
 class Echoes(NamedTuple):
-    """What S scans measured; E echoes a beam, nearest first."""
+    """Measurements of S scans; E echoes per beam, nearest first."""
 
     ranges: NDArray[np.float32]
-    """(S, E, beams) m; inf no echo, -inf too near (REP-117)."""
+    """(S, E, beams) m; inf no echo, -inf below the minimum range (REP-117)."""
     intensities: NDArray[np.float32]
-    """(S, E, beams), 0 without an echo; (S, 0, beams) where they are not wanted."""
+    """(S, E, beams), 0 without an echo; (S, 0, beams) if not requested."""
 
 
 @inner_kernel
 def _dropped(lidar: LidarConstants, distance: float, cosine: float, draw: float) -> bool:
-    """Whether the echo is lost; the formula stands in the model's data file."""
+    """Returns whether the echo is lost; the model's data file states the formula."""
     far = distance / lidar.range_max
     grazing = (1.0 - cosine) * (1.0 - cosine)
     kept = (1.0 - lidar.dropout_far * far * far) * (1.0 - lidar.dropout_grazing * grazing * grazing)
@@ -82,10 +82,11 @@ def _dropped(lidar: LidarConstants, distance: float, cosine: float, draw: float)
 
 @inner_kernel
 def beyond_edge(lidar: LidarConstants, distance: float, neighbour: float, gap: float) -> float:
-    """Range of a beam whose axis passes an edge at `gap` (in beam spacings) towards `neighbour`.
+    """Returns the range of a beam whose axis passes an edge at `gap`, in beam spacings.
 
-    The part of the footprint beyond the edge sees the neighbour's surface. Two echoes within a
-    pulse length merge to their mean, weighted by energy; of two farther apart the first counts.
+    The part of the footprint beyond the edge sees the surface of the beam `neighbour`. Two echoes
+    within a pulse length merge to their mean, weighted by energy; of two farther apart the first
+    counts.
     """
     if gap >= lidar.half_footprint:
         return distance
@@ -99,14 +100,14 @@ def beyond_edge(lidar: LidarConstants, distance: float, neighbour: float, gap: f
 
 @inner_kernel
 def is_edge(lidar: LidarConstants, a: float, b: float) -> bool:
-    """Whether two neighbouring beams meet surfaces that are no continuation of each other."""
-    gap = abs(a - b)  # inf or NaN where a beam meets nothing
+    """Returns whether two neighbouring beams hit surfaces that do not continue each other."""
+    gap = abs(a - b)  # inf or NaN where a beam hits nothing
     return bool(lidar.least_jump < gap < np.inf)
 
 
 @inner_kernel
 def warm_up_bias(lidar: LidarConstants, time_ns: int) -> float:
-    """Range error of a device that is warming up."""
+    """Returns the range error of a device that is warming up, m."""
     if lidar.warm_up_bias == 0.0 or not lidar.noise:
         return 0.0
     bias: float = lidar.warm_up_bias * np.exp(-1e-9 * time_ns / lidar.warm_up_s)
@@ -123,7 +124,7 @@ def disturbed(
     key: np.uint64,
     counter: int,
 ) -> float:
-    """An echo's measured range: noise, rounding, dropout. `r` is where it comes from."""
+    """Returns an echo's range after noise, rounding and dropout, m. `r` is the range before."""
     sigma = max(lidar.noise_floor, lidar.noise_slope * r + lidar.noise_offset)
     r += sigma * normal(key, counter) + bias
     r = lidar.resolution * np.floor(r / lidar.resolution + 0.5)
@@ -136,7 +137,7 @@ def disturbed(
 
 @inner_kernel
 def _power(base: float, exponent: float) -> float:
-    """Power; the usual exponents cost no logarithm."""
+    """Returns `base ** exponent`; the usual exponents need no logarithm."""
     if exponent == 1.0:
         return base
     if exponent == 2.0:
@@ -154,7 +155,7 @@ def echo_intensity(
     key: np.uint64,
     counter: int,
 ) -> float:
-    """Strength of an echo; the formula stands at `lidar_model.Intensity`."""
+    """Returns an echo's intensity; `lidar_model.Intensity` states the formula."""
     value = lidar.brightness[material]
     if lidar.incidence_exponent != 0.0:
         value *= _power(float(cosine), lidar.incidence_exponent)

@@ -1,4 +1,4 @@
-"""What estimators believe, as odometry: the source of `/uavN/odom`."""
+"""Estimates of the on-board estimators, as odometry: the source of `/uavN/odom`."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ Array = NDArray[np.float64]
 class EstimateBank(Memoryless):
     """The estimates of all UAVs of one rate and phase.
 
-    `rows` (S,) are those of the estimator, `gyro_variance` (S,) rad^2/s^2 that of one gyroscope
-    reading, which the estimated rates hold.
+    `rows` (S,) are the UAVs' rows in the estimator, `gyro_variance` (S,) rad^2/s^2 the variance of
+    one gyroscope measurement, which the estimated rates contain.
     """
 
     name = "estimate"
@@ -43,7 +43,7 @@ class EstimateBank(Memoryless):
         self._gyro_variance = gyro_variance
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> OdometryReadings:  # noqa: ARG002
-        """What is believed now."""
+        """Returns the present estimates: poses in the map frame, twists in the body frame (FLU)."""
         state, rows = self._estimator.state, self._taken
         velocity, attitude = state.velocity_map[rows], state.attitude[rows].copy()
         covariance = self._estimator.covariance(self._rows)

@@ -1,6 +1,7 @@
-"""Broken sensors: one table of faults for each bank, applied to whatever it measured.
+"""Sensor faults: one fault table per bank, applied to its samples.
 
-A faulty sensor goes on measuring unseen, so that a fault changes no noise of later measurements.
+A faulty sensor continues to measure internally, so that a fault does not change the noise of later
+measurements.
 """
 
 from __future__ import annotations
@@ -21,25 +22,25 @@ from volery.sensors.samples import Samples, SensorId, owned
 
 Array = NDArray[np.float64]
 Arrays = dict[str, Any]
-"""Quantities by name, each (S, ...): row i is sensor i's."""
+"""Quantities by name, each (S, ...): row i belongs to sensor i."""
 
 
 class FaultKind(IntEnum):
-    """How a sensor fails."""
+    """Kinds of sensor faults."""
 
     NONE = 0
     DROPPED = 1
-    """It sends nothing."""
+    """The sensor sends nothing."""
     STUCK = 2
-    """It sends its last measurement over and over, with new stamps."""
+    """The sensor repeats its last measurement, with new stamps."""
     BIASED = 3
-    """A constant is added to what it measures."""
+    """A constant is added to the measurements."""
 
 
 class FaultTable:
-    """Faults of the S sensors of a bank, one at most for each.
+    """Faults of the S sensors of a bank, at most one each.
 
-    `measured` names the quantities that a bias is added to and how many numbers it takes for each,
+    `measured` names the quantities that a bias is added to and the numbers that a bias of each has,
     such as `{"ranges": 1}`: see `MEASURED` of the samples.
     """
 
@@ -49,38 +50,39 @@ class FaultTable:
         self._kind = np.zeros(len(sensors), np.int64)
         self._bias = np.zeros((len(sensors), sum(measured.values())))
         self._known = np.zeros(len(sensors), np.bool_)
-        """Whether a sensor has measured since its start."""
+        """(S,) whether a sensor has measured since its start."""
         self._last: Arrays | Samples = {}
-        """What left the table last, or its arrays by name of the quantity; rows are sensors."""
+        """The last output of the table, or its arrays by name of the quantity; rows are sensors."""
         self._is_quiet = False
-        """Whether nobody fails and all are known, as nearly always."""
+        """Whether no sensor fails and all have measured: the usual case."""
 
     def set(self, row: int, kind: FaultKind | str, value: ArrayLike | None = None) -> None:
-        """Let sensor `row` of the bank fail from its next measurement on.
+        """Makes sensor `row` of the bank fail from its next measurement on.
 
         `kind` may be a name: none, dropped, stuck, biased. A bias needs `value`: one number for
-        each that is measured (an IMU: three rates in rad/s, three forces in m/s^2), or a single one
-        for all of a sensor that measures one quantity. Raises `CommandError` for anything else.
+        each measured component (an IMU: three rates in rad/s, three forces in m/s^2), or a single
+        number for a sensor that measures one quantity. Raises `CommandError` for an unknown row or
+        kind, a missing, superfluous or malformed value.
         """
         if not 0 <= row < len(self._sensors):
-            raise CommandError(f"row {row} is no sensor of a bank of {len(self._sensors)}")
+            raise CommandError(f"no sensor in row {row}: the bank has {len(self._sensors)}")
         fault = _kind_of(kind)
         if (fault is FaultKind.BIASED) != (value is not None):
-            raise CommandError(f"fault {fault.name.lower()}: a value belongs to biased, only there")
+            raise CommandError(f"fault {fault.name.lower()}: a value belongs to biased only")
         self._bias[row] = 0.0 if value is None else self._checked(value)
         self._kind[row] = fault
         self._is_quiet = False
 
     def clear(self, row: int) -> None:
-        """Let sensor `row` work again."""
+        """Removes the fault of sensor `row`."""
         self.set(row, FaultKind.NONE)
 
     def kind(self, row: int) -> FaultKind:
-        """Present fault of sensor `row`."""
+        """Returns the present fault of sensor `row`."""
         return FaultKind(int(self._kind[row]))
 
     def apply(self, samples: Samples) -> Samples:
-        """What the sensors send of what they measured."""
+        """Returns the samples with the faults applied; rows of dropped sensors are removed."""
         if self._is_quiet:
             self._last = samples
             return samples
@@ -98,7 +100,7 @@ class FaultTable:
         return _without(samples, arrays, dropped) if dropped.any() else samples
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns copies of the faults and of the last measurements."""
         return {
             "kind": self._kind.copy(),
             "bias": self._bias.copy(),
@@ -107,7 +109,7 @@ class FaultTable:
         }
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a state of `get_state`."""
         self._kind = np.array(state["kind"])
         self._bias = np.array(state["bias"])
         self._known = np.array(state["known"])
@@ -115,7 +117,7 @@ class FaultTable:
         self._is_quiet = False
 
     def reset(self, rows: NDArray[np.int64]) -> None:
-        """Mend the sensors `rows` and forget what they sent."""
+        """Removes the faults and last measurements of the sensors `rows` (R,)."""
         self._kind[rows] = FaultKind.NONE
         self._bias[rows] = 0.0
         self._known[rows] = False
@@ -137,7 +139,7 @@ class FaultTable:
         return bias
 
     def _bias_of(self, arrays: Arrays) -> Arrays:
-        """Measured quantities with the biases added; empty without a biased sensor."""
+        """Returns the measured quantities with biases added; empty without a biased sensor."""
         rows = np.flatnonzero(self._kind == FaultKind.BIASED)
         changed: Arrays = {}
         first = 0
@@ -152,7 +154,7 @@ class FaultTable:
         return changed
 
     def _repeat(self, arrays: Arrays) -> Arrays:
-        """All quantities with the stuck sensors' last ones; empty without a stuck sensor."""
+        """Returns the quantities with stuck sensors' last values; empty without a stuck sensor."""
         rows = np.flatnonzero((self._kind == FaultKind.STUCK) & self._known)
         changed: Arrays = {}
         last = _arrays_of(self._last)
@@ -165,7 +167,7 @@ class FaultTable:
 
 
 class FaultableBank:
-    """A bank whose sensors can fail; everything else is the inner bank's."""
+    """A bank whose sensors can fail; it wraps another bank."""
 
     def __init__(self, bank: Bank, measured: Mapping[str, int]) -> None:
         self.bank = bank
@@ -178,34 +180,34 @@ class FaultableBank:
 
     @property
     def schedule(self) -> Schedule:
-        """When they measure."""
+        """Rate and phase of the measurements."""
         return self.bank.schedule
 
     @property
     def lag_ns(self) -> int:
-        """How long after its instant a measurement is known."""
+        """Delay from a measurement's time to its availability, ns."""
         return self.bank.lag_ns
 
     def is_wanted(self) -> bool:
-        """Whether measurements are worth making; only cameras ask who receives them."""
+        """Returns whether to sample; only camera banks are skipped without receivers."""
         asks = getattr(self.bank, "is_wanted", None)
         return asks is None or bool(asks())
 
     @property
     def sensors(self) -> tuple[SensorId, ...]:
-        """Which they are, row by row."""
+        """Sensors of the bank, row by row."""
         return self.bank.sensors
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> Samples:
-        """Measurement number k, as the sensors send it."""
+        """Returns measurement number `k` with the faults applied; see `Bank.sample`."""
         return self.faults.apply(self.bank.sample(k, time_ns, fleet))
 
     def get_state(self) -> dict[str, Any]:
-        """State of the bank and its faults."""
+        """Returns the state of the bank and its faults."""
         return {"bank": self.bank.get_state(), "faults": self.faults.get_state()}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a state of `get_state`."""
         self.bank.set_state(state["bank"])
         self.faults.set_state(state["faults"])
 
@@ -216,13 +218,13 @@ class FaultableBank:
         time_ns: int,
         k: int,
     ) -> None:
-        """Put the sensors of some UAVs back to their start, without faults; see `Bank.reset`."""
+        """Resets the sensors of some UAVs and removes their faults; see `Bank.reset`."""
         self.bank.reset(uavs, keys, time_ns, k)
         self.faults.reset(rows_of(uav_rows(self.sensors), uavs))
 
 
 def _arrays_of(samples: Arrays | Samples) -> Arrays:
-    """The arrays by name of the quantity."""
+    """Returns the arrays by name of the quantity."""
     if isinstance(samples, dict):
         return samples
     return {n: v for n, v in vars(samples).items() if isinstance(v, np.ndarray)}

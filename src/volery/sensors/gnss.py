@@ -1,7 +1,7 @@
-"""Satellite navigation receivers: late fixes with noise and drift, lost where signals are denied.
+"""GNSS receivers: delayed fixes with noise and drift, lost where signals are denied.
 
 White noise and a Gauss-Markov drift of the position, white noise of the velocity: the model of
-PX4's Gazebo classic. The drift goes on while a fix is lost.
+PX4's Gazebo classic. The drift continues while a fix is lost.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ Array = NDArray[np.float64]
 
 FOREVER_NS = np.iinfo(np.int64).max
 _LONGEST_DELAY_NS = KEPT_NS - 6_000_000
-"""A fix looks back by the delay, up to one physics step and another for the velocity."""
+"""A fix reads poses as old as the delay plus up to two physics steps, one of them for the velocity.
+"""
 
 
 class GnssModel(SensorModel):
@@ -39,26 +40,28 @@ class GnssModel(SensorModel):
     horizontal_noise_m: NonNegativeFloat
     vertical_noise_m: NonNegativeFloat
     horizontal_drift_m: NonNegativeFloat
-    """Standard deviation of the drift on each horizontal axis, in the long run."""
+    """Long-run standard deviation of the drift on each horizontal axis, m."""
     vertical_drift_m: NonNegativeFloat
     drift_correlation_s: PositiveFloat
     horizontal_velocity_noise_m_s: NonNegativeFloat
     vertical_velocity_noise_m_s: NonNegativeFloat
     reacquisition_s: NonNegativeFloat
-    """From the return of the signals to the next fix."""
+    """Time from the return of the signals to the next fix."""
 
 
 def load_gnss_model(name: str, folder: Path | None = None) -> GnssModel:
-    """Model by shipped name or `.toml` path."""
+    """Returns the model by shipped name or `.toml` path, also relative to `folder`."""
     return load_model(GnssModel, "GNSS", name, folder)
 
 
 class GnssBank(NoisyBank):
     """All receivers of one model, rate and phase.
 
-    `position_body` (S, 3) m places each antenna in its body (FLU); `keys` (S,) are the noise
-    streams, or None for receivers without noise. A fix is sampled `lag_ns` after its instant, from
-    the poses that the fleet's history kept, and carries that instant.
+    `position_body` (S, 3) m is each antenna's position in the body frame (FLU); `keys` (S,) are the
+    noise streams, or None for receivers without noise. A fix is sampled `lag_ns` after its time,
+    from the fleet's pose history, and carries that time.
+
+    Raises `DataFileError` if the model's delay exceeds the pose history.
     """
 
     name = "gnss"
@@ -100,7 +103,7 @@ class GnssBank(NoisyBank):
         self._denied_until_ns = np.full(len(sensors), FOREVER_NS)
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> GnssReadings:
-        """Fix number k (counted from 0) of all receivers of the bank, as of `time_ns`."""
+        """Returns fix number `k` of all receivers, in the map frame; see `Bank`."""
         position, velocity = _antennas(fleet.history, self._rows, self._lever_body, time_ns)
         has_fix = self._acquire(time_ns, position)
         noise = self._noise.measurement(k)
@@ -123,10 +126,11 @@ class GnssBank(NoisyBank):
         )
 
     def deny(self, uav: int, since_ns: int, until_ns: int = FOREVER_NS) -> None:
-        """Take the signals from a UAV (a row of the fleet) for fixes of since_ns <= t < until_ns.
+        """Denies signals to a UAV (a row of the fleet) for fixes of since_ns <= t < until_ns.
 
-        A fix comes again the reacquisition time after the last denied instant. A second call
-        replaces the first. Raises `CommandError` where the UAV has no receiver here.
+        Fixes return the reacquisition time after the last denied instant. A second call replaces
+        the first. Raises `CommandError` if the UAV has no receiver in this bank or the interval is
+        empty.
         """
         rows = rows_of(self._rows, np.array([uav]))
         if not len(rows):
@@ -137,20 +141,23 @@ class GnssBank(NoisyBank):
         self._denied_until_ns[rows] = until_ns
 
     def allow(self, uav: int, time_ns: int) -> None:
-        """Give a UAV (a row of the fleet) its signals back; a denial that begins later stays."""
+        """Restores the signals of UAV row `uav`; a denial that begins later is unchanged."""
         rows = rows_of(self._rows, np.array([uav]))
         begun = rows[self._denied_from_ns[rows] <= time_ns]
         self._denied_until_ns[begun] = np.minimum(self._denied_until_ns[begun], time_ns)
 
     def _switch_on(self, rows: NDArray[np.int64], time_ns: int) -> None:  # noqa: ARG002
-        """With fresh drift and a fix at once."""
+        """Draws a new drift and provides a fix at once."""
         self._drift[rows] = (self._wander.sigma * self._noise.start())[rows]
         self._fix_from_ns[rows] = 0
         self._denied_from_ns[rows] = FOREVER_NS
         self._denied_until_ns[rows] = FOREVER_NS
 
     def _acquire(self, time_ns: int, position: Array) -> NDArray[np.bool_]:
-        """Who has a fix at `time_ns`, with antennas at `position` (S, 3); notes who lost it."""
+        """Returns (S,) whether a receiver has a fix at `time_ns`; records lost fixes.
+
+        `position` (S, 3) m are the antennas' positions in the map frame.
+        """
         denied = self._denial.covers(position)
         denied |= (self._denied_from_ns <= time_ns) & (time_ns < self._denied_until_ns)
         self._fix_from_ns[denied] = time_ns + self._reacquisition_ns
@@ -160,7 +167,7 @@ class GnssBank(NoisyBank):
 def _antennas(
     history: PoseHistory, rows: NDArray[np.int64], lever_body: Array, time_ns: int
 ) -> tuple[Array, Array]:
-    """Places (S, 3) m and velocities (S, 3) m/s of antennas, the mean over a physics step."""
+    """Returns antenna positions (S, 3) m and velocities (S, 3) m/s, mean over a physics step."""
     before_ns = max(time_ns - history.dt_ns, 0)
     now = _places(history, rows, lever_body, time_ns)
     before = _places(history, rows, lever_body, before_ns)

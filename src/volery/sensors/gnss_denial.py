@@ -1,4 +1,4 @@
-"""Where satellite signals are denied: everywhere, or in prisms over parts of the map."""
+"""Regions in which satellite signals are denied: everywhere, or prisms over parts of the map."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ Array = NDArray[np.float64]
 
 
 class Prism(NamedTuple):
-    """A polygon of the map, from a lowest to a highest z."""
+    """A polygon of the map, between a minimum and a maximum z in m."""
 
     corners: Array
-    """(C, 2) m, in order around; the last is joined to the first."""
+    """(C, 2) m, in order around; the last corner connects to the first."""
     lowest: float = -math.inf
     highest: float = math.inf
 
     def contains(self, position: Array) -> NDArray[np.bool_]:
-        """Which places (N, 3) lie in it, by the even-odd rule."""
+        """Returns (N,) whether positions (N, 3) m lie in the prism, by the even-odd rule."""
         x, y, z = position.T
         inside = np.zeros(len(position), np.bool_)
         for (ax, ay), (bx, by) in zip(self.corners, np.roll(self.corners, -1, axis=0), strict=True):
@@ -31,13 +31,13 @@ class Prism(NamedTuple):
 
 
 class GnssDenial(NamedTuple):
-    """All that a scenario denies."""
+    """All denied regions of a scenario."""
 
     everywhere: bool = False
     prisms: tuple[Prism, ...] = ()
 
     def covers(self, position: Array) -> NDArray[np.bool_]:
-        """Which places (N, 3) of the map get no signals."""
+        """Returns (N,) whether positions (N, 3) m of the map receive no signals."""
         covered = np.full(len(position), self.everywhere)
         for prism in self.prisms:
             covered |= prism.contains(position)

@@ -1,8 +1,8 @@
 """Inertial measurement units: discrete noise and bias model of PX4 and RotorS.
 
-White noise N / sqrt(dt); bias a first-order Gauss-Markov process with correlation time tau:
-b+ = exp(-dt/tau) b + sigma sqrt(tau/2 (1 - exp(-2 dt/tau))) n. A turn-on bias, drawn once,
-stays as it is. A part may also warm up: a bias drawn once that dies as exp(-t / time constant).
+White noise N / sqrt(dt); bias a first-order Gauss-Markov process with correlation time tau: b+ =
+exp(-dt/tau) b + sigma sqrt(tau/2 (1 - exp(-2 dt/tau))) n. A turn-on bias is drawn once and
+constant. A sensor may also warm up: a bias drawn once that decays as exp(-t / time constant).
 """
 
 from __future__ import annotations
@@ -38,21 +38,21 @@ class ImuModel(SensorModel):
     accel_bias_correlation_s: PositiveFloat
     accel_turn_on_bias_m_s2: NonNegativeFloat
     gyro_warm_up_bias_rad_s: NonNegativeFloat = 0.0
-    """Standard deviation of the bias of a cold sensor, on top of the turn-on bias."""
+    """Standard deviation of a cold sensor's bias, in addition to the turn-on bias."""
     accel_warm_up_bias_m_s2: NonNegativeFloat = 0.0
     warm_up_time_constant_s: PositiveFloat = 60.0
 
 
 def load_imu_model(name: str, folder: Path | None = None) -> ImuModel:
-    """Model by shipped name or `.toml` path."""
+    """Returns the model by shipped name or `.toml` path, also relative to `folder`."""
     return load_model(ImuModel, "IMU", name, folder)
 
 
 class ImuBank(NoisyBank):
     """All IMUs of one model, rate and phase.
 
-    `position_body` (S, 3) m and `attitude_body` (S, 4) place each sensor frame in its body (FLU);
-    `keys` (S,) are the noise streams, or None for sensors without noise.
+    `position_body` (S, 3) m and `attitude_body` (S, 4) are the poses of the sensor frames in the
+    body frame (FLU); `keys` (S,) are the noise streams, or None for sensors without noise.
     """
 
     name = "imu"
@@ -90,7 +90,10 @@ class ImuBank(NoisyBank):
         self._switch_on(np.arange(len(sensors)), 0)
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> ImuReadings:
-        """Reading number k (counted from 0) of all sensors of the bank."""
+        """Returns rates (rad/s) and specific forces (m/s^2), (S, 3) each, in the sensor frames.
+
+        They belong to measurement number `k`; see `Bank`.
+        """
         state = fleet.state
         reading = np.empty((len(self._rows), 6))
         feel_motion(

@@ -1,4 +1,4 @@
-"""What a body feels and how it moves, seen from sensor and body frames."""
+"""Compiled inertial quantities in sensor and body frames."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ def feel_motion(
     body_from_sensor: Array,
     out: Array,
 ) -> None:
-    """Rates (rad/s) and specific force (m/s^2) at each sensor, in its frame: out (S, 6).
+    """Fills `out` (S, 6) with rates (rad/s) and specific force (m/s^2) in each sensor's frame.
 
     State arrays are (N, 3) or (N, 4), read at `rows` (S,); `lever_body` (S, 3) m and
-    `body_from_sensor` (S, 4) place the sensors.
+    `body_from_sensor` (S, 4) are the poses of the sensors in the body.
     """
     for s in range(len(rows)):
         i = rows[s]
@@ -57,7 +57,7 @@ def feel_motion(
 def body_twists(
     rows: NDArray[np.int64], attitude: Array, velocity_map: Array, omega_body: Array, out: Array
 ) -> None:
-    """Velocity (m/s) and rates (rad/s) in the body: out (S, 6)."""
+    """Fills `out` (S, 6) with velocity (m/s) and rates (rad/s) in the body frame."""
     for s in range(len(rows)):
         i = rows[s]
         q, v = attitude[i], velocity_map[i]
@@ -70,7 +70,7 @@ def body_twists(
 def feel_vector(
     rows: NDArray[np.int64], attitude: Array, body_from_sensor: Array, vector_map: Array, out: Array
 ) -> None:
-    """A vector (3,) of the map in each sensor's frame: out (S, 3)."""
+    """Fills `out` (S, 3) with the map-frame vector `vector_map` (3,) in each sensor's frame."""
     for s in range(len(rows)):
         p, q = attitude[rows[s]], body_from_sensor[s]
         x, y, z, w = quaternion_product(p[0], p[1], p[2], p[3], q[0], q[1], q[2], q[3])

@@ -1,4 +1,4 @@
-"""Encoders of nodding mounts: the angle that a LIDAR is tilted by."""
+"""Encoders of nodding mounts: tilt angles of LIDARs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _DIFFERENCE_NS = 1_000_000
 
 
 class JointBank(Memoryless):
-    """All nodding mounts, read out 80 times a second: at the start and in the middle of a turn."""
+    """Encoders of all nodding mounts, sampled at 80 Hz."""
 
     name = "joints"
     lag_ns = 0
@@ -26,7 +26,7 @@ class JointBank(Memoryless):
         self._mounts = mounts
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> JointAngles:  # noqa: ARG002
-        """Angles and rates now."""
+        """Returns the present angles (S,) rad and rates (S,) rad/s."""
         now = np.array([nodding_angle_at(mount, time_ns) for mount in self._mounts])
         soon = np.array([nodding_angle_at(m, time_ns + _DIFFERENCE_NS) for m in self._mounts])
         rate = (soon - now) / (_DIFFERENCE_NS / NS_PER_S)

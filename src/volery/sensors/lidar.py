@@ -1,4 +1,4 @@
-"""Batches of LIDAR scans over a scene; `lidar_model` tells what a scanner is."""
+"""Batches of LIDAR scans over a scene; `lidar_model` describes the scanners."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ __all__ = [
 ]
 
 _FEW_BEAMS = 5000
-"""A batch up to this size is swept by the calling thread alone."""
+"""Maximum size of a batch that the calling thread sweeps alone."""
 
 
 def stack_mounts(mounts: Sequence[Mount]) -> MountTable:
-    """Mounts as a table that batches refer to by row."""
+    """Returns the table of M mounts that batches refer to by row."""
     return MountTable(
         np.array([m.position_body for m in mounts], dtype=np.float64).reshape(-1, 3),
         np.array([m.attitude_body for m in mounts], dtype=np.float64).reshape(-1, 4),
@@ -59,11 +59,11 @@ def make_batch(
     scan_number: ArrayLike,
     mounts: MountTable,
 ) -> RayBatch:
-    """Batch of S scans from arrays (S,) or numbers for all; see `RayBatch` for their meaning."""
+    """Returns a batch of S scans from arrays (S,) or scalars for all; see `RayBatch`."""
     uavs = np.atleast_1d(np.asarray(uav, dtype=np.int64))
 
     def column(values: ArrayLike, kind: type) -> NDArray[Any]:
-        # Of its own, as kernels are compiled for: a single scan's would be a read-only view.
+        # A copy: broadcasting a scalar gives a read-only view, which kernels are not compiled for.
         return np.array(np.broadcast_to(np.asarray(values, dtype=kind), uavs.shape))
 
     return RayBatch(
@@ -83,7 +83,7 @@ def sample_lidars(
     history: PoseHistory,
     workers: Workers | None = None,
 ) -> NDArray[np.float32]:
-    """Make the batch's scans: ranges (S, beams) of the first echoes, m; see `sample_echoes`."""
+    """Returns the ranges (S, beams) of the batch's first echoes, m; see `sample_echoes`."""
     return sample_echoes(scene, model, batch, history, workers=workers).ranges[:, 0]
 
 
@@ -97,14 +97,16 @@ def sample_echoes(
     air: ParticleTable | None = None,
     workers: Workers | None = None,
 ) -> Echoes:
-    """Make the batch's scans: ranges of all echoes, and their intensities where wanted.
+    """Returns the echoes of the batch's S scans: ranges, m, and intensities if requested.
 
     `history` must reach from the earliest sweep's start to the latest one's end. The scene's
-    bodies, if it has any, are moved along that interval, so that every beam sees the other UAVs
-    where they were; the scan's own UAV is not seen. Results do not depend on the number of threads
-    or on which scans share a batch, but for the bodies' linear interpolation over the interval.
-    A pattern that goes on from sweep to sweep needs scans of one number in a batch. `air`: what is
-    in it, None where it is clear.
+    bodies, if any, move linearly over that interval, so that every beam sees the other UAVs at
+    their positions of that time; a scan does not see its own UAV. Apart from this interpolation,
+    results do not depend on the number of threads or on the other scans of a batch. `air`:
+    particles in the air; None for clear air.
+
+    Raises `ValueError` if a scan's UAV row is out of range, or if scans of a non-repeating pattern
+    have different numbers.
     """
     echoes = _clear_echoes(scene, model, batch, history, intensities, workers)
     if air is not None and len(batch.uav):
@@ -122,7 +124,7 @@ def _clear_echoes(
     intensities: bool,
     workers: Workers | None,
 ) -> Echoes:
-    """The batch's scans in clear air."""
+    """Returns the batch's echoes in clear air."""
     scans, beams = len(batch.uav), model.beams
     echoes = Echoes(
         np.empty((scans, model.echoes, beams), dtype=np.float32),
@@ -153,7 +155,7 @@ def _clear_echoes(
 def scan_rays(
     model: LidarModel, batch: RayBatch, scan: int, history: PoseHistory
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """One scan's beams as rays: origins and unit directions (beams, 3), map, and times, ns.
+    """Returns one scan's rays: origins and unit directions (beams, 3), map frame, and times, ns.
 
     A time is that at which the beam's packet sees the other UAVs.
     """
@@ -172,16 +174,16 @@ def _rays(
 
 
 def _interval(model: LidarModel, batch: RayBatch, history: PoseHistory) -> tuple[int, int]:
-    """Start of the earliest sweep and end of the latest one."""
+    """Returns the start of the earliest sweep and the end of the latest one, ns."""
     count = history.position.shape[1]
     if int(batch.uav.min()) < 0 or int(batch.uav.max()) >= count:
-        raise ValueError(f"a scan names UAV row {int(batch.uav.max())} of {count}")
+        raise ValueError(f"a scan has UAV row {int(batch.uav.max())}; the history has {count} UAVs")
     starts = batch.sweep_start_ns
     return int(starts.min()), int(starts.max()) + model.sweep_duration_ns
 
 
 def move_bodies(scene: Scene, history: PoseHistory, start: int, end: int) -> int:
-    """Let UAVs and things move through the interval; how many bodies there are."""
+    """Moves UAVs and actors of the scene through the interval, ns; returns the number of bodies."""
     table = scene.handle.bodies
     bodies = len(table.scene)
     uavs = bodies - table.actors
@@ -205,7 +207,7 @@ _own = threading.local()
 
 
 def _surfaces(scans: int, beams: int) -> Surfaces:
-    """The calling thread's memory for that many scans, kept: fresh pages cost as much as rays."""
+    """Returns the calling thread's memory for that many scans; reuse saves page faults."""
     room = packets_of(beams) * LANES
     needed = scans * room
     flat: Surfaces | None = _own.__dict__.get("surfaces")

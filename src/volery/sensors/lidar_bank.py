@@ -1,4 +1,4 @@
-"""All LIDARs of one model and phase, swept together."""
+"""The bank of all LIDARs of one model and phase."""
 
 from __future__ import annotations
 
@@ -22,11 +22,14 @@ _LONGEST_SWEEP_NS = KEPT_NS - 10_000_000
 
 
 class LidarBank(NoisyBank):
-    """One batch of rays for all LIDARs that are due; `keys` (S,) are their noise streams, or None.
+    """Sweeps all LIDARs of one model and phase in one batch of rays.
 
-    A scan is known when its sweep has ended: it is sampled `lag_ns` after its first beam, from the
-    poses that the fleet's history kept. Noise follows from the number of a LIDAR's scan since its
-    start; warming up goes by the clock, and so does the pattern of a rosette, which never repeats.
+    `keys` (S,) are the noise streams, or None for exact LIDARs. A scan is sampled `lag_ns` after
+    its first beam, when its sweep has ended, from the fleet's pose history. Noise depends on the
+    number of a LIDAR's scan since its start; warm-up and the pattern of a rosette, which never
+    repeats, depend on the clock.
+
+    Raises `DataFileError` if a sweep takes longer than the pose history reaches.
     """
 
     name = "lidar"
@@ -57,7 +60,7 @@ class LidarBank(NoisyBank):
         self._air: ParticleTable | None = None
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> LidarScans:
-        """Scan number k of all LIDARs of the bank; `time_ns` is that of the first beam."""
+        """Returns scan number `k` of all LIDARs; `time_ns` is the time of the first beam."""
         numbers = k - self._noise.first_k if self._model.scan.is_fixed else k
         batch = make_batch(
             self._rows, np.arange(len(self._rows)), time_ns, self._noise.keys, numbers, self._mounts
@@ -80,7 +83,7 @@ class LidarBank(NoisyBank):
         )
 
     def _air_of(self, particles: Particles) -> ParticleTable | None:
-        """The particles as this model meets them, made anew when they are others."""
+        """Returns the particle table of this model, rebuilt when the particles change."""
         if particles != self._particles:
             clear = particles == CLEAR_AIR
             self._air = None if clear else particle_table(self._model, particles)

@@ -1,7 +1,7 @@
 """Compiled LIDAR scans: rays are aimed, cast and measured in pieces that threads share.
 
 A planar sweep is one piece, measured by the thread that cast it; a large sweep is cut into pieces
-of PIECE packets and measured when all of them are there.
+of PIECE packets and measured when all of them are cast.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from volery.world.scene_kernels import RayBlock, SceneHandle, cast_block, near_b
 PIECE = 2048 // LANES
 """Packets of a piece."""
 _CURVE_MARGIN_M = 0.5
-"""How far a sensor may stray in a sweep from the box of its first and last position."""
+"""Distance by which a sensor may leave the box of its first and last position in a sweep."""
 
 
 @inner_kernel
@@ -34,7 +34,7 @@ def _near_scan(
     history: PoseHistory,
     near: NDArray[np.int32],
 ) -> int:
-    """List the other UAVs within reach during the sweep; their number."""
+    """Lists in `near` the other UAVs within range during the sweep; returns their number."""
     if scene.bodies.scene.shape[0] == 0:
         return 0
     start = batch.sweep_start_ns[scan]
@@ -56,10 +56,10 @@ def _near_scan(
 def _note(
     block: RayBlock, table: BeamTable, first: int, packets: int, row: int, surfaces: Surfaces
 ) -> None:
-    """Enter the hits of a piece, so many packets from `first` on, under their beams.
+    """Writes the hits of a piece, `packets` packets from `first` on, to the rows of their beams.
 
-    All lanes are entered, those past the last ray too, for which rows have room: without
-    conditions the compiler makes vectors of the loops.
+    Lanes beyond the last ray are written too, for which rows have space: without conditions the
+    compiler vectorizes the loops.
     """
     rays, instance, material = block.rays, block.instance, block.material
     start = first * LANES
@@ -131,10 +131,11 @@ def scan_batch(
     surfaces: Surfaces,
     echoes: Echoes,
 ) -> None:
-    """Cast pieces of scans, taken one by one from `counter`; measure scans of one piece.
+    """Casts pieces of scans, numbered by `counter`, and measures scans of one piece.
 
-    Scans of several pieces need a row each in `surfaces`, which `measure_batch` reads; those of one
-    piece share the first row of a thread's own memory.
+    Runs in every thread until no piece is left. Scans of several pieces need a row each in
+    `surfaces`, which `measure_batch` reads; scans of one piece use the first row of the thread's
+    own memory.
     """
     total, packets = table.rays, table.seen_ns.shape[0]
     pieces = (packets + PIECE - 1) // PIECE
@@ -168,7 +169,7 @@ def measure_batch(
     surfaces: Surfaces,
     echoes: Echoes,
 ) -> None:
-    """Measure whole scans, taken one by one from `counter`."""
+    """Measures whole scans, numbered by `counter`; runs in every thread."""
     while True:
         scan = fetch_add(counter.ctypes.data)
         if scan >= batch.uav.shape[0]:

@@ -1,4 +1,4 @@
-"""What a scanning range finder is: pattern, reach, noise and intensity, from a data file."""
+"""LIDAR model: pattern, range, noise and intensity, read from a data file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class RangeLimits(SensorModel):
-    """What distances are measured."""
+    """Limits and resolution of measured ranges."""
 
     min_m: NonNegativeFloat
     max_m: PositiveFloat
@@ -39,7 +39,7 @@ class RangeNoise(SensorModel):
 
 
 class Dropout(SensorModel):
-    """Shares of beams lost at full reach and at grazing incidence."""
+    """Fractions of beams lost at maximum range and at grazing incidence."""
 
     far: Share
     grazing: Share
@@ -57,20 +57,20 @@ class MixedPixels(SensorModel):
 class Intensity(SensorModel):
     """I = scale reflectivity cos(incidence)^incidence_exponent (reference / r)^range_exponent.
 
-    The range counts as `reference_range_m` where it is less, and I is cut at `maximum`.
+    Ranges below `reference_range_m` count as that, and I is limited to `maximum`.
     """
 
     scale: PositiveFloat
-    """Of a surface that reflects everything, head on, at the reference range."""
+    """Intensity of a perfect reflector at normal incidence and the reference range."""
     incidence_exponent: NonNegativeFloat
     range_exponent: NonNegativeFloat
-    """2 for the power of the echo, 0 for a sensor that makes up for the range."""
+    """2 for the power of the echo, 0 for a sensor that compensates for the range."""
     reference_range_m: PositiveFloat
     maximum: PositiveFloat
     noise: NonNegativeFloat
-    """Standard deviation as a share of I."""
+    """Standard deviation as a fraction of I."""
     published: bool = True
-    """Whether planar scans carry them unless the scenario says otherwise; clouds do."""
+    """Whether planar scans carry intensities by default; point clouds always do."""
 
 
 class WarmUp(SensorModel):
@@ -81,22 +81,22 @@ class WarmUp(SensorModel):
 
 
 class ParticleSight(SensorModel):
-    """How the scanner meets particles in the air; `particle_echoes` explains it."""
+    """Interaction with particles in the air; `particle_echoes` explains the model."""
 
     beam_diameter_m: NonNegativeFloat = 0.005
-    """Where it leaves the scanner (modelling choice)."""
+    """Diameter at the scanner (modelling choice)."""
     overlap_m: NonNegativeFloat = 1.0
-    """Nearer the receiver does not see all of the beam (Hahner et al. 2021: from 1 m on)."""
+    """Range below which the receiver sees part of the beam (Hahner et al. 2021: from 1 m on)."""
     threshold_reflectivity: Annotated[float, Field(gt=0.0, le=1.0)] = 0.9
-    """Of the surface that is just noticed at `max_m` (Kilic et al. 2021)."""
+    """Reflectivity of the surface that is just detected at `max_m` (Kilic et al. 2021)."""
 
 
 class LidarModel(SensorModel):
-    """A scanner; where the numbers come from stands in its data file."""
+    """A scanner; its data file names the sources of the numbers."""
 
     name: str
     echoes: Annotated[int, Field(ge=1, le=MOST_ECHOES)] = 1
-    """Most echoes of a beam that are told apart."""
+    """Maximum number of echoes per beam."""
     scan: ScanPattern
     range: RangeLimits
     noise: RangeNoise
@@ -106,21 +106,21 @@ class LidarModel(SensorModel):
     warm_up: WarmUp = WarmUp()
     particles: ParticleSight = ParticleSight()
     exact: bool = False
-    """Exact distances: nothing is disturbed, rounded, lost or mixed."""
+    """Exact ranges: without noise, rounding, dropout and mixing."""
 
     @property
     def beams(self) -> int:
-        """Beams of a sweep."""
+        """Number of beams of a sweep."""
         return self.scan.beam_count
 
     @property
     def sweep_duration_ns(self) -> int:
-        """From the start of a sweep to its last beam, on the simulation's clock."""
+        """Time from the start of a sweep to its last beam, ns of simulated time."""
         return self.scan.sweep_ns
 
     @cached_property
     def constants(self) -> LidarConstants:
-        """The model as kernels take it."""
+        """Parameters of the model for kernels."""
         shine = self.intensity or _NO_INTENSITY
         return LidarConstants(
             stride=self.scan.stride,
@@ -149,11 +149,11 @@ class LidarModel(SensorModel):
         )
 
     def without_noise(self) -> LidarModel:
-        """The same scanner with exact ranges."""
+        """Returns the same scanner with exact ranges."""
         return self.changed(exact=True)
 
     def changed(self, **values: Any) -> LidarModel:
-        """The same scanner with other values; a section is changed by the keys given for it."""
+        """Returns a copy with other values; sections are updated by the given keys."""
         data = self.model_dump()
         for key, value in values.items():
             data[key] = {**(data[key] or {}), **value} if isinstance(value, dict) else value
@@ -161,7 +161,7 @@ class LidarModel(SensorModel):
 
     @property
     def folder(self) -> Path:
-        """Where files that the model names are looked for."""
+        """Folder of the files that the model names."""
         return self.scan._folder if isinstance(self.scan, TableScan) else Path()
 
 
@@ -176,17 +176,17 @@ _NO_INTENSITY = Intensity(
 
 
 def load_lidar(name: str | Path = "utm_30lx", folder: Path | None = None) -> LidarModel:
-    """Scanner by shipped name or `.toml` path, also beside the scenario in `folder`.
+    """Returns a scanner by shipped name or `.toml` path, also relative to the scenario's `folder`.
 
-    Raises `DataFileError` naming file, key and what is allowed.
+    Raises `DataFileError`, naming file, key and allowed values, for an invalid file.
     """
     path = find_model(name, "LIDAR", folder)
     return _placed(read_model(path, LidarModel), path.parent)
 
 
 def _placed(model: LidarModel, folder: Path) -> LidarModel:
-    """The model with its beam table, if it names one, read from `folder`."""
+    """Returns the model after reading its beam table, if any, from `folder`."""
     if isinstance(model.scan, TableScan):
         model.scan._folder = folder
-        _ = model.scan.time_ns  # a broken table is told now
+        _ = model.scan.time_ns  # raises now if the table is invalid
     return model

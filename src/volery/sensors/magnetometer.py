@@ -1,4 +1,4 @@
-"""Magnetometers: the earth's field seen from the sensor, iron, noise and a wandering bias."""
+"""Magnetometers: the earth's field in the sensor frame, iron, noise and a drifting bias."""
 
 from __future__ import annotations
 
@@ -29,21 +29,22 @@ class MagnetometerModel(SensorModel):
     random_walk_t_s_sqrt_hz: NonNegativeFloat
     bias_correlation_s: PositiveFloat
     hard_iron_t: Row = (0.0, 0.0, 0.0)
-    """Field of magnetised parts, in the sensor's frame."""
+    """Field of magnetised parts, T, in the sensor frame."""
     soft_iron: tuple[Row, Row, Row] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    """Matrix by which magnetisable parts distort the outer field, in the sensor's frame."""
+    """Distortion of the outer field by magnetisable parts, in the sensor frame."""
 
 
 def load_magnetometer_model(name: str, folder: Path | None = None) -> MagnetometerModel:
-    """Model by shipped name or `.toml` path."""
+    """Returns the model by shipped name or `.toml` path, also relative to `folder`."""
     return load_model(MagnetometerModel, "magnetometer", name, folder)
 
 
 class MagnetometerBank(NoisyBank):
     """All magnetometers of one model, rate and phase.
 
-    `attitude_body` (S, 4) turns each sensor frame against its body (FLU); `keys` (S,) are the noise
-    streams, or None for sensors without noise; `field_map` (3,) T is the field over the whole map.
+    `attitude_body` (S, 4) is the rotation of each sensor frame in the body frame (FLU); `keys` (S,)
+    are the noise streams, or None for sensors without noise; `field_map` (3,) T is the uniform
+    field in the map frame.
     """
 
     name = "magnetometer"
@@ -70,7 +71,7 @@ class MagnetometerBank(NoisyBank):
         self._bias = np.zeros((len(sensors), 3))
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> MagneticReadings:
-        """Reading number k (counted from 0) of all sensors of the bank."""
+        """Returns fields (S, 3) T in the sensor frames, of measurement `k`; see `Bank`."""
         outer = np.empty((len(self._rows), 3))
         feel_vector(
             self._rows, fleet.state.attitude, self._body_from_sensor, self._field_map, outer
@@ -87,5 +88,5 @@ class MagnetometerBank(NoisyBank):
         )
 
     def _switch_on(self, rows: NDArray[np.int64], time_ns: int) -> None:  # noqa: ARG002
-        """Without a bias."""
+        """Clears the bias."""
         self._bias[rows] = 0.0

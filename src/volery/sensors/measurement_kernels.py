@@ -1,4 +1,4 @@
-"""Compiled measuring of whole scans: from what the beams met to ranges and intensities."""
+"""Compiled measurement of whole scans: from surfaces hit to ranges and intensities."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from volery.sensors.echo_kernels import (
 )
 
 _FIRST_ECHO_STREAM = 1 << 62
-"""Number of the draw that becomes the key of an echo's own stream, counted from here."""
+"""First draw number whose value is the key of an echo's own stream."""
 
 
 @inner_kernel
@@ -36,7 +36,7 @@ def _measure_single(
     ranges: NDArray[np.float32],
     intensities: NDArray[np.float32],
 ) -> None:
-    """One echo a beam: distances (beams,) to ranges (beams,) and intensities (0 or 1, beams)."""
+    """Measures one echo per beam: distances (beams,) to ranges and intensities (0 or 1, beams)."""
     beams, stride = distance.shape[0], lidar.stride
     wanted = intensities.shape[0] > 0
     if not (lidar.noise or wanted):
@@ -74,7 +74,7 @@ def _shares(
     i: int,
     distance: NDArray[np.float32],
 ) -> tuple[float, float]:
-    """Shares of a beam's footprint that lie beyond its edges to the next and the last beam."""
+    """Returns the fractions of a footprint beyond the edges to the next and the last beam."""
     stride = lidar.stride
     after = before = 0.0
     if i + stride < distance.shape[0] and is_edge(lidar, distance[i], distance[i + stride]):
@@ -93,7 +93,7 @@ def _merge(
     share: NDArray[np.float64],
     source: NDArray[np.int64],
 ) -> int:
-    """Sort the echoes by distance and merge those within a pulse length; how many are left."""
+    """Sorts echoes by distance and merges those within a pulse length; returns the number left."""
     for m in range(1, MOST_ECHOES):
         for n in range(m, 0, -1):
             if place[n] < place[n - 1]:
@@ -129,10 +129,10 @@ def _measure_several(
     ranges: NDArray[np.float32],
     intensities: NDArray[np.float32],
 ) -> None:
-    """Up to E echoes a beam: distances (beams,) to ranges and intensities (E, beams).
+    """Measures up to E echoes per beam: distances (beams,) to ranges and intensities (E, beams).
 
-    A footprint that reaches beyond an edge sends an echo from either side, each with its share of
-    the light. Echoes within a pulse length are one; those with too small a share are not noticed.
+    A footprint that extends beyond an edge returns an echo from either side, each with its fraction
+    of the light. Echoes within a pulse length merge; those with too small a fraction are lost.
     """
     beams, stride, most = distance.shape[0], lidar.stride, ranges.shape[0]
     place, share = np.empty(MOST_ECHOES), np.empty(MOST_ECHOES)
@@ -185,9 +185,9 @@ def measure(
     surfaces: Surfaces,
     echoes: Echoes,
 ) -> None:
-    """Turn what a scan met (`row` of surfaces) into what it measures (row `scan` of echoes).
+    """Turns a scan's hits (`row` of surfaces) into measurements (row `scan` of echoes).
 
-    `time_ns` is when the sweep began.
+    `time_ns` is the start of the sweep.
     """
     bias = warm_up_bias(lidar, time_ns)
     ranges, intensities = echoes.ranges[scan], echoes.intensities[scan]
@@ -215,5 +215,5 @@ def measure_scan(
     surfaces: Surfaces,
     echoes: Echoes,
 ) -> None:
-    """`measure` for callers in Python."""
+    """Calls `measure` from Python."""
     measure(lidar, key, scan_number, time_ns, scan, row, surfaces, echoes)

@@ -1,4 +1,4 @@
-"""Sensor models: data files in `models/`, or a user's own beside the scenario."""
+"""Sensor models: data files in `models/`, or user files relative to the scenario."""
 
 from __future__ import annotations
 
@@ -12,25 +12,26 @@ _SHIPPED = Path(__file__).parent / "models"
 
 
 class SensorModel(Bounded):
-    """Numbers of a sensor as its data file states them."""
+    """Parameters of a sensor, with the keys of its data file."""
 
 
 Model = TypeVar("Model", bound=SensorModel)
 
 
 def load_model(kind: type[Model], what: str, name: str | Path, folder: Path | None) -> Model:
-    """Model by shipped name or `.toml` path, also beside the scenario in `folder`.
+    """Returns a model by shipped name or `.toml` path, also relative to the scenario's `folder`.
 
-    `what` names the kind of sensor in errors. Raises `DataFileError` naming file and key.
+    `what` names the kind of sensor in errors. Raises `DataFileError`, naming file and key, for an
+    invalid file.
     """
     return read_model(find_model(name, what, folder), kind)
 
 
 def find_model(name: str | Path, what: str, folder: Path | None) -> Path:
-    """Path of a model's file; see `load_model`."""
+    """Returns the path of a model's file; see `load_model`."""
     return find_data_file(str(name), _SHIPPED, f"{what} model", folder)
 
 
 def read_model(path: Path, kind: type[Model]) -> Model:
-    """Model of a file, with its base. Raises `DataFileError` naming file and key."""
+    """Reads the model of a file, with its base; raises `DataFileError`, naming file and key."""
     return load_data_file(path, kind, _SHIPPED)

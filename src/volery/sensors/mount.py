@@ -1,4 +1,4 @@
-"""Where a sensor sits on a UAV, and how it nods."""
+"""Sensor mounts: pose on the UAV and nodding motion."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _TWO_PI = 2.0 * math.pi
 
 
 class Mount(NamedTuple):
-    """Pose of a sensor in the body frame (FLU); optionally it nods about the sensor's y axis.
+    """Pose of a sensor in the body frame (FLU), optionally nodding about the sensor's y axis.
 
     The nodding angle at time t is offset + amplitude sin(2 pi t / period + phase); a positive angle
     turns the sensor's x axis down. Without nodding `period_s` is 0.
@@ -24,7 +24,7 @@ class Mount(NamedTuple):
     position_body: NDArray[np.float64]
     """(3,) m."""
     attitude_body: NDArray[np.float64]
-    """(4,) unit quaternion, body from sensor base."""
+    """(4,) unit quaternion x y z w, body from sensor base."""
     amplitude_rad: float
     period_s: float
     offset_rad: float
@@ -32,7 +32,7 @@ class Mount(NamedTuple):
 
     @property
     def nods(self) -> bool:
-        """Whether the sensor moves against the body."""
+        """Whether the sensor moves relative to the body."""
         return self.period_s > 0.0
 
 
@@ -45,7 +45,11 @@ def make_mount(
     offset_rad: float = 0.0,
     phase_rad: float = 0.0,
 ) -> Mount:
-    """Checked mount; ValueError for numbers that are not finite or of the wrong shape."""
+    """Returns a mount with a normalised quaternion.
+
+    `position_body` (3,) m and `attitude_body` (4,) x y z w in FLU. Raises `ValueError` for numbers
+    that are not finite, wrong shapes, a zero quaternion or a negative period.
+    """
     position = np.ascontiguousarray(position_body, dtype=np.float64)
     attitude = np.ascontiguousarray(attitude_body, dtype=np.float64)
     numbers = np.array([amplitude_rad, period_s, offset_rad, phase_rad], dtype=np.float64)
@@ -70,10 +74,10 @@ def make_mount(
 def nodding_angle(
     amplitude_rad: float, period_s: float, offset_rad: float, phase_rad: float, time_ns: int
 ) -> float:
-    """Angle of a `Mount` about the sensor's y axis at a time, rad."""
+    """Returns the angle of a `Mount` about the sensor's y axis at a time, rad."""
     if period_s <= 0.0:
         return offset_rad
-    # The phase is reduced in integers first: a long run loses no precision.
+    # Reducing the phase in integers first preserves precision in long runs.
     period_ns = round(period_s / _NS)
     turn = (time_ns % period_ns) / period_ns
     angle: float = offset_rad + amplitude_rad * np.sin(_TWO_PI * turn + phase_rad)
@@ -84,7 +88,7 @@ def nodding_angle(
 def nodded(
     x: float, y: float, z: float, w: float, angle: float
 ) -> tuple[float, float, float, float]:
-    """Quaternion, body from sensor, of a mount with that quaternion at a nodding angle."""
+    """Returns the quaternion (x, y, z, w) of a mount, body from sensor, at a nodding angle, rad."""
     if angle == 0.0:
         return x, y, z, w
     half = 0.5 * angle
@@ -94,7 +98,7 @@ def nodded(
 
 @brief_kernel
 def nodding_angle_at(mount: Mount, time_ns: int) -> float:
-    """`nodding_angle` for callers in Python."""
+    """Returns the `nodding_angle` of a mount, rad; for callers in Python."""
     return nodding_angle(
         mount.amplitude_rad, mount.period_s, mount.offset_rad, mount.phase_rad, time_ns
     )

@@ -1,4 +1,4 @@
-"""Noise of a bank's sensors: numbered draws from named streams, and slowly wandering biases."""
+"""Noise of a bank's sensors: numbered draws from named streams, and drifting biases."""
 
 from __future__ import annotations
 
@@ -16,12 +16,11 @@ Array = NDArray[np.float64]
 class NoiseStreams:
     """Normal numbers of S sensors, each counted from its own start.
 
-    Row i draws from stream `keys[i]`: first `at_start` numbers for what is settled when the sensor
-    is switched on, then `per_measurement` for each measurement. What measurement k draws follows
-    from its key and from how many measurements lie between it and the sensor's start, not from
-    other rows or earlier calls. Without `keys` all numbers are zero. Kernels that draw by
-    themselves, those of LIDARs and cameras, take `keys` (S,) and what is counted from `first_k`
-    (S,), the number of each sensor's first measurement.
+    Row i draws from stream `keys[i]`: first `at_start` numbers for the sensor's start, then
+    `per_measurement` for each measurement. The draws of measurement k do not depend on other rows
+    or earlier calls. Without `keys` all numbers are zero. Kernels that draw random numbers
+    themselves, those of LIDARs and cameras, use `keys` (S,) and `first_k` (S,), the number of each
+    sensor's first measurement.
     """
 
     def __init__(
@@ -39,20 +38,20 @@ class NoiseStreams:
         self._per_measurement = per_measurement
 
     def start(self) -> Array:
-        """Numbers settled at the start, (S, at_start)."""
+        """Returns the numbers of the start, (S, at_start)."""
         return self._draw(np.zeros_like(self.first_k), self._at_start)
 
     def measurement(self, k: int) -> Array:
-        """Numbers of measurement k, (S, per_measurement)."""
+        """Returns the numbers of measurement `k`, (S, per_measurement)."""
         since_start = k - self.first_k
         return self._draw(
             self._at_start + self._per_measurement * since_start, self._per_measurement
         )
 
     def restart(self, rows: NDArray[np.int64], keys: NDArray[np.uint64] | None, k: int) -> None:
-        """Let `rows` (R,) draw at measurement k as a fresh sensor does at its first one.
+        """Restarts `rows` (R,): measurement `k` draws the numbers of a new sensor's first one.
 
-        `keys` (R,) are their streams from now on; None keeps the present ones, and sensors without
+        `keys` (R,) are their new streams; None leaves the streams unchanged, and sensors without
         noise ignore them.
         """
         self.first_k[rows] = k
@@ -60,11 +59,11 @@ class NoiseStreams:
             self.keys[rows] = keys
 
     def get_state(self) -> dict[str, Any]:
-        """Keys and starts."""
+        """Returns copies of keys and first measurement numbers."""
         return {"keys": self.keys.copy(), "first_k": self.first_k.copy()}
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a state of `get_state`."""
         self.keys = np.array(state["keys"], np.uint64)
         self.first_k = np.array(state["first_k"], np.int64)
 
@@ -81,13 +80,14 @@ class GaussMarkov(NamedTuple):
     decay: Array
     step: Array
     sigma: Array
-    """Standard deviation in the long run."""
+    """Long-run standard deviation."""
 
 
 def gauss_markov(walk: ArrayLike, correlation_s: ArrayLike, dt_s: float) -> GaussMarkov:
-    """Process driven by white noise of density `walk` (unit/s/sqrt(Hz)), exact at steps of `dt_s`.
+    """Returns the process driven by white noise of density `walk` (unit/s/sqrt(Hz)).
 
-    b+ = exp(-dt/tau) b + walk sqrt(tau/2 (1 - exp(-2 dt/tau))) n, as PX4 and RotorS have it.
+    b+ = exp(-dt/tau) b + walk sqrt(tau/2 (1 - exp(-2 dt/tau))) n, as in PX4 and RotorS; exact for
+    steps of `dt_s`.
     """
     tau = np.asarray(correlation_s, dtype=np.float64)
     decay = np.exp(-dt_s / tau)
@@ -96,5 +96,5 @@ def gauss_markov(walk: ArrayLike, correlation_s: ArrayLike, dt_s: float) -> Gaus
 
 
 def gauss_markov_of_sigma(sigma: ArrayLike, correlation_s: float, dt_s: float) -> GaussMarkov:
-    """Process of a stated standard deviation in the long run."""
+    """Returns the process with a given long-run standard deviation."""
     return gauss_markov(np.asarray(sigma) * np.sqrt(2.0 / correlation_s), correlation_s, dt_s)

@@ -1,4 +1,4 @@
-"""Odometry: where a UAV believes it is. And the ground truth that reports compare it with."""
+"""Odometry with drift, and the ground truth that reports compare it with."""
 
 from __future__ import annotations
 
@@ -33,17 +33,17 @@ class OdometryModel(SensorModel):
 
 
 def load_odometry_model(name: str, folder: Path | None = None) -> OdometryModel:
-    """Model by shipped name or `.toml` path."""
+    """Returns the model by shipped name or `.toml` path, also relative to `folder`."""
     return load_model(OdometryModel, "odometry", name, folder)
 
 
 class OdometryBank(NoisyBank):
     """All odometry sources of one model, rate and phase.
 
-    Each step of the way is added as the source sees it: turned by its yaw error so far, plus a
-    random part. Both errors are random walks over the distance flown; the odometry frame coincides
-    with the map at the start, and again at every reset. `keys` (S,) are the noise streams, or None
-    for perfect odometry.
+    Each displacement is integrated as the source measures it: rotated by its yaw error so far, plus
+    a random part. Both errors are random walks over the distance flown; the odometry frame
+    coincides with the map at the start and at every reset. `keys` (S,) are the noise streams, or
+    None for perfect odometry.
     """
 
     name = "odometry"
@@ -70,7 +70,10 @@ class OdometryBank(NoisyBank):
         self._last_position = self._position_odom.copy()
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> OdometryReadings:
-        """Reading number k (counted from 0) of all sources of the bank."""
+        """Returns poses in the odometry frame and twists in the body frame (FLU), with variances.
+
+        They belong to measurement number `k` of all S sources; see `Bank`.
+        """
         position = fleet.state.position_map[self._taken]
         attitude = fleet.state.attitude[self._taken]
         way = position - self._last_position
@@ -87,7 +90,7 @@ class OdometryBank(NoisyBank):
             self._yaw_error += walk[:, 3]
             twist += self._twist_noise * noise[:, 4:]
             variance[:, [0, 1, 2, 5]] = self._flown[:, None] * self._drift**2
-            # What the yaw error does to a straight way, in whichever direction it led.
+            # Effect of the yaw error on a straight path of any direction.
             variance[:, :2] += (self._drift[3] ** 2 * self._flown**3 / 3.0)[:, None]
         return OdometryReadings(
             self.sensors,
@@ -102,7 +105,7 @@ class OdometryBank(NoisyBank):
         )
 
     def _switch_on(self, rows: NDArray[np.int64], time_ns: int) -> None:  # noqa: ARG002
-        """Where their UAVs are now."""
+        """Starts at the present positions of the UAVs."""
         self._yaw_error[rows] = 0.0
         self._flown[rows] = 0.0
         self._position_odom[rows] = self._fleet.state.position_map[self._rows[rows]]
@@ -114,7 +117,7 @@ class OdometryBank(NoisyBank):
 
 
 class GroundTruthBank(Memoryless):
-    """The true poses and twists."""
+    """Ground truth: exact poses in the map frame and twists in the body frame (FLU)."""
 
     name = "ground_truth"
     lag_ns = 0
@@ -126,7 +129,7 @@ class GroundTruthBank(Memoryless):
         self._taken = in_one_piece(self._rows)
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> OdometryReadings:  # noqa: ARG002
-        """The present state of all UAVs of the bank."""
+        """Returns the present state of all S UAVs of the bank."""
         twist = _twist_body(fleet, self._rows)
         zero = np.zeros((len(self._rows), 6))
         return OdometryReadings(

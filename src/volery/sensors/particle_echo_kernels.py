@@ -1,7 +1,7 @@
-"""Scans made in rain, snow, fog or dust: what is lost and what is seen in the air; compiled.
+"""Compiled effect of rain, snow, fog or dust on scans: lost and false echoes.
 
-They are worked over after they were measured as in clear air, with numbers from streams of their
-own: without particles nothing is different, and nothing is computed.
+Scans are processed after they were measured in clear air, with numbers from separate streams:
+without particles nothing changes and nothing is computed.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from volery.sensors.echo_kernels import MOST_ECHOES, Echoes, LidarConstants
 from volery.sensors.particle_echoes import KINDS, VOLUME, ParticleTable
 
 _STREAM = 1 << 61
-"""Number of the draw of a scan's stream that becomes the key of its particles."""
+"""Number of the draw of a scan's stream whose value is the key of its particles."""
 _DRAWS = MOST_ECHOES + 3 * KINDS
-"""Of a beam: whether each echo is kept; place, strength and noise of each kind's false one."""
+"""Draws per beam: survival of each echo; position, strength and noise of each kind's false one."""
 
 
 @inner_kernel
@@ -32,7 +32,7 @@ def _weaken(
     ranges: NDArray[np.float32],
     intensities: NDArray[np.float32],
 ) -> None:
-    """Take away the echoes of beam `i` that are too weak now; those that stay move up."""
+    """Removes the echoes of beam `i` that are now too weak; the others move up."""
     kept = 0
     for m in range(ranges.shape[0]):
         r: float = np.float64(ranges[m, i])
@@ -58,7 +58,7 @@ def _weaken(
 
 @inner_kernel
 def _place_of(table: NDArray[np.float64], events: float) -> float:
-    """Index, with a fraction, at which so many events have come, of a table that reaches them."""
+    """Returns the fractional index at which an ascending table reaches `events`."""
     low, high = 0, table.shape[0] - 1
     while high - low > 1:
         middle = (low + high) // 2
@@ -84,7 +84,7 @@ def _insert(
     ranges: NDArray[np.float32],
     intensities: NDArray[np.float32],
 ) -> None:
-    """Put an echo in its place among those of beam `i`; the farthest of too many goes."""
+    """Inserts an echo among those of beam `i` by range; the farthest of too many is dropped."""
     m = ranges.shape[0] - 1
     if not r < ranges[m, i]:
         return
@@ -109,9 +109,9 @@ def _see_particles(
     ranges: NDArray[np.float32],
     intensities: NDArray[np.float32],
 ) -> None:
-    """Enter the first false echo of each kind before the `surface` that beam `i` meets.
+    """Adds the first false echo of each kind in front of the `surface` that beam `i` hits.
 
-    It needs the share of all light that any echo needs to be noticed beside others.
+    It needs the fraction of all light that any echo needs to be detected.
     """
     behind = 0.0
     if ranges[0, i] < np.inf:
@@ -151,9 +151,9 @@ def weather_scans(
     counter: NDArray[np.int64],
     echoes: Echoes,
 ) -> None:
-    """Let particles act on whole scans, taken one by one from `counter`.
+    """Applies particles to whole scans, numbered by `counter`; runs in every thread.
 
-    A LIDAR without noise loses what is beyond its reach, and sees no particles.
+    A LIDAR without noise loses echoes beyond its reduced range, and sees no particles.
     """
     beams = echoes.ranges.shape[2]
     while True:

@@ -1,4 +1,4 @@
-"""What all beam patterns have in common."""
+"""Base class of beam patterns."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ from volery.world.embree import LANES
 Array = NDArray[np.float64]
 
 MOST_BEAMS = 1 << 20
-"""Of a sweep."""
+"""Maximum number of beams of a sweep."""
 
 
 class Pattern(SensorModel):
-    """Where the beams of a scanner go and when; the kinds stand in `scan_patterns`."""
+    """Directions and times of a scanner's beams; `scan_patterns` defines the kinds."""
 
     rate_hz: PositiveFloat
 
     @property
     @abstractmethod
     def time_ns(self) -> NDArray[np.int64]:
-        """(beams,) time of each beam after the start of the sweep."""
+        """(beams,) time of each beam after the start of the sweep, ns."""
 
     @property
     @abstractmethod
     def spacing_rad(self) -> float:
-        """Angle between a beam and the one `stride` numbers on."""
+        """Angle between a beam and that `stride` numbers later, rad."""
 
     @property
     def stride(self) -> int:
-        """A beam's neighbours along the sweep are so many numbers before and after it."""
+        """Distance in beam numbers between neighbours along the sweep."""
         return 1
 
     @property
@@ -46,38 +46,38 @@ class Pattern(SensorModel):
 
     @property
     def beam_count(self) -> int:
-        """Beams of a sweep."""
+        """Number of beams of a sweep."""
         return len(self.time_ns)
 
     @property
     def sweep_ns(self) -> int:
-        """From the start of the sweep to its last beam."""
+        """Time from the start of the sweep to its last beam, ns."""
         return int(self.time_ns.max())
 
     @cached_property
     def ring(self) -> NDArray[np.uint16]:
-        """(beams,) number of the ring that a beam belongs to."""
+        """(beams,) number of each beam's ring."""
         return np.zeros(self.beam_count, dtype=np.uint16)
 
     def directions(self, sweep: int) -> Array:
-        """(3, beams) unit vectors of a sweep, counted from 0, in the sensor frame; read only."""
+        """Returns read-only unit vectors (3, beams) of sweep `sweep`, from 0, sensor frame FLU."""
         return self._first_directions if self.is_fixed else self._aim(sweep)
 
     @cached_property
     def time_s(self) -> NDArray[np.float32]:
-        """(beams,) time of each beam after the start of the sweep, as messages carry it."""
+        """(beams,) time of each beam after the start of the sweep, s, as in messages."""
         return (self.time_ns * 1e-9).astype(np.float32)
 
     @abstractmethod
     def _aim(self, sweep: int) -> Array:
-        """Compute `directions`."""
+        """Computes `directions`."""
 
     @cached_property
     def _first_directions(self) -> Array:
         return self._aim(0)
 
     def table(self, sweep: int) -> BeamTable:
-        """The beams of a sweep, counted from 0, for kernels."""
+        """Returns the beams of sweep number `sweep`, counted from 0, for kernels."""
         if self.is_fixed:
             return self._first_table
         fraction = self._first_table.lanes[:, -1].reshape(-1)[: self.beam_count]
@@ -90,6 +90,6 @@ class Pattern(SensorModel):
 
 
 def median_spacing(direction: Array) -> float:
-    """Median angle between consecutive unit vectors (3, N), rad."""
+    """Returns the median angle between consecutive unit vectors (3, N), rad."""
     chord = np.linalg.norm(np.diff(direction, axis=1), axis=0)
     return max(float(np.median(2.0 * np.arcsin(np.minimum(chord / 2.0, 1.0)))), 1e-9)

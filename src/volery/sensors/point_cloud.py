@@ -1,8 +1,8 @@
-"""From echoes to points as PointCloud2 lists them: x y z intensity ring time, one after the other.
+"""Points for PointCloud2 from echoes: packed x y z intensity ring time.
 
-The layout is that of the Velodyne driver's cloud with ring and time (22 bytes a point), which
-LIO-SAM, FAST-LIO and other deskewing tools read by field name. Points are unorganized and dense:
-beams without an echo are left out, and points follow each other in order of time, column by column.
+The layout is that of the Velodyne driver's cloud with ring and time (22 bytes per point), which
+LIO-SAM, FAST-LIO and other deskewing tools read by field name. Clouds are unorganized and dense:
+beams without an echo are left out, and points are ordered by time, column by column.
 """
 
 from __future__ import annotations
@@ -25,11 +25,12 @@ POINT = np.dtype(
         ("time", "<f4"),
     ]
 )
-"""x y z in m, where the sensor frame was at the point's own time; `time` in s after the stamp."""
+"""Fields of a point: x y z in m, in the sensor frame at the point's own time; `time` in s after the
+stamp."""
 
 
 class PointMaker:
-    """Makes the points of a batch of scans; what all its sensors share is computed once."""
+    """Makes the points of a batch of scans; data that all its sensors share is computed once."""
 
     def __init__(self, scans: LidarScans) -> None:
         pattern = scans.model.scan
@@ -39,9 +40,9 @@ class PointMaker:
         self._time_s = pattern.time_s
 
     def points(self, row: int) -> NDArray[Any]:
-        """Points of one sensor, (N,) of POINT, read-only and its own.
+        """Returns a new, read-only array (N,) of POINT with the points of sensor `row`.
 
-        All echoes of a beam follow each other; without intensities in the scans they are 0.
+        Echoes of a beam are adjacent; without intensities in the scans these are 0.
         """
         echoes = self._scans.echoes[row]
         points = np.empty(echoes.size, dtype=POINT)
@@ -67,7 +68,7 @@ def _fill(
     intensities: NDArray[np.float32],
     points: NDArray[Any],
 ) -> int:
-    """Enter the echoes (E, beams) of one scan; how many points they make."""
+    """Writes the echoes (E, beams) of one scan as points; returns their number."""
     count = 0
     for i in range(echoes.shape[1]):
         for e in range(echoes.shape[0]):

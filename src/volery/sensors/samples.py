@@ -1,7 +1,7 @@
-"""What sensors measured, as batches: one object for all sensors of a bank at one instant.
+"""Samples of sensors, as batches: one object for all S sensors of a bank at one time.
 
-Row i of every array belongs to `sensors[i]`. Arrays are fresh, owned by the sample and read-only.
-`MEASURED` names what a biased sensor gets wrong, and how many numbers tell the error of one sensor.
+Row i of every array belongs to `sensors[i]`. Arrays are new, owned by the sample and read-only.
+`MEASURED` names the quantities that a bias acts on, and the numbers that a sensor's bias has.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class SensorId:
-    """Which sensor of which UAV."""
+    """Identifies a sensor of a UAV."""
 
     uav: int
     """Row of the UAV in the fleet."""
@@ -30,7 +30,7 @@ class SensorId:
 
     @property
     def path(self) -> str:
-        """`uav1/imu`: names it also where rows have changed."""
+        """Name such as `uav1/imu`, which stays valid when rows change."""
         return f"{self.uav_name}/{self.name}"
 
 
@@ -45,34 +45,35 @@ class LidarScans:
     """Time of the first beam."""
     model: LidarModel
     number: int
-    """Of the sweep, counted from 0."""
+    """Number of the sweep, counted from 0."""
     echoes: NDArray[np.float32]
-    """(S, E, beams) m, nearest first; +inf no echo, -inf nearer than the least range (REP-117)."""
+    """(S, E, beams) m, nearest first; +inf no echo, -inf below the minimum range (REP-117)."""
     intensities: NDArray[np.float32]
-    """(S, E, beams), 0 without an echo; (S, 0, beams) where they were not wanted."""
+    """(S, E, beams), 0 without an echo; (S, 0, beams) if not requested."""
 
     @property
     def ranges(self) -> NDArray[np.float32]:
-        """(S, beams) of the first echoes, m."""
+        """(S, beams) ranges of the first echoes, m."""
         return self.echoes[:, 0]
 
 
 @dataclass(frozen=True)
 class CameraFrames:
-    """One picture of each camera of a bank; a part that nobody wanted has no pixels."""
+    """One image of each camera of a bank; a part without receivers has no pixels."""
 
     MEASURED: ClassVar[dict[str, int]] = {"depth": 1}
 
     sensors: tuple[SensorId, ...]
     stamp_ns: int
-    """When the first row was exposed."""
+    """Time of the first row's exposure."""
     model: CameraModel
     colour: NDArray[np.uint8]
     """(S, height, width, 3) sRGB."""
     depth: NDArray[np.float32]
-    """(S, height, width) m along the optical axis; -inf too near, inf too far, NaN not seen."""
+    """(S, height, width) m along the optical axis; -inf too near, inf too far, NaN outside the
+    lens."""
     instance: NDArray[np.int32]
-    """(S, height, width) instance of the scene, -1 for none."""
+    """(S, height, width) scene instance, -1 for none."""
     material: NDArray[np.uint8]
     """(S, height, width) `Material`."""
 
@@ -102,17 +103,17 @@ class RangeReadings:
     sensors: tuple[SensorId, ...]
     stamp_ns: int
     ranges: Array
-    """(S,) m; +inf nothing in reach, -inf nearer than the least range (REP-117)."""
+    """(S,) m; +inf nothing in range, -inf below the minimum range (REP-117)."""
     field_of_view_rad: float
     range_min_m: float
     range_max_m: float
     variance: float
-    """m^2 of the noise."""
+    """Variance of the noise, m^2."""
 
 
 @dataclass(frozen=True)
 class OdometryReadings:
-    """Poses in the odometry frame and twists in the body."""
+    """Poses in the odometry frame and twists in the body frame."""
 
     MEASURED: ClassVar[dict[str, int]] = {"position_odom": 3}
 
@@ -129,7 +130,7 @@ class OdometryReadings:
     pose_variance: Array
     """(S, 6): x, y, z m^2 and roll, pitch, yaw rad^2."""
     twist_variance: Array
-    """(S, 6)."""
+    """(S, 6): linear (m/s)^2 and angular (rad/s)^2, body frame."""
     is_ground_truth: bool
 
 
@@ -149,17 +150,17 @@ class JointAngles:
 
 @dataclass(frozen=True)
 class GnssReadings:
-    """Fixes of satellite navigation receivers: where and how fast their antennas were."""
+    """Fixes of GNSS receivers: position and velocity of the antennas."""
 
     MEASURED: ClassVar[dict[str, int]] = {"position_map": 3}
 
     sensors: tuple[SensorId, ...]
     stamp_ns: int
-    """Time of the position, before it was worked out and sent."""
+    """Time of the position, before the receiver's delay."""
     frame: LocalFrame
-    """The map's place on the earth."""
+    """Position of the map on the earth."""
     has_fix: NDArray[np.bool_]
-    """(S,)."""
+    """(S,) whether the receiver has a fix."""
     position_map: Array
     """(S, 3) m; nan without a fix."""
     velocity_map: Array
@@ -200,7 +201,7 @@ class MagneticReadings:
 
 @dataclass(frozen=True)
 class BatteryReadings:
-    """What battery monitors tell."""
+    """Measurements of battery monitors."""
 
     MEASURED: ClassVar[dict[str, int]] = {"voltage": 1, "current": 1}
 
@@ -211,11 +212,11 @@ class BatteryReadings:
     current: Array
     """(S,) A out of the battery."""
     charge: Array
-    """(S,) share of the capacity that is left."""
+    """(S,) remaining fraction of the capacity."""
     capacity_ah: Array
-    """(S,) A h."""
+    """(S,) capacity, A h."""
     cells: NDArray[np.int64]
-    """(S,) in series."""
+    """(S,) cells in series."""
     level: NDArray[np.int64]
     """(S,) `vehicle.battery.BatteryLevel`."""
 
@@ -235,6 +236,6 @@ Samples: TypeAlias = (
 
 
 def owned(array: NDArray[Any]) -> NDArray[Any]:
-    """The array, made read-only."""
+    """Makes the array read-only and returns it."""
     array.flags.writeable = False
     return array

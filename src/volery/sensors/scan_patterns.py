@@ -1,7 +1,7 @@
-"""Where the beams of a scanner go and when: planar, rings, rosette, or a table of the user's.
+"""Beam patterns of scanners: planar, rings, rosette, or a user-defined table.
 
-Beams are numbered in the order in which messages list them. Angles are those of the sensor frame
-(FLU): azimuth counter-clockwise about z from x, elevation up from the x-y plane.
+Beams are numbered in the order of the messages. Angles are those of the sensor frame (FLU): azimuth
+counter-clockwise about z from x, elevation up from the x-y plane.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class PlanarScan(Pattern):
     angle_min_rad: float
     angle_max_rad: float
     sweep_duration_s: PositiveFloat
-    """From the first beam to the last; the rest of a turn is blind."""
+    """Time from the first beam to the last; the rest of a turn is blind."""
 
     @model_validator(mode="after")
     def _is_one_turn(self) -> Self:
@@ -49,12 +49,12 @@ class PlanarScan(Pattern):
 
     @property
     def angle_increment_rad(self) -> float:
-        """Angle from a beam to the next."""
+        """Angle from a beam to the next, rad."""
         return (self.angle_max_rad - self.angle_min_rad) / (self.beams - 1)
 
     @property
     def time_increment_s(self) -> float:
-        """Time from a beam to the next."""
+        """Time from a beam to the next, s."""
         return self.sweep_duration_s / (self.beams - 1)
 
     @property
@@ -69,12 +69,12 @@ class PlanarScan(Pattern):
 
     @cached_property
     def time_ns(self) -> NDArray[np.int64]:
-        """(beams,) evenly spaced over the sweep."""
+        """(beams,) ns, evenly spaced over the sweep."""
         duration = ns_from_s(self.sweep_duration_s)
         return (duration * np.arange(self.beams) / (self.beams - 1)).astype(np.int64)
 
     def _aim(self, sweep: int) -> Array:  # noqa: ARG002 - all sweeps are alike
-        """(3, beams)."""
+        """Returns directions (3, beams)."""
         return np.stack([np.cos(self.angles), np.sin(self.angles), np.zeros(self.beams)])
 
     @cached_property
@@ -83,10 +83,10 @@ class PlanarScan(Pattern):
 
 
 class RingScan(Pattern):
-    """A spinning head with one laser a ring; a column is one firing of all of them.
+    """A spinning head with one laser per ring; a column is one firing of all lasers.
 
-    Beams are numbered column by column, within a column by ring. Laser r of column c fires at
-    `c column_period_s + firing_offset_s[r]`, and its azimuth is that of the head then, plus
+    Beams are numbered column by column, within a column by ring. Laser r of column c fires at `c
+    column_period_s + firing_offset_s[r]`; its azimuth is that of the head at that time plus
     `azimuth_offset_deg[r]`.
     """
 
@@ -94,27 +94,27 @@ class RingScan(Pattern):
     columns: Annotated[int, Field(ge=2, le=MOST_BEAMS)]
     column_period_s: PositiveFloat
     azimuth_start_deg: Degrees = 0.0
-    """Of the head at the first column."""
+    """Azimuth of the head at the first column."""
     azimuth_step_deg: Degrees
-    """From a column to the next; negative turns clockwise, seen from above."""
+    """Angle from a column to the next; negative turns clockwise, seen from above."""
     elevation_deg: Annotated[
         tuple[Annotated[float, Field(ge=-90.0, le=90.0)], ...],
         Field(min_length=1, max_length=1024),
     ]
-    """Of each laser, in the order of the rings' numbers."""
+    """Elevation of each laser, in the order of the rings' numbers."""
     azimuth_offset_deg: tuple[Degrees, ...] = ()
-    """Of each laser; empty: none."""
+    """Offset of each laser; empty: none."""
     firing_offset_s: tuple[NonNegativeFloat, ...] = ()
-    """Of each laser; empty: all fire at once."""
+    """Offset of each laser; empty: all fire at once."""
 
     @model_validator(mode="after")
     def _is_one_turn(self) -> Self:
         rings = len(self.elevation_deg)
         for name in ("azimuth_offset_deg", "firing_offset_s"):
             if len(getattr(self, name)) not in {0, rings}:
-                raise ValueError(f"{name} must have one entry a ring ({rings}), or none")
+                raise ValueError(f"{name} must have one entry per ring ({rings}), or none")
         if rings * self.columns > MOST_BEAMS:
-            raise ValueError(f"rings times columns may be {MOST_BEAMS} at most")
+            raise ValueError(f"rings times columns must be at most {MOST_BEAMS}")
         if self.azimuth_step_deg == 0.0:
             raise ValueError("azimuth_step_deg must not be 0")
         if self.sweep_ns > NS_PER_S / self.rate_hz:
@@ -123,7 +123,7 @@ class RingScan(Pattern):
 
     @property
     def stride(self) -> int:
-        """The next beam of a ring is one column on."""
+        """Number of rings: the next beam of a ring is one column later."""
         return len(self.elevation_deg)
 
     @property
@@ -133,17 +133,17 @@ class RingScan(Pattern):
 
     @cached_property
     def ring(self) -> NDArray[np.uint16]:
-        """(beams,)."""
+        """(beams,) see `Pattern`."""
         return np.tile(np.arange(self.stride, dtype=np.uint16), self.columns)
 
     @cached_property
     def time_ns(self) -> NDArray[np.int64]:
-        """(beams,)."""
+        """(beams,) see `Pattern`."""
         seconds = np.arange(self.columns)[:, None] * self.column_period_s + self._firing_offset
         return np.round(seconds * NS_PER_S).astype(np.int64).reshape(-1)
 
     def _aim(self, sweep: int) -> Array:  # noqa: ARG002 - all sweeps are alike
-        """(3, beams)."""
+        """Returns directions (3, beams)."""
         column = np.arange(self.columns)[:, None] + self._firing_offset / self.column_period_s
         offset = np.array(self.azimuth_offset_deg or [0.0] * self.stride)
         azimuth = np.radians(self.azimuth_start_deg + self.azimuth_step_deg * column + offset)
@@ -158,7 +158,7 @@ class RingScan(Pattern):
 
     @cached_property
     def _first_table(self) -> BeamTable:
-        """Packets are tiles of a few columns and rings, neighbours in azimuth and elevation."""
+        """Table whose packets are tiles of neighbouring columns and rings."""
         column, ring = np.divmod(np.arange(self.columns * self.stride), self.stride)
         rank = np.argsort(np.argsort(self.elevation_deg, kind="stable"))[ring]
         tile, rows = column // _TILE_COLUMNS, LANES // _TILE_COLUMNS
@@ -167,9 +167,9 @@ class RingScan(Pattern):
 
 
 class RosetteScan(Pattern):
-    """One beam bent by two turning prisms, whose pattern goes on from sweep to sweep.
+    """One beam deflected by two turning prisms; the pattern continues from sweep to sweep.
 
-    Each prism bends the beam by `deflection_deg` towards its own direction, which turns at
+    Each prism deflects the beam by `deflection_deg` towards its own direction, which turns at
     `prism_rpm` in the sensor's y-z plane; small angles add up as vectors.
     """
 
@@ -177,7 +177,7 @@ class RosetteScan(Pattern):
     points: Annotated[int, Field(ge=2, le=MOST_BEAMS)]
     point_period_s: PositiveFloat
     prism_rpm: tuple[float, float]
-    """Positive turns from y to z."""
+    """Speed of each prism; positive turns from y to z."""
     deflection_deg: tuple[
         Annotated[float, Field(gt=0.0, le=45.0)], Annotated[float, Field(gt=0.0, le=45.0)]
     ]
@@ -190,7 +190,7 @@ class RosetteScan(Pattern):
 
     @property
     def is_fixed(self) -> bool:
-        """The prisms do not come back to where they were after a sweep."""
+        """False: the prisms do not return to their start angles after a sweep."""
         return False
 
     @cached_property
@@ -200,11 +200,11 @@ class RosetteScan(Pattern):
 
     @cached_property
     def time_ns(self) -> NDArray[np.int64]:
-        """(points,)."""
+        """(points,) ns after the start of the sweep."""
         return np.round(np.arange(self.points) * self.point_period_s * NS_PER_S).astype(np.int64)
 
     def _aim(self, sweep: int) -> Array:
-        """(3, points)."""
+        """Returns directions (3, points)."""
         start_s = sweep / self.rate_hz
         bent = np.zeros(self.points, dtype=np.complex128)
         for path, rpm in zip(self._paths, self.prism_rpm, strict=True):
@@ -216,7 +216,7 @@ class RosetteScan(Pattern):
 
     @cached_property
     def _paths(self) -> tuple[NDArray[np.complex128], ...]:
-        """What each prism adds in the first sweep, y + i z, rad."""
+        """Deflection by each prism in the first sweep, y + i z, rad."""
         return tuple(
             math.radians(angle) * np.exp(1j * math.tau * (rpm / 60.0) * self.time_ns / NS_PER_S)
             for angle, rpm in zip(self.deflection_deg, self.prism_rpm, strict=True)
@@ -228,7 +228,7 @@ class TableScan(Pattern):
 
     kind: Literal["table"]
     file: str
-    """In the folder of the model file, or below it."""
+    """Path in the folder of the model file, or below it."""
 
     _folder: Path = PrivateAttr(default=Path())
 
@@ -239,7 +239,7 @@ class TableScan(Pattern):
             path = access.find_file(self.file, shipped=None)
         except DataFileError:
             raise DataFileError(
-                f"{self._folder / self.file}: cannot be read: a beam table lies in the folder of "
+                f"{self._folder / self.file}: cannot be read; a beam table lies in the folder of "
                 "its model file or below it"
             ) from None
         return read_beams(path, 1.0 / self.rate_hz, MOST_BEAMS)
@@ -251,16 +251,16 @@ class TableScan(Pattern):
 
     @property
     def time_ns(self) -> NDArray[np.int64]:
-        """(beams,)."""
+        """(beams,) see `Pattern`."""
         return self._list.time_ns
 
     @property
     def ring(self) -> NDArray[np.uint16]:
-        """(beams,)."""
+        """(beams,) see `Pattern`."""
         return self._list.ring
 
     def _aim(self, sweep: int) -> Array:  # noqa: ARG002 - all sweeps are alike
-        """(3, beams)."""
+        """Returns directions (3, beams)."""
         return self._list.direction
 
 

@@ -1,4 +1,4 @@
-"""Ultrasonic range finders: the nearest echo within a cone."""
+"""Sonars (ultrasonic range finders): the nearest echo within a cone."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from volery.world.scene import Scene
 
 Array = NDArray[np.float64]
 _RINGS = ((0.0, 1), (0.5, 6), (1.0, 12))
-"""Rays of the cone: share of the half angle and number of rays on that ring."""
+"""Rays of the cone: fraction of the half angle and number of rays on that ring."""
 
 
 class SonarModel(SensorModel):
-    """Reach, cone and noise; see the data files in `models/`."""
+    """Range, cone and noise; see the data files in `models/`."""
 
     name: str
     range_min_m: NonNegativeFloat
@@ -34,15 +34,15 @@ class SonarModel(SensorModel):
 
 
 def load_sonar_model(name: str, folder: Path | None = None) -> SonarModel:
-    """Model by shipped name or `.toml` path."""
+    """Returns the model by shipped name or `.toml` path, also relative to `folder`."""
     return load_model(SonarModel, "sonar", name, folder)
 
 
 class SonarBank(NoisyBank):
-    """All sonars of one model, rate and phase; they look along their frame's x axis.
+    """All sonars of one model, rate and phase, aimed along their frame's x axis.
 
-    `position_body` (S, 3) m and `attitude_body` (S, 4) place each sensor frame in its body (FLU);
-    `keys` (S,) are the noise streams, or None for sensors without noise.
+    `position_body` (S, 3) m and `attitude_body` (S, 4) are the poses of the sensor frames in the
+    body frame (FLU); `keys` (S,) are the noise streams, or None for sensors without noise.
     """
 
     name = "sonar"
@@ -68,7 +68,7 @@ class SonarBank(NoisyBank):
         self._cone = _cone_directions(math.radians(model.field_of_view_deg) / 2.0)
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> RangeReadings:
-        """Reading number k (counted from 0) of all sensors of the bank."""
+        """Returns ranges (S,) m of measurement number `k`; see `Bank`."""
         rows, rays = self._rows, len(self._cone)
         attitude = fleet.state.attitude[rows]
         map_from_sensor = rotations.multiply(attitude, self._body_from_sensor)

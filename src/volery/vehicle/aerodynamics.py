@@ -10,9 +10,9 @@ A rotor at speed w whose hub moves at v through the air, v_par along its axis an
 with s = +1 for a rotor that turns counter-clockwise seen from above. Its speed follows the command
 as a first-order lag, faster up than down, solved exactly. Source of form and constants: the motor
 model plugins of RotorS (ETH Zurich) and PX4's Gazebo Classic simulation. kF is each rotor's own
-(`BODY`'s rotor_lift): wear lowers it, the ground raises it (`vehicle.ground_effect`).
+(`BODY`'s rotor_lift): wear reduces it, the ground increases it (`vehicle.ground_effect`).
 
-The body's drag along each of its axes is -1/2 rho C_d A |v| v_i, v relative to the air around
+The body's drag along each of its axes is -1/2 rho C_d A |v| v_i, v relative to the surrounding air
 (modelling choice; the areas are the airframe's).
 """
 
@@ -34,7 +34,7 @@ from volery.core.simd import (
 from volery.vehicle.compiled import inner_kernel
 
 INFLOW_SPEED = 25.0
-"""m/s along the axis at which a rotor's thrust is gone (RotorS, PX4)."""
+"""Speed along the axis at which a rotor's thrust vanishes, m/s (RotorS, PX4)."""
 _INVERSE_INFLOW = 1.0 / INFLOW_SPEED
 
 
@@ -50,12 +50,11 @@ def air_wrench(
     oy: float,
     oz: float,
 ) -> tuple[float, float, float, float, float, float]:
-    """Force and torque of the air at mid-step, FLU; the rotors' speeds move on by a whole step.
+    """Returns force and torque of the air at mid-step, FLU; advances rotor speeds by a step.
 
-    body: a `BODY`. plant: a `PLANT`. command: a record with `rotor_reference`, rad/s.
-    (vx, vy, vz) m/s: velocity of the centre of mass through the air, (ox, oy, oz) rad/s: body
-    rates, both FLU and at mid-step.
-    Returns (fx, fy, fz, tx, ty, tz) in N and N m.
+    body: a `BODY`. plant: a `PLANT`. command: a record with `rotor_reference`, rad/s. (vx, vy, vz)
+    m/s: velocity of the centre of mass through the air, (ox, oy, oz) rad/s: body rates, both FLU
+    and at mid-step. Returns (fx, fy, fz, tx, ty, tz) in N and N m.
     """
     if plant.upright and not body.altered:
         fx, fy, fz, tx, ty, tz = upright_rotors(body, plant, command, vx, vy, vz, ox, oy, oz)
@@ -70,7 +69,7 @@ def air_wrench(
 
 @inner_kernel
 def _speed_at_mid_step(body: Any, plant: Any, wanted: float, r: int) -> float:
-    """Speed of rotor `r` half a step on, rad/s; its speed in `body` moves on by a whole step."""
+    """Returns the speed of rotor `r` at mid-step, rad/s; advances its speed in `body` by a step."""
     lead = body.rotor_speed[r] - wanted
     rising = lead < 0.0
     body.rotor_speed[r] = wanted + lead * (plant.rise[r] if rising else plant.fall[r])
@@ -80,7 +79,7 @@ def _speed_at_mid_step(body: Any, plant: Any, wanted: float, r: int) -> float:
 
 @inner_kernel
 def _speeds_at_mid_step(body: Any, plant: Any, command: Any, first: int) -> Any:
-    """`_speed_at_mid_step` of the rotors of `lanes_at(..., first)`, none of them lost."""
+    """Returns `_speed_at_mid_step` of the rotors of `lanes_at(..., first)`, none of them failed."""
     wanted = lanes_at(command.rotor_reference, first)
     lead = lanes_at(body.rotor_speed, first) - wanted
     rise, fall = lanes_at(plant.rise, first), lanes_at(plant.fall, first)
@@ -101,12 +100,12 @@ def leaning_rotors(
     oy: float,
     oz: float,
 ) -> tuple[float, float, float, float, float, float]:
-    """Force and torque of rotors with any places, axes and thrust constants."""
+    """Returns force and torque of rotors with any positions, axes and thrust constants."""
     loss, roll = plant.rotor_drag, plant.rolling
     fx = fy = fz = tx = ty = tz = 0.0
     for r in range(plant.rotors):
         lift = body.rotor_lift[r]
-        wanted = command.rotor_reference[r] if lift > 0.0 else 0.0  # a lost motor stops
+        wanted = command.rotor_reference[r] if lift > 0.0 else 0.0  # a failed motor stops
         w = _speed_at_mid_step(body, plant, wanted, r)
         px, py, pz = plant.rotor_x[r], plant.rotor_y[r], plant.rotor_z[r]
         ax, ay, az = plant.rotor_axis[r, 0], plant.rotor_axis[r, 1], plant.rotor_axis[r, 2]
@@ -144,13 +143,13 @@ def upright_rotors(
     oy: float,
     oz: float,
 ) -> tuple[float, float, float, float, float, float]:
-    """`leaning_rotors` for axes along the body's z, hubs at one height and thrusts unaltered.
+    """Returns `leaning_rotors` for axes along body z, hubs at one height, unaltered thrusts.
 
-    Two rotors at once; one that there is not stands still at the origin.
+    Computes two rotors at once; a missing one is at rest at the origin.
     """
     constant, loss, roll = plant.thrust_constant, plant.rotor_drag, plant.rolling
     pz = plant.rotor_z[0]
-    ux, uy = vx + oy * pz, vy - ox * pz  # across, at the middle of the rotors' plane
+    ux, uy = vx + oy * pz, vy - ox * pz  # across, at the centre of the rotors' plane
     fx = fy = lift = tx = ty = tz = no_lanes()
     for first in range(0, plant.rotors, LANES):
         w = _speeds_at_mid_step(body, plant, command, first)

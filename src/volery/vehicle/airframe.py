@@ -1,8 +1,8 @@
-"""Airframes: what a vehicle is, as a data file with the source of every number.
+"""Airframes: data files that describe vehicles, with the source of every number.
 
-A file names masses, rotors (any number from 4 to 12, anywhere, with any axis), feet and limits;
-gains follow from these numbers unless the file overrides a bandwidth. `load_airframe` takes the
-name of a vehicle that ships with Volery or the path of a user's own TOML file.
+A file names masses, rotors (any number from 4 to 12, with any position and axis), feet and limits;
+gains follow from these numbers unless the file overrides a bandwidth. `load_airframe` accepts the
+name of a shipped vehicle or the path of a user's TOML file.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from volery.vehicle.tables import NotNegative, Positive, PositiveVector, Table, 
 GRAVITY = 9.80665
 """Standard gravity, m/s^2 (ISO 80000-3)."""
 MAX_ROTORS = 12
-"""A whole number of `core.simd`: kernels take rotors two at a time."""
+"""Maximum number of rotors, a multiple of `core.simd`'s width: kernels compute two at a time."""
 MAX_FEET = 8
 _HOVER_MARGIN = 1.1
 _AIRFRAMES = Path(__file__).parent / "airframes"
@@ -33,14 +33,14 @@ Array = NDArray[np.float64]
 def _possible_inertia(moments: PositiveVector) -> PositiveVector:
     x, y, z = sorted(moments)
     if x + y < z * (1.0 - 1e-9):
-        raise ValueError("no body has one moment of inertia above the sum of the other two")
+        raise ValueError("no moment of inertia may exceed the sum of the other two")
     return moments
 
 
 def _unit(axis: Vector) -> Vector:
     length = math.hypot(*axis)
     if length < 1e-6:
-        raise ValueError("an axis needs a direction")
+        raise ValueError("an axis must not be zero")
     return axis[0] / length, axis[1] / length, axis[2] / length
 
 
@@ -49,22 +49,22 @@ class Body(Table):
 
     mass_kg: Positive
     inertia_kg_m2: Annotated[PositiveVector, AfterValidator(_possible_inertia)]
-    """Principal moments Ixx, Iyy, Izz; the body axes are taken to be the principal ones."""
+    """Principal moments Ixx, Iyy, Izz; the body axes are the principal ones."""
     drag_area_m2: tuple[NotNegative, NotNegative, NotNegative]
     """Drag coefficient times area along each axis."""
     size_m: PositiveVector
-    """Box that range sensors of other vehicles see."""
+    """Box that range sensors of other vehicles detect."""
     collision_radius_m: Positive
-    """Sphere about the origin that holds the whole vehicle, rotor discs included."""
+    """Radius of a sphere about the origin that contains the whole vehicle, rotor discs included."""
 
 
 class RotorGeometry(Table):
-    """Where a rotor sits and how it turns, seen from above."""
+    """Position and sense of rotation of a rotor, seen from above."""
 
     position_m: Vector
     direction: Literal["ccw", "cw"]
     axis: Annotated[Vector, AfterValidator(_unit)] = (0.0, 0.0, 1.0)
-    """Direction of its thrust; made a unit vector."""
+    """Direction of its thrust; normalised."""
 
 
 class Rotors(Table):
@@ -82,7 +82,7 @@ class Rotors(Table):
 
 
 class Ground(Table):
-    """How the vehicle stands and what it survives."""
+    """Feet, friction and landing limits."""
 
     feet_m: Annotated[tuple[Vector, ...], Field(min_length=3, max_length=MAX_FEET)]
     landing_speed_limit_m_s: Positive
@@ -91,7 +91,7 @@ class Ground(Table):
 
 
 class Limits(Table):
-    """What the controllers may ask of the vehicle."""
+    """Limits of the controllers' setpoints."""
 
     tilt_deg: Annotated[float, Field(gt=0.0, le=75.0)]
     speed_m_s: Positive
@@ -101,12 +101,12 @@ class Limits(Table):
     landing_m_s: Positive
     acceleration_m_s2: Positive
     rate_deg_s: Positive
-    """Roll and pitch rate."""
+    """Maximum roll and pitch rate."""
     yaw_rate_deg_s: Positive
 
 
 class TrackingPoles(Table):
-    """Where `control.rpt` puts the poles of an axis group; what is left out is derived."""
+    """Poles of an axis group for `control.rpt`; omitted values are derived."""
 
     wn: Positive | None = None
     """Natural frequency times epsilon, rad/s."""
@@ -115,11 +115,11 @@ class TrackingPoles(Table):
     ki: NotNegative | None = None
     """Integral pole times epsilon, rad/s; 0: no integral."""
     epsilon: Positive = 1.0
-    """Smaller tracks tighter."""
+    """Scale of the poles; smaller values track tighter."""
 
 
 class Bandwidths(Table):
-    """Bandwidths of the control loops, rad/s; what is left out follows from the rotors' lag."""
+    """Bandwidths of the control loops, rad/s; omitted values follow from the rotors' lag."""
 
     rate: Positive | None = None
     yaw_rate: Positive | None = None
@@ -128,13 +128,13 @@ class Bandwidths(Table):
     velocity: Positive | None = None
     vertical: Positive | None = None
     position: Positive | None = None
-    """Of the reference's approach to a place."""
+    """Bandwidth of the reference's approach to a position."""
     horizontal: TrackingPoles = TrackingPoles()
     height: TrackingPoles = TrackingPoles()
 
 
 class Airframe(Table):
-    """A vehicle: body, rotors, feet, limits and, where given, battery and bandwidths."""
+    """A vehicle: body, rotors, feet, limits and, if given, battery and bandwidths."""
 
     name: Annotated[str, Field(pattern=r"^[a-z0-9_]+$")]
     title: str
@@ -144,14 +144,14 @@ class Airframe(Table):
     limits: Limits
     control: Bandwidths = Bandwidths()
     battery: Battery | None = None
-    """Left out: an ideal supply that never sags or ends."""
+    """Omitted: an ideal supply with constant voltage."""
 
     @model_validator(mode="after")
     def _can_fly(self) -> Self:
         farthest = _farthest(self)
         if self.body.collision_radius_m < farthest - 1e-6:
             raise ValueError(
-                f"body.collision_radius_m = {self.body.collision_radius_m} leaves out feet or "
+                f"body.collision_radius_m = {self.body.collision_radius_m} excludes feet or "
                 f"rotors; at least {farthest:.3f} is needed"
             )
         if self.ground.landing_speed_limit_m_s <= self.limits.landing_m_s:
@@ -166,7 +166,7 @@ class Airframe(Table):
 
     @property
     def weight(self) -> float:
-        """N."""
+        """Weight, N."""
         return self.body.mass_kg * GRAVITY
 
     @property
@@ -176,12 +176,12 @@ class Airframe(Table):
 
     @property
     def ground_offset(self) -> float:
-        """Height of the origin over level ground when standing on it, m."""
+        """Height of the origin above level ground on its feet, m."""
         return -min(foot[2] for foot in self.ground.feet_m)
 
 
 def wrench_matrix(airframe: Airframe) -> Array:
-    """Force and torque (6, R) on the body, FLU, per newton of each rotor's thrust."""
+    """Returns force and torque (6, R) on the body, FLU, per newton of each rotor's thrust."""
     columns = []
     for place in airframe.rotors.places:
         axis = np.array(place.axis)
@@ -192,16 +192,16 @@ def wrench_matrix(airframe: Airframe) -> Array:
 
 
 def allocation_matrix(airframe: Airframe) -> Array:
-    """Rotor thrusts (R, 4) per unit of thrust along z and torque about x, y, z.
+    """Returns rotor thrusts (R, 4) per unit of thrust along z and torque about x, y, z.
 
-    The pseudo-inverse of the rotors' geometry: among all thrusts that give the wanted wrench, those
-    of the least sum of squares.
+    The pseudo-inverse of the rotors' geometry: among all thrusts with a given wrench, those with
+    the smallest sum of squares.
     """
     return np.asarray(np.linalg.pinv(wrench_matrix(airframe)[2:]))
 
 
 def hover_thrusts(airframe: Airframe) -> Array:
-    """Thrust of each rotor (R,) that carries the weight without torque, N."""
+    """Returns the hover thrust of each rotor (R,), N, which carries the weight without torque."""
     return allocation_matrix(airframe)[:, 0] * airframe.weight
 
 
@@ -220,7 +220,9 @@ def _check_feet(airframe: Airframe) -> None:
     bearings = np.sort(np.arctan2(feet[:, 1], feet[:, 0]))
     gaps = np.diff(np.append(bearings, bearings[0] + 2.0 * math.pi))
     if gaps.max() >= math.pi - 1e-6:
-        raise ValueError("ground.feet_m must surround the centre of mass, else it falls over")
+        raise ValueError(
+            "ground.feet_m must surround the centre of mass, otherwise the vehicle falls over"
+        )
 
 
 def _check_hover(airframe: Airframe) -> None:
@@ -228,25 +230,25 @@ def _check_hover(airframe: Airframe) -> None:
     scaled = matrix / np.abs(matrix).max(axis=1, keepdims=True).clip(1e-12)
     if np.linalg.matrix_rank(scaled, tol=1e-6) < 4:
         raise ValueError(
-            "rotors.places cannot steer: thrust, roll, pitch and yaw must be free of each other"
+            "rotors.places cannot steer: thrust, roll, pitch and yaw must be independent"
         )
     lift = float(matrix[0].clip(0.0).sum()) * airframe.max_rotor_thrust
     if lift < _HOVER_MARGIN * airframe.weight:
         raise ValueError(
             f"rotors lift {lift:.3g} N at full speed; {_HOVER_MARGIN * airframe.weight:.3g} N, "
-            "the weight and a tenth, are needed to hover"
+            "1.1 times the weight, are needed to hover"
         )
     trim = hover_thrusts(airframe)
     for number, thrust in enumerate(trim):
         if not 0.0 < thrust < airframe.max_rotor_thrust:
             raise ValueError(
-                f"rotors.places.{number} would have to pull {thrust:.3g} N in hover; more than 0 "
+                f"rotors.places.{number} needs {thrust:.3g} N in hover; more than 0 "
                 f"and less than {airframe.max_rotor_thrust:.3g} N is possible"
             )
 
 
 def hover_power(airframe: Airframe) -> float:
-    """Power that hovering takes out of the battery, W; 0 without one."""
+    """Returns the battery power in hover, W; 0 without a battery."""
     battery, rotors = airframe.battery, airframe.rotors
     if battery is None:
         return 0.0
@@ -267,21 +269,22 @@ def _check_battery(airframe: Airframe) -> None:
     needed = speed / airframe.rotors.max_speed_rad_s * battery.rated_v
     if room < 0.0 or voltage < needed:
         raise ValueError(
-            f"battery cannot hold it up: hovering takes {power:.3g} W at no less than "
+            f"battery cannot sustain hover, which takes {power:.3g} W at no less than "
             f"{needed:.3g} V; a full pack of {source:.3g} V behind {battery.resistance_ohm} ohm "
             f"{'cannot give that power' if room < 0.0 else f'sags to {voltage:.3g} V'}"
         )
 
 
 def airframe_names() -> tuple[str, ...]:
-    """Names of the airframes that ship with Volery."""
+    """Returns the names of the shipped airframes."""
     return tuple(sorted(path.stem for path in _AIRFRAMES.glob("*.toml")))
 
 
 def load_airframe(name: str | Path, folder: Path | None = None) -> Airframe:
-    """Airframe of a shipped name such as `f450`, or of a `.toml` file, also beside `folder`.
+    """Returns the airframe of a shipped name such as `f450`, or of a `.toml` file.
 
-    Raises DataFileError that names the file, each wrong key and what is allowed there.
+    Paths may be relative to `folder`. Raises `DataFileError`, naming the file, each wrong key and
+    its allowed values, for an invalid file.
     """
     path = find_data_file(str(name), _AIRFRAMES, "airframe", folder)
     return load_data_file(path, Airframe, _AIRFRAMES)

@@ -1,4 +1,4 @@
-"""Batteries: what the rotors draw, how the voltage sags, when the charge runs low.
+"""Batteries: power of the rotors, voltage under load, charge levels.
 
     power     P = sum over rotors of (k_P kF w^3) / efficiency + avionics
     voltage   V = E(charge) - V_1 - I R_0,   I from P = V I
@@ -7,9 +7,9 @@
     speed     no rotor turns faster than max_speed V / rated_v
 
 This is the Thevenin model with one RC pair (M. Chen, G. Rincon-Mora, "Accurate electrical battery
-model", IEEE Trans. Energy Conversion 21, 2006, with one of its two pairs). It is brought up to date
-at every fifth guidance tick, 25 times a second, the current held in between; the RC pair is solved
-exactly for that.
+model", IEEE Trans. Energy Conversion 21, 2006, with one of its two pairs). Updates run at
+every fifth guidance tick, 25 times a second, with constant current in between, for which the RC
+pair is solved exactly.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from volery.vehicle.compiled import apart_kernel, inner_kernel
 from volery.vehicle.tables import NotNegative, Positive, Share, Table
 
 GUIDANCE_TICKS = 5
-"""Guidance ticks from one update to the next."""
+"""Guidance ticks between updates."""
 OCV_POINTS = 21
-"""Points of the open-circuit voltage that kernels interpolate between."""
+"""Points of the open-circuit voltage, for interpolation in kernels."""
 
 BATTERY = np.dtype(
     [
@@ -36,7 +36,7 @@ BATTERY = np.dtype(
         ("open_circuit", "f8", OCV_POINTS),  # V of the pack, charge 0 to 1
         ("resistance", "f8"),
         ("pair_resistance", "f8"),
-        ("pair_keep", "f8"),  # what is left of the pair's voltage after an update
+        ("pair_keep", "f8"),  # fraction of the pair's voltage left after an update
         ("avionics", "f8"),  # W
         ("speed_a_volt", "f8"),  # rad/s V
         ("low", "f8"),
@@ -45,19 +45,19 @@ BATTERY = np.dtype(
     ],
     align=True,
 )
-"""One battery as kernels read it."""
+"""Parameters of one battery, for kernels."""
 
 
 class BatteryLevel(IntEnum):
-    """How much is left."""
+    """Charge level."""
 
     NORMAL = 0
     LOW = 1
-    """Below the battery's `low`: time to come home."""
+    """Below the battery's `low`: return home."""
     CRITICAL = 2
-    """Below its `critical`: time to land."""
+    """Below its `critical`: land."""
     EMPTY = 3
-    """Nothing left: the rotors stop."""
+    """No charge: the rotors stop."""
 
 
 _LOW = int(BatteryLevel.LOW)
@@ -66,25 +66,25 @@ _EMPTY = int(BatteryLevel.EMPTY)
 
 
 class Battery(Table):
-    """A pack of cells in series and what it feeds."""
+    """A pack of cells in series, and its load."""
 
     cells: Annotated[int, Field(ge=1, le=24)]
     capacity_ah: Positive
     open_circuit_v: Annotated[tuple[Positive, ...], Field(min_length=2, max_length=101)]
-    """Of one cell, at charges evenly spaced from empty to full."""
+    """Open-circuit voltage of one cell, at charges evenly spaced from empty to full."""
     resistance_ohm: NotNegative
-    """Of the whole pack, at once."""
+    """Immediate resistance of the whole pack."""
     pair_resistance_ohm: NotNegative
-    """Of the whole pack, in addition after a while ..."""
+    """Additional resistance of the whole pack after a while ..."""
     pair_time_s: Positive
     """... with this time constant."""
     efficiency: Annotated[float, Field(gt=0.0, le=1.0)]
-    """From the battery to the rotors' shafts: speed controllers and motors."""
+    """Efficiency from the battery to the rotors' shafts: speed controllers and motors."""
     avionics_w: NotNegative
     rated_v: Positive
-    """Voltage of the pack under load at which rotors reach `max_speed_rad_s`."""
+    """Voltage of the loaded pack at which rotors reach `max_speed_rad_s`."""
     power_torque_m: Positive | None = None
-    """k_P, torque over thrust for the rotors' power; left out: `rotors.torque_m`."""
+    """k_P, torque over thrust for the rotors' power; default: `rotors.torque_m`."""
     low: Share = 0.25
     critical: Share = 0.10
 
@@ -98,7 +98,7 @@ class Battery(Table):
 
 
 def open_circuit_voltage(battery: Battery, charge: float) -> float:
-    """Voltage of the pack without load at a `charge` from 0 to 1, V."""
+    """Returns the voltage of the pack without load at a `charge` from 0 to 1, V."""
     table = battery.open_circuit_v
     return battery.cells * float(np.interp(charge, np.linspace(0.0, 1.0, len(table)), table))
 
@@ -106,7 +106,7 @@ def open_circuit_voltage(battery: Battery, charge: float) -> float:
 def battery_row(
     battery: Battery | None, max_speed_rad_s: float, period_s: float
 ) -> NDArray[np.void]:
-    """The (1,) `BATTERY` row of a battery updated each `period_s`; None: ideal supply."""
+    """Returns the (1,) `BATTERY` row of a battery updated each `period_s`; None: ideal supply."""
     row = np.zeros(1, BATTERY)
     if battery is None:
         return row
@@ -126,10 +126,10 @@ def battery_row(
 
 @apart_kernel
 def drain(body: Any, plant: Any, command: Any) -> bool:
-    """Take the charge of one update out of a `BODY`'s battery; whether it fell to a lower level.
+    """Drains a `BODY`'s battery by one update; returns whether it fell to a lower level.
 
-    plant: a `PLANT` with a battery. command: a record with `full_thrust`, N, the most that a rotor
-    can give now; control asks for no more.
+    plant: a `PLANT` with a battery. command: a record whose `full_thrust`, N, is set to the present
+    maximum of a rotor; control stays below it.
     """
     battery = plant.battery
     power = battery.avionics
@@ -173,10 +173,10 @@ def _open_circuit(battery: Any, charge: float) -> float:
 
 @inner_kernel
 def _loaded(source: float, power: float, resistance: float) -> tuple[float, float]:
-    """Current (A) and voltage (V) where a source behind a resistance gives `power` W.
+    """Returns current (A) and voltage (V) of a source with a resistance that supplies `power` W.
 
-    Of the two solutions that of the smaller current; where there is none, the current at which the
-    source gives the most it can.
+    Of two solutions, that with the smaller current; without a solution, the current of maximum
+    power.
     """
     if source <= 0.0:
         return 0.0, 0.0

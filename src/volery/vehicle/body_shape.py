@@ -1,4 +1,4 @@
-"""What others see of a UAV: its body, arms and turning rotors, as meshes in the body frame."""
+"""Shape of a UAV for other UAVs' sensors: body, arms and rotors as meshes in the body frame."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ _BOX_TRIANGLES = np.array(
 
 
 def body_shape(airframe: Airframe) -> BodyShape:
-    """Box, arms and rotor discs of an airframe, in FLU about its centre of mass, m.
+    """Returns box, arms and rotor discs of an airframe, in FLU about its centre of mass, m.
 
-    A turning rotor is a disc to a LIDAR: a pulse of some nanoseconds meets a blade or passes, but a
-    sweep sees the whole circle. A camera sees the blades where they are (`world.rotor_kernels`).
+    A turning rotor is a disc to a LIDAR: a pulse of some nanoseconds hits a blade or passes, but a
+    sweep covers the whole circle. A camera sees the blades at their angles (`world.rotor_kernels`).
     """
     solid = [_box(np.zeros(3), np.array(airframe.body.size_m), 0.0)]
     solid += [_arm(place) for place in airframe.rotors.places]
@@ -53,7 +53,7 @@ def _box(center: Array, size: Array, yaw: float) -> tuple[Array, NDArray[np.uint
 
 
 def _arm(place: RotorGeometry) -> tuple[Array, NDArray[np.uint32]]:
-    """A bar from the body's axis to below the rotor, at half the rotor's height."""
+    """Returns a bar from the body's axis to below the rotor, at half the rotor's height."""
     x, y, z = place.position_m
     length = math.hypot(x, y)
     size = np.array([length, _ARM_WIDTH_M, _ARM_WIDTH_M])
@@ -61,7 +61,7 @@ def _arm(place: RotorGeometry) -> tuple[Array, NDArray[np.uint32]]:
 
 
 def _turning(place: RotorGeometry, radius: float) -> Array:
-    """Row (10,) of `BodyShape.rotors`."""
+    """Returns a row (10,) of `BodyShape.rotors`."""
     axis = np.array(place.axis)
     side = np.cross(axis, [1.0, 0.0, 0.0] if abs(axis[0]) < 0.9 else [0.0, 1.0, 0.0])
     side /= np.linalg.norm(side)

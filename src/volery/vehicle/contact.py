@@ -1,10 +1,10 @@
 """Contact with the ground: impulses at feet, rotor tips and roof on the triangles of the terrain.
 
-Each step the points that would pass the ground get impulses along its normal, never pulling, and
-across it within Coulomb's cone, by sequential (Gauss-Seidel) sweeps as game physics does it (E.
-Catto, "Iterative Dynamics with Temporal Coherence", 2005). A point still above the ground may close
-its gap within the step and no more, so that nothing passes through at any speed; a point below it
-is lifted gently. Impulses need no stiffness to be tuned: 27 g and 20 kg rest alike.
+Each step, points that would pass the ground receive impulses along its normal, never pulling, and
+across it within Coulomb's cone, by sequential (Gauss-Seidel) sweeps as in game physics (E. Catto,
+"Iterative Dynamics with Temporal Coherence", 2005). A point above the ground may close its gap
+within the step and no more, so that nothing tunnels at any speed; a point below the ground is
+lifted gently. Impulses need no stiffness to be tuned: 27 g and 20 kg rest alike.
 """
 
 from __future__ import annotations
@@ -30,34 +30,34 @@ Nine: TypeAlias = tuple[float, float, float, float, float, float, float, float, 
 """Rotation matrix, map from body, row by row."""
 
 # A row of the scratch memory is one contact, in the body frame: the point (m), the ground's normal,
-# the mass that an impulse along it moves (kg), the speed along it that is wanted (m/s), the
-# impulses so far along it and across it (N s).
+# the effective mass along it (kg), the desired speed along it (m/s), the impulses so far along it
+# and across it (N s).
 _POINT, _NORMAL, _MASS, _WANTED, _PUSH, _GRIP, _ROW = 0, 3, 6, 7, 8, 9, 12
 SCRATCH_SHAPE = (MAX_CONTACTS, _ROW)
 SWEEPS = 24
-"""At most; sweeps end when no velocity changes by more than `_SETTLED`."""
+"""Maximum number; sweeps end when no velocity changes by more than `_SETTLED`."""
 _SETTLED = 1e-7
 _SLOP = 5e-4
-"""m of sinking that is left alone."""
+"""Penetration that is not corrected, m."""
 _LIFT_SHARE = 0.1
 _LIFT_SPEED = 1.0
-"""m/s at which a sunken point is lifted at most."""
+"""Maximum speed at which a point below the ground is lifted, m/s."""
 _TOUCHING = 2e-3
-"""m within which a point counts as touching."""
+"""Distance within which a point counts as touching, m."""
 _NO_SLIDE = 1e-12
-"""m/s below which a point does not slide."""
+"""Speed below which a point does not slide, m/s."""
 _REBOUND_SPEED = 0.5
-"""m/s of approach below which nothing rebounds."""
+"""Speed of approach below which nothing rebounds, m/s."""
 _COS_UPRIGHT = 0.5
-"""Touching the ground with more than 60 degrees between the vehicle's axis and up is an impact."""
+"""Cosine of 60 degrees: contact with a larger tilt of the vehicle's axis is an impact."""
 FRESH_S = 0.2
-"""s without contact after which a touch is a new one."""
+"""Time without contact after which a touch is a new one, s."""
 
 NO_TOUCH, TOUCH_DOWN, IMPACT = 0, 1, 2
 
 
 def steepest_cosine(grid: TerrainGrid) -> float:
-    """Cosine of the steepest slope of a terrain: true distance >= height over it * cosine."""
+    """Returns the cosine of a terrain's steepest slope: distance >= height above it * cosine."""
     h, spacing = np.asarray(grid.heights), float(grid.spacing)
     across, up = np.diff(h, axis=1) / spacing, np.diff(h, axis=0) / spacing
     below = np.hypot(across[:-1, :], up[:, 1:])
@@ -66,9 +66,9 @@ def steepest_cosine(grid: TerrainGrid) -> float:
 
 
 def standing_pose(airframe: Airframe, terrain: Terrain, x: float, y: float, yaw: float) -> Array:
-    """Pose (7,) x, y, z m, quaternion x y z w, of a vehicle that stands at map position (x, y).
+    """Returns the pose (7,) x, y, z m, quaternion x y z w, of a vehicle on the ground at (x, y).
 
-    It leans with the ground there; no foot is below the terrain.
+    The vehicle tilts with the ground; no foot is below the terrain.
     """
     normal = terrain.normal(x, y)
     tilt = np.array([-normal[1], normal[0], 0.0, 1.0 + normal[2]])
@@ -83,11 +83,11 @@ def standing_pose(airframe: Airframe, terrain: Terrain, x: float, y: float, yaw:
 def resolve_contact(
     body: Any, plant: Any, grid: TerrainGrid, bounce: bool, scratch: Array, dt: float
 ) -> float:
-    """Change the body's velocity and rates so that nothing goes below the ground.
+    """Changes velocity and rates so that no contact point passes the ground.
 
     The pose is that at the step's start, velocity and rates are those at its end without contact.
-    scratch: `SCRATCH_SHAPE`. Returns the greatest speed of approach (m/s, along the normal), or -1
-    where nothing touches.
+    scratch: `SCRATCH_SHAPE`. Returns the maximum speed of approach (m/s, along the normal), or -1
+    without contact.
     """
     turn = matrix_of(body.attitude[0], body.attitude[1], body.attitude[2], body.attitude[3])
     r00, r01, r02, r10, r11, r12, r20, r21, r22 = turn
@@ -121,9 +121,9 @@ def _list_contacts(
     scratch: Array,
     dt: float,
 ) -> tuple[int, float]:
-    """Write the points that touch, or would within the step, into `scratch`.
+    """Writes the points that touch, or would within the step, to `scratch`.
 
-    Returns their number and the greatest speed of approach, m/s, -1 where there are none.
+    Returns their number and the maximum speed of approach, m/s, -1 without any.
     """
     r00, r01, r02, r10, r11, r12, r20, r21, r22 = turn
     ux, uy, uz, ox, oy, oz = motion
@@ -157,7 +157,7 @@ def _list_contacts(
 
 @inner_kernel
 def _wanted_speed(plant: Any, gap: float, closing: float, rebounds: bool, dt: float) -> float:
-    """Speed along the normal, m/s, that a point shall have at least after the step."""
+    """Returns the minimum speed along the normal of a point after the step, m/s."""
     wanted = -gap / dt
     if gap < 0.0:
         wanted = min(max(-gap - _SLOP, 0.0) * _LIFT_SHARE / dt, _LIFT_SPEED)
@@ -168,7 +168,7 @@ def _wanted_speed(plant: Any, gap: float, closing: float, rebounds: bool, dt: fl
 
 @inner_kernel
 def _settled(plant: Any, scratch: Array, active: int, motion: Six) -> Six:
-    """Motion after sweeps over the contacts that end when the impulses agree with each other."""
+    """Returns the motion after sweeps over the contacts until the impulses converge."""
     ux, uy, uz, ox, oy, oz = motion
     for _ in range(SWEEPS):
         change = 0.0
@@ -207,7 +207,7 @@ def _settled(plant: Any, scratch: Array, active: int, motion: Six) -> Six:
 
 @inner_kernel
 def _grip(plant: Any, row: Array, dx: float, dy: float, dz: float, slide: float) -> Three:
-    """Impulse, N s, against sliding at `slide` m/s along d, within Coulomb's cone; notes it."""
+    """Returns the friction impulse, N s, at `slide` m/s along d in Coulomb's cone; records it."""
     px, py, pz = three(row)
     wx, wy, wz = py * dz - pz * dy, pz * dx - px * dz, px * dy - py * dx
     hold = slide / _ease(plant, wx, wy, wz)
@@ -223,7 +223,7 @@ def _grip(plant: Any, row: Array, dx: float, dy: float, dz: float, slide: float)
 
 @inner_kernel
 def _ease(plant: Any, wx: float, wy: float, wz: float) -> Any:
-    """How easily an impulse moves its point along itself, 1/kg; w: its lever arm, m."""
+    """Returns the inverse effective mass of an impulse, 1/kg; w: its lever arm, m."""
     jx, jy, jz = three(plant.inverse_inertia)
     return plant.inverse_mass + wx * wx * jx + wy * wy * jy + wz * wz * jz
 
@@ -244,7 +244,7 @@ def _after_impulse(
     fy: float,
     fz: float,
 ) -> Six:
-    """Velocity u and rates o after an impulse f, N s, at the point p."""
+    """Returns velocity u and rates o after an impulse f, N s, at the point p."""
     light = plant.inverse_mass
     jx, jy, jz = three(plant.inverse_inertia)
     ux += fx * light
@@ -260,10 +260,10 @@ def _after_impulse(
 def classify_touch(
     body: Any, plant: Any, approach: float, speed: float, step: int, dt: float, bounce: bool
 ) -> int:
-    """Whether a contact is news: `TOUCH_DOWN`, `IMPACT` or `NO_TOUCH`; remembers its time.
+    """Classifies a contact as `TOUCH_DOWN`, `IMPACT` or `NO_TOUCH`; records its time.
 
-    speed: of the centre of mass before the contact, m/s. An impact is a touch faster than the
-    landing limit, or with the vehicle tilted beyond 60 degrees; a crashed vehicle reports no more.
+    speed: of the centre of mass before the contact, m/s. An impact is a new contact faster than the
+    landing limit, or with the vehicle tilted beyond 60 degrees; a crashed vehicle reports none.
     """
     fresh = (step - body.last_contact_step) * dt > FRESH_S
     body.last_contact_step = step

@@ -1,24 +1,24 @@
-"""Downwash: the jet of air under a UAV, and what it does to UAVs below.
+"""Downwash: the jet of air below a UAV, and its effect on UAVs below.
 
 Momentum theory gives the rotors' induced speed and the speed of the air far below a disc:
 
     v_i = sqrt(T / (2 rho A))        w = 2 v_i
 
-with T the thrust and A the area of all rotors, pi R^2. The jet hangs straight down, spreads and
-keeps its momentum; at depth s below the rotors and r off its middle
+with T the thrust and A the area of all rotors, pi R^2. The jet points straight down, spreads and
+conserves its momentum; at depth s below the rotors and distance r from its axis
 
     w(s, r) = v_i (1 + s / sqrt(s^2 + R^2)) (R / b) exp(-r^2 / b^2)        b = R + 0.1 s
 
 which is v_i at the disc (an actuator disc's inflow), and a Gaussian of momentum flux
 rho w_0^2 pi b^2 / 2 = T far below. It ends smoothly at 2.5 b and fades out over the last third of
-100 R (modelling choices, as are the straight hang and the rate of spread). For a UAV below it is
-moving air: its rotors lose thrust and its body is dragged down.
+100 R (modelling choices, as are the vertical direction and the rate of spread). It acts on a
+UAV below as moving air: its rotors lose thrust and its body is dragged down.
 
-The search for neighbours is by conservative advancement, as for contacts: each UAV carries a
-distance that it may fly before it can meet a jet or reach another UAV with its own; for each pair
-the two distances never exceed the gap. Only who has used his up looks around, along the order of
-the UAVs in x. So fleets without UAVs over each other cost next to nothing, and the sum of jets,
-taken in the order of places, depends on places alone.
+The search for neighbours is by conservative advancement, as for contacts: each UAV has a
+budget of distance that it may fly before it can meet a jet or reach another UAV with its own; for
+each pair the two budgets never exceed the gap. Only a UAV without budget searches, along the order
+of the UAVs in x. Fleets without UAVs above each other therefore cost next to nothing, and the sum
+of jets, taken in the order of positions, depends on positions alone.
 """
 
 from __future__ import annotations
@@ -35,22 +35,22 @@ from volery.vehicle.plant import AIR_DENSITY
 SPREAD = 0.1
 """Growth of the jet's radius with depth."""
 DEPTH = 100.0
-"""Jet radii R after which the jet is gone."""
+"""Length of the jet in radii R."""
 EDGE = 2.5
-"""Radii b after which the jet has ended sideways."""
+"""Half width of the jet in radii b."""
 _FADE_FROM = 2.0 / 3.0
 _AT_EDGE = math.exp(-EDGE * EDGE)
 _INVERSE_SLANT = 1.0 / math.sqrt(1.0 + (EDGE * SPREAD) ** 2)
 _LOOK_BEYOND = 2.0
-"""m beyond the widest jet that a look reaches, and twice what may be flown until the next."""
+"""Search distance beyond the widest jet, m; half of it is flown until the next search."""
 
 _REFILL_BELOW = 0.5
-"""m: who has less left looks around when somebody must, so that looks come together."""
+"""Remaining budget, m, below which a UAV joins a search by others, so that searches coincide."""
 
 
 JET = np.dtype(
     [
-        ("row", "i8"),  # of the UAV at this place in the order
+        ("row", "i8"),  # of the UAV at this position in the order
         ("copy", "i8"),  # of the scenario, that UAV's
         ("x", "f8"),
         ("y", "f8"),
@@ -60,12 +60,12 @@ JET = np.dtype(
     ],
     align=True,
 )
-"""What a look around notes. No state: of an earlier look only `row` is read, and any order of the
-rows gives the same result."""
+"""Entries of a search. Not a state: only `row` is reused, and any order of the rows gives the same
+result."""
 
 
 def new_jets(count: int) -> NDArray[np.void]:
-    """Room (N,) of `JET` for a fleet of `count` UAVs."""
+    """Allocates memory (N,) of `JET` for a fleet of `count` UAVs."""
     jets = np.zeros(count, JET)
     jets["row"] = np.arange(count)
     return jets
@@ -73,7 +73,7 @@ def new_jets(count: int) -> NDArray[np.void]:
 
 @apart_kernel
 def find_downwash(uavs: NDArray[np.void], models: NDArray[np.void], jets: Any) -> None:
-    """Fill the `downwash` of `jets`, from the present places and thrusts."""
+    """Computes the `downwash` of `jets`, m/s, from the present positions and thrusts."""
     count = uavs.shape[0]
     waiting = False
     under = False
@@ -96,10 +96,10 @@ def find_downwash(uavs: NDArray[np.void], models: NDArray[np.void], jets: Any) -
 
 @inner_kernel
 def _line_up(uavs: Any, models: Any, jets: Any) -> float:
-    """Sort the UAVs by copy, x, y, z; the half width of the widest jet between them, m."""
+    """Sorts the UAVs by copy, x, y, z; returns the half width of the widest jet, m."""
     count = uavs.shape[0]
     low, high, widest = math.inf, -math.inf, 0.0
-    for k in range(count):  # by insertion: from one look to the next little changes
+    for k in range(count):  # by insertion: little changes between searches
         i = jets[k].row
         body = uavs[i].body
         x, y, z = body.position_map[0], body.position_map[1], body.position_map[2]
@@ -135,9 +135,9 @@ def _is_before(copy: int, x: float, y: float, z: float, other: Any) -> bool:
 
 @inner_kernel
 def _refill_budgets(uavs: Any, jets: Any, k: int, reach: float) -> None:
-    """Share the gap to each neighbour of UAV number `k` in order between the two of them.
+    """Divides the gap to each neighbour of UAV number `k` in order between the two UAVs.
 
-    A gap that is closed counts no more: who is `in_jet` sums the jets over him at every tick.
+    A closed gap is ignored: for UAVs `in_jet` the jets above are summed at every tick.
     """
     own = uavs[jets[k].row].body
     own.in_jet = False
@@ -163,7 +163,7 @@ def _refill_budgets(uavs: Any, jets: Any, k: int, reach: float) -> None:
 
 @inner_kernel
 def _jets_over(uavs: Any, models: Any, jets: Any, k: int, reach: float) -> float:
-    """Speed of the air downwards at UAV number `k` in order, m/s, summed in that order."""
+    """Returns the downward speed of the air at UAV number `k` in order, m/s, summed in order."""
     speed = 0.0
     first, last = _window(jets, k, reach)
     for n in range(first, last):
@@ -180,7 +180,7 @@ def _jets_over(uavs: Any, models: Any, jets: Any, k: int, reach: float) -> float
 
 @inner_kernel
 def jet_speed(thrust: float, radius: float, r: float, s: float) -> float:
-    """Speed (m/s) of the jet of `thrust` N from a disc of `radius` m, r off and s below it, m."""
+    """Returns the speed (m/s) of a jet of `thrust` N, `radius` m, at r off and s below it, m."""
     if s <= 0.0 or s >= DEPTH * radius:
         return 0.0
     wide = radius + SPREAD * s
@@ -197,9 +197,9 @@ def jet_speed(thrust: float, radius: float, r: float, s: float) -> float:
 
 @inner_kernel
 def _gap(r: float, s: float, radius: float) -> float:
-    """No more than the distance to the jet of a disc of `radius`, from r off and s below it.
+    """Returns a lower bound of the distance to the jet of a disc, r off and s below it, m.
 
-    Negative inside. It changes by no more than the way moved.
+    Negative inside. The change is at most the distance moved.
     """
     depth = DEPTH * radius
     wide = EDGE * (radius + SPREAD * min(max(s, 0.0), depth))
@@ -208,7 +208,7 @@ def _gap(r: float, s: float, radius: float) -> float:
 
 @inner_kernel
 def _offset(jets: Any, k: int, n: int) -> tuple[float, float]:
-    """How far number `k` in order is off the vertical through number `n`, and below it; m."""
+    """Returns the horizontal distance of number `k` from number `n`, and its depth below; m."""
     dx = jets[k].x - jets[n].x
     dy = jets[k].y - jets[n].y
     return math.sqrt(dx * dx + dy * dy), jets[n].z - jets[k].z
@@ -216,7 +216,7 @@ def _offset(jets: Any, k: int, n: int) -> tuple[float, float]:
 
 @inner_kernel
 def _window(jets: Any, k: int, reach: float) -> tuple[int, int]:
-    """Range in order of the UAVs in the same copy within `reach` m in x of number `k`."""
+    """Returns the range in order of UAVs in the same copy within `reach` m in x of number `k`."""
     copy, x = jets[k].copy, jets[k].x
     first = k
     while first > 0 and jets[first - 1].copy == copy and x - jets[first - 1].x <= reach:

@@ -1,7 +1,7 @@
-"""Computes what moving air costs an airframe: the acceleration that it pushes with, and the tilt.
+"""Drag of an airframe in moving air: acceleration and steady tilt.
 
-These are numbers of a whole vehicle, to derive controllers from and to compare with flights that
-others have published (docs/models.md, drag). `vehicle.aerodynamics` has the forces themselves.
+Figures of a whole vehicle, for the design of controllers and for comparison with published flights
+(docs/models.md, drag). `vehicle.aerodynamics` computes the forces.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def drag_acceleration(airframe: Airframe, speed_m_s: float) -> float:
 def steady_tilt(airframe: Airframe, speed_m_s: float) -> float:
     """Returns the tilt, rad, that holds the vehicle in a wind, or at that speed in a calm.
 
-    From `drag_acceleration`: that the rotors turn faster when they lean is left out, 2 degrees at
+    From `drag_acceleration`; the higher rotor speed of a tilted vehicle is left out, 2 degrees at
     30 degrees.
     """
     return math.atan(drag_acceleration(airframe, speed_m_s) / GRAVITY)

@@ -1,4 +1,4 @@
-"""The state of a fleet: one row a UAV, in arrays that kernels, sensors and the engine share."""
+"""The state of a fleet: one row per UAV, in arrays that kernels, sensors and the engine share."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 BODY = np.dtype(
     [
-        # what seldom changes
+        # fields that rarely change
         ("touch_speed", "f8"),
         ("last_contact_step", "i8"),
         ("still_steps", "i8"),
@@ -24,10 +24,18 @@ BODY = np.dtype(
         ("battery_level", "i8"),
         ("rotor_angle", "f8", MAX_ROTORS),  # turned so far, at the end of the guidance tick
         ("rotor_health", "f8", MAX_ROTORS),
-        ("rotor_lift", "f8", MAX_ROTORS),  # N s^2: thrust over speed squared, wear and ground in it
-        ("free_acceleration", "f8", 3),  # on the ground, acceleration_map without its push ...
-        ("free_angular_acceleration", "f8", 3),  # ... and likewise
-        # what every step reads or writes, close together for the cache
+        (
+            "rotor_lift",
+            "f8",
+            MAX_ROTORS,
+        ),  # N s^2: thrust over speed squared, wear and ground included
+        (
+            "free_acceleration",
+            "f8",
+            3,
+        ),  # on the ground: acceleration_map without contact ...
+        ("free_angular_acceleration", "f8", 3),  # ... and the angular one
+        # fields of every step, adjacent for the cache
         ("rotor_speed", "f8", MAX_ROTORS),
         ("position_map", "f8", 3),
         ("velocity_map", "f8", 3),
@@ -39,52 +47,53 @@ BODY = np.dtype(
         ("contact_budget", "f8"),
         ("separation_budget", "f8"),
         ("ground_budget", "f8"),
-        ("downwash_budget", "f8"),  # m until it may meet the jet of another, vehicle.downwash
+        ("downwash_budget", "f8"),  # m until it may meet another's jet, vehicle.downwash
         ("crashed", "?"),
         ("on_ground", "?"),
         ("asleep", "?"),
         ("altered", "?"),  # some rotor_lift is not that of a new rotor far from the ground
-        ("in_jet", "?"),  # another's air may reach it, vehicle.downwash
+        ("in_jet", "?"),  # another's jet may reach it, vehicle.downwash
         ("spare", "u1", 3),  # no hidden padding: equal states are equal bytes
     ],
     align=True,
 )
-"""The plant's state of one UAV; `FleetState` explains the fields."""
+"""State of one UAV's plant; `FleetState` explains the fields."""
 
 NEVER = -(1 << 40)
 """A step long before the start."""
 
 
 class FleetState(NamedTuple):
-    """Views of the state, rows of UAVs; what is written here is what flies on.
+    """Writable views of the state, rows of N UAVs; writing changes the simulation.
 
-    The rows lie one UAV after the other in memory, so the views are strided; use
-    `np.ascontiguousarray` (or the rows of `Fleet.history`) where a kernel needs packed ones.
+    The rows are one UAV after the other in memory, so the views are strided; use
+    `np.ascontiguousarray` (or the rows of `Fleet.history`) where a kernel needs contiguous ones.
     """
 
     position_map: Array
-    """(N, 3) m."""
+    """(N, 3) m, map frame."""
     velocity_map: Array
-    """(N, 3) m/s."""
+    """(N, 3) m/s, map frame."""
     attitude: Array
     """(N, 4) unit quaternions, map from body."""
     omega_body: Array
     """(N, 3) rad/s, FLU."""
     air_velocity_map: Array
-    """(N, 3) m/s of the air around each UAV: wind and downwash, of the last guidance tick."""
+    """(N, 3) m/s, map frame, of the air around each UAV: wind and downwash, of the last guidance
+    tick."""
     acceleration_map: Array
-    """(N, 3) m/s^2: dv/dt, the mean over the last step, contacts included; zero at rest."""
+    """(N, 3) m/s^2, map frame: dv/dt, mean of the last step, contacts included; zero at rest."""
     angular_acceleration_body: Array
-    """(N, 3) rad/s^2, FLU, the mean over the last step."""
+    """(N, 3) rad/s^2, FLU, mean of the last step."""
     rotor_speed: Array
-    """(N, MAX_ROTORS) rad/s; columns beyond a UAV's rotors stay zero."""
+    """(N, MAX_ROTORS) rad/s; columns beyond a UAV's rotors are zero."""
     rotor_angle: Array
-    """(N, MAX_ROTORS) rad that each has turned, its sense aside; see `RotorTurns`."""
+    """(N, MAX_ROTORS) rad turned by each rotor, unsigned; see `RotorTurns`."""
     rotor_health: Array
-    """(N, MAX_ROTORS) share of the new rotor's thrust; 0: lost, it stops; zero beyond a UAV's
-    rotors. `Fleet.set_rotor_health` changes it."""
+    """(N, MAX_ROTORS) fraction of the new rotor's thrust; 0: failed and stopped; zero beyond a
+    UAV's rotors. `Fleet.set_rotor_health` changes it."""
     battery_charge: Array
-    """(N,) share of the capacity that is left; stays 1 without a battery."""
+    """(N,) remaining fraction of the capacity; 1 without a battery."""
     battery_voltage: Array
     """(N,) V under the present load; 0 without a battery."""
     battery_current: Array
@@ -92,33 +101,33 @@ class FleetState(NamedTuple):
     battery_level: NDArray[np.int64]
     """(N,) `vehicle.battery.BatteryLevel`."""
     crashed: NDArray[np.bool_]
-    """(N,) rotors stopped for good."""
+    """(N,) whether the rotors are stopped for good."""
     on_ground: NDArray[np.bool_]
-    """(N,) touched the terrain in the last step."""
+    """(N,) whether the UAV touched the terrain in the last step."""
     asleep: NDArray[np.bool_]
-    """(N,) lies still on the ground with its rotors stopped and is not computed."""
+    """(N,) whether the UAV rests on the ground with stopped rotors and is not computed."""
     contact_budget: Array
-    """(N,) m that may be flown before the clearance to solids must be looked up; inf: ever."""
+    """(N,) m to fly before the clearance to solids must be computed again; inf: never."""
     separation_budget: Array
-    """(N,) m likewise, for the distance to other UAVs."""
+    """(N,) m to fly before the distance to other UAVs must be computed again; inf: never."""
 
 
 class RotorTurns(NamedTuple):
-    """How far the rotors have turned at a time, and how fast they turn."""
+    """Angles and speeds of the rotors at a time."""
 
     angle: Array
-    """(N, MAX_ROTORS) rad at `time_ns`, its sense aside."""
+    """(N, MAX_ROTORS) rad at `time_ns`, unsigned."""
     speed: Array
     """(N, MAX_ROTORS) rad/s."""
     time_ns: int
 
     def at(self, time_ns: int) -> Array:
-        """Angles (N, MAX_ROTORS), rad, at a time close by, at a constant speed."""
+        """Returns angles (N, MAX_ROTORS), rad, at a nearby time, at constant speed."""
         return self.angle + self.speed * (1e-9 * (time_ns - self.time_ns))
 
 
 def new_bodies(position_map: Array, attitude: Array) -> NDArray[np.void]:
-    """Bodies (N,) at rest at `position_map` (N, 3) m, `attitude` (N, 4)."""
+    """Returns bodies (N,) at rest at `position_map` (N, 3) m, `attitude` (N, 4) map from body."""
     bodies = np.zeros(len(position_map), BODY)
     bodies["position_map"] = position_map
     bodies["attitude"] = attitude
@@ -129,7 +138,7 @@ def new_bodies(position_map: Array, attitude: Array) -> NDArray[np.void]:
 
 
 def fit_rotors(body: np.void, plant: np.void, health: ArrayLike) -> None:
-    """Give a `BODY` record new rotors of its `PLANT`, of `health` (R,)."""
+    """Sets the rotor health (R,) of a `BODY` record with its `PLANT`."""
     count = int(plant["rotors"])
     body["rotor_health"][:count] = health
     body["rotor_lift"][:count] = plant["thrust_constant"] * np.asarray(health)
@@ -137,7 +146,7 @@ def fit_rotors(body: np.void, plant: np.void, health: ArrayLike) -> None:
 
 
 def charge_battery(body: np.void, plant: np.void, charge: float) -> None:
-    """Give a `BODY` record a rested battery of its `PLANT` with `charge` from 0 to 1."""
+    """Sets a `BODY` record's battery of its `PLANT` to a `charge` from 0 to 1, without load."""
     battery = plant["battery"]
     body["battery_charge"] = charge
     body["battery_pair_voltage"] = body["battery_current"] = 0.0
@@ -147,5 +156,5 @@ def charge_battery(body: np.void, plant: np.void, charge: float) -> None:
 
 
 def state_of(bodies: NDArray[np.void]) -> FleetState:
-    """Views of `bodies` (N,)."""
+    """Returns views of `bodies` (N,)."""
     return FleetState(*(bodies[name] for name in FleetState._fields))

@@ -1,4 +1,4 @@
-"""Ground effect: rotors near the ground give more thrust at the same speed.
+"""Ground effect: rotors near the ground produce more thrust at the same speed.
 
     T / T_free = 1 / (1 - e)      e = S(z) / (1 + (V / v_i)^2)
 
@@ -11,9 +11,9 @@ speed in hover. One rotor: I. Cheeseman, W. Bennett, "The effect of the ground o
 rotor in forward flight", ARC R&M 3021, 1955. Four rotors in a plane: P. Sanchez-Cuevas, G. Heredia,
 A. Ollero, "Characterization of the aerodynamic ground effect and its influence in multirotor
 control", 2017, with d between neighbours, b between opposite rotors and the fountain of air under
-the body K_b = 2; other numbers of rotors go by the first form.
+the body K_b = 2; other numbers of rotors use the first form.
 
-The effect fades to nothing between `GROUND_FADE` radii (a cubic, so that forces stay smooth), and
+The effect fades out between `GROUND_FADE` radii (a cubic, so that forces stay smooth), and
 heights below half a radius count as that (the first form has a pole at a quarter): modelling
 choices.
 """
@@ -31,21 +31,21 @@ from volery.world.terrain import TerrainGrid, terrain_height
 BODY_LIFT = 2.0
 """K_b (Sanchez-Cuevas et al. 2017)."""
 _LEAST_HEIGHT = 0.5
-"""Rotor radii."""
+"""Minimum height in rotor radii."""
 _FADE_FROM, _FADE_TO = GROUND_FADE
 
 
 @inner_kernel
 def feels_ground(body: Any, plant: Any) -> bool:
-    """Whether the ground may be near enough for its effect in this step."""
+    """Returns whether the ground may be near enough for its effect in this step."""
     return bool(body.ground_budget < plant.ground_reach)
 
 
 @apart_kernel
 def feel_ground(body: Any, plant: Any, grid: TerrainGrid, steepest: float, dt: float) -> None:
-    """Look at the ground: fresh `ground_budget`, and each rotor's `rotor_lift` at mid-step.
+    """Updates `ground_budget`, and each rotor's `rotor_lift` at mid-step.
 
-    A pure function of pose, velocity and rotor speeds; out of reach it leaves the free thrust.
+    A pure function of pose, velocity and rotor speeds; out of range the thrust is the free one.
     """
     x, y, z = body.position_map[0], body.position_map[1], body.position_map[2]
     body.ground_budget = (z - terrain_height(grid, x, y)) * steepest - plant.contact_radius
@@ -78,7 +78,7 @@ def feel_ground(body: Any, plant: Any, grid: TerrainGrid, steepest: float, dt: f
 
 @inner_kernel
 def ground_share(plant: Any, height: float) -> float:
-    """S of a rotor whose hub is at `height` m over the ground, in hover, faded out far above."""
+    """Returns S of a rotor with its hub at `height` m above the ground, in hover, faded out."""
     radius = plant.rotor_radius
     if height >= _FADE_TO * radius:
         return 0.0

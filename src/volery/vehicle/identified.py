@@ -1,9 +1,9 @@
-"""The identified plant: closed loops of attitude and thrust, as measured on a vehicle that flies.
+"""The identified plant: closed loops of attitude and thrust, as measured in flight.
 
-The model of the ROSUnitySim platform: with its inner controllers a vehicle answers a wanted
-attitude and thrust as first- or second-order systems with gain and dead time. A file names their
-numbers; `volery identify` makes one. Roll and pitch turn about the body's x and y axes, which for
-small angles is what Euler angles do, without their singularity. Thrust tilts with the vehicle and
+The model of the ROSUnitySim platform: with its inner controllers a vehicle responds to attitude and
+thrust setpoints as first- or second-order systems with gain and dead time. A file holds their
+parameters; `volery identify` makes one. Roll and pitch turn about the body's x and y axes, which
+for small angles equals Euler angles, without their singularity. Thrust tilts with the vehicle and
 moves it with gravity and a linear drag along the body's axes:
 
     v' = R (0, 0, T/m) - R D R^T (v - wind) - g
@@ -34,7 +34,7 @@ DeadTime = Annotated[float, Field(ge=0.0, le=0.25)]
 
 _MODELS = Path(__file__).parent / "identified"
 REFERENCE_COLUMNS = 6
-"""Kept of each past step: the wanted attitude (4), thrust and yaw rate."""
+"""Columns of each past step: attitude setpoint (4), thrust and yaw rate."""
 
 
 class _Table(BaseModel):
@@ -79,11 +79,11 @@ class FitError(_Table):
 
 
 class IdentifiedModel(_Table):
-    """Closed loops of one vehicle from wanted to true attitude and thrust."""
+    """Closed loops of one vehicle from setpoints to true attitude and thrust."""
 
     name: Annotated[str, Field(pattern=r"^[a-z0-9_]+$")]
     source: str
-    """Where the numbers are from."""
+    """Source of the numbers."""
     roll: Loop
     pitch: Loop
     yaw: Loop
@@ -102,7 +102,7 @@ IDENTIFIED = np.dtype(
         ("roll_gain", "f8"),
         ("pitch_gain", "f8"),
         ("heave_gain", "f8"),
-        ("heave", "f8"),  # what is left of a thrust error after a step
+        ("heave", "f8"),  # fraction of a thrust error left after a step
         ("heave_half", "f8"),
         ("drag", "f8", 3),
         ("rate_limit", "f8"),
@@ -113,11 +113,11 @@ IDENTIFIED = np.dtype(
     ],
     align=True,
 )
-"""An identified model as kernels read it, for one time step."""
+"""Parameters of an identified model for kernels, for one time step."""
 
 
 def identified_row(model: IdentifiedModel, airframe: Airframe, dt: float) -> NDArray[np.void]:
-    """The (1,) `IDENTIFIED` row of a model, within its airframe's limits, stepped by `dt` s."""
+    """Returns the (1,) `IDENTIFIED` row of a model for steps of `dt` s, with the limits."""
     row = np.zeros(1, IDENTIFIED)
     for name in ("roll", "pitch", "yaw"):
         row[name] = transition(getattr(model, name), dt)
@@ -135,7 +135,7 @@ def identified_row(model: IdentifiedModel, airframe: Airframe, dt: float) -> NDA
 
 
 def transition(loop: FirstOrder | SecondOrder, dt: float) -> Array:
-    """How (angle to go, rate) of a loop moves on in `dt` s: a (2, 2) matrix as (4,)."""
+    """Returns the transition of (angle to go, rate) in `dt` s: a (2, 2) matrix as (4,)."""
     if isinstance(loop, FirstOrder):
         left = math.exp(-dt / loop.time_constant_s)
         return np.array([left, 0.0, -left / loop.time_constant_s, 0.0])
@@ -151,9 +151,10 @@ def transition(loop: FirstOrder | SecondOrder, dt: float) -> Array:
 
 
 def load_identified(name: str, folder: Path | None = None) -> IdentifiedModel:
-    """Model of a shipped name such as `f450`, or of a `.toml` file, also beside `folder`.
+    """Returns the model of a shipped name such as `f450`, or of a `.toml` file.
 
-    Raises DataFileError that names the file, each wrong key and what is allowed there.
+    Paths may be relative to `folder`. Raises `DataFileError`, naming the file, each wrong key and
+    its allowed values, for an invalid file.
     """
     path = find_data_file(name, _MODELS, "identified model", folder)
     return load_data_file(path, IdentifiedModel, _MODELS)
@@ -171,11 +172,12 @@ def accelerate_identified(
     now: int,
     dt: float,
 ) -> None:
-    """Like `kernels.accelerate`: take velocity and rates of a `BODY` to the end of the step.
+    """Advances velocity and rates of a `BODY` to the end of the step.
 
-    command: a record with `attitude`, `thrust` and `yaw_rate`, and `rotor_reference` to be filled.
-    live: whether its controllers run. references: (N, L, 6), commands of the last L steps in a
-    ring; i: whose; now: the ring's row of this step.
+    Counterpart of `rigid_body_kernels.accelerate`. command: a record with `attitude`, `thrust` and
+    `yaw_rate`, and `rotor_reference`, which is set. live: whether its controllers run. references:
+    (N, L, 6), commands of the last L steps in a ring; i: the UAV's row; now: the ring's row of this
+    step.
     """
     for k in range(4):
         references[i, now, k] = command.attitude[k]
@@ -232,7 +234,7 @@ def _row_before(references: Array, now: int, delay: int) -> int:
 
 @inner_kernel
 def _thrust(body: Any, plant: Any, model: Any, command: Any, wanted: float) -> float:
-    """Thrust at mid-step, N; it is kept as the speed at which all rotors alike would give it."""
+    """Returns the thrust at mid-step, N; stores it as the equal speed of all rotors."""
     whole = plant.thrust_constant * plant.rotors
     wanted = min(max(model.heave_gain * wanted, 0.0), model.most_thrust)
     before = 0.0
@@ -249,7 +251,7 @@ def _thrust(body: Any, plant: Any, model: Any, command: Any, wanted: float) -> f
 
 @inner_kernel
 def _turn(body: Any, model: Any, references: Array, i: int, row: int, dt: float) -> None:
-    """Rates at the step's end, and the acceleration with which `carry` turns by the right angle."""
+    """Computes rates at the step's end, and the acceleration with which `carry` turns exactly."""
     px, py, turn = _angles_to(
         body,
         model,
@@ -272,7 +274,7 @@ def _turn(body: Any, model: Any, references: Array, i: int, row: int, dt: float)
 def _advance(
     body: Any, axis: int, loop: Any, angle: float, moving: float, limit: float, dt: float
 ) -> None:
-    """One axis: `angle` rad to go to a reference that itself turns at `moving` rad/s."""
+    """Advances one axis: `angle` rad to go to a reference that turns at `moving` rad/s."""
     before = body.omega_body[axis]
     lag = before - moving
     way = (1.0 - loop[0]) * angle + loop[1] * lag + moving * dt
@@ -281,7 +283,7 @@ def _advance(
     rate = min(max(rate, -limit), limit)
     body.omega_body[axis] = rate
     back = 1.0 / dt
-    # that with which `carry`, which turns by the mean of both rates, turns by `way`
+    # so that `carry`, which turns by the mean of both rates, turns by `way`
     acceleration = 2.0 * back * (rate - back * way)
     body.angular_acceleration_body[axis] = acceleration
     body.free_angular_acceleration[axis] = acceleration
@@ -291,9 +293,9 @@ def _advance(
 def _angles_to(
     body: Any, model: Any, qx: float, qy: float, qz: float, qw: float
 ) -> tuple[float, float, float]:
-    """Angles (rad) about the body's axes to the wanted attitude, its tilt times the loops' gains.
+    """Returns angles (rad) about the body's axes to the setpoint, its tilt times the loops' gains.
 
-    Tilt and turn apart, as the attitude controller does it (`control.rates_attitude`).
+    Tilt and turn are separate, as in the attitude controller (`control.rates_attitude`).
     """
     # wanted = turn about z * tilt without z; the tilt times the gains
     n = math.sqrt(qz * qz + qw * qw)

@@ -1,8 +1,8 @@
-"""The kinematic plant: a velocity or a pose from outside moves the body, exactly and at once.
+"""The kinematic plant: an external velocity or pose moves the body exactly and at once.
 
-As the ROS and Unity3D platform of 2025 flew its vehicles: no forces, level attitude, a Twist is
+Like the vehicles of the ROS and Unity3D platform of 2025: no forces, level attitude, a Twist is
 integrated along its arc. Optionally velocities follow with a first-order lag and within the
-airframe's limits. The ground stops it; nothing crashes by itself.
+airframe's limits. The ground stops the UAV; collisions do not crash it by themselves.
 """
 
 from __future__ import annotations
@@ -21,33 +21,33 @@ from volery.vehicle.rotation_math import four, three
 from volery.world.terrain import TerrainGrid, terrain_height
 
 _GROUND_MARGIN = 0.05
-"""m kept when the next look at the terrain is put off."""
+"""Margin when the next terrain query is postponed, m."""
 
 
 @dataclass(frozen=True)
 class Kinematic:
-    """How a kinematic UAV answers velocity commands."""
+    """Response of a kinematic UAV to velocity commands."""
 
     time_constant_s: float = 0.0
     """First-order lag of velocity and yaw rate; 0: at once."""
     limited: bool = False
-    """Whether the airframe's limits of speed, climb, descent and yaw rate bind it."""
+    """Whether the airframe's limits of speed, climb, descent and yaw rate apply."""
 
 
 KINEMATIC = np.dtype(
     [
-        ("left", "f8"),  # what is left of a velocity error after a step
-        ("offset", "f8"),  # m, of the origin above the ground it stands on
+        ("left", "f8"),  # fraction of a velocity error left after a step
+        ("offset", "f8"),  # m, of the origin above the ground at rest
         ("hover_speed", "f8"),  # rad/s, shown as its rotors' speed
         ("limited", "i8"),
     ],
     align=True,
 )
-"""A kinematic model as kernels read it, for one time step."""
+"""Parameters of a kinematic model for kernels, for one time step."""
 
 
 def kinematic_row(model: Kinematic, airframe: Airframe, dt: float) -> NDArray[np.void]:
-    """The (1,) `KINEMATIC` row of a model, stepped by `dt` s."""
+    """Returns the (1,) `KINEMATIC` row of a model, stepped by `dt` s."""
     row = np.zeros(1, KINEMATIC)
     lag = model.time_constant_s
     row["left"] = math.exp(-dt / lag) if lag > 0.0 else 0.0
@@ -60,7 +60,7 @@ def kinematic_row(model: Kinematic, airframe: Airframe, dt: float) -> NDArray[np
 
 @inner_kernel
 def drive(body: Any, ux: float, uy: float, uz: float, rate: float, dt: float) -> None:
-    """Move with (ux, uy, uz) m/s, forward, left and up, turning at `rate` rad/s: along an arc."""
+    """Moves with (ux, uy, uz) m/s, forward, left and up, along an arc of `rate` rad/s."""
     c, s = _heading(body)
     h = 0.5 * rate * dt
     ch, sh = _cosine_and_sine(h)
@@ -76,7 +76,7 @@ def drive(body: Any, ux: float, uy: float, uz: float, rate: float, dt: float) ->
 
 @inner_kernel
 def glide(body: Any, ax: float, ay: float, az: float, dt: float) -> None:
-    """Move on from the present velocity with a steady acceleration, m/s^2, map."""
+    """Advances from the present velocity with a constant acceleration, m/s^2, map."""
     half = 0.5 * dt
     px, py, pz = three(body.position_map)
     vx, vy, vz = three(body.velocity_map)
@@ -90,7 +90,7 @@ def glide(body: Any, ax: float, ay: float, az: float, dt: float) -> None:
 def put(
     body: Any, px: float, py: float, pz: float, vx: float, vy: float, vz: float, dt: float
 ) -> None:
-    """Place and velocity at the step's end, map; the way counts against the budgets."""
+    """Sets position and velocity at the step's end, map; reduces budgets by the distance."""
     dx, dy, dz = (
         px - body.position_map[0],
         py - body.position_map[1],
@@ -111,7 +111,7 @@ def put(
 
 @inner_kernel
 def turn_by(body: Any, rate: float, dt: float) -> None:
-    """Stand level and turn at `rate` rad/s for a step."""
+    """Levels the body and turns it at `rate` rad/s for a step."""
     x, y, z, w = four(body.attitude)
     if x == 0.0 and y == 0.0:
         ch, sh = _cosine_and_sine(0.5 * rate * dt)
@@ -127,7 +127,7 @@ def turn_by(body: Any, rate: float, dt: float) -> None:
 
 @inner_kernel
 def face(body: Any, c: float, s: float, rate: float, dt: float) -> None:
-    """Level attitude with the heading of cosine `c` and sine `s`, turning at `rate` rad/s."""
+    """Sets a level attitude with heading cosine `c` and sine `s`, turning at `rate` rad/s."""
     n = 1.0 / math.sqrt(c * c + s * s)
     c *= n
     s *= n
@@ -144,7 +144,7 @@ def face(body: Any, c: float, s: float, rate: float, dt: float) -> None:
 
 @inner_kernel
 def _spin(body: Any, rate: float, dt: float) -> None:
-    """Body rates of a level vehicle."""
+    """Sets the body rates of a level vehicle."""
     back = 1.0 / dt
     body.angular_acceleration_body[0] = -back * body.omega_body[0]
     body.angular_acceleration_body[1] = -back * body.omega_body[1]
@@ -155,7 +155,7 @@ def _spin(body: Any, rate: float, dt: float) -> None:
 
 @inner_kernel
 def _cosine_and_sine(angle: float) -> tuple[float, float]:
-    """Of an angle that is small most of the time: the series errs by 1e-17 where it is used."""
+    """Returns cosine and sine; for small angles by a series with an error of 1e-17."""
     if abs(angle) > 0.02:
         return math.cos(angle), math.sin(angle)
     q = angle * angle
@@ -167,11 +167,10 @@ def _cosine_and_sine(angle: float) -> tuple[float, float]:
 def stop_at_ground(
     body: Any, plant: Any, model: Any, grid: TerrainGrid, steepest: float, step: int, dt: float
 ) -> int:
-    """Keep its feet above the ground; `NO_TOUCH`, `TOUCH_DOWN` or `IMPACT`.
+    """Keeps the feet above the ground; returns `NO_TOUCH`, `TOUCH_DOWN` or `IMPACT`.
 
-    It may press on: that is the same touch.
-
-    steepest: cosine of the terrain's steepest slope. step: number of the step that ends here.
+    Continued pressure is the same contact. steepest: cosine of the terrain's steepest slope. step:
+    number of the step that ends here.
     """
     if body.ground_budget > _GROUND_MARGIN:
         return NO_TOUCH

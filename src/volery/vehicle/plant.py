@@ -1,4 +1,4 @@
-"""The plant of one airframe as kernels read it: masses, rotors, battery, points of contact."""
+"""Parameters of one airframe's plant, for kernels: masses, rotors, battery, contact points."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from volery.vehicle.battery import BATTERY, battery_row
 Array = NDArray[np.float64]
 
 AIR_DENSITY = 1.225
-"""kg/m^3: International Standard Atmosphere at sea level."""
+"""Density of air, kg/m^3: International Standard Atmosphere at sea level."""
 MAX_CONTACTS = MAX_FEET + MAX_ROTORS + 2
 GROUND_FADE = (6.0, 10.0)
 """Heights in rotor radii between which the ground effect fades out (modelling choice: at the lower
-one it is below 2 percent of the thrust)."""
+one the effect is below 2 percent of the thrust)."""
 
 PLANT = np.dtype(
     [
@@ -59,16 +59,16 @@ PLANT = np.dtype(
     ],
     align=True,
 )
-"""One airframe as kernels read it: SI, FLU, lag factors for one time step and half of it."""
+"""Parameters of one airframe for kernels: SI, FLU, lag factors for a time step and half of it."""
 
 
 def plant_of(
     airframe: Airframe, dt: float, battery_period: float, wear: Sequence[RotorWear] = ()
 ) -> NDArray[np.void]:
-    """The (1,) `PLANT` row of an airframe stepped by `dt` s, its battery each `battery_period` s.
+    """Returns the (1,) `PLANT` row of an airframe stepped by `dt` s.
 
-    wear: one a rotor, or none at all. The thrust that wear leaves is a state (`BODY`'s
-    rotor_health), not part of this row.
+    battery_period: time between battery updates, s. wear: one per rotor, or none. The thrust that
+    wear leaves is a state (`BODY`'s rotor_health), outside this row.
     """
     row = np.zeros(1, PLANT)
     body, ground = airframe.body, airframe.ground
@@ -124,7 +124,7 @@ def _fill_rotors(row: np.void, airframe: Airframe, dt: float, wear: Sequence[Rot
 
 
 def _fill_neighbours(row: np.void, airframe: Airframe) -> None:
-    """How far the ground effect reaches, and the spacings of four rotors in one plane."""
+    """Sets the range of the ground effect, and the spacings of four rotors in one plane."""
     rotors = airframe.rotors
     row["ground_reach"] = GROUND_FADE[1] * rotors.radius_m
     if not (row["upright"] and row["rotors"] == 4):
@@ -136,7 +136,7 @@ def _fill_neighbours(row: np.void, airframe: Airframe) -> None:
 
 
 def contact_points(airframe: Airframe) -> Array:
-    """Points (P, 3) of the body that the ground can touch: feet, rotor tips, roof; m, FLU."""
+    """Returns contact points (P, 3) of the body: feet, rotor tips, roof; m, FLU."""
     points = [np.array(foot) for foot in airframe.ground.feet_m]
     for place in airframe.rotors.places:
         hub = np.array(place.position_m)

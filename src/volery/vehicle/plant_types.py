@@ -1,4 +1,4 @@
-"""The plants a UAV may have: what turns commands into motion."""
+"""The plants of UAVs: models that turn commands into motion."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from volery.vehicle.kinematic import Kinematic
 
 @dataclass(frozen=True)
 class RigidBody:
-    """Rotors, air and a rigid body; everything follows from the airframe."""
+    """Rotors, air and a rigid body; all parameters follow from the airframe."""
 
 
 Plant: TypeAlias = RigidBody | IdentifiedModel | Kinematic
@@ -21,7 +21,7 @@ RIGID_BODY, IDENTIFIED_LOOPS, KINEMATIC_MOTION = 0, 1, 2
 
 
 def kind_of(plant: Plant) -> int:
-    """Number of a plant."""
+    """Returns the number of a plant."""
     if isinstance(plant, IdentifiedModel):
         return IDENTIFIED_LOOPS
     return KINEMATIC_MOTION if isinstance(plant, Kinematic) else RIGID_BODY

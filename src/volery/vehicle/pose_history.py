@@ -1,6 +1,6 @@
-"""The last few poses of every UAV, so that a sensor can look back at where it was.
+"""The latest poses of every UAV, for sensors that need past poses.
 
-A ring buffer: row `k % H` is the pose after physics step k, at time `k * dt_ns`; row 0 of a fresh
+A ring buffer: row `k % H` is the pose after physics step k, at time `k * dt_ns`; row 0 of a new
 history is the initial state. A LIDAR sweep of 18.75 ms reads about 20 rows.
 """
 
@@ -14,23 +14,23 @@ from numpy.typing import ArrayLike, NDArray
 from volery.core.compiled import inline_kernel
 
 KEPT_NS = 128_000_000
-"""How far back it reaches: a whole turn of a 10 Hz scanner and more."""
+"""Duration of the history, ns: more than a turn of a 10 Hz scanner."""
 LEAST_LENGTH = 64
 
 
 class PoseHistory(NamedTuple):
-    """Poses of N UAVs after the last H physics steps; plain arrays, so that kernels can take it."""
+    """Poses of N UAVs after the last H physics steps; plain arrays for kernels."""
 
     position: NDArray[np.float64]
     """(H, N, 3) m, map."""
     attitude: NDArray[np.float64]
     """(H, N, 4) unit quaternions, map from body."""
     dt_ns: int
-    """Length of a physics step."""
+    """Physics step, ns."""
 
 
 def new_history(position: ArrayLike, attitude: ArrayLike, dt_ns: int) -> PoseHistory:
-    """History of a fleet that has stood still at `position` (N, 3), `attitude` (N, 4) so far."""
+    """Returns the history of a fleet at rest at `position` (N, 3) m, `attitude` (N, 4)."""
     length = max(LEAST_LENGTH, -(-KEPT_NS // dt_ns))
     p = np.asarray(position, dtype=np.float64)
     q = np.asarray(attitude, dtype=np.float64)
@@ -45,7 +45,7 @@ def new_history(position: ArrayLike, attitude: ArrayLike, dt_ns: int) -> PoseHis
 def record(
     history: PoseHistory, step: int, position: NDArray[np.float64], attitude: NDArray[np.float64]
 ) -> None:
-    """Store the poses (N, 3), (N, 4) after physics step `step`."""
+    """Stores the poses (N, 3), (N, 4) after physics step `step`."""
     row = step % history.position.shape[0]
     for i in range(position.shape[0]):
         for j in range(3):
@@ -58,13 +58,13 @@ def record(
 def pose_at(
     history: PoseHistory, uav: int, time_ns: int
 ) -> tuple[float, float, float, float, float, float, float]:
-    """Pose (x, y, z, qx, qy, qz, qw) of one UAV at a time that the history covers.
+    """Returns the pose (x, y, z, qx, qy, qz, qw) of one UAV, map frame, at a time in the history.
 
     Positions are interpolated linearly between two steps, attitudes by the normalized mean, whose
-    error against the great arc is below 1e-9 rad for the millisecond of a step.
+    error against the great arc is below 1e-9 rad for a step of a millisecond.
     """
     length = history.position.shape[0]
-    # By floating point, which is exact here: whole-number divisions cost more than all the rest.
+    # Floating point is exact here: integer divisions would cost more than all the rest.
     steps = max(time_ns, 0) / history.dt_ns
     step = np.floor(steps)
     f = steps - step

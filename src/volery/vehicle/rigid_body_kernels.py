@@ -1,9 +1,9 @@
 """One step of the plant: rotors, air, gravity, ground, and the rigid body's motion.
 
-Velocity Verlet in its one-evaluation form: forces are taken once, at mid-step, from velocity,
+Velocity Verlet in its one-evaluation form: forces are evaluated once, at mid-step, from velocity,
 rates and attitude extrapolated half a step and from the rotors' exact mid-step speeds; the velocity
-takes the whole step with them, the position goes with the mean of old and new velocity, and the
-attitude turns by the exponential of the mean rate. Second order in the step wherever commands and
+advances the whole step with them, the position with the mean of old and new velocity, and the
+attitude by the exponential of the mean rate. Second order in the step wherever commands and
 contacts leave the motion smooth.
 """
 
@@ -26,27 +26,27 @@ from volery.world.terrain import TerrainGrid, terrain_height
 Array = NDArray[np.float64]
 
 _GROUND_MARGIN = 0.05
-"""m kept when the next look at the terrain is put off."""
+"""Margin when the next terrain query is postponed, m."""
 _STILL_SPEED = 0.03
-"""m/s, and rad/s, below which a body on the ground counts as still ..."""
+"""Speed, m/s, and rate, rad/s, below which a body on the ground counts as still ..."""
 _STILL_S = 0.25
-"""... and the s for which it must be so before it sleeps."""
+"""... and the time in s after which it sleeps."""
 _WRECK_DAMPING_S = 0.15
-"""s: time constant with which a wreck on the ground loses its motion (modelling choice)."""
+"""Time constant with which a crashed body on the ground loses its motion, s (modelling choice)."""
 
 
 @inner_kernel
 def accelerate(body: Any, plant: Any, command: Any, dt: float) -> None:
-    """Rotors, air and gravity: take velocity and rates of a `BODY` to the end of the step.
+    """Advances velocity and rates of a `BODY` to the end of the step: rotors, air and gravity.
 
-    command: a record with `rotor_reference`, rad/s, held over the step.
+    command: a record with `rotor_reference`, rad/s, constant over the step.
     """
     half = 0.5 * dt
     vx, vy, vz = three(body.velocity_map)
     ox, oy, oz = three(body.omega_body)
     ax, ay, az = three(body.acceleration_map)
     bx, by, bz = three(body.angular_acceleration_body)
-    if body.on_ground:  # without the push of the contact
+    if body.on_ground:  # without contact forces
         ax, ay, az = three(body.free_acceleration)
         bx, by, bz = three(body.free_angular_acceleration)
     # mid-step, extrapolated
@@ -94,10 +94,10 @@ def accelerate(body: Any, plant: Any, command: Any, dt: float) -> None:
 
 @inner_kernel
 def turn_rotors(body: Any, plant: Any, seconds: float) -> None:
-    """Count on how far the rotors turn within a guidance tick, from its start to its end.
+    """Advances the rotor angles by a guidance tick, from its start to its end.
 
-    Cameras see by it where the blades are; nothing of the motion depends on it, so the speed at the
-    start of the tick will do.
+    Cameras draw the blades by them; the motion does not depend on them, so the speed at the start
+    of the tick suffices.
     """
     for first in range(0, plant.rotors, LANES):
         angle = lanes_at(body.rotor_angle, first) + lanes_at(body.rotor_speed, first) * seconds
@@ -106,9 +106,11 @@ def turn_rotors(body: Any, plant: Any, seconds: float) -> None:
 
 @inner_kernel
 def near_ground(body: Any, dt: float) -> bool:
-    """Whether the ground must be looked at in this step."""
+    """Returns whether the ground must be queried in this step."""
     vx, vy, vz = three(body.velocity_map)
-    travel = (abs(vx) + abs(vy) + abs(vz)) * dt  # no less than the way flown, without a root
+    travel = (
+        abs(vx) + abs(vy) + abs(vz)
+    ) * dt  # an upper bound of the distance flown, without a root
     return bool(body.ground_budget < _GROUND_MARGIN + travel)
 
 
@@ -124,7 +126,7 @@ def meet_ground(
     step: int,
     dt: float,
 ) -> int:
-    """Look at the ground, and let it stop the body; `NO_TOUCH`, `TOUCH_DOWN` or `IMPACT`.
+    """Stops the body at the ground; returns `NO_TOUCH`, `TOUCH_DOWN` or `IMPACT`.
 
     steepest: cosine of the terrain's steepest slope. step: number of the step that ends here.
     """
@@ -157,10 +159,10 @@ def meet_ground(
 
 @inner_kernel
 def carry(body: Any, dt: float) -> None:
-    """Take position and attitude to the end of the step, and count the way against the budgets.
+    """Advances position and attitude to the end of the step; reduces budgets by the distance.
 
-    They go with the mean of the old and the new velocity; on the ground with the new one, which is
-    the one that the contact allows.
+    They advance by the mean of the old and the new velocity; on the ground by the new one, which
+    the contact allows.
     """
     half = 0.5 * dt
     back = 0.0 if body.on_ground else half
@@ -203,7 +205,7 @@ def _store(vector: Array, x: float, y: float, z: float) -> None:
 
 @inner_kernel
 def _rest(body: Any, plant: Any, command: Any, dt: float) -> None:
-    """Put a body to sleep that has lain still, rotors stopped, for a while."""
+    """Puts a body to sleep that has rested, rotors stopped, for a while."""
     still = True
     for k in range(3):
         still = still and abs(body.velocity_map[k]) < _STILL_SPEED

@@ -1,4 +1,4 @@
-"""Small compiled words of rigid-body motion, on plain numbers."""
+"""Compiled scalar functions of rigid-body motion."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ Array = NDArray[np.float64]
 
 @inner_kernel
 def three(vector: Array) -> tuple[float, float, float]:
-    """The numbers of a (3,) vector."""
+    """Returns the elements of a (3,) vector."""
     return vector[0], vector[1], vector[2]
 
 
 @inner_kernel
 def four(quaternion: Array) -> tuple[float, float, float, float]:
-    """The numbers of a (4,) quaternion."""
+    """Returns the elements of a (4,) quaternion."""
     return quaternion[0], quaternion[1], quaternion[2], quaternion[3]
 
 
@@ -26,7 +26,7 @@ def four(quaternion: Array) -> tuple[float, float, float, float]:
 def matrix_of(
     x: float, y: float, z: float, w: float
 ) -> tuple[float, float, float, float, float, float, float, float, float]:
-    """Rotation matrix, row by row, of the unit quaternion (x, y, z, w)."""
+    """Returns the rotation matrix, row by row, of the unit quaternion (x, y, z, w)."""
     xx, yy, zz = 2.0 * x * x, 2.0 * y * y, 2.0 * z * z
     xy, xz, yz = 2.0 * x * y, 2.0 * x * z, 2.0 * y * z
     xw, yw, zw = 2.0 * x * w, 2.0 * y * w, 2.0 * z * w
@@ -47,7 +47,10 @@ def matrix_of(
 def product(
     px: float, py: float, pz: float, pw: float, qx: float, qy: float, qz: float, qw: float
 ) -> tuple[float, float, float, float]:
-    """Composition: first q, then p; `core.rotation_kernels` has it without fused multiply-add."""
+    """Returns the composition: first q, then p.
+
+    `core.rotation_kernels` has it without fused multiply-add.
+    """
     return (
         pw * qx + px * qw + py * qz - pz * qy,
         pw * qy - px * qz + py * qw + pz * qx,
@@ -60,9 +63,9 @@ def product(
 def nudged(
     qx: float, qy: float, qz: float, qw: float, hx: float, hy: float, hz: float
 ) -> tuple[float, float, float, float]:
-    """Attitude turned by about 2 h, body frame: first order in h, with an error of 2 |h|^3 / 3.
+    """Returns the attitude turned by about 2 h, body frame, with an error of 2 |h|^3 / 3.
 
-    For attitudes at mid-step, where forces need no more: 8e-8 rad at 20 rad/s and 1 kHz.
+    First order in h, sufficient for attitudes at mid-step: 8e-8 rad at 20 rad/s and 1 kHz.
     """
     x = qw * hx + qx + qy * hz - qz * hy
     y = qw * hy - qx * hz + qy + qz * hx
@@ -76,10 +79,10 @@ def nudged(
 def turned(
     qx: float, qy: float, qz: float, qw: float, hx: float, hy: float, hz: float
 ) -> tuple[float, float, float, float]:
-    """Attitude turned by the body-frame rotation vector 2 h: q exp(h), by its series in |h|.
+    """Returns the attitude turned by the body-frame vector 2 h: q exp(h), by its series in |h|.
 
-    The series errs by |h|^6/5040 (1e-12 at 100 rad/s and 1 kHz); one Newton step keeps the
-    quaternion of unit length.
+    The series errs by |h|^6/5040 (1e-12 at 100 rad/s and 1 kHz); one Newton step preserves the
+    quaternion's unit length.
     """
     s = hx * hx + hy * hy + hz * hz
     c = 1.0 - s * (0.5 - s * (1.0 / 24.0))

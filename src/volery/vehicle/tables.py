@@ -1,4 +1,4 @@
-"""Words in which airframe files are checked: a frozen table and the ranges of its numbers."""
+"""Types of airframe files: a frozen table and the ranges of its numbers."""
 
 from __future__ import annotations
 

@@ -2,8 +2,7 @@
 
     python -m volery.vehicle.typescript > web/src/scene/uavs/airframes.generated.ts
 
-The page builds the picture of a UAV from what its airframe's file says: where rotors, feet and the
-box of the body are.
+The page draws a UAV from its airframe's file: positions of rotors and feet, and the body's box.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ export const AIRFRAMES: Readonly<Record<string, AirframeShape>> = {
 
 
 def declarations() -> str:
-    """The whole file."""
+    """Returns the whole file."""
     shapes = [_shape(load_airframe(name)) for name in airframe_names()]
     return _HEAD + "".join(shapes) + "};\n"
 

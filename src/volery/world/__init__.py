@@ -1,1 +1,1 @@
-"""What stands in the map: terrain, trees, forests, and the rays cast at them."""
+"""Terrain, trees, forests and cities of a map, and ray casting at them."""

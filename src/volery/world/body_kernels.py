@@ -1,9 +1,9 @@
-"""Compiled ray casting at bodies that move while rays are cast: UAVs, then things.
+"""Compiled ray casting at bodies that move during a batch: UAVs, then actors.
 
-Bodies are few and move at every step, so they have no search tree over them: a packet is tested
-against each body's bounding sphere and, where it may touch, turned into the body's frame and cast
-at the Embree scene of its shape. Nothing has to be rebuilt when a UAV moves, a ray sees a body
-where it was at the ray's own time, and a UAV's own body is simply left out.
+Bodies are few and move at every step, so they have no search tree: a packet is tested against each
+body's bounding sphere and, where it may hit, transformed to the body's frame and cast at the Embree
+scene of its shape. Nothing is rebuilt when a UAV moves, a ray sees a body at its pose of the ray's
+own time, and a UAV's own body is left out.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ from volery.world.scene_memory import BodyTable, RayBlock, SceneHandle
 _INVALID = np.uint32(INVALID)
 _ROTOR = int(Material.ROTOR)
 _PAST_M = np.float32(1e-4)
-"""A ray that went through a gap starts again this far behind the disc."""
+"""Distance behind the disc at which a ray through a gap restarts, m."""
 
 
 @inner_kernel
 def body_pose(
     bodies: BodyTable, row: int, fraction: float
 ) -> tuple[float, float, float, float, float, float, float]:
-    """Pose of a body at `fraction` of the interval: linear, the quaternion normalized."""
+    """Returns the pose of a body at `fraction` of the interval: linear, quaternion normalized."""
     a, b = bodies.start, bodies.end
     g = 1.0 - fraction
     dot = 0.0
@@ -65,7 +65,7 @@ def body_pose(
 
 @inner_kernel
 def body_sphere(bodies: BodyTable, row: int) -> tuple[float, float, float, float]:
-    """Centre (x, y, z) and radius, m, of what a body stays within during the interval."""
+    """Returns centre (x, y, z) and radius, m, of a sphere around a body in the interval."""
     a, b = bodies.start, bodies.end
     x, y = 0.5 * (a[row, 0] + b[row, 0]), 0.5 * (a[row, 1] + b[row, 1])
     z = 0.5 * (a[row, 2] + b[row, 2])
@@ -82,9 +82,10 @@ def near_bodies(
     uav: int,
     near: NDArray[np.int32],
 ) -> int:
-    """List the bodies that rays from the box `low`..`high` may touch; their number.
+    """Lists in `near` the bodies that rays from a box may hit; returns their number.
 
-    uav: whose rays they are, -1 for rays of nobody or of several.
+    low, high: corners of the box, m, map. uav: the row of the rays' UAV; -1 for rays of no UAV or
+    of several.
     """
     count = 0
     uavs = bodies.scene.shape[0] - bodies.actors
@@ -110,7 +111,7 @@ def near_bodies(
 def _may_touch(
     rays: NDArray[np.float32], lanes: int, x: float, y: float, z: float, radius: float
 ) -> bool:
-    """Whether any of a packet's lanes may meet the sphere; never wrong when it says no."""
+    """Returns whether a packet's lanes may hit the sphere; false is always exact."""
     m = lanes // 2
     shift, spread, reach = 0.0, 0.0, 0.0
     for k in range(lanes):
@@ -133,7 +134,7 @@ def _may_touch(
 
 @inner_kernel
 def _sees(bodies: BodyTable, uav: int, row: int) -> bool:
-    """Whether rays of `uav` (-1: of nobody) may meet body `row`."""
+    """Returns whether rays of `uav` (-1: of none) may hit body `row`."""
     is_actor = row >= bodies.scene.shape[0] - bodies.actors
     own_copy = uav // bodies.crew == row // bodies.crew
     return bool(uav < 0 or is_actor or (uav != row and own_copy))
@@ -143,7 +144,7 @@ def _sees(bodies: BodyTable, uav: int, row: int) -> bool:
 def _into_body(
     bodies: BodyTable, block: RayBlock, p: int, lanes: int, row: int, pose: tuple[float, ...]
 ) -> None:
-    """Fill the body-frame packet; lanes that do not see this body stay masked."""
+    """Fills the body-frame packet; lanes that do not see this body remain masked."""
     x, y, z, qx, qy, qz, qw = pose
     a, b, c = matrix_rows(qx, qy, qz, qw)
     rays, out = block.rays[p], block.body_rays
@@ -160,7 +161,7 @@ def _into_body(
 
 @inner_kernel
 def _leave_gaps(bodies: BodyTable, block: RayBlock, p: int, row: int) -> bool:
-    """Let rays that met a rotor between its blades start again behind it; whether any did."""
+    """Restarts rays that passed between a rotor's blades behind it; returns whether any did."""
     found, words, rays = block.body_rays, block.body_words, block.rays[p]
     again = False
     for k in range(LANES):
@@ -182,12 +183,12 @@ def _leave_gaps(bodies: BodyTable, block: RayBlock, p: int, row: int) -> bool:
 
 @inner_kernel
 def _cast_in_body(bodies: BodyTable, block: RayBlock, p: int, row: int) -> None:
-    """Closest hits of the body-frame packet, through the gaps of turning rotors."""
+    """Finds the closest hits of the body-frame packet, through the gaps of turning rotors."""
     found, valid = block.body_rays, block.body_valid
     intersect_packet(valid.ctypes.data, bodies.scene[row], found.ctypes.data, 0)
     if bodies.rotors.shape[1] == 0:
         return
-    for _ in range(bodies.rotors.shape[1]):  # each disc is met once at most
+    for _ in range(bodies.rotors.shape[1]):  # each disc is hit at most once
         if not _leave_gaps(bodies, block, p, row):
             break
         intersect_packet(valid.ctypes.data, bodies.scene[row], found.ctypes.data, 0)
@@ -197,7 +198,7 @@ def _cast_in_body(bodies: BodyTable, block: RayBlock, p: int, row: int) -> None:
 
 @inner_kernel
 def cast_at_body(scene: SceneHandle, block: RayBlock, p: int, lanes: int, row: int) -> None:
-    """Let one body shorten the rays of packet `p`."""
+    """Shortens the rays of packet `p` that hit a body."""
     bodies = scene.bodies
     pose = body_pose(bodies, row, block.fraction[p])
     rays = block.rays[p]
@@ -222,7 +223,7 @@ def cast_at_body(scene: SceneHandle, block: RayBlock, p: int, lanes: int, row: i
 
 @inner_kernel
 def hide_behind_body(scene: SceneHandle, block: RayBlock, p: int, lanes: int, row: int) -> None:
-    """Mark, by FAR = -inf, the lanes that meet a body."""
+    """Marks, by FAR = -inf, the lanes that hit a body."""
     pose = body_pose(scene.bodies, row, block.fraction[p])
     rays, found, sees = block.rays[p], block.body_rays, block.body_valid
     if not _may_touch(rays, lanes, pose[0], pose[1], pose[2], scene.bodies.radius[row]):

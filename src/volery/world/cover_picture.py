@@ -1,6 +1,6 @@
-"""The ground's cover as a picture: what files of worlds lay over the terrain.
+"""The ground cover as an image, for texturing the terrain in exported worlds.
 
-PNG (ISO/IEC 15948): one byte a cell, an index into a palette; rows from south to north.
+PNG (ISO/IEC 15948): one byte per cell, an index into a palette; rows from south to north.
 """
 
 from __future__ import annotations
@@ -16,11 +16,14 @@ from volery.world.ground_cover import GroundCover
 from volery.world.materials import Material
 
 _RIM = 1
-"""Cells of bare earth around the cover: a viewer repeats the outermost ones beyond the picture."""
+"""Cells of bare earth around the cover: viewers repeat the outermost cells beyond the image."""
 
 
 def cover_png(cover: GroundCover, colours: Mapping[Material, tuple[float, float, float]]) -> bytes:
-    """A pixel a cell, with a rim of earth; colours: linear (r, g, b) of each material."""
+    """Returns a PNG with one pixel per cell and a rim of earth.
+
+    colours: linear (r, g, b) of each material.
+    """
     cells = np.pad(cover.material, _RIM, constant_values=Material.GROUND)
     rows, columns = cells.shape
     linear = np.array([colours[material] for material in Material])
@@ -39,7 +42,7 @@ def cover_png(cover: GroundCover, colours: Mapping[Material, tuple[float, float,
 
 
 def cover_places(cover: GroundCover, points: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Where in that picture points (n, 3), m, map, lie: (n, 2) shares of its width and height."""
+    """Returns image coordinates (n, 2), fractions of width and height, of points (n, 3), m, map."""
     rows, columns = cover.material.shape
     low = np.array([cover.origin_x, cover.origin_y]) - _RIM * cover.spacing
     size = np.array([columns + 2 * _RIM, rows + 2 * _RIM]) * cover.spacing

@@ -1,10 +1,10 @@
-"""The one place that knows Embree's C interface: the library inside the `embreex` wheel.
+"""Binding of Embree's C interface, from the library inside the `embreex` wheel.
 
-ctypes builds scenes; compiled kernels cast packets of rays and ask for nearest points through
+ctypes builds scenes; compiled kernels cast packets of rays and query nearest points through
 `numba.types.ExternalFunction`, which, unlike a ctypes function, lets a kernel be cached on disk.
 Names, numbers and layouts are those of Embree 4's headers (`include/embree4/rtcore_*.h`, version
 4.4, RTC_MAX_INSTANCE_LEVEL_COUNT = 1, instance arrays built in); `load` checks the library's
-version, and `Device` casts a ray and a point query at a known triangle before it is trusted.
+symbols, `Device` its version, and `self_test` casts a ray at a known triangle.
 
 A packet holds LANES rays, structure of arrays: row r of lane k is float `r * LANES + k` of a
 64-byte aligned block of PACKET_ROWS * LANES floats. An INVALID geometry number after a cast means
@@ -31,31 +31,31 @@ from volery.world.mesh import Mesh
 
 
 class PaddedMesh(NamedTuple):
-    """A mesh as Embree reads it: vertices 16 bytes at a time, so one more row ends the array."""
+    """A mesh for Embree, which reads vertices 16 bytes at a time and so needs one more row."""
 
     vertices: NDArray[np.float32]
-    """(V + 1, 3), the last row unused."""
+    """(V + 1, 3) m, the last row unused."""
     triangles: NDArray[np.uint32]
-    """(T, 3)."""
+    """(T, 3) rows of `vertices`."""
 
 
 def padded(mesh: Mesh) -> PaddedMesh:
-    """Copy of a mesh in the form that Embree may read."""
+    """Returns a copy of a mesh with the additional row."""
     vertices = np.zeros((len(mesh.vertices) + 1, 3), dtype=np.float32)
     vertices[:-1] = mesh.vertices
     return PaddedMesh(vertices, np.ascontiguousarray(mesh.triangles, dtype=np.uint32))
 
 
 class EmbreeError(VoleryError):
-    """Embree refused a call; the message names the call and Embree's reason."""
+    """A call of Embree failed; the message names the call and Embree's reason."""
 
 
 EMBREEX_VERSION = "4.4.0.post1"
-"""Of the wheel: it names its libraries by their hashes, and holds the Embree that fits here."""
+"""Version of the wheel, which determines the version of Embree and its file names."""
 
 
 class EmbreeUnavailableError(EmbreeError):
-    """The library, or something in it that is needed, is not there; the message says the fix."""
+    """The library or a required part of it is missing; the message names the fix."""
 
     def __init__(self, reason: str) -> None:
         command = f"pip install --force-reinstall embreex=={EMBREEX_VERSION}"
@@ -84,22 +84,22 @@ CONTEXT_WORDS = 36
 # RTCPointQueryFunctionArguments in 64-bit words; the third is primitive | geometry << 32.
 QUERY_WORD, USER_WORD, PRIMITIVE_WORD, CONTEXT_WORD = 0, 1, 2, 3
 QUERY_RADIUS = 4
-"""Float of RTCPointQuery (x, y, z, time, radius)."""
+"""Index of the radius in RTCPointQuery (x, y, z, time, radius)."""
 
 LANES = 16 if llvm.get_host_cpu_features().get("avx512f", False) else 8
-"""Rays a packet: 16 with AVX-512, else 8."""
+"""Rays per packet: 16 with AVX-512, otherwise 8."""
 _INTERSECT, _OCCLUDED = f"rtcIntersect{LANES}", f"rtcOccluded{LANES}"
 
 _CONFIG = "threads=1,set_affinity=0" + (",frequency_level=simd512" if LANES == 16 else "")
-"""One thread; AVX-512 may be used in full where there is any (a few per cent faster)."""
+"""Device configuration: one thread; full use of AVX-512 where present (a few per cent faster)."""
 
 # RTCIntersectArguments, 32-bit words: flags, feature mask, then pointers that stay null.
 ARGUMENT_WORDS = 16
 FLAGS_WORD, FEATURES_WORD = 0, 1
 COHERENT = 1 << 16
-"""Query flag: the packet's rays run close together; Embree then moves them down the tree as one.
+"""Query flag for coherent rays, which Embree traverses together.
 
-For the beams of a scan this halves the time with 16 lanes; scattered rays are better off without.
+For the beams of a scan this halves the time with 16 lanes; scattered rays are slower with it.
 """
 
 _P, _SIZE, _INT, _UINT = ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int, ctypes.c_uint
@@ -128,7 +128,7 @@ _CALLED_FROM_KERNELS = (_INTERSECT, _OCCLUDED, "rtcPointQuery")
 intersect_packet: Any = types.ExternalFunction(
     _INTERSECT, types.void(types.intp, types.intp, types.intp, types.intp)
 )
-"""(valid, scene, packet, arguments): closest hits of the lanes whose `valid` is -1."""
+"""(valid, scene, packet, arguments): finds the closest hits of the lanes whose `valid` is -1."""
 occluded_packet: Any = types.ExternalFunction(
     _OCCLUDED, types.void(types.intp, types.intp, types.intp, types.intp)
 )
@@ -141,7 +141,10 @@ point_query: Any = types.ExternalFunction(
 
 
 def library_folder() -> Path:
-    """Folder of the shared libraries that come with the `embreex` wheel."""
+    """Returns the folder of the shared libraries in the `embreex` wheel.
+
+    Raises `EmbreeUnavailableError` if embreex is not installed.
+    """
     spec = importlib.util.find_spec("embreex")
     if spec is None or spec.origin is None:
         raise EmbreeUnavailableError("the package embreex is not installed")
@@ -150,7 +153,10 @@ def library_folder() -> Path:
 
 @cache
 def load() -> ctypes.CDLL:
-    """Load Embree, once, for ctypes and for compiled kernels."""
+    """Loads Embree, once, for ctypes and for compiled kernels.
+
+    Raises `EmbreeUnavailableError` if a library or symbol is missing.
+    """
     folder = library_folder()
     # The wheel's tools append a hash to each library's name; Embree needs TBB, so TBB comes first.
     paths = [*sorted(folder.glob("libtbb*.so*")), *sorted(folder.glob("libembree4*.so*"))]
@@ -174,10 +180,10 @@ def load() -> ctypes.CDLL:
 
 @cache
 def _device() -> int:
-    """The one device of this process, which is never released.
+    """Returns the device of this process, which is never released.
 
-    With its last device Embree ends its limit of one thread. After that TBB has a worker which
-    spins as long as the process lives: half a core in a flight, all of one at rest.
+    Embree ends its limit of one thread with the last device. Afterwards TBB has a worker that spins
+    as long as the process lives: half a core during a flight, a whole one at rest.
     """
     library = load()
     device = library.rtcNewDevice(_CONFIG.encode())
@@ -185,21 +191,22 @@ def _device() -> int:
         code = library.rtcGetDeviceError(None)
         reason = library.rtcGetDeviceLastErrorMessage(None) or b""
         raise EmbreeUnavailableError(
-            f"Embree makes no device (error {code}): {reason.decode() or 'no reason given'}"
+            f"Embree cannot create a device (error {code}): {reason.decode() or 'no reason given'}"
         )
     return int(device)
 
 
 def _release(library: ctypes.CDLL, scenes: list[int]) -> None:
-    """Give every scene back; run once, by `Device.close` or when the device is collected."""
+    """Releases every scene; called once, by `Device.close` or when the device is collected."""
     while scenes:
         library.rtcReleaseScene(scenes.pop())
 
 
 class Device:
-    """Makes scenes on Embree's device, owns them, checks every call, gives all back in `close`.
+    """Creates and owns scenes on Embree's device; checks every call.
 
-    Built with one thread, so that the same input gives the same tree, and the same hits, each time.
+    Uses one thread, so that the same input gives the same tree, and the same hits, each time.
+    Raises `EmbreeUnavailableError` if the library's version is not supported.
     """
 
     def __init__(self) -> None:
@@ -217,7 +224,7 @@ class Device:
             )
 
     def close(self) -> None:
-        """Release all scenes; no handle may be used afterwards."""
+        """Releases all scenes; no handle may be used afterwards."""
         self._finalizer()
         self._buffers.clear()
 
@@ -225,14 +232,14 @@ class Device:
         return int(self._library.rtcGetDeviceProperty(self._device, number))
 
     def check(self, call: str) -> None:
-        """Raise what Embree has to say about the calls so far."""
+        """Raises `EmbreeError` if Embree reports an error of the calls so far."""
         code = self._library.rtcGetDeviceError(self._device)
         if code:
             reason = self._library.rtcGetDeviceLastErrorMessage(self._device) or b""
             raise EmbreeError(f"{call} failed (Embree error {code}): {reason.decode()}")
 
     def new_scene(self, *, quality: int = QUALITY_HIGH, flags: int = 0) -> int:
-        """An empty scene."""
+        """Returns the handle of a new, empty scene; raises `EmbreeError` on failure."""
         scene = self._library.rtcNewScene(self._device)
         self.check("rtcNewScene")
         self._scenes.append(scene)
@@ -241,7 +248,7 @@ class Device:
         return int(scene)
 
     def attach_mesh(self, scenes: Sequence[int], number: int, mesh: PaddedMesh) -> None:
-        """Add a mesh to each of `scenes`, which share it and its arrays, as geometry `number`."""
+        """Adds a mesh to each of `scenes`, which share its arrays, as geometry `number`."""
         lib = self._library
         self._buffers.extend((mesh.vertices, mesh.triangles))
         geometry = lib.rtcNewGeometry(self._device, _GEOMETRY_TRIANGLE)
@@ -263,9 +270,10 @@ class Device:
         subscenes: Sequence[int],
         transforms: ArrayLike,
     ) -> None:
-        """Add instances of committed scenes to each of `scenes`, which share them.
+        """Adds instances of committed scenes to each of `scenes`, which share them.
 
-        numbers: (N,) geometry numbers; transforms: (N, 3, 4), scene from sub-scene.
+        numbers: (N,) geometry numbers; subscenes: N scene handles; transforms: (N, 3, 4), scene
+        from sub-scene.
         """
         lib = self._library
         matrices = np.ascontiguousarray(transforms, dtype=np.float32).reshape(-1, 3, 4)
@@ -285,21 +293,21 @@ class Device:
         self._library.rtcReleaseGeometry(geometry)  # the scene holds it now
 
     def detach_mesh(self, scenes: Sequence[int], number: int, mesh: PaddedMesh) -> None:
-        """Take geometry `number`, which shows `mesh`, out of each of `scenes`, and let it go."""
+        """Detaches geometry `number`, which holds `mesh`, from each of `scenes`; releases it."""
         for scene in scenes:
             self._library.rtcDetachGeometry(scene, number)
-        self.check(f"taking mesh {number} out of a scene")
+        self.check(f"removing mesh {number} from a scene")
         own = mesh.vertices, mesh.triangles
         self._buffers = [b for b in self._buffers if not any(b is array for array in own)]
 
     def commit(self, scene: int) -> None:
-        """Build the scene's search tree; it can be cast at from now on."""
+        """Builds the scene's search tree; required before casting."""
         self._library.rtcCommitScene(scene)
         self.check("rtcCommitScene")
 
 
 def aligned(shape: tuple[int, ...], kind: type = np.float32) -> NDArray[Any]:
-    """Zeros (32-bit numbers) that begin at a multiple of 64 bytes."""
+    """Returns zeros of `shape` (32-bit numbers), aligned to 64 bytes."""
     count = int(np.prod(shape))
     raw: NDArray[Any] = np.zeros(count + 16, dtype=kind)
     start = (-raw.ctypes.data // 4) % 16
@@ -307,7 +315,7 @@ def aligned(shape: tuple[int, ...], kind: type = np.float32) -> NDArray[Any]:
 
 
 def coherent_arguments() -> NDArray[np.int32]:
-    """Arguments for a packet of rays that run close together; 0 stands for the default ones."""
+    """Returns the arguments for coherent packets; pass 0 for the default ones."""
     arguments = aligned((ARGUMENT_WORDS,), np.int32)
     arguments[FLAGS_WORD] = COHERENT
     arguments[FEATURES_WORD] = -1
@@ -315,7 +323,7 @@ def coherent_arguments() -> NDArray[np.int32]:
 
 
 def _cast_one(scene: int, x: float, y: float) -> tuple[float, int, int]:
-    """Distance, geometry and instance number of a ray downward from (x, y, 1)."""
+    """Returns distance, geometry and instance number of a ray downward from (x, y, 1)."""
     packet = aligned((PACKET_ROWS, LANES))
     words = packet.view(np.uint32)
     valid = aligned((LANES,), np.int32)
@@ -330,9 +338,9 @@ def _cast_one(scene: int, x: float, y: float) -> tuple[float, int, int]:
 
 
 def self_test(device: Device) -> None:
-    """Cast at a known instance of a known triangle: a changed layout shows here, not in a flight.
+    """Casts at a known instance of a known triangle, which detects changed layouts.
 
-    Raises EmbreeUnavailableError when the answer is wrong.
+    Raises `EmbreeUnavailableError` if the result is wrong.
     """
     triangle = Mesh(
         np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32), np.array([[0, 1, 2]], np.uint32)

@@ -1,4 +1,4 @@
-"""Scenes in Embree, instanced: one tree model is stored once, however often it stands."""
+"""Instanced scenes in Embree: each tree model is stored once."""
 
 from __future__ import annotations
 
@@ -15,11 +15,14 @@ from volery.world.scene_kernels import CHUNK, cast_rays, find_enclosing, find_oc
 from volery.world.scene_memory import BodyTable, SceneHandle, thread_block
 
 FEW_RAYS = 5000
-"""A batch up to this size is cast by the calling thread alone: waking another costs more."""
+"""Maximum size of a batch that the calling thread casts alone: waking others costs more."""
 
 
 class EmbreeBackend:
-    """Ray casting and point queries through Embree's C interface."""
+    """Ray casting and point queries through Embree's C interface.
+
+    Raises `EmbreeError` if the scene cannot be built. Points and rays are in the map frame, m.
+    """
 
     def __init__(self, content: SceneContent) -> None:
         self._content = content
@@ -34,8 +37,8 @@ class EmbreeBackend:
 
     def _build(self) -> None:
         content, device = self._content, self._device
-        # Robust: no ray slips between two triangles of the ground, not even straight down at a grid
-        # point. Trees do without, for speed: an edge of theirs meets a ray only by chance.
+        # Robust: no ray passes between two triangles of the ground, not even straight down at a
+        # grid point. Trees do without, for speed: a ray hits an edge of theirs only by chance.
         self._static = device.new_scene(flags=embree.SCENE_ROBUST)
         self._obstacles = device.new_scene(flags=embree.SCENE_ROBUST)  # without the ground
         feet = [self._tree_piece(first, 0) for first in content.tree_parts]
@@ -54,9 +57,9 @@ class EmbreeBackend:
         self._attach_solids(1 + content.trees)
 
     def replace_solids(self, content: SceneContent, first: int) -> None:
-        """Go on with `content`, whose instances differ from `first` on, all of them solids.
+        """Replaces the content, whose instances differ from `first` on, all of them solids.
 
-        The ground, the trees and the solids before `first` stay as they are.
+        The ground, the trees and the solids before `first` are unchanged.
         """
         both = [self._static, self._obstacles]
         for number in range(first, self._content.instances):
@@ -76,7 +79,7 @@ class EmbreeBackend:
             self._device.commit(scene)
 
     def _tree_piece(self, first: int, part: int) -> int:
-        """Scene of the foot or crown whose parts begin at `part` of a model; 0: it has none."""
+        """Returns the scene of the foot or crown whose parts begin at `part`; 0 if empty."""
         parts = range(part, part + MATERIALS)
         meshes = {k: self._content.parts[first + k] for k in parts}
         if not any(len(mesh.triangles) for mesh in meshes.values()):
@@ -89,7 +92,7 @@ class EmbreeBackend:
         return scene
 
     def handle(self, bodies: BodyTable) -> SceneHandle:
-        """What kernels need, with these bodies."""
+        """Returns the scene for kernels, with these bodies."""
         content = self._content
         return SceneHandle(
             static=self._static,
@@ -105,7 +108,7 @@ class EmbreeBackend:
         )
 
     def shape_scenes(self, shapes: Sequence[BodyShape]) -> NDArray[np.int64]:
-        """Embree scenes of body shapes, built once a shape."""
+        """Returns new Embree scenes (K,) of K body shapes."""
         device = self._device
         scenes = []
         for shape in shapes:
@@ -128,7 +131,7 @@ class EmbreeBackend:
         fraction: float,
         out: tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32], NDArray[np.uint8]],
     ) -> None:
-        """Fill distance, normal, instance, material."""
+        """Fills distance (R,), normal (R, 3), instance (R,), material (R,) of `Scene.cast`."""
         counter, bodies = new_counter(), len(handle.bodies.scene)
 
         def work() -> None:
@@ -147,7 +150,7 @@ class EmbreeBackend:
         fraction: float,
         out: NDArray[np.bool_],
     ) -> None:
-        """Fill `out`."""
+        """Fills `out` (R,) of `Scene.occluded`."""
         counter, bodies = new_counter(), len(handle.bodies.scene)
 
         def work() -> None:
@@ -163,18 +166,18 @@ class EmbreeBackend:
         include_terrain: bool,
         out: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]],
     ) -> None:
-        """Fill distance, nearest, instance."""
+        """Fills distance (P,), nearest (P, 3), instance (P,) of `Scene.clearance`."""
         scene = self._static if include_terrain else self._obstacles
         table, memory = self._content.table, new_query_memory()
         trees = self._content.trees
         nearest_points(scene, callback_address(), table, trees, points, reach, memory, *out)
 
     def enclosing(self, points: NDArray[np.float64], out: NDArray[np.int32]) -> None:
-        """Fill `out` with the closed solid that each point lies in, -1 for none."""
+        """Fills `out` (P,) with the closed solid around each point (P, 3), -1 for none."""
         find_enclosing(
             self._obstacles, self._content.trees, points, thread_block(embree.LANES, 0), out
         )
 
     def close(self) -> None:
-        """Give all handles back."""
+        """Releases all handles."""
         self._device.close()

@@ -1,10 +1,9 @@
 """Forests: many trees that share few models.
 
-A tree is a model with a place, a turn about the vertical and a scale. The scale makes its trunk
-diameter at breast height and its height exactly those of the inventory (or those drawn for it); the
-model comes from the nearest size class of the species, so that scales stay close to one.
-
-Everything random is drawn from named streams of one seed: the same arguments give the same forest.
+A tree is a model with a position, a rotation about the vertical and a scale. The scale gives its
+trunk diameter at breast height and its height exactly the values of the inventory (or drawn ones);
+the model comes from the nearest size class of the species, so that scales are close to one. All
+random numbers come from named streams of one seed: the same arguments give the same forest.
 """
 
 from __future__ import annotations
@@ -30,16 +29,16 @@ Region = tuple[float, float, float, float]
 
 _LOWEST_TREE_M = 0.3
 _DARTS_PER_TREE = 30
-"""Random places tried for each tree before its forest counts as full."""
+"""Random positions tried for each tree before its forest counts as full."""
 
 
 @dataclass(frozen=True, eq=False)
 class Forest:
     """N trees, in the map frame.
 
-    models: shapes that trees share. model_index: (N,) int32, rows of `models`.
-    position_map: (N, 3) feet of the trunks on the ground, m. yaw: (N,) rad.
-    scale: (N, 3) along the model's axes. dbh_m, height_m: (N,). species: N names.
+    models: shapes that trees share. model_index: (N,) int32, rows of `models`. position_map: (N, 3)
+    feet of the trunks on the ground, m. yaw: (N,) rad. scale: (N, 3) along the model's axes. dbh_m,
+    height_m: (N,). species: N names.
     """
 
     models: tuple[TreeModel, ...]
@@ -56,7 +55,7 @@ class Forest:
         return len(self.model_index)
 
     def tree_transforms(self) -> NDArray[np.float32]:
-        """Transforms (N, 3, 4) to the map from each tree's model: point_map = T @ (point, 1)."""
+        """Returns transforms (N, 3, 4), map from tree model: point_map = T @ (point, 1)."""
         cos, sin = np.cos(self.yaw), np.sin(self.yaw)
         sx, sy, sz = self.scale.T
         zero = np.zeros_like(cos)
@@ -89,18 +88,18 @@ def forest_from_inventory(
     diameters: str | None = None,
     species_map: Mapping[str, str] | None = None,
 ) -> Forest:
-    """Forest of surveyed trees; what was not measured is drawn from the species' laws.
+    """Returns a forest of surveyed trees; missing sizes are drawn from the species' laws.
 
-    inventory: a CSV file or what `read_inventory` made of one.
-    species: species of trees for which the inventory names none, or one that does not ship; one
+    inventory: a CSV file or the result of `read_inventory`.
+    species: species of trees without one in the inventory, or with one that is not shipped; one
     warning counts the latter. species_map: shipped species by the inventory's names.
-    region: (x0, y0, x1, y1) in m; trees with x0 <= x < x1 and y0 <= y < y1 stay. None keeps all.
+    region: (x0, y0, x1, y1) in m; only trees with x0 <= x < x1 and y0 <= y < y1 are used. None uses
+    all.
     fraction: of the trees, 0 to 1, chosen at random.
-    diameters: name of the species' spread from which missing diameters come (None: its "stand").
-
-    Sizes are drawn for the whole inventory before the region is cut out, so a tree is the same in
-    every region and with every fraction. Raises DataFileError for a bad file, ScenarioError for an
-    unknown `species` or one in `species_map`.
+    diameters: name of the species' distribution of missing diameters (None: its "stand").
+    Sizes are drawn for the whole inventory before the region is selected, so a tree is the same in
+    every region and with every fraction. Raises `DataFileError` for an invalid file,
+    `ScenarioError` for an unknown `species` or one in `species_map`.
     """
     trees = inventory if isinstance(inventory, Inventory) else read_inventory(inventory)
     load_species(species)
@@ -147,13 +146,12 @@ def procedural_forest(
     seed: int = 0,
     diameters: str | None = None,
 ) -> Forest:
-    """Forest of trees thrown at random into `region` (x0, y0, x1, y1), m.
+    """Returns a forest of trees at random positions in `region` (x0, y0, x1, y1), m.
 
-    species: names with their shares (normalised), or names alone for equal shares.
-    trees or density_per_ha: how many; give one of them.
-    minimum_spacing_m: no two trunks' axes are closer than this.
-
-    Raises ScenarioError where that many trees do not fit, or for an unknown species.
+    species: names with their fractions (normalised), or names alone for equal fractions.
+    trees or density_per_ha: number or density of trees; give one of them.
+    minimum_spacing_m: minimum distance between two trunks' axes.
+    Raises `ScenarioError` if the trees do not fit, or for an unknown species.
     """
     _check(region)
     shares = _shares(species)
@@ -179,10 +177,10 @@ def procedural_forest(
 
 
 def _quarter_turns(count: int, seed: int) -> Array:
-    """Yaws in steps of 90 degrees: bounding boxes stay as tight as the models' own.
+    """Returns yaws in steps of 90 degrees, which leaves bounding boxes as tight as the models'.
 
-    Turning trees freely widens their boxes by a quarter on average and costs a tenth of the rays a
-    second; with several variants a size class nobody sees the difference.
+    Arbitrary yaws enlarge boxes by a quarter on average and cost a tenth of the rays per second;
+    with several variants per size class there is no visible difference.
     """
     return np.asarray(0.5 * np.pi * generator(seed, "forest/yaw").integers(0, 4, count), np.float64)
 
@@ -214,7 +212,7 @@ def _draw_missing(
     seed: int,
     diameters: str | None,
 ) -> None:
-    """Fill in NaN diameters and heights of the trees in `rows`, in place."""
+    """Replaces NaN diameters and heights of the trees in `rows`, in place."""
     drawn = species.spread(diameters).draw(
         generator(seed, f"forest/{species.name}/diameter"), len(rows)
     )
@@ -225,7 +223,7 @@ def _draw_missing(
 
 
 def _throw(region: Region, count: int, spacing: float, rng: np.random.Generator) -> Array:
-    """Darts thrown one after the other; one too close to an earlier tree is thrown again."""
+    """Draws positions one after the other; one too close to an earlier tree is drawn again."""
     low = np.array(region[:2])
     extent = np.array(region[2:]) - low
     if spacing == 0.0:
@@ -265,7 +263,7 @@ def _assemble(
     terrain: Terrain,
     seed: int,
 ) -> Forest:
-    """Give each tree the variant of its nearest size class that the draw `variant` names."""
+    """Assigns each tree the variant of its nearest size class given by the draw `variant`."""
     if not len(position):
         return EMPTY_FOREST
     models: list[TreeModel] = []
@@ -294,7 +292,7 @@ def _assemble(
 def _scales(
     models: Sequence[TreeModel], index: NDArray[np.int32], dbh: Array, height: Array
 ) -> Array:
-    """Scales (N, 3) that give each tree its own diameter at breast height and height."""
+    """Returns scales (N, 3) that give each tree its own diameter at breast height and height."""
     scale = np.empty((len(index), 3))
     scale[:, 2] = height / np.array([m.height_m for m in models])[index]
     breast = np.minimum(BREAST_HEIGHT_M, 0.5 * height) / scale[:, 2]

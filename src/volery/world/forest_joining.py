@@ -1,4 +1,4 @@
-"""Two forests as one."""
+"""Joins two forests."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from volery.world.forest import Forest
 
 
 def joined(first: Forest | None, second: Forest | None) -> Forest | None:
-    """All trees of both, those of the first before the others; None where there is no tree."""
+    """Returns all trees of both, those of the first before the others; None without trees."""
     forests = [forest for forest in (first, second) if forest]
     if not forests:
         return first or second

@@ -1,10 +1,10 @@
-"""Worlds as binary glTF 2.0: what browsers, Blender and game engines read.
+"""Exports worlds as binary glTF 2.0, for browsers, Blender and game engines.
 
 `glb_of` has one node for the ground, for each tree and for each solid, named as in
 `Scene.instance_name`. Nodes of trees share the meshes of their models, so a forest is little more
-than a list of places. `instanced_glb_of` is for those who draw it many times a second: a node for
-each tree model with all its places (EXT_mesh_gpu_instancing), one for all solids. Axes are glTF's
-(y up), see `core.frames`.
+than a list of positions. `instanced_glb_of` is for real-time rendering: a node for each tree model
+with all its positions (EXT_mesh_gpu_instancing), one for all solids. Axes are glTF's (y up), see
+`core.frames`.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     from volery.world.forest import Forest
 
 _DIGITS = 5
-"""Of places, m: a hundredth of a millimetre."""
+"""Digits of positions in m: a hundredth of a millimetre."""
 _GRAIN_M = 1.0 / 256.0
-"""Of the trees' vertices where they are only looked at: half a file's bytes are their last bits."""
+"""Resolution of the trees' vertices for rendering: their last bits are half a file's bytes."""
 
 
 def glb_of(
@@ -42,7 +42,7 @@ def glb_of(
     cover: GroundCover = BARE_GROUND,
     detail: DetailLevel = DetailLevel.SENSING,
 ) -> bytes:
-    """A world as the bytes of a .glb file; colours: linear (r, g, b) of each material."""
+    """Returns a world as the bytes of a .glb file; colours: linear (r, g, b) of each material."""
     file = GltfFile(colours)
     _add_ground(file, terrain, cover)
     if forest is not None:
@@ -67,11 +67,11 @@ def instanced_glb_of(
     detail: DetailLevel = DetailLevel.SENSING,
     extras: Mapping[str, Any] | None = None,
 ) -> bytes:
-    """The same surfaces in few nodes; ground and wood are shaded round, all else level.
+    """Returns the same surfaces in few nodes; ground and wood are shaded smooth, others flat.
 
-    Solids are one node, a primitive for each material: COLOR_0 says what each of them looks like,
-    `_STOREYS` of facades (z where storeys begin, their height, m, and how many there are).
-    `extras` are those of the asset.
+    Solids are one node, a primitive for each material: COLOR_0 holds the colour of each, `_STOREYS`
+    of facades z where storeys begin, their height, m, and their number. `extras` are those of the
+    asset.
     """
     file = GltfFile(colours, extras)
     _add_ground(file, terrain, cover, smooth=True)
@@ -86,7 +86,7 @@ def instanced_glb_of(
 
 
 class _Placed(NamedTuple):
-    """How trees stand, in glTF's axes."""
+    """Poses and scales of trees, in glTF's axes."""
 
     places: NDArray[np.float64]
     turns: NDArray[np.float64]
@@ -108,7 +108,7 @@ def _add_ground(
 def _tree_surfaces(
     forest: Forest, detail: DetailLevel, *, smooth: bool = False
 ) -> list[list[Surface]]:
-    """Wood and leaves of each model; smooth: for eyes alone."""
+    """Returns wood and leaves of each model; smooth: for rendering alone."""
     trees = [model.levels[detail] for model in forest.models]
     fit = _grained if smooth else _as_it_is
     return [
@@ -140,7 +140,7 @@ def _placed(forest: Forest) -> _Placed:
 
 
 def _parts_of(solid: Solid) -> list[Surface]:
-    """A solid, its tops apart where they are of another material."""
+    """Returns a solid's surfaces, with its tops separate if of another material."""
     if solid.top is None or solid.top == solid.material:
         return [Surface(solid.mesh, solid.material, solid.look)]
     normals = solid.mesh.face_normals
@@ -152,13 +152,13 @@ def _parts_of(solid: Solid) -> list[Surface]:
 
 
 def _piece(mesh: Mesh, chosen: NDArray[np.bool_]) -> Mesh:
-    """Some triangles of a mesh, with no vertex that is not theirs."""
+    """Returns some triangles of a mesh, without unused vertices."""
     used, triangles = np.unique(mesh.triangles[chosen], return_inverse=True)
     return Mesh(mesh.vertices[used], triangles.reshape(-1, 3).astype(np.uint32))
 
 
 def _joined(parts: Sequence[Surface]) -> list[Surface]:
-    """All parts of a material as one, their looks told at their vertices."""
+    """Returns all parts of a material as one surface, with their looks at the vertices."""
     joined = []
     for material in sorted({part.material for part in parts}):
         same = [part for part in parts if part.material == material]

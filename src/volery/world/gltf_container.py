@@ -1,9 +1,7 @@
-"""The bytes of glTF 2.0 files: JSON, buffers, and the arrays that lie in them.
+"""Bytes of glTF 2.0 files: JSON, buffers, and the arrays in them.
 
-No size that a file tells is believed: memory is taken for what is there. What is wrong is a
-`ValueError` without the file's name.
-
-Khronos Group, glTF 2.0 Specification, sections 3.6 (binary data storage) and 4 (GLB).
+Sizes stated by a file are checked before memory is allocated. Errors are `ValueError` without the
+file's name. Khronos Group, glTF 2.0 Specification, sections 3.6 (binary data storage) and 4 (GLB).
 """
 
 from __future__ import annotations
@@ -25,11 +23,14 @@ _HEAD, _CHUNK = struct.Struct("<4sII"), struct.Struct("<II")
 _JSON, _BINARY = 0x4E4F534A, 0x004E4942
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC3": 3}
-"""Components of an element; meshes without their paint need no others."""
+"""Components of an element; meshes without textures need no others."""
 
 
 def field(holder: dict[str, Any], key: str, kind: type, default: Any = None) -> Any:
-    """A value of an object of the JSON, of the type `kind`; without a default it must be there."""
+    """Returns a value of type `kind` of a JSON object; required without a default.
+
+    Raises `ValueError` if the value is missing or of another type.
+    """
     value = holder.get(key, default)
     if not isinstance(value, kind) or isinstance(value, bool):
         raise ValueError(f"'{key}' is {str(value)[:40]!r}, not {_NAMES[kind]}")
@@ -37,7 +38,7 @@ def field(holder: dict[str, Any], key: str, kind: type, default: Any = None) -> 
 
 
 def entry(holder: dict[str, Any], key: str, number: Any) -> dict[str, Any]:
-    """Object `number` of the list `key`."""
+    """Returns object `number` of the list `key`; raises `ValueError` if it does not exist."""
     entries = field(holder, key, list, [])
     if not isinstance(number, int) or not 0 <= number < len(entries):
         raise ValueError(
@@ -46,7 +47,7 @@ def entry(holder: dict[str, Any], key: str, number: Any) -> dict[str, Any]:
         )
     found = entries[number]
     if not isinstance(found, dict):
-        raise ValueError(f"'{key}' {number} is no object")
+        raise ValueError(f"'{key}' {number} is not an object")
     return found
 
 
@@ -65,21 +66,21 @@ class Container:
             data = self._unpack(data)
         document = json.loads(data.decode("utf-8-sig"))
         if not isinstance(document, dict):
-            raise ValueError("its JSON is no object")
+            raise ValueError("its JSON is not an object")
         version = field(field(document, "asset", dict), "version", str)
         if version.split(".")[0] != "2":
             raise ValueError(f"glTF 2 is read, this is version '{version[:20]}'")
         self.document = document
 
     def count(self, number: Any) -> int:
-        """How many elements accessor `number` says it has."""
+        """Returns the number of elements that accessor `number` states."""
         count: int = field(entry(self.document, "accessors", number), "count", int)
         if count < 0:
             raise ValueError(f"accessor {number} has {count} elements")
         return count
 
     def array(self, number: Any, form: str) -> NDArray[Any]:
-        """(count, width) elements of accessor `number`, which must be of the type `form`."""
+        """Returns the elements (count, width) of accessor `number`, which has the type `form`."""
         accessor = entry(self.document, "accessors", number)
         count, kind = self.count(number), _component(accessor)
         if accessor.get("type") != form:
@@ -101,7 +102,7 @@ class Container:
     # ------------------------------------------------------------------------------------ buffers
 
     def _unpack(self, data: bytes) -> bytes:
-        """The JSON of a GLB; its binary chunk becomes buffer 0."""
+        """Returns the JSON of a GLB; its binary chunk becomes buffer 0."""
         if len(data) < _HEAD.size:
             raise ValueError("it ends within its head")
         magic, version, _ = _HEAD.unpack_from(data)
@@ -113,7 +114,7 @@ class Container:
             length, name = _CHUNK.unpack_from(data, at)
             at += _CHUNK.size
             if at + length > len(data):
-                raise ValueError(f"a chunk of {length} bytes has {len(data) - at}")
+                raise ValueError(f"a chunk of {length} bytes has only {len(data) - at}")
             chunks.append((name, data[at : at + length]))
             at += length
         if not chunks or chunks[0][0] != _JSON:
@@ -130,7 +131,7 @@ class Container:
         return self._buffers[number]
 
     def _fetched(self, uri: str) -> bytes:
-        """Bytes of a data URI, or of a file in the folder of the glTF file or below."""
+        """Returns the bytes of a data URI, or of a file in the glTF file's folder or below."""
         if uri.startswith("data:"):
             head, comma, code = uri.partition(",")
             if not comma or not head.endswith(";base64"):
@@ -138,7 +139,7 @@ class Container:
             try:
                 return base64.b64decode(code, validate=True)
             except binascii.Error as error:
-                raise ValueError(f"a buffer is no base64: {error}") from None
+                raise ValueError(f"a buffer is not base64: {error}") from None
         path = (self._folder / unquote(uri)).resolve()
         if not path.is_relative_to(self._folder.resolve()):
             raise ValueError(f"buffer '{uri[:80]}' lies outside of the file's folder")
@@ -155,7 +156,7 @@ class Container:
     def _elements(
         self, holder: dict[str, Any], count: int, kind: np.dtype[Any], width: int
     ) -> NDArray[Any]:
-        """(count, width) elements of the buffer view that an accessor or its like names."""
+        """Returns elements (count, width) of the buffer view that `holder` names."""
         number = holder.get("bufferView")
         view = entry(self.document, "bufferViews", number)
         packed = kind.itemsize * width
@@ -163,7 +164,7 @@ class Container:
         begin, length = field(view, "byteOffset", int, 0), field(view, "byteLength", int)
         offset = field(holder, "byteOffset", int, 0)
         if stride < packed or min(begin, length, offset) < 0:
-            raise ValueError(f"the stride or an offset of buffer view {number} cannot be")
+            raise ValueError(f"the stride or an offset of buffer view {number} is invalid")
         data = memoryview(self._buffer(view.get("buffer")))[begin : begin + length]
         if count and offset + (count - 1) * stride + packed > len(data):
             raise ValueError(f"buffer view {number} has {len(data)} bytes: too few for {count}")
@@ -172,14 +173,14 @@ class Container:
         return np.ndarray((count, width), kind, data, offset, (stride, kind.itemsize))
 
     def _replaced(self, found: NDArray[Any], sparse: dict[str, Any]) -> NDArray[Any]:
-        """The array with some of its elements replaced."""
+        """Returns the array with some of its elements replaced."""
         count = field(sparse, "count", int)
         places, values = field(sparse, "indices", dict), field(sparse, "values", dict)
         if not 0 <= count <= len(found):
             raise ValueError(f"{count} of {len(found)} elements are replaced")
         at = self._elements(places, count, _component(places), 1)[:, 0]
         if count and not (at.dtype.kind == "u" and at.max() < len(found)):
-            raise ValueError("an element is replaced that is not there")
+            raise ValueError("a replaced element does not exist")
         changed = found.copy()
         changed[at] = self._elements(values, count, found.dtype, found.shape[1])
         return changed

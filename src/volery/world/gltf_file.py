@@ -1,7 +1,6 @@
-"""A binary glTF 2.0 file that grows: nodes, meshes, materials, and their stretches of numbers.
+"""Writer of binary glTF 2.0 files: nodes, meshes, materials, and their arrays.
 
-Khronos Group, glTF 2.0 Specification, sections 3 (properties) and 4 (GLB);
-EXT_mesh_gpu_instancing.
+Khronos Group, glTF 2.0 Specification, sections 3 (properties) and 4 (GLB); EXT_mesh_gpu_instancing.
 """
 
 from __future__ import annotations
@@ -27,30 +26,30 @@ Colours = Mapping[Material, tuple[float, float, float]]
 _FLOAT, _UINT8, _UINT16, _UINT32 = 5126, 5121, 5123, 5125
 _VERTICES, _INDICES, _CLAMP = 34962, 34963, 33071
 _NORMAL_STEPS = 128.0
-"""Of a normal's components from 0 to 1: half a degree, finer than the triangles that it smooths."""
+"""Steps of a normal's components from 0 to 1: half a degree, finer than the smoothed triangles."""
 _FEW_VERTICES = 65535
-"""Up to which numbers of two bytes name them; the last one restarts primitives in some systems."""
+"""Maximum number of vertices for two-byte indices; 65535 restarts primitives in some systems."""
 _SMOOTH = {Material.METAL: 0.5, Material.PAINTED: 0.6}
-"""Roughness below 0.9."""
+"""Roughness of materials other than 0.9."""
 _INSTANCING = "EXT_mesh_gpu_instancing"
 
 
 class Surface(NamedTuple):
-    """A mesh in the map, or in the frame of who shows it, and what it is made of."""
+    """A mesh in the map or its node's frame, with its material."""
 
     mesh: Mesh
     material: Material
     look: Look = PLAIN
     smooth: bool = False
-    """Whether it is shaded as if it were round; if not, every triangle is level."""
+    """Whether shading is smooth; otherwise every triangle is flat."""
     colours: NDArray[np.float64] | None = None
-    """(V, 3) factors of the material's colour, 0 to 1; None: of the look alone."""
+    """(V, 3) factors of the material's colour, 0 to 1; None: the look's."""
     storeys: NDArray[np.float32] | None = None
-    """(V, 3) where storeys begin and how high they are, m, and how many there are."""
+    """(V, 3) begin and height of storeys, m, and their number."""
 
 
 class _Stretch(Enum):
-    """Which numbers lie together: bytes an element, and what they are for."""
+    """Arrays that are stored together: bytes per element, and their target."""
 
     POINTS = (12, _VERTICES)
     NUMBERS = (4, _INDICES)
@@ -63,7 +62,10 @@ class _Stretch(Enum):
 
 
 class GltfFile:
-    """The file; `content` gives its bytes. colours: linear (r, g, b) of each material."""
+    """A file under construction; `content` returns its bytes.
+
+    colours: linear (r, g, b) of each material.
+    """
 
     def __init__(self, colours: Colours, extras: Mapping[str, Any] | None = None) -> None:
         self._colours = colours
@@ -79,7 +81,7 @@ class GltfFile:
     # -------------------------------------------------------------------------------------- nodes
 
     def add_node(self, name: str, mesh: int | None, **properties: Any) -> None:
-        """Show mesh number `mesh`; nodes without a mesh are left out."""
+        """Adds a node for mesh number `mesh`; nodes without a mesh are left out."""
         if mesh is not None:
             self._nodes.append({"name": name, "mesh": mesh, **properties})
 
@@ -91,7 +93,7 @@ class GltfFile:
         turns: NDArray[np.floating],
         scales: NDArray[np.floating],
     ) -> None:
-        """Show a mesh at (N, 3) places with (N, 4) turns and (N, 3) scales, in glTF's axes."""
+        """Adds instances of a mesh: positions (N, 3), turns (N, 4), scales (N, 3), glTF's axes."""
         if mesh is None or not len(places):
             return
         attributes = {
@@ -105,7 +107,7 @@ class GltfFile:
     # ------------------------------------------------------------------------------------- meshes
 
     def add_mesh(self, surfaces: Sequence[Surface]) -> int | None:
-        """Number of a new mesh; None where it has no triangle."""
+        """Adds a mesh and returns its number; None if it has no triangle."""
         primitives = [self._primitive(surface) for surface in surfaces if len(surface.mesh)]
         if not primitives:
             return None
@@ -135,7 +137,7 @@ class GltfFile:
         }
 
     def lay_over(self, number: int | None, mesh: Mesh, cover: GroundCover) -> None:
-        """Show a picture of the ground's cover on mesh `number`, made of `mesh`."""
+        """Textures mesh number `number`, made of `mesh`, with the ground's cover."""
         if number is None:
             return
         self._stretches[_Stretch.PICTURE] = [cover_png(cover, self._colours)]
@@ -171,7 +173,7 @@ class GltfFile:
         return self._add_rows(_Stretch.NUMBERS, numbers, _UINT32, "SCALAR")
 
     def _add_rows(self, stretch: _Stretch, rows: NDArray[Any], component: int, kind: str) -> int:
-        """Number of a new accessor to rows that are put at the end of a stretch."""
+        """Appends rows to a stretch and returns the number of their new accessor."""
         form = {_FLOAT: "<f4", _UINT8: "u1", _UINT16: "<u2", _UINT32: "<u4"}[component]
         pieces = self._stretches.setdefault(stretch, [])
         accessor = {
@@ -208,7 +210,7 @@ class GltfFile:
     # ---------------------------------------------------------------------------------- the bytes
 
     def content(self) -> bytes:
-        """The file's bytes: header, JSON chunk, binary chunk."""
+        """Returns the file's bytes: header, JSON chunk, binary chunk."""
         document: dict[str, Any] = {
             "asset": {"version": "2.0", "generator": "Volery"},
             "scene": 0,
@@ -244,7 +246,7 @@ class GltfFile:
         return b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks
 
     def _views(self) -> tuple[list[dict[str, Any]], bytes]:
-        """A view for each stretch, each at a multiple of four bytes, and all their bytes."""
+        """Returns a view for each stretch, aligned to four bytes, and all their bytes."""
         views, pieces, begin = [], [], 0
         for stretch, parts in self._stretches.items():
             size, target = stretch.value

@@ -1,9 +1,8 @@
-"""Triangles of a glTF 2.0 scene: what its nodes show, with the base colours of its materials.
+"""Reads the triangles of a glTF 2.0 scene, with the base colours of its materials.
 
-Triangles, strips and fans are read; points, lines, textures, skins and animations are left out.
-Sizes and links are checked before memory is taken.
-
-Khronos Group, glTF 2.0 Specification, sections 3.5 (scenes), 3.7 (meshes) and 3.12 (extensions).
+Triangles, strips and fans are read; points, lines, textures, skins and animations are ignored.
+Sizes and links are checked before memory is allocated. Khronos Group, glTF 2.0 Specification,
+sections 3.5 (scenes), 3.7 (meshes) and 3.12 (extensions).
 """
 
 from __future__ import annotations
@@ -21,17 +20,17 @@ from volery.world.gltf_container import Container, entry, field
 Array = NDArray[np.float64]
 
 MOST_PARTS = 100_000
-"""Meshes that nodes show, each counted as often as it is shown."""
+"""Maximum number of meshes in nodes, each counted as often as used."""
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_", "KHR_mesh_quant")
-"""Beginnings of required extensions without which the triangles are right all the same."""
+"""Prefixes of required extensions that do not affect the triangles."""
 
 
 class Part(NamedTuple):
-    """One stretch of a file's surface.
+    """One part of a file's surface.
 
     points: (V, 3) in the file's axes and units. triangles: (T, 3) rows of `points`, not checked.
-    colour: (3,) linear red, green, blue, if the file tells one.
+    colour: (3,) linear red, green, blue, or None.
     """
 
     points: Array
@@ -40,14 +39,14 @@ class Part(NamedTuple):
 
 
 class _Shown(NamedTuple):
-    """A primitive of a mesh where a node shows it; transform: (4, 4) scene from mesh."""
+    """A primitive of a mesh in a node; transform: (4, 4) scene from mesh."""
 
     primitive: dict[str, Any]
     transform: Array
 
 
 def read_gltf(path: Path, most_bytes: int, most_triangles: int) -> list[Part]:
-    """Everything that the file's scene shows. Raises `ValueError` without the file's name."""
+    """Returns all parts of the file's scene; raises `ValueError` without the file's name."""
     file = Container(path, most_bytes)
     required = field(file.document, "extensionsRequired", list, [])
     for name in required:
@@ -72,7 +71,7 @@ def read_gltf(path: Path, most_bytes: int, most_triangles: int) -> list[Part]:
 
 
 def _shown(document: dict[str, Any]) -> Iterator[_Shown]:
-    """Primitives made of triangles in the order of the tree of nodes."""
+    """Yields primitives made of triangles in the order of the tree of nodes."""
     seen: set[int] = set()
     todo = [(number, np.eye(4)) for number in reversed(_roots(document))]
     while todo:
@@ -93,7 +92,7 @@ def _shown(document: dict[str, Any]) -> Iterator[_Shown]:
 
 
 def _roots(document: dict[str, Any]) -> Sequence[Any]:
-    """Nodes at the top of the scene: the one that is named, else the first, else all nodes."""
+    """Returns the root nodes of the scene: of the named one, else the first, else all roots."""
     if field(document, "scenes", list, []):
         scene = entry(document, "scenes", document.get("scene", 0))
         return list(field(scene, "nodes", list, []))
@@ -108,7 +107,7 @@ def _roots(document: dict[str, Any]) -> Sequence[Any]:
 
 
 def _transform(node: dict[str, Any]) -> Array:
-    """(4, 4) parent from node."""
+    """Returns the transform (4, 4), parent from node."""
     if "matrix" in node:
         return _numbers(node, "matrix", 16, ()).reshape(4, 4).T
     turn = _numbers(node, "rotation", 4, (0.0, 0.0, 0.0, 1.0))
@@ -172,7 +171,7 @@ def _part(file: Container, shown: _Shown) -> Part:
 
 
 def _triangles(corners: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
-    """(T, 3) corners of the triangles of a list, a strip or a fan."""
+    """Returns the corners (T, 3) of the triangles of a list, a strip or a fan."""
     if mode == _TRIANGLES:
         return corners[: len(corners) // 3 * 3].reshape(-1, 3)
     if len(corners) < 3:
@@ -180,7 +179,7 @@ def _triangles(corners: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
     if mode == _FAN:
         first = np.full(len(corners) - 2, corners[0])
         return np.stack([corners[1:-1], corners[2:], first], axis=1)
-    odd = np.arange(len(corners) - 2) % 2 == 1  # every other triangle of a strip is turned around
+    odd = np.arange(len(corners) - 2) % 2 == 1  # every other triangle of a strip is reversed
     second, third = corners[1:-1], corners[2:]
     return np.stack(
         [corners[:-2], np.where(odd, third, second), np.where(odd, second, third)], axis=1

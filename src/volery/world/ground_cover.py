@@ -1,4 +1,4 @@
-"""What the ground is made of, where it is not bare earth: a raster over the map."""
+"""Materials of the ground other than bare earth: a raster over the map."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ BARE_GROUND = GroundCover(np.zeros((0, 0), np.uint8), 0.0, 0.0, 1.0)
 
 @inline_kernel
 def ground_material(cover: GroundCover, x: float, y: float) -> int:
-    """`Material` of the ground at map position (x, y)."""
+    """Returns the `Material` of the ground at map position (x, y)."""
     material, origin_x, origin_y, spacing = cover
     rows, columns = material.shape
     u, v = (x - origin_x) / spacing, (y - origin_y) / spacing

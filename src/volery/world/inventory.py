@@ -1,8 +1,8 @@
-"""Reading tree inventories: CSV files with a heading row and one tree a row.
+"""Reads tree inventories: CSV files with a header row and one tree per row.
 
 Columns `x_m` and `y_m` are required; `dbh_cm`, `height_m` and `species` may follow in any order,
-and an empty field means "not measured". Species may have any name (see `species_map`). All bad rows
-are reported together, with their row numbers in the file (the heading is row 1).
+and an empty field means "not measured". Species may have any name (see `species_map`). All invalid
+rows are reported together, with their row numbers in the file (the header is row 1).
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ _REQUIRED = ("x_m", "y_m")
 _OPTIONAL = ("dbh_cm", "height_m", "species")
 _SHOWN_FAULTS = 20
 _THICKEST_CM, _TALLEST_M = 1500.0, 130.0
-"""Beyond any living tree: a larger number is a slip of units."""
+"""Limits beyond any living tree: larger numbers are errors of units."""
 
 
 @dataclass(frozen=True, eq=False)
 class Inventory:
-    """Trees as surveyed: N rows, lengths in m, NaN and "" where not measured.
+    """Surveyed trees: N rows, lengths in m, NaN and "" where not measured.
 
     position: (N, 2) in the map. dbh_m, height_m: (N,). species: N names.
     """
@@ -42,7 +42,7 @@ class Inventory:
         return len(self.position)
 
     def within(self, region: tuple[float, float, float, float]) -> Inventory:
-        """Trees with x0 <= x < x1 and y0 <= y < y1 of `region` (x0, y0, x1, y1), m."""
+        """Returns trees with x0 <= x < x1 and y0 <= y < y1 of `region` (x0, y0, x1, y1), m."""
         x, y = self.position.T
         kept = (x >= region[0]) & (x < region[2]) & (y >= region[1]) & (y < region[3])
         rows = np.flatnonzero(kept)
@@ -55,7 +55,7 @@ class Inventory:
 
 
 def read_inventory(path: str | Path) -> Inventory:
-    """Read an inventory; raises one DataFileError that lists every bad row."""
+    """Reads an inventory; raises one `DataFileError` that lists every invalid row."""
     path = Path(path)
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
@@ -106,7 +106,7 @@ def _columns(path: Path, heading: list[str]) -> dict[str, int]:
 
 
 def _parse(row: list[str], columns: dict[str, int], width: int) -> tuple[str, list[float], str]:
-    """What is wrong with a row ("" if nothing), x, y, dbh and height in m, species."""
+    """Returns the error of a row ("" if none), x, y, dbh and height in m, species."""
     if len(row) != width:
         return f"{counted(len(row), 'field')}, the heading has {width}", [], ""
     values: list[float] = []

@@ -27,13 +27,13 @@ _T_PER_NT = 1e-9
 
 
 def field_enu(frame: LocalFrame, year: float = EPOCH_YEAR) -> Array:
-    """Field (3,) at a frame's origin, T, east-north-up.
+    """Returns the field (3,) at a frame's origin, T, east-north-up.
 
-    `year` is a decimal one within five years of the epoch, 2025.
+    `year` is a decimal year within five years of the epoch, 2025.
     """
     ecef = ecef_from_geodetic(frame.origin_geodetic)
     radius = float(np.linalg.norm(ecef))
-    # The poles themselves have no east; a millionth of a radius beside them has.
+    # East is undefined at the poles; a millionth of a radius from them it is not.
     from_axis = max(math.hypot(ecef[0], ecef[1]), 1e-6 * radius)
     cosine, sine = ecef[2] / radius, from_axis / radius
     up, south, east = _spherical_field(radius, cosine, sine, frame.longitude_rad, year)
@@ -50,7 +50,10 @@ def field_enu(frame: LocalFrame, year: float = EPOCH_YEAR) -> Array:
 
 
 def field_of_angles(declination_rad: float, inclination_rad: float, strength_t: float) -> Array:
-    """Field (3,), T, east-north-up; declination east of north, inclination below the horizon."""
+    """Returns the field (3,), T, east-north-up.
+
+    Declination is east of north, inclination below the horizon.
+    """
     level = strength_t * math.cos(inclination_rad)
     return np.array(
         [
@@ -62,7 +65,7 @@ def field_of_angles(declination_rad: float, inclination_rad: float, strength_t: 
 
 
 def angles_of_field(field: Array) -> tuple[float, float, float]:
-    """Declination rad, inclination rad and strength T of an east-north-up field (3,)."""
+    """Returns declination rad, inclination rad and strength T of an east-north-up field (3,)."""
     east, north, up = (float(component) for component in field)
     level = math.hypot(east, north)
     return math.atan2(east, north), math.atan2(-up, level), math.hypot(level, up)
@@ -70,14 +73,14 @@ def angles_of_field(field: Array) -> tuple[float, float, float]:
 
 @cache
 def _coefficients() -> Array:
-    """(rows, 6): n, m, g, h and their change in a year."""
+    """Returns the coefficients (rows, 6): n, m, g, h and their change per year."""
     return np.loadtxt(_FILE, delimiter=",", skiprows=3)
 
 
 def _spherical_field(
     radius: float, cosine: float, sine: float, longitude: float, year: float
 ) -> tuple[float, float, float]:
-    """Field upward, southward, eastward, T, at a radius, colatitude and longitude."""
+    """Returns the field upward, southward, eastward, T, at a radius, colatitude and longitude."""
     table = _coefficients()
     values, slopes = _legendre(int(table[-1, 0]), cosine, sine)
     up = south = east = 0.0
@@ -95,7 +98,7 @@ def _spherical_field(
 
 
 def _legendre(degree: int, cosine: float, sine: float) -> tuple[Array, Array]:
-    """Schmidt semi-normalised Legendre functions and their derivatives by colatitude, [n, m]."""
+    """Returns Schmidt semi-normalised Legendre functions and derivatives by colatitude, [n, m]."""
     p = np.zeros((degree + 1, degree + 1))
     d = np.zeros_like(p)
     p[0, 0] = 1.0

@@ -1,4 +1,4 @@
-"""What a surface is made of, as a ray reports it."""
+"""Materials of surfaces, as rays report them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Material(IntEnum):
     PAVING = 16
     METAL = 17
     PAINTED = 18
-    """Of a colour that its solid states."""
+    """Paint in the colour of its solid."""
 
 
 _DIFFUSE_REFLECTIVITY_905_NM = {
@@ -56,5 +56,5 @@ _DIFFUSE_REFLECTIVITY_905_NM = {
 }
 
 REFLECTIVITY = np.array([_DIFFUSE_REFLECTIVITY_905_NM[material] for material in Material])
-"""(materials,) share of near-infrared light that a surface scatters back, by `Material`."""
+"""(materials,) fraction of near-infrared light that a surface reflects, by `Material`."""
 REFLECTIVITY.flags.writeable = False

@@ -1,4 +1,4 @@
-"""Triangle meshes: the form in which every surface reaches the ray caster, the page and files.
+"""Triangle meshes: the common form of surfaces for the ray caster, the page and files.
 
 A mesh is two read-only arrays. Helpers return new meshes; none changes its argument.
 """
@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 class Mesh:
     """Triangles over shared vertices, counter-clockwise when seen from outside.
 
-    vertices: (V, 3) float32, m, in the frame of whoever holds the mesh.
-    triangles: (T, 3) uint32, rows of `vertices`.
+    vertices: (V, 3) float32, m, in the owner's frame. triangles: (T, 3) uint32, rows of `vertices`.
+    Raises `ValueError` if a triangle has a vertex that does not exist.
     """
 
     vertices: NDArray[np.float32]
@@ -28,7 +28,7 @@ class Mesh:
         triangles = np.ascontiguousarray(self.triangles, dtype=np.uint32).reshape(-1, 3)
         if len(triangles) and int(triangles.max()) >= len(vertices):
             raise ValueError(
-                f"a triangle names vertex {int(triangles.max())}, the mesh has {len(vertices)}"
+                f"a triangle has vertex {int(triangles.max())}; the mesh has {len(vertices)}"
             )
         vertices, triangles = vertices.view(), triangles.view()
         vertices.flags.writeable = False
@@ -56,7 +56,7 @@ class Mesh:
     def vertex_normals(self) -> NDArray[np.float64]:
         """Unit normals (V, 3): of the triangles around each vertex, weighted by their areas.
 
-        Up where there is no triangle with an area.
+        Up where no triangle has an area.
         """
         cross = np.repeat(_crosses(self), 3, axis=0)
         rows, count = self.triangles.ravel(), len(self.vertices)
@@ -84,9 +84,9 @@ class Mesh:
 
     @property
     def is_closed(self) -> bool:
-        """Whether every edge lies between two triangles that run along it in opposite directions.
+        """Whether every edge belongs to two triangles in opposite directions.
 
-        Vertices at the same place count as one.
+        Vertices at the same position count as one.
         """
         _, same = np.unique(self.vertices, axis=0, return_inverse=True)
         a, b, c = same.reshape(-1)[self.triangles].T
@@ -97,9 +97,9 @@ class Mesh:
         return bool(np.array_equal(ways, back) and np.array_equal(counts, others))
 
     def transformed(self, transform: ArrayLike) -> Mesh:
-        """Mesh in another frame; `transform` is (3, 4) or (4, 4): new point = M p + t.
+        """Returns the mesh in another frame; `transform` is (3, 4) or (4, 4): new point = M p + t.
 
-        A mirroring transform turns the triangles around so that outsides stay outside.
+        A mirroring transform reverses the triangles so that outsides remain outside.
         """
         matrix = np.asarray(transform, dtype=np.float64)[:3, :4]
         points = self.vertices @ matrix[:, :3].T + matrix[:, 3]
@@ -114,7 +114,7 @@ EMPTY = Mesh(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint32))
 
 
 def concatenate(meshes: Sequence[Mesh]) -> Mesh:
-    """One mesh that holds all triangles of `meshes`, in their order."""
+    """Returns one mesh with all triangles of `meshes`, in order."""
     if not meshes:
         return EMPTY
     offsets = np.cumsum([0] + [len(m.vertices) for m in meshes[:-1]])

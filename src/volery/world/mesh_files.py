@@ -1,6 +1,6 @@
-"""Meshes of the user's own: glTF, OBJ and STL, checked before anything uses them.
+"""Reads user meshes: glTF, OBJ and STL, with validation.
 
-Textures are left out; the base colour of the file's largest part is kept. All parts become one mesh
+Textures are ignored; the base colour of the file's largest part is used. All parts become one mesh
 in the file's units, z up.
 """
 
@@ -24,33 +24,35 @@ from volery.world.mesh import Mesh
 
 MOST_BYTES = 128_000_000
 MOST_TRIANGLES = 5_000_000
-"""Larger meshes are refused: 5 million triangles take about 1 GB in the ray caster."""
+"""Maximum number of triangles: 5 million take about 1 GB in the ray caster."""
 FARTHEST_M = 100_000.0
-"""Vertices beyond this are slips of scale; 32-bit numbers are then coarser than 4 mm."""
+"""Maximum distance of vertices, which larger scale errors exceed; beyond, 32-bit numbers are
+coarser than 4 mm."""
 _LARGEST = 1e15
-"""Of a coordinate in a file's own units; products of three of them fit 64-bit numbers well."""
+"""Maximum coordinate in a file's units; products of three of them fit 64-bit numbers."""
 FORMATS = (".glb", ".gltf", ".obj", ".stl")
 _GLTF = (".glb", ".gltf")
 _MOST_MATERIAL_BYTES = 4_000_000
 _STL_HEAD, _STL_TRIANGLE = 84, 50
-"""Bytes of a binary STL: a free text and the number of triangles, then each of them."""
+"""Bytes of a binary STL: a header with the number of triangles, then each of them."""
 _GREY = (0.5, 0.5, 0.5)
 
 
 @dataclass(frozen=True, eq=False)
 class MeshFile:
-    """What a file holds: a mesh, z up, in its units; linear (r, g, b) of its largest part."""
+    """Content of a file: a mesh, z up, in its units; linear (r, g, b) of its largest part."""
 
     mesh: Mesh
     colour: tuple[float, float, float]
     dropped: int
-    """Triangles without area that were left out."""
+    """Number of omitted triangles without area."""
 
 
 def read_mesh(path: str | Path, *, up: Literal["y", "z"] | None = None) -> MeshFile:
-    """Mesh of a .glb, .gltf, .obj or .stl file.
+    """Reads the mesh of a .glb, .gltf, .obj or .stl file.
 
-    up: which of the file's axes points up; None: y for glTF, else z. Raises `DataFileError`.
+    up: the file's vertical axis; None: y for glTF, else z. Raises `DataFileError` for an invalid
+    file.
     """
     path = Path(path)
     kind = path.suffix.lower()
@@ -79,20 +81,20 @@ def read_mesh(path: str | Path, *, up: Literal["y", "z"] | None = None) -> MeshF
 
 
 def _load(path: Path, kind: str) -> list[Part]:
-    """The file's parts in its own axes."""
+    """Returns the file's parts in its own axes."""
     try:
         if kind in _GLTF:
             with np.errstate(all="ignore"):
                 return read_gltf(path, MOST_BYTES, MOST_TRIANGLES)
         with _quiet():
             return _read_other(path)
-    except Exception as error:  # the parsers raise whatever a broken file makes them stumble over
+    except Exception as error:  # the parsers raise any exception for a broken file
         told = " ".join(str(error).split())[:200] or type(error).__name__
         raise DataFileError(f"{path} cannot be read as a mesh: {told}") from None
 
 
 def _read_other(path: Path) -> list[Part]:
-    """OBJ and STL, by trimesh."""
+    """Reads OBJ and STL, by trimesh."""
     import trimesh
 
     _check_text(path)
@@ -115,7 +117,7 @@ def _read_other(path: Path) -> list[Part]:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Without trimesh's log: what matters comes as an error."""
+    """Disables trimesh's log: problems are raised as errors."""
     log = logging.getLogger("trimesh.util")
     was_off, log.disabled = log.disabled, True
     try:
@@ -126,7 +128,7 @@ def _quiet() -> Iterator[None]:
 
 
 class _Materials:
-    """What an OBJ file may read besides itself: material files next to it, no pictures."""
+    """Files that an OBJ file may refer to: material files next to it, no images."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -135,7 +137,7 @@ class _Materials:
         return self.get(name)
 
     def get(self, name: str) -> bytes:
-        """Content of a material file; `OSError` for any other."""
+        """Returns the content of a material file; raises `OSError` for any other."""
         path = (self._folder / name).resolve()
         is_material = path.suffix.lower() == ".mtl" and path.is_file()
         if not (is_material and path.is_relative_to(self._folder.resolve())):
@@ -146,9 +148,9 @@ class _Materials:
 
 
 def _check_text(path: Path) -> None:
-    """ValueError for an OBJ or STL file that is neither text nor binary STL of its size.
+    """Raises `ValueError` for an OBJ or STL file that is neither text nor a complete binary STL.
 
-    trimesh would guess at the encoding of such a file.
+    trimesh would guess the encoding of such a file.
     """
     data = path.read_bytes()
     if path.suffix.lower() == ".stl" and len(data) >= _STL_HEAD:
@@ -163,14 +165,14 @@ def _check_text(path: Path) -> None:
 
 
 def _joined(path: Path, parts: list[Part]) -> tuple[NDArray[np.float64], NDArray[np.uint32]]:
-    """All parts' vertices and triangles, checked."""
+    """Returns all parts' vertices and triangles, checked."""
     triangles, first = [], 0
     for points, own, _ in parts:
         if points.shape[1:] != (3,) or own.shape[1:] != (3,):
             raise DataFileError(f"{path}: corners or triangles do not have three numbers each")
         if len(own) and (own.min() < 0 or own.max() >= len(points)):
             raise DataFileError(
-                f"{path}: a triangle names vertex {own.max()}; there are {len(points)}"
+                f"{path}: a triangle has vertex {own.max()}; there are {len(points)}"
             )
         triangles.append(own + first)
         first += len(points)
@@ -185,7 +187,7 @@ def _joined(path: Path, parts: list[Part]) -> tuple[NDArray[np.float64], NDArray
 
 
 def _colour_of_largest(mesh: Mesh, parts: list[Part]) -> tuple[float, float, float]:
-    """Colour of the part with the largest area; grey where the file tells none."""
+    """Returns the colour of the part with the largest area; grey without a colour."""
     owner = np.repeat(np.arange(len(parts)), [len(part.triangles) for part in parts])
     largest = parts[int(np.argmax(np.bincount(owner, mesh.areas)))].colour
     if largest is None or largest.shape != (3,) or not np.isfinite(largest).all():
@@ -195,7 +197,7 @@ def _colour_of_largest(mesh: Mesh, parts: list[Part]) -> tuple[float, float, flo
 
 
 def _colour_of(part: Any) -> NDArray[np.float64] | None:
-    """Linear diffuse colour of a material of trimesh, which codes it as sRGB."""
+    """Returns the linear diffuse colour of a trimesh material, which is coded as sRGB."""
     main = getattr(getattr(part.visual, "material", None), "main_color", None)
     if main is None:
         return None

@@ -1,4 +1,4 @@
-"""Tables of the bodies that move through a scene: shapes, materials, room for their poses."""
+"""Tables of a scene's moving bodies: shapes, materials, poses."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from volery.world.scene_content import BodyShape, rotor_table
 from volery.world.scene_memory import BodyTable
 
 _NOWHERE = (0.0, 0.0, -1e6, 0.0, 0.0, 0.0, 1.0)
-"""Pose of a body that was not placed yet: far below the map."""
+"""Pose of a body before its first placement: far below the map."""
 
 
 class BodyRows(NamedTuple):
-    """What bodies look like, one row each."""
+    """Shapes of N bodies, one row each."""
 
     scene: NDArray[np.int64]
     radius: NDArray[np.float64]
     material: NDArray[np.uint8]
     rotors: NDArray[np.float64]
-    """(N, R, 10) as of `BodyShape.rotors`, filled up with zeros."""
+    """(N, R, 10) as `BodyShape.rotors`, padded with zeros."""
 
 
 NO_ROWS = BodyRows(
@@ -34,7 +34,7 @@ NO_ROWS = BodyRows(
 def body_rows(
     shapes: Sequence[BodyShape], shape_index: ArrayLike, scenes: NDArray[np.int64]
 ) -> BodyRows:
-    """Rows for the entries of `shape_index` (N,); `scenes` are the shapes' Embree scenes."""
+    """Returns rows for the entries of `shape_index` (N,); `scenes` are Embree's, per shape."""
     index = np.asarray(shape_index, dtype=np.int64).reshape(-1)
     parts = max((len(shape.parts) for shape in shapes), default=1)
     materials = np.zeros((len(shapes), parts), dtype=np.uint8)
@@ -47,7 +47,7 @@ def body_rows(
 
 
 def body_table(uavs: BodyRows, actors: BodyRows, crew: int) -> BodyTable:
-    """UAVs, `crew` of them a copy, then things, all of them nowhere yet."""
+    """Returns the table of UAVs, `crew` per copy, then actors, all of them not yet placed."""
     both = uavs, actors
     widest = max(rows.material.shape[1] for rows in both)
     count = sum(len(rows.scene) for rows in both)
@@ -73,9 +73,9 @@ def body_table(uavs: BodyRows, actors: BodyRows, crew: int) -> BodyTable:
 def with_blades(
     table: BodyTable, uavs: BodyRows, start: NDArray[np.float64], end: NDArray[np.float64]
 ) -> BodyTable:
-    """The table for rays that see the blades of the UAVs' rotors instead of discs.
+    """Returns the table for rays that see the blades of the UAVs' rotors instead of discs.
 
-    start, end: (N, R or more) rad, how far each has turned at either end of the interval.
+    start, end: (N, R or more) rad, rotor angles at either end of the interval.
     """
     count, most, _ = uavs.rotors.shape
     rotors = np.zeros((len(table.scene), most, 10))

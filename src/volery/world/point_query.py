@@ -1,8 +1,8 @@
 """Compiled nearest-point queries: the exact nearest point of any triangle to a point of the map.
 
-Embree walks its search tree and calls back for every triangle that may be near; the callback is
-compiled, so no Python runs. Distances are taken in the map frame, in double precision, and are
-therefore right for trees scaled unequally in height and width, too.
+Embree traverses its search tree and calls back for every candidate triangle; the callback is
+compiled, so no Python runs. Distances are computed in the map frame, in double precision, and are
+therefore exact for trees with different scales of height and width, too.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _POINT, _SQUARED, _NEAREST, _INSTANCE, _STATE_WORDS = 0, 3, 4, 7, 8
 
 
 class TriangleTable(NamedTuple):
-    """Where the triangles of a scene's instances lie in memory."""
+    """Addresses of the triangles of a scene's instances."""
 
     vertices: NDArray[np.int64]
     """(parts,) address of a part's vertices, float32 triples."""
@@ -52,13 +52,13 @@ class TriangleTable(NamedTuple):
     first_part: NDArray[np.int64]
     """(instances + 1,) parts of instance i are first_part[i] .. first_part[i] + part_count[i]."""
     part_count: NDArray[np.int64]
-    """(instances,)."""
+    """(instances,) number of parts."""
     transform: NDArray[np.float64]
     """(instances, 12) rows of the 3x4 matrix, map from instance."""
 
 
 class QueryMemory(NamedTuple):
-    """What Embree and the callback read and write during a query."""
+    """Memory that Embree and the callback use during a query."""
 
     query: NDArray[np.float32]
     context: NDArray[np.uint32]
@@ -67,7 +67,7 @@ class QueryMemory(NamedTuple):
 
 
 def new_query_memory() -> QueryMemory:
-    """Memory for one thread's queries."""
+    """Allocates memory for one thread's queries."""
     return QueryMemory(
         aligned((16,)),
         aligned((CONTEXT_WORDS,), np.uint32),
@@ -78,7 +78,7 @@ def new_query_memory() -> QueryMemory:
 
 @intrinsic
 def _make_pointer(_context: Any, _address: Any) -> Any:
-    """Pointer with that address."""
+    """Returns a pointer with that address."""
 
     def generate(context: Any, builder: Any, _signature: Any, args: Any) -> Any:
         return builder.inttoptr(args[0], context.get_value_type(types.voidptr))
@@ -91,10 +91,10 @@ _pointer: Any = _make_pointer
 
 @inner_kernel
 def instance_of(number: Any, trees: Any) -> Any:
-    """Scene instance behind a geometry number of Embree's.
+    """Returns the scene instance of one of Embree's geometry numbers.
 
-    The ground is 0 and the feet of trees 1..T, as they are in the scene; then come the crowns of
-    the same trees, and after them the solids.
+    The ground is 0 and the feet of trees 1..T, as in the scene; then follow the crowns of the same
+    trees, then the solids.
     """
     return number - trees if number > trees else number
 
@@ -106,7 +106,7 @@ def _nearest_on_triangle(
     b: tuple[float, float, float],
     c: tuple[float, float, float],
 ) -> tuple[float, float, float]:
-    """Nearest point of a triangle, by the regions of its corners, edges and face.
+    """Returns the nearest point of a triangle, by the regions of its corners, edges and face.
 
     C. Ericson, Real-Time Collision Detection, 2005, section 5.1.5.
     """
@@ -151,7 +151,7 @@ def _nearest_on_triangle(
 def _corner(
     vertices: NDArray[np.float32], row: int, m: NDArray[np.float64]
 ) -> tuple[float, float, float]:
-    """Vertex `row` in the map."""
+    """Returns vertex `row` in the map."""
     x, y, z = float(vertices[row, 0]), float(vertices[row, 1]), float(vertices[row, 2])
     return (
         m[0] * x + m[1] * y + m[2] * z + m[3],
@@ -169,7 +169,7 @@ def _try_triangle(
     matrix: NDArray[np.float64],
     instance: int,
 ) -> bool:
-    """Keep the triangle's nearest point if it is nearer than what `state` holds."""
+    """Stores the triangle's nearest point if nearer than that in `state`; returns whether it is."""
     corners = _carray(_pointer(triangles_address + 12 * triangle), (3,), np.uint32)
     # The number of vertices is not known here and not needed: rows are read by address.
     vertices = _carray(_pointer(vertices_address), (1 << 32, 3), np.float32)
@@ -190,7 +190,7 @@ def _try_triangle(
 
 
 def _consider(arguments: Any) -> bool:
-    """Embree's callback for one triangle; shrinks the query's radius when it is nearer."""
+    """Embree's callback for one triangle; reduces the query's radius if it is nearer."""
     words = _carray(arguments, (4,), np.int64)
     # User data: addresses of state, vertices, triangles, first_part, transform; then the trees.
     user = _carray(_pointer(words[USER_WORD]), (6,), np.int64)
@@ -226,7 +226,7 @@ _compiled: list[Any] = []
 
 
 def callback_address() -> int:
-    """Address of the compiled callback; compiles it, or reads it from the cache, at first use."""
+    """Returns the address of the compiled callback, compiling or loading it at first use."""
     if not _compiled:
         _compiled.append(_compile_callback(_consider))
     return int(_compiled[0].address)
@@ -245,7 +245,11 @@ def nearest_points(
     nearest: NDArray[np.float64],
     instance: NDArray[np.int32],
 ) -> None:
-    """Nearest point of the Embree scene to each point, if nearer than `reach`."""
+    """Finds the nearest point of the Embree scene to each of `points` (P, 3) within `reach` m, map.
+
+    Fills `distance` (P,), `nearest` (P, 3) and `instance` (P,), with `reach`, the point itself and
+    -1 where nothing is within reach.
+    """
     query, context, state, user = memory
     user[0] = state.ctypes.data
     user[1] = table.vertices.ctypes.data
@@ -260,7 +264,7 @@ def nearest_points(
             state[_POINT + j] = points[i, j]
             state[_NEAREST + j] = points[i, j]
         query[3] = 0.0
-        # The query's own point is rounded to 32 bits: look a little further than that.
+        # The query's own point is rounded to 32 bits: the radius includes that error.
         query[QUERY_RADIUS] = limit * (1.0 + 1e-6) + 1e-4
         state[_SQUARED] = limit * limit
         state[_INSTANCE] = -1.0

@@ -1,4 +1,4 @@
-"""Compiled turning rotors: where in a disc a ray meets a blade, and where it goes on.
+"""Compiled turning rotors: whether a ray through a disc hits a blade.
 
 A rotor is two opposite blades and a hub. Their shape is a modelling choice for small propellers:
 the chord falls linearly from .22 of the radius at the axis to .10 at the tip, which fills .10 of
@@ -13,7 +13,7 @@ from volery.core.compiled import inner_kernel
 from volery.world.scene_memory import BodyTable
 
 DISC_SIDES = 16
-"""Triangles of the mesh of a rotor's disc."""
+"""Number of triangles of a rotor disc's mesh."""
 _HUB = 0.12
 _ROOT, _TAPER = 0.22, 0.12
 
@@ -22,7 +22,7 @@ _ROOT, _TAPER = 0.22, 0.12
 def meets_blade(
     bodies: BodyTable, row: int, triangle: int, fraction: float, x: float, y: float, z: float
 ) -> bool:
-    """Whether there is a blade or hub at a place of a rotor's disc, body frame.
+    """Returns whether a point of a rotor's disc, body frame, is on a blade or the hub.
 
     triangle: its number in the mesh of all discs of a body. fraction: of the interval of motion.
     """
@@ -33,7 +33,7 @@ def meets_blade(
     b = dx * place[6] + dy * place[7] + dz * place[8]
     radius = place[9]
     away = np.sqrt(a * a + b * b)
-    if radius == 0.0 or away <= _HUB * radius:  # without a radius it is no rotor that turns
+    if radius == 0.0 or away <= _HUB * radius:  # no radius: not a turning rotor
         return True
     angle = turn[0] + fraction * (turn[1] - turn[0])
     beside = abs(b * np.cos(angle) - a * np.sin(angle))

@@ -1,8 +1,8 @@
-"""The scene: everything a ray can hit, and the questions one can ask of it.
+"""The scene: all objects that rays can hit, and its queries.
 
 Instances are numbered: -1 nothing, 0 the terrain, 1..T the trees in forest order, then the solids,
-then, from `moving_offset`, one moving body a UAV, then the things that move by themselves. Embree
-casts the rays (`embree_backend`).
+then, from `moving_offset`, one moving body per UAV, then the actors. Embree casts the rays
+(`embree_backend`).
 """
 
 from __future__ import annotations
@@ -35,31 +35,31 @@ class Hits(NamedTuple):
     """Closest hits of R rays."""
 
     distance: NDArray[np.float32]
-    """(R,) m; inf where nothing was hit."""
+    """(R,) m; inf without a hit."""
     normal: NDArray[np.float32]
-    """(R, 3) unit, map, on the side of the ray's origin; zero where nothing was hit."""
+    """(R, 3) unit, map, on the side of the ray's origin; zero without a hit."""
     instance: NDArray[np.int32]
-    """(R,) -1 where nothing was hit."""
+    """(R,) scene instance; -1 without a hit."""
     material: NDArray[np.uint8]
     """(R,) `Material`."""
 
 
 class Clearance(NamedTuple):
-    """Nearest surface points to P points."""
+    """Nearest surface points of P points."""
 
     distance: NDArray[np.float64]
-    """(P,) m; the reach where nothing is nearer. Inside of a closed solid it is below zero."""
+    """(P,) m; the reach if nothing is nearer. Negative inside a closed solid."""
     nearest: NDArray[np.float64]
-    """(P, 3) m, map; the point itself where nothing is nearer."""
+    """(P, 3) m, map; the point itself if nothing is nearer."""
     instance: NDArray[np.int32]
-    """(P,) -1 where nothing is nearer; inside of a closed solid that one."""
+    """(P,) scene instance; -1 if nothing is nearer; the solid for points inside a closed one."""
 
 
 class Scene:
-    """Static world, whose solids can be replaced, plus the moving bodies of UAVs and things.
+    """Static world, whose solids can be replaced, plus the moving bodies of UAVs and actors.
 
     `threads` share batches above 5,000 rays; results do not depend on their number, bit for bit.
-    `EmbreeUnavailableError` where Embree's library is missing or another one than is needed.
+    Raises `EmbreeUnavailableError` if Embree's library is missing or of another version.
     """
 
     def __init__(
@@ -77,7 +77,7 @@ class Scene:
         self._content = collect(terrain, forest, detail, self.solids, cover)
         self.backend = EmbreeBackend(self._content)
         self.actors: MovingActors | None = None
-        """What moves by itself and is seen by all."""
+        """Actors, which all rays see."""
         self._uav_rows, self._actor_rows, self._crew = NO_ROWS, NO_ROWS, 1
         self._bodies = body_table(NO_ROWS, NO_ROWS, 1)
         self._is_twin = False
@@ -89,22 +89,22 @@ class Scene:
 
     @property
     def handle(self) -> SceneHandle:
-        """What compiled kernels need to cast in this scene; only while the scene is open."""
+        """Scene for casting in compiled kernels; valid while the scene is open."""
         return self.backend.handle(self._bodies)
 
     def handle_with_blades(
         self, start: NDArray[np.float64], end: NDArray[np.float64]
     ) -> SceneHandle:
-        """A handle whose rays see the blades of turning rotors instead of discs.
+        """Returns a handle whose rays see the blades of turning rotors instead of discs.
 
-        start, end: (N, R or more) rad, how far each has turned at either end of the interval.
+        start, end: (N, R or more) rad, rotor angles at either end of the interval.
         """
         return self.backend.handle(with_blades(self._bodies, self._uav_rows, start, end))
 
     def twin(self) -> Scene:
-        """The same static world and things with UAVs of its own, for another thread.
+        """Returns the same static world and actors with separate UAVs, for another thread.
 
-        It lives as long as this scene, and casts on the thread that asks.
+        The twin is valid as long as this scene, and casts in the calling thread.
         """
         twin = copy.copy(self)
         twin.workers = Workers(1)
@@ -114,20 +114,20 @@ class Scene:
         return twin
 
     def close(self) -> None:
-        """Give memory and threads back; the scene must not be asked anything afterwards."""
+        """Releases memory and threads; the scene must not be used afterwards."""
         self.workers.close()
         if not self._is_twin:
             self.backend.close()
 
     def replace_solids(self, solids: Sequence[Solid]) -> int:
-        """Let `solids` stand in the place of those that stood so far, between two questions.
+        """Replaces the solids; must not run during a query.
 
-        Solids at the beginning that are the same objects as before are not touched, nor are ground
-        and trees. Twins must not be asked afterwards. Returns the instance number from which on
-        instances are others than before.
+        Leading solids that are the same objects as before are not rebuilt, nor are ground and
+        trees. Twins must not be used afterwards. Returns the first instance number that changed.
+        Raises `ValueError` if called on a twin.
         """
         if self._is_twin:
-            raise ValueError("a twin shows the static world of its scene, which alone can change")
+            raise ValueError("a twin cannot replace solids; call replace_solids of its scene")
         pairs = zip(self.solids, solids, strict=False)
         kept = sum(1 for _ in itertools.takewhile(lambda pair: pair[0] is pair[1], pairs))
         first = 1 + self._content.trees + kept
@@ -137,7 +137,7 @@ class Scene:
         return first
 
     def instance_name(self, instance: int) -> str:
-        """What a number stands for: "ground", "tree 17", a solid's or thing's name, "uav3"."""
+        """Returns an instance's name: "ground", "tree 17", a solid's or actor's name, "uav3"."""
         if instance < 0:
             return "nothing"
         if instance == 0:
@@ -154,10 +154,11 @@ class Scene:
     def set_bodies(
         self, shapes: Sequence[BodyShape], shape_index: ArrayLike, *, copies: int = 1
     ) -> None:
-        """Make one UAV's body for each entry of `shape_index` (N,); place them with move_bodies.
+        """Creates a UAV body for each entry of `shape_index` (N,); `move_bodies` places them.
 
-        Until then they are far below the map. `copies`: of how many independent copies of a
-        scenario they are, one copy after the other; a UAV's rays see its own copy alone.
+        Until then they are far below the map. `copies`: number of independent copies of a scenario,
+        one copy after the other; a UAV's rays see its own copy alone. Raises `ValueError` if an
+        index is out of range.
         """
         index = np.asarray(shape_index, dtype=np.int64).reshape(-1)
         if index.size and (index.min() < 0 or index.max() >= len(shapes)):
@@ -167,7 +168,7 @@ class Scene:
         self._bodies = body_table(self._uav_rows, self._actor_rows, self._crew)
 
     def set_actors(self, actors: MovingActors) -> None:
-        """Let `actors` be seen by all; `move_actors` places them."""
+        """Adds `actors`, which all rays see; `move_actors` places them."""
         scenes = self.backend.shape_scenes(actors.shapes)
         self.actors = actors
         self._actor_rows = body_rows(actors.shapes, np.arange(len(scenes)), scenes)
@@ -180,10 +181,10 @@ class Scene:
         end_position: ArrayLike | None = None,
         end_attitude: ArrayLike | None = None,
     ) -> None:
-        """Place the UAVs' bodies: position (N, 3) m, attitude (N, 4) map from body.
+        """Places the UAVs' bodies: position (N, 3) m, attitude (N, 4) map from body.
 
-        With a second pose the bodies move from the first to it, and a ray sees them at its own
-        fraction of that interval.
+        With a second pose the bodies move from the first to the second, and a ray sees them at its
+        own fraction of that interval.
         """
         start, end = (table[: len(self._uav_rows.scene)] for table in self._poses)
         start[:, :3] = position
@@ -192,7 +193,7 @@ class Scene:
         end[:, 3:] = attitude if end_attitude is None else end_attitude
 
     def move_actors(self, start_ns: int, end_ns: int) -> None:
-        """Place the things where they are at two simulated times, as `move_bodies` does UAVs."""
+        """Places the actors at their poses of two simulated times, as `move_bodies` does UAVs."""
         if self.actors is not None:
             for table, time_ns in zip(self._poses, (start_ns, end_ns), strict=True):
                 table[len(self._uav_rows.scene) :] = self.actors.poses_at(time_ns)
@@ -211,11 +212,12 @@ class Scene:
         fraction: float = 1.0,
         out: Hits | None = None,
     ) -> Hits:
-        """Closest hits of rays: origins (R, 3) m, unit directions (R, 3), map.
+        """Returns the closest hits of rays: origins (R, 3) m, unit directions (R, 3), map.
 
-        exclude: row of the UAV whose own body the rays do not see, or one a ray (R,); -1: none.
-        fraction: where in their interval of motion the bodies are seen; 1 is the newest pose.
-        out: an earlier result for as many rays, whose memory is used again; large batches gain.
+        reach_m: maximum distance. exclude: row of the UAV whose own body the rays do not see, or
+        one per ray (R,); -1: none. fraction: of the bodies' interval of motion; 1 is the newest
+        pose. out: an earlier result for as many rays, whose memory is reused, which speeds up large
+        batches. Raises `ValueError` for arrays of a wrong shape.
         """
         o, d = _ray_arrays(origins, directions, "directions")
         count = len(o)
@@ -242,9 +244,10 @@ class Scene:
         *,
         fraction: float = 1.0,
     ) -> NDArray[np.bool_]:
-        """Whether anything lies between origins (R, 3) and targets (R, 3), m, map: (R,).
+        """Returns whether anything lies between origins (R, 3) and targets (R, 3), m, map: (R,).
 
         The last .1 mm before the target do not count, so a surface does not hide its own points.
+        exclude, fraction: see `cast`. Raises `ValueError` for arrays of a wrong shape.
         """
         o, t = _ray_arrays(origins, targets, "targets")
         result = np.empty(len(o), dtype=np.bool_)
@@ -256,9 +259,11 @@ class Scene:
     def clearance(
         self, points: ArrayLike, reach_m: float, include_terrain: bool = True
     ) -> Clearance:
-        """Nearest point of the static world (trees, solids, ground) to points (P, 3), m, map.
+        """Returns the nearest point of the static world to each point (P, 3), m, map.
 
-        What is meant by inside of a solid, `Solid` says.
+        The static world consists of trees, solids and, unless excluded, the terrain; `reach_m` is
+        the maximum distance. `Solid` defines the inside of a solid. Raises `ValueError` if points
+        are not finite or the reach is negative.
         """
         p = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
         if not np.isfinite(p).all():
@@ -277,7 +282,7 @@ class Scene:
         return result
 
     def enclosing(self, points: ArrayLike) -> NDArray[np.int32]:
-        """Instance of the solid inside which each of the points (P, 3), m, map, lies; -1: none."""
+        """Returns the solid's instance (P,) around each of the points (P, 3), m, map; -1: none."""
         p = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
         found = np.empty(len(p), dtype=np.int32)
         self.backend.enclosing(p, found)

@@ -1,6 +1,6 @@
-"""What a scene holds, as flat tables that the ray casting reads.
+"""Content of a scene, as flat tables for ray casting.
 
-Instances: 0 is the terrain, 1..T the trees in forest order, then the solids. An instance shows one
+Instances: 0 is the terrain, 1..T the trees in forest order, then the solids. An instance has one
 or more parts; a part is a mesh with a material, shared by all instances of a tree model. A tree has
 four: wood and leaves of its foot, wood and leaves of its crown (see `tree_pieces`).
 """
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
     from volery.world.forest import Forest
 
 MATERIALS = 2
-"""Of an instance at most; a tree's parts are of the first and the second by turns."""
+"""Maximum number of materials of an instance; a tree's parts alternate between the two."""
 _TREE_PARTS = 4
 
 
 class Look(NamedTuple):
-    """How a solid of material FACADE or PAINTED differs from others, for cameras."""
+    """Appearance of a solid of material FACADE or PAINTED, for cameras."""
 
     colour: tuple[float, float, float] = (1.0, 1.0, 1.0)
     """Linear red, green, blue; factors of the material's own colour."""
@@ -49,36 +49,36 @@ PLAIN = Look()
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A fixed thing in the map: a wall, a building; its mesh is in map coordinates.
+    """A fixed object in the map: a wall, a building; its mesh is in map coordinates, m.
 
-    What lies below an upper side of the mesh, seen from its back, counts as inside the solid: a
-    mesh is closed but for its underside, or has no upper side at all. Where one stands on another,
-    a millimetre between them tells whose side is met first.
+    A point is inside the solid if the first surface straight above it is an upper side of the mesh,
+    seen from its back: a mesh is closed except for its underside, or has no upper side at all.
+    Stacked solids need a gap of a millimetre, which determines the side that is hit first.
     """
 
     mesh: Mesh
     material: Material
     name: str
     top: Material | None = None
-    """Of faces that look up more than sideways; None: `material`, too."""
+    """Material of faces that point up more than sideways; None: `material`, too."""
     look: Look = PLAIN
     is_shell: bool = False
-    """Whether its surface has holes, so that it has no inside."""
+    """Whether the surface has holes, so that the solid has no inside."""
 
 
 @dataclass(frozen=True, eq=False)
 class BodyShape:
-    """What the others see of a UAV: meshes in the body frame (FLU) with their materials."""
+    """Shape of a UAV or actor for sensors: meshes in the body frame (FLU) with materials."""
 
     parts: tuple[tuple[Mesh, Material], ...]
     rotors: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 10)))
-    """(R, 10) turning rotors: centre, two unit vectors in the disc of which it turns the first one
-    towards the second, radius, m. The part of material ROTOR has `DISC_SIDES` triangles for each
-    (`rotor_kernels`), in order; without any it is solid."""
+    """(R, 10) turning rotors: centre, two unit vectors in the disc (rotation from the first to the
+    second), radius, m. The part of material ROTOR has `DISC_SIDES` triangles for each
+    (`rotor_kernels`), in order; without rotors it is solid."""
 
     @property
     def radius(self) -> float:
-        """Radius of the sphere about the body's origin that holds all parts, m."""
+        """Radius of the sphere about the body's origin that contains all parts, m."""
         lengths = [
             float(np.linalg.norm(mesh.vertices, axis=1).max())
             for mesh, _ in self.parts
@@ -105,7 +105,7 @@ class SceneContent:
     """(trees, 3, 4) map from tree."""
     has_terrain: bool
     steepest: float
-    """Largest slope of the terrain, height by distance; 0 without one."""
+    """Maximum slope of the terrain, height by distance; 0 without one."""
     solids: int
     look: NDArray[np.float32]
     """(instances, 6) rows of `Look`."""
@@ -118,16 +118,16 @@ class SceneContent:
 
     @property
     def instances(self) -> int:
-        """Number of static instances, the terrain's number counted even where there is none."""
+        """Number of static instances; the terrain's number counts even without a terrain."""
         return 1 + self.trees + self.solids
 
     def solid_part(self, instance: int) -> PaddedMesh:
-        """Mesh of a solid, by its instance number."""
+        """Returns the mesh of a solid, by its instance number."""
         return self.parts[int(self.table.first_part[instance])]
 
 
 def rotor_table(shapes: Sequence[BodyShape]) -> NDArray[np.float64]:
-    """Rotors (shapes, R, 10) of body shapes, zero beyond those that a shape has."""
+    """Returns the rotors (shapes, R, 10) of body shapes, padded with zeros."""
     most = max((len(shape.rotors) for shape in shapes), default=0)
     table = np.zeros((len(shapes), most, 10))
     for row, shape in zip(table, shapes, strict=True):
@@ -150,14 +150,14 @@ def collect(
     solids: Sequence[Solid],
     cover: GroundCover = BARE_GROUND,
 ) -> SceneContent:
-    """Tables of a world at one level of detail."""
+    """Returns the tables of a world at one level of detail."""
     return with_solids(_collect_land(terrain, forest, detail, cover), 0, solids)
 
 
 def with_solids(content: SceneContent, kept: int, solids: Sequence[Solid]) -> SceneContent:
-    """`content` with `solids` in the place of its own solids after the first `kept`.
+    """Returns `content` with `solids` instead of its own solids after the first `kept`.
 
-    Meshes that stay lie where they lay in memory.
+    Meshes that remain are not moved in memory.
     """
     first, old = content.instances - content.solids + kept, content.table
     staying = content.parts[: len(content.parts) - content.solids + kept]
@@ -191,7 +191,7 @@ def with_solids(content: SceneContent, kept: int, solids: Sequence[Solid]) -> Sc
 def _memory_of(
     parts: Sequence[PaddedMesh],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Where the parts' vertices and triangles lie in memory, and how many triangles they have."""
+    """Returns the addresses of the parts' vertices and triangles, and the numbers of triangles."""
     return (
         np.array([p.vertices.ctypes.data for p in parts], dtype=np.int64),
         np.array([p.triangles.ctypes.data for p in parts], dtype=np.int64),
@@ -202,7 +202,7 @@ def _memory_of(
 def _collect_land(
     terrain: Terrain | None, forest: Forest | None, detail: DetailLevel, cover: GroundCover
 ) -> SceneContent:
-    """Tables of ground and trees alone."""
+    """Returns the tables of ground and trees alone."""
     models = forest.models if forest is not None else ()
     trees = len(forest.model_index) if forest is not None else 0
     meshes: list[Mesh] = []

@@ -45,31 +45,32 @@ _INVALID = np.uint32(INVALID)
 _SECOND = np.uint32(1)
 """Odd parts of trees are leaves, the second of a tree's materials."""
 CHUNK = 512
-"""Rays of one piece of work; a multiple of LANES, so that packets do not depend on the threads."""
+"""Rays of one piece of work; a multiple of LANES, so that packets do not depend on threads."""
 _TOGETHER_M, _TOGETHER_COSINE = 1.0, 0.9
-"""Rays of a packet count as running close together up to this distance and angle."""
+"""Maximum distance (m) and angle of coherent rays in a packet."""
 _LEAST_COMPONENT = np.float32(1e-12)
-"""Smaller components of a direction are made zero.
+"""Minimum component of a direction; smaller ones become zero.
 
 Embree's coherent traversal sorts rays by the signs of their directions, but takes the reciprocal of
-a component below 1e-18 as positive: one beam at -90 degrees, whose cosine is a rounding error, then
-makes its neighbours miss.
+a component below 1e-18 as positive: one beam at -90 degrees, whose cosine is a rounding error,
+would make its neighbours miss.
 """
 _MOST_PASSED = 64
-"""Surfaces of trees through which a look upwards goes."""
+"""Maximum number of tree surfaces that an upward ray passes."""
 _SHORT_OF_TARGET_M = 1e-4
-"""`occluded` looks this much less far than the target, so that the target's surface is no cover."""
+"""Distance before the target at which `occluded` ends, so that the target's surface hides nothing.
+"""
 
 
 @inner_kernel
 def _settled(component: Any) -> Any:
-    """A component of a direction, zero where it is next to nothing."""
+    """Returns a component of a direction, zero if negligible."""
     return component if abs(component) >= _LEAST_COMPONENT else np.float32(0.0)
 
 
 @inner_kernel
 def _make_ready(rays: NDArray[np.float32], words: NDArray[np.uint32], p: int, reach: float) -> None:
-    """Set the rows of packet `p` that a cast changes."""
+    """Initialises the rows of packet `p` that a cast changes."""
     for k in range(LANES):
         rays[p, FAR, k] = reach
         words[p, GEOMETRY, k] = _INVALID
@@ -81,7 +82,7 @@ def _make_ready(rays: NDArray[np.float32], words: NDArray[np.uint32], p: int, re
 
 @inner_kernel
 def run_together(rays: NDArray[np.float32], p: int, lanes: int) -> bool:
-    """Whether first and last ray of packet `p` run close together."""
+    """Returns whether first and last ray of packet `p` are close in position and direction."""
     last = lanes - 1
     apart, along = 0.0, 0.0
     for row in range(3):
@@ -94,9 +95,9 @@ def run_together(rays: NDArray[np.float32], p: int, lanes: int) -> bool:
 def cast_block(
     scene: SceneHandle, block: RayBlock, count: int, reach: float, near_count: int
 ) -> None:
-    """Closest hits of the block's first `count` rays among static geometry and near bodies.
+    """Finds the closest hits of the block's first `count` rays, on static and moving geometry.
 
-    One call handles many packets: handing so many arrays to a function costs as much as a ray.
+    One call handles many packets, because passing so many arrays costs as much as a ray.
     """
     rays, words, valid = block.rays, block.words, block.valid
     instance, material = block.instance, block.material
@@ -194,7 +195,11 @@ def cast_rays(
     instance: NDArray[np.int32],
     material: NDArray[np.uint8],
 ) -> None:
-    """Cast rays in chunks of CHUNK taken from `counter`; `exclude` has one row, or one a ray."""
+    """Casts rays in chunks of CHUNK, numbered by `counter`; runs in every thread.
+
+    origins, directions: (R, 3), map. exclude: (1,) or (R,) body rows. Fills distance (R,), normal
+    (R, 3), instance (R,) and material (R,); see `Hits`.
+    """
     count = origins.shape[0]
     for p in range(block.fraction.shape[0]):
         block.fraction[p] = fraction
@@ -245,7 +250,7 @@ def _aim(
     p: int,
     lanes: int,
 ) -> None:
-    """Fill a packet with rays that end just short of their targets."""
+    """Fills a packet with rays that end just short of their targets."""
     rays, valid = block.rays[p], block.valid
     for k in range(LANES):
         i = first + p * LANES + min(k, lanes - 1)
@@ -272,7 +277,10 @@ def find_occluded(
     block: RayBlock,
     occluded: NDArray[np.bool_],
 ) -> None:
-    """Whether anything lies between origins and targets, in chunks taken from `counter`."""
+    """Fills `occluded` (R,): whether anything lies between origins and targets (R, 3), map.
+
+    Works in chunks numbered by `counter`; runs in every thread.
+    """
     count = origins.shape[0]
     for p in range(block.fraction.shape[0]):
         block.fraction[p] = fraction
@@ -311,9 +319,9 @@ def find_enclosing(
     block: RayBlock,
     enclosing: NDArray[np.int32],
 ) -> None:
-    """Which closed solid each point (P, 3) m lies in, -1 for none.
+    """Fills `enclosing` (P,) with the closed solid around each point (P, 3) m, map; -1 for none.
 
-    Straight up from inside, the first surface of a solid is met from its back; trees, which are
+    Straight up from inside, the first surface of a solid is hit from its back; trees, which are
     instances in the Embree scene `obstacles`, are passed.
     """
     rays, words, valid = block.rays, block.words, block.valid

@@ -1,6 +1,6 @@
-"""What the compiled queries of a scene read and write: its tables, and memory for rays.
+"""Data of the compiled queries of a scene: tables, and memory for rays.
 
-Written by `scene` and `embree_backend`, read by `scene_kernels`, `body_kernels` and the sensors.
+`scene` and `embree_backend` write it; `scene_kernels`, `body_kernels` and the sensors read it.
 """
 
 from __future__ import annotations
@@ -18,46 +18,47 @@ _KEPT_BLOCKS = 8
 
 
 class BodyTable(NamedTuple):
-    """The moving bodies, one row a UAV, then one a thing that moves by itself."""
+    """The N moving bodies: one row per UAV, then one per actor."""
 
     scene: NDArray[np.int64]
     """(N,) Embree scene of the shape, in the body frame."""
     radius: NDArray[np.float64]
-    """(N,) m, of the sphere about the body's origin that holds the shape."""
+    """(N,) radius in m of the sphere about the body's origin that contains the shape."""
     material: NDArray[np.uint8]
-    """(N, parts)."""
+    """(N, parts) `Material`."""
     start: NDArray[np.float64]
-    """(N, 7) x y z qx qy qz qw at fraction 0 of the interval that rays may look into."""
+    """(N, 7) x y z (m) qx qy qz qw, map from body, at fraction 0 of the interval."""
     end: NDArray[np.float64]
     """(N, 7) the same at fraction 1: the newest pose."""
     crew: int
-    """UAVs of one copy of a scenario: a UAV's rays see the others of its own copy alone."""
+    """Number of UAVs in one copy of a scenario: a UAV's rays see those of its own copy alone."""
     rotors: NDArray[np.float64]
-    """(N, R, 10) `BodyShape.rotors`, for rays that tell blades from gaps; (N, 0, 10) for those that
-    see discs."""
+    """(N, R, 10) `BodyShape.rotors`, for rays that distinguish blades from gaps; (N, 0, 10) for
+    rays that see discs."""
     turn: NDArray[np.float64]
     """(N, R, 2) rad, angles of the rotors at fractions 0 and 1."""
     actors: int
-    """How many of the last rows are things: people, vehicles, birds. Everybody sees them."""
+    """Number of actors, the last rows: people, vehicles, birds. All rays see them."""
 
 
 class SceneHandle(NamedTuple):
-    """What kernels need of a scene; valid until the scene is closed."""
+    """A scene for kernels; valid until the scene is closed."""
 
     static: int
     """Embree scene of terrain, trees and solids."""
     obstacles: int
-    """The same without the terrain."""
+    """Embree scene of trees and solids."""
     steepest: float
-    """Largest slope of the terrain, height by distance; 0 without one."""
+    """Maximum slope of the terrain, height by distance; 0 without one."""
     moving_offset: int
     """Instance number of the first body."""
     trees: int
-    """How many there are; see `point_query.instance_of` for Embree's numbers of them."""
+    """Number of trees; see `point_query.instance_of` for their numbers in Embree."""
     normal_matrix: NDArray[np.float32]
-    """(instances, 9) rows of the matrix that takes normals to the map (not unit length)."""
+    """(instances, 9) rows of the matrix that transforms normals to the map (not unit length)."""
     material: NDArray[np.uint8]
-    """(instances, 2) of the instance's parts (trees: wood, leaves; solids: sides, tops)."""
+    """(instances, 2) materials of the instance's parts (trees: wood, leaves; solids: sides, tops).
+    """
     look: NDArray[np.float32]
     """(instances, 6) rows of `scene_content.Look`."""
     cover: GroundCover
@@ -71,34 +72,34 @@ class RayBlock(NamedTuple):
     """
 
     rays: NDArray[np.float32]
-    """(P, PACKET_ROWS, LANES) Embree's packets. Set ORIGIN and unit DIRECTION, map; read FAR, m,
-    and, where something was hit, NORMAL, map, of any length, facing any side."""
+    """(P, PACKET_ROWS, LANES) Embree's packets. Inputs: ORIGIN and unit DIRECTION, map; outputs:
+    FAR, m, and, for hits, NORMAL, map, of any length, facing either side."""
     words: NDArray[np.uint32]
-    """The same memory as whole numbers."""
+    """The same memory as integers."""
     skip: NDArray[np.int32]
     """(P, LANES) row of the body that a ray does not see, -1 for none."""
     fraction: NDArray[np.float64]
-    """(P,) where in their interval of motion a packet sees the bodies."""
+    """(P,) fraction of the bodies' interval of motion at which a packet sees them."""
     instance: NDArray[np.int32]
     """(P, LANES) result: instance number, -1 for none."""
     material: NDArray[np.uint8]
-    """(P, LANES) result."""
+    """(P, LANES) result: `Material`."""
     near: NDArray[np.int32]
-    """(N,) body rows that these rays may touch; the count is an argument."""
+    """(N,) body rows that these rays may hit; the count is an argument."""
     valid: NDArray[np.int32]
     """(LANES,) -1 for the lanes that are cast."""
     body_rays: NDArray[np.float32]
-    """(PACKET_ROWS, LANES) a packet in a body's frame."""
+    """(PACKET_ROWS, LANES) packet in a body's frame."""
     body_words: NDArray[np.uint32]
-    """The same memory as whole numbers."""
+    """The same memory as integers."""
     body_valid: NDArray[np.int32]
-    """(LANES,)."""
+    """(LANES,) -1 for the lanes that are cast at the body."""
     coherent: NDArray[np.int32]
-    """Embree's arguments for rays that run close together."""
+    """Embree's arguments for coherent rays."""
 
 
 def new_block(rays: int, bodies: int) -> RayBlock:
-    """Memory for `rays` rays in a scene with that many bodies."""
+    """Allocates memory for `rays` rays in a scene with that many bodies."""
     packets = (rays + LANES - 1) // LANES
     memory = aligned((packets, PACKET_ROWS, LANES))
     body_memory = aligned((PACKET_ROWS, LANES))
@@ -125,7 +126,7 @@ _own = threading.local()
 
 
 def thread_block(rays: int, bodies: int) -> RayBlock:
-    """The calling thread's block of that size, kept between calls."""
+    """Returns the calling thread's block of that size, reused between calls."""
     blocks: dict[tuple[int, int], RayBlock] = _own.__dict__.setdefault("blocks", {})
     block = blocks.get((rays, bodies))
     if block is None:

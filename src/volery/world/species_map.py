@@ -1,7 +1,7 @@
-"""Which shipped species stands for each species that an inventory names.
+"""Maps the species of an inventory to shipped species.
 
-An inventory of a real forest names species that do not ship. A map names the shipped species for
-some of them; all others stand as the species that the scenario names, and one warning counts them.
+Inventories of real forests name species that are not shipped. A map assigns shipped species to some
+of them; all others use the scenario's default species, and one warning counts them.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from volery.world.trees import species_names
 _log = logging.getLogger(__name__)
 
 _MAX_SHOWN = 5
-"""Species that a warning names."""
+"""Maximum number of species in a warning."""
 _MAX_LETTERS = 40
-"""Of a species' name in a warning."""
+"""Maximum length of a species' name in a warning."""
 
 
 def shipped_species(
     names: Sequence[str], fallback: str, species_map: Mapping[str, str], where: str
 ) -> list[str]:
-    """Return the shipped species of each tree; `fallback` for those of unknown or no species.
+    """Returns the shipped species of each tree; `fallback` for those of unknown or no species.
 
-    names: of the trees, as the inventory has them. Letter case does not matter, and spaces are as
-    good as underscores. species_map: inventory's name to shipped species. where: names the
-    inventory in the warning about unknown species. Raises `ScenarioError` where the map names a
-    species that does not ship.
+    names: of the trees' species in the inventory; letter case does not matter, and spaces equal
+    underscores. species_map: inventory's name to shipped species. where: names the inventory in
+    the warning about unknown species. Raises `ScenarioError` if the map names a species that is
+    not shipped.
     """
     known = {name: name for name in species_names()}
     chosen = {**known, **_checked(species_map)}
@@ -41,7 +41,7 @@ def shipped_species(
         name.strip() for name, key in zip(names, keys, strict=True) if key and key not in chosen
     )
     if unknown:
-        _warn(f"{where}: {_told(unknown)} stand as {fallback}; map them in {_TABLE}")
+        _warn(f"{where}: {_told(unknown)} become {fallback}; map them in {_TABLE}")
     present = set(keys)
     unused = sorted(name for name in species_map if _key(name) not in present)
     if unused:
@@ -53,7 +53,7 @@ _TABLE = "[world.forest.species_map]"
 
 
 def _checked(species_map: Mapping[str, str]) -> dict[str, str]:
-    """The map by keys that compare. Raises `ScenarioError` for a target that does not ship."""
+    """Returns the map by comparable keys; raises `ScenarioError` for unknown target species."""
     allowed = species_names()
     for name, target in species_map.items():
         if target not in allowed:
@@ -84,12 +84,12 @@ def _shown(names: Sequence[str]) -> str:
 
 
 def _plain(name: str) -> str:
-    """A name as a terminal may show it: short, and no control characters."""
+    """Returns a name for terminals: short, and without control characters."""
     short = name if len(name) <= _MAX_LETTERS else f"{name[:_MAX_LETTERS]}..."
     return "".join(letter if letter.isprintable() else "?" for letter in short)
 
 
 @lru_cache(maxsize=100)
 def _warn(text: str) -> None:
-    """Log a warning once, however often the same forest is built."""
+    """Logs a warning once, however often the same forest is built."""
     _log.warning("%s", text)

@@ -1,9 +1,9 @@
-"""The ground: heights on a square grid, and one surface through them for everyone.
+"""The ground: heights on a square grid, and a common surface through them.
 
 Each cell is split along its diagonal from lower left to upper right, and a height anywhere is that
 of the triangle there, so that rays (`Terrain.mesh`), ground contact (`terrain_height`,
 `terrain_normal`) and queries agree to rounding. Beyond the grid the height is that of the nearest
-edge point and the ground is level across the edge.
+edge point and the ground is horizontal across the edge.
 
 A file of heights is a CSV matrix without a header: row i holds y = origin_y + i * spacing, column j
 holds x = origin_x + j * spacing.
@@ -38,7 +38,7 @@ class TerrainGrid(NamedTuple):
 
 @inline_kernel
 def terrain_height(grid: TerrainGrid, x: float, y: float) -> float:
-    """Height of the ground at map position (x, y), m."""
+    """Returns the height of the ground at map position (x, y), m."""
     heights, origin_x, origin_y, spacing = grid
     rows, columns = heights.shape
     u: float = min(max((x - origin_x) / spacing, 0.0), columns - 1.0)
@@ -58,7 +58,7 @@ def terrain_height(grid: TerrainGrid, x: float, y: float) -> float:
 
 @inline_kernel
 def terrain_normal(grid: TerrainGrid, x: float, y: float) -> tuple[float, float, float]:
-    """Unit normal (nx, ny, nz), upward, of the ground at map position (x, y)."""
+    """Returns the unit normal (nx, ny, nz), upward, of the ground at map position (x, y)."""
     heights, origin_x, origin_y, spacing = grid
     rows, columns = heights.shape
     u = (x - origin_x) / spacing
@@ -103,12 +103,13 @@ def _normals_kernel(
 class Terrain:
     """Ground of a world, in the map frame.
 
-    grid: heights and their place; at least 2 x 2 finite heights, held read-only.
+    grid: heights and their position; at least 2 x 2 finite heights, copied and read-only. Raises
+    `ValueError` for other grids.
     """
 
     grid: TerrainGrid
     _own: TerrainGrid = field(init=False, repr=False)
-    """The same memory, not marked as read-only: kernels compile once for both kinds of array."""
+    """The same memory, writable: kernels compile once for both kinds of array."""
 
     def __post_init__(self) -> None:
         heights = np.array(self.grid.heights, dtype=np.float64, order="C")
@@ -131,7 +132,10 @@ class Terrain:
     def from_heights(
         cls, heights: ArrayLike, spacing_m: float, origin: tuple[float, float] = (0.0, 0.0)
     ) -> Terrain:
-        """Terrain through `heights` (rows along y, columns along x), m; [0, 0] lies at `origin`."""
+        """Returns a terrain through `heights` (rows along y, columns along x), m.
+
+        heights[0, 0] is at `origin`. Raises `ValueError` for invalid heights or spacing.
+        """
         return cls(TerrainGrid(np.asarray(heights, dtype=np.float64), *origin, spacing_m))
 
     @classmethod
@@ -141,7 +145,7 @@ class Terrain:
         height_m: float = 0.0,
         origin: tuple[float, float] = (0.0, 0.0),
     ) -> Terrain:
-        """Level square of side `extent_m` whose lower left corner is `origin`."""
+        """Returns a horizontal square of side `extent_m` whose lower left corner is `origin`."""
         return cls.from_heights(np.full((2, 2), height_m), extent_m, origin)
 
     @classmethod
@@ -151,9 +155,9 @@ class Terrain:
         spacing_m: float,
         origin: tuple[float, float] = (0.0, 0.0),
     ) -> Terrain:
-        """Terrain of a CSV matrix of heights in m (first row at the lowest y).
+        """Reads a terrain from a CSV matrix of heights in m (first row at the lowest y).
 
-        Raises DataFileError that names the file and every bad row.
+        Raises `DataFileError`, naming the file and every invalid row.
         """
         path = Path(path)
         return cls.from_heights(_read_heights(path), spacing_m, origin)
@@ -167,9 +171,9 @@ class Terrain:
 
     @property
     def steepest(self) -> float:
-        """Largest slope of the surface, height by level distance.
+        """Maximum slope of the surface, height by horizontal distance.
 
-        Each triangle of `mesh` has one side along x and one along y: two rises make its slope.
+        Each triangle of `mesh` has one side along x and one along y: two rises determine its slope.
         """
         along_x, along_y = np.diff(self.grid.heights, axis=1), np.diff(self.grid.heights, axis=0)
         upper = along_x[1:] ** 2 + along_y[:, :-1] ** 2
@@ -177,21 +181,21 @@ class Terrain:
         return math.sqrt(max(upper.max(), lower.max())) / self.grid.spacing
 
     def height(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
-        """Heights at map positions; x and y broadcast, the result has their shape, m."""
+        """Returns heights at map positions, m; x and y broadcast, the result has their shape."""
         x, y = _broadcast(x, y)
         out = np.empty(x.size)
         _heights_kernel(self._own, x.ravel(), y.ravel(), out)
         return out.reshape(x.shape)
 
     def normal(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
-        """Unit upward normals at map positions, shape (..., 3)."""
+        """Returns unit upward normals at map positions, (..., 3)."""
         x, y = _broadcast(x, y)
         out = np.empty((x.size, 3))
         _normals_kernel(self._own, x.ravel(), y.ravel(), out)
         return out.reshape((*x.shape, 3))
 
     def mesh(self) -> Mesh:
-        """The surface as triangles facing up, in the map frame: two a cell."""
+        """Returns the surface as upward triangles in the map frame, two per cell."""
         heights, x0, y0, spacing = self.grid
         rows, columns = heights.shape
         x, y = np.meshgrid(x0 + spacing * np.arange(columns), y0 + spacing * np.arange(rows))

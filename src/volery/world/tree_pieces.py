@@ -1,7 +1,7 @@
-"""Trees in two pieces, foot and crown, so that rays below the crowns need not enter their boxes.
+"""Splits trees into foot and crown, so that rays below the crowns do not enter their boxes.
 
-Embree looks into a tree when a ray meets the box around it. Most of a whole tree's box is the air
-beside its trunk: the space in which UAVs fly.
+Embree traverses a tree when a ray hits its bounding box. Most of a whole tree's box is air around
+its trunk: the space in which UAVs fly.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from volery.world.trees.model import TreeMesh
 
 
 def foot_and_crown(tree: TreeMesh) -> tuple[TreeMesh, TreeMesh]:
-    """The triangles of a tree that end below some height, and all others.
+    """Returns the triangles of a tree that end below some height, and all others.
 
-    The height is that at which the two boxes have the least surface together, which a ray from
-    anywhere is the less likely to meet; where one box has less, all is foot.
+    The height minimises the total surface of the two boxes, and so the probability of a hit by rays
+    from anywhere; if one box has less, all is foot.
     """
     corners = np.concatenate([tree.wood.corners, tree.leaves.corners])
     if not len(corners):
@@ -38,12 +38,12 @@ def foot_and_crown(tree: TreeMesh) -> tuple[TreeMesh, TreeMesh]:
 
 
 def _surface(low: NDArray[np.float32], high: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Half the surface of boxes (N, 3), (N, 3), m^2."""
+    """Returns half the surface of boxes (N, 3), (N, 3), m^2."""
     x, y, z = (high - low).astype(np.float64).T
     return np.asarray(x * y + y * z + z * x)
 
 
 def _part(mesh: Mesh, rows: NDArray[np.bool_]) -> Mesh:
-    """Some of a mesh's triangles, with the vertices that they use."""
+    """Returns some of a mesh's triangles, with the vertices that they use."""
     used, triangles = np.unique(mesh.triangles[rows], return_inverse=True)
     return Mesh(mesh.vertices[used], triangles.reshape(-1, 3).astype(np.uint32))

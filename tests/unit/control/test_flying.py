@@ -176,7 +176,7 @@ def test_low_level_hands_over_smoothly():
         ("command_position", ((0, 0, INF),), "position"),
         ("command_position", ((0, 0, 1e9),), "out of range"),
         ("command_position", ((0, 0, 1), NAN), "yaw"),
-        ("take_off", (5.0,), "it flies"),
+        ("take_off", (5.0,), "is flying"),
         ("return_home", (-1.0,), "return height"),
     ],
 )

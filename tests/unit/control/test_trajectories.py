@@ -97,7 +97,7 @@ def test_polynomials_are_taken_as_they_are():
     ("make", "words"),
     [
         (lambda: Trajectory.from_samples([0.0], [[0, 0, 0]]), "2 to"),
-        (lambda: Trajectory.from_samples([0, 0], np.zeros((2, 3))), "must grow"),
+        (lambda: Trajectory.from_samples([0, 0], np.zeros((2, 3))), "must increase"),
         (lambda: Trajectory.from_samples([-1, 0], np.zeros((2, 3))), "not be negative"),
         (lambda: Trajectory.from_samples([0, 1], np.zeros((3, 3))), "shape"),
         (lambda: Trajectory.from_samples([0, 1], [[0, 0, NAN], [0, 0, 0]]), "not finite"),

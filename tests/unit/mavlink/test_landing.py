@@ -104,11 +104,11 @@ def test_a_landing_speed_is_of_one_landing(flight):
         request = message_type("volery_interfaces/srv/SetLandingSpeed_Request")(speed)
         return simulation.graph.call("/uav1/set_landing_speed", request)
 
-    assert "does not land" in ask(1.0).message
+    assert "is not landing" in ask(1.0).message
     uav.take_off(12.0)
     simulation.run(12.0)
     uav.land()
-    assert "is not above 0" in ask(-1.0).message
+    assert "must be above 0" in ask(-1.0).message
     assert ask(9.0).success
     simulation.run(3.0)
     assert -uav.velocity_map[2] == pytest.approx(uav.airframe.limits.descent_m_s, abs=0.1)

@@ -285,7 +285,7 @@ def test_uavs_are_not_placed_in_blocks(simulate, blocks_data):
         ({"cell_size_m": 0.0}, ScenarioError, "cell_size_m"),
         ({"block_height_m": 2000.0}, ScenarioError, "block_height_m"),
         ({"origin_m": [495.0, 0.0]}, ScenarioError, "beyond the terrain"),
-        ({"maps": [{"file": "map_command.csv"}]}, ScenarioError, "comes over the graph"),
+        ({"maps": [{"file": "map_command.csv"}]}, ScenarioError, "received over the graph"),
         ({"maps": [{"file": "none.csv"}]}, DataFileError, "no file 'none.csv'"),
         ({"maps": [{"file": "a.csv"}, {"file": "b/a.csv"}]}, ScenarioError, "used twice: a"),
     ],

@@ -61,7 +61,7 @@ def test_take_off_to_a_height(pair):
     assert pair.uavs["uav1"].position_map[2] == pytest.approx(4.1, abs=0.3)
     again = ask(pair, "/uav1/take_off_to", altitude=4.0)
     assert not again.success
-    assert "flies" in again.message
+    assert "is flying" in again.message
 
 
 @pytest.mark.parametrize("altitude", [0.0, -1.0, float("nan"), 1e9])

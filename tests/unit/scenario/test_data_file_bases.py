@@ -104,10 +104,10 @@ def test_circles_of_bases_are_refused(write):
     write("a.toml", 'base = "b.toml"\n')
     path = write("b.toml", 'base = "a.toml"\n')
     assert refusal(path).endswith(
-        "a.toml: key 'base': the bases go in a circle: b.toml -> a.toml -> b.toml"
+        "a.toml: key 'base': the bases form a circle: b.toml -> a.toml -> b.toml"
     )
     itself = write("itself.toml", 'base = "itself.toml"\n')
-    assert "go in a circle: itself.toml -> itself.toml" in refusal(itself)
+    assert "form a circle: itself.toml -> itself.toml" in refusal(itself)
 
 
 def test_long_chains_of_bases_are_refused(write):
@@ -119,7 +119,7 @@ def test_long_chains_of_bases_are_refused(write):
 @pytest.mark.parametrize(
     ("base", "message"),
     [
-        ('"vlp_61"', "key 'base': no 'vlp_61' ships; did you mean 'vlp_16'? Allowed: adis16448, "),
+        ('"vlp_61"', "no shipped 'vlp_61'; did you mean 'vlp_16'? Allowed: adis16448, "),
         ('"none.toml"', "key 'base': there is no file 'none.toml' in "),
         ("7", "key 'base': a name is needed: adis16448, "),
         ('"inner/mine.toml"', "key 'base': 'inner/mine.toml' lies in another folder"),

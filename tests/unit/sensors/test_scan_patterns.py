@@ -231,7 +231,7 @@ def test_a_table_needs_its_file_and_columns(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"elevation_deg": [0.0] * 16, "firing_offset_s": [0.0] * 3}, "one entry a ring"),
+        ({"elevation_deg": [0.0] * 16, "firing_offset_s": [0.0] * 3}, "one entry per ring"),
         ({"columns": 2000}, "fit in one turn"),
         ({"azimuth_step_deg": 0.0}, "must not be 0"),
         ({"columns": 100_000, "column_period_s": 1e-7}, "rings times columns"),

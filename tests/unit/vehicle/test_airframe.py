@@ -63,7 +63,7 @@ def test_own_file_beside_the_scenario(tmp_path):
         ("friction = 0.8", "friction = 0.8\nglue = 1.0", ["glue", "friction"]),
         ("cells = 4", "cells = 0", ["battery.cells", "greater than or equal to 1"]),
         ("rated_v = 14.8", "rated_v = nan", ["battery.rated_v", "finite"]),
-        ("rated_v = 14.8", "rated_v = 25.0", ["battery cannot hold it up", "17.5 V", "sags to"]),
+        ("rated_v = 14.8", "rated_v = 25.0", ["battery cannot sustain hover", "17.5 V", "sags to"]),
         ("resistance_ohm = 0.028 ", "resistance_ohm = 0.5 ", ["cannot give that power", "347 W"]),
         ("3.3, 3.61, 3.69", "3.7, 3.61, 3.69", ["battery", "open_circuit_v must not fall"]),
         (

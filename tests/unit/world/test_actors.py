@@ -183,7 +183,7 @@ def test_actors_know_where_they_are_and_who_may_put_them():
     np.testing.assert_allclose(actors.velocity_at(0, 1_000_000_000), [0.0, 1.5, 0.0], atol=1e-6)
     actors.say(1, 10, [0, 0, 0, 0, 0, 0, 1], [3, 0, 0])
     assert actors.speeds_m_s.tolist() == [1.5, 3.0]
-    with pytest.raises(CommandError, match="anna goes its own way"):
+    with pytest.raises(CommandError, match="anna has a motion of its own"):
         actors.say(0, 10, [0, 0, 0, 0, 0, 0, 1])
     kept = actors.get_state()
     actors.say(1, 20, [7, 0, 0, 0, 0, 0, 1])

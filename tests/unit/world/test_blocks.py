@@ -125,7 +125,7 @@ def test_degenerate_maps():
     assert len(full) == 10
     assert volume(full) == pytest.approx(409.6**2, rel=1e-5)
     ragged = np.indices((4096, 4096)).sum(axis=0) % 2 == 0
-    with pytest.raises(CommandError, match=r"too ragged.* faces and more"):
+    with pytest.raises(CommandError, match=r"too irregular.* faces, more than"):
         block_mesh(grid_of(ragged, cell=0.1), 0.0, 1.0)
 
 

@@ -159,7 +159,7 @@ def test_broken_pictures_are_refused():
 
 
 def test_files_are_refused_by_kind_and_absence(tmp_path):
-    with pytest.raises(DataFileError, match=r"no grid map is read from '.jpg'.*\.csv, \.txt"):
+    with pytest.raises(DataFileError, match=r"unknown grid map format '.jpg'.*\.csv, \.txt"):
         read_cells(tmp_path / "x.jpg")
     with pytest.raises(DataFileError, match="cannot be read"):
         read_cells(tmp_path / "x.csv")

@@ -22,7 +22,7 @@ def test_arrays_are_read_only(square):
 
 
 def test_a_triangle_without_a_vertex_is_refused():
-    with pytest.raises(ValueError, match="names vertex 3"):
+    with pytest.raises(ValueError, match="has vertex 3"):
         Mesh(np.zeros((3, 3), np.float32), np.array([[0, 1, 3]], np.uint32))
 
 

@@ -124,7 +124,7 @@ def ascii_stl(corner):
             "cannot be read|no triangle",
         ),
         ("a.obj", b"v 0 0 0\nv 1 0 0\n", "no triangle|cannot be read"),
-        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "cannot be read|names vertex"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "cannot be read|has vertex"),
         ("a.obj", b"\xff\xfe\x00\x01" * 50, "cannot be read|no triangle"),
         ("a.glb", b"glTF" + bytes(4), "cannot be read"),
         ("a.gltf", b'{"asset": {"version": "2.0"}}', "no triangle|cannot be read"),

@@ -54,7 +54,7 @@ def test_unknown_species_stand_as_the_scenarios_and_are_counted_in_one_line(fore
     assert record.levelno == logging.WARNING
     assert record.getMessage() == (
         "inventory oaks.csv: 55 trees of 14 species that are not known (Quercus alba 40, "
-        "Acer rubrum 3, Rara avis0 1, Rara avis1 1, Rara avis2 1, ...) stand as broadleaf; "
+        "Acer rubrum 3, Rara avis0 1, Rara avis1 1, Rara avis2 1, ...) become broadleaf; "
         "map them in [world.forest.species_map]"
     )
     forest_of()
@@ -91,4 +91,4 @@ def test_targets_that_do_not_ship_are_refused_with_those_that_do(forest_of):
 def test_names_are_shown_short_and_without_control_characters(forest_of, caplog):
     forest_of(species=["\x1b[31m" + "x" * 1000])
     [record] = caplog.records
-    assert f"(?[31m{'x' * 35}... 1) stand" in record.getMessage()
+    assert f"(?[31m{'x' * 35}... 1) become" in record.getMessage()

@@ -1,4 +1,4 @@
-"""The attitude of a vehicle at rest, and how uncertain a start is."""
+"""Attitude of a vehicle at rest, and the covariance at the start."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ Array = NDArray[np.float64]
 def align_at_rest(
     specific_force_body: ArrayLike, magnetic_body: ArrayLike, magnetic_field_map: ArrayLike
 ) -> Array:
-    """Attitude (..., 4), map from body, of vehicles that stand still.
+    """Returns the attitude (..., 4), map from body, of vehicles at rest.
 
-    The mean specific force (..., 3) points up, which gives the tilt; the mean magnetic field
-    (..., 3), levelled, points along the horizontal part of `magnetic_field_map` (3,), which gives
-    the heading. Body axes: FLU.
+    The mean specific force (..., 3) points up, which gives the tilt; the mean magnetic field (...,
+    3), levelled, points along the horizontal part of `magnetic_field_map` (3,), which gives the
+    heading. Body axes: FLU.
     """
     up = np.asarray(specific_force_body, dtype=np.float64)
     up = up / np.linalg.norm(up, axis=-1, keepdims=True)
@@ -44,7 +44,7 @@ def align_at_rest(
 
 
 def start_covariance(settings: EstimatorSettings, start: StartSigmas, attitude: Array) -> Array:
-    """Covariance (STATES, STATES) of the error states at the start; attitude: (4,)."""
+    """Returns the covariance (STATES, STATES) of the error states at the start; attitude: (4,)."""
     sigma = np.zeros(STATES)
     sigma[POSITION : POSITION + 3] = start.position_m
     sigma[VELOCITY : VELOCITY + 3] = start.velocity_m_s
@@ -63,10 +63,10 @@ def start_covariance(settings: EstimatorSettings, start: StartSigmas, attitude: 
 
 
 def _alignment_errors(settings: EstimatorSettings, attitude: Array) -> Array:
-    """How errors of the sensors become errors of `align_at_rest`: (STATES, STATES).
+    """Returns the effect (STATES, STATES) of sensor errors on `align_at_rest`.
 
     A bias b of the accelerometer tilts the vertical by R b / g; a tilt turns the heading by the
-    field's dip, as in the measurement of the heading, whose offset is the heading's error.
+    field's dip, as in the measurement of the heading; the heading's error is its offset.
     """
     turn = rotations.matrix(attitude)
     mixing = np.eye(STATES)

@@ -1,4 +1,4 @@
-"""How the filter's larger parts are compiled: with fused multiply-add, but called, not inlined."""
+"""Compiler options of the filter's larger parts: fused multiply-add, called instead of inlined."""
 
 from __future__ import annotations
 
@@ -11,5 +11,5 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def part_kernel(function: F) -> F:
-    """Compile a part that kernels call in several places; `vehicle.compiled` inlines instead."""
+    """Compiles a part that kernels call several times; `vehicle.compiled` inlines instead."""
     return compiled.inner_kernel(function, fastmath={"contract"})

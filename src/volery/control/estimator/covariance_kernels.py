@@ -1,4 +1,4 @@
-"""Covariance of the error states: along the motion, at a measurement, and when errors are undone.
+"""Covariance of the error states: propagation, measurement updates and error resets.
 
 The matrix P is flat, row i from i * STATES, and inner loops run down a column: the compiler then
 knows the distances between rows and works on several columns at once, ten times as fast.
@@ -34,9 +34,9 @@ _V, _R, _G, _A = (first * STATES for first in (VELOCITY, ROTATION, GYRO_BIAS, AC
 
 @part_kernel
 def carry(P: Array, flow: Any, tuning: Any, keep: Array) -> None:
-    """Covariance after the motion of a `FLOW`, process noise added.
+    """Propagates the covariance along the motion of a `FLOW` and adds process noise.
 
-    P: (STATES^2,); keep: (STATES,) share of each state that its decay leaves, as `decay` gives it.
+    P: (STATES^2,); keep: (STATES,) fraction of each state that its decay leaves, from `decay`.
     """
     transform(P, flow)
     transpose(P)
@@ -53,8 +53,8 @@ def carry(P: Array, flow: Any, tuning: Any, keep: Array) -> None:
         _spread(P, PRESSURE_OFFSET + i, tuning.offset_variance[i], keep)
     duration = flow.duration
     P[PRESSURE_OFFSET * (STATES + 1)] += tuning.pressure_walk * duration
-    # White noise of the IMU. What the gyroscope's does to velocity within the stretch is left out:
-    # three orders of magnitude below the accelerometer's, for stretches of a tenth of a second.
+    # White noise of the IMU. The effect of the gyroscope's on velocity is left out: in a tenth
+    # of a second it is three orders of magnitude below the accelerometer's.
     speed = tuning.accel_noise * duration
     for k in range(3):
         p, v, r = POSITION + k, VELOCITY + k, ROTATION + k
@@ -67,7 +67,7 @@ def carry(P: Array, flow: Any, tuning: Any, keep: Array) -> None:
 
 @part_kernel
 def decay(tuning: Any, duration: float, keep: Array) -> None:
-    """Keep (STATES,): share of each state's mean that is left after `duration` s."""
+    """Computes `keep` (STATES,): fraction of each state's mean that is left after `duration` s."""
     for i in range(GYRO_BIAS):
         keep[i] = 1.0
     gyro = math.exp(-tuning.bias_rate[0] * duration)
@@ -80,13 +80,13 @@ def decay(tuning: Any, duration: float, keep: Array) -> None:
 
 @inner_kernel
 def _spread(P: Array, i: int, variance: float, keep: Array) -> None:
-    """Noise of state i, a Gauss-Markov process with this stationary variance."""
+    """Adds the noise of state `i`, a Gauss-Markov process with this stationary variance."""
     P[i * (STATES + 1)] += variance * (1.0 - keep[i] * keep[i])
 
 
 @part_kernel
 def transform(P: Array, flow: Any) -> None:
-    """Phi P of the motion; done again on the transpose: Phi P Phi'."""
+    """Computes Phi P of the motion in place; a second call on the transpose gives Phi P Phi'."""
     t = flow.duration
     b0, b1, b2 = three(flow.way)
     s0, s1, s2 = three(flow.speed)
@@ -117,7 +117,7 @@ def _dot(a: Vector, b: Vector) -> float:
 
 @part_kernel
 def transpose(P: Array) -> None:
-    """Exchange rows and columns."""
+    """Transposes P in place."""
     for i in range(1, STATES):
         for j in range(i):
             P[i * STATES + j], P[j * STATES + i] = P[j * STATES + i], P[i * STATES + j]
@@ -125,7 +125,7 @@ def transpose(P: Array) -> None:
 
 @part_kernel
 def _mirror(P: Array) -> None:
-    """Make P symmetric to the bit."""
+    """Makes P exactly symmetric."""
     for i in range(1, STATES):
         for j in range(i):
             P[i * STATES + j] = P[j * STATES + i]
@@ -133,7 +133,7 @@ def _mirror(P: Array) -> None:
 
 @part_kernel
 def normalised_innovation(P: Array, rows: int, work: Any) -> float:
-    """Squared innovation r' S^-1 r of up to three numbers, with S = H P H' + R.
+    """Returns the squared innovation r' S^-1 r of up to three numbers, with S = H P H' + R.
 
     work: a `WORK` with H, residual and variance.
     """
@@ -160,7 +160,7 @@ def normalised_innovation(P: Array, rows: int, work: Any) -> float:
 
 @part_kernel
 def correct(P: Array, rows: int, work: Any) -> None:
-    """Fuse up to three numbers one after the other; `work.error` becomes the estimated error.
+    """Fuses up to three numbers one after the other; `work.error` becomes the estimated error.
 
     The covariance is updated in Joseph's form, (I - k h) P (I - k h)' + k r k', written out.
     """
@@ -186,7 +186,7 @@ def correct(P: Array, rows: int, work: Any) -> None:
 
 @inner_kernel
 def _times(P: Array, h: Array, out: Array) -> None:
-    """Out = P h, for an h of mostly zeros."""
+    """Computes `out` = P h, for an h of mostly zeros."""
     for k in range(STATES):
         out[k] = 0.0
     for i in range(STATES):
@@ -207,7 +207,7 @@ def _product(h: Array, vector: Array) -> float:
 
 @part_kernel
 def turn_errors(P: Array, x: float, y: float, z: float) -> None:
-    """Covariance after the attitude took over the rotation (x, y, z) rad from its error.
+    """Updates the covariance after the attitude absorbed the rotation error (x, y, z) rad.
 
     G = I + [r]x / 2 for errors in the map (Sola 2017, section 7).
     """
@@ -224,7 +224,7 @@ def turn_errors(P: Array, x: float, y: float, z: float) -> None:
 
 @part_kernel
 def forget(P: Array, first: int, variance: Array) -> None:
-    """Covariance when three states from `first` on are taken anew, with variance (3,)."""
+    """Resets three states from `first` on to independent ones with variance (3,)."""
     for k in range(first, first + 3):
         for j in range(STATES):
             P[k * STATES + j] = 0.0
@@ -234,9 +234,9 @@ def forget(P: Array, first: int, variance: Array) -> None:
 
 @part_kernel
 def forget_place(P: Array, variance: Array) -> None:
-    """Covariance when position and velocity are taken anew from a GNSS fix; variance (6,).
+    """Resets position and velocity to a GNSS fix with variance (6,).
 
-    The new position is off by what the receiver is: by minus its offset and by noise.
+    The new position has the receiver's error: minus its offset, plus noise.
     """
     for k in range(3):
         p, v, o = (POSITION + k) * STATES, (VELOCITY + k) * STATES, (GNSS_OFFSET + k) * STATES

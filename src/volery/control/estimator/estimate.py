@@ -1,4 +1,4 @@
-"""What users see of the filters."""
+"""Outputs of the filters."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ Array = NDArray[np.float64]
 
 
 class Estimate(NamedTuple):
-    """Views of what the filters believe of the present, rows of UAVs, at the centre of mass."""
+    """Views of the present estimates of N UAVs, at the centre of mass."""
 
     position_map: Array
-    """(N, 3) m."""
+    """(N, 3) m, map frame."""
     velocity_map: Array
-    """(N, 3) m/s."""
+    """(N, 3) m/s, map frame."""
     attitude: Array
     """(N, 4) unit quaternions, map from body."""
     omega_body: Array
-    """(N, 3) rad/s, FLU, without the gyroscope's bias."""
+    """(N, 3) rad/s, FLU, corrected by the gyroscope's bias."""
     gyro_bias: Array
     """(N, 3) rad/s, body axes."""
     accel_bias: Array
@@ -28,11 +28,11 @@ class Estimate(NamedTuple):
 
 
 class InnovationGate(NamedTuple):
-    """How one aid fared since the start, rows of UAVs."""
+    """Statistics of one aiding source since the start, rows of N UAVs."""
 
     innovation: Array
-    """(N,) the latest normalised squared innovation, fused or not."""
+    """(N,) latest normalised squared innovation, fused or not."""
     accepted: NDArray[np.int64]
-    """(N,)."""
+    """(N,) number of fused measurements."""
     rejected: NDArray[np.int64]
-    """(N,)."""
+    """(N,) number of rejected measurements."""

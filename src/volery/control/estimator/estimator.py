@@ -1,4 +1,4 @@
-"""The estimators of a fleet: give them readings, ask them where the UAVs are."""
+"""Estimators of a fleet: fuse sensor measurements into position, velocity and attitude."""
 
 from __future__ import annotations
 
@@ -45,14 +45,16 @@ _IN_THE_AIR = StartSigmas()
 class Estimator:
     """Error-state Kalman filters of `count` UAVs.
 
-    settings, mounting, start: one for all, or one a UAV. position (N, 3) m, velocity (N, 3) m/s,
-    attitude (N, 4): what is believed of the centre of mass at `stamp_ns`, as well as `start` says.
+    settings, mounting, start: one for all, or one per UAV. position (N, 3) m, velocity (N, 3) m/s,
+    map frame, attitude (N, 4) map from body: the estimated motion of the centre of mass at
+    `stamp_ns`, with the standard deviations of `start`.
 
-    Readings are given in the order in which they arrive: `predict` in the order of their stamps, at
-    any rate; measurements of the other sensors whenever they come. They are fused when the horizon
-    (`EstimatorSettings.horizon_s` behind the newest IMU reading) reaches their stamp. In all calls
-    `rows` (S,) are distinct rows of UAVs and row i of each array belongs to `rows[i]`; `valid` (S,)
-    leaves rows out, as do numbers that are not finite.
+    Measurements are passed in the order of their arrival: `predict` in the order of stamps, at any
+    rate; measurements of other sensors at any time. They are fused when the horizon
+    (`EstimatorSettings.horizon_s` behind the newest IMU measurement) reaches their stamp. In all
+    calls `rows` (S,) are distinct rows of UAVs and row i of each array belongs to `rows[i]`; rows
+    with `valid` (S,) false or with non-finite numbers are skipped. Raises `EstimatorError` for rows
+    out of range and arrays of a wrong shape.
     """
 
     def __init__(
@@ -101,9 +103,11 @@ class Estimator:
         stamp_ns: int,
         start: StartSigmas | None = None,
     ) -> None:
-        """Begin anew, with nothing kept: as a new estimator would with the same arguments.
+        """Resets filters to the state of a new estimator with the same arguments.
 
-        position (S, 3), velocity (S, 3), attitude (S, 4); start: None keeps the UAV's own.
+        position (S, 3) m, velocity (S, 3) m/s, attitude (S, 4) map from body; start: None uses the
+        UAV's own. Raises `EstimatorError` if numbers are not finite or quaternions not of unit
+        length.
         """
         rows = checked_rows(rows, len(self))
         position = shaped("position", position, (len(rows), 3))
@@ -127,10 +131,10 @@ class Estimator:
     def predict(
         self, rows: ArrayLike, stamp_ns: int, angular_velocity: ArrayLike, specific_force: ArrayLike
     ) -> None:
-        """Take readings of the IMU: (S, 3) rad/s and (S, 3) m/s^2 in the sensors' axes.
+        """Integrates IMU measurements: (S, 3) rad/s and (S, 3) m/s^2 in the sensors' axes.
 
-        Raises EstimatorError at a row whose last reading is not earlier; those before it have taken
-        theirs.
+        Raises `EstimatorError` at a row whose last measurement is not earlier; the rows before it
+        are already integrated.
         """
         rows = checked_rows(rows, len(self))
         gyro = shaped("angular_velocity", angular_velocity, (len(rows), 3))
@@ -162,9 +166,9 @@ class Estimator:
         variances: ArrayLike,
         valid: ArrayLike | None = None,
     ) -> None:
-        """Take fixes: (S, 3) m and (S, 3) m/s of the antenna in the map.
+        """Queues GNSS fixes: position (S, 3) m and velocity (S, 3) m/s of the antenna, map frame.
 
-        variances: (6,) or (S, 6), position then velocity; inf marks what a receiver does not tell.
+        variances: (6,) or (S, 6), position then velocity; inf marks a quantity without measurement.
         """
         rows = checked_rows(rows, len(self))
         values = np.zeros((len(rows), 7))
@@ -180,7 +184,7 @@ class Estimator:
         variance: ArrayLike,
         valid: ArrayLike | None = None,
     ) -> None:
-        """Take heights of barometers: (S,) m; their datum is estimated. variance: () or (S,)."""
+        """Queues barometer heights (S,) m; their datum is estimated. variance: () or (S,) m^2."""
         self._fuse_columns(rows, stamp_ns, PRESSURE, [height], variance, valid)
 
     def fuse_magnetic(
@@ -191,7 +195,7 @@ class Estimator:
         variance: ArrayLike,
         valid: ArrayLike | None = None,
     ) -> None:
-        """Take fields (S, 3) in the magnetometers' axes, in the unit of `magnetic_field_map`.
+        """Queues fields (S, 3) in the magnetometers' axes, in the unit of `magnetic_field_map`.
 
         variance: () or (S,), of each component.
         """
@@ -207,10 +211,10 @@ class Estimator:
         ground_height: ArrayLike,
         valid: ArrayLike | None = None,
     ) -> None:
-        """Take distances (S,) m to flat ground at `ground_height` () or (S,) m in the map.
+        """Queues distances (S,) m to flat ground at `ground_height` () or (S,) m in the map.
 
-        Infinite ones (REP 117) are left out; ground that is not flat, or an obstacle, meets the
-        gate. variance: () or (S,).
+        Infinite ranges (REP 117) are skipped; the gate rejects uneven ground and obstacles.
+        variance: () or (S,) m^2.
         """
         self._fuse_columns(rows, stamp_ns, RANGE, [ranges, ground_height], variance, valid)
 
@@ -223,10 +227,10 @@ class Estimator:
         variances: ArrayLike,
         valid: ArrayLike | None = None,
     ) -> None:
-        """Take poses of the body in the map, such as SLAM's: (S, 3) m and (S, 4).
+        """Queues poses of the body in the map, such as SLAM's: (S, 3) m and (S, 4) map from body.
 
         variances: (6,) or (S, 6): x, y, z, m^2, and rotations about the map's axes, rad^2; inf in
-        either half leaves that half out.
+        either half skips that half.
         """
         rows = checked_rows(rows, len(self))
         values = np.zeros((len(rows), 7))
@@ -242,9 +246,9 @@ class Estimator:
         variances: ArrayLike,
         valid: ArrayLike | None = None,
     ) -> None:
-        """Take velocities (S, 3) m/s of the body: visual odometry's, or zero while it stands.
+        """Queues velocities (S, 3) m/s of the body, map frame: of visual odometry, or zero at rest.
 
-        variances: (3,) or (S, 3).
+        variances: (3,) or (S, 3) (m/s)^2.
         """
         rows = checked_rows(rows, len(self))
         values = np.zeros((len(rows), 7))
@@ -254,10 +258,10 @@ class Estimator:
         self._enqueue(rows, stamp_ns, STATED_VELOCITY, values, six, valid)
 
     def covariance(self, rows: ArrayLike) -> Array:
-        """Of the present error states (S, STATES, STATES), in the order of `records`.
+        """Returns the covariances (S, STATES, STATES) of the present error states.
 
-        Position and velocity are errors in the map, attitude a rotation vector in the map (true =
-        exp(error) * estimated).
+        They are ordered as in `records`. Position and velocity are errors in the map, attitude a
+        rotation vector in the map (true = exp(error) * estimated).
         """
         rows = checked_rows(rows, len(self))
         out = np.empty((len(rows), STATES * STATES))
@@ -265,28 +269,28 @@ class Estimator:
         return out.reshape(-1, STATES, STATES)
 
     def gate(self, aid: AidingSource) -> InnovationGate:
-        """Views of how measurements of an aid passed their gate."""
+        """Returns views of the gate statistics of an aiding source."""
         return InnovationGate(*(self._filters[name][:, aid] for name in InnovationGate._fields))
 
     @property
     def restarts(self) -> NDArray[np.int64]:
-        """(N,) how often the place was taken anew, from a GNSS fix or a pose."""
+        """(N,) number of restarts of the position from a GNSS fix or a pose."""
         return np.asarray(self._filters["restarts"])
 
     @property
     def dropped(self) -> NDArray[np.int64]:
-        """(N,) measurements that came too late, or found no room, to be fused."""
+        """(N,) number of measurements dropped because they were late or the queue was full."""
         return np.asarray(self._filters["dropped"])
 
     def continue_from(self, other: Estimator, kept: Sequence[tuple[int, int]]) -> None:
-        """Go on with filters of another estimator: own row and the other's, for each pair."""
+        """Copies filters of another estimator: (own row, other's row) for each pair."""
         for own, row in kept:
             self._filters[own] = other._filters[row]
             self._queues[own] = other._queues[row]
             self._copy_readings(own, other._rings[row])
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns copies of filters and queues."""
         return {
             "filters": self._filters.copy(),
             "rings": self._rings.copy(),
@@ -294,13 +298,13 @@ class Estimator:
         }
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a state of `get_state`."""
         self._filters[:] = state["filters"]
         self._rings[:] = state["rings"]
         self._queues[:] = state["queues"]
 
     def _copy_readings(self, row: int, ring: NDArray[np.void]) -> None:
-        """Take over the readings that wait in another ring, which may be of another length."""
+        """Copies the queued IMU measurements of another ring, whose length may differ."""
         state: Any = self._filters[row]
         waiting = min(int(state["waiting_readings"]), self._rings.shape[1])
         slots = (int(state["first_reading"]) + np.arange(waiting)) % len(ring)
@@ -310,7 +314,7 @@ class Estimator:
     def _begin(
         self, row: int, position: Array, velocity: Array, attitude: Array, start: StartSigmas
     ) -> None:
-        """Fill one row; rates of the body at the start count as zero for the IMU's own motion."""
+        """Initialises one row; the body's initial rates count as zero for the IMU's own motion."""
         own: NDArray[np.void] = self._filters[row]
         arm = rotations.rotate(attitude, self._tunings["imu_arm"][row])
         own["position_map"], own["velocity_map"], own["attitude"] = position, velocity, attitude

@@ -1,11 +1,11 @@
-"""The filter's step for rows of UAVs: take a reading of the IMU, fuse what is due.
+"""Filter steps for rows of UAVs: integrate an IMU measurement, fuse what is due.
 
-The filter proper runs at a horizon a fixed time behind the present, where every measurement can be
-fused at its own time and in order, however late it arrived. The present is that state, carried on
-through the readings since (the delayed fusion horizon of PX4's EKF2, after A. Khosravian, J.
+The filter runs at a horizon a fixed time behind the present, where every measurement is fused at
+its own time and in order, however late it arrived. The present is that state, propagated through
+the IMU measurements since (the delayed fusion horizon of PX4's EKF2, after A. Khosravian, J.
 Trumpf, R. Mahony, T. Hamel, "Recursive attitude estimation in the presence of multi-rate and
-multi-delay vector measurements", 2015; here the readings are integrated anew each time, instead of
-being followed by a complementary filter, so that the present adds no lag of its own).
+multi-delay vector measurements", 2015; here the measurements are integrated again each time,
+instead of tracked by a complementary filter, so that the present adds no lag of its own).
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ Rows = NDArray[np.int64]
 Records = NDArray[np.void]
 
 _LONGEST_FLOW = 0.1
-"""s; a longer stretch is carried into the covariance even where nothing is measured."""
+"""s; a longer interval is propagated into the covariance even without measurements."""
 _LARGE_TURN = 1e-6
 """rad^2; a smaller correction of attitude changes the covariance by less than a thousandth."""
 
@@ -67,10 +67,10 @@ def predict_rows(
     accel: Array,
     works: Records,
 ) -> int:
-    """Take a reading of the IMU of each of `rows` (S,), in sensor axes (S, 3).
+    """Integrates an IMU measurement of each of `rows` (S,), in sensor axes (S, 3).
 
-    rings: (N, readings); queues: (N, QUEUE); works: (1,). Returns how many rows were
-    served before one that has a reading of this or a later time already.
+    rings: (N, readings); queues: (N, QUEUE); works: (1,). Returns the number of rows processed
+    before one that already has a measurement of this or a later time.
     """
     work = works[0]
     capacity = rings.shape[1]
@@ -84,7 +84,7 @@ def predict_rows(
         _store(ring[slot], tuning, stamp_ns, gyro[s], accel[s])
         state.waiting_readings += 1
         state.newest_ns = stamp_ns
-        if first_ever:  # nothing is known of the time before: as now
+        if first_ever:  # the time before counts as now
             _copy_reading(state.reading, ring[slot], state.reading.stamp_ns)
         state.readings += 1
         horizon_ns = stamp_ns - tuning.horizon_ns
@@ -101,7 +101,7 @@ def predict_rows(
 
 @inner_kernel
 def _store(slot: Any, tuning: Any, stamp_ns: int, gyro: Array, accel: Array) -> None:
-    """Write a reading, turned from sensor to body axes, into the ring."""
+    """Writes a measurement, rotated from sensor to body axes, into the ring."""
     x, y, z, w = four(tuning.imu_attitude)
     a, b, c = three(gyro)
     slot.gyro[0], slot.gyro[1], slot.gyro[2] = rotate_vector(x, y, z, w, a, b, c)
@@ -150,7 +150,7 @@ def _fuse_due(state: Any, tuning: Any, queue: Any, work: Any) -> None:
 
 @part_kernel
 def _catch_up(state: Any, tuning: Any, work: Any) -> None:
-    """Bring the covariance, and what decays, to the time of the horizon."""
+    """Propagates the covariance and decaying states to the time of the horizon."""
     keep = work.keep
     decay(tuning, state.flow.duration, keep)
     carry(state.covariance, state.flow, tuning, keep)
@@ -164,7 +164,7 @@ def _catch_up(state: Any, tuning: Any, work: Any) -> None:
 
 @part_kernel
 def fuse(state: Any, tuning: Any, measured: Any, work: Any) -> None:
-    """Correct the state at the horizon by a measurement, each part if it passes its gate."""
+    """Corrects the state at the horizon by a measurement, each part if it passes its gate."""
     missed = False
     for part in range(PARTS):
         count = linearise(state, tuning, measured, part, work)
@@ -174,7 +174,7 @@ def fuse(state: Any, tuning: Any, measured: Any, work: Any) -> None:
         ratio = normalised_innovation(state.covariance, count, work)
         state.innovation[aid] = ratio
         is_fix = measured.kind == GNSS and part == 0
-        if ratio <= (tuning.gate_1 if count == 1 else tuning.gate_3):  # which NaN fails
+        if ratio <= (tuning.gate_1 if count == 1 else tuning.gate_3):  # false for NaN
             correct(state.covariance, count, work)
             take_over(state, work.error)
             state.accepted[aid] += 1
@@ -193,7 +193,7 @@ def fuse(state: Any, tuning: Any, measured: Any, work: Any) -> None:
 
 @inner_kernel
 def _is_lost(state: Any, patience_ns: int, measured: Any) -> bool:
-    """Whether this place, rejected as those before it, tells enough to begin from it."""
+    """Returns whether positions were rejected for long enough to restart from this one."""
     if state.rejected_since_ns < 0:
         state.rejected_since_ns = measured.stamp_ns
     complete = True
@@ -205,7 +205,7 @@ def _is_lost(state: Any, patience_ns: int, measured: Any) -> bool:
 
 @inner_kernel
 def _restart(state: Any, measured: Any, residual: Array) -> None:
-    """Take position and velocity anew from a GNSS fix."""
+    """Restarts position and velocity from a GNSS fix."""
     for k in range(3):
         state.position[k] += residual[k]
         state.velocity[k] = measured.value[3 + k]
@@ -216,7 +216,7 @@ def _restart(state: Any, measured: Any, residual: Array) -> None:
 
 @part_kernel
 def _restart_from_pose(state: Any, tuning: Any, measured: Any, work: Any) -> None:
-    """Take place and attitude anew; the velocity, as seen from the vehicle, goes on."""
+    """Restarts position and attitude from a pose; the velocity in body axes is unchanged."""
     if linearise(state, tuning, measured, 1, work) == 3:
         for k in range(STATES):
             work.error[k] = 0.0
@@ -241,7 +241,7 @@ def _restart_from_pose(state: Any, tuning: Any, measured: Any, work: Any) -> Non
 
 @part_kernel
 def take_over(state: Any, error: Array) -> None:
-    """Put the estimated error (STATES,) into the state at the horizon."""
+    """Adds the estimated error (STATES,) to the state at the horizon."""
     for k in range(3):
         state.position[k] += error[k]
         state.velocity[k] += error[VELOCITY + k]

@@ -1,4 +1,4 @@
-"""Where an estimator begins: near the truth, by chance as near as it says."""
+"""Initial estimates: ground truth with random errors."""
 
 from __future__ import annotations
 
@@ -20,9 +20,10 @@ def drawn_start(
     attitude: Array,
     sigmas: StartSigmas,
 ) -> tuple[Array, Array, Array]:
-    """What S UAVs believe at first of the true position, velocity (S, 3) and attitude (S, 4).
+    """Returns initial estimates of position, velocity (S, 3) and attitude (S, 4) of S UAVs.
 
-    keys: (S,) random streams. The errors are normal, with the standard deviations of `sigmas`.
+    position, velocity, attitude: the true ones. keys: (S,) random streams. The errors are normal,
+    with the standard deviations of `sigmas`.
     """
     draws = np.empty((len(keys), _NUMBERS))
     rng.fill_normal(keys, 0, draws)

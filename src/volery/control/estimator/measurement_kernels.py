@@ -1,7 +1,7 @@
-"""What each sensor should measure, and how that changes with the error states.
+"""Expected measurement of each sensor, and its derivative by the error states.
 
-A measurement of age t (between its stamp and the reading at which it is fused, less than an IMU
-period) is compared with the state of its own time, position - t velocity.
+A measurement of age t (between its stamp and the IMU measurement at which it is fused, less than an
+IMU period) is compared with the state of its own time, position - t velocity.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ _OFFSET_0 = PRESSURE_OFFSET
 def linearise(  # noqa: PLR0911
     state: Any, tuning: Any, measured: Any, part: int, work: Any
 ) -> int:
-    """Fill residual, its Jacobian H and noise variance of a `WORK`; returns the rows filled.
+    """Fills residual, its Jacobian H and noise variance of a `WORK`; returns the rows filled.
 
     state: a `FILTER` at its horizon; measured: a `MEASUREMENT`; part: 0 or 1. No rows: this part is
-    missing or cannot be used.
+    missing or not usable.
     """
     H, residual, variance = work.H, work.residual, work.variance
     for i in range(3):
@@ -79,7 +79,7 @@ def _has(measured: Any, part: int) -> bool:
 
 @inner_kernel
 def _arm(state: Any, tuning: Any, kind: int) -> tuple[float, float, float]:
-    """From the IMU to what is measured: the antenna, or the centre of mass; map, m."""
+    """Returns the vector from the IMU to the measured point, antenna or centre of mass; map, m."""
     x, y, z, w = four(state.rotation)
     sign = 1.0 if kind == GNSS else -1.0
     ax, ay, az = three(tuning.gnss_arm) if kind == GNSS else three(tuning.imu_arm)
@@ -88,7 +88,7 @@ def _arm(state: Any, tuning: Any, kind: int) -> tuple[float, float, float]:
 
 @inner_kernel
 def _swing(H: Array, row: int, axis: int, ax: float, ay: float, az: float) -> None:
-    """Row of H for component `axis` of an arm that turns with the vehicle: -[arm]x."""
+    """Fills a row of H for component `axis` of an arm that turns with the vehicle: -[arm]x."""
     if axis == 0:
         H[row, ROTATION + 1], H[row, ROTATION + 2] = az, -ay
     elif axis == 1:
@@ -99,7 +99,7 @@ def _swing(H: Array, row: int, axis: int, ax: float, ay: float, az: float) -> No
 
 @inner_kernel
 def turn_rate(state: Any) -> tuple[float, float, float]:
-    """Body rates at the horizon, rad/s, without bias."""
+    """Returns the body rates at the horizon, rad/s, without bias."""
     gx, gy, gz = three(state.reading.gyro)
     bx, by, bz = three(state.gyro_bias)
     return gx - bx, gy - by, gz - bz
@@ -191,10 +191,11 @@ def _pressure(
 def _range(
     state: Any, tuning: Any, measured: Any, age: float, H: Array, residual: Array, variance: Array
 ) -> int:
-    """Height over the plane at value[1], from the slant range value[0].
+    """Measures the height over the plane at value[1] by the slant range value[0].
 
-    A tilt within the cone does not lengthen the range, as the nearest echo stays straight below;
-    beyond it the range grows with the rest of the tilt (whose own error is left out: millimetres).
+    A tilt within the cone does not lengthen the range, as the nearest echo remains straight below;
+    beyond it the range grows with the rest of the tilt (the error of the tilt is left out:
+    millimetres).
     """
     x, y, z, w = four(state.rotation)
     ax, ay, az = three(tuning.range_axis)
@@ -218,10 +219,10 @@ def _range(
 def _heading(
     state: Any, tuning: Any, measured: Any, age: float, H: Array, residual: Array, variance: Array
 ) -> int:
-    """The angle by which the field's horizontal part misses the known field's.
+    """Measures the angle between the horizontal parts of the measured and the known field.
 
-    Only this angle is used: the field's strength and dip say little of the attitude that gravity
-    does not say better, and are the first to suffer from iron nearby.
+    Only this angle is used: strength and dip of the field add little to the attitude from gravity,
+    and nearby iron disturbs them first.
     """
     rx, ry, rz = turn_rate(state)
     x, y, z, w = four(tuning.magnetic_attitude)

@@ -1,9 +1,9 @@
-"""The motion that IMU readings tell, and how errors flow along with it.
+"""Motion from IMU measurements, and the error transition along it.
 
 The error of attitude is a rotation vector r in the map: true = exp(r) * estimated (the "global
 angular error" of J. Sola, "Quaternion kinematics for the error-state Kalman filter", 2017, section
-7). It does not turn with the vehicle, so that the error transition over any stretch of motion is a
-few integrals (`records.FLOW`), taken along at each reading.
+7). It does not turn with the vehicle, so that the error transition over any motion is a few
+integrals (`records.FLOW`), updated at each measurement.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from volery.vehicle.rotation_math import four, matrix_of, three, turned
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 Motion = tuple[Vector, Vector, Quaternion, Vector]
-"""Position m, velocity m/s, rotation map from body, specific force m/s^2; all in the map."""
+"""Position m, velocity m/s, rotation map from body, specific force m/s^2; map frame."""
 
 
 @inner_kernel
 def travelled(
     motion: Motion, before: Any, reading: Any, gyro_bias: Vector, accel: Vector
 ) -> Motion:
-    """The motion at `reading`, from that at the reading `before`.
+    """Returns the motion at `reading`, from that at the measurement `before`.
 
-    Readings are momentary values: their mean stands for the time between them. accel: bias of the
-    accelerometer.
+    IMU measurements are momentary values: their mean holds for the time between them. accel: bias
+    of the accelerometer.
     """
     (px, py, pz), (vx, vy, vz), (x, y, z, w), (ax, ay, az) = motion
     dt = (reading.stamp_ns - before.stamp_ns) * 1e-9
@@ -60,7 +60,7 @@ def travelled(
 
 @inner_kernel
 def felt(rotation: Quaternion, reading: Any, accel_bias: Vector) -> Vector:
-    """Specific force in the map, m/s^2, without its bias."""
+    """Returns the specific force in the map, m/s^2, without its bias."""
     x, y, z, w = rotation
     fx, fy, fz = three(reading.accel)
     return rotate_vector(x, y, z, w, fx - accel_bias[0], fy - accel_bias[1], fz - accel_bias[2])
@@ -68,7 +68,7 @@ def felt(rotation: Quaternion, reading: Any, accel_bias: Vector) -> Vector:
 
 @inner_kernel
 def motion_at_horizon(state: Any) -> Motion:
-    """Of a `FILTER`, at the IMU."""
+    """Returns the motion of a `FILTER` at its horizon, at the IMU."""
     rotation = four(state.rotation)
     force = felt(rotation, state.reading, three(state.accel_bias))
     return three(state.position), three(state.velocity), rotation, force
@@ -76,7 +76,7 @@ def motion_at_horizon(state: Any) -> Motion:
 
 @part_kernel
 def flow_on(flow: Any, dt: float, before: Motion, after: Motion) -> None:
-    """Take the motion between two readings, `dt` s apart, into a `FLOW`."""
+    """Adds the motion between two measurements, `dt` s apart, to a `FLOW`."""
     half = 0.5 * dt
     x, y, z, w = before[2]
     first = matrix_of(x, y, z, w)
@@ -86,7 +86,7 @@ def flow_on(flow: Any, dt: float, before: Motion, after: Motion) -> None:
     ay = half * (before[3][1] + after[3][1])
     az = half * (before[3][2] + after[3][2])
     for j in range(3):
-        # what the gyro bias of axis j has turned, mean over the step
+        # rotation by the gyro bias of axis j, mean over the step
         mx = flow.turn[0, j] + half * first[j]
         my = flow.turn[1, j] + half * first[3 + j]
         mz = flow.turn[2, j] + half * first[6 + j]
@@ -109,7 +109,7 @@ def flow_on(flow: Any, dt: float, before: Motion, after: Motion) -> None:
 
 @part_kernel
 def still(flow: Any) -> None:
-    """Make a `FLOW` that of no motion."""
+    """Resets a `FLOW` to no motion."""
     flow.duration = 0.0
     for i in range(3):
         flow.speed[i] = flow.way[i] = 0.0

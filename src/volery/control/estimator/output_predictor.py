@@ -1,4 +1,4 @@
-"""The present: the state at the horizon, carried on through the readings since."""
+"""The present state: the state at the horizon, propagated through later IMU measurements."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Records = NDArray[np.void]
 
 @part_kernel
 def renew_present(state: Any, tuning: Any, ring: Any) -> None:
-    """The state at the newest reading, at the centre of mass."""
+    """Computes the state at the newest measurement, at the centre of mass."""
     motion = motion_at_horizon(state)
     gyro_bias, accel_bias = three(state.gyro_bias), three(state.accel_bias)
     before = state.reading
@@ -48,7 +48,7 @@ def renew_present(state: Any, tuning: Any, ring: Any) -> None:
 def _arm_and_swing(
     state: Any, tuning: Any
 ) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """From centre of mass to IMU, m, and its speed relative to it, m/s; map, present."""
+    """Returns the vector from centre of mass to IMU, m, and its velocity, m/s; map frame."""
     x, y, z, w = four(state.attitude)
     ax, ay, az = three(tuning.imu_arm)
     wx, wy, wz = three(state.omega_body)
@@ -60,7 +60,7 @@ def _arm_and_swing(
 def present_covariances(
     filters: Records, tunings: Records, rings: Records, rows: Rows, works: Records, out: Array
 ) -> None:
-    """Covariance out (S, STATES^2) of the present, of the centre of mass; works: (1,)."""
+    """Computes present covariances `out` (S, STATES^2), at the centre of mass; works: (1,)."""
     work = works[0]
     flow, keep = work.flow, work.keep
     for s in range(len(rows)):
@@ -99,7 +99,7 @@ def _copy_flow(target: Any, source: Any) -> None:
 
 @part_kernel
 def _lever(state: Any, tuning: Any, flow: Any) -> None:
-    """As a `FLOW`, the way from the errors of the IMU's motion to those of the centre of mass."""
+    """Sets `flow` to the transition of errors from the IMU to the centre of mass."""
     still(flow)
     arm, swing = _arm_and_swing(state, tuning)
     x, y, z, w = four(state.attitude)
@@ -107,7 +107,7 @@ def _lever(state: Any, tuning: Any, flow: Any) -> None:
     for k in range(3):
         flow.way[k] = -arm[k]
         flow.speed[k] = -swing[k]
-        # -R [arm]x: a bias of the gyroscope swings the arm
+        # -R [arm]x: effect of a gyroscope bias on the arm
         sx, sy, sz = cross(ax, ay, az, 1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2))
         sx, sy, sz = rotate_vector(x, y, z, w, -sx, -sy, -sz)
         flow.gyro_speed[0, k], flow.gyro_speed[1, k], flow.gyro_speed[2, k] = sx, sy, sz

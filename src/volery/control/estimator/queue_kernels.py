@@ -1,4 +1,4 @@
-"""Measurements wait for the horizon, in the order of their time."""
+"""Queues of measurements that await the horizon, ordered by time."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ def enqueue_rows(
     variances: Array,
     valid: NDArray[np.bool_],
 ) -> None:
-    """Let measurements wait for the horizon, sorted by stamp, then kind.
+    """Queues measurements for the horizon, sorted by stamp, then kind.
 
-    values (S, 7), variances (S, 6). One that is too late, or finds the queue full, is counted as
-    dropped.
+    values (S, 7), variances (S, 6), valid (S,). Late measurements, and those that find the queue
+    full, are counted as dropped.
     """
     for s in range(len(rows)):
         if not valid[s]:

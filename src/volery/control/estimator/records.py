@@ -1,4 +1,4 @@
-"""The filter's data: what it knows of one UAV, its assumptions, and what waits to be fused."""
+"""Records of the filter: state of one UAV, assumptions, and queued measurements."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ Array = NDArray[np.float64]
 POSITION, VELOCITY, ROTATION, GYRO_BIAS, ACCEL_BIAS = 0, 3, 6, 9, 12
 """First of three error states each: map, map, rotation vector in the map, body, body ..."""
 PRESSURE_OFFSET, HEADING_OFFSET, GNSS_OFFSET = 15, 16, 17
-"""... and the slow errors of the aids: m, rad, three m in the map."""
+"""... and the slow errors of the aiding sources: m, rad, three m in the map."""
 STATES = 20
 OFFSETS = STATES - PRESSURE_OFFSET
 
 GNSS, PRESSURE, MAGNETIC, RANGE, POSE, STATED_VELOCITY = range(6)
-"""Kinds of measurements; each has up to two parts that are gated apart."""
+"""Kinds of measurements; each has up to two parts with a gate each."""
 PARTS = 2
 QUEUE = 96
-"""Measurements of one UAV that can wait for the horizon."""
+"""Maximum number of queued measurements of one UAV."""
 
 
 class AidingSource(IntEnum):
-    """What corrects the filter, each with its own gate."""
+    """Aiding sources of the filter, each with its own gate."""
 
     GNSS_POSITION = PARTS * GNSS
     GNSS_VELOCITY = PARTS * GNSS + 1
@@ -42,12 +42,12 @@ class AidingSource(IntEnum):
 AIDS = PARTS * 6
 
 READING = np.dtype([("stamp_ns", "i8"), ("gyro", "f8", 3), ("accel", "f8", 3)], align=True)
-"""An IMU's reading, body axes: rad/s, m/s^2."""
+"""An IMU measurement, body axes: rad/s, m/s^2."""
 
 MEASUREMENT = np.dtype(
     [("stamp_ns", "i8"), ("kind", "i8"), ("value", "f8", 7), ("variance", "f8", 6)], align=True
 )
-"""What waits for the horizon; an infinite variance marks a missing part."""
+"""A queued measurement; an infinite variance marks a missing part."""
 
 FLOW = np.dtype(
     [
@@ -61,7 +61,7 @@ FLOW = np.dtype(
     ],
     align=True,
 )
-"""The error transition over a stretch of motion, in the integrals that make its blocks:
+"""The error transition over an interval of motion, as the integrals of its blocks:
 
 p' = p + T v - way x r + gyro_way g - turn_way a
 v' = v - speed x r + gyro_speed g - turn a
@@ -101,7 +101,7 @@ FILTER = np.dtype(
     ],
     align=True,
 )
-"""All that one UAV's filter knows."""
+"""State of one UAV's filter."""
 
 WORK = np.dtype(
     [
@@ -119,7 +119,7 @@ WORK = np.dtype(
     ],
     align=True,
 )
-"""Room to work in; nothing of it outlives a call."""
+"""Temporary memory; valid within a call only."""
 
 TUNING = np.dtype(
     [
@@ -151,11 +151,11 @@ TUNING = np.dtype(
     ],
     align=True,
 )
-"""The assumptions of one UAV's filter."""
+"""Parameters of one UAV's filter."""
 
 
 def tuning_of(settings: EstimatorSettings, mounting: Mounting) -> NDArray[np.void]:
-    """The (1,) record of `settings` and `mounting`."""
+    """Returns the (1,) `TUNING` record of `settings` and `mounting`."""
     record = np.zeros(1, TUNING)
     row = record[0]
     row["horizon_ns"] = round(settings.horizon_s * 1e9)

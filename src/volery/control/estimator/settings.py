@@ -1,4 +1,4 @@
-"""What the estimator assumes: noise of its sensors, where they are mounted, how well it starts."""
+"""Settings of the estimator: sensor noise, mounting, initial uncertainty."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ NonNegativeVector = tuple[NonNegativeFloat, NonNegativeFloat, NonNegativeFloat]
 Quaternion = tuple[float, float, float, float]
 _LEAST_DENSITY = 1e-9
 Density = Annotated[NonNegativeFloat, AfterValidator(lambda value: max(value, _LEAST_DENSITY))]
-"""Of white noise; a sensor without any is taken to have a little, so that the filter is regular."""
+"""Density of white noise; zero becomes a small value, so that the filter is regular."""
 
 
 class EstimatorSettings(Bounded):
@@ -34,54 +34,54 @@ class EstimatorSettings(Bounded):
     accel_bias_correlation_s: PositiveFloat = 300.0
     accel_turn_on_bias_m_s2: NonNegativeFloat = 0.196
     imu_rate_hz: PositiveFloat = 200.0
-    """Sizes the buffer; faster readings only shorten the horizon."""
+    """Sizes the buffer; a higher actual rate shortens the horizon."""
 
     horizon_s: NonNegativeFloat = 0.13
-    """How far behind the present measurements are fused; no sensor's delay should be longer.
-    Default: the 120 ms of PX4's simulated GNSS receiver and two IMU periods."""
+    """Delay of the fusion horizon; no sensor's delay should be longer. Default: the 120 ms of PX4's
+    simulated GNSS receiver and two IMU periods."""
     lateness_s: NonNegativeFloat = 0.02
-    """A measurement that is older than the horizon by more is dropped (modelling choice)."""
+    """Measurements older than the horizon by more than this are dropped (modelling choice)."""
 
     gnss_offset_sigma_m: NonNegativeVector = (0.5, 0.5, 0.8)
     """East, north, up: slow part of a receiver's position error, which its stated variances do not
-    show as such (modelling choice, within the 1 m that PX4's simulated receiver states)."""
+    include as such (modelling choice, within the 1 m that PX4's simulated receiver states)."""
     gnss_offset_correlation_s: PositiveFloat = 60.0
     """Correlation time of that part (PX4's simulated receiver)."""
     pressure_offset_sigma_m: NonNegativeFloat = 20.0
     """Datum of the pressure height at the start; 20 m is 2.4 hPa of weather (modelling choice)."""
     pressure_drift_m_sqrt_s: NonNegativeFloat = 0.05
-    """Its random walk: 3 m in an hour of changing weather (modelling choice)."""
+    """Random walk of that datum: 3 m in an hour of changing weather (modelling choice)."""
     magnetic_field_map: Vector = (1.13e-6, 2.161e-5, -4.302e-5)
     """East, north, up; T, or any other unit that the magnetometer reports. Default: 48 uT, inclined
     by 63.3 deg and declined by 3 deg, as at the origin of PX4's simulated world."""
     magnetic_strength_tolerance: PositiveFloat = 0.3
-    """A field stronger or weaker by this share is a disturbance (modelling choice)."""
+    """A field that deviates by more than this fraction is a disturbance (modelling choice)."""
     heading_offset_sigma_rad: NonNegativeFloat = 0.02
     """Slow heading error of the magnetometer: hard iron, declination (modelling choice)."""
     heading_offset_correlation_s: PositiveFloat = 600.0
     """Correlation time of PX4's simulated magnetometer."""
     range_half_cone_rad: NonNegativeFloat = math.radians(12.0)
-    """A sonar hears the ground straight below while it is tilted by no more than this."""
+    """Tilt up to which a sonar measures the ground straight below."""
     range_largest_tilt_rad: Annotated[float, Field(gt=0.0, lt=1.5)] = math.radians(25.0)
-    """Beyond, ranges are not used (modelling choice)."""
+    """Maximum tilt at which ranges are used (modelling choice)."""
     ground_sigma_m: NonNegativeFloat = 0.05
-    """How far flat ground is from flat (modelling choice)."""
+    """Unevenness of flat ground (modelling choice)."""
 
     gate_1: PositiveFloat = 25.0
-    """Largest normalised squared innovation of one number: five sigma, as PX4 gates."""
+    """Maximum normalised squared innovation of one number: five sigma, as PX4 gates."""
     gate_3: PositiveFloat = 32.0
-    """Largest one of three numbers, with about the same probability of a false alarm."""
+    """Maximum of three numbers, with about the same probability of a false alarm."""
     restart_after_s: PositiveFloat = 7.0
-    """After rejecting all GNSS positions for this long the filter believes the receiver again and
-    restarts position and velocity from a fix that tells both (PX4's EKF2 resets after 7 s)."""
+    """After rejecting all GNSS positions for this time the filter restarts position and velocity
+    from a fix with both (PX4's EKF2 resets after 7 s)."""
     pose_restart_after_s: PositiveFloat = 1.0
-    """The same of poses: a SLAM that has found itself elsewhere insists. It is soon, because what
-    would pass the gate later on, as uncertainty grows, would be taken for a drift in velocity."""
+    """The same for poses, after a SLAM has relocalized. The time is short, because poses that pass
+    the gate later, as uncertainty grows, would appear as a drift in velocity."""
 
 
 @dataclass(frozen=True)
 class Mounting:
-    """Where the sensors of one UAV sit, m from its centre of mass, and how they are turned; FLU."""
+    """Mounting of one UAV's sensors: m from the centre of mass, and orientation; FLU."""
 
     imu_position_body: Vector = (0.0, 0.0, 0.0)
     imu_attitude_body: Quaternion = (0.0, 0.0, 0.0, 1.0)
@@ -90,15 +90,16 @@ class Mounting:
     magnetometer_attitude_body: Quaternion = (0.0, 0.0, 0.0, 1.0)
     range_position_body: Vector = (0.0, 0.0, 0.0)
     range_axis_body: Vector = (0.0, 0.0, -1.0)
-    """Unit vector along which the range finder looks."""
+    """Unit vector of the range finder's axis."""
 
 
 @dataclass(frozen=True)
 class StartSigmas:
-    """How well the state is known at the start, one standard deviation (modelling choices).
+    """Standard deviations of the initial state (modelling choices).
 
-    With `aligned` the attitude comes from `align_at_rest`: its errors then follow from those of
-    accelerometer and magnetometer; `tilt_rad` and `heading_rad` are what averaged noise adds.
+    With `aligned` the attitude comes from `align_at_rest`: its errors then follow from the errors
+    of accelerometer and magnetometer; `tilt_rad` and `heading_rad` are the contribution of averaged
+    noise.
     """
 
     position_m: Vector = (0.5, 0.5, 0.5)
@@ -112,4 +113,4 @@ AT_REST = StartSigmas(
     velocity_m_s=(0.01, 0.01, 0.01), tilt_rad=2e-3, heading_rad=5e-3, aligned=True
 )
 """On the ground, attitude from `align_at_rest` over about a second. The tilt covers averaged noise
-and what the filter's first order leaves out: heading error times accelerometer bias."""
+and an effect beyond the filter's first order: heading error times accelerometer bias."""

@@ -1,4 +1,4 @@
-"""The scenarios that ship: one TOML file each in this folder."""
+"""The shipped scenarios: one TOML file each in this folder."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _FOLDER = Path(__file__).parent
 
 
 def names() -> list[str]:
-    """Names of all shipped scenarios, sorted."""
+    """Returns the names of all shipped scenarios, sorted."""
     return list(_names())
 
 
@@ -20,11 +20,11 @@ def _names() -> tuple[str, ...]:
 
 
 def path_of(name: str) -> Path | None:
-    """File of a shipped scenario, or None."""
+    """Returns the file of a shipped scenario, or None."""
     return _FOLDER / f"{name}.toml" if name in names() else None
 
 
 def describe(name: str) -> str:
-    """First line of a shipped scenario's description."""
+    """Returns the first line of a shipped scenario's description."""
     data = tomllib.loads((_FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
     return str(data.get("description", "")).strip().split("\n")[0]

@@ -1,1 +1,1 @@
-"""Cameras: lenses, shading, and pictures of a scene."""
+"""Cameras: lenses, shading, and images of a scene."""

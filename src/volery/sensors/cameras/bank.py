@@ -1,4 +1,4 @@
-"""All cameras of one model and phase, exposed together."""
+"""The bank of all cameras of one model and phase."""
 
 from __future__ import annotations
 
@@ -27,10 +27,13 @@ _LONGEST_READOUT_NS = KEPT_NS - 10_000_000
 
 
 class CameraBank(NoisyBank):
-    """Pictures of all cameras of the bank; `keys` (S,) are their noise streams, or None.
+    """Renders the images of all cameras of one model and phase together.
 
-    A picture is known when its last row has been read out. Only what somebody wants is made, as
-    `wants()` says: nobody's later picture depends on it. light_in: the light in a weather.
+    `keys` (S,) are the noise streams, or None for cameras without noise. An image is available when
+    its last row has been read out. Only the parts that `wants()` returns are rendered; the choice
+    does not affect later images. `light_in` returns the light in a weather.
+
+    Raises `DataFileError` if the model's readout takes longer than the pose history reaches.
     """
 
     name = "camera"
@@ -53,7 +56,7 @@ class CameraBank(NoisyBank):
         super().__init__(schedule, sensors, keys)
         self.lag_ns = model.readout_ns
         self.wants: Callable[[], Collection[Part]] = lambda: EVERY_PART
-        """What of the pictures is wanted now."""
+        """Returns the parts of the images that have receivers now."""
         self._model = model if keys is not None else model.without_noise()
         self._scene = scene
         self._light_in = light_in
@@ -61,15 +64,19 @@ class CameraBank(NoisyBank):
 
     @property
     def pixels(self) -> int:
-        """How many a picture has."""
+        """Pixels of an image."""
         return self._model.width * self._model.height
 
     def is_wanted(self) -> bool:
-        """Whether anybody would receive a picture."""
+        """Returns whether any part of the images has a receiver."""
         return bool(self.wants())
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> CameraFrames:
-        """Picture number k of all cameras of the bank; `time_ns` is that of the first row."""
+        """Returns image number `k` of all cameras; `time_ns` is the exposure of the first row.
+
+        Parts without a receiver have no pixels, (S, 0, 0), unless none has one: then all are
+        rendered.
+        """
         batch = make_batch(
             self._rows,
             np.arange(len(self._rows)),
@@ -94,7 +101,7 @@ class CameraBank(NoisyBank):
 
 
 def _arrays(pictures: Images) -> dict[str, Any]:
-    """Arrays of all parts, without pixels where a part was not wanted."""
+    """Returns the arrays of all parts; a part that was not rendered has no pixels."""
     count = next(len(part) for part in pictures if part is not None)
     return {
         name: owned(np.zeros((count, 0, 0), _KINDS[name]) if part is None else part)

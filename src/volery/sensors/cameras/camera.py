@@ -1,4 +1,4 @@
-"""Pictures of a scene, taken by several cameras of one model at once."""
+"""Images of a scene from several cameras of one model, rendered together."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ EVERY_PART: tuple[Part, ...] = ("colour", "depth", "labels")
 
 
 class Images(NamedTuple):
-    """S pictures; what was not wanted is None."""
+    """Images of S exposures; a part that was not requested is None."""
 
     colour: NDArray[np.uint8] | None
     """(S, height, width, 3) sRGB."""
     depth: NDArray[np.float32] | None
-    """(S, height, width) m along the optical axis; -inf: nearer than the camera sees, inf: farther,
-    NaN: outside of what its lens shows."""
+    """(S, height, width) m along the optical axis; -inf: nearer than `near_m`, inf: beyond `far_m`,
+    NaN: outside the lens's image."""
     instance: NDArray[np.int32] | None
-    """(S, height, width) instance of the scene, -1 for none."""
+    """(S, height, width) scene instance, -1 for none."""
     material: NDArray[np.uint8] | None
     """(S, height, width) `Material`."""
 
@@ -55,18 +55,18 @@ def take(
     falling: Sequence[Falling] = (),
     workers: Workers | None = None,
 ) -> Images:
-    """Expose the batch's pictures: the first row of each at its `sweep_start_ns`.
+    """Renders the batch's S images and returns the requested `parts`.
 
-    Noise follows from `key` and `scan_number`, the number of a camera's picture.
-    `history` must reach from the earliest exposure to the end of the latest one's readout. A camera
-    does not see its own UAV. The rotors of others are where `rotors` says; None: blurred to discs.
-    The same picture comes of any number of threads. falling: drops and flakes, which are seen in
-    the colour picture alone.
+    The first row of each image is exposed at its `sweep_start_ns`. Noise depends on `key` and
+    `scan_number`, the number of a camera's image. `history` must reach from the earliest exposure
+    to the end of the latest readout. A camera does not see its own UAV. `rotors` holds the rotor
+    angles of the other UAVs; None draws blurred discs. `falling`: drops and flakes, drawn into the
+    colour image only. Images do not depend on the number of threads.
     """
     shots, pixels = len(batch.uav), model.width * model.height
     colour, depth, labels = (pixels if part in parts else 0 for part in EVERY_PART)
     if colour and falling:
-        depth = pixels  # to know what they are before
+        depth = pixels  # hides particles behind surfaces
     frames = Frames(
         np.empty((shots, colour, 3), np.uint8),
         np.empty((shots, depth), np.float32),
@@ -132,7 +132,7 @@ def _view_of(model: CameraModel) -> WeatherView:
 
 @cache
 def _linear() -> NDArray[np.float32]:
-    """(256,) light of a byte: IEC 61966-2-1 (sRGB)."""
+    """Returns (256,) linear light of each byte value: IEC 61966-2-1 (sRGB)."""
     coded = np.arange(256) / 255.0
     light = np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4)
     return np.asarray(light, dtype=np.float32)
@@ -140,6 +140,6 @@ def _linear() -> NDArray[np.float32]:
 
 @cache
 def _normals() -> NDArray[np.float32]:
-    """Quantiles of the normal distribution in the middles of equal shares."""
+    """Returns (NORMALS,) quantiles of the normal distribution at the middles of equal intervals."""
     quantile = NormalDist().inv_cdf
     return np.array([quantile((i + 0.5) / NORMALS) for i in range(NORMALS)], dtype=np.float32)

@@ -1,4 +1,4 @@
-"""Compiled pictures: rays of pixels are aimed, cast and shaded in pieces that threads share."""
+"""Compiled rendering: rays of pixels are aimed, cast and shaded in pieces that threads share."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from volery.world.embree import DIRECTION, FAR, LANES, ORIGIN
 from volery.world.scene_kernels import RayBlock, SceneHandle, cast_block, near_bodies
 
 NORMALS = 4096
-"""Size of the table of normal numbers: its largest is 3.7 standard deviations."""
+"""Size of the table of normal numbers; the largest is 3.7 standard deviations."""
 
 f4 = np.float32
 _LAST = np.uint64(NORMALS - 1)
 _CHANNEL_BITS, _DEPTH_BITS = np.uint64(12), np.uint64(36)
-"""Three channels and the depth draw from twelve of a pixel's random bits each."""
+"""Bits of a pixel's random number: three channels and the depth use twelve each."""
 
 
 class Frames(NamedTuple):
-    """What is wanted of S pictures; arrays without pixels are left alone."""
+    """Output arrays of S images; arrays without pixels are not written."""
 
     colour: NDArray[np.uint8]
     """(S, height * width, 3) sRGB, or (S, 0, 3)."""
@@ -44,19 +44,19 @@ class Frames(NamedTuple):
 
 
 class Optics(NamedTuple):
-    """Numbers of a camera that kernels need."""
+    """Parameters of a camera for kernels."""
 
     near_m: float
     far_m: float
     reach_m: float
-    """Length of the longest ray: to `far_m` in the picture's corner."""
+    """Length of the longest ray: to depth `far_m` in the image's corner."""
     readout_ns: int
     exposure: float
     read_noise: float
     shot_noise: float
     depth_noise_per_m: float
     normals: NDArray[np.float32]
-    """(NORMALS,) normal numbers from which noise is drawn."""
+    """(NORMALS,) normal numbers that noise is drawn from."""
 
 
 @inner_kernel
@@ -69,7 +69,7 @@ def _aim(
     count: int,
     block: RayBlock,
 ) -> None:
-    """Fill packets with the rays of a picture's packets from `first` on."""
+    """Fills `block` with the rays of `count` packets of an image, from packet `first` on."""
     known_ns = np.int64(-1)
     frame = sensor_frame(batch, shot, history, batch.sweep_start_ns[shot])
     for p in range(count):
@@ -97,7 +97,7 @@ def _near(
     optics: Optics,
     near: NDArray[np.int32],
 ) -> int:
-    """List the other UAVs that a piece of the picture may show; their number."""
+    """Lists in `near` the other UAVs that a piece of the image may show; returns their number."""
     bodies = scene.bodies
     if bodies.scene.shape[0] == 0:
         return 0
@@ -133,7 +133,7 @@ def _near(
 
 @inner_kernel
 def _first_number(table: PixelTable, batch: RayBatch, shot: int) -> int:
-    """Where in its stream a picture's random bits begin: a number a pixel."""
+    """Returns the index of an image's first random number; each pixel has one."""
     room = table.direction.shape[0] * LANES
     return int(batch.scan_number[shot] * room)
 
@@ -149,7 +149,7 @@ def _write_geometry(
     shot: int,
     frames: Frames,
 ) -> None:
-    """Depth and labels of pixels, of the first sample of each."""
+    """Writes depth and labels of pixels, from the first sample of each."""
     wants_depth, wants_labels = frames.depth.shape[1] > 0, frames.instance.shape[1] > 0
     is_noisy = optics.depth_noise_per_m > 0.0
     normals, key, number = optics.normals, batch.key[shot], _first_number(table, batch, shot)
@@ -170,7 +170,7 @@ def _write_geometry(
                     depth = f4(-np.inf)
                 elif is_noisy:
                     drawn = normals[(random_bits(key, number + pixel) >> _DEPTH_BITS) & _LAST]
-                    # The noise of stereo is one of 1 / depth; without any left it is too far.
+                    # Stereo noise acts on 1 / depth; where that becomes too small, depth is inf.
                     share = f4(1.0) + f4(optics.depth_noise_per_m) * drawn * depth
                     depth = depth / share if share * far > depth else f4(np.inf)
                 frames.depth[shot, pixel] = depth
@@ -183,7 +183,7 @@ def _write_geometry(
 def _gather_light(
     colour: NDArray[np.float32], blinds: NDArray[np.bool_], samples: int, scale: Any
 ) -> None:
-    """Make a packet's linear colours the exposed means of pixels, in the first lane of each."""
+    """Turns a packet's linear colours into exposed pixel means, in the first lane of each pixel."""
     for j in range(3):
         for k in range(LANES):
             bounded = min(max(colour[j, k], f4(0.0)), f4(1e4))
@@ -207,7 +207,7 @@ def _write_colour(
     colours: NDArray[np.float32],
     frames: Frames,
 ) -> None:
-    """Bytes of pixels, each the mean of its samples' light."""
+    """Writes the bytes of pixels, each the mean of its samples' light."""
     samples, codes, out = table.samples, light.code, frames.colour[shot]
     scale = f4(optics.exposure / samples)
     is_noisy = optics.read_noise > 0.0 or optics.shot_noise > 0.0
@@ -248,7 +248,13 @@ def take_pictures(
     block: RayBlock,
     frames: Frames,
 ) -> None:
-    """Take pieces of pictures, one by one from `counter`."""
+    """Renders pieces of images, numbered by `counter`, until none is left; runs in every thread.
+
+    A piece is PIECE packets of one image. Rays start at the camera's pose at the exposure of their
+    row, map frame; UAVs and actors move from `bodies_start_ns` to `bodies_end_ns`. `counter` (1,)
+    is shared by all threads, `block` is the calling thread's memory. Results go to `frames`; its
+    arrays without pixels are skipped.
+    """
     packets = table.direction.shape[0]
     pieces = (packets + PIECE - 1) // PIECE
     interval = max(bodies_end_ns - bodies_start_ns, 1)

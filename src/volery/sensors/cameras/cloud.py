@@ -1,4 +1,4 @@
-"""From depth to points: one for each pixel, in rows and columns as the picture has them."""
+"""Point clouds from depth images: one point per pixel, in the rows and columns of the image."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from volery.sensors.cameras.model import CameraModel
 
 PLAIN = ("x", "y", "z")
 COLOURED = (*PLAIN, "rgb")
-"""Fields of a point, all of four bytes; `rgb` is 0x00RRGGBB, which PCL and RViz keep in a float."""
+"""Fields of a point, four bytes each; `rgb` is 0x00RRGGBB, which PCL and RViz read as a float."""
 
 
 def organised_points(
     model: CameraModel, depth: NDArray[np.float32], colour: NDArray[np.uint8] | None
 ) -> NDArray[np.float32]:
-    """Points (height, width, 3 or 4) of a picture in the optical frame, m, and their colours.
+    """Returns points (height, width, 3 or 4) of an image in the optical frame, m, with colours.
 
-    depth: (height, width) m along the optical axis. A point of a pixel whose depth is not finite
-    is NaN. colour: (height, width, 3) sRGB; None: points without `rgb`.
+    depth: (height, width) m along the optical axis; where it is not finite, the point is NaN.
+    colour: (height, width, 3) sRGB; None: points without `rgb`.
     """
     fields = PLAIN if colour is None else COLOURED
     points = np.empty((*depth.shape, len(fields)), np.float32)
@@ -36,7 +36,7 @@ def _fill(
     points: NDArray[np.float32],
     words: NDArray[np.uint32],
 ) -> None:
-    """Enter all points; `words` are the same memory as `points`."""
+    """Writes all points; `words` are the same memory as `points`."""
     nothing = np.float32(np.nan)
     for v in range(depth.shape[0]):
         for u in range(depth.shape[1]):

@@ -1,8 +1,8 @@
-"""Compiled look of outer walls: storeys of windows by height and by distance along the wall.
+"""Compiled texture of outer walls: storeys of windows by height and by distance along the wall.
 
 Bays have one width everywhere and are counted along the wall's direction from the map's origin, so
-nothing needs to be known of a wall but where the ray met it; a window may be cut by a corner. All
-numbers are modelling choices.
+that the texture depends on the hit point alone; a corner may cut a window. All numbers are
+modelling choices.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ f4 = np.float32
 _BAY_M = np.float32(2.6)
 _MASK = GRAIN - 1
 _PIXEL = np.float32(0.0015)
-"""Radians: edges are softened over what a pixel of a usual camera sees, against flicker."""
+"""Angle over which edges are softened, rad: about a pixel of a usual camera, against flicker."""
 _MULLION_M = np.float32(0.04)
 
 
 @inner_kernel
 def _within(offset: Any, half: Any, edge: Any) -> Any:
-    """1 where `offset` from the middle is less than `half`, 0 beyond, soft over `edge`, all m."""
+    """Returns 1 for `offset` from the middle below `half`, 0 above, soft over `edge`, all m."""
     return min(max((half - abs(offset)) / edge + f4(0.5), f4(0.0)), f4(1.0))
 
 
@@ -33,9 +33,10 @@ def _within(offset: Any, half: Any, edge: Any) -> Any:
 def pane_share(
     look: NDArray[np.float32], x: Any, y: Any, z: Any, nx: Any, ny: Any, distance: Any
 ) -> tuple[Any, Any]:
-    """How much of a wall's point is glass, 0 to 1, and the number of its window.
+    """Returns the fraction of glass at a wall's point, 0 to 1, and the number of its window.
 
-    look: row of `scene_content.Look`. (x, y, z) m, map; (nx, ny) of the wall's normal.
+    look: row of `scene_content.Look`. (x, y, z) m, map; (nx, ny) of the wall's normal; distance in
+    m.
     """
     up = (z - look[3]) / look[4]
     row = np.floor(up)
@@ -45,7 +46,7 @@ def pane_share(
     bay = np.floor(along)
     aside = (along - bay - f4(0.5)) * _BAY_M
     above = (up - row - f4(0.55)) * look[4]
-    # shops on the ground floor have wider panes that reach further down
+    # shops on the ground floor have wider and lower panes
     half_width, half_height = f4(0.65), f4(0.26) * look[4]
     if row == f4(0.0):
         half_width, above, half_height = f4(1.0), above + f4(0.1) * look[4], f4(0.32) * look[4]
@@ -57,7 +58,7 @@ def pane_share(
 
 @inner_kernel
 def pane_light(light: Light, j: int, dz: Any, window: Any) -> Any:
-    """Channel `j` of what a pane mirrors to a ray that falls at `dz`: sky above, street below."""
+    """Returns channel `j` of a pane's reflection of a ray with slope `dz`: sky or street."""
     dim = f4(0.12) + f4(0.25) * light.grain[window & _MASK, (window >> 6) & _MASK]
     horizon = light.horizon[j]
     if dz > f4(0.0):

@@ -1,4 +1,4 @@
-"""Memory for shading, and the hits of rays as shading reads them."""
+"""Memory for shading, and ray hits in the form that shading reads."""
 
 from __future__ import annotations
 
@@ -18,30 +18,30 @@ f4 = np.float32
 
 
 class Scratch(NamedTuple):
-    """What shading keeps of P packets; see `new_scratch`."""
+    """Shading data of P packets; see `new_scratch`."""
 
     hit: NDArray[np.float32]
-    """(P, rows, LANES) whether anything was hit, where, how the sun falls, the normal, how
-    much is left by haze, what a pane mirrors (3 channels)."""
+    """(P, rows, LANES): hit flag, hit point, light of the sun, normal, fraction of contrast left by
+    haze, reflection of a pane (3 channels)."""
     distance: NDArray[np.float32]
     """(P, LANES) m."""
     direction: NDArray[np.float32]
-    """(P, 3, LANES) of the ray."""
+    """(P, 3, LANES) direction of the ray, map frame."""
     colour: NDArray[np.float32]
-    """(P, 3, LANES) linear."""
+    """(P, 3, LANES) linear colour."""
     source: NDArray[np.int32]
-    """(P, LANES) number of the hit, packet by packet, that a ray to the sun comes from."""
+    """(P, LANES) number of the hit, packet by packet, at which a ray to the sun starts."""
     taken: NDArray[np.int32]
-    """(P,) such rays in each of their packets; they fill its first lanes."""
+    """(P,) number of such rays in each packet; they fill its first lanes."""
     low: NDArray[np.float32]
-    """(3, LANES) lowest place of each lane's hits."""
+    """(3, LANES) lowest coordinates of each lane's hits, m, map frame."""
     high: NDArray[np.float32]
-    """(3, LANES) highest one."""
+    """(3, LANES) highest coordinates of each lane's hits, m, map frame."""
 
 
 @owning_kernel
 def new_scratch(packets: int) -> Scratch:
-    """Memory for shading that many packets."""
+    """Allocates memory for shading `packets` packets."""
     return Scratch(
         np.empty((packets, _ROWS, LANES), f4),
         np.empty((packets, LANES), f4),
@@ -56,10 +56,10 @@ def new_scratch(packets: int) -> Scratch:
 
 @inner_kernel
 def note_hits(block: RayBlock, count: int, scratch: Scratch) -> None:
-    """Take the hits of the block's first `count` packets into `scratch`.
+    """Copies the hits of the block's first `count` packets to `scratch`.
 
     Normals become unit vectors on the side of the camera. Here and below one call handles many
-    packets: handing over so many arrays costs as much as the rays of one.
+    packets, because passing so many arrays costs as much as one packet's rays.
     """
     for p in range(count):
         rays, hit, instance = block.rays[p], scratch.hit[p], block.instance[p]

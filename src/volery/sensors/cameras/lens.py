@@ -19,11 +19,14 @@ Array = NDArray[np.float64]
 
 _STEPS = 20
 _CLOSE = 1e-12
-"""Of normalised coordinates: far below a millionth of a pixel."""
+"""Tolerance in normalised coordinates: far below a millionth of a pixel."""
 
 
 def distort(points: ArrayLike, coefficients: Sequence[float]) -> Array:
-    """Where a lens of (k1, k2, p1, p2, k3) puts points (..., 2) of the ideal picture."""
+    """Returns the distorted points (..., 2) of ideal `points` (..., 2), both normalised.
+
+    `coefficients` are k1, k2, p1, p2, k3.
+    """
     p = np.asarray(points, dtype=np.float64)
     x, y = p[..., 0], p[..., 1]
     k1, k2, p1, p2, k3 = coefficients
@@ -39,9 +42,9 @@ def distort(points: ArrayLike, coefficients: Sequence[float]) -> Array:
 
 
 def undistort(points: ArrayLike, coefficients: Sequence[float]) -> Array:
-    """The ideal points (..., 2) that a lens puts at `points`.
+    """Returns the ideal points (..., 2) that the lens maps to `points` (..., 2), both normalised.
 
-    NaN where there are none: beyond the ring at which a barrel distortion folds the picture over.
+    NaN where none exist: beyond the ring at which a barrel distortion folds the image over.
     """
     wanted = np.asarray(points, dtype=np.float64)
     found = wanted.copy()
@@ -57,7 +60,7 @@ def undistort(points: ArrayLike, coefficients: Sequence[float]) -> Array:
 
 
 def _jacobian(points: Array, coefficients: Sequence[float]) -> tuple[Array, Array, Array, Array]:
-    """dx'/dx, dx'/dy, dy'/dx, dy'/dy."""
+    """Returns dx'/dx, dx'/dy, dy'/dx, dy'/dy, (...,) each."""
     x, y = points[..., 0], points[..., 1]
     k1, k2, p1, p2, k3 = coefficients
     r2 = x * x + y * y
@@ -77,7 +80,7 @@ def _determinant(j: tuple[Array, Array, Array, Array]) -> Array:
 
 
 def _solved(j: tuple[Array, Array, Array, Array], right: Array) -> Array:
-    """Solution of the 2 x 2 systems; no step where there is none."""
+    """Returns the solutions of 2 x 2 systems; zero where the matrix is singular."""
     d = _determinant(j)
     inverse = np.divide(1.0, d, out=np.zeros_like(d), where=np.abs(d) > _CLOSE)
     u, v = right[..., 0], right[..., 1]

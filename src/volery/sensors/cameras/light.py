@@ -1,7 +1,7 @@
-"""Light and surfaces as cameras see them: sun, sky, haze, and the colours of materials.
+"""Light and surfaces for cameras: sun, sky, haze, and the colours of materials.
 
-Colours are linear (r, g, b) with 1 for a white surface in full sun; the picture is coded by sRGB.
-All numbers here are modelling choices for a clear day, but where a source is named.
+Colours are linear (r, g, b) with 1 for a white surface in full sun; images are coded by sRGB. All
+numbers here are modelling choices for a clear day unless a source is named.
 """
 
 from __future__ import annotations
@@ -15,37 +15,38 @@ from numpy.typing import NDArray
 from volery.world.materials import Material
 
 CODES = 4096
-"""Steps of the table from linear light to a byte."""
+"""Entries of the table from linear light to a byte."""
 CLEAR = 8192
 LAST_DEPTH = 8.0
-"""Optical depth at which nothing but haze is left: exp(-8) is a tenth of a byte's step."""
+"""Optical depth at which only haze is visible: exp(-8) is a tenth of a byte's step."""
 GRAIN = 64
 """Side of the table of random greys."""
 
 
 class Light(NamedTuple):
-    """What kernels need to shade; see `make_light`."""
+    """Light and materials for shading kernels; see `make_light`."""
 
     sun: NDArray[np.float32]
-    """(3,) unit vector towards it, map."""
+    """(3,) unit vector towards the sun, map frame."""
     sun_colour: NDArray[np.float32]
-    """(3,) of a white surface that faces it."""
+    """(3,) colour of a white surface that faces the sun."""
     zenith: NDArray[np.float32]
-    """(3,) of the sky overhead."""
+    """(3,) colour of the sky overhead."""
     horizon: NDArray[np.float32]
-    """(3,) of the sky at the horizon, and of haze."""
+    """(3,) colour of the sky at the horizon, and of haze."""
     bounce: NDArray[np.float32]
-    """(3,) of the light that the ground throws back up."""
+    """(3,) light that the ground reflects upward."""
     overhead: NDArray[np.float32]
-    """(3,) of the sky's light on a level surface."""
+    """(3,) light of the sky on a horizontal surface."""
     clear: NDArray[np.float32]
-    """(CLEAR,) share of its contrast that a thing keeps, by its distance: exp(-extinction d)."""
+    """(CLEAR,) fraction of contrast left at a distance: exp(-extinction d)."""
     clear_per_m: float
-    """Entries of `clear` per metre; the last one holds for all that is farther away."""
+    """Entries of `clear` per metre; the last one holds for all greater distances."""
     surface: NDArray[np.float32]
-    """(materials, 8): colour, second colour, size of the grain 1/m, share of light let through."""
+    """(materials, 8): colour, second colour, size of the grain 1/m, fraction of light let through.
+    """
     grain: NDArray[np.float32]
-    """(GRAIN, GRAIN) random greys from 0 to 1, the same at opposite edges."""
+    """(GRAIN, GRAIN) random greys from 0 to 1, periodic at the edges."""
     code: NDArray[np.uint8]
     """(CODES,) bytes of linear light from 0 to 1."""
 
@@ -77,10 +78,10 @@ _SURFACES = {
 def make_light(
     sun_elevation_deg: float = 50.0, sun_azimuth_deg: float = 135.0, visibility_m: float = 20_000.0
 ) -> Light:
-    """Light of a day; azimuth clockwise from north.
+    """Returns the light of a clear day; azimuth clockwise from north.
 
-    visibility_m: where a contrast of 1 has faded to .05, so that extinction is 3 / visibility (the
-    meteorological optical range of the WMO, Guide to Instruments WMO-No. 8, ch. 9).
+    visibility_m: distance at which a contrast of 1 has faded to .05, so that extinction is 3 /
+    visibility (the meteorological optical range of the WMO, Guide to Instruments WMO-No. 8, ch. 9).
     """
     elevation, azimuth = math.radians(sun_elevation_deg), math.radians(sun_azimuth_deg)
     level = math.cos(elevation)
@@ -105,7 +106,7 @@ def make_light(
 
 
 def base_colours() -> dict[Material, tuple[float, float, float]]:
-    """Linear (r, g, b) of each material, its texture averaged out."""
+    """Returns the linear (r, g, b) of each material, averaged over its texture."""
     rows = _surface_table()
     return {
         material: (float(r), float(g), float(b))
@@ -119,7 +120,7 @@ def _surface_table() -> NDArray[np.float32]:
 
 
 def _grain() -> NDArray[np.float32]:
-    """Greys whose neighbours resemble each other a little, spread evenly."""
+    """Returns evenly distributed greys (GRAIN, GRAIN) with a slight correlation of neighbours."""
     greys = np.random.default_rng(20_251_121).random((GRAIN, GRAIN))
     for axis in (0, 1):
         greys = 0.5 * greys + 0.25 * (np.roll(greys, 1, axis) + np.roll(greys, -1, axis))
@@ -128,7 +129,7 @@ def _grain() -> NDArray[np.float32]:
 
 
 def _codes() -> NDArray[np.uint8]:
-    """IEC 61966-2-1 (sRGB)."""
+    """Returns (CODES,) bytes by IEC 61966-2-1 (sRGB)."""
     linear = np.linspace(0.0, 1.0, CODES)
     coded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     return np.asarray(np.round(255.0 * coded), dtype=np.uint8)

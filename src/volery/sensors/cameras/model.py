@@ -1,4 +1,4 @@
-"""What a camera is: its picture's size, its lens, how far it sees, how it exposes."""
+"""Camera model: image size, lens, range, exposure and noise."""
 
 from __future__ import annotations
 
@@ -21,40 +21,40 @@ Side = Annotated[int, Field(ge=1, le=8192)]
 
 
 class CameraModel(SensorModel):
-    """Numbers of a camera; see the data files in `models/`.
+    """Parameters of a camera; see the data files in `models/`.
 
-    Pixel (column u, row v) covers u - .5 to u + .5: its centre has whole coordinates, as OpenCV and
-    ROS count them.
+    Pixel (column u, row v) covers u - .5 to u + .5: its centre has integer coordinates, as in
+    OpenCV and ROS.
     """
 
     name: str = "pinhole"
     width: Side = 640
     height: Side = 480
     horizontal_fov_deg: Annotated[float, Field(gt=0.0, lt=180.0)] = 60.0
-    """Of the ideal picture, before the lens distorts it."""
+    """Field of view of the ideal image, before the lens distorts it."""
     distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
     """k1, k2, p1, p2, k3 of `plumb_bob`."""
     near_m: NonNegativeFloat = 0.05
-    """Depth of what is nearer is told as -inf."""
+    """Minimum depth; nearer surfaces have depth -inf."""
     far_m: PositiveFloat = 200.0
-    """What is farther away is sky; its depth is told as inf."""
+    """Maximum depth; beyond it the image shows sky, and depth is inf."""
     readout_s: Annotated[float, Field(ge=0.0, le=0.1)] = 0.0
-    """From the exposure of the first row to that of the last one; 0: a global shutter."""
+    """Time from the exposure of the first row to that of the last; 0: a global shutter."""
     samples: Literal[1, 4] = 1
-    """Rays a pixel; 4 smooth the edges of the colour picture."""
+    """Rays per pixel; 4 smooth the edges of the colour image."""
     exposure: PositiveFloat = 1.0
     """Factor of the light."""
     exposure_time_s: Annotated[float, Field(gt=0.0, le=0.05)] = 0.005
-    """How long the shutter is open: what falls leaves a streak as long as its way (modelling
+    """Time that the shutter is open; falling particles leave streaks of that duration (modelling
     choice)."""
     read_noise: NonNegativeFloat = 0.0
-    """Standard deviation of a dark pixel, of the light that saturates it."""
+    """Standard deviation of a dark pixel, as a fraction of the saturating light."""
     shot_noise: NonNegativeFloat = 0.0
-    """Standard deviation that light adds to a pixel which it just saturates; it goes with the
+    """Standard deviation that light adds to a pixel which it just saturates; proportional to the
     square root of the light."""
     depth_noise_per_m: NonNegativeFloat = 0.0
-    """Standard deviation of 1 / depth, 1/m, as that of stereo; that of the depth grows with its
-    square, and is this at 1 m. What seems beyond `far_m` is told as inf."""
+    """Standard deviation of 1 / depth, 1/m, as for stereo; that of the depth grows with the depth
+    squared, and has this value at 1 m. A noisy depth beyond `far_m` becomes inf."""
 
     @model_validator(mode="after")
     def _sees_something(self) -> Self:
@@ -69,37 +69,37 @@ class CameraModel(SensorModel):
 
     @property
     def centre_px(self) -> tuple[float, float]:
-        """(cx, cy), pixels: the middle of the picture."""
+        """Image centre (cx, cy), pixels."""
         return (self.width - 1) / 2.0, (self.height - 1) / 2.0
 
     @property
     def matrix(self) -> Array:
-        """K (3, 3)."""
+        """Camera matrix K (3, 3), pixels."""
         (cx, cy), f = self.centre_px, self.focal_px
         return np.array([[f, 0.0, cx], [0.0, f, cy], [0.0, 0.0, 1.0]])
 
     def model_copy(
         self, *, update: Mapping[str, Any] | None = None, deep: bool = False
     ) -> CameraModel:
-        """Copy with other numbers; what was worked out from the old ones stays behind."""
+        """Returns a copy with `update` applied; cached properties are not copied."""
         copy = super().model_copy(update=update, deep=deep)
         for name in ("table", "ideal", "widest"):
             copy.__dict__.pop(name, None)
         return copy
 
     def without_noise(self) -> CameraModel:
-        """The same camera, exact."""
+        """Returns the same camera without noise."""
         none = {"read_noise": 0.0, "shot_noise": 0.0, "depth_noise_per_m": 0.0}
         return self.model_copy(update=none)
 
     @property
     def readout_ns(self) -> int:
-        """From the first row's exposure to the last one's."""
+        """Time from the first row's exposure to the last one's, ns."""
         return round(self.readout_s * 1e9)
 
     @cached_property
     def table(self) -> PixelTable:
-        """The rays of the pixels."""
+        """Rays of the pixels, for kernels."""
         return make_table(
             self.width,
             self.height,
@@ -112,9 +112,9 @@ class CameraModel(SensorModel):
 
     @cached_property
     def ideal(self) -> NDArray[np.float32]:
-        """(height, width, 2) x and y, in the optical frame, of what a pixel sees at depth 1.
+        """(height, width, 2) x and y, in the optical frame, of a pixel's point at depth 1.
 
-        NaN where the lens shows nothing.
+        NaN outside the lens's image.
         """
         v, u = np.mgrid[0 : self.height, 0 : self.width]
         seen = (np.stack([u, v], axis=-1) - np.array(self.centre_px)) / self.focal_px
@@ -122,12 +122,12 @@ class CameraModel(SensorModel):
 
     @cached_property
     def widest(self) -> float:
-        """Largest distance to the side, and up or down, of what is seen, per metre ahead."""
+        """Largest lateral or vertical distance in view, per metre of depth."""
         ahead, aside = self.table.direction[:, 0], np.abs(self.table.direction[:, 1:])
         return float((aside.max(axis=1) / ahead).max())
 
     def project(self, points: ArrayLike) -> Array:
-        """Pixels (..., 2), column and row, of points (..., 3) in the optical frame, m.
+        """Returns pixels (..., 2), column and row, of points (..., 3) in the optical frame, m.
 
         The optical frame has z forward, x right, y down. NaN for points that are not in front.
         """
@@ -138,5 +138,5 @@ class CameraModel(SensorModel):
 
 
 def load_camera(name: str | Path = "pinhole", folder: Path | None = None) -> CameraModel:
-    """Model by shipped name or `.toml` path."""
+    """Returns the model by shipped name or `.toml` path, also relative to `folder`."""
     return load_model(CameraModel, "camera", name, folder)

@@ -1,4 +1,4 @@
-"""The rays of a picture, ordered in packets whose pixels lie close together."""
+"""Rays of an image, ordered in packets of neighbouring pixels."""
 
 from __future__ import annotations
 
@@ -12,33 +12,33 @@ from volery.sensors.cameras.lens import undistort
 from volery.world.embree import LANES
 
 PIECE = 2048 // LANES
-"""Packets of a piece of work: a compact part of the picture, 16 x 8 tiles."""
+"""Packets of a piece of work: a compact part of the image, 16 x 8 tiles."""
 _PIECE_ACROSS, _PIECE_DOWN = 16, 8
 _OFFSETS = {
     1: np.array([[0.0, 0.0]]),
-    # A rotated grid: four rows and four columns are met, so that edges of any slope are smoothed.
+    # A rotated grid covers four rows and four columns, which smooths edges of any slope.
     4: np.array([[-0.125, -0.375], [0.375, -0.125], [-0.375, 0.125], [0.125, 0.375]]),
 }
-"""Places of a pixel's samples about its centre, pixels."""
+"""Offsets of a pixel's samples from its centre, pixels."""
 
 
 class PixelTable(NamedTuple):
     """P packets of LANES rays: tiles of 4 x 4 pixels, or of 2 x 2 with four samples each.
 
-    Samples of a pixel are neighbouring lanes. Lanes beyond the picture's edge repeat one within.
+    Samples of a pixel are neighbouring lanes. Lanes beyond the image's edge repeat one within.
     """
 
     direction: NDArray[np.float32]
     """(P, 3, LANES) unit vectors in the sensor's axes: x forward, y left, z up."""
     pixel: NDArray[np.int64]
-    """(P, LANES) row * width + column; -1 where nothing is to be written."""
+    """(P, LANES) row * width + column; -1 for lanes that are not written."""
     blind: NDArray[np.bool_]
-    """(P, LANES) where the lens shows nothing."""
+    """(P, LANES) whether the pixel lies outside the lens's image."""
     after_ns: NDArray[np.int64]
-    """(P,) when it is exposed, after the first row."""
+    """(P,) time of exposure, ns after the first row."""
     cone: NDArray[np.float64]
-    """(pieces, 5) what holds all rays of a piece of PIECE packets: its axis in the sensor's axes,
-    cosine and sine of its half angle. All around where a rolling shutter turns it."""
+    """(pieces, 5) cone around all rays of a piece of PIECE packets: its axis in the sensor's axes,
+    cosine and sine of its half angle; the full sphere with a rolling shutter, which may turn."""
     samples: int
 
 
@@ -51,7 +51,7 @@ def make_table(
     samples: int,
     readout_ns: int,
 ) -> PixelTable:
-    """Rays of a picture; the arguments are those of `CameraModel`."""
+    """Returns the rays of an image; the arguments are those of `CameraModel`."""
     side = 4 if samples == 1 else 2
     across, down = -(-width // side), -(-height // side)
     y, x = np.mgrid[0:side, 0:side].reshape(2, -1)
@@ -84,7 +84,7 @@ def make_table(
 
 
 def _cones(rays: NDArray[np.float64], readout_ns: int) -> NDArray[np.float64]:
-    """Cones of the pieces of `rays` (P, 3, LANES); see `PixelTable.cone`."""
+    """Returns the cones (pieces, 5) of `rays` (P, 3, LANES); see `PixelTable.cone`."""
     cones = []
     for first in range(0, len(rays), PIECE):
         own = np.moveaxis(rays[first : first + PIECE], 1, -1).reshape(-1, 3)

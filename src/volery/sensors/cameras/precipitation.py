@@ -1,9 +1,9 @@
-"""Rain and snow as cameras see them: drops and flakes that fall through the map.
+"""Rain and snow for cameras: drops and flakes that fall through the map.
 
-They stand on a lattice that falls and drifts with the wind, one in each cell, at a place and of a
-size that follow from the cell's numbers alone: all cameras see the same ones, at any time. Numbers
-and sizes are those of `world.weather.particles`. Nearer than `reach_m` each larger than `least_mm`
-is drawn; what is smaller or farther away is part of the haze.
+Particles lie on a lattice that falls and drifts with the wind, one in each cell; position and size
+depend on the cell's numbers alone, so that all cameras see the same particles at any time. Numbers
+and sizes are those of `world.weather.particles`. Particles within `reach_m` and above `least_mm`
+are drawn; smaller or farther ones are part of the haze.
 """
 
 from __future__ import annotations
@@ -29,34 +29,35 @@ from volery.world.weather.particles import (
 
 _LEAST_MM = 0.5
 _RAIN_REACH_M, _SNOW_REACH_M = 5.0, 8.0
-"""Where drops have become too faint, and flakes too small (modelling choices)."""
+"""Distances at which drops become too faint and flakes too small (modelling choices)."""
 _FLAKES_FALL_M_S = 1.0
-"""Of aggregates of dry snow (Locatelli and Hobbs 1974: 0.8 to 1.4 m/s)."""
+"""Fall speed of aggregates of dry snow (Locatelli and Hobbs 1974: 0.8 to 1.4 m/s)."""
 _DROP_TRANSMITS = 0.94
-"""Of the light of its surroundings, most of them in view through it (Garg and Nayar 2007)."""
+"""Fraction of the surrounding light that a drop transmits, which shows most of the surroundings
+(Garg and Nayar 2007)."""
 _FLAKE_REFLECTS = 0.9
-"""Modelling choice: clean snow."""
+"""Reflectivity of clean snow (modelling choice)."""
 
 
 class Falling(NamedTuple):
-    """Drops or flakes, for kernels."""
+    """Drops or flakes of one kind, for kernels."""
 
     key: np.uint64
-    """Stream of the lattice's cells."""
+    """Random stream of the lattice's cells."""
     velocity: NDArray[np.float64]
-    """(3,) m/s, map."""
+    """(3,) m/s, map frame."""
     cell_m: float
-    """Side of a cell."""
+    """Side of a cell, m."""
     reach_m: float
     least_mm: float
     slope: float
-    """Of their numbers over the diameter, 1/mm."""
+    """Decay of the number of particles with the diameter, 1/mm."""
     colour: NDArray[np.float32]
-    """(3,) linear."""
+    """(3,) linear colour."""
 
 
 def falling_in(weather: Weather, light: Light) -> tuple[Falling, ...]:
-    """What falls in a weather, in its light."""
+    """Returns the particles that fall in a weather, with their colour in its light."""
     found = []
     rain, snow = weather.particles.rain_mm_h, weather.particles.snow_mm_h
     if rain > 0.0:

@@ -28,12 +28,12 @@ _FACADE, _PAINTED = int(Material.FACADE), int(Material.PAINTED)
 
 f4 = np.float32
 _FAR_OFF = np.float32(65536.0)
-"""Makes coordinates positive, so that cutting off is rounding down."""
+"""Offset that makes coordinates positive, so that truncation rounds down."""
 
 
 @inner_kernel
 def _grey(grain: NDArray[np.float32], x: Any, y: Any) -> Any:
-    """The table of greys at a place, between its four neighbours."""
+    """Returns the table of greys at (x, y), interpolated between four entries."""
     fx, fy = np.floor(x), np.floor(y)
     i, j = np.int64(fx), np.int64(fy)
     u, v = x - fx, y - fy
@@ -45,7 +45,7 @@ def _grey(grain: NDArray[np.float32], x: Any, y: Any) -> Any:
 
 @inner_kernel
 def _texture(light: Light, material: int, x: Any, y: Any, z: Any, steep: bool) -> Any:
-    """How much of the second colour a surface has at a place, 0 to 1."""
+    """Returns the fraction of a surface's second colour at a point, 0 to 1."""
     size = light.surface[material, 6]
     u, v = ((x + y) * size, z * size) if steep else (x * size, y * size)
     i = np.int64(u * f4(8.0) + _FAR_OFF) & _MASK
@@ -56,14 +56,14 @@ def _texture(light: Light, material: int, x: Any, y: Any, z: Any, steep: bool) -
 
 @inner_kernel
 def shade(scene: SceneHandle, block: RayBlock, count: int, light: Light, scratch: Scratch) -> None:
-    """Linear colours of the block's first `count` packets, after `find_shadows`."""
+    """Computes linear colours of the block's first `count` packets, after `find_shadows`."""
     _paint(scene, block, count, light, scratch)
     _illuminate(count, light, scratch)
 
 
 @inner_kernel
 def _paint(scene: SceneHandle, block: RayBlock, count: int, light: Light, scratch: Scratch) -> None:
-    """Own colours of what was hit, what panes mirror, how clear the air is; the sky elsewhere."""
+    """Computes surface colours, reflections of panes and clearness of the air, or the sky."""
     for p in range(count):
         hit, colour, direction = scratch.hit[p], scratch.colour[p], scratch.direction[p]
         materials, instances, distance = block.material[p], block.instance[p], scratch.distance[p]
@@ -96,9 +96,9 @@ def _paint(scene: SceneHandle, block: RayBlock, count: int, light: Light, scratc
 
 @inner_kernel
 def _illuminate(count: int, light: Light, scratch: Scratch) -> None:
-    """Light of the sun and the sky on painted hits, then haze before them.
+    """Applies the light of sun and sky to painted hits, then haze.
 
-    Without a branch or a look-up, so that all lanes are computed at once.
+    Without branches and table look-ups, so that the compiler vectorizes over the lanes.
     """
     for p in range(count):
         hit, colour = scratch.hit[p], scratch.colour[p]
@@ -115,7 +115,7 @@ def _illuminate(count: int, light: Light, scratch: Scratch) -> None:
 
 @inner_kernel
 def _sky(light: Light, direction: NDArray[np.float32], k: int, colour: NDArray[np.float32]) -> None:
-    """Colour of the sky in a direction; below the horizon that of haze."""
+    """Computes the colour of the sky in a direction; below the horizon that of haze."""
     dx, dy, dz = direction[0, k], direction[1, k], direction[2, k]
     height = np.sqrt(max(dz, f4(0.0)))
     glow = max(dx * light.sun[0] + dy * light.sun[1] + dz * light.sun[2], f4(0.0))

@@ -1,4 +1,4 @@
-"""Compiled shadows: which hits the sun falls on, by rays towards it."""
+"""Compiled shadows: rays towards the sun find the hits that it reaches."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from volery.world.scene_kernels import RayBlock, SceneHandle, run_together
 f4 = np.float32
 
 SHADOW_REACH_M = 80.0
-"""Farther away nothing throws a shadow: trees and houses are lower."""
+"""Length of shadow rays, m: trees and houses are lower."""
 _SUN_ABOVE = 0.01
-"""The sun counts as above a slope when its sine is by this much larger (modelling choice)."""
+"""Margin by which the sine of the sun's elevation must exceed a slope (modelling choice)."""
 
 
 @inner_kernel
@@ -29,12 +29,12 @@ def shading_bodies(
     count: int,
     near: NDArray[np.int32],
 ) -> int:
-    """List the other bodies whose shadows may fall on the hits; their number.
+    """Lists in `near` the other bodies whose shadows may fall on the hits; returns their number.
 
-    Each is a sphere that moves away from the sun, the hits are a ball.
+    Each body is a sphere swept away from the sun, the hits are a ball.
     """
     bodies = scene.bodies
-    if bodies.crew + bodies.actors <= 1:  # nobody but the camera's own UAV
+    if bodies.crew + bodies.actors <= 1:  # only the camera's own UAV
         return 0
     low, high = _box(scratch, count)
     if low[0] > high[0]:
@@ -60,9 +60,9 @@ def shading_bodies(
 def _box(
     scratch: Scratch, count: int
 ) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Lowest and highest corner of the box around all hits; the other way round without any.
+    """Returns the corners of the box around all hits; lowest above highest without hits.
 
-    Each lane has its own box at first, so that all lanes are compared at once.
+    Each lane has its own box at first, so that the compiler vectorizes over the lanes.
     """
     low, high = scratch.low, scratch.high
     for j in range(3):
@@ -83,10 +83,10 @@ def _box(
 
 @inner_kernel
 def _casters(scene: SceneHandle, light: Light) -> int:
-    """Embree scene of what may stand between a hit and the sun.
+    """Returns the Embree scene of objects that may lie between a hit and the sun.
 
-    While the sun is higher than the terrain is steep anywhere, no ray from above the terrain to the
-    sun meets it, and it is left out.
+    While the sun is higher than the terrain's steepest slope, no ray from above the terrain to the
+    sun meets it, and the terrain is left out.
     """
     sx, sy, sz = float(light.sun[0]), float(light.sun[1]), float(light.sun[2])
     level = np.sqrt(sx * sx + sy * sy)
@@ -95,10 +95,10 @@ def _casters(scene: SceneHandle, light: Light) -> int:
 
 @inner_kernel
 def _aim_at_sun(block: RayBlock, count: int, may_mix: bool, light: Light, scratch: Scratch) -> int:
-    """Fill packets with rays to the sun, of those hits alone that face it; the packets' number.
+    """Fills packets with rays to the sun from the hits that face it; returns the number of packets.
 
-    They replace the block's rays, packets and their `fraction`. Hits that face away get what light
-    they have here. may_mix: whether rays of several packets may share one.
+    They replace the block's rays, packets and `fraction`. The light of hits that face away is set
+    here. may_mix: whether rays of several packets may share one.
     """
     surface, rays, source, taken = light.surface, block.rays, scratch.source, scratch.taken
     sx, sy, sz = light.sun[0], light.sun[1], light.sun[2]
@@ -113,7 +113,7 @@ def _aim_at_sun(block: RayBlock, count: int, may_mix: bool, light: Light, scratc
             cosine = nx * sx + ny * sy + nz * sz
             met = is_day and hit[HIT, k] > f4(0.0)
             if not met or cosine <= f4(0.0):
-                # What comes through from behind is taken as half shaded, without looking.
+                # Light through the surface from behind counts as half shaded, without a ray.
                 behind = f4(0.5) * surface[material[k], 7] if met else f4(0.0)
                 hit[LIT, k] = -cosine * behind
                 continue
@@ -142,10 +142,10 @@ def find_shadows(
     light: Light,
     scratch: Scratch,
 ) -> None:
-    """Note how much of the sun falls on each hit, the cosine with it: 0 in the shade.
+    """Writes the light of the sun on each hit, the cosine of incidence: 0 in the shade.
 
-    The block's rays are replaced by those towards the sun, packed: in a forest that makes a quarter
-    fewer packets. Where bodies may throw shadows, each packet has its own time and keeps its rays.
+    The block's rays are replaced by packed rays towards the sun: in a forest that makes a quarter
+    fewer packets. Where bodies may throw shadows, each packet has its own time and is not mixed.
     """
     valid, casters = block.valid, _casters(scene, light)
     sx, sy, sz = light.sun[0], light.sun[1], light.sun[2]

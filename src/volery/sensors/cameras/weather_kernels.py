@@ -1,8 +1,8 @@
-"""Compiled drawing of drops and flakes into pictures that were taken without them.
+"""Compiled drawing of drops and flakes into rendered images.
 
-Each is drawn as the streak that it moves along while the shutter is open, camera's motion included,
-and takes as much of a pixel's light as the share of the time and of the pixel that it covers (Garg
-and Nayar 2007, "Vision and rain"). Nothing is drawn before what is nearer.
+Each particle is drawn as its streak while the shutter is open, camera motion included, and covers a
+pixel's light by its fraction of the time and of the pixel (Garg and Nayar 2007, "Vision and rain").
+Nearer surfaces hide particles.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from volery.sensors.cameras.precipitation import Falling
 from volery.vehicle.pose_history import PoseHistory
 
 _NEAREST_M = 0.3
-"""Nearer ones are a blur that is not drawn."""
+"""Minimum distance, m; nearer particles are an invisible blur."""
 _FAINT = 3e-4
-"""Share of a pixel's light below which nothing is drawn: the first byte above black."""
+"""Fraction of a pixel's light below which nothing is drawn: the first byte above black."""
 _SHARE_BITS = np.uint64(16)
 _SHARE_MASK = np.uint64(0xFFFF)
 _CELL_MASK = 0xFFFFFFFF
@@ -33,7 +33,7 @@ f4 = np.float32
 
 
 class WeatherView(NamedTuple):
-    """A camera as particles fall through its view."""
+    """Camera parameters for drawing particles."""
 
     width: int
     height: int
@@ -42,20 +42,20 @@ class WeatherView(NamedTuple):
     distortion: NDArray[np.float64]
     """(5,) k1, k2, p1, p2, k3."""
     across: float
-    """Largest distance to the side, and up or down, of what is seen, per metre ahead."""
+    """Largest lateral or vertical distance in view, per metre of depth."""
     exposure_ns: int
-    """How long the shutter is open, up to the picture's time."""
+    """Time that the shutter is open, up to the image's time, ns."""
     exposure: float
     """Factor of the light."""
     linear: NDArray[np.float32]
-    """(256,) light of a byte."""
+    """(256,) linear light of each byte value."""
 
 
 @inner_kernel
 def _seen_at(
     view: WeatherView, frame: Frame, x: float, y: float, z: float
 ) -> tuple[float, float, float]:
-    """Column, row and depth, m, of a point of the map; a depth of 0 or less: it is not in view."""
+    """Returns column, row and depth, m, of a point of the map; depth 0 or less: not in view."""
     dx, dy, dz = x - frame[0], y - frame[1], z - frame[2]
     ahead = dx * frame[3] + dy * frame[4] + dz * frame[5]
     if ahead < 0.5 * _NEAREST_M:
@@ -84,14 +84,14 @@ def _draw(
     depth: NDArray[np.float32],
     colour: NDArray[np.uint8],
 ) -> None:
-    """Blend a streak from `start` to `end` (column, row, depth) into a picture (pixels, 3)."""
+    """Blends a streak from `start` to `end` (column, row, depth) into an image (pixels, 3)."""
     along, down = end[0] - start[0], end[1] - start[1]
     length = np.sqrt(along * along + down * down)
     ahead = 0.5 * (start[2] + end[2])
     width = diameter_m * view.focal_px / ahead
     drawn = max(width, 1.0)
     quarter = 0.25 * np.pi
-    # what is drawn below, the soft edge half a pixel wide included
+    # of the streak drawn below, including its soft edge, half a pixel wide
     area = drawn * length + quarter * drawn * drawn + np.pi / 12.0
     share = min(quarter * width * width / area, 1.0)
     if share < _FAINT:
@@ -124,7 +124,7 @@ def _draw(
 
 @inner_kernel
 def _box(view: WeatherView, frame: Frame, reach: float, j: int) -> tuple[float, float]:
-    """Least and greatest coordinate `j` of what is seen up to `reach`."""
+    """Returns the minimum and maximum of coordinate `j` in view up to `reach`, m, map frame."""
     aside = view.across * reach * (abs(frame[6 + j]) + abs(frame[9 + j]))
     far = frame[j] + reach * frame[3 + j]
     return min(frame[j], far - aside), max(frame[j], far + aside)
@@ -141,7 +141,7 @@ def _draw_all(
     depth: NDArray[np.float32],
     colour: NDArray[np.uint8],
 ) -> None:
-    """Draw all particles of a kind into one picture, taken at `time_ns`."""
+    """Draws all particles of a kind into one image, taken at `time_ns`."""
     cell, v = particle.cell_m, particle.velocity
     sx, sy, sz = v[0] * 1e-9 * time_ns, v[1] * 1e-9 * time_ns, v[2] * 1e-9 * time_ns
     open_s = 1e-9 * view.exposure_ns
@@ -184,9 +184,9 @@ def draw_falling(
     counter: NDArray[np.int64],
     frames: Frames,
 ) -> None:
-    """Draw what falls into whole pictures, taken one by one from `counter`.
+    """Draws particles of one kind into whole images, numbered by `counter`; runs in every thread.
 
-    They must hold depth and colour. A rolling shutter's rows are all taken to be exposed with the
+    `frames` must hold depth and colour. All rows of a rolling shutter count as exposed with the
     first.
     """
     while True:

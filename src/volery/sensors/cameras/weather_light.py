@@ -1,15 +1,15 @@
 """The light of a day in rain, snow, fog or dust, from that of the same day in clear air.
 
-- Haze: extinctions add up (`world.weather.particles`), so that contrast fades as Koschmieder's law
-  says; what is left of it far away has the horizon's colour.
-- Clouds, which rain and snow come from, hide the sun and let through a quarter of all light (Kasten
+- Haze: extinctions add up (`world.weather.particles`), so that contrast fades by Koschmieder's law;
+  distant objects take the horizon's colour.
+- Clouds of rain and snow hide the sun and let through a quarter of all light (Kasten
   and Czeplak 1980: 1 - 0.75 N^3.4, N = 1 for an overcast sky); the sky is then three times as
   bright overhead as at the horizon (Moon and Spencer 1942, the CIE's overcast sky).
 - Fog and dust lie in layers on the ground, through which the sun shines with exp(-a h / sin
-  elevation); of the light that they take from it 40 % goes on to the ground, and the sky is the
-  same all around (layers and share: modelling choices).
-- Rain makes what it wets darker (Twomey, Bohren and Mergenthaler 1986 tell why), here by a third
-  (modelling choice). Fallen snow does not lie.
+  elevation); of the light that they scatter, 40 % reaches the ground, and the sky is
+  uniform (layers and fraction: modelling choices).
+- Rain darkens wet surfaces (explained by Twomey, Bohren and Mergenthaler 1986), here by a third
+  (modelling choice). Fallen snow does not settle.
 """
 
 from __future__ import annotations
@@ -34,14 +34,15 @@ from volery.world.weather.particles import (
 _FOG_LAYER_M, _DUST_LAYER_M = 100.0, 300.0
 """Thickness of fog and of dust (modelling choice)."""
 _PASSED = 0.4
-"""Share of the light that goes on to the ground through thick fog or dust (modelling choice)."""
+"""Fraction of scattered light that reaches the ground through thick fog or dust (modelling choice).
+"""
 _LOWEST_SINE = 0.05
-"""Of the sun's elevation: the light that comes through a layer at dusk comes from the sky."""
+"""Minimum sine of the sun's elevation: at dusk the light below a layer comes from the sky."""
 _GREY = np.array([1.0, 1.0, 1.0])
 _DUSTY = np.array([1.15, 0.98, 0.68])
 """Colour of light that dust scattered, of the same brightness (modelling choice)."""
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-"""Of linear sRGB (IEC 61966-2-1)."""
+"""Luminance weights of linear sRGB (IEC 61966-2-1)."""
 _WET = 2.0 / 3.0
 _ABSORBENT = (
     Material.GROUND,
@@ -57,9 +58,9 @@ Array = NDArray[np.floating[Any]]
 
 
 class LightOfTheHour:
-    """The light in a weather, kept until that changes.
+    """Returns the light in a weather, cached until the weather changes.
 
-    sun_in: elevation and azimuth of the sun in it, deg. visibility_m: of clear air.
+    sun_in: returns elevation and azimuth of the sun in a weather, deg. visibility_m: of clear air.
     """
 
     def __init__(
@@ -71,7 +72,7 @@ class LightOfTheHour:
         self._light: Light | None = None
 
     def __call__(self, weather: Weather) -> Light:
-        """The light in `weather`."""
+        """Returns the light in `weather`."""
         wanted = (weather.particles, weather.hour_of_day)
         if self._light is None or wanted != self._made_for:
             clear = make_light(*self._sun_in(weather), self._visibility_m)
@@ -81,7 +82,7 @@ class LightOfTheHour:
 
 
 def light_in(clear: Light, particles: Particles) -> Light:
-    """The light of a clear day when particles are in the air; the same light where none are."""
+    """Returns the light of a clear day with particles in the air; `clear` itself in clear air."""
     if particles == CLEAR_AIR:
         return clear
     fog, dust = _depths(particles)
@@ -94,7 +95,7 @@ def light_in(clear: Light, particles: Particles) -> Light:
     whole = sun * height + clear.overhead
     sky = passed * whole - direct * sun * height
     veiled = 1.0 - direct
-    hanging = 1.0 - math.exp(-fog - dust)  # share of the sky's look that is fog's or dust's
+    hanging = 1.0 - math.exp(-fog - dust)  # fraction of the sky that fog or dust covers
     colour = _tint(fog, dust)
     overhead = _mixed(sky, _brightness(sky) * colour, veiled)
     zenith = overhead * (9.0 / 7.0 + hanging * (1.0 - 9.0 / 7.0))
@@ -111,7 +112,7 @@ def light_in(clear: Light, particles: Particles) -> Light:
 
 
 def _depths(particles: Particles) -> tuple[float, float]:
-    """Optical depths of fog and of dust, from the ground straight up."""
+    """Returns the vertical optical depths of fog and of dust."""
     return (
         fog_extinction(particles.fog_visibility_m) * _FOG_LAYER_M,
         dust_extinction(particles.dust_visibility_m) * _DUST_LAYER_M,
@@ -119,7 +120,7 @@ def _depths(particles: Particles) -> tuple[float, float]:
 
 
 def _tint(fog: float, dust: float) -> Array:
-    """Colour of scattered light, of brightness 1: grey but for dust's share of the layers."""
+    """Returns the colour of scattered light, of brightness 1: grey but for the fraction of dust."""
     share = dust / (fog + dust) if dust > 0.0 else 0.0
     colour: Array = _mixed(_GREY, _DUSTY, share)
     return colour / _brightness(colour)

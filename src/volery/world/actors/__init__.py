@@ -1,4 +1,4 @@
-"""What moves through a world by itself: people, vehicles, birds; their shapes and their ways."""
+"""Actors: people, vehicles and birds that move independently; their shapes and motions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ways of things: where one is at a simulated time, as a function of that time alone.
+"""Motions of actors: poses as a function of simulated time alone.
 
 A pose is (7,): x y z m, qx qy qz qw, map from body (FLU).
 """
@@ -15,27 +15,27 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 HeightAt = Callable[[float, float], float]
-"""z of the ground at a place (x, y) of the map, m."""
+"""Returns z of the ground at (x, y) of the map, m."""
 
 _GRAVITY_M_S2 = 9.80665
 
 
 class ActorMotion(Protocol):
-    """A way."""
+    """Motion of an actor as a function of simulated time."""
 
     @property
     def speed_m_s(self) -> float:
-        """Never is it faster."""
+        """Maximum speed, m/s."""
 
     def pose_at(self, time_s: float) -> Array:
-        """Pose (7,) at a time since the start, before which it stands as at the start."""
+        """Returns the pose (7,), map from body, at a time since the start; at least 0 s."""
 
 
 class WaypointMotion:
-    """Along straight lines at a constant speed, turning ahead of and behind each waypoint.
+    """Moves along straight lines at a constant speed, turning around each waypoint.
 
-    waypoints: (K, 3) m, or (K, 2) for what goes on the ground, whose height `ground` tells. The
-    heading is that of the line between the places `turn_m` behind and ahead on the way.
+    waypoints: (K, 3) m, map, or (K, 2) for actors on the ground, whose height `ground` returns. The
+    heading is that of the line between the positions `turn_m` behind and ahead on the path.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class WaypointMotion:
             tuple(point) for point in points[np.append(True, moves)].tolist()
         ]
         self._way: list[float] = [0.0, *np.cumsum(length[moves]).tolist()]
-        """How far along the way each point lies, m."""
+        """Distance of each point along the path, m."""
         self._at_end = at_end
         self._start_s = start_s
         self._turn_m = min(turn_m, 0.25 * self._way[-1])
@@ -65,7 +65,7 @@ class WaypointMotion:
         self.speed_m_s = speed_m_s
 
     def pose_at(self, time_s: float) -> Array:
-        """See `ActorMotion`."""
+        """Returns the pose (7,) at a time; see `ActorMotion`."""
         way = self.speed_m_s * max(time_s - self._start_s, 0.0)
         if self._at_end == "stop":
             way = min(way, self._way[-1])
@@ -77,13 +77,13 @@ class WaypointMotion:
     def _heading(self, way: float) -> float:
         ahead, behind = self._place(way + self._turn_m), self._place(way - self._turn_m)
         dx, dy = ahead[0] - behind[0], ahead[1] - behind[1]
-        if math.hypot(dx, dy) < 1e-9:  # at the very point where it turns back, or straight up
+        if math.hypot(dx, dy) < 1e-9:  # exactly at a reversal, or vertical
             ahead, behind = self._place(way + 2e-3 * self._turn_m), self._place(way)
             dx, dy = ahead[0] - behind[0], ahead[1] - behind[1]
         return math.atan2(dy, dx)
 
     def _place(self, way: float) -> list[float]:
-        """Where it is after `way` m, by the numbers of a waypoint; an end is not passed."""
+        """Returns the position after `way` m, with a waypoint's dimension, within the path."""
         length = self._way[-1]
         if self._at_end == "loop":
             way %= length
@@ -98,7 +98,7 @@ class WaypointMotion:
 
 
 class CircleMotion:
-    """Round a centre (3,) m at one height, leaning so that weight and turn balance."""
+    """Circles a centre (3,) m at one height, banked so that weight and turn balance."""
 
     def __init__(
         self,
@@ -117,7 +117,7 @@ class CircleMotion:
         self.speed_m_s = speed_m_s
 
     def pose_at(self, time_s: float) -> Array:
-        """See `ActorMotion`."""
+        """Returns the pose (7,) at a time; see `ActorMotion`."""
         turned = self.speed_m_s / self._radius * max(time_s, 0.0)
         angle = self._start + self._sense * turned
         x, y, z = self._centre
@@ -130,9 +130,9 @@ class CircleMotion:
 
 
 class GivenMotion:
-    """Where something outside says, from the time on at which that was said.
+    """Motion set externally; each setting is valid from its time on.
 
-    What was said of the last quarter of a second is remembered: sensors look back that far.
+    Settings of the last quarter of a second are stored: sensors look back that far.
     """
 
     _REMEMBERED_S = 0.25
@@ -141,15 +141,15 @@ class GivenMotion:
         self._said: tuple[tuple[float, Array, Array], ...] = (
             (0.0, np.array(pose, dtype=np.float64), np.zeros(3)),
         )
-        """Since when, pose then, velocity (3,) m/s since then; oldest first."""
+        """Time, pose (7,) and velocity (3,) m/s of each setting; oldest first."""
 
     @property
     def speed_m_s(self) -> float:
-        """Speed since the last word."""
+        """Speed since the latest setting, m/s."""
         return float(np.linalg.norm(self._said[-1][2]))
 
     def say(self, time_s: float, pose: ArrayLike, velocity: ArrayLike) -> None:
-        """Be at `pose` (7,) now, at `time_s`, and go on from there at `velocity` (3,) m/s."""
+        """Sets `pose` (7,) at `time_s`, and the velocity (3,) m/s from there on."""
         kept = [said for said in self._said if said[0] < time_s]
         recent = [said for said in kept if said[0] > time_s - self._REMEMBERED_S]
         older = kept[: len(kept) - len(recent)][-1:]
@@ -157,7 +157,7 @@ class GivenMotion:
         self._said = (*older, *recent, word)
 
     def pose_at(self, time_s: float) -> Array:
-        """See `ActorMotion`."""
+        """Returns the pose (7,) at a time; see `ActorMotion`."""
         since, pose, velocity = next(
             (said for said in reversed(self._said) if said[0] <= time_s), self._said[0]
         )
@@ -166,10 +166,10 @@ class GivenMotion:
         return pose
 
     def get_state(self) -> object:
-        """What a snapshot keeps."""
+        """Returns the stored settings."""
         return self._said
 
     def set_state(self, state: object) -> None:
-        """Go back to a kept state."""
+        """Restores a state of `get_state`."""
         assert isinstance(state, tuple)
         self._said = state

@@ -1,4 +1,4 @@
-"""The things of a world: names, shapes, and where all of them are at a time."""
+"""The actors of a world: names, shapes, and poses at a time."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _VELOCITY_STEP_S = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class MovingActor:
-    """One of them. `kind`: what it is, such as person."""
+    """One actor. `kind`: its shape, such as person."""
 
     name: str
     kind: str
@@ -29,7 +29,7 @@ class MovingActor:
 
 
 class MovingActors:
-    """All things of a world, in a fixed order."""
+    """All T actors of a world, in a fixed order."""
 
     def __init__(self, actors: Sequence[MovingActor]) -> None:
         self._actors = tuple(actors)
@@ -39,57 +39,57 @@ class MovingActors:
 
     @property
     def actors(self) -> tuple[MovingActor, ...]:
-        """In order."""
+        """One entry per actor, in order."""
         return self._actors
 
     @property
     def names(self) -> tuple[str, ...]:
-        """In order."""
+        """One entry per actor, in order."""
         return tuple(actor.name for actor in self._actors)
 
     @property
     def shapes(self) -> tuple[BodyShape, ...]:
-        """In order."""
+        """One entry per actor, in order."""
         return tuple(actor.shape for actor in self._actors)
 
     @property
     def speeds_m_s(self) -> Array:
-        """(T,) none moves faster until something else is said of it."""
+        """(T,) maximum speeds, m/s, until an external setting changes them."""
         return np.array([actor.motion.speed_m_s for actor in self._actors])
 
     def poses_at(self, time_ns: int) -> Array:
-        """(T, 7) x y z qx qy qz qw, map from body."""
+        """Returns the poses (T, 7) x y z (m) qx qy qz qw, map from body."""
         time_s = s_from_ns(time_ns)
         return np.array([actor.motion.pose_at(time_s) for actor in self._actors]).reshape(-1, 7)
 
     def velocity_at(self, row: int, time_ns: int) -> Array:
-        """(3,) m/s of one, map: that of the millisecond that begins now."""
+        """Returns the velocity (3,) m/s of an actor, map: mean of the millisecond from now on."""
         motion, time_s = self._actors[row].motion, s_from_ns(time_ns)
         step = motion.pose_at(time_s + _VELOCITY_STEP_S) - motion.pose_at(time_s)
         return np.asarray(step[:3] / _VELOCITY_STEP_S)
 
     def say(self, row: int, time_ns: int, pose: ArrayLike, velocity: ArrayLike = (0, 0, 0)) -> None:
-        """Put one at `pose` (7,) from now on, moving on at `velocity` (3,) m/s.
+        """Sets the `pose` (7,) of an actor from now on, and its velocity (3,) m/s, map.
 
-        `CommandError` for one that has a way of its own.
+        Raises `CommandError` if the actor's motion is not external.
         """
         actor = self._actors[row]
         if not isinstance(actor.motion, GivenMotion):
             raise CommandError(
-                f"{actor.name} goes its own way; only things whose motion is of kind "
+                f"{actor.name} has a motion of its own; only actors with a motion of kind "
                 '"external" can be moved'
             )
         actor.motion.say(s_from_ns(time_ns), pose, velocity)
 
     def get_state(self) -> list[object]:
-        """What a snapshot keeps: what was said from outside."""
+        """Returns the state of externally set actors; None for others."""
         return [
             actor.motion.get_state() if isinstance(actor.motion, GivenMotion) else None
             for actor in self._actors
         ]
 
     def set_state(self, state: Sequence[object]) -> None:
-        """Go back to a kept state."""
+        """Restores a state of `get_state`."""
         for actor, kept in zip(self._actors, state, strict=True):
             if isinstance(actor.motion, GivenMotion):
                 actor.motion.set_state(kept)

@@ -1,4 +1,4 @@
-"""Closed convex meshes of which shapes are built, outsides counter-clockwise, m."""
+"""Closed convex meshes for shapes, outsides counter-clockwise, m."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ _FACES = np.array(
 
 
 def box(low: ArrayLike, high: ArrayLike) -> Mesh:
-    """Between two opposite corners (3,)."""
+    """Returns a box between two opposite corners (3,)."""
     a, b = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     return Mesh(((a + b) / 2.0 + _CORNERS * (b - a)).astype(np.float32), _FACES)
 
 
 def ellipsoid(centre: ArrayLike, half_axes: ArrayLike, sides: int = 12, rings: int = 8) -> Mesh:
-    """With half axes (3,) along x, y, z; its corners lie on the true one."""
+    """Returns an ellipsoid with half axes (3,) along x, y, z; vertices lie on the exact surface."""
     latitude = np.linspace(-0.5 * np.pi, 0.5 * np.pi, rings + 1)[1:-1]
     around = np.arange(sides) * 2.0 * np.pi / sides
     ring = np.cos(latitude)[:, None], np.sin(latitude)[:, None]
@@ -50,7 +50,7 @@ def ellipsoid(centre: ArrayLike, half_axes: ArrayLike, sides: int = 12, rings: i
 
 
 def wheel(centre: ArrayLike, radius: float, width: float, sides: int = 16) -> Mesh:
-    """A closed cylinder about an axis along y."""
+    """Returns a closed cylinder about an axis along y."""
     angle = np.arange(sides) * 2.0 * np.pi / sides
     rim = radius * np.column_stack([np.cos(angle), np.zeros(sides), np.sin(angle)])
     half = np.array([0.0, width / 2.0, 0.0])
@@ -67,7 +67,7 @@ def wheel(centre: ArrayLike, radius: float, width: float, sides: int = 16) -> Me
 
 
 def plate(corners: ArrayLike, thickness: float) -> Mesh:
-    """A flat or bent quadrilateral: corners (4, 3) counter-clockwise from above, made thick."""
+    """Returns a thick plate: corners (4, 3) counter-clockwise from above, flat or bent."""
     middle = np.asarray(corners, dtype=np.float64)
     up = np.array([0.0, 0.0, thickness / 2.0])
     points = np.vstack([middle + up, middle - up])

@@ -1,8 +1,8 @@
-"""Simple shapes that one knows at a glance: a person, a car, a bird.
+"""Simple recognisable shapes: a person, a car, a bird.
 
-Frames are FLU. The origin of a person and of a car lies on the ground below the middle, that of a
-bird in its middle. Parts are closed and a millimetre apart, so that a look upwards from inside one
-meets its own top first (see `Solid`). Sizes are modelling choices near those of everyday life.
+Frames are FLU. The origin of a person and of a car lies on the ground below the centre, that of a
+bird in its centre. Parts are closed and a millimetre apart, so that an upward ray from inside a
+part meets its own top first (see `Solid`). Sizes are everyday ones (modelling choices).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from volery.world.scene_content import BodyShape
 
 
 def person() -> BodyShape:
-    """1.75 m tall, in mid-stride, arms at the sides."""
+    """Returns a person 1.75 m tall, in mid-stride, arms at the sides."""
     clothes = [
         box([0.05, 0.03, 0.0], [0.21, 0.17, 0.849]),  # left leg, ahead
         box([-0.21, -0.17, 0.0], [-0.05, -0.03, 0.849]),
@@ -34,7 +34,7 @@ def person() -> BodyShape:
 
 
 def car() -> BodyShape:
-    """4.4 m long, 1.8 m wide, 1.45 m high, looking along x."""
+    """Returns a car 4.4 m long, 1.8 m wide, 1.45 m high, facing along x."""
     paint = [
         box([-2.2, -0.9, 0.45], [2.2, 0.9, 0.85]),
         box([-1.7, -0.6, 0.25], [1.7, 0.6, 0.449]),  # floor between the wheels
@@ -48,7 +48,7 @@ def car() -> BodyShape:
 
 
 def bird() -> BodyShape:
-    """A large gull: 1.3 m of wings, held up a little, .6 m long, looking along x."""
+    """Returns a large gull: 1.3 m of slightly raised wings, .6 m long, facing along x."""
     parts = [
         ellipsoid([0.0, 0.0, 0.0], [0.22, 0.07, 0.07]),
         ellipsoid([0.27, 0.0, 0.03], [0.06, 0.045, 0.045], sides=8, rings=6),

@@ -1,7 +1,7 @@
 """Cities from building outlines.
 
-geojson.py     a file's features                heights.py    how tall a building is
-outlines.py    sound footprints, and a report   buildings.py  walls and roofs
+geojson.py     a file's features                heights.py    heights of buildings
+outlines.py    valid footprints, and a report   buildings.py  walls and roofs
 streets.py     pavement and asphalt             furniture.py  lamps and street trees
 city.py        all of it together
 """

@@ -1,4 +1,4 @@
-"""From footprints to closed solids: walls that end in flat roofs, with a floor under the ground."""
+"""Closed solids from footprints: walls with flat roofs, and a floor below the ground."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from volery.world.terrain import Terrain
 Array = NDArray[np.float64]
 
 FOUNDATION_M = 0.5
-"""How deep walls reach below the lowest ground, so that nothing slips under them."""
+"""Depth of walls below the lowest ground, so that nothing passes under them."""
 _LOOK_EVERY_M = 5.0
-"""Distance of the points along an outline at which the ground is looked up."""
+"""Distance of the points along an outline at which the ground is sampled."""
 _PLASTER = (
     (0.98, 0.90, 0.70),
     (0.95, 0.78, 0.50),
@@ -37,9 +37,9 @@ _PLASTER = (
 
 @dataclass(frozen=True, eq=False)
 class Building:
-    """A building that stands in the map.
+    """A building in the map.
 
-    foot_m: z of the lowest ground that it touches. roof_m: z of its flat roof.
+    foot_m: minimum z of the ground along its outline. roof_m: z of its flat roof.
     """
 
     outline: Outline
@@ -48,12 +48,12 @@ class Building:
 
     @property
     def area_m2(self) -> float:
-        """Area of its footprint."""
+        """Area of the footprint."""
         return float(self.outline.footprint.area)
 
 
 def stand(outlines: Sequence[Outline], terrain: Terrain) -> tuple[Building, ...]:
-    """Buildings on the ground, heights counted from the lowest ground along their outlines."""
+    """Returns buildings on the ground; heights count from the lowest ground along an outline."""
     import shapely
 
     if not outlines:
@@ -69,7 +69,7 @@ def stand(outlines: Sequence[Outline], terrain: Terrain) -> tuple[Building, ...]
 
 
 def solids_of(buildings: Sequence[Building], seed: int) -> tuple[Solid, ...]:
-    """A closed solid for each building, "building" and its id by name."""
+    """Returns a closed solid for each building, with "building" and its id as name."""
     picks = generator(seed, "city/plaster").integers(0, len(_PLASTER), len(buildings))
     return tuple(
         Solid(
@@ -91,9 +91,9 @@ def solids_of(buildings: Sequence[Building], seed: int) -> tuple[Solid, ...]:
 
 
 def extruded(footprint: Any, low_m: float, high_m: float) -> Mesh:
-    """Closed mesh over a shapely polygon, or several that do not overlap, facing outwards.
+    """Returns the closed mesh over disjoint shapely polygons, facing outwards.
 
-    Outer rings run counter-clockwise, holes clockwise, as `shapely.orient_polygons` makes them.
+    Outer rings run counter-clockwise, holes clockwise, as `shapely.orient_polygons` returns them.
     """
     import shapely
 
@@ -110,7 +110,7 @@ def extruded(footprint: Any, low_m: float, high_m: float) -> Mesh:
 
 
 def _wall(ring: Array, low_m: float, high_m: float) -> Mesh:
-    """Upright rectangles along a closed ring (n, 2), facing its right."""
+    """Returns upright rectangles along a closed ring (n, 2), facing its right."""
     count = len(ring) - 1
     corners = np.empty((count, 4, 3))
     for k, (along, height) in enumerate(itertools.product((ring[:-1], ring[1:]), (low_m, high_m))):
@@ -122,7 +122,7 @@ def _wall(ring: Array, low_m: float, high_m: float) -> Mesh:
 
 
 def _level(triangles: Array, height_m: float) -> Mesh:
-    """Triangles (n, 3, 2) at a height."""
+    """Returns triangles (n, 3, 2) at a height."""
     points = np.full((3 * len(triangles), 3), height_m)
     points[:, :2] = triangles.reshape(-1, 2)
     return Mesh(points.astype(np.float32), np.arange(len(points), dtype=np.uint32).reshape(-1, 3))

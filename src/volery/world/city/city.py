@@ -1,4 +1,4 @@
-"""A city: everything that building outlines, a ground and a seed make."""
+"""Builds a city from building outlines, a ground and a seed."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ from volery.world.terrain import Terrain
 class City:
     """A city on its ground, in the map.
 
-    solids: a building each, then a lamp each. lamps: (L, 4) place and direction of the arm.
-    trees: of the streets; they join the forest. report: what became of the outlines.
+    solids: one per building, then one per lamp. lamps: (L, 4) position and direction of the arm.
+    trees: street trees, which join the forest. report: results of reading the outlines.
     """
 
     buildings: tuple[Building, ...]
@@ -49,10 +49,10 @@ def build_city(
     streets: StreetRule | None = None,
     furniture: FurnitureRule | None = None,
 ) -> City:
-    """City of a GeoJSON file of outlines; `frame` is the map's place on the earth.
+    """Builds the city of a GeoJSON file of outlines; `frame` is the map's position on the earth.
 
-    region: (x0, y0, x1, y1) in m; buildings whose middle lies in it stay. None keeps all.
-    Raises `DataFileError` for a file that is none, or has no building there, or for buildings
+    region: (x0, y0, x1, y1) in m; only buildings whose centre lies in it are used. None uses all.
+    Raises `DataFileError` if the file is invalid, contains no building there, or has buildings
     beyond the terrain.
     """
     outlines, report = read_outlines(path, frame, rule=heights or HeightRule(), region=region)

@@ -1,4 +1,4 @@
-"""What stands in the streets: lamps on the pavement, rows of young trees along the kerb."""
+"""Street furniture: lamps on the pavement, rows of young trees along the kerb."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from volery.world.terrain import Terrain
 Array = NDArray[np.float64]
 
 _FROM_KERB_M = 0.5
-"""Of a lamp's post, on the pavement."""
+"""Distance of a lamp's post from the kerb, on the pavement."""
 _TREES_BEYOND_KERB_M = 1.2
-"""Trees stand in the parking lane, so that their crowns keep off the walls."""
+"""Distance of trees from the kerb: in the parking lane, which keeps crowns off the walls."""
 _TREE_ROADWAY_M = 9.0
 """Roadways narrower than this have no trees."""
 _POST_M, _POST_RADIUS_M, _FOOT_M = 6.0, 0.08, 0.4
@@ -33,9 +33,9 @@ _TREE_DBH_M = (0.10, 0.24)
 
 @dataclass(frozen=True)
 class FurnitureRule:
-    """How far apart things stand along a street; modelling choices, as all sizes here.
+    """Spacing of objects along a street; modelling choices, as all sizes here.
 
-    0 leaves them out. tree_share: of the places for trees that have one.
+    0 omits them. tree_share: fraction of the tree positions that have a tree.
     """
 
     lamp_spacing_m: float = 28.0
@@ -44,7 +44,7 @@ class FurnitureRule:
 
 
 def place_lamps(streets: Streets, rule: FurnitureRule, seed: int) -> Array:
-    """Lamps (L, 4): x and y, m, and the unit direction of the arm, over the street."""
+    """Returns lamps (L, 4): x and y, m, and the unit direction of the arm, over the street."""
     if not rule.lamp_spacing_m:
         return np.zeros((0, 4))
     from_wall_m = streets.rule.pavement_m - _FROM_KERB_M
@@ -54,7 +54,7 @@ def place_lamps(streets: Streets, rule: FurnitureRule, seed: int) -> Array:
 
 
 def place_trees(streets: Streets, rule: FurnitureRule, seed: int, lamps: Array) -> Inventory:
-    """Street trees, none near a lamp; their trunks' diameters are drawn, heights follow."""
+    """Returns street trees, none near a lamp; trunk diameters are drawn, heights follow."""
     places = np.zeros((0, 4))
     if rule.tree_spacing_m:
         from_wall_m = streets.rule.pavement_m + _TREES_BEYOND_KERB_M
@@ -70,7 +70,7 @@ def place_trees(streets: Streets, rule: FurnitureRule, seed: int, lamps: Array) 
 
 
 def _along(lines: Sequence[Array], spacing_m: float, seed: int, stream: str) -> Array:
-    """Places (n, 4) a spacing apart on lines, each line from a random start, with their right."""
+    """Returns positions (n, 4) a spacing apart on lines, from random starts, with their right."""
     starts = generator(seed, stream).random(len(lines))
     places = [np.zeros((0, 4))]
     for line, start in zip(lines, starts, strict=True):
@@ -86,7 +86,7 @@ def _along(lines: Sequence[Array], spacing_m: float, seed: int, stream: str) -> 
 
 
 def _apart(places: Array, least_m: float) -> NDArray[np.bool_]:
-    """Which places to keep so that no two are nearer than `least_m`; earlier ones go first."""
+    """Returns which positions are at least `least_m` from all earlier selected ones."""
     kept = np.zeros(len(places), dtype=bool)
     cells: dict[tuple[int, int], list[tuple[float, float]]] = {}
     side = max(least_m, 1e-3)
@@ -102,7 +102,7 @@ def _apart(places: Array, least_m: float) -> NDArray[np.bool_]:
 
 
 def lamp_solids(lamps: Array, terrain: Terrain) -> tuple[Solid, ...]:
-    """A solid for each lamp, "lamp 1" and on by name."""
+    """Returns a solid for each lamp, with "lamp 1" and so on as names."""
     model = _lamp_model()
     ground = terrain.height(lamps[:, 0], lamps[:, 1])
     solids = []
@@ -113,7 +113,7 @@ def lamp_solids(lamps: Array, terrain: Terrain) -> tuple[Solid, ...]:
 
 
 def _lamp_model() -> Mesh:
-    """Post, arm along x and head, each closed; the post's foot reaches below the ground."""
+    """Returns post, arm along x and head, each closed; the post's foot extends below the ground."""
     top = _POST_M
     length, width, height = _HEAD_M
     return concatenate(

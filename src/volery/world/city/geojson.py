@@ -1,8 +1,8 @@
-"""Reading building outlines from GeoJSON (RFC 7946), checked as far as its form goes.
+"""Reads building outlines from GeoJSON (RFC 7946) and validates the format.
 
-Whatever is no GeoJSON of WGS 84 coordinates is one `DataFileError` that names file and feature.
-What is well formed but no good outline (crossing itself, too few corners) passes; `outlines` mends
-or drops it.
+Anything other than GeoJSON with WGS 84 coordinates raises a `DataFileError` that names file and
+feature. Well-formed but invalid outlines (self-intersecting, too few corners) pass; `outlines`
+repairs or drops them.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 from volery.core.errors import DataFileError
 
 MOST_BYTES = 256_000_000
-"""Larger files are refused: Python's form of them would take gigabytes."""
+"""Maximum file size: parsed larger files would need gigabytes."""
 _WGS_84 = ("CRS84", "EPSG::4326", "EPSG:4326")
 _ID_KEYS = ("id", "@id", "osm_id")
 _SHAPES = ("Point", "MultiPoint", "LineString", "MultiLineString", "GeometryCollection")
-"""Geometries that are no outlines, though right in a file."""
+"""Valid geometries that are not outlines."""
 
 Ring = NDArray[np.float64]
 """(n, 2) longitude and latitude in degrees."""
@@ -33,7 +33,7 @@ Ring = NDArray[np.float64]
 class Feature:
     """One feature of a file.
 
-    polygons: each with its outer ring first, then its holes; none for another shape or no geometry.
+    polygons: each with its outer ring first, then its holes; empty for other shapes or no geometry.
     """
 
     id: str
@@ -43,13 +43,13 @@ class Feature:
 
 
 def read_features(path: str | Path) -> tuple[Feature, ...]:
-    """All features of a file, in its order. Raises `DataFileError`."""
+    """Returns all features of a file, in order; raises `DataFileError` for an invalid file."""
     path = Path(path)
     data = _load(path)
     kind = data.get("type") if isinstance(data, dict) else None
     if kind != "FeatureCollection":
         raise DataFileError(
-            f"{path}: outlines are a GeoJSON FeatureCollection; this file's 'type' is another one"
+            f"{path}: outlines must be a GeoJSON FeatureCollection; this file has another 'type'"
         )
     _check_crs(path, data.get("crs"))
     features = data.get("features")
@@ -88,7 +88,7 @@ def _load(path: Path) -> Any:
 
 
 def _check_crs(path: Path, crs: Any) -> None:
-    """GeoJSON before RFC 7946 could name other coordinates than WGS 84."""
+    """Rejects coordinates other than WGS 84, which GeoJSON before RFC 7946 could name."""
     if crs is None:
         return
     properties = crs.get("properties") if isinstance(crs, dict) else None

@@ -1,4 +1,4 @@
-"""How tall a building is, from what its feature says."""
+"""Heights of buildings from the properties of their features."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 TALLEST_M = 1000.0
-"""Above any building: a larger number is a slip."""
+"""Maximum height; larger numbers are errors."""
 _FOOT_M = 0.3048
 _LENGTH = re.compile(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*(m|metres|meters|ft|feet|'|)\s*", re.IGNORECASE)
 _MOST_LEVELS = 300.0
@@ -17,10 +17,10 @@ _MOST_LEVELS = 300.0
 
 @dataclass(frozen=True)
 class HeightRule:
-    """What stands in for heights that nobody mapped; both are modelling choices.
+    """Defaults for unmapped heights; both are modelling choices.
 
     storey_m: height of a storey where only the number of levels is known, and between windows.
-    default_m: of a building of which nothing is known.
+    default_m: of a building without any data.
     """
 
     storey_m: float = 3.2
@@ -29,9 +29,9 @@ class HeightRule:
 
 @dataclass(frozen=True)
 class Height:
-    """Height above the lowest ground that a building touches, m, and its storeys.
+    """Height above the lowest ground along a building's outline, m, and its storeys.
 
-    source: "height", "levels" or "default". fault: what could not be understood, if anything.
+    source: "height", "levels" or "default". fault: values that could not be parsed, if any.
     """
 
     height_m: float
@@ -41,14 +41,15 @@ class Height:
 
     @property
     def storey_m(self) -> float:
-        """Height of each of its storeys."""
+        """Height of a storey, m."""
         return self.height_m / max(self.storeys, 1)
 
 
 def height_of(properties: Mapping[str, Any], rule: HeightRule) -> Height:
-    """`height` (m, or with a unit), else `building:levels` or `levels` times a storey's height.
+    """Returns a building's `height` (m, or with a unit), else its levels times the storey height.
 
-    OpenStreetMap's words: `height` counts from the lowest point that touches the ground to the top.
+    Levels are `building:levels` or `levels`. As in OpenStreetMap, `height` counts from the lowest
+    point on the ground to the top.
     """
     faults = []
     given = properties.get("height")

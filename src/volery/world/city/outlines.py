@@ -1,8 +1,9 @@
-"""From features of a file to sound footprints in the map, with a report of what was mended.
+"""Valid footprints in the map from features of a file, with a report of repairs.
 
-A sound footprint is a valid polygon, or several: simple rings, holes inside, no overlap. Outlines
-that cross themselves are rebuilt from the areas that they enclose, open ones are closed; what has
-no area, stands twice or is hidden in a taller building is dropped. Each of these is told by id.
+A valid footprint consists of one or more polygons: simple rings, holes inside, no overlap.
+Self-intersecting outlines are rebuilt from the areas that they enclose, open ones are closed;
+outlines without area, duplicates and buildings hidden in a taller one are dropped. The report lists
+each by id.
 """
 
 from __future__ import annotations
@@ -25,18 +26,18 @@ Array = NDArray[np.float64]
 Region = tuple[float, float, float, float]
 
 LEAST_AREA_M2 = 1.0
-"""Smaller footprints are slips of the mapper (modelling choice)."""
+"""Minimum area; smaller footprints are mapping errors (modelling choice)."""
 FARTHEST_M = 50_000.0
-"""From the map's origin: beyond it a flat map is wrong by 200 m of height."""
+"""Maximum distance from the map's origin: beyond it a flat map is wrong by 200 m of height."""
 _MOST_MENDED = 1000
-"""Corners of an outline that crosses itself: its parts can be as many as this squared."""
+"""Maximum corners of a self-intersecting outline: it may have this number squared of parts."""
 _SAME = 0.999
-"""Share of two footprints that must agree for one to count as the other once more."""
+"""Fraction of common area at which two footprints count as duplicates."""
 
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """A building as mapped: a shapely MultiPolygon in the map, m, whose area is positive."""
+    """A mapped building: a shapely MultiPolygon in the map, m, with positive area."""
 
     id: str
     footprint: Any
@@ -45,7 +46,7 @@ class Outline:
 
 @dataclass(frozen=True)
 class Report:
-    """What became of a file's outlines; pairs are an id and what was done or why."""
+    """Results of reading a file's outlines; pairs are an id and the action or reason."""
 
     file: str
     outlines: int
@@ -53,14 +54,14 @@ class Report:
     repaired: tuple[tuple[str, str], ...]
     dropped: tuple[tuple[str, str], ...]
     guessed: tuple[tuple[str, str], ...]
-    """Heights that could not be understood."""
+    """Heights that could not be parsed."""
     heights: tuple[int, int, int]
     """Buildings whose height came from `height`, from levels, from the default."""
     outside: int
-    """Outlines beyond the region that was asked for."""
+    """Outlines beyond the requested region."""
 
     def summary(self) -> str:
-        """One line."""
+        """Returns a summary in one line."""
         buildings = counted(self.buildings, "building")
         text = f"{self.file}: {buildings} of {counted(self.outlines, 'outline')}"
         parts = [
@@ -76,7 +77,7 @@ class Report:
         return text + (": " + ", ".join(parts) if parts else "")
 
     def __str__(self) -> str:
-        """The summary, then a line for each outline that needed something."""
+        """Returns the summary, then a line for each repaired, dropped or guessed outline."""
         lines = [self.summary()]
         lines += [f"  repaired {own}: {what}" for own, what in self.repaired]
         lines += [f"  dropped {own}: {why}" for own, why in self.dropped]
@@ -87,10 +88,10 @@ class Report:
 def read_outlines(
     path: str | Path, frame: LocalFrame, *, rule: HeightRule, region: Region | None = None
 ) -> tuple[tuple[Outline, ...], Report]:
-    """Sound outlines of a file around the map's origin, in the file's order.
+    """Returns the valid outlines of a file around the map's origin, in the file's order.
 
-    region: (x0, y0, x1, y1) in m; buildings whose middle lies in it stay. None keeps all.
-    Raises `DataFileError`.
+    region: (x0, y0, x1, y1) in m; only buildings whose centre lies in it are used. None uses all.
+    Raises `DataFileError` for an invalid file, or if the outlines are far from the map's origin.
     """
     features = read_features(path)
     _check_place(path, features, frame)
@@ -129,7 +130,7 @@ def _check_place(path: str | Path, features: Sequence[Feature], frame: LocalFram
     rings = [ring for feature in features for polygon in feature.polygons for ring in polygon]
     corners = [ring for ring in rings if len(ring)]
     if not corners:
-        raise DataFileError(f"{path}: there is no outline of a building in it")
+        raise DataFileError(f"{path}: it contains no outline of a building")
     middle = np.median(np.concatenate(corners), axis=0)
     away = float(np.linalg.norm(_in_map(middle[None], frame)))
     if away > FARTHEST_M:
@@ -141,14 +142,14 @@ def _check_place(path: str | Path, features: Sequence[Feature], frame: LocalFram
 
 
 def _in_map(ring: Ring, frame: LocalFrame) -> Array:
-    """Positions (n, 2) in degrees to x and y in the map, at the height of its origin."""
+    """Converts positions (n, 2) in degrees to x and y in the map, at the height of its origin."""
     longitude, latitude = np.radians(ring).T
     height = np.full(len(ring), frame.altitude_m)
     return frame.enu_from_geodetic(np.stack([latitude, longitude, height], axis=1))[:, :2]
 
 
 def _footprint(feature: Feature, frame: LocalFrame) -> tuple[Any, str, str]:
-    """Footprint in the map, what was mended, or why there is none."""
+    """Returns the footprint in the map, its repairs, or the reason for its absence."""
     import shapely
 
     if not feature.polygons:
@@ -182,7 +183,7 @@ def _footprint(feature: Feature, frame: LocalFrame) -> tuple[Any, str, str]:
 
 
 def _closed(ring: Ring, mended: list[str]) -> Ring:
-    """The ring without repeated corners, its last corner the first."""
+    """Returns the ring closed and without repeated corners."""
     if len(ring) and not np.array_equal(ring[0], ring[-1]):
         mended.append("open: closed")
         ring = np.concatenate([ring, ring[:1]])
@@ -200,7 +201,7 @@ def _lies_in(footprint: Any, region: Region) -> bool:
 def _without_hidden(
     outlines: Sequence[Outline],
 ) -> tuple[tuple[Outline, ...], list[tuple[str, str]]]:
-    """Leave out what stands twice, or inside a building at least as tall; of twins the first."""
+    """Removes duplicates, and buildings inside one at least as tall; keeps the first duplicate."""
     import shapely
 
     if not outlines:
@@ -220,7 +221,7 @@ def _without_hidden(
 
 
 def _exact_twins(outlines: Sequence[Outline]) -> dict[int, str]:
-    """Whose footprint and height were there before: a file may hold a building a thousand times."""
+    """Finds exact duplicates of footprint and height: a file may contain a building many times."""
     first: dict[tuple[bytes, float], int] = {}
     gone = {}
     for k, outline in enumerate(outlines):
@@ -231,7 +232,7 @@ def _exact_twins(outlines: Sequence[Outline]) -> dict[int, str]:
 
 
 def _hidden(outlines: Sequence[Outline], inner: int, outer: int) -> str:
-    """Why the one building need not be there beside the other; empty if it must."""
+    """Returns the reason why one building makes the other superfluous; empty if it does not."""
     a, b = outlines[inner], outlines[outer]
     if inner == outer or a.height.height_m > b.height.height_m:
         return ""
@@ -239,7 +240,7 @@ def _hidden(outlines: Sequence[Outline], inner: int, outer: int) -> str:
     if size > other * (2.0 - _SAME):
         return ""
     twins = size > _SAME * other and a.height.height_m == b.height.height_m
-    if twins and inner < outer:  # the first of them stays
+    if twins and inner < outer:  # the first one remains
         return ""
     if a.footprint.intersection(b.footprint).area < _SAME * size:
         return ""

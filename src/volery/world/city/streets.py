@@ -1,8 +1,8 @@
-"""Streets between buildings, read off the buildings alone.
+"""Streets between buildings, derived from the buildings alone.
 
 A gap between blocks narrower than `widest_m` counts as a street: pavement along the walls, asphalt
-between the kerbs where that leaves room for a car. Courtyards and alleys are paved. What lies
-farther from any wall is no street: it keeps the ground's own look.
+between the kerbs if it leaves room for a car. Courtyards and alleys are paved. Areas farther from
+any wall are not streets: they have the ground's own material.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from volery.world.materials import Material
 Array = NDArray[np.float64]
 
 _ROADWAY_M = 3.0
-"""Asphalt narrower than this is left out: no car fits (modelling choice)."""
+"""Minimum width of asphalt: a car's (modelling choice)."""
 _CELL_M = 0.5
 _MOST_CELLS = 16_000_000
-"""Larger cities get larger cells."""
+"""Maximum number of cells; larger cities get larger cells."""
 _ROUGH_M = 0.1
-"""Kerbs may be off by this, which saves most of their corners."""
+"""Tolerance of kerbs, which saves most of their corners."""
 _ROUND = 4
-"""Straight pieces of a quarter circle around corners."""
+"""Straight segments of a quarter circle around corners."""
 
 
 @dataclass(frozen=True)
 class StreetRule:
-    """How gaps become streets; modelling choices."""
+    """Geometry of streets; modelling choices."""
 
     widest_m: float = 32.0
     pavement_m: float = 3.0
@@ -54,7 +54,7 @@ class Streets:
 
 
 def find_streets(footprints: Sequence[Any], rule: StreetRule) -> Streets:
-    """Streets between footprints (shapely polygons, map, m)."""
+    """Returns the streets between footprints (shapely polygons, map, m)."""
     import shapely
 
     walls = shapely.union_all(list(footprints))
@@ -69,9 +69,9 @@ def find_streets(footprints: Sequence[Any], rule: StreetRule) -> Streets:
 
 
 def kerb_lines(streets: Streets, from_wall_m: float, roadway_m: float) -> tuple[Array, ...]:
-    """Lines (n, 2) at a distance from the walls, along roadways at least `roadway_m` wide.
+    """Returns lines (n, 2) at a distance from the walls, along roadways at least `roadway_m` wide.
 
-    They run with the blocks on their left, so the street lies on their right.
+    The blocks lie on their left, the street on their right.
     """
     import shapely
 
@@ -85,7 +85,7 @@ def kerb_lines(streets: Streets, from_wall_m: float, roadway_m: float) -> tuple[
 
 
 def cover_of(streets: Streets) -> GroundCover:
-    """Paving and asphalt as a raster."""
+    """Returns paving and asphalt as a raster."""
     paved = streets.fabric.union(streets.blocks.buffer(streets.rule.pavement_m, quad_segs=_ROUND))
     if paved.is_empty:
         return GroundCover(np.zeros((0, 0), np.uint8), 0.0, 0.0, 1.0)
@@ -101,9 +101,9 @@ def cover_of(streets: Streets) -> GroundCover:
 def covered(
     area: Any, corner: tuple[float, float], cell_m: float, shape: tuple[int, int]
 ) -> NDArray[np.bool_]:
-    """Cells (rows, columns) whose middle lies in a shapely area.
+    """Returns the cells (rows, columns) whose centre lies in a shapely area.
 
-    By the even-odd rule: along each row of cells, every edge that crosses it changes sides.
+    By the even-odd rule: along each row of cells, every crossing edge changes sides.
     """
     import shapely
 

@@ -1,4 +1,4 @@
-"""Worlds from 0/1 matrices: grid maps, their files, and the blocks that they become."""
+"""Worlds from 0/1 matrices: grid maps, their files, and their blocks."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""The blocks of a grid map as one mesh: their tops and the walls that can be seen.
+"""Meshes of a grid map's blocks: tops and visible walls.
 
 Tops of neighbours are merged to rectangles, walls along a line to one, so that a mesh grows with
-the length of its outlines and not with the number of cells. There are no undersides: nobody sees
-them, and what is in a block leaves it by a wall or by the top.
+the length of its outlines instead of the number of cells. There are no undersides: they are
+invisible, and a body inside a block leaves it by a wall or the top.
 """
 
 from __future__ import annotations
@@ -17,27 +17,27 @@ from volery.world.grid_maps.grid_map import GridMap
 from volery.world.mesh import EMPTY, Mesh
 
 _TRIANGLES = (0, 1, 2, 0, 2, 3)
-"""Of a rectangle, by its corners."""
+"""Triangles of a rectangle, by its corners."""
 MOST_FACES = 1_000_000
-"""Rectangles of a mesh: with Embree's search trees they take about .6 GB."""
+"""Maximum rectangles of a mesh: with Embree's search trees they take about .6 GB."""
 
 
 class _Runs(NamedTuple):
-    """Unbroken rows of set cells."""
+    """Contiguous runs of set cells."""
 
     row: NDArray[np.int64]
     first: NDArray[np.int64]
     end: NDArray[np.int64]
-    """The column after the last one."""
+    """Column after the last one."""
 
 
 def block_mesh(grid: GridMap, bottom_m: float, top_m: float) -> Mesh:
-    """Blocks from `bottom_m` to `top_m`, z in the map.
+    """Returns the blocks from `bottom_m` to `top_m`, z in the map.
 
-    Raises `CommandError` where the map is so ragged that its mesh would be too large.
+    Raises `CommandError` if the map is so irregular that its mesh would be too large.
     """
     edges = _walls(grid.blocked)
-    _check_faces(grid, sum(_run_count(cells) for cells in edges))  # before memory is taken
+    _check_faces(grid, sum(_run_count(cells) for cells in edges))  # before memory is allocated
     walls = [_runs(cells) for cells in edges]
     tops = _runs(grid.blocked)
     corners = [_top_corners(*_merged(tops))]
@@ -57,13 +57,13 @@ def block_mesh(grid: GridMap, bottom_m: float, top_m: float) -> Mesh:
 def _check_faces(grid: GridMap, faces: int) -> None:
     if faces > MOST_FACES:
         raise CommandError(
-            f"grid map '{grid.name}' is too ragged: its blocks have {faces} faces and more, "
-            f"at most {MOST_FACES} are shown; a coarser grid or fewer single cells help"
+            f"grid map '{grid.name}' is too irregular: its blocks have at least {faces} "
+            f"faces, more than {MOST_FACES}; use a coarser grid or fewer single cells"
         )
 
 
 def _walls(blocked: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], ...]:
-    """Cells with a wall towards +x, -x (those two transposed), +y and -y."""
+    """Returns cells with a wall towards +x, -x (those two transposed), +y and -y."""
     free = ~np.pad(blocked, 1)
     return (
         (blocked & free[1:-1, 2:]).T,
@@ -74,7 +74,7 @@ def _walls(blocked: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], ...]:
 
 
 def _runs(cells: NDArray[np.bool_]) -> _Runs:
-    """Runs of set cells along the rows of `cells`, row by row."""
+    """Returns runs of set cells along the rows of `cells`, row by row."""
     step = np.diff(np.pad(cells, ((0, 0), (1, 1))).view(np.int8), axis=1)
     row, first = np.nonzero(step > 0)
     end = np.nonzero(step < 0)[1]
@@ -82,13 +82,13 @@ def _runs(cells: NDArray[np.bool_]) -> _Runs:
 
 
 def _run_count(cells: NDArray[np.bool_]) -> int:
-    """How many runs `_runs` finds."""
+    """Returns the number of runs that `_runs` finds."""
     begins = np.count_nonzero(cells[:, 1:] > cells[:, :-1])
     return int(begins + np.count_nonzero(cells[:, 0]))
 
 
 def _merged(runs: _Runs) -> tuple[_Runs, NDArray[np.int64]]:
-    """Runs of equal extent in rows that follow each other as one; the second: rows of each."""
+    """Merges runs of equal extent in consecutive rows; also returns the rows of each."""
     order = np.lexsort((runs.row, runs.end, runs.first))
     row, first, end = (column[order] for column in runs)
     begins = np.ones(len(row), dtype=np.bool_)
@@ -99,13 +99,13 @@ def _merged(runs: _Runs) -> tuple[_Runs, NDArray[np.int64]]:
 
 
 def _top_corners(runs: _Runs, rows: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(F, 4 corners, 3): column, row, whether up; counter-clockwise from outside."""
+    """Returns (F, 4 corners, 3): column, row, 1 for up; counter-clockwise from outside."""
     x0, x1, y0, y1 = runs.first, runs.end, runs.row, runs.row + rows
     return _quads((x0, y0, 1), (x1, y0, 1), (x1, y1, 1), (x0, y1, 1))
 
 
 def _wall_corners(side: int, runs: _Runs) -> NDArray[np.float64]:
-    """The same of walls towards +x, -x, +y, -y (side 0 to 3)."""
+    """Returns the same for walls towards +x, -x, +y, -y (side 0 to 3)."""
     a, b = (runs.first, runs.end) if side in (0, 3) else (runs.end, runs.first)
     if side < 2:  # along y; rows of the transposed cells are columns
         x = runs.row + (1 if side == 0 else 0)

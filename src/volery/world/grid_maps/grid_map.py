@@ -1,7 +1,7 @@
-"""A grid map: which cells of a level grid are blocked, and how large that is in the world.
+"""A grid map: blocked cells of a horizontal grid, and its size in the world.
 
-Row 0 holds the cells of lowest y and column 0 those of lowest x, as in `nav_msgs/OccupancyGrid`.
-Files are matrices whose first row is the top of a picture: reading them turns the rows around.
+Row 0 holds the cells of lowest y and column 0 those of lowest x, as in `nav_msgs/OccupancyGrid`. In
+files the first row is the top of an image; reading them flips the rows.
 """
 
 from __future__ import annotations
@@ -16,14 +16,17 @@ from volery.core.errors import CommandError
 
 MOST_CELLS = 4096 * 4096
 LARGEST_M = 1000.0
-"""Of a cell's side and a block's height."""
+"""Maximum side of a cell and height of a block."""
 FARTHEST_M = 100_000.0
-"""Of the origin; beyond, single precision leaves more than a centimetre between two places."""
+"""Maximum distance of the origin; beyond, single precision is coarser than a centimetre."""
 
 
 @dataclass(frozen=True, eq=False)
 class GridMap:
-    """Cells and their place in the map. Raises `CommandError` for sizes that cannot be."""
+    """Cells and their pose in the map.
+
+    Raises `CommandError` for sizes out of range.
+    """
 
     name: str
     blocked: NDArray[np.bool_]
@@ -31,9 +34,9 @@ class GridMap:
     cell_size_m: float
     block_height_m: float
     origin_m: tuple[float, float] = (0.0, 0.0)
-    """Corner of the cell in row 0, column 0 that is farthest from all others."""
+    """Outer corner of the cell in row 0, column 0."""
     yaw_rad: float = 0.0
-    """Turns the map about its origin, counter-clockwise."""
+    """Rotation of the map about its origin, counter-clockwise."""
 
     def __post_init__(self) -> None:
         blocked = np.ascontiguousarray(self.blocked, dtype=np.bool_).view()
@@ -54,30 +57,30 @@ class GridMap:
         reach = max(abs(self.origin_m[0]), abs(self.origin_m[1]))
         if not (reach <= FARTHEST_M and math.isfinite(self.yaw_rad)):
             raise CommandError(
-                f"grid map '{self.name}': the origin is within {FARTHEST_M:g} m, its yaw finite; "
-                f"not {self.origin_m}, {self.yaw_rad}"
+                f"grid map '{self.name}': the origin must be within {FARTHEST_M:g} m and yaw "
+                f"finite, not {self.origin_m}, {self.yaw_rad}"
             )
         blocked.flags.writeable = False
         object.__setattr__(self, "blocked", blocked)
 
     @property
     def rows(self) -> int:
-        """Cells along y, before it is turned."""
+        """Number of cells along y, before rotation."""
         return int(self.blocked.shape[0])
 
     @property
     def columns(self) -> int:
-        """Cells along x, before it is turned."""
+        """Number of cells along x, before rotation."""
         return int(self.blocked.shape[1])
 
     def map_from_cells(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Places (P, 2) m in the map of points (P, 2) that count in columns and rows of cells."""
+        """Returns positions (P, 2) m in the map of points (P, 2) in columns and rows of cells."""
         c, s = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
         turn = self.cell_size_m * np.array([[c, s], [-s, c]])
         return np.asarray(points @ turn + np.array(self.origin_m))
 
     def bounds_of_blocks(self) -> tuple[float, float, float, float] | None:
-        """x_min, y_min, x_max, y_max, m, of a box around all blocked cells; None without any."""
+        """Returns x_min, y_min, x_max, y_max, m, around all blocked cells; None without any."""
         rows, columns = (np.flatnonzero(self.blocked.any(axis=axis)) for axis in (1, 0))
         if not len(rows):
             return None
@@ -87,7 +90,7 @@ class GridMap:
         return x0, y0, x1, y1
 
     def describe(self) -> str:
-        """One line for people."""
+        """Returns a description in one line."""
         return (
             f"grid map '{self.name}', {self.columns} x {self.rows} cells of {self.cell_size_m:g} m,"
             f" blocks {self.block_height_m:g} m high"

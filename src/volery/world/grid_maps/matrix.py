@@ -1,4 +1,4 @@
-"""Grid maps as text: a matrix of 0 (free) and 1 (blocked), a row a line."""
+"""Grid maps as text: a matrix of 0 (free) and 1 (blocked), one row per line."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from volery.world.grid_maps.grid_map import MOST_CELLS
 
 _ZERO, _ONE, _COMMA = (ord(character) for character in "01,")
 _SHOWN = 20
-"""Characters of what was found that an error shows."""
+"""Maximum characters of the input that an error shows."""
 
 
 def parse_matrix(data: bytes, where: str) -> NDArray[np.bool_]:
-    """Blocked cells (rows, columns), row 0: the first line.
+    """Returns blocked cells (rows, columns), row 0: the first line.
 
-    Entries are separated by commas, semicolons or blanks. Empty lines are passed over. Raises
-    `DataFileError` naming line and column.
+    Entries are separated by commas, semicolons or blanks; empty lines are skipped. Raises
+    `DataFileError`, naming line and column, for other input.
     """
     rows: list[NDArray[np.bool_]] = []
     cells = 0
@@ -36,7 +36,7 @@ def parse_matrix(data: bytes, where: str) -> NDArray[np.bool_]:
             raise DataFileError(f"{where}: more than {MOST_CELLS} entries")
         rows.append(row)
     if not rows:
-        raise DataFileError(f"{where}: there is no row in it; a matrix of 0 and 1 is needed")
+        raise DataFileError(f"{where}: it has no row; a matrix of 0 and 1 is needed")
     return np.stack(rows)
 
 
@@ -51,7 +51,7 @@ def _text(data: bytes, where: str) -> str:
 
 
 def _row(line: str, where: str) -> NDArray[np.bool_]:
-    """Entries of a line: at once where it is written as most are, else one by one."""
+    """Returns the entries of a line: at once in the usual form, otherwise one by one."""
     compact = line.replace(" ", "") if "," in line else line
     if compact.isascii():
         codes = np.frombuffer(compact.encode(), dtype=np.uint8)

@@ -1,7 +1,7 @@
 """Grid maps of the benchmarks of movingai.com.
 
 The format is that of N. R. Sturtevant, "Benchmarks for grid-based pathfinding", 2012, as described
-on movingai.com: four lines of head (`type octile`, `height`, `width`, `map`), then a character a
+on movingai.com: four header lines (`type octile`, `height`, `width`, `map`), then a character per
 cell. `.` and `G` are passable, `S` (swamp) from regular terrain, too; `@` and `O` are out of
 bounds, `T` trees, `W` water that cannot be entered from terrain: these four are blocked.
 """
@@ -21,9 +21,9 @@ _LONGEST_NUMBER = 9
 
 
 def parse_moving_ai(data: bytes, where: str) -> NDArray[np.bool_]:
-    """Blocked cells (rows, columns), row 0: the first line after the head.
+    """Returns blocked cells (rows, columns), row 0: the first line after the header.
 
-    Raises `DataFileError` naming line and column.
+    Raises `DataFileError`, naming line and column, for other input.
     """
     lines = data.splitlines()
     height, width = _head(lines, where)
@@ -32,13 +32,15 @@ def parse_moving_ai(data: bytes, where: str) -> NDArray[np.bool_]:
         rows.pop()
     if len(rows) != height:
         raise DataFileError(
-            f"{where}: {counted(len(rows), 'row')} after the head, which says {height}"
+            f"{where}: {counted(len(rows), 'row')} after the header, which states {height}"
         )
     cells = np.empty((height, width), dtype=np.uint8)
     for k, row in enumerate(rows):
         line = f"{where}, line {_HEAD_LINES + k + 1}"
         if len(row) != width:
-            raise DataFileError(f"{line} has {counted(len(row), 'cell')}; the head says {width}")
+            raise DataFileError(
+                f"{line} has {counted(len(row), 'cell')}; the header states {width}"
+            )
         cells[k] = np.frombuffer(row, dtype=np.uint8)
     blocked = np.isin(cells, np.frombuffer(BLOCKED, dtype=np.uint8))
     unknown = np.argwhere(~blocked & ~np.isin(cells, np.frombuffer(FREE, dtype=np.uint8)))

@@ -1,4 +1,4 @@
-"""Grid maps as PNG pictures: a pixel a cell, dark ones are blocked."""
+"""Grid maps as PNG images: one pixel per cell, dark ones are blocked."""
 
 from __future__ import annotations
 
@@ -14,16 +14,17 @@ from volery.world.grid_maps.grid_map import MOST_CELLS
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _HEAD = struct.Struct(">8sI4sII")
-"""Signature, then length, name, width and height of the chunk that comes first."""
+"""Signature, then length, name, width and height of the first chunk."""
 _LUMA = (0.299, 0.587, 0.114)
 """Weights of red, green and blue: ITU-R BT.601."""
 
 
 def parse_picture(data: bytes, where: str, threshold: float = 0.5) -> NDArray[np.bool_]:
-    """Blocked cells (rows, columns), row 0: the top.
+    """Returns blocked cells (rows, columns), row 0: the top.
 
-    Blocked is what is darker than `threshold`, from 0 (white) to 1 (black); grey, colours, a
-    palette, 1 to 16 bits. What is more than half transparent is free. Raises `DataFileError`.
+    A pixel is blocked if darker than `threshold`, from 0 (white) to 1 (black); grey, colours, a
+    palette, 1 to 16 bits. Pixels more than half transparent are free. Raises `DataFileError` for
+    other input.
     """
     _check_size(data, where)
     grey, alpha = _decode(data, where)
@@ -31,18 +32,18 @@ def parse_picture(data: bytes, where: str, threshold: float = 0.5) -> NDArray[np
 
 
 def _check_size(data: bytes, where: str) -> None:
-    """Refuse what is no picture, or a large one, before memory is taken for it."""
+    """Rejects other files and large images before memory is allocated."""
     if len(data) < _HEAD.size or data[: len(_SIGNATURE)] != _SIGNATURE:
-        raise DataFileError(f"{where}: not a PNG picture")
+        raise DataFileError(f"{where}: not a PNG image")
     _, _, name, width, height = _HEAD.unpack_from(data)
     if name != b"IHDR" or not 0 < width * height <= MOST_CELLS:
         raise DataFileError(
-            f"{where}: a PNG picture of {width} x {height} pixels; allowed are 1 to {MOST_CELLS}"
+            f"{where}: a PNG image of {width} x {height} pixels; allowed are 1 to {MOST_CELLS}"
         )
 
 
 def _decode(data: bytes, where: str) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Grey and alpha (rows, columns), 0 to 1."""
+    """Returns grey and alpha (rows, columns), 0 to 1."""
     from PIL import Image
 
     try:
@@ -53,7 +54,7 @@ def _decode(data: bytes, where: str) -> tuple[NDArray[np.float32], NDArray[np.fl
                 return grey, np.ones_like(grey)
             colours = np.asarray(picture.convert("RGBA"))
     except (OSError, SyntaxError, ValueError, EOFError, struct.error, zlib.error) as error:
-        raise DataFileError(f"{where}: the picture is damaged: {error}") from None
+        raise DataFileError(f"{where}: the image is damaged: {error}") from None
     grey = np.zeros(colours.shape[:2], dtype=np.float32)
     for channel, weight in enumerate(_LUMA):
         grey += np.float32(weight / 255.0) * colours[:, :, channel]

@@ -1,4 +1,4 @@
-"""Cells from files: what kind of file it is, and whether it can be read at all."""
+"""Reads cells from files: selects the format and checks the size."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from volery.world.grid_maps.moving_ai import parse_moving_ai
 from volery.world.grid_maps.picture import parse_picture
 
 MOST_BYTES = 4 * MOST_CELLS
-"""Of a file: room for a matrix of the most cells with separators and blanks."""
+"""Maximum size of a file: a matrix of the most cells with separators and blanks."""
 
 _SUFFIXES = (".csv", ".txt", ".png", ".map")
 
 
 def read_cells(path: Path, threshold: float = 0.5) -> NDArray[np.bool_]:
-    """Blocked cells (rows, columns) of a grid map's file, row 0: lowest y.
+    """Returns the blocked cells (rows, columns) of a grid map's file, row 0: lowest y.
 
-    A .csv or .txt file is a matrix of 0 and 1, a .map file one of movingai.com, a .png file a
-    picture in which a cell is blocked where it is darker than `threshold` (0 white, 1 black). The
-    first row of a file is the top: it holds the highest y. Raises `DataFileError` naming the file
-    and, where there are lines, the line.
+    A .csv or .txt file is a matrix of 0 and 1, a .map file one of movingai.com, a .png file an
+    image in which a cell is blocked where it is darker than `threshold` (0 white, 1 black). The
+    first row of a file is the top: it holds the highest y. Raises `DataFileError`, naming the file
+    and, where there are lines, the line, for other input.
     """
     suffix = path.suffix.lower()
     if suffix not in _SUFFIXES:
         raise DataFileError(
-            f"{path}: no grid map is read from '{path.suffix}'; allowed are {', '.join(_SUFFIXES)}"
+            f"{path}: unknown grid map format '{path.suffix}'; allowed are {', '.join(_SUFFIXES)}"
         )
     try:
         size = path.stat().st_size
@@ -43,7 +43,7 @@ def read_cells(path: Path, threshold: float = 0.5) -> NDArray[np.bool_]:
 
 
 def parse_cells(data: bytes, suffix: str, where: str, threshold: float = 0.5) -> NDArray[np.bool_]:
-    """The same from the content of a file; `where` is what errors begin with."""
+    """Returns the same from the content of a file; errors begin with `where`."""
     if suffix == ".png":
         from_top = parse_picture(data, where, threshold)
     elif suffix == ".map":

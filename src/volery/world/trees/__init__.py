@@ -1,9 +1,9 @@
 """Procedural trees: species as data, grown into shared models at three levels of detail.
 
-species.py    what a species file holds        allometry.py  sizes from trunk diameter
-branches.py   shoots and tubes                 foliage.py    leaves and their stand-ins
-growth.py     what all forms share             broadleaf.py, conifers.py, palm.py, snag.py
-models.py     from a species to tree models    model.py      what others see
+species.py    contents of species files        allometry.py  sizes from trunk diameter
+branches.py   shoots and tubes                 foliage.py    leaves and simplified leaves
+growth.py     common parts of all forms             broadleaf.py, conifers.py, palm.py, snag.py
+models.py     from a species to tree models    model.py      shared tree models
 """
 
 from volery.world.trees.model import BREAST_HEIGHT_M, DetailLevel, TreeMesh, TreeModel

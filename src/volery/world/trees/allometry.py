@@ -1,6 +1,6 @@
-"""How height and crown follow from trunk diameter, and how diameters are spread in a stand.
+"""Laws of height and crown width by trunk diameter, and distributions of diameters.
 
-Diameters are at breast height in m; each law converts to the units of its source inside.
+Diameters are at breast height in m; each law converts to the units of its source.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _EXPONENT = Quantity("", 20.0)
 
 
 class Data(Bounded):
-    """Base of what a species file holds."""
+    """Base class of tables in a species file."""
 
     quantities: ClassVar[Mapping[str, Quantity]] = {
         **dict.fromkeys(("b", "p4", "c0", "c1", "c2", "e", "sigma_ln"), _EXPONENT),
@@ -49,7 +49,7 @@ class MichaelisMentenHeight(Data):
     source: str
 
     def height(self, dbh: Array) -> Array:
-        """Heights of trunks `dbh`, m."""
+        """Returns heights of trunks `dbh`, m."""
         power = (100.0 * dbh) ** self.b
         return np.asarray(self.a * power / (self.k + power))
 
@@ -65,7 +65,7 @@ class ChaveHeight(Data):
     source: str
 
     def height(self, dbh: Array) -> Array:
-        """Heights of trunks `dbh`, m."""
+        """Returns heights of trunks `dbh`, m."""
         log = np.log(100.0 * dbh)
         return np.asarray(np.exp(self.c0 - self.e + self.c1 * log + self.c2 * log * log))
 
@@ -80,7 +80,7 @@ class CurtisArneyHeight(Data):
     source: str
 
     def height(self, dbh: Array) -> Array:
-        """Heights of trunks `dbh`, m."""
+        """Returns heights of trunks `dbh`, m."""
         inches = 100.0 * dbh / _CM_PER_INCH
         return np.asarray(_M_PER_FOOT * (4.5 + self.p2 * np.exp(-self.p3 * inches**self.p4)))
 
@@ -95,7 +95,7 @@ class LinearHeight(Data):
     source: str
 
     def height(self, dbh: Array) -> Array:
-        """Heights of trunks `dbh`, m."""
+        """Returns heights of trunks `dbh`, m."""
         return np.minimum(self.h0 + self.h1 * 100.0 * dbh, self.highest)
 
 
@@ -113,12 +113,12 @@ class CrownWidth(Data):
     source: str
 
     def radius(self, dbh: float) -> float:
-        """Crown radius of a trunk `dbh`, m."""
+        """Returns the crown radius of a trunk `dbh`, m."""
         return float(np.sqrt(self.area_a * (100.0 * dbh) ** self.area_b / np.pi))
 
 
 class DiameterSpread(Data):
-    """Log-normal diameters, cut off at both ends (drawn by inversion, so every draw counts)."""
+    """Log-normal diameters, truncated at both ends (drawn by inversion, so every draw counts)."""
 
     median_cm: Positive
     sigma_ln: Positive
@@ -130,18 +130,18 @@ class DiameterSpread(Data):
     def _holds_some(self) -> Self:
         low, high = self._ends()
         if not high - low > _LEAST_SHARE:
-            raise ValueError("no tree has a diameter from smallest_cm to largest_cm by this spread")
+            raise ValueError("this spread has no diameters from smallest_cm to largest_cm")
         return self
 
     def _ends(self) -> tuple[float, float]:
-        """Shares of the whole distribution below the smallest and below the largest diameter."""
+        """Returns fractions of the distribution below the smallest and the largest diameter."""
         from statistics import NormalDist
 
         normal = NormalDist(math.log(self.median_cm), self.sigma_ln)
         return normal.cdf(math.log(self.smallest_cm)), normal.cdf(math.log(self.largest_cm))
 
     def draw(self, rng: np.random.Generator, count: int) -> Array:
-        """`count` diameters in m."""
+        """Returns `count` diameters, m."""
         from statistics import NormalDist
 
         normal = NormalDist(float(np.log(self.median_cm)), self.sigma_ln)

@@ -1,7 +1,7 @@
-"""Growing branches, many at once, and turning them into tubes.
+"""Grows branches, many at once, and turns them into tubes.
 
-A `Branches` batch holds B shoots of P points each. All randomness comes in through a generator, so
-the same seed grows the same tree.
+A `Branches` batch holds B shoots of P points each. All randomness comes from a generator argument,
+so the same seed grows the same tree.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Branches:
         return np.asarray(np.linalg.norm(np.diff(self.points, axis=1), axis=2).sum(axis=1))
 
     def at(self, fraction: Array) -> tuple[Array, Array, Array]:
-        """Points, unit tangents (B, N, 3) and radii (B, N) at `fraction` (B, N) of the way."""
+        """Returns points, unit tangents (B, N, 3) and radii (B, N) at `fraction` (B, N)."""
         last = self.points.shape[1] - 1
         place = np.clip(fraction, 0.0, 1.0) * last
         k = np.minimum(place.astype(np.int64), last - 1)
@@ -41,24 +41,24 @@ class Branches:
         return start + part * (end - start), unit(end - start), radius
 
     def decimated(self, segments: int) -> Branches:
-        """The same shoots with at most `segments` segments, ends kept."""
+        """Returns the shoots with at most `segments` segments, including their ends."""
         last = self.points.shape[1] - 1
         keep = np.unique(np.linspace(0, last, min(segments, last) + 1).round().astype(np.int64))
         return Branches(self.points[:, keep], self.radii[:, keep])
 
     def scaled_z(self, factor: float) -> Branches:
-        """The same shoots stretched along z."""
+        """Returns the shoots stretched along z."""
         return Branches(self.points * np.array([1.0, 1.0, factor]), self.radii)
 
 
 def unit(v: ArrayLike) -> Array:
-    """Vectors (..., 3) at length one (zero stays zero)."""
+    """Returns vectors (..., 3) with unit length (zero remains zero)."""
     v = np.asarray(v, dtype=np.float64)
     return np.asarray(v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-12))
 
 
 def across(direction: Array) -> tuple[Array, Array]:
-    """Two unit vectors square to `direction` (..., 3) and to each other; the first is level."""
+    """Returns two unit vectors normal to `direction` (..., 3) and each other, the first level."""
     level = np.cross(UP, direction)
     steep = np.linalg.norm(level, axis=-1, keepdims=True) < 1e-6
     first = unit(np.where(steep, np.array([1.0, 0.0, 0.0]), level))
@@ -66,7 +66,7 @@ def across(direction: Array) -> tuple[Array, Array]:
 
 
 def turned(direction: Array, angle: Array, roll: Array) -> Array:
-    """`direction` (..., 3) tilted by `angle` towards the side that `roll` names, rad (...)."""
+    """Returns `direction` (..., 3) tilted by `angle` towards the azimuth `roll`, rad (...)."""
     level, other = across(direction)
     side = np.cos(roll)[..., None] * level + np.sin(roll)[..., None] * other
     return np.asarray(np.cos(angle)[..., None] * direction + np.sin(angle)[..., None] * side)
@@ -84,10 +84,10 @@ def grow(
     wobble: float = 0.1,
     tip: float = 0.3,
 ) -> Branches:
-    """Shoots from `base` (B, 3) along `direction` (B, 3), `length` and foot `radius` (B,) in m.
+    """Grows shoots from `base` (B, 3) along `direction` (B, 3), `length` and foot `radius` (B,), m.
 
-    lift: how far a shoot bends up (down where negative) over its length, rad, about.
-    wobble: random bend at each joint, rad. tip: radius at the end as a share of the foot's.
+    lift: approximate upward bend of a shoot (negative: downward) over its length, rad. wobble:
+    random bend at each joint, rad. tip: radius at the end as a fraction of the foot's.
     """
     count = len(base)
     points = np.empty((count, segments + 1, 3))
@@ -104,16 +104,16 @@ def grow(
 
 
 def concatenated(batches: list[Branches]) -> Branches:
-    """One batch of several with the same number of points."""
+    """Returns one batch of several with the same number of points."""
     return Branches(
         np.concatenate([b.points for b in batches]), np.concatenate([b.radii for b in batches])
     )
 
 
 def tubes(branches: Branches, sides: int, *, capped: bool = False) -> Mesh:
-    """Tubes around the shoots with `sides` facets; `capped` closes the far ends.
+    """Returns tubes around the shoots with `sides` facets; `capped` closes the far ends.
 
-    The facets' cross-section has the area of the circle that it stands for.
+    The facets' cross-section has the area of the circle that they approximate.
     """
     points, radii = branches.points, branches.radii
     count, rings, _ = points.shape

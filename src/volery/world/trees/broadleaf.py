@@ -17,11 +17,11 @@ from volery.world.trees.growth import (
 )
 
 _TWIGS_FROM = 0.2
-"""Maturity from which shoots carry twigs of their own."""
+"""Minimum maturity at which shoots carry twigs of their own."""
 
 
 def broadleaf(site: Site) -> Growth:
-    """Grow one variant."""
+    """Grows one variant."""
     trunk = stem(site)
     limbs = _limbs(site, trunk)
     shoots = _side_shoots(site, limbs, site.count(site.species.crown.twigs), 0.25, 0.52)
@@ -36,7 +36,7 @@ def broadleaf(site: Site) -> Growth:
 
 
 def _limbs(site: Site, trunk: Branches) -> Branches:
-    """Limbs on the stem; they reach the crown's envelope."""
+    """Grows limbs on the stem, up to the crown's envelope."""
     crown, rng = site.species.crown, site.rng
     count = site.count(crown.branches)
     share = (np.arange(count) + rng.uniform(0.1, 0.9, count)) / count
@@ -63,7 +63,7 @@ def _limbs(site: Site, trunk: Branches) -> Branches:
 def _side_shoots(
     site: Site, parents: Branches, number: int, first: float, share_of_length: float
 ) -> Branches:
-    """`number` shoots on each parent, alternating left and right, and one that goes on."""
+    """Grows `number` shoots on each parent, alternating left and right, and one continuation."""
     rng, count = site.rng, len(parents.points)
     fraction = np.linspace(first, 0.96, number) + rng.uniform(-0.06, 0.04, (count, number))
     fraction = np.concatenate([fraction, np.full((count, 1), 1.0)], axis=1)

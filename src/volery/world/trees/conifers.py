@@ -22,7 +22,7 @@ _WHORL = 5
 
 
 def pine(site: Site) -> Growth:
-    """Grow one variant of a pine: few stout branches, tufts at the ends of twigs."""
+    """Grows one variant of a pine: few stout branches, tufts at the ends of twigs."""
     trunk = stem(site)
     limbs = _limbs(site, trunk, whorl=3, wobble=0.16)
     number = site.count(site.species.crown.twigs)
@@ -48,7 +48,7 @@ def pine(site: Site) -> Growth:
 
 
 def _tufts(site: Site, trunk: Branches, limbs: Branches, shoots: Branches) -> Blades:
-    """Needle blades that stand off the ends of stem, limbs and shoots in all directions."""
+    """Grows needle blades in all directions from the ends of stem, limbs and shoots."""
     leaf, rng = site.species.leaf, site.rng
     assert leaf is not None
     ends = [b.points[:, -1] for b in (shoots, limbs, trunk)]
@@ -70,12 +70,12 @@ def _tufts(site: Site, trunk: Branches, limbs: Branches, shoots: Branches) -> Bl
     middle = centres[tuft] + 0.5 * length[:, None] * axis
     width = leaf.width_m * np.ones(count)
     blades = Blades(middle, axis, side, length, width)
-    # needles have one length at any age: the area that is left to give goes into the width
+    # needles have one length at any age: the width provides the remaining area
     return Blades(middle, axis, side, length, width * area / blades.area)
 
 
 def spruce(site: Site) -> Growth:
-    """Grow one variant of a spruce: whorls down the stem, shoots in a plane, hanging sprays."""
+    """Grows one variant of a spruce: whorls down the stem, shoots in a plane, hanging sprays."""
     trunk = stem(site)
     limbs = _limbs(site, trunk, whorl=_WHORL, wobble=0.07)
     number = site.count(site.species.crown.twigs)
@@ -104,7 +104,7 @@ def spruce(site: Site) -> Growth:
 
 
 def _limbs(site: Site, trunk: Branches, *, whorl: int, wobble: float) -> Branches:
-    """Branches in loose whorls of `whorl` down from the top."""
+    """Grows branches in loose whorls of `whorl` down from the top."""
     crown, rng = site.species.crown, site.rng
     count = site.count(crown.branches)
     step = np.arange(count) // whorl

@@ -1,9 +1,9 @@
-"""Leaves: small flat blades, and how a coarser level stands in for them.
+"""Leaves: small flat blades, and their simplification at coarser levels.
 
-A coarser level keeps a random share of the blades and enlarges them so that the total area stays:
-the mean share of light that passes depends on total area, orientation and clumping, so it stays
-too (Cook, Halstead, Planck & Ryu 2007, "Stochastic simplification of aggregate detail"). Larger
-blades clump a little less, which `spread` makes up for.
+A coarser level uses a random fraction of the blades and enlarges them to preserve the total area:
+the mean fraction of light that passes depends on total area, orientation and clumping, and is
+preserved too (Cook, Halstead, Planck & Ryu 2007, "Stochastic simplification of aggregate detail").
+Larger blades clump a little less, for which `spread` compensates.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from volery.world.mesh import EMPTY, Mesh
 Array = NDArray[np.float64]
 
 _LONGEST_STAND_IN = 2.2
-"""Length over width of a stand-in at most: slivers make poor bounding boxes."""
+"""Maximum length over width of a simplified leaf: slivers have poor bounding boxes."""
 _FOLD = 0.12
-"""A leaf's halves rise from its midrib by this share of its width."""
+"""Rise of a leaf's halves from its midrib, as a fraction of its width."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,18 +46,18 @@ class Blades:
         return float((self.length * self.width).sum() / 2.0)
 
     def scaled_z(self, factor: float) -> Blades:
-        """The same leaves on a tree stretched along z."""
+        """Returns the leaves on a tree stretched along z."""
         middle = self.middle * np.array([1.0, 1.0, factor])
         return Blades(middle, self.axis, self.side, self.length, self.width)
 
     def with_area(self, area: float) -> Blades:
-        """The same leaves scaled so that they cover `area` m^2 together."""
+        """Returns the leaves scaled to a total area of `area` m^2."""
         factor = np.sqrt(area / self.area) if len(self) else 1.0
         return Blades(self.middle, self.axis, self.side, self.length * factor, self.width * factor)
 
 
 def quads(blades: Blades) -> Mesh:
-    """Every leaf as two triangles that meet at the midrib, slightly folded."""
+    """Returns every leaf as two triangles that meet at the midrib, slightly folded."""
     if not len(blades):
         return EMPTY
     half = 0.5 * blades.length[:, None] * blades.axis
@@ -72,10 +72,10 @@ def quads(blades: Blades) -> Mesh:
 
 
 def stand_ins(blades: Blades, count: int, spread: float, rng: np.random.Generator) -> Mesh:
-    """At most `count` triangles that together have `spread` times the area of all leaves."""
+    """Returns at most `count` triangles with `spread` times the total area of all leaves."""
     if not len(blades):
         return EMPTY
-    # which leaves stay is drawn evenly along the order of growth, so that no branch goes bald
+    # leaves are drawn evenly along the order of growth, so that no branch is bare
     count = min(count, len(blades))
     edges = np.linspace(0, len(blades), count + 1)
     chosen = (edges[:-1] + rng.random(count) * np.diff(edges)).astype(np.int64)

@@ -1,4 +1,4 @@
-"""What all forms of trees share: the stem, leaf-bearing shoots, and the meshes of each level."""
+"""Common parts of all tree forms: stem, leaf-bearing shoots, and meshes of each level."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from volery.world.trees.species import Simplified, Species
 Array = NDArray[np.float64]
 
 GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
-"""Turn between successive branches: spreads them evenly around the stem."""
+"""Angle between successive branches, which distributes them evenly around the stem."""
 
 
 class Facets(NamedTuple):
-    """How finely a shoot becomes a tube; zero sides leave it out."""
+    """Resolution of a shoot's tube; zero sides omit it."""
 
     segments: int
     sides: int
@@ -34,13 +34,14 @@ _FACETS: dict[DetailLevel, tuple[Facets, ...]] = {
     DetailLevel.COARSE: (Facets(99, 5), Facets(2, 3), Facets(0, 0), Facets(0, 0)),
 }
 """By order: stem, limbs on the stem, shoots on the limbs, twigs. All levels share the stem's rings
-so that the trunk has the same radius everywhere. Thin shoots are left to the visual level: they
-hide among the leaves, whose stand-ins make up for them, and their long boxes slow every ray."""
+so that the trunk has the same radius everywhere. Thin shoots exist at the visual level only: they
+are hidden among the leaves, whose simplified versions compensate for them, and their long boxes
+slow every ray."""
 
 
 @dataclass(frozen=True, eq=False)
 class Site:
-    """What a form needs to know to grow one variant: sizes in m, maturity 0 thin to 1 thick."""
+    """Parameters for growing one variant: sizes in m, maturity 0 thin to 1 thick."""
 
     species: Species
     height: float
@@ -49,11 +50,11 @@ class Site:
     rng: np.random.Generator
 
     def between(self, pair: tuple[float, float]) -> float:
-        """Value for this size class out of a pair for the thinnest and the thickest."""
+        """Returns the value for this size class from those of the thinnest and the thickest."""
         return pair[0] + (pair[1] - pair[0]) * self.maturity
 
     def count(self, pair: tuple[float, float]) -> int:
-        """Number for this size class; numbers grow geometrically."""
+        """Returns the number for this size class; numbers grow geometrically."""
         return max(1, round(float(pair[0] * (pair[1] / pair[0]) ** self.maturity)))
 
     @property
@@ -67,7 +68,7 @@ class Site:
         return self.height * self.between(self.species.crown.base)
 
     def envelope(self, share: Array) -> Array:
-        """Crown radius as a share of the largest, at `share` of the crown's depth from below."""
+        """Returns the fraction of the maximum crown radius at `share` of its depth from below."""
         widest, power = self.species.crown.widest, 1.0 + self.species.crown.roundness
         below = (widest - share) / (widest + 0.35)
         above = (share - widest) / (1.0 - widest + 0.03)
@@ -85,9 +86,9 @@ class Growth:
     capped: bool = False
 
     def fitted(self, height: float, radius: float) -> Growth:
-        """The same tree within its allometry: a crown of about `radius`, `height` exactly, m.
+        """Returns the tree within its allometry: a crown of about `radius`, `height` exactly, m.
 
-        Shoots that strayed far outside are drawn in, so that bounding boxes stay tight.
+        Shoots far outside are drawn in, so that bounding boxes are tight.
         """
 
         def drawn_in(points: Array) -> Array:
@@ -116,7 +117,7 @@ class Growth:
         )
 
     def wood(self, level: DetailLevel) -> Mesh:
-        """Stem and limbs as tubes."""
+        """Returns stem and limbs as tubes."""
         parts = []
         for order, shoots in enumerate((self.stem, *self.limbs)):
             facets = _FACETS[level][min(order, 3)]
@@ -132,9 +133,9 @@ class Growth:
         simplified: tuple[int, float] | None,
         rng: np.random.Generator,
     ) -> TreeMesh:
-        """Surface at a level; its highest point is `height`.
+        """Returns the surface at a level; its highest point is `height`, m.
 
-        simplified: number of leaf triangles and their spread; None shows every leaf.
+        simplified: number of leaf triangles and their spread; None uses every leaf.
         """
         if self.blades is None:
             leaves = EMPTY
@@ -149,7 +150,7 @@ class Growth:
 
 
 def _reaching(mesh: Mesh, base: float, top: float, height: float) -> Mesh:
-    """The mesh of a tree whose top is `top`, stretched above `base` so that it becomes `height`."""
+    """Stretches the mesh of a tree with top at `top` above `base`, to reach `height`."""
     z = mesh.vertices[:, 2].astype(np.float64)
     stretched = base + (z - base) * (height - base) / (top - base)
     vertices = mesh.vertices.copy()
@@ -158,7 +159,7 @@ def _reaching(mesh: Mesh, base: float, top: float, height: float) -> Mesh:
 
 
 def simplification(species: Species, level: DetailLevel, maturity: float) -> tuple[int, float]:
-    """Leaf triangles and their spread at a coarser level."""
+    """Returns the number of leaf triangles and their spread at a coarser level."""
     rule = species.sensing if level is DetailLevel.SENSING else species.coarse
     assert isinstance(rule, Simplified)
     few, many = rule.leaf_triangles
@@ -167,9 +168,9 @@ def simplification(species: Species, level: DetailLevel, maturity: float) -> tup
 
 
 def stem(site: Site, *, top: float | None = None, broken: float = 0.0) -> Branches:
-    """The trunk up to `top` (the tree's height), with roots below the ground for slopes.
+    """Grows the trunk up to `top` (the tree's height), with roots below the ground for slopes.
 
-    broken: share of the former height that is missing; the trunk ends thick.
+    broken: missing fraction of the former height; the trunk ends thick.
     """
     trunk = site.species.trunk
     top = site.height if top is None else top
@@ -195,14 +196,14 @@ def stem(site: Site, *, top: float | None = None, broken: float = 0.0) -> Branch
 
 
 def on_stem(trunk: Branches, height: Array) -> tuple[Array, Array]:
-    """Points (N, 3) and radii (N,) of the trunk at heights (N,), m."""
+    """Returns points (N, 3) and radii (N,) of the trunk at heights (N,), m."""
     line, radii = trunk.points[0], trunk.radii[0]
     x, y, r = (np.interp(height, line[:, 2], a) for a in (line[:, 0], line[:, 1], radii))
     return np.stack([x, y, height], axis=1), r
 
 
 def leaf_count(site: Site) -> tuple[int, float]:
-    """Number of leaves to show and the area that they cover together, m^2."""
+    """Returns the number of leaves and their total area, m^2."""
     leaf = site.species.leaf
     assert leaf is not None
     area = site.between(leaf.area_index) * np.pi * site.crown_radius**2
@@ -213,9 +214,9 @@ def leaf_count(site: Site) -> tuple[int, float]:
 def along(
     shoots: Branches, count: int, rng: np.random.Generator, start: float = 0.15
 ) -> tuple[Array, Array]:
-    """`count` points spread evenly over the length of all shoots, from `start` of each on.
+    """Returns `count` points spread evenly over the length of all shoots, from `start` of each on.
 
-    Returns points and unit tangents (count, 3), in order of growth.
+    The results are points and unit tangents (count, 3), in order of growth.
     """
     bounds = np.concatenate([[0.0], np.cumsum(shoots.lengths)])
     place = (np.arange(count) + rng.random(count)) / count * bounds[-1]
@@ -236,10 +237,10 @@ def flat_leaves(
     tilt: float,
     grown: Array | float = 1.0,
 ) -> Blades:
-    """Leaves in two rows along shoots, faces up, as most plants hold them.
+    """Grows leaves in two rows along shoots, faces up, as for most plants.
 
-    forward: how far leaves lean along the shoot (tangent against sideways). tilt: scatter of the
-    faces about the vertical. grown: size of each leaf as a share of the species' leaf.
+    forward: inclination of leaves along the shoot (tangent against sideways). tilt: scatter of the
+    faces about the vertical. grown: size of each leaf as a fraction of the species' leaf.
     """
     leaf, rng, count = site.species.leaf, site.rng, len(points)
     assert leaf is not None

@@ -1,4 +1,4 @@
-"""A grown tree as others see it: one shape at three levels of detail."""
+"""Tree models: one shape at three levels of detail."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ BREAST_HEIGHT_M = 1.3
 
 
 class DetailLevel(StrEnum):
-    """How finely a tree is modelled. All levels let about the same share of rays through."""
+    """Level of detail of a tree. All levels let about the same fraction of rays through."""
 
     VISUAL = "visual"
     """For cameras and the page: every leaf has its own quad."""
@@ -43,9 +43,9 @@ class TreeMesh:
 class TreeModel:
     """One variant of a species in one size class; many trees of a forest share it.
 
-    height_m: highest point above the foot. dbh_m: trunk diameter at breast height.
-    levels: the surface at each level of detail, grown when first asked for.
-    stem: (K, 2) heights above the foot and radii of the trunk, m; linear between rows, as the mesh.
+    height_m: highest point above the foot. dbh_m: trunk diameter at breast height. levels: the
+    surface at each level of detail, grown on first use. stem: (K, 2) heights above the foot and
+    radii of the trunk, m; linear between rows, as the mesh.
     """
 
     species: str
@@ -56,5 +56,5 @@ class TreeModel:
     stem: NDArray[np.float64]
 
     def stem_radius(self, height: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Trunk radii at heights above the foot, m."""
+        """Returns trunk radii at heights above the foot, m."""
         return np.interp(height, self.stem[:, 0], self.stem[:, 1])

@@ -1,4 +1,4 @@
-"""From a species to the tree models that a forest shares."""
+"""Grows the tree models of a species, which a forest shares."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _FORMS: dict[str, Callable[[Site], Growth]] = {
 
 
 class _GrownLevels(Mapping[DetailLevel, TreeMesh]):
-    """Levels of one variant, meshed when first asked for; what is asked first changes nothing."""
+    """Levels of one variant, meshed on first use; the order of use does not matter."""
 
     def __init__(self, mesh: Callable[[DetailLevel], TreeMesh]) -> None:
         self._mesh = mesh
@@ -45,7 +45,7 @@ class _GrownLevels(Mapping[DetailLevel, TreeMesh]):
 
 
 def grow_model(species: Species, size_class: int, variant: int, seed: int) -> TreeModel:
-    """Grow one variant of a size class; the same arguments give the same bytes."""
+    """Grows one variant of a size class; the same arguments give the same bytes."""
     stream = f"tree/{species.name}/{size_class}/{variant}"
     dbh = species.size_classes_cm[size_class] / 100.0
     height = float(species.height.height(np.array([dbh]))[0])
@@ -67,7 +67,7 @@ def grow_model(species: Species, size_class: int, variant: int, seed: int) -> Tr
 
 
 def grow_models(species: Species, seed: int) -> tuple[TreeModel, ...]:
-    """All variants of all size classes, the thinnest class first."""
+    """Returns all variants of all size classes, the thinnest class first."""
     return tuple(
         grow_model(species, size_class, variant, seed)
         for size_class in range(len(species.size_classes_cm))

@@ -18,7 +18,7 @@ from volery.world.trees.growth import (
 
 
 def palm(site: Site) -> Growth:
-    """Grow one variant."""
+    """Grows one variant."""
     crown, rng = site.species.crown, site.rng
     frond = 1.25 * site.crown_radius
     top = max(site.height - 0.7 * frond, 0.45 * site.height)

@@ -9,7 +9,7 @@ from volery.world.trees.growth import GOLDEN_ANGLE, Growth, Site, on_stem, stem
 
 
 def snag(site: Site) -> Growth:
-    """Grow one variant."""
+    """Grows one variant."""
     rng = site.rng
     splinter = float(np.clip(1.6 * site.dbh, 0.1, 0.8))
     top = site.height - 0.8 * splinter

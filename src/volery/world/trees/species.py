@@ -38,7 +38,7 @@ class Trunk(Data):
     flare: Positive
     """Radius at the foot over the radius above the roots."""
     bend: Annotated[float, Field(ge=0.0, le=0.5)]
-    """Sideways shift of the stem over its height, about."""
+    """Approximate sideways shift of the stem over its height."""
     source: str
 
 
@@ -46,43 +46,43 @@ class Crown(Data):
     """Shape of the crown. Pairs hold the value of the thinnest and the thickest size class."""
 
     base: tuple[Share, Share]
-    """Height of the lowest branches as a share of the tree's height."""
+    """Height of the lowest branches as a fraction of the tree's height."""
     branches: Pair
     """Branches on the trunk (fronds of a palm)."""
     angle_deg: tuple[Finite, Finite]
     """Angle between trunk and branch, lowest and highest branch."""
     lift: Finite
-    """How far branches bend up over their length, rad."""
+    """Upward bend of branches over their length, rad."""
     widest: Share
-    """Where the crown is widest, as a share of its depth from below."""
+    """Position of the largest width, as a fraction of the crown's depth from below."""
     roundness: Share
-    """Outline above the widest place: 1 an ellipse, 0 a straight cone."""
+    """Outline above the largest width: 1 an ellipse, 0 a straight cone."""
     twigs: Pair
-    """Side shoots a branch."""
+    """Side shoots per branch."""
     source: str
 
 
 class Leaf(Data):
-    """A leaf (needle bundle, leaflet) as the visual level shows it."""
+    """A leaf (needle bundle, leaflet) at the visual level."""
 
     length_m: Positive
     width_m: Positive
     area_index: Pair
     """One-sided leaf area over the crown's projected area, thinnest and thickest size class."""
     most: Annotated[int, Field(ge=1, le=40_000)]
-    """Leaves of a tree at most; beyond it they grow instead, area kept."""
+    """Maximum leaves of a tree; beyond it leaves grow in size, with the same total area."""
     droop: Finite
-    """How far leaves hang, rad."""
+    """Droop of leaves, rad."""
     source: str
 
 
 class Simplified(Data):
-    """A coarser level: how many triangles stand for the leaves, and how much they spread."""
+    """A coarser level: number of triangles for the leaves, and their spread."""
 
     leaf_triangles: tuple[int, int]
     """Triangles for the leaves of the thinnest and the thickest size class."""
     spread: tuple[float, float]
-    """Area of the stand-ins over that of the leaves; set so that gap fractions agree."""
+    """Area of the triangles over that of the leaves; set so that gap fractions agree."""
 
 
 class Species(Data):
@@ -93,9 +93,9 @@ class Species(Data):
     form: Literal["broadleaf", "pine", "spruce", "palm", "snag"]
     wood_source: str = ""
     size_classes_cm: Annotated[tuple[Positive, ...], Field(min_length=1)]
-    """Trunk diameters at which variants are grown; trees take the nearest and scale it."""
+    """Trunk diameters at which variants are grown; trees scale the nearest one."""
     variants: Annotated[int, Field(ge=1, le=20)]
-    """Shapes a size class."""
+    """Number of shapes per size class."""
     height_scatter: Annotated[float, Field(ge=0.0, le=0.5)]
     """Standard deviation of the logarithm of height about the law (a modelling choice)."""
     height: HeightLaw
@@ -106,7 +106,7 @@ class Species(Data):
     sensing: Simplified | None = None
     coarse: Simplified | None = None
     diameters: dict[str, DiameterSpread]
-    """Named spreads; `stand` is used where nothing else is asked for."""
+    """Named spreads; `stand` is the default."""
 
     @model_validator(mode="after")
     def _has_what_it_names(self) -> Self:
@@ -119,7 +119,10 @@ class Species(Data):
         return self
 
     def spread(self, name: str | None = None) -> DiameterSpread:
-        """The spread of diameters called `name`, or the stand's."""
+        """Returns the spread of diameters called `name`, or the stand's.
+
+        Raises `ScenarioError` if the species has no such spread.
+        """
         try:
             return self.diameters[name or "stand"]
         except KeyError:
@@ -129,25 +132,28 @@ class Species(Data):
             ) from None
 
     def heights(self, dbh_m: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
-        """Heights by the species' law, with its scatter, m."""
+        """Returns heights by the species' law, with its scatter, m."""
         scatter = np.exp(self.height_scatter * np.clip(rng.standard_normal(len(dbh_m)), -2.5, 2.5))
         return np.asarray(self.height.height(dbh_m) * scatter)
 
     def maturity(self, size_class: int) -> float:
-        """Where a size class stands between the thinnest (0) and the thickest (1), by logarithm."""
+        """Returns the logarithmic position of a size class, 0 the thinnest to 1 the thickest."""
         classes = np.log(self.size_classes_cm)
         reach = classes[-1] - classes[0]
         return float((classes[size_class] - classes[0]) / reach) if reach > 0.0 else 1.0
 
 
 def species_names() -> tuple[str, ...]:
-    """Names of the species that ship, sorted."""
+    """Returns the names of the shipped species, sorted."""
     return tuple(sorted(p.stem for p in _FOLDER.glob("*.toml")))
 
 
 @cache
 def load_species(name: str) -> Species:
-    """The species `name`; raises ScenarioError that lists the known ones, or DataFileError."""
+    """Returns the species `name`.
+
+    Raises `ScenarioError`, listing the known species, for an unknown name, or `DataFileError`.
+    """
     if name not in species_names():
         raise ScenarioError(f"unknown tree species {name!r}; known: {', '.join(species_names())}")
     return load_data_file(_FOLDER / f"{name}.toml", Species)

@@ -27,11 +27,11 @@ def air_velocity(
     tick: int,
     period: float,
 ) -> tuple[float, float, float]:
-    """Velocity (x, y, z) m/s, map, that the air at a UAV keeps during tick number `tick`.
+    """Returns the velocity (x, y, z) m/s, map, of the air at a UAV during tick number `tick`.
 
     air: an `AIR`. nodes: its field, (Z, Y, X, 3). turbulence: the UAV's `TURBULENCE`, which is
-    stepped. position, velocity: the UAV's, (3,) m and m/s, map. period: s of a tick, at whose
-    middle the gusts are taken.
+    advanced. position, velocity: the UAV's, (3,) m and m/s, map. period: s of a tick; gusts are
+    evaluated at its middle.
     """
     x, y, z = position[0], position[1], position[2]
     turbulent = air.w20 > 0.0

@@ -1,4 +1,4 @@
-"""Dryden turbulence of MIL-F-8785C at low altitude, one exact discrete filter a UAV.
+"""Dryden turbulence of MIL-F-8785C at low altitude, one exact discrete filter per UAV.
 
 With h in feet above ground, 10 to 1000, and k = 0.177 + 0.000823 h:
 
@@ -7,7 +7,7 @@ With h in feet above ground, 10 to 1000, and k = 0.177 + 0.000823 h:
     Hu(s) = su sqrt(2 Lu / (pi V)) / (1 + Lu s / V)
     Hv(s) = sv sqrt(Lv / (pi V)) (1 + sqrt(3) Lv s / V) / (1 + Lv s / V)^2, and so for w
 
-V is the largest of airspeed, wind and 1 m/s (the turbulence is frozen and carried past by one or
+V is the largest of airspeed, wind and 1 m/s (the turbulence is frozen and moves past by one or
 the other). With p = V / L and white noise n of unit intensity the filters are
 
     u = su x                                       x' = -p x + sqrt(2 p) n
@@ -37,7 +37,7 @@ from volery.core.rng import normal, stream_key
 
 _KNOT = 1852.0 / 3600.0
 W20_M_S = {"none": 0.0, "light": 15.0 * _KNOT, "moderate": 30.0 * _KNOT, "severe": 45.0 * _KNOT}
-"""m/s, mean wind at 20 ft of each level (MIL-F-8785C)."""
+"""Mean wind at 20 ft of each level, m/s (MIL-F-8785C)."""
 
 TURBULENCE = np.dtype(
     [
@@ -54,19 +54,19 @@ TURBULENCE = np.dtype(
 
 _FOOT = 0.3048
 _LOW, _HIGH = 10.0, 1000.0
-"""ft: range of the low-altitude model."""
+"""Range of the low-altitude model, ft."""
 _LEAST_SPEED = 1.0
-"""m/s of V (modelling choice: eddies drift past a hovering UAV even in a calm)."""
+"""Minimum of V, m/s (modelling choice: eddies drift past a hovering UAV even in a calm)."""
 _CALM = 0.3
-"""m/s, horizontal, below which a wind has no direction (Beaufort 0)."""
+"""Horizontal speed below which a wind has no direction, m/s (Beaufort 0)."""
 _DRAWS = 5
-"""Normal numbers a tick."""
+"""Normal numbers per tick."""
 _SQRT_HALF = math.sqrt(0.5)
 _DIRECT, _LAGGED = math.sqrt(1.5), (1.0 - math.sqrt(3.0)) * _SQRT_HALF
 
 
 def new_turbulence(seed: int, names: Sequence[str]) -> NDArray[np.void]:
-    """Filters (N,) that have not begun, with the streams of the UAVs `names` in a run of `seed`."""
+    """Returns filters (N,) that have not begun, with the random streams of UAVs `names`."""
     rows = np.zeros(len(names), TURBULENCE)
     rows["key"] = [stream_key(seed, f"{name}/turbulence") for name in names]
     return rows
@@ -86,7 +86,7 @@ def turbulent_velocity(
     tick: int,
     period: float,
 ) -> tuple[float, float, float]:
-    """Step a `TURBULENCE` to tick number `tick` and return its velocity (x, y, z) m/s, map.
+    """Advances a `TURBULENCE` to tick number `tick` and returns its velocity (x, y, z) m/s, map.
 
     w20: m/s. height: m above ground. wind: mean wind, m/s, map. air: the UAV's velocity through it,
     m/s, map. period: s of a tick.
@@ -127,11 +127,11 @@ def turbulent_velocity(
 
 @inner_kernel
 def _step_of(q: float, begun: bool) -> tuple[float, float, float, float]:
-    """Over q = p t lengths: exp(-q), and the Cholesky factor of the covariance that x, y gain.
+    """Returns, over q = p t lengths, exp(-q) and the Cholesky factor of the covariance of x, y.
 
     With P(n, r) = exp(-r) sum over i >= n of r^i / i!, r = 2 q, that covariance is P(1, r) of x,
-    P(2, r) / 2 of both and P(3, r) / 2 of y; P(3, r) comes from its series, without cancellation.
-    What has not begun takes all of its steady state.
+    P(2, r) / 2 of both and P(3, r) / 2 of y; P(3, r) comes from its series, without cancellation. A
+    filter that has not begun receives its whole steady state.
     """
     if not begun:
         return 0.0, 1.0, 0.5, 0.5
@@ -159,7 +159,7 @@ def _step(
     key: np.uint64,
     counter: int,
 ) -> None:
-    """Step the states x, y of a second-order filter by q lengths; the rest as of `_step_of`."""
+    """Advances the states x, y of a second-order filter by q lengths; the rest as in `_step_of`."""
     n, m = normal(key, counter), normal(key, counter + 1)
     pair[1] = keep * (pair[1] + q * pair[0]) + coupled * n + rest * m
     pair[0] = keep * pair[0] + whole * n
@@ -167,10 +167,10 @@ def _step(
 
 @inner_kernel
 def _turn(axis: NDArray[np.float64], x: float, y: float, share: float) -> None:
-    """Turn the axis by `share` of the way to the line along (x, y).
+    """Turns the axis by the fraction `share` towards the line along (x, y).
 
-    Turbulence is the same forwards and backwards, so the axis is a line; and it turns within a
-    length L, so that no change of direction makes the air jump.
+    Turbulence is the same forwards and backwards, so the axis is a line; it turns within a length
+    L, so that no change of direction makes the air jump.
     """
     length = math.sqrt(x * x + y * y)
     if x * axis[0] + y * axis[1] < 0.0:

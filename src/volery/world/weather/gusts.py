@@ -1,4 +1,4 @@
-"""1-cosine gusts (MIL-F-8785C, discrete gust model), with a fall like the rise."""
+"""1-cosine gusts (MIL-F-8785C, discrete gust model), with equal rise and fall."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ Array = NDArray[np.float64]
 
 @inner_kernel
 def gust_velocity(air: Any, position: Array, time: float) -> tuple[float, float, float]:
-    """Sum (x, y, z) m/s, map, of all gusts of an `AIR` record at `position` (3,) m, `time` s."""
+    """Returns the sum (x, y, z) m/s, map, of an `AIR` record's gusts.
+
+    position: (3,) m, map. time: s.
+    """
     x = y = z = 0.0
     for g in range(air.gusts):
         since = time - air.gust_start[g]

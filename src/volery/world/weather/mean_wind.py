@@ -1,4 +1,4 @@
-"""The mean wind at a place: steady, by a profile over height, or from a field."""
+"""The mean wind at a position: steady, by a profile over height, or from a field."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ Array = NDArray[np.float64]
 UNIFORM, LOG, POWER, FIELD = 0, 1, 2, 3
 """Kinds of mean wind."""
 _TOP = 304.8
-"""m above ground (1000 ft) beyond which profiles stay as they are (MIL-F-8785C)."""
+"""Height above ground (1000 ft) beyond which profiles are constant, m (MIL-F-8785C)."""
 
 
 @inner_kernel
 def mean_wind(air: Any, nodes: Array, position: Array, height: float) -> tuple[float, float, float]:
-    """Velocity (x, y, z) m/s, map, at `position` (3,) m, `height` m above ground.
+    """Returns the velocity (x, y, z) m/s, map, at `position` (3,) m, `height` m above ground.
 
     air: an `AIR` record. nodes: its field, (Z, Y, X, 3).
     """

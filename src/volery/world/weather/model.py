@@ -1,4 +1,4 @@
-"""What blows, falls and hangs in the air: frozen data, checked on construction (`CommandError`).
+"""Weather: frozen data, checked on construction (`CommandError`).
 
 The velocity of the air is the mean wind (a steady vector, with or without a profile over height, or
 a field over the map) plus all gusts plus turbulence. All vectors are map frame, ENU, m/s.
@@ -27,11 +27,11 @@ class LogProfile:
     """Neutral surface layer: the steady wind times ln(h / z0) / ln(reference / z0).
 
     h: m above the terrain, at most 304.8 m (1000 ft, the height up to which MIL-F-8785C uses this
-    law); the air stands still below z0.
+    law); there is no wind below z0.
     """
 
     reference_height_m: float = 10.0
-    """Height at which the steady wind blows (default: that of weather stations, WMO)."""
+    """Height of the steady wind (default: that of weather stations, WMO)."""
     roughness_m: float = 0.03
     """Roughness length z0 (default: open, grass; classes of Davenport and Wieringa)."""
 
@@ -59,16 +59,16 @@ class PowerProfile:
 class Gust:
     """A 1-cosine gust (MIL-F-8785C): amplitude / 2 (1 - cos(pi t / rise)), then the amplitude.
 
-    It falls back along the same curve so that it is over at its end. With a front, which travels at
+    It falls along the same curve, to end at `end_s`. With a front, which travels at
     `front_velocity_map`, its times are those at the map's origin, and a UAV that flies against it
-    meets it faster; without one it reaches all places at once.
+    meets it faster; without one it reaches all positions at once.
     """
 
     amplitude_map: Vector
     start_s: float
     rise_s: float
     end_s: float = math.inf
-    """inf: it stays for good."""
+    """inf: the gust is permanent."""
     front_velocity_map: Vector = _STILL
 
     def __post_init__(self) -> None:
@@ -86,16 +86,16 @@ class Gust:
 
     @property
     def has_front(self) -> bool:
-        """Whether it reaches one place after the other."""
+        """Whether the gust travels with a front."""
         return self.front_velocity_map != _STILL
 
 
 @dataclass(frozen=True, slots=True)
 class Weather:
-    """The air's motion everywhere and at all times, what is in it, and what hour it is.
+    """The air's motion everywhere and at all times, its particles, and the hour.
 
-    `Weather((6.0, 0.0, 0.0))` is a steady wind. A field takes the place of the steady wind and its
-    profile. `w20_m_s` is the wind at 20 ft that sets the turbulence; 0: none.
+    `Weather((6.0, 0.0, 0.0))` is a steady wind. A field replaces the steady wind and its profile.
+    `w20_m_s` is the wind at 20 ft that sets the turbulence; 0: none.
     """
 
     velocity_map: Vector = _STILL
@@ -105,7 +105,7 @@ class Weather:
     gusts: tuple[Gust, ...] = ()
     particles: Particles = CLEAR_AIR
     hour_of_day: float | None = None
-    """Local mean solar time, which sets the sun; None: it stands where the scenario puts it."""
+    """Local mean solar time, which determines the sun; None: the sun has the scenario's angles."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "velocity_map", _wind("velocity_map", self.velocity_map))
@@ -114,12 +114,12 @@ class Weather:
         if self.hour_of_day is not None:
             _within("hour_of_day", self.hour_of_day, 0.0, 24.0)
         if self.field is not None and (self.profile is not None or self.velocity_map != _STILL):
-            raise CommandError("a wind field takes the place of velocity_map and profile")
+            raise CommandError("a wind field replaces velocity_map and profile; leave them out")
         if len(self.gusts) > MAX_GUSTS:
             raise CommandError(f"{len(self.gusts)} gusts; at most {MAX_GUSTS} are allowed at once")
 
     def with_gust(self, gust: Gust, now_s: float) -> Weather:
-        """The weather with one more gust, without those that are over everywhere by `now_s`."""
+        """Returns the weather with one more gust, without those that ended by `now_s`."""
         kept = tuple(g for g in self.gusts if g.has_front or g.end_s > now_s)
         return replace(self, gusts=(*kept, gust))
 
@@ -145,4 +145,4 @@ def _within(what: str, value: float, low: float, high: float) -> None:
 
 
 CALM = Weather()
-"""Air that stands still, with nothing in it."""
+"""Still, clear air."""

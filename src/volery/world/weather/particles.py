@@ -1,10 +1,10 @@
-"""What hangs in or falls through the air, and what that does to light.
+"""Particles in the air, and their extinction of light.
 
-Extinction is that of single scattering, the sum of all kinds; a is per metre, light that has gone
-r metres is exp(-a r) of what it was (Beer and Lambert):
+Extinction is that of single scattering, the sum of all kinds; a is per metre, the fraction of light
+left after r metres is exp(-a r) (Beer and Lambert):
 
 - rain: Marshall and Palmer 1948, drops of diameter D in numbers N0 exp(-s D), N0 = 8000 /m^3/mm,
-  s = 4.1 R^-0.21 /mm, each of which takes away twice its cross-section: a = pi N0 / s^3, that is
+  s = 4.1 R^-0.21 /mm, each with an extinction of twice its cross-section: a = pi N0 / s^3, that is
   0.365 R^0.63 /km, which is also ITU-R P.1817-1's law of rain (1.58 R^0.63 dB/km, Japan).
 - snow: ITU-R P.1817-1, dry snow: (5.42e-5 L + 5.4958776) S^1.38 dB/km, L the wavelength in nm.
 - fog: ln(20) / V at 550 nm by the definition of the meteorological optical range V (WMO-No. 8, a
@@ -44,11 +44,11 @@ _MM2 = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Particles:
-    """Rain and snow by their rates, fog and dust by how far one would see in them alone."""
+    """Rain and snow by their rates, fog and dust by the visibility in each alone."""
 
     rain_mm_h: float = 0.0
     snow_mm_h: float = 0.0
-    """Of water."""
+    """Rate of snow as water."""
     fog_visibility_m: float = math.inf
     """Meteorological optical range; inf: none."""
     dust_visibility_m: float = math.inf
@@ -63,7 +63,7 @@ class Particles:
 
     @property
     def visibility_m(self) -> float:
-        """Meteorological optical range in all of them together; inf where there are none."""
+        """Meteorological optical range in all particles together; inf without any."""
         whole = extinction(self, VISIBLE_NM)
         return _FAINT / whole if whole > 0.0 else math.inf
 
@@ -74,11 +74,11 @@ def _within(what: str, value: float, low: float, high: float) -> None:
 
 
 CLEAR_AIR = Particles()
-"""Nothing in the air."""
+"""Air without particles."""
 
 
 def extinction(particles: Particles, wavelength_nm: float) -> float:
-    """Extinction coefficient, 1/m."""
+    """Returns the extinction coefficient, 1/m."""
     return (
         rain_extinction(particles.rain_mm_h)
         + snow_extinction(particles.snow_mm_h, wavelength_nm)
@@ -88,40 +88,43 @@ def extinction(particles: Particles, wavelength_nm: float) -> float:
 
 
 def rain_slope(rain_mm_h: float) -> float:
-    """Of the numbers of drops over their diameter, 1/mm (Marshall and Palmer 1948)."""
+    """Returns the slope of drop numbers over the diameter, 1/mm (Marshall and Palmer 1948)."""
     return float(4.1 * rain_mm_h**-0.21)
 
 
 def drop_speed(diameter_mm: float) -> float:
-    """With which a drop falls, m/s (Atlas, Srivastava and Sekhon 1973, 0.6 to 5.8 mm)."""
+    """Returns the fall speed of a drop, m/s (Atlas, Srivastava and Sekhon 1973, 0.6 to 5.8 mm)."""
     return max(9.65 - 10.3 * math.exp(-0.6 * diameter_mm), 0.1)
 
 
 def rain_speed(rain_mm_h: float) -> float:
-    """With which the drops fall that carry most of the water: of diameter 4 / slope, m/s."""
+    """Returns the fall speed of the drops with most of the water: of diameter 4 / slope, m/s."""
     return drop_speed(4.0 / rain_slope(rain_mm_h))
 
 
 def rain_extinction(rain_mm_h: float) -> float:
-    """Extinction coefficient of rain at any wavelength, 1/m."""
+    """Returns the extinction coefficient of rain at any wavelength, 1/m."""
     if rain_mm_h == 0.0:
         return 0.0
     return math.pi * _DROPS * _MM2 / rain_slope(rain_mm_h) ** 3
 
 
 def snow_slope(snow_mm_h: float) -> float:
-    """Of the numbers of flakes over their diameter, 1/mm (Gunn and Marshall 1958, melted: 2.55)."""
+    """Returns the slope of flake numbers over the diameter, 1/mm.
+
+    Gunn and Marshall 1958, melted: 2.55.
+    """
     return float(2.55 / _FLAKE_STRETCH * snow_mm_h**-0.48)
 
 
 def snow_extinction(snow_mm_h: float, wavelength_nm: float = VISIBLE_NM) -> float:
-    """Extinction coefficient of dry snow, 1/m."""
+    """Returns the extinction coefficient of dry snow, 1/m."""
     decibel_per_km = (5.42e-5 * wavelength_nm + 5.4958776) * snow_mm_h**1.38
     return float(1e-3 * _DECIBEL * decibel_per_km)
 
 
 def fog_extinction(visibility_m: float, wavelength_nm: float = VISIBLE_NM) -> float:
-    """Extinction coefficient of fog or haze, 1/m."""
+    """Returns the extinction coefficient of fog or haze, 1/m."""
     green = _FAINT / visibility_m
     if green == 0.0:
         return 0.0
@@ -140,10 +143,10 @@ def _kim_exponent(visibility_km: float) -> float:
 
 
 def dust_extinction(visibility_m: float) -> float:
-    """Extinction coefficient of dust at any wavelength, 1/m."""
+    """Returns the extinction coefficient of dust at any wavelength, 1/m."""
     return _FAINT / visibility_m
 
 
 def number_per_mm(extinction_per_m: float, slope_per_mm: float) -> float:
-    """N0 of particles N0 exp(-slope D), /m^3/mm, that take away so much light; Q = 2."""
+    """Returns N0 of particles N0 exp(-slope D), /m^3/mm, with that extinction; Q = 2."""
     return extinction_per_m * slope_per_mm**3 / (math.pi * _MM2)

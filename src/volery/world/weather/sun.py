@@ -1,4 +1,4 @@
-"""Where the sun stands, by place, date and hour."""
+"""Angles of the sun by position, date and hour."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import math
 
 
 def sun_angles(latitude_deg: float, date: datetime.date, hour_of_day: float) -> tuple[float, float]:
-    """Elevation above the horizon and azimuth clockwise from north, deg.
+    """Returns the elevation above the horizon and the azimuth clockwise from north, deg.
 
-    hour_of_day: local mean solar time, 0 to 24: 12 is noon but for the equation of time, and no
+    hour_of_day: local mean solar time, 0 to 24: 12 is noon except for the equation of time, and no
     time zone is needed. Declination and equation of time are Spencer's series (1971, "Fourier
-    series representation of the position of the sun"; within 0.05 deg and 35 s); refraction, half
-    a degree at the horizon, is left out.
+    series representation of the position of the sun"; within 0.05 deg and 35 s); refraction, half a
+    degree at the horizon, is left out.
     """
     days = date.timetuple().tm_yday - 1 + hour_of_day / 24.0
     year = 2.0 * math.pi * days / 365.0

@@ -1,4 +1,4 @@
-"""A weather as kernels read it: one record, beside it the nodes of its field."""
+"""A weather for kernels: one record, with the nodes of its field as an array."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from volery.world.weather.particles import rain_speed
 AIR = np.dtype(
     [
         ("kind", "i8"),  # of the mean wind
-        ("steady", "i8"),  # the air moves alike everywhere and always
+        ("steady", "i8"),  # uniform and constant wind
         ("velocity", "f8", 3),
         ("profile_shape", "f8"),
         ("profile_scale", "f8"),
@@ -23,10 +23,10 @@ AIR = np.dtype(
         ("field_inverse_spacing", "f8", 3),
         ("w20", "f8"),
         ("rain_water", "f8"),  # kg of falling water in a m^3 of air
-        ("rain_speed", "f8"),  # with which it falls
+        ("rain_speed", "f8"),  # fall speed of rain
         ("gusts", "i8"),
         ("gust_amplitude", "f8", (MAX_GUSTS, 3)),
-        ("gust_slowness", "f8", (MAX_GUSTS, 3)),  # s later a m towards x, y, z
+        ("gust_slowness", "f8", (MAX_GUSTS, 3)),  # delay per distance along x, y, z, s/m
         ("gust_start", "f8", MAX_GUSTS),
         ("gust_length", "f8", MAX_GUSTS),  # s from start to end
         ("gust_inverse_rise", "f8", MAX_GUSTS),  # 1/s
@@ -37,7 +37,7 @@ AIR = np.dtype(
 
 
 def air_of(weather: Weather) -> NDArray[np.void]:
-    """The (1,) `AIR` of a weather."""
+    """Returns the (1,) `AIR` row of a weather."""
     row = np.zeros(1, AIR)
     row["kind"] = UNIFORM
     row["velocity"] = weather.velocity_map

@@ -1,6 +1,6 @@
 """Winds that vary over the map: velocities on a regular 3-D grid, interpolated trilinearly.
 
-Beyond the grid the air moves as at its nearest border.
+Beyond the grid the velocity is that of its nearest border.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, repr=False, slots=True)
 class WindField:
-    """A regular grid of velocities; [k, j, i] lies at origin + (i, j, k) * spacing.
+    """A regular grid of velocities; [k, j, i] is at origin + (i, j, k) * spacing.
 
-    velocity_map: (Z, Y, X, 3) m/s, held read-only. origin_map: (3,) m. spacing_m: (3,) along x, y,
-    z. Along an axis with one node the wind is constant.
+    velocity_map: (Z, Y, X, 3) m/s, read-only. origin_map: (3,) m. spacing_m: (3,) along x, y, z.
+    Along an axis with one node the wind is constant. Raises `CommandError` for other arrays.
     """
 
     velocity_map: Array
@@ -50,12 +50,12 @@ class WindField:
 
     @classmethod
     def from_file(cls, path: str | Path) -> WindField:
-        """Field of a .csv or .npz file; raises one DataFileError that names file and bad rows."""
+        """Reads a .csv or .npz file; raises one `DataFileError` for all invalid rows."""
         return cls(*read_wind_field(Path(path)))
 
 
 def nodes_of(field: WindField | None) -> Array:
-    """(Z, Y, X, 3) m/s as kernels read it: at least two nodes along each axis; no field: zeros."""
+    """Returns nodes (Z, Y, X, 3) m/s for kernels, at least two per axis; zeros without a field."""
     if field is None:
         return np.zeros((2, 2, 2, 3))
     twice = [(0, int(n == 1)) for n in field.velocity_map.shape[:3]]
@@ -64,7 +64,7 @@ def nodes_of(field: WindField | None) -> Array:
 
 @inner_kernel
 def field_velocity(air: Any, nodes: Array, position: Array) -> tuple[float, float, float]:
-    """Velocity (x, y, z) m/s, map, of the field at `position` (3,) m.
+    """Returns the velocity (x, y, z) m/s, map, of the field at `position` (3,) m.
 
     air: an `AIR` record with `field_origin` and `field_inverse_spacing`.
     """
@@ -80,7 +80,7 @@ def field_velocity(air: Any, nodes: Array, position: Array) -> tuple[float, floa
 
 @inner_kernel
 def _cell(air: Any, position: Array, axis: int, count: int) -> tuple[int, float]:
-    """Number of the cell along an axis and the place in it, 0 to 1."""
+    """Returns the number of the cell along an axis and the position in it, 0 to 1."""
     place = (position[axis] - air.field_origin[axis]) * air.field_inverse_spacing[axis]
     place = min(max(place, 0.0), count - 1.0)
     cell = max(min(int(place), count - 2), 0)

@@ -1,7 +1,7 @@
-"""Reading wind fields: a CSV table of nodes or a numpy .npz archive.
+"""Reads wind fields: a CSV table of nodes or a numpy .npz archive.
 
 A .csv file names its columns `x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s` in its first row and holds one node
-of a regular grid a row, both in any order. An .npz file holds `velocity_m_s` (Z, Y, X, 3),
+of a regular grid per row, both in any order. An .npz file holds `velocity_m_s` (Z, Y, X, 3),
 `origin_m` (3,) and `spacing_m` (3,).
 """
 
@@ -26,13 +26,13 @@ _SHAPES = {"velocity_m_s": "(Z, Y, X, 3)", "origin_m": "(3,)", "spacing_m": "(3,
 _SHOWN_FAULTS = 20
 _MOST_BYTES = 1_000_000_000
 _SLACK = 1e-2
-"""Share of the spacing by which a node may stand off the grid: written coordinates are rounded."""
+"""Tolerance of a node's position as a fraction of the spacing: written coordinates are rounded."""
 
 
 def read_wind_field(path: Path) -> Field:
-    """Velocities (Z, Y, X, 3) m/s, origin (3,) m and spacing (3,) m of a file.
+    """Reads velocities (Z, Y, X, 3) m/s, origin (3,) m and spacing (3,) m of a file, map frame.
 
-    Raises one DataFileError that names the file and every bad row.
+    Raises one `DataFileError` that names the file and every invalid row.
     """
     if path.suffix not in (".csv", ".npz"):
         raise DataFileError(f"wind field {path}: a .csv or an .npz file is needed")
@@ -52,7 +52,7 @@ def _read_npz(path: Path) -> Field:
     except KeyError:
         wanted = ", ".join(f"{name} {shape}" for name, shape in _SHAPES.items())
         raise DataFileError(f"wind field {path} must hold {wanted}") from None
-    except Exception as error:  # zipfile raises whatever a broken file makes it stumble over
+    except Exception as error:  # zipfile raises any exception for a broken file
         told = " ".join(str(error).split())[:200] or type(error).__name__
         raise DataFileError(f"wind field {path} cannot be read: {told}") from None
     velocity, origin, spacing = held.values()
@@ -77,7 +77,7 @@ def _read_npz(path: Path) -> Field:
 
 
 def _check_size(path: Path) -> None:
-    """ValueError for an archive that unpacks to more than `_MOST_BYTES`."""
+    """Raises `ValueError` for an archive that unpacks to more than `_MOST_BYTES`."""
     with zipfile.ZipFile(path) as archive:
         size = sum(member.file_size for member in archive.infolist())
     if size > _MOST_BYTES:
@@ -118,7 +118,7 @@ def _read_csv(path: Path) -> Field:
 
 
 def _rows_of(path: Path) -> tuple[list[int], Array]:
-    """Row numbers in the file (the heading is row 1) and the table (M, 6) of `_COLUMNS`."""
+    """Returns row numbers in the file (the header is row 1) and the table (M, 6) of `_COLUMNS`."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             rows = list(csv.reader(file))
@@ -146,7 +146,7 @@ def _rows_of(path: Path) -> tuple[list[int], Array]:
 
 
 def _parse(row: list[str], order: list[int]) -> tuple[str, list[float]]:
-    """What is wrong with a row ("" if nothing), and its numbers in the order of `_COLUMNS`."""
+    """Returns the error of a row ("" if none), and its numbers in the order of `_COLUMNS`."""
     if len(row) != len(order):
         return f"{counted(len(row), 'field')}, the heading has {len(order)}", []
     values = []
@@ -164,7 +164,7 @@ def _parse(row: list[str], order: list[int]) -> tuple[str, list[float]]:
 
 
 def _axis_of(path: Path, column: Array, name: str) -> Array:
-    """Evenly spaced coordinates of the grid: those that as good as every line of nodes has."""
+    """Returns the evenly spaced coordinates that nearly every line of nodes has."""
     values, counts = np.unique(column, return_counts=True)
     axis = values[2 * counts >= counts.max()]
     even: Array = np.linspace(axis[0], axis[-1], len(axis))
