@@ -163,7 +163,7 @@ def check_place(
     x0, y0, x1, y1 = terrain.bounds
     if not (x0 <= place[0] <= x1 and y0 <= place[1] <= y1):
         raise PlacementError(
-            f"{where}: {at} is outside the terrain, which extends from ({x0:g}, {y0:g}) to "
+            f"{where}: {at} is beyond the terrain, which extends from ({x0:g}, {y0:g}) to "
             f"({x1:g}, {y1:g}) m"
         )
     check_room(place, airframe, scene, terrain, f"{where}: {at}", hint=hint)

@@ -96,7 +96,7 @@ def build_forest(scenario: Scenario, terrain: Terrain, city: City | None = None)
         outside = int(((x < x0) | (x > x1) | (y < y0) | (y > y1)).sum())
         if outside:
             raise ScenarioError(
-                f"{scenario.name}: world.forest: {counted(outside, 'tree')} outside the "
+                f"{scenario.name}: world.forest: {counted(outside, 'tree')} beyond the "
                 f"terrain, which extends from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m; "
                 "region_m crops an inventory"
             )
