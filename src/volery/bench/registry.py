@@ -1,4 +1,4 @@
-"""The benches by name, their bounds, and the form of a result.
+"""Lists the benches by name with their bounds, and defines the format of a result.
 
 A bench is a module of this package with `measure() -> Measured`, or only its figures as a dict.
 """
@@ -17,13 +17,13 @@ from volery.core.errors import VoleryError
 
 @dataclass(frozen=True)
 class Bound:
-    """What a figure must reach on a machine with two cores of the present class."""
+    """Limit of a figure on a present-day machine with two cores."""
 
     value: float
     at_most: bool = False
 
     def holds(self, figure: float) -> bool:
-        """Whether a figure is within the bound."""
+        """Returns whether a figure is within the bound."""
         return figure <= self.value if self.at_most else figure >= self.value
 
     def __str__(self) -> str:
@@ -32,9 +32,10 @@ class Bound:
 
 @dataclass(frozen=True)
 class Measured:
-    """What a bench found.
+    """Holds the figures of a bench.
 
-    failures: what could not be measured, and why. versions: of others' software that took part.
+    `failures` maps figures that could not be measured to the reason; `versions` lists other
+    software that took part.
     """
 
     figures: Mapping[str, float]
@@ -44,9 +45,9 @@ class Measured:
 
 @dataclass(frozen=True)
 class Result:
-    """Figures of one bench and the machine they were measured on.
+    """Holds the figures of one bench and the machine on which they were measured.
 
-    failures, versions: as in `Measured`.
+    `failures` and `versions` are as in `Measured`.
     """
 
     bench: str
@@ -56,7 +57,7 @@ class Result:
     versions: Mapping[str, str] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data."""
+        """Returns the result as plain data."""
         return {
             "bench": self.bench,
             "machine": dict(self.machine),
@@ -66,12 +67,12 @@ class Result:
         }
 
     def to_json(self) -> str:
-        """One JSON object on one line."""
+        """Returns the result as one JSON object on one line."""
         return json.dumps(self.as_dict())
 
     @classmethod
     def from_json(cls, text: str) -> Result:
-        """A result written by `to_json`. VoleryError if it is none."""
+        """Returns a result written by `to_json`. Raises `VoleryError` if the text is invalid."""
         try:
             return cls.from_dict(json.loads(text))
         except json.JSONDecodeError:
@@ -79,7 +80,7 @@ class Result:
 
     @classmethod
     def from_dict(cls, data: Any) -> Result:
-        """A result as plain data. VoleryError if it is none."""
+        """Returns a result from plain data. Raises `VoleryError` if the data is invalid."""
         try:
             figures = {str(k): float(v) for k, v in data["figures"].items()}
             machine = _texts(data["machine"])
@@ -91,10 +92,10 @@ class Result:
 
 @dataclass(frozen=True)
 class Bench:
-    """A module to measure with and the bounds of its figures.
+    """Describes a bench: a module to measure with and the bounds of its figures.
 
-    in_all: whether `volery bench all` runs it. apart: prefix of figures that a page of their own
-    tells. has_quick: whether `measure` takes `quick`.
+    `in_all`: whether `volery bench all` runs it. `apart`: prefix of figures that have a page of
+    their own. `has_quick`: whether `measure` takes `quick`.
     """
 
     name: str
@@ -105,7 +106,7 @@ class Bench:
     has_quick: bool = False
 
     def run(self, *, quick: bool = False) -> Result:
-        """Measure now; `quick` less, where the bench can. `VoleryError` where it cannot."""
+        """Measures; `quick` measures less. Raises `VoleryError` if the bench has no `quick`."""
         module = importlib.import_module(f"volery.bench.{self.name}")
         if quick and not self.has_quick:
             raise VoleryError(f"bench {self.name} has no --quick")
@@ -336,7 +337,7 @@ BENCHES: dict[str, Bench] = {
 
 
 def find(name: str) -> Bench:
-    """A bench by name; VoleryError listing the names there are."""
+    """Returns a bench by name. Raises `VoleryError` with the known names if there is none."""
     if name not in BENCHES:
         raise VoleryError(f"no bench '{name}'; there are {', '.join(BENCHES)}, or all")
     return BENCHES[name]

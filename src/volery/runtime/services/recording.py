@@ -68,7 +68,7 @@ class RecordingServices:
 
     def _stop(self, _request: Any) -> Fields:
         if self._log is None:
-            raise RecordingError("no log is being recorded")
+            raise RecordingError("nothing is being recorded")
         failure = self._failure
         log = self._end()
         if failure is not None:
