@@ -126,7 +126,7 @@ BENCHES: dict[str, Bench] = {
     for bench in (
         Bench(
             "lidar",
-            "LIDAR: ray casting in a 500 m forest of 5,000 trees, 30 m reach, "
+            "LIDAR: ray casting in a 500 m forest of 5,000 trees, max range 30 m, "
             "batches of 100 UAVs with two scanners of 1081 beams",
             {
                 "rays_per_s_1_thread": Bound(6e6),
@@ -144,7 +144,7 @@ BENCHES: dict[str, Bench] = {
         ),
         Bench(
             "camera",
-            "Cameras: 640 x 480 pictures in the forest of the bench `lidar`, with shadows; the "
+            "Cameras: 640 x 480 images in the forest of the bench `lidar`, with shadows; the "
             "largest fleet at real-time factor 1 with 320 x 240 colour and depth at 10 Hz",
             {
                 "rgbd_ms_1_thread": Bound(120.0, at_most=True),
@@ -156,7 +156,7 @@ BENCHES: dict[str, Bench] = {
         Bench(
             "dynamics",
             "Dynamics: plant and control, fused substeps; a swarm with contacts and downwash, "
-            "500 Hz position control; 1,024 copies under velocity control on two threads",
+            "500 Hz position control; 1,024 environments under velocity control on two threads",
             {
                 "ns_per_drone_step_n1000": Bound(150.0, at_most=True),
                 "us_per_step_n1": Bound(1.5, at_most=True),
@@ -166,7 +166,7 @@ BENCHES: dict[str, Bench] = {
         ),
         Bench(
             "reset",
-            "Reset: back to a kept state, ten UAVs of the main job with two LIDARs and their node",
+            "Reset: restoring a snapshot, ten UAVs of the main job with two LIDARs and their node",
             {"restore_ms_10_uavs": Bound(5.0, at_most=True)},
         ),
         Bench(
@@ -180,7 +180,7 @@ BENCHES: dict[str, Bench] = {
         ),
         Bench(
             "bridge",
-            "Bridges: messages to clients in processes of their own; the lines are "
+            "Bridges: messages to clients in their own processes; the lines are "
             "L = alpha S + beta through the medians of 100 messages a size, 0 to 2.5 MB; sizes and "
             "end points beside the published ones in [bridge_latency.md](bridge_latency.md)",
             {
@@ -201,7 +201,7 @@ BENCHES: dict[str, Bench] = {
             "ros2",
             "ROS 2 over DDS: one way from the simulation to a subscriber in another process, the "
             "line L = alpha S + beta through images of 0 to 1 MB; scans of 10 UAVs with two LIDARs "
-            "at 40 Hz to one subscriber, and while a subscriber stands still",
+            "at 40 Hz to one subscriber, and while a subscriber is stopped",
             {
                 "alpha_s_per_mb": Bound(0.003, at_most=True),
                 "beta_s": Bound(0.0007, at_most=True),
@@ -238,7 +238,7 @@ BENCHES: dict[str, Bench] = {
         Bench(
             "search",
             "Search: a UAV's call to another one, from the caller to the handler, and back; each "
-            "node in a process of its own, or both in lock step",
+            "node in its own process, or both in lock step",
             {
                 f"{way}_one_way_ms": Bound(10.0, at_most=True)
                 for way in ("lock_step", "rosbridge", "ros_tcp", "ros1")
@@ -247,7 +247,7 @@ BENCHES: dict[str, Bench] = {
         Bench(
             "mavlink",
             "MAVLink: ten autopilots with the streams of an onboard computer and of a ground "
-            "station, beyond the same flight without them; commands from a process of its own; "
+            "station, beyond the same flight without them; commands from another process; "
             "velocity setpoints to rotors in simulated time, physics at 250 Hz",
             {
                 "ten_vehicles_core_share": Bound(0.25, at_most=True),
@@ -291,7 +291,7 @@ BENCHES: dict[str, Bench] = {
         ),
         Bench(
             "forest_search",
-            "Forest search: three UAVs without satellite navigation share out the Barro Colorado "
+            "Forest search: three UAVs without satellite navigation divide the Barro Colorado "
             "forest for five minutes, ten seeds; each with two LIDARs at 40 Hz, a camera at 5 Hz, "
             "IMU, sonar, radio; `searched_three_to_one` beside one UAV in the same time",
             {
@@ -309,15 +309,15 @@ BENCHES: dict[str, Bench] = {
         ),
         Bench(
             "load",
-            "Load: what one, two, three and six UAVs of the scenario `forest_search` take of one "
+            "Load: CPU load of one, two, three and six UAVs of the scenario `forest_search` on one "
             "core, in percent of real time; nodes by the CPU time of their callbacks",
             has_quick=True,
         ),
         Bench(
             "hostile",
-            "Hostile clients: a run in real time while clients attack its bridges, each attack a "
-            "process of its own on one core; real-time factor, delay of another client's service "
-            "call, memory that stays; the worst of all attacks, and of each",
+            "Hostile clients: a run in real time while clients attack its bridges, each attack in "
+            "its own process on one core; real-time factor, delay of another client's service "
+            "call, memory growth; the worst of all attacks, and of each",
             {
                 "rtf_under_attack": Bound(0.95),
                 "other_client_delay_p99_ms": Bound(50.0, at_most=True),
@@ -328,8 +328,8 @@ BENCHES: dict[str, Bench] = {
         ),
         Bench(
             "peers",
-            "Peers: other simulators beside Volery, in turns on one core; what each includes is "
-            "told in [peers.md](peers.md)",
+            "Peers: other simulators beside Volery, in turns on one core; [peers.md](peers.md) "
+            "lists what each includes",
             in_all=False,  # it installs a few GB
         ),
     )

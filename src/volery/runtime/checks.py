@@ -32,9 +32,9 @@ def check_reset_seed(scenario: Scenario, seed: Any) -> None:
     check_seed(seed)
     if scenario.has_seeded_world and seed != scenario.seed:
         raise CommandError(
-            f"a reset keeps the world, which scenario '{scenario.name}' grows from its seed "
-            f"{scenario.seed}, so it cannot go on with seed {seed}. For another world make a new "
-            f"simulation of scenario.with_(seed={seed}). For resets in this world fix it first: "
+            f"a reset keeps the world, which scenario '{scenario.name}' generates from its seed "
+            f"{scenario.seed}, so a reset to seed {seed} is not possible. For another world make a "
+            f"new simulation of scenario.with_(seed={seed}). For resets in this world fix it first: "
             f'scenario.with_(world={{"seed": {scenario.seed}}})'
         )
 

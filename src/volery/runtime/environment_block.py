@@ -213,7 +213,7 @@ class EnvironmentBlock:
         """Returns the error with the environment's number among all, not in this block."""
         number, name = error.uav.split("/")
         copy = self._first + int(number)
-        text = str(error).replace(error.uav, f"{name} of copy {copy}", 1)
+        text = str(error).replace(error.uav, f"{name} of environment {copy}", 1)
         return DivergenceError(f"{copy}/{name}", error.time_s, text)
 
     def _renew(self, samples: Samples, rows: NDArray[np.int64]) -> None:

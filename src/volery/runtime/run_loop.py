@@ -88,7 +88,7 @@ class RunLoop:
             teller.tell(s_from_ns(engine.time_ns) - s_from_ns(start_ns), last=over)
         engine.state_check.look()
         if self.finished:
-            pacer.drop_steps("the scenario has come to its end")
+            pacer.drop_steps("the scenario has ended")
 
     def _is_held(self) -> bool:
         """Returns whether the run must wait; waits a moment unless commands are pending."""

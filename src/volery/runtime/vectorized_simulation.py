@@ -59,7 +59,9 @@ class VectorizedSimulation:
         threads: int = 2,
     ) -> None:
         if count < 1 or threads < 1:
-            raise ScenarioError(f"at least 1 copy and 1 thread (found {count} and {threads})")
+            raise ScenarioError(
+                f"at least 1 environment and 1 thread (found {count} and {threads})"
+            )
         if seeds is None:
             seeds = range(scenario.seed, scenario.seed + count)
         if len(seeds) != count:
@@ -227,20 +229,20 @@ class VectorizedSimulation:
 
     def _check_open(self) -> None:
         if self._closed:
-            raise CommandError("the copies are closed; make new ones")
+            raise CommandError("the environments are closed; make a new VectorizedSimulation")
 
     def _chosen(self, copies: ArrayLike | None) -> NDArray[np.int64]:
         chosen = np.arange(self.count) if copies is None else np.atleast_1d(np.asarray(copies))
         if chosen.dtype == bool:
             if chosen.shape != (self.count,):
                 raise CommandError(
-                    f"a mask of copies has one entry for each of {self.count}, not {chosen.shape}"
+                    f"a mask of environments has shape ({self.count},), not {chosen.shape}"
                 )
             chosen = np.flatnonzero(chosen)
         if len(chosen) and (chosen.ndim != 1 or not np.issubdtype(chosen.dtype, np.integer)):
-            raise CommandError(f"copies are named by whole numbers or a mask, not {copies!r}")
+            raise CommandError(f"environments are given by whole numbers or a mask, not {copies!r}")
         if len(chosen) and not 0 <= chosen.min() <= chosen.max() < self.count:
-            raise CommandError(f"copies are numbered 0 to {self.count - 1}")
+            raise CommandError(f"environments are numbered 0 to {self.count - 1}")
         return chosen.astype(np.int64)
 
 
@@ -249,11 +251,14 @@ def _spread(what: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
     try:
         spread = np.broadcast_to(np.asarray(values, dtype=np.float64), shape)
     except (TypeError, ValueError):
-        raise CommandError(f"{what}: numbers that fit {shape} are needed") from None
+        raise CommandError(f"{what}: numbers that broadcast to {shape} are needed") from None
     if not np.isfinite(spread).all():
         raise CommandError(f"{what} must be finite")
     return spread
 
 
 def _without_seeds(copies: int, seeds: int) -> str:
-    return f"{counted(copies, 'copy', 'copies')} with {counted(seeds, 'seed')}: each needs one"
+    return (
+        f"{counted(copies, 'environment', 'environments')} with "
+        f"{counted(seeds, 'seed')}: each needs one"
+    )

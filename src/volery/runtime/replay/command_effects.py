@@ -46,9 +46,9 @@ _SETS_PARAMETERS = {"rosapi_msgs/srv/SetParam", "rosapi_msgs/srv/DeleteParam"}
 class CommandEffect(Enum):
     """Classifies the effect of a command on the flight."""
 
-    ASKS = "nothing: it only asks"
-    PACES = "its pace, its files, its end, its audience, but no result"
-    CHANGES = "its results"
+    ASKS = "nothing: a query"
+    PACES = "the pace, files, end or audience of the run, but no result"
+    CHANGES = "the results"
 
 
 def restarts(taken: ClientCommand) -> bool:

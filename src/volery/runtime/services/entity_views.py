@@ -74,7 +74,7 @@ def entities_of_actors(actors: MovingActors | None, time_ns: int) -> Iterator[En
         yield Entity(
             name=actor.name,
             category=_CATEGORIES.get(actor.kind, Category.DYNAMIC_OBJECT),
-            description=f"{actor.kind} that moves by itself",
+            description=f"actor of kind {actor.kind}",
             tags=("actor", actor.kind),
             make_shape=partial(_shape_of, actor),
             radius_m=actor.shape.radius,

@@ -76,8 +76,8 @@ def offer_features(
         "simulation_interfaces/msg/SimulatorFeatures",
         {
             "features": np.array(features, dtype=np.uint16),
-            "custom_info": "Volery: entities are UAVs and things, worlds are scenarios, "
-            "/volery/* is beside the standard",
+            "custom_info": "Volery: entities are UAVs and actors, worlds are scenarios, "
+            "/volery/* services extend the standard",
         },
     )
     response = message_type(f"{_SRV}_Response")

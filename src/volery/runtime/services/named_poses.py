@@ -43,7 +43,7 @@ def offer_named_poses(graph: Graph, starts: Sequence[StartPose]) -> None:
 def _named(name: str, start: StartPose) -> Any:
     fields = {
         "name": name,
-        "description": f"where {start.name} starts",
+        "description": f"start pose of {start.name}",
         "tags": ["start", start.type_name],
         "pose": pose_message(np.asarray(start.position_map), np.asarray(start.attitude)),
     }

@@ -65,7 +65,7 @@ class SpawnServices:
         if request.entity_resource.resource_string:
             raise RefusedError(_UNSUPPORTED_FORMAT, "UAVs are spawned by type, not from a string")
         if not request.entity_resource.uri:
-            raise RefusedError(_NO_RESOURCE, "uri must be one of those of /get_spawnables")
+            raise RefusedError(_NO_RESOURCE, "uri must be an entity_resource of /get_spawnables")
         if pose.header.frame_id not in ("", "map"):
             reason = f"poses are in 'map', not in '{pose.header.frame_id}'"
             raise RefusedError(_INVALID_POSE, reason)
