@@ -34,7 +34,7 @@ def check_reset_seed(scenario: Scenario, seed: Any) -> None:
         raise CommandError(
             f"a reset keeps the world, which scenario '{scenario.name}' generates from its seed "
             f"{scenario.seed}, so a reset to seed {seed} is not possible. For another world make a "
-            f"new simulation of scenario.with_(seed={seed}). For resets in this world fix it first: "
+            f"new simulation of scenario.with_(seed={seed}). To reset in this world, fix it first: "
             f'scenario.with_(world={{"seed": {scenario.seed}}})'
         )
 
