@@ -24,8 +24,8 @@ Array = NDArray[np.float64]
 
 _LOOK_S = 0.1
 _SILENT_S, _TOLD_S = 2.0, 5.0
-"""Times without poses, s: after the first a landed UAV is held still, after the second an
-event is logged. Modelling choices."""
+"""Times without poses, s: after the first the estimate of a landed UAV is kept at rest, after the
+second an event is logged. Modelling choices."""
 
 
 class ExternalOdometry:

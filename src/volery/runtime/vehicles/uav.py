@@ -128,7 +128,7 @@ class Uav:
     # ------------------------------------------------------------------------------------- faults
 
     def set_rotor_health(self, rotor: int, factor: float) -> None:
-        """Limits the thrust of rotor `rotor` to the fraction `factor` (0 to 1); 0 stops it."""
+        """Scales the max thrust of rotor `rotor` by `factor` (0 to 1); 0 stops the rotor."""
         self._fleet.set_rotor_health(self._row, rotor, factor)
 
     # ------------------------------------------------------------------------------ flight modes
@@ -161,7 +161,10 @@ class Uav:
         self._fleet.land(self._row)
 
     def set_landing_speed(self, speed_m_s: float) -> None:
-        """Sets the descent speed until touchdown, m/s, limited to that of the airframe."""
+        """Sets the descent speed until touchdown, m/s, limited to that of the airframe.
+
+        Raises `CommandError` if the speed is not finite.
+        """
         if math.isinf(speed_m_s):
             raise CommandError(f"landing speed = {speed_m_s} m/s is not finite")
         self._fleet.set_landing_speed(self._row, min(speed_m_s, self.airframe.limits.descent_m_s))
