@@ -228,7 +228,7 @@ def test_uavs_come_and_go_among_actors(simulate, actors_data):
     simulation.run(0.2)
     assert ahead(scans[-1]) == pytest.approx(3.8, abs=0.05)
     assert simulation.scene.instance_name(simulation.scene.moving_offset + 1) == "van"
-    with pytest.raises(SpawnError, match="there is a thing 'van'"):
+    with pytest.raises(SpawnError, match="there is an actor 'van'"):
         simulation.spawn_uav("van", "crazyflie", [2.0, 0.0, 0.7])
 
 

@@ -254,7 +254,7 @@ def test_it_stays_while_it_stands_and_tells_that_no_poses_come(simulate, slam_da
     simulation.run(45.0)
     at_start, at_end = np.array(rows[0][1:4]), np.array(rows[-1][1:4])
     assert np.linalg.norm(at_end - at_start) < 0.5
-    told = [event.describe() for event in simulation.events if "hears no poses" in event.detail]
+    told = [event.describe() for event in simulation.events if "receives no poses" in event.detail]
     assert len(told) == 1
     assert told[0].startswith("5.0")
     assert "slam/odom" in told[0]

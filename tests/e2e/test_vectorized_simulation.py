@@ -146,9 +146,9 @@ def test_mass_command_is_the_same_as_single_ones(pair_data):
 
 
 def test_impossible_requests_are_refused(flat_data):
-    with pytest.raises(ScenarioError, match="at least 1 copy"):
+    with pytest.raises(ScenarioError, match="at least 1 environment"):
         make(flat_data, 0)
-    with pytest.raises(ScenarioError, match="2 copies with 1 seed: each needs one"):
+    with pytest.raises(ScenarioError, match="2 environments with 1 seed: each needs one"):
         make(flat_data, 2, seeds=[1])
     with make(flat_data, 2) as copies:
         with pytest.raises(CommandError, match="numbered 0 to 1"):

@@ -1,11 +1,11 @@
-"""Avoidance by depth camera in fields of randomly placed obstacles, two ways side by side.
+"""Measures depth-camera avoidance in fields of random obstacles, by two methods.
 
-`region`: `autonomy.avoidance.region_avoidance`, a machine of four states on the mean depth of one
-region. `whole`: `autonomy.avoidance.depth_avoidance`, every pixel, remembered. Both cross the same
-fields with the same camera, speed and course of 66 m: `trees` are dead trees (the scenario
-`obstacle_field` with other seeds), `blocks` are blocks of 1 m x 1 m x 5 m. A flight ends where the
-UAV has landed, touched something or used up two minutes; distances and times are medians over those
-that arrived.
+`region`: `autonomy.avoidance.region_avoidance`, a state machine of four states on the mean depth of
+one region. `whole`: `autonomy.avoidance.depth_avoidance`, every pixel, remembered. Both cross the
+same fields with the same camera, speed and course of 66 m: `trees` are dead trees (the scenario
+`obstacle_field` with other seeds), `blocks` are blocks of 1 m x 1 m x 5 m. A flight ends when the
+UAV has landed, touched an obstacle or used two minutes; distances and times are medians over the
+flights that arrived.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ _COURSE_M = 66.0
 _FIELD_M = (8.0, -14.0, 58.0, 14.0)
 _BLOCKS = 40
 _APART_M = 4.0
-"""Least distance of the middles of two blocks."""
+"""Min distance between the centers of two blocks, m."""
 _SLICE_S = 0.25
 _PROCESSES = 2
 
 
 @dataclass(frozen=True)
 class Flight:
-    """How one flight went."""
+    """Holds the outcome of one flight."""
 
     way: str
     field: str
@@ -58,7 +58,7 @@ class Flight:
 
 
 def measure(seeds: Sequence[int] = range(1, SEEDS + 1)) -> Measured:
-    """Collisions, arrivals, metres and seconds, by field and way."""
+    """Returns collisions, arrivals, metres and seconds, by field and method."""
     tasks = [(way, field, seed) for field in FIELDS for way in WAYS for seed in seeds]
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(_PROCESSES, spawn) as pool:
@@ -67,7 +67,7 @@ def measure(seeds: Sequence[int] = range(1, SEEDS + 1)) -> Measured:
 
 
 def figures_of(flights: Sequence[Flight]) -> dict[str, float]:
-    """Numbers of collisions and arrivals, medians of distance and time."""
+    """Returns numbers of collisions and arrivals, medians of distance and time."""
     figures: dict[str, float] = {}
     for field in FIELDS:
         for way in WAYS:
@@ -87,7 +87,7 @@ def _fly_task(task: tuple[str, str, int]) -> Flight:
 
 
 def fly(way: str, field: str, seed: int) -> Flight:
-    """Cross one field."""
+    """Crosses one field."""
     with tempfile.TemporaryDirectory() as folder:
         scenario = field_scenario(way, field, seed, Path(folder))
         with Simulation(scenario, threads=1) as simulation:
@@ -109,9 +109,9 @@ def _is_over(simulation: Simulation) -> bool:
 
 
 def field_scenario(way: str, field: str, seed: int, folder: Path) -> Scenario:
-    """The scenario `obstacle_field` with another seed, node and kind of obstacles.
+    """Returns the scenario `obstacle_field` with another seed, node and kind of obstacles.
 
-    Files that it needs are written into `folder`.
+    Writes the files that the scenario needs into `folder`.
     """
     data: dict[str, Any] = load_scenario("obstacle_field").model_dump()
     data["seed"] = seed
@@ -127,7 +127,7 @@ def field_scenario(way: str, field: str, seed: int, folder: Path) -> Scenario:
 
 
 def _write_blocks(seed: int, folder: Path) -> Path:
-    """A map of cells of a metre with blocks at random, none near another."""
+    """Writes a map of 1 m cells with random blocks that keep a min distance."""
     x0, y0, x1, y1 = _FIELD_M
     cells = np.zeros((round(y1 - y0), round(x1 - x0)), dtype=int)
     rng = np.random.default_rng(seed)

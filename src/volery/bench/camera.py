@@ -1,10 +1,10 @@
-"""Pictures in the forest that the main job's trees make, and how many UAVs can take them at once.
+"""Measures images in the forest of the main job's trees, and the fleet that can take them.
 
-The forest is that of the bench `lidar`. `rgbd_ms_*` are 640 x 480 pictures with 60 degrees field of
-view and 200 m reach, colour with shadows and depth together, from ten places where a UAV has room,
-2 to 5 m above ground; `depth_ms_*` is depth alone. Medians over the places, taking turns.
-`realtime_camera_uavs` is the largest fleet at real-time factor 1 in which each UAV sends 320 x 240
-colour and depth at 10 Hz, beside IMU at 200 Hz and physics and control at 1 kHz.
+The forest is that of the bench `lidar`. `rgbd_ms_*` are 640 x 480 images with 60 degrees field of
+view and 200 m max range, colour with shadows and depth together, from ten free positions 2 to 5 m
+above ground; `depth_ms_*` is depth alone. Figures are medians over the positions, in turns.
+`realtime_camera_uavs` is the largest fleet at real-time factor 1 in which each UAV publishes
+320 x 240 colour and depth at 10 Hz, beside IMU at 200 Hz and physics and control at 1 kHz.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _PARTS = {"rgbd_ms": ("colour", "depth"), "depth_ms": ("depth",)}
 
 
 def measure() -> dict[str, float]:
-    """Figures of the bench `camera`."""
+    """Returns the figures of the bench `camera`."""
     uavs, factor = largest(_real_time_factor, first=4, step=1)
     return {
         **_pictures(),
@@ -76,7 +76,7 @@ def _pictures() -> dict[str, float]:
 
 
 def _median_s(calls: Mapping[str, Callable[[], None]]) -> dict[str, float]:
-    """Median seconds of each call, in turns, after a round to warm up."""
+    """Returns the median time of each call, s, in turns, after a warm-up round."""
     seconds: dict[str, list[float]] = {name: [] for name in calls}
     for turn in range(_ROUNDS + 1):
         for name, call in calls.items():
@@ -107,5 +107,5 @@ def _real_time_factor(uavs: int) -> float:
         simulation.run(_SECONDS)
         factor = _SECONDS / (time.perf_counter() - before)
         if abs(received - 20 * uavs * _SECONDS) > 4 * uavs:
-            raise AssertionError(f"{received} pictures instead of {20 * uavs * _SECONDS:.0f}")
+            raise AssertionError(f"{received} images instead of {20 * uavs * _SECONDS:.0f}")
         return factor

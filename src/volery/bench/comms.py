@@ -1,4 +1,4 @@
-"""The bench `comms`: many stations over loopback, and a server that is killed under them."""
+"""Measures the radio network: many stations over loopback, and a server that is killed."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ _SETTLE_S = 10.0
 _SLICE_S = 0.002
 
 _STAMP = struct.Struct("<qI")
-"""Time of sending by the computer's monotonic clock, number within the pair."""
+"""Time of sending, ns of the monotonic clock, and number within the pair."""
 
 
 def measure(
     stations: int = _STATIONS, rate_per_s: int = _RATE_PER_S, steady_s: float = _STEADY_S
 ) -> dict[str, float]:
-    """Rate and latency in steady traffic, then loss and order across a killed server."""
+    """Returns rate and latency in steady traffic, then loss and order across a killed server."""
     return asyncio.run(_measure(stations, rate_per_s, steady_s))
 
 
 @contextlib.contextmanager
 def served(port: int = 0) -> Iterator[tuple[subprocess.Popen[str], int]]:
-    """A communication server in a process of its own, and its port; killed at the end."""
+    """Runs a communication server in its own process; yields it and its port; kills it."""
     command = [sys.executable, "-P", "-m", "volery.cli.app", "comms", "--port", str(port)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
@@ -56,7 +56,7 @@ def served(port: int = 0) -> Iterator[tuple[subprocess.Popen[str], int]]:
 
 
 class Traffic:
-    """Stations that send to one another in turns, and what came of it."""
+    """Runs stations that send to one another in turns, and counts the deliveries."""
 
     def __init__(self, port: int, count: int) -> None:
         self._stations = [
@@ -66,31 +66,31 @@ class Traffic:
         self._got: dict[tuple[int, int], int] = {}
         self._turn = 0
         self.latencies_ns: list[int] = []
-        """From sending to the handler."""
+        """Latencies from sending to the handler, ns."""
         self.came = 0
         self.reordered = 0
-        """Messages that came behind later ones of their pair, or twice."""
+        """Number of messages that arrived after later ones of their pair, or twice."""
 
     @property
     def sent(self) -> int:
-        """Messages sent so far."""
+        """Number of messages sent."""
         return sum(self._sent.values())
 
     @property
     def joined(self) -> bool:
-        """Whether every station stands in a connection."""
+        """Whether every station is connected."""
         return all(station.joined for station in self._stations)
 
     async def start(self) -> None:
-        """Join all."""
+        """Connects all stations."""
         await asyncio.gather(*(station.start(30.0) for station in self._stations))
 
     async def stop(self) -> None:
-        """Leave."""
+        """Disconnects all stations."""
         await asyncio.gather(*(station.stop() for station in self._stations))
 
     async def flow(self, rate_per_s: float, seconds: float) -> float:
-        """Send at a steady rate; seconds that it took."""
+        """Sends at a steady rate; returns the time that it took, s."""
         began, sent = time.perf_counter(), 0
         while (passed := time.perf_counter() - began) < seconds:
             while sent < passed * rate_per_s:
@@ -100,7 +100,7 @@ class Traffic:
         return time.perf_counter() - began
 
     async def until_quiet(self, seconds: float) -> None:
-        """Wait until all has come, but no longer than so many seconds."""
+        """Waits until all messages have arrived, at most `seconds`."""
         with contextlib.suppress(TimeoutError, asyncio.TimeoutError):
             await asyncio.wait_for(self._all_came(), seconds)
 
@@ -156,7 +156,7 @@ async def _measure(stations: int, rate_per_s: int, steady_s: float) -> dict[str,
 
 
 async def _restarted(traffic: Traffic, port: int, rate_per_s: int) -> float:
-    """Traffic goes on while the server is away; seconds from its listening to the last welcome."""
+    """Sends during the server's absence; returns seconds from listening to the last welcome."""
     flowing = asyncio.create_task(traffic.flow(rate_per_s / 10, _AROUND_KILL_S))
     await asyncio.sleep(0.2)
     again = served(port)

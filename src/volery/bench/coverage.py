@@ -1,9 +1,9 @@
-"""Planning a coverage flight: the published reference cases of DARP, beside an open implementation.
+"""Measures coverage planning: DARP's published reference cases, beside an open implementation.
 
-Ours is measured always, the peer where VOLERY_COVERAGE_PEER names a folder with its modules: that
-of github.com/alice-st/DARP (Python), whose own tests hold these four cases. It runs in a process of
-its own, with the interpreter that VOLERY_COVERAGE_PEER_PYTHON names (it needs numpy, numba, cv2,
-pygame, scikit-learn and PIL), in turns with ours. Both divide the map and plan all tours.
+Volery is always measured, the peer if VOLERY_COVERAGE_PEER names a folder with its modules: that of
+github.com/alice-st/DARP (Python), whose own tests contain these four cases. It runs in its own
+process, with the interpreter that VOLERY_COVERAGE_PEER_PYTHON names (it needs numpy, numba, cv2,
+pygame, scikit-learn and PIL), in turns with Volery. Both divide the map and plan all tours.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ print(time.perf_counter() - begin)
 
 @dataclass(frozen=True)
 class Case:
-    """A square map, cells in which UAVs start, blocked cells; cells are numbered row by row."""
+    """Describes a square map: cells in which UAVs start, blocked cells; numbered row by row."""
 
     name: str
     side: int
@@ -48,13 +48,13 @@ class Case:
     blocked: tuple[int, ...] = ()
 
     def free(self) -> NDArray[np.bool_]:
-        """The free cells (side, side)."""
+        """Returns the free cells (side, side)."""
         free = np.ones(self.side * self.side, np.bool_)
         free[list(self.blocked)] = False
         return free.reshape(self.side, self.side)
 
     def start_cells(self) -> list[tuple[int, int]]:
-        """Row and column of each UAV."""
+        """Returns row and column of each UAV."""
         return [divmod(start, self.side) for start in self.starts]
 
 
@@ -67,12 +67,12 @@ CASES = (
 
 
 def plan(case: Case) -> None:
-    """Do ours."""
+    """Plans a case with Volery."""
     plan_coverage(case.free(), case.start_cells())
 
 
 def measure() -> Measured:
-    """Medians in ms; `*_share_of_peer` is ours divided by the peer's time."""
+    """Returns medians in ms; `*_share_of_peer` is Volery's time divided by the peer's."""
     figures: dict[str, float] = {"first_plan_of_a_process_ms": 1e3 * _first_plan()}
     failures: dict[str, str] = {}
     versions: dict[str, str] = {}
@@ -92,7 +92,7 @@ def measure() -> Measured:
 
 
 def _beside(case: Case, peer: Path, versions: dict[str, str]) -> dict[str, float]:
-    """Figures of one case with the peer's."""
+    """Returns the figures of one case with the peer's."""
     python = Path(os.environ.get("VOLERY_COVERAGE_PEER_PYTHON", sys.executable))
     request = {
         "folder": str(peer),
@@ -119,7 +119,7 @@ def _beside(case: Case, peer: Path, versions: dict[str, str]) -> dict[str, float
 
 
 def _medians(rounds: list[Callable[[], float]]) -> list[float]:
-    """Median seconds of each, in turns, after one round to warm up."""
+    """Returns the median time of each, s, in turns, after a warm-up round."""
     for each in rounds:
         each()
     taken = [[each() for each in rounds] for _ in range(_ROUNDS)]
@@ -133,7 +133,7 @@ def _timed(case: Case) -> float:
 
 
 def _first_plan() -> float:
-    """Seconds of the first plan of a new process that finds everything compiled on disk."""
+    """Returns the time of a new process's first plan, s, with all kernels cached on disk."""
     plan(CASES[1])
     told = subprocess.run(
         [sys.executable, "-P", "-c", _FIRST_PLAN], capture_output=True, text=True, check=True

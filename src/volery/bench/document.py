@@ -1,4 +1,4 @@
-"""Turns results of benches into docs/benchmarks.md.
+"""Renders results of benches as docs/benchmarks.md.
 
 python -m volery.bench.document result.json ... > docs/benchmarks.md
 """
@@ -25,7 +25,7 @@ are meant for a machine with two cores.
 
 
 def render(results: Sequence[Result]) -> str:
-    """The page, in Markdown."""
+    """Returns the page in Markdown."""
     parts = [_HEAD]
     machines: list[dict[str, str]] = []
     for result in results:
@@ -46,7 +46,7 @@ def render(results: Sequence[Result]) -> str:
 
 
 def _by_bench(results: Sequence[Result]) -> list[list[Result]]:
-    """Runs of one bench on one machine together, in the order of their first ones."""
+    """Groups the runs of one bench on one machine, in the order of the first runs."""
     groups: list[list[Result]] = []
     for result in results:
         for runs in groups:
@@ -79,7 +79,7 @@ def _row(bench: Bench, name: str, values: Sequence[float]) -> str:
 
 
 def read_results(path: Path) -> list[Result]:
-    """Results of a file that `volery bench --out` wrote. VoleryError if it holds none."""
+    """Returns the results in a file of `volery bench --out`. Raises `VoleryError` if invalid."""
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:

@@ -1,7 +1,7 @@
-"""Plant and control, no sensors: the fused step by itself, then whole swarms and many copies.
+"""Measures plant and control without sensors: the fused step, swarms, many environments.
 
-The slices are those of the engine: five steps between two IMU samples for one UAV, with Python's
-share of the call included; longer ones for a thousand, where it does not count.
+Calls are as long as the engine's: five steps between two IMU samples for one UAV, including
+Python's share of the call; longer ones for a thousand UAVs, where Python's share is negligible.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _ROUNDS = 15
 
 
 def measure() -> dict[str, float]:
-    """Medians: ns a drone-step at N = 1000, us a step at N = 1; see also `bench.swarm`."""
+    """Returns medians: ns per drone-step at N = 1000, us per step at N = 1; see `bench.swarm`."""
     many, one = _fleet(1000), _fleet(1)
     terrain = Terrain.flat(4000.0, 0.0, (-2000.0, -2000.0)).grid
     for fleet in (many, one):
@@ -45,7 +45,7 @@ def measure() -> dict[str, float]:
 
 
 def _fleet(count: int) -> Fleet:
-    """UAVs on the way to a place 20 m away, so that every layer of control works."""
+    """Returns UAVs on the way to goals 20 m away, so that every control layer is active."""
     side = np.arange(count)
     place = np.column_stack([2.0 * (side % 40), 2.0 * (side // 40), np.full(count, 30.0)])
     attitude = rotations.from_rpy(np.zeros(count), 0.0, 0.01 * side)

@@ -1,10 +1,10 @@
-"""The largest fleets that fly in real time, with scanning LIDARs and their messages.
+"""Measures the largest fleets that fly in real time, with scanning LIDARs and their messages.
 
-The UAVs circle slowly in free places of a forest like that of the main job (same species, 5,000
+The UAVs circle slowly at free positions of a forest like that of the main job (same species, 5,000
 trees in 500 m x 500 m), 3 m above ground; IMU at 200 Hz, 1 kHz physics and control, LIDARs with
-noise and sweep distortion, every message built. `realtime_uavs` has two planar LIDARs a UAV, 1081
-beams at 40 Hz each; in `realtime_uavs_64_rings` a scanner with 64 rings of 1024 beams at 10 Hz
-takes their place.
+noise and sweep distortion, every message built. `realtime_uavs` has two planar LIDARs per UAV, 1081
+beams at 40 Hz each; `realtime_uavs_64_rings` has a LIDAR with 64 rings of 1024 beams at 10 Hz
+instead.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _RINGS: list[dict[str, Any]] = [
 
 
 def measure() -> dict[str, float]:
-    """Figures of the bench `fleet`."""
+    """Returns the figures of the bench `fleet`."""
     at_sixty = real_time_factor(60)
     uavs, factor = largest(real_time_factor, first=round(60 * at_sixty), step=5)
     rings, rings_factor = largest(lambda n: real_time_factor(n, rings=True), first=8, step=1)
@@ -44,10 +44,11 @@ def measure() -> dict[str, float]:
 
 
 def largest(factor_of: Callable[[int], float], *, first: int, step: int) -> tuple[int, float]:
-    """Largest multiple of `step` whose factor is at least 1, and that factor; (0, 0) if none is.
+    """Returns the largest multiple of `step` with a factor of at least 1, and the factor.
 
-    Wall time grows about in proportion to the fleet, so each measurement points to where to look
-    next, up or down; the search ends between a fleet that holds and the next one, which does not.
+    Returns (0, 0) if there is none. Wall time is roughly proportional to the fleet, so each
+    measurement suggests the next fleet; the search ends between a fleet that holds and the next
+    one, which fails.
     """
     holds, held, fails = 0, 0.0, 1 << 30
     uavs = max(step, first // step * step)
@@ -63,7 +64,7 @@ def largest(factor_of: Callable[[int], float], *, first: int, step: int) -> tupl
 
 
 def real_time_factor(uavs: int, *, rings: bool = False) -> float:
-    """Median real-time factor of a fleet of `uavs`, with two planar LIDARs or one of 64 rings."""
+    """Returns the median real-time factor of a fleet with two planar LIDARs or one of 64 rings."""
     scenario = parse_scenario(
         fleet_scenario(uavs, _RINGS if rings else _PLANAR), where="bench fleet"
     )
@@ -93,7 +94,7 @@ def real_time_factor(uavs: int, *, rings: bool = False) -> float:
 
 
 def fleet_scenario(uavs: int, sensors: list[dict[str, Any]]) -> dict[str, object]:
-    """UAVs with `sensors`, besides an IMU, above free places of the forest."""
+    """Returns a scenario of UAVs with `sensors` and an IMU at free positions of the forest."""
     rows = min(_ROWS, uavs)
     groups = [
         {

@@ -1,4 +1,4 @@
-"""The forest, the scanners above it and their beams, as the benches of ray casting share them."""
+"""Builds the forest, the LIDARs and their beams for the benches of ray casting."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from volery.world.trees import DetailLevel
 REACH_M = 30.0
 EXTENT_M, TREES = 500.0, 5000
 PIECE_M = 150.0
-"""Side of the piece that is flattened to triangles for peers; 450 of the trees stand in it."""
+"""Side of the piece that is flattened to triangles for peers, m; it holds 450 of the trees."""
 _UAVS = 100
 
 Array = NDArray[np.float64]
 
 
 def forest_of(extent: float, terrain: Terrain) -> Forest:
-    """A square forest of the main job's species, as dense as `TREES` on `EXTENT_M`."""
+    """Returns a square forest of the main job's species, as dense as `TREES` on `EXTENT_M`."""
     return procedural_forest(
         (0.0, 0.0, extent, extent),
         species="beilschmiedia_pendula",
@@ -37,7 +37,7 @@ def forest_of(extent: float, terrain: Terrain) -> Forest:
 
 
 def scans_of(scene: Scene, extent: float) -> tuple[RayBatch, PoseHistory]:
-    """Two scans of each UAV from places at least half a metre from anything."""
+    """Returns two scans of each UAV from positions at least half a metre from any surface."""
     rng = np.random.default_rng(1)
     places = rng.uniform((0, 0, 2), (extent, extent, 5), (50 * _UAVS, 3))
     inner = (places[:, :2] > 0.06 * extent) & (places[:, :2] < 0.94 * extent)
@@ -59,14 +59,14 @@ def scans_of(scene: Scene, extent: float) -> tuple[RayBatch, PoseHistory]:
 
 
 def rays_of(batch: RayBatch, history: PoseHistory) -> tuple[Array, Array]:
-    """The scans' beams as rays (R, 3), (R, 3), scan after scan."""
+    """Returns origins and directions (R, 3) of the scans' beams, scan after scan."""
     model = load_lidar()
     scans = [scan_rays(model, batch, scan, history)[:2] for scan in range(len(batch.uav))]
     return np.concatenate([o for o, _ in scans]), np.concatenate([d for _, d in scans])
 
 
 def flattened(terrain: Terrain, forest: Forest) -> list[Mesh]:
-    """The ground, then wood and leaves of each tree in the map frame at the sensors' detail."""
+    """Returns the ground, then wood and leaves of each tree, map frame, at the sensors' detail."""
     meshes = [terrain.mesh()]
     for index, transform in zip(forest.model_index, forest.tree_transforms(), strict=True):
         tree = forest.models[index].levels[DetailLevel.SENSING]

@@ -1,4 +1,4 @@
-"""One flight of the scenario `forest_search`, and what is measured of it."""
+"""Flies the scenario `forest_search` once and measures the flight."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from volery.scenario.schema import Scenario
 Array = NDArray[np.float64]
 
 SIGHT_M = 6.0
-"""As far as the task manager takes a place for seen."""
+"""Distance up to which the task manager counts a position as seen, m."""
 _CELL_M = 2.0
 _POSE_NS = 100_000_000
 _TARGET_GATE_M = 4.0
@@ -32,41 +32,41 @@ _TARGET_GATE_M = 4.0
 
 @dataclass
 class Flown:
-    """What is gathered of one UAV. Times are s."""
+    """Holds the data of one UAV; times are in s."""
 
     truth: list[tuple[float, ...]] = field(default_factory=list)
-    """Time, position (3), attitude (4)."""
+    """Time, position (3), attitude (4), from ground truth."""
     estimate: list[tuple[float, ...]] = field(default_factory=list)
     survey: TrunkSurvey = field(default_factory=TrunkSurvey)
-    """What its trunks are told from."""
+    """Scans from which trunks are extracted."""
     targets: list[tuple[float, Array]] = field(default_factory=list)
-    """Time, and the places (T, 2) on its list, whenever it is published."""
+    """Time and target positions (T, 2) of each published list."""
 
     @property
     def way(self) -> RecordedTrajectory:
-        """Where it truly was."""
+        """True trajectory."""
         return RecordedTrajectory.of_rows(self.truth)
 
     @property
     def own_way(self) -> RecordedTrajectory:
-        """Where it thought it was."""
+        """Estimated trajectory."""
         return RecordedTrajectory.of_rows(self.estimate)
 
     def way_and_own(self) -> tuple[Array, Array]:
-        """Places (N, 3) where it truly was, and where it thought it was at these times."""
+        """Returns true and estimated positions (N, 3), m, at the times of the estimates."""
         own, way = self.own_way, self.way
         known = common_times(own.time_s, way.time_s)
         return at_times(way.time_s, way.position, own.time_s[known]), own.position[known]
 
     def alignment(self) -> Alignment | None:
-        """What brings its own way as near to the true one as may be."""
+        """Returns the alignment of the estimated to the true trajectory; None if too short."""
         true, own = self.way_and_own()
         return umeyama(own, true) if len(own) > 3 else None
 
 
 @dataclass(frozen=True)
 class Search:
-    """One search that was flown."""
+    """Holds one search flight."""
 
     scenario: Scenario
     uavs: dict[str, Flown]
@@ -74,24 +74,24 @@ class Search:
     simulated_s: float
     collisions: int
     trees: Array
-    """(N, 2) true feet of the trees, m, map."""
+    """True trunk bases (N, 2), m, map."""
 
     @property
     def real_time_factor(self) -> float:
-        """Simulated seconds a wall second."""
+        """Simulated time over wall time."""
         return self.simulated_s / self.wall_s
 
     def distances_m(self) -> dict[str, float]:
-        """How far each has flown over ground."""
+        """Returns each UAV's distance over ground, m."""
         return {name: uav.way.length_m for name, uav in self.uavs.items()}
 
     def ate_rmse_m(self) -> dict[str, float]:
-        """Error of each UAV's own idea of its way, after alignment."""
+        """Returns each UAV's absolute trajectory error, m, after alignment."""
         pairs = {name: uav.way_and_own() for name, uav in self.uavs.items()}
         return {name: ate_rmse_m(own, true) for name, (true, own) in pairs.items() if len(own) > 3}
 
     def searched_m2(self, until_s: float = np.inf) -> float:
-        """Size of the part of the area that somebody came within sight of."""
+        """Returns the area that some UAV came within sight of, m^2."""
         x0, y0, x1, y1 = area_of(self.scenario)
         x, y = (np.arange(a + _CELL_M / 2.0, b, _CELL_M) for a, b in ((x0, x1), (y0, y1)))
         seen = np.zeros((len(y), len(x)), np.bool_)
@@ -102,11 +102,11 @@ class Search:
         return float(seen.sum()) * _CELL_M**2
 
     def trunk_errors_m(self, *, aligned: bool = False) -> Array:
-        """Distances of mapped trunks from the nearest trees, of those seen three times or more.
+        """Returns distances, m, of trunks seen three times or more from the nearest trees.
 
-        They are all that each UAV takes for trunks by its own sensors and its own idea of its way;
-        what is none is as far off as the next tree stands. `aligned`: each UAV's map is laid onto
-        the world as its way is for the trajectory error, else by the place of take-off alone.
+        Each UAV maps trunks by its own sensors and estimated trajectory; a false trunk counts with
+        its distance from the nearest tree. `aligned`: each map is aligned like the trajectory for
+        its error, else by the take-off position alone.
         """
         errors = [np.zeros(0)]
         for uav in self.uavs.values():
@@ -120,7 +120,7 @@ class Search:
         return np.concatenate(errors)
 
     def target_delays_s(self) -> list[float]:
-        """For each thing found: from the first list that has it to the last one, inf if never."""
+        """Returns each target's delay from the first list with it to the last, s; inf: never."""
         finds = [
             (seconds, place)
             for uav in self.uavs.values()
@@ -137,7 +137,7 @@ class Search:
         return delays
 
     def target_errors_m(self) -> list[float]:
-        """Distance of each hidden thing from the nearest find; those not found are left out."""
+        """Returns distances of hidden targets from the nearest find, m, without those not found."""
         finds = [p for uav in self.uavs.values() if uav.targets for p in uav.targets[-1][1]]
         errors = []
         for mesh in self.scenario.world.meshes:
@@ -148,12 +148,12 @@ class Search:
 
 
 def search_scenario(uavs: int, seed: int, seconds: float) -> Scenario:
-    """The scenario with so many UAVs, a seed and a duration."""
+    """Returns the scenario with a fleet size, a seed and a duration."""
     return overrides.apply(load_scenario("forest_search"), uavs=uavs, seed=seed, seconds=seconds)
 
 
 def sparse_scenario(seed: int, seconds: float) -> Scenario:
-    """One UAV where on a third of the area less than three trunks are in a LIDAR's reach."""
+    """Returns one UAV where fewer than three trunks are in LIDAR range on a third of the area."""
     scenario = search_scenario(1, seed, seconds)
     data = scenario.model_dump(exclude_unset=True)
     data["uavs"][0].update(position_m=[186.0, 162.0], last_position_m=[186.0, 162.0])
@@ -164,7 +164,7 @@ def sparse_scenario(seed: int, seconds: float) -> Scenario:
 
 
 def area_of(scenario: Scenario) -> tuple[float, float, float, float]:
-    """x_min, y_min, x_max, y_max that the task managers share out."""
+    """Returns x_min, y_min, x_max, y_max, m, of the area that the task managers divide."""
     for kind in scenario.types.values():
         for node in kind.nodes:
             if "area_m" in node.parameters:
@@ -174,7 +174,7 @@ def area_of(scenario: Scenario) -> tuple[float, float, float, float]:
 
 
 def fly(scenario: Scenario, *, threads: int = 2) -> Search:
-    """Fly it to its end, as fast as possible."""
+    """Flies the scenario to its end, as fast as possible."""
     with Simulation(scenario, threads=threads) as simulation:
         uavs = {name: Flown() for name in simulation.uavs}
         for name, flown in uavs.items():
@@ -210,7 +210,7 @@ def _listen(simulation: Simulation, name: str, flown: Flown) -> None:
 
 
 def _thinning(period_ns: int, take: Callable[[Published], None]) -> Callable[[Published], None]:
-    """Let one message a period through."""
+    """Passes one message per period."""
     next_ns = 0
 
     def receive(published: Published) -> None:
@@ -253,7 +253,7 @@ def _first_heard(uav: Flown, place: Array) -> float:
 
 
 def _thinned(way: Array, step_m: float = 0.5) -> Array:
-    """Places (N, 2) of a way, no nearer to each other along it than `step_m`."""
+    """Returns positions (N, 2) of a path at least `step_m` apart along it."""
     along = np.concatenate([[0.0], np.hypot(*np.diff(way, axis=0).T).cumsum()])
     kept = np.diff(along // step_m, prepend=-1.0) > 0.0
     return way[kept[: len(way)]]

@@ -1,7 +1,7 @@
-"""The bench `forest_search`: three UAVs search the Barro Colorado forest, ten times.
+"""Measures the bench `forest_search`: three UAVs search the Barro Colorado forest, ten times.
 
-Each flight takes five minutes; a tenth of the seeds are flown again by one UAV alone, to tell what
-a team is worth, and once more where trunks are rare. `quick` flies one minute with one seed.
+Each flight takes five minutes; one UAV alone flies a tenth of the seeds again, to show the benefit
+of a team, and once more where trunks are rare. `quick` flies one minute with one seed.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ _UAVS = 3
 _SEEDS, _SECONDS = range(1, 11), 300.0
 _QUICK_SEEDS, _QUICK_SECONDS = range(1, 2), 60.0
 _FIRST_SECONDS = 30.0
-"""Flown before anything is measured: by then all kernels have been compiled, or read."""
+"""Time flown before any measurement, s: by then all kernels are compiled or loaded."""
 _TRUNK_M = 0.5
 
 
 def measure(*, quick: bool = False) -> Measured:
-    """Figures of the bench."""
+    """Returns the figures of the bench."""
     seeds, seconds = (_QUICK_SEEDS, _QUICK_SECONDS) if quick else (_SEEDS, _SECONDS)
     team = []
     fly(search_scenario(_UAVS, seeds[0], _FIRST_SECONDS))
@@ -43,7 +43,7 @@ def measure(*, quick: bool = False) -> Measured:
 
 
 def figures_of_sparse(search: Search) -> dict[str, float]:
-    """What a flight among few trunks comes to."""
+    """Returns the figures of a flight among few trunks."""
     return {
         "sparse_ate_rmse_m": max(search.ate_rmse_m().values(), default=math.nan),
         "sparse_distance_m": min(search.distances_m().values()),
@@ -52,7 +52,7 @@ def figures_of_sparse(search: Search) -> dict[str, float]:
 
 
 def figures_of(team: Sequence[Search], alone: Sequence[Search]) -> Measured:
-    """What flights of a team, and of one UAV with the first of their seeds, come to."""
+    """Returns the figures of a team's flights, and of one UAV's with the first of their seeds."""
     errors = [error for search in team for error in search.ate_rmse_m().values()]
     distances = [way for search in team for way in search.distances_m().values()]
     delays = [delay for search in team for delay in search.target_delays_s()]
@@ -74,7 +74,7 @@ def figures_of(team: Sequence[Search], alone: Sequence[Search]) -> Measured:
         figures["ate_rmse_m_median"] = statistics.median(errors)
         figures["ate_rmse_m_worst"] = max(errors)
     else:
-        failures["ate_rmse_m_median"] = "nobody told where it thinks it is"
+        failures["ate_rmse_m_median"] = "no UAV published an estimated pose"
     if len(trunks):
         figures["trunks"] = float(len(trunks))
         figures["trunks_within_half_m"] = float((trunks <= _TRUNK_M).mean())
@@ -85,12 +85,12 @@ def figures_of(team: Sequence[Search], alone: Sequence[Search]) -> Measured:
         figures["target_delay_s_worst"] = max(delays)
         figures["target_error_m_median"] = statistics.median(places)
     else:
-        failures["target_delay_s_worst"] = "nothing was found"
+        failures["target_delay_s_worst"] = "no target was found"
     return Measured(figures, failures)
 
 
 def _three_to_one(team: Sequence[Search], alone: Sequence[Search]) -> float:
-    """Area searched by the team over that of one UAV, of the same seeds in the same time."""
+    """Returns the area searched by the team over that of one UAV, same seeds and time."""
     ratios = []
     for three, one in zip(team, alone, strict=False):
         until_s = min(three.simulated_s, one.simulated_s)

@@ -1,15 +1,16 @@
-"""Ray casting as the LIDARs do it, and peers on the same triangles.
+"""Measures LIDAR ray casting, and peers on the same triangles.
 
 The forest is 500 m x 500 m with 5,000 trees of the main job's species at its level of detail. A
-hundred UAVs hover in free places 2..5 m above the ground; each has a level and a nodding scanner,
-whose 2 x 1081 beams make the batch (reach 30 m). `rays_per_s_*` are exact scans of the whole batch,
-each beam from its own pose, the closest hit without noise; `noisy_*` add the noise of the real
-scanner; `cast_*` is the call for any rays (`Scene.cast`: distance, normal, instance, material).
+hundred UAVs hover at free positions 2..5 m above the ground; each has a horizontal and a nodding
+LIDAR, whose 2 x 1081 beams make the batch (max range 30 m). `rays_per_s_*` are exact scans of the
+whole batch, each beam from its own pose, the closest hit without noise; `noisy_*` add the noise of
+the real LIDAR; `cast_*` is the call for any rays (`Scene.cast`: distance, normal, instance,
+material).
 
 The peers get the triangles of a 150 m x 150 m piece of the forest, flattened, because the whole
-does not fit in the memory of a small machine when every tree is stored as often as it stands; ours
-gets the same piece. embreex's call is given the reach and asked for distances only, its fastest
-form; open3d's call knows no reach. One thread each, taking turns, medians.
+forest does not fit in the memory of a small machine if every tree is stored separately; Volery gets
+the same piece. embreex's call gets the max range and returns distances only, its fastest form;
+open3d's call has no max range. One thread each, in turns, medians.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ Array = NDArray[np.float64]
 
 
 def measure(seconds_budget: float = 40.0) -> dict[str, float]:
-    """Figures of the bench `lidar`, with about `seconds_budget` of repeated casting."""
+    """Returns the figures of the bench `lidar`, with about `seconds_budget` of repeated casting."""
     figures = _whole_forest(0.55 * seconds_budget)
     figures.update(_peers(0.45 * seconds_budget))
     return figures
@@ -55,7 +56,7 @@ def measure(seconds_budget: float = 40.0) -> dict[str, float]:
 def _take_turns(
     calls: Mapping[str, Callable[[], object]], seconds_budget: float
 ) -> dict[str, float]:
-    """Median seconds of each call; one of each a round, after a round to warm up."""
+    """Returns the median time of each call, s, in turns, after a warm-up round."""
     seconds: dict[str, list[float]] = {name: [] for name in calls}
     for call in calls.values():
         call()
@@ -101,7 +102,7 @@ def _whole_forest(seconds_budget: float) -> dict[str, float]:
 
 
 def _peers(seconds_budget: float) -> dict[str, float]:
-    """How many times faster ours is than the peers on the same piece of forest."""
+    """Returns Volery's speed over that of the peers on the same piece of forest."""
     terrain = Terrain.flat(extent_m=PIECE_M)
     forest = forest_of(PIECE_M, terrain)
     scene = Scene(terrain, forest)

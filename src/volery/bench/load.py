@@ -1,8 +1,8 @@
-"""The bench `load`: what the parts of a search take of a core, by the number of UAVs.
+"""Measures the CPU load of a search's parts, by the number of UAVs.
 
-The scenario `forest_search` is flown as fast as possible on one thread; figures are CPU time in
-percent of one core at real time. Nodes are counted by their callbacks, wherever they run. The
-graph's share is that of the stage that hands messages out, less the nodes that are called in it.
+It flies the scenario `forest_search` as fast as possible on one thread; figures are CPU time in
+percent of one core at real time. Nodes are measured by their callbacks, wherever they run. The
+graph's load is that of the stage that delivers messages, less the nodes that are called in it.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from volery.runtime import Simulation
 _FLEETS, _SECONDS = (1, 2, 3, 6), 30.0
 _QUICK_FLEETS, _QUICK_SECONDS = (1, 3), 10.0
 _CLIMB_S = 15.0
-"""The take-off is left out, and the first map, for which kernels may still be compiled."""
+"""Excludes the take-off and the first map, for which kernels may still be compiled."""
 _ENGINE = ("take_commands", "advance_vehicles", "resolve_contacts", "raise_events", "meet_partners")
 _SENSORS, _GRAPH = "sample_sensors", "publish"
 
 
 def measure(*, quick: bool = False) -> dict[str, float]:
-    """Figures of the bench."""
+    """Returns the figures of the bench."""
     fleets, seconds = (_QUICK_FLEETS, _QUICK_SECONDS) if quick else (_FLEETS, _SECONDS)
     figures: dict[str, float] = {}
     for uavs in fleets:
@@ -31,7 +31,7 @@ def measure(*, quick: bool = False) -> dict[str, float]:
 
 
 def shares(uavs: int, seconds: float) -> dict[str, float]:
-    """Percent of one core at real time by part, and of all of the process together."""
+    """Returns percent of one core at real time by part, and of the whole process."""
     scenario = search_scenario(uavs, 1, _CLIMB_S + seconds + 1.0)
     with Simulation(scenario, threads=1) as simulation:
         simulation.run(_CLIMB_S)
@@ -55,7 +55,7 @@ def shares(uavs: int, seconds: float) -> dict[str, float]:
 
 
 def _busy(simulation: Simulation) -> dict[str, float]:
-    """CPU seconds of the nodes so far, by their name; workers are waited for."""
+    """Returns the nodes' CPU seconds so far, by name; waits for workers."""
     busy: dict[str, float] = {}
     for node in simulation.nodes:
         node.join()
@@ -64,5 +64,5 @@ def _busy(simulation: Simulation) -> dict[str, float]:
 
 
 def _with_latency(simulation: Simulation) -> set[str]:
-    """Names of nodes that work on threads of their own."""
+    """Returns the names of nodes with threads of their own."""
     return {node.get_name() for node in simulation.nodes if node.has_worker}

@@ -1,4 +1,4 @@
-"""What figures depend on: the machine and the versions."""
+"""Describes the machine and the versions on which figures depend."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _PACKAGES = ("volery", "numpy", "numba", "embreex", "rosbags")
 
 
 def describe_machine() -> dict[str, str]:
-    """Processor, usable cores, memory and system, as text."""
+    """Returns processor, usable cores, memory and system, as text."""
     return {
         "processor": _processor(),
         "cores": str(usable_cores()),
@@ -21,7 +21,7 @@ def describe_machine() -> dict[str, str]:
 
 
 def describe_versions() -> dict[str, str]:
-    """Versions of Python and of the packages that decide speed and results."""
+    """Returns versions of Python and of the packages that affect speed and results."""
     found = {"python": platform.python_version()}
     for name in _PACKAGES:
         try:
@@ -32,12 +32,12 @@ def describe_versions() -> dict[str, str]:
 
 
 def usable_cores() -> int:
-    """Cores that this process may run on."""
+    """Returns the number of cores that this process may use."""
     return len(os.sched_getaffinity(0))
 
 
 def memory_bytes() -> int:
-    """Memory of the machine, or the limit of the container if that is less."""
+    """Returns the machine's memory, or the container's limit if that is less, bytes."""
     total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     try:
         limit = Path("/sys/fs/cgroup/memory.max").read_text(encoding="ascii").strip()

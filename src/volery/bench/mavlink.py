@@ -1,4 +1,4 @@
-"""The bench `mavlink`: what ten autopilots cost, how soon they answer, how soon setpoints act."""
+"""Measures ten autopilots: CPU load, response time of commands, latency of setpoints."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ _STEADY_S = 10.0
 _LIFT_S = 6.0
 _COMMANDS = 400
 _PORT = 34540
-"""Away from the ports that a run of the user's has."""
+"""UDP port away from the usual ones of a user's run."""
 _PHYSICS_HZ = 250
 
 
 def measure() -> dict[str, float]:
-    """Share of a core, wall time of answers, simulated time from setpoints to rotors."""
+    """Returns the core share, wall time of responses, simulated time from setpoints to rotors."""
     with_streams, ack_ms = _fly_ten(streams=True)
     without, _ = _fly_ten(streams=False)
     return {
@@ -58,7 +58,7 @@ def _scenario(count: int, physics_hz: int = 1000) -> Any:
 
 
 def _fly_ten(*, streams: bool) -> tuple[float, list[float]]:
-    """CPU seconds a second in real time, and milliseconds from commands to their answers."""
+    """Returns CPU seconds per second in real time, and ms from commands to their responses."""
     from volery.bridges.bridge_host import BridgeHost
     from volery.mavlink.links.udp_bridge import MavlinkUdp
     from volery.runtime import Simulation
@@ -76,7 +76,7 @@ def _fly_ten(*, streams: bool) -> tuple[float, list[float]]:
 
 
 def _ask(simulation: Any) -> list[float]:
-    """Ask a vehicle of a running simulation from a process of its own."""
+    """Sends requests to a vehicle of a running simulation from another process."""
     simulation.use_low_latency()
     thread = threading.Thread(target=lambda: simulation.run(600.0, speed=1.0))
     thread.start()
@@ -100,7 +100,7 @@ def _ask(simulation: Any) -> list[float]:
 
 
 def _setpoint_to_motor_ms() -> float:
-    """The longest of several phases between the steps of guidance, at 250 Hz of physics."""
+    """Returns the max over several phases between the guidance steps, at 250 Hz of physics."""
     from volery.graph.messages import message_type
     from volery.mavlink.codec import Codec, dialect
     from volery.mavlink.node import PACKETS

@@ -1,4 +1,4 @@
-"""Asks a vehicle over UDP again and again, and tells how long each answer took, in ms.
+"""Sends requests to a vehicle over UDP and prints each response time in ms.
 
 python -m volery.bench.mavlink_client PORT COUNT
 """
@@ -14,12 +14,12 @@ from volery.mavlink.codec import Codec, dialect
 from volery.mavlink.framing import Framer
 
 _PAUSE_S = 0.013
-"""Between two commands, out of step with every stream."""
+"""Pause between two commands, s, not a multiple of any stream's period."""
 _ACK = 77
 
 
 def main() -> None:
-    """Ask for the home position COUNT times at PORT."""
+    """Requests the home position COUNT times at PORT."""
     port, count = int(sys.argv[1]), int(sys.argv[2])
     codec, framer = Codec(245, 190), Framer()
     command = dialect().MAVLink_command_long_message(1, 1, 512, 0, 242.0, 0, 0, 0, 0, 0, 0)

@@ -1,8 +1,8 @@
-"""The README's pictures of the page: scenarios played in headless Chromium.
+"""Takes the README's screenshots of the page: scenarios in headless Chromium.
 
     python -m volery.bench.page_pictures [NAME...] [--folder FOLDER]
 
-WebGL is drawn in software, so a simulation waits, paused, until its picture is done.
+WebGL is drawn in software, so the simulation is paused until a screenshot is taken.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ if TYPE_CHECKING:
 _SIZE = {"width": 1440, "height": 810}
 _PATIENCE_MS = 600_000
 _FRAMES = 12
-"""Drawn after the simulation was paused: details and smooth turns come to an end."""
+"""Frames drawn after the pause: details and camera motions finish."""
 _PAUSED = 2
 _JPEG_QUALITY = 85
 
 
 @dataclass(frozen=True)
 class Shot:
-    """One picture.
+    """Describes one screenshot.
 
-    at_s: simulated time. view: of the page's address. layout: as the page keeps it. lines: fields
-    that are drawn as plots.
+    `at_s` is the simulated time, `view` the fragment of the page's address, `layout` as the page
+    stores it, `lines` the fields that are plotted.
     """
 
     name: str
@@ -90,7 +90,7 @@ SHOTS = (
 
 
 def main(folder: Path, names: list[str]) -> None:
-    """Take all pictures, or those of the given names."""
+    """Takes all screenshots, or those of the given names."""
     wanted = [shot for shot in SHOTS if not names or shot.name in names]
     folder.mkdir(parents=True, exist_ok=True)
     with open_browser() as browser:
@@ -117,7 +117,7 @@ def _take(browser: Browser, shot: Shot, path: Path) -> None:
 
 
 def _kept(shot: Shot) -> str:
-    """What a browser keeps of a former visit."""
+    """Returns a script that stores the layout and the plots in the browser."""
     lines = [{"topic": topic, "type": kind, "path": path} for topic, kind, path in shot.lines]
     kept = {"volery.layout": shot.layout}
     if lines:
@@ -129,13 +129,13 @@ def _kept(shot: Shot) -> str:
 
 
 def _pause_at(server: PageProcess, time_s: float) -> None:
-    """Pause the simulation when its time has come."""
+    """Pauses the simulation at a simulated time."""
     with connect(server.rosbridge) as socket:
         socket.send(json.dumps({"op": "subscribe", "topic": "/volery/status", "queue_length": 1}))
         ends = time.monotonic() + _PATIENCE_MS / 1000
         while json.loads(socket.recv(timeout=60))["msg"]["stamp"]["sec"] < time_s:
             if time.monotonic() > ends:
-                raise VoleryError(f"the simulation did not come to {time_s} s")
+                raise VoleryError(f"the simulation did not reach {time_s} s")
         call = {"op": "call_service", "service": "/set_simulation_state", "id": "pause"}
         socket.send(json.dumps({**call, "args": {"state": {"state": _PAUSED}}}))
         while json.loads(socket.recv(timeout=60)).get("id") != "pause":
@@ -145,7 +145,7 @@ def _pause_at(server: PageProcess, time_s: float) -> None:
 def _settle(page: Page) -> None:
     seen = page.evaluate("window.volery.frames")
     drawn = f"window.volery.frames >= {seen + _FRAMES}"
-    heard = "document.querySelector('.banner') === null"  # a slow frame may look like silence
+    heard = "document.querySelector('.banner') === null"  # slow frames may look like a lost server
     wait_until(page, f"{drawn} && {heard}", _PATIENCE_MS / 1000.0)
 
 

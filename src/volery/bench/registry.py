@@ -1,4 +1,4 @@
-"""The benches by name, their bounds, and the form of a result.
+"""Lists the benches by name with their bounds, and defines the format of a result.
 
 A bench is a module of this package with `measure() -> Measured`, or only its figures as a dict.
 """
@@ -17,13 +17,13 @@ from volery.core.errors import VoleryError
 
 @dataclass(frozen=True)
 class Bound:
-    """What a figure must reach on a machine with two cores of the present class."""
+    """Limit of a figure on a present-day machine with two cores."""
 
     value: float
     at_most: bool = False
 
     def holds(self, figure: float) -> bool:
-        """Whether a figure is within the bound."""
+        """Returns whether a figure is within the bound."""
         return figure <= self.value if self.at_most else figure >= self.value
 
     def __str__(self) -> str:
@@ -32,9 +32,10 @@ class Bound:
 
 @dataclass(frozen=True)
 class Measured:
-    """What a bench found.
+    """Holds the figures of a bench.
 
-    failures: what could not be measured, and why. versions: of others' software that took part.
+    `failures` maps figures that could not be measured to the reason; `versions` lists other
+    software that took part.
     """
 
     figures: Mapping[str, float]
@@ -44,9 +45,9 @@ class Measured:
 
 @dataclass(frozen=True)
 class Result:
-    """Figures of one bench and the machine they were measured on.
+    """Holds the figures of one bench and the machine on which they were measured.
 
-    failures, versions: as in `Measured`.
+    `failures` and `versions` are as in `Measured`.
     """
 
     bench: str
@@ -56,7 +57,7 @@ class Result:
     versions: Mapping[str, str] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data."""
+        """Returns the result as plain data."""
         return {
             "bench": self.bench,
             "machine": dict(self.machine),
@@ -66,12 +67,12 @@ class Result:
         }
 
     def to_json(self) -> str:
-        """One JSON object on one line."""
+        """Returns the result as one JSON object on one line."""
         return json.dumps(self.as_dict())
 
     @classmethod
     def from_json(cls, text: str) -> Result:
-        """A result written by `to_json`. VoleryError if it is none."""
+        """Returns a result written by `to_json`. Raises `VoleryError` if the text is invalid."""
         try:
             return cls.from_dict(json.loads(text))
         except json.JSONDecodeError:
@@ -79,7 +80,7 @@ class Result:
 
     @classmethod
     def from_dict(cls, data: Any) -> Result:
-        """A result as plain data. VoleryError if it is none."""
+        """Returns a result from plain data. Raises `VoleryError` if the data is invalid."""
         try:
             figures = {str(k): float(v) for k, v in data["figures"].items()}
             machine = _texts(data["machine"])
@@ -91,10 +92,10 @@ class Result:
 
 @dataclass(frozen=True)
 class Bench:
-    """A module to measure with and the bounds of its figures.
+    """Describes a bench: a module to measure with and the bounds of its figures.
 
-    in_all: whether `volery bench all` runs it. apart: prefix of figures that a page of their own
-    tells. has_quick: whether `measure` takes `quick`.
+    `in_all`: whether `volery bench all` runs it. `apart`: prefix of figures that have a page of
+    their own. `has_quick`: whether `measure` takes `quick`.
     """
 
     name: str
@@ -105,7 +106,7 @@ class Bench:
     has_quick: bool = False
 
     def run(self, *, quick: bool = False) -> Result:
-        """Measure now; `quick` less, where the bench can. `VoleryError` where it cannot."""
+        """Measures; `quick` measures less. Raises `VoleryError` if the bench has no `quick`."""
         module = importlib.import_module(f"volery.bench.{self.name}")
         if quick and not self.has_quick:
             raise VoleryError(f"bench {self.name} has no --quick")
@@ -125,7 +126,7 @@ BENCHES: dict[str, Bench] = {
     for bench in (
         Bench(
             "lidar",
-            "LIDAR: ray casting in a 500 m forest of 5,000 trees, 30 m reach, "
+            "LIDAR: ray casting in a 500 m forest of 5,000 trees, max range 30 m, "
             "batches of 100 UAVs with two scanners of 1081 beams",
             {
                 "rays_per_s_1_thread": Bound(6e6),
@@ -143,7 +144,7 @@ BENCHES: dict[str, Bench] = {
         ),
         Bench(
             "camera",
-            "Cameras: 640 x 480 pictures in the forest of the bench `lidar`, with shadows; the "
+            "Cameras: 640 x 480 images in the forest of the bench `lidar`, with shadows; the "
             "largest fleet at real-time factor 1 with 320 x 240 colour and depth at 10 Hz",
             {
                 "rgbd_ms_1_thread": Bound(120.0, at_most=True),
@@ -155,7 +156,7 @@ BENCHES: dict[str, Bench] = {
         Bench(
             "dynamics",
             "Dynamics: plant and control, fused substeps; a swarm with contacts and downwash, "
-            "500 Hz position control; 1,024 copies under velocity control on two threads",
+            "500 Hz position control; 1,024 environments under velocity control on two threads",
             {
                 "ns_per_drone_step_n1000": Bound(150.0, at_most=True),
                 "us_per_step_n1": Bound(1.5, at_most=True),
@@ -165,7 +166,7 @@ BENCHES: dict[str, Bench] = {
         ),
         Bench(
             "reset",
-            "Reset: back to a kept state, ten UAVs of the main job with two LIDARs and their node",
+            "Reset: restoring a snapshot, ten UAVs of the main job with two LIDARs and their node",
             {"restore_ms_10_uavs": Bound(5.0, at_most=True)},
         ),
         Bench(
@@ -179,7 +180,7 @@ BENCHES: dict[str, Bench] = {
         ),
         Bench(
             "bridge",
-            "Bridges: messages to clients in processes of their own; the lines are "
+            "Bridges: messages to clients in their own processes; the lines are "
             "L = alpha S + beta through the medians of 100 messages a size, 0 to 2.5 MB; sizes and "
             "end points beside the published ones in [bridge_latency.md](bridge_latency.md)",
             {
@@ -200,7 +201,7 @@ BENCHES: dict[str, Bench] = {
             "ros2",
             "ROS 2 over DDS: one way from the simulation to a subscriber in another process, the "
             "line L = alpha S + beta through images of 0 to 1 MB; scans of 10 UAVs with two LIDARs "
-            "at 40 Hz to one subscriber, and while a subscriber stands still",
+            "at 40 Hz to one subscriber, and while a subscriber is stopped",
             {
                 "alpha_s_per_mb": Bound(0.003, at_most=True),
                 "beta_s": Bound(0.0007, at_most=True),
@@ -237,7 +238,7 @@ BENCHES: dict[str, Bench] = {
         Bench(
             "search",
             "Search: a UAV's call to another one, from the caller to the handler, and back; each "
-            "node in a process of its own, or both in lock step",
+            "node in its own process, or both in lock step",
             {
                 f"{way}_one_way_ms": Bound(10.0, at_most=True)
                 for way in ("lock_step", "rosbridge", "ros_tcp", "ros1")
@@ -246,7 +247,7 @@ BENCHES: dict[str, Bench] = {
         Bench(
             "mavlink",
             "MAVLink: ten autopilots with the streams of an onboard computer and of a ground "
-            "station, beyond the same flight without them; commands from a process of its own; "
+            "station, beyond the same flight without them; commands from another process; "
             "velocity setpoints to rotors in simulated time, physics at 250 Hz",
             {
                 "ten_vehicles_core_share": Bound(0.25, at_most=True),
@@ -290,7 +291,7 @@ BENCHES: dict[str, Bench] = {
         ),
         Bench(
             "forest_search",
-            "Forest search: three UAVs without satellite navigation share out the Barro Colorado "
+            "Forest search: three UAVs without satellite navigation divide the Barro Colorado "
             "forest for five minutes, ten seeds; each with two LIDARs at 40 Hz, a camera at 5 Hz, "
             "IMU, sonar, radio; `searched_three_to_one` beside one UAV in the same time",
             {
@@ -308,15 +309,15 @@ BENCHES: dict[str, Bench] = {
         ),
         Bench(
             "load",
-            "Load: what one, two, three and six UAVs of the scenario `forest_search` take of one "
+            "Load: CPU load of one, two, three and six UAVs of the scenario `forest_search` on one "
             "core, in percent of real time; nodes by the CPU time of their callbacks",
             has_quick=True,
         ),
         Bench(
             "hostile",
-            "Hostile clients: a run in real time while clients attack its bridges, each attack a "
-            "process of its own on one core; real-time factor, delay of another client's service "
-            "call, memory that stays; the worst of all attacks, and of each",
+            "Hostile clients: a run in real time while clients attack its bridges, each attack in "
+            "its own process on one core; real-time factor, delay of another client's service "
+            "call, memory growth; the worst of all attacks, and of each",
             {
                 "rtf_under_attack": Bound(0.95),
                 "other_client_delay_p99_ms": Bound(50.0, at_most=True),
@@ -327,8 +328,8 @@ BENCHES: dict[str, Bench] = {
         ),
         Bench(
             "peers",
-            "Peers: other simulators beside Volery, in turns on one core; what each includes is "
-            "told in [peers.md](peers.md)",
+            "Peers: other simulators beside Volery, in turns on one core; [peers.md](peers.md) "
+            "lists what each includes",
             in_all=False,  # it installs a few GB
         ),
     )
@@ -336,7 +337,7 @@ BENCHES: dict[str, Bench] = {
 
 
 def find(name: str) -> Bench:
-    """A bench by name; VoleryError listing the names there are."""
+    """Returns a bench by name. Raises `VoleryError` with the known names if there is none."""
     if name not in BENCHES:
         raise VoleryError(f"no bench '{name}'; there are {', '.join(BENCHES)}, or all")
     return BENCHES[name]

@@ -1,4 +1,4 @@
-"""Keeping and taking back the state of a flight: ten UAVs of the main job in the air."""
+"""Measures snapshots, restores and resets: ten UAVs of the main job in the air."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ _ROUNDS = 40
 
 
 def measure() -> dict[str, float]:
-    """Medians: ms to keep a state, to go back to it, and to start anew with another seed."""
+    """Returns medians, ms: to save a snapshot, to restore it, to reset with another seed."""
     scenario = overrides.apply(load_scenario("forest_survey"), uavs=10)
-    fixed = scenario.with_(world={"seed": scenario.seed})  # what resets with other seeds need
+    fixed = scenario.with_(world={"seed": scenario.seed})  # required by resets with other seeds
     with Simulation(fixed) as simulation:
         simulation.run(4.0)
         kept = simulation.snapshot()

@@ -1,4 +1,4 @@
-"""The bench `ros2`: the ROS 2 bridge over DDS, with a subscriber in a process of its own."""
+"""Measures the ROS 2 bridge over DDS, with a subscriber in its own process."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _SETTLED_S = 1.0
 
 
 def measure() -> dict[str, float]:
-    """Figures of the bench."""
+    """Returns the figures of the bench."""
     with in_real_time(load_scenario("hover")) as (simulation, bridges):
         bridges.open(_bridge())
         images, lost = _images(simulation)
@@ -54,7 +54,7 @@ def _bridge() -> Ros2Bridge:
 
 
 class _Peer:
-    """A subscriber in a process of its own; it tells what came when it is asked."""
+    """Runs a subscriber in its own process; it reports its messages at the end."""
 
     def __init__(self, kind: str, topics: list[str]) -> None:
         command = [
@@ -70,17 +70,17 @@ class _Peer:
         self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True)
 
     def signal(self, number: int) -> None:
-        """Have it stand still, or go on."""
+        """Stops or continues the process."""
         os.kill(self._process.pid, number)
 
     def finish(self) -> list[tuple[str, int, int, int]]:
-        """Topic, bytes of data, stamp and time of arrival (ns) of all that came."""
+        """Returns topic, size, stamp and arrival time (ns) of all received messages."""
         out, _ = self._process.communicate("\n", timeout=_PATIENCE_S)
         return [(str(t), int(size), int(stamp), int(at)) for t, size, stamp, at in json.loads(out)]
 
 
 def _images(simulation: Simulation) -> tuple[list[tuple[int, float]], int]:
-    """(bytes, s) of images published by the simulation's thread; and how many did not come."""
+    """Returns (bytes, s) of images from the simulation's thread, and how many were lost."""
     publisher = advertise_images(simulation)
     peer = _Peer("image", [IMAGE_TOPIC])
     _wait_for_subscribers(simulation, [IMAGE_TOPIC])
@@ -91,7 +91,7 @@ def _images(simulation: Simulation) -> tuple[list[tuple[int, float]], int]:
 
 
 def _streams() -> dict[str, float]:
-    """Scans of ten UAVs to one subscriber; then another one that stands still."""
+    """Streams scans of ten UAVs to one subscriber; then to another one that is stopped."""
     with in_real_time(stream_scenario()) as (simulation, bridges):
         bridges.open(_bridge())
         topics = [
@@ -128,11 +128,11 @@ def _real_time_factor(simulation: Simulation, wall_s: float) -> float:
 
 
 def _wait_for_subscribers(simulation: Simulation, topics: list[str], least: int = 1) -> None:
-    """Until each topic has so many, and a moment more for DDS to match both sides."""
+    """Waits until each topic has `least` subscribers, and then for DDS to match both sides."""
     end = time.monotonic() + _PATIENCE_S
     wanted = set(topics)
     while wanted - {t.name for t in simulation.graph.topics() if t.subscribers >= least}:
         if time.monotonic() > end:
-            raise VoleryError(f"nobody subscribed within {_PATIENCE_S:.0f} s")
+            raise VoleryError(f"no subscriber within {_PATIENCE_S:.0f} s")
         time.sleep(0.02)
     time.sleep(_SETTLED_S)

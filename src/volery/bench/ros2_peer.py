@@ -1,4 +1,4 @@
-"""Subscribes over DDS, and tells what came when a line comes on stdin.
+"""Subscribes over DDS, and reports the received messages after a line on stdin.
 
 python -m volery.bench.ros2_peer DOMAIN image|scan TOPIC ...
 """
@@ -20,7 +20,7 @@ _BEST_EFFORT = Profile(reliable=False, depth=10)
 
 
 def main() -> None:
-    """Do what the command line says."""
+    """Runs the command line."""
     domain, kind, *topics = sys.argv[1:]
     msgtype = _TYPES[kind]
     came: list[tuple[str, bytes, int]] = []

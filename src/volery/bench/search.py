@@ -1,8 +1,8 @@
-"""The bench `search`: how long a UAV's call to another one takes, over each transport.
+"""Measures the duration of a UAV's call to another UAV, over each transport.
 
-The called node is that of a cooperative search, which goes on all the while: pictures, odometry and
-commands go over the same transport. One way is from the call in the caller's process to its handler
-in the other process, by the computer's monotonic clock, which both share.
+The called node is that of a cooperative search, which continues meanwhile: images, odometry and
+commands use the same transport. One way is from the call in the caller's process to its handler in
+the other process, by the computer's monotonic clock, which both share.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ from volery.scenario.load import parse_scenario
 _CALLS = 200
 _WARM_UP = 20
 _START_S = 15.0
-"""By then the called UAV searches, and looks at its pictures."""
+"""Time, s, after which the called UAV searches and processes its images."""
 _TIMEOUT_S = 120.0
 
 
 def measure() -> Measured:
-    """Medians and 95th percentiles in ms; `lock_step` is in one process, in wall time."""
+    """Returns medians and 95th percentiles, ms; `lock_step`: one process, in wall time."""
     figures = _lock_step_figures()
     failures: dict[str, str] = {}
     for name, bridge in (
@@ -59,7 +59,7 @@ def measure() -> Measured:
 
 
 def _ros1_figures() -> dict[str, float]:
-    """Those over a roscore. `VoleryError` where ROS 1 is not installed."""
+    """Returns the figures over a roscore. Raises `VoleryError` without ROS 1."""
     if shutil.which("rosmaster") is None or not rospy_is_installed():
         raise VoleryError("ROS 1 is not installed; .ci/install_ros1 does it on Debian")
     with ros1_master(), flying() as bridges:
@@ -79,20 +79,20 @@ def _lock_step_figures() -> dict[str, float]:
 
 
 class _NoTimers:
-    """For nodes that are only called."""
+    """Provides no timers, for nodes that are only called."""
 
     def every(self, *_arguments: Any, **_keywords: Any) -> None:
-        """Never ring."""
+        """Never fires."""
 
     def forget(self, callback: Callable[[], None]) -> None:
-        """Nothing rings."""
+        """Does nothing."""
 
     def at(self, time_ns: int, action: Callable[[], Any]) -> None:
-        """Never act."""
+        """Never calls `action`."""
 
 
 def call_figures(name: str, took: Sequence[Sequence[int]]) -> dict[str, float]:
-    """Of (one way, round trip) in ns, without the first ones."""
+    """Returns figures of (one way, round trip), ns, without the warm-up calls."""
     found: dict[str, float] = {}
     milliseconds = 1e-6 * np.array(took[_WARM_UP:])
     for what, values in zip(("one_way", "round_trip"), milliseconds.T, strict=True):
@@ -102,7 +102,7 @@ def call_figures(name: str, took: Sequence[Sequence[int]]) -> dict[str, float]:
 
 
 def _scenario() -> Any:
-    """Two UAVs with the cameras of the scenario `cooperative_search`."""
+    """Returns two UAVs with the cameras of the scenario `cooperative_search`."""
     camera = {
         "kind": "camera",
         "name": "down",
@@ -132,7 +132,7 @@ def _scenario() -> Any:
 
 @contextlib.contextmanager
 def flying() -> Iterator[BridgeHost]:
-    """Bridges of a simulation of two UAVs that runs in real time until the block ends."""
+    """Runs two UAVs in real time until the block ends; yields the simulation's bridges."""
     with Simulation(_scenario()) as simulation:
         simulation.step(1)
         with BridgeHost(simulation.gateway) as bridges:
@@ -153,7 +153,7 @@ def flying() -> Iterator[BridgeHost]:
 
 
 def exchange(via: str, port: int) -> list[list[int]]:
-    """(one way, round trip) in ns of each call between two processes."""
+    """Returns (one way, round trip), ns, of each call between two processes."""
     with _peer(via, port, "called") as called:
         if not called.stdout or "ready" not in called.stdout.readline():
             raise VoleryError(f"the called node ended early on {via}")

@@ -1,11 +1,10 @@
-"""One node of the bench `search`, in a process of its own.
+"""Runs one node of the bench `search` in its own process.
 
     python -m volery.bench.search_peer rosbridge|ros_tcp|ros1 PORT called|calling CALLS
 
 PORT is that of the bridge on this computer, 0 with ros1, whose master the environment names.
-`called` is the node of a cooperative search, which tells when its handler ran, and ends with its
-input;
-`calling` calls it CALLS times. Both print JSON.
+`called` runs the node of a cooperative search, which returns the start time of its handler and ends
+with its input; `calling` calls the node CALLS times. Both print JSON.
 """
 
 from __future__ import annotations
@@ -30,10 +29,10 @@ _LIMIT_S = 60.0
 
 
 class Called(CooperativeSearch):
-    """Answers as the search does, and with the time in the message."""
+    """Responds as the search does, and with the handler's start time in the message."""
 
     def on_call(self, request: Any, response: Any) -> Any:
-        """Note when the handler begins."""
+        """Records the start time of the handler."""
         began_ns = time.monotonic_ns()
         response = super().on_call(request, response)
         response.message = str(began_ns)
@@ -41,7 +40,7 @@ class Called(CooperativeSearch):
 
 
 class Calling(Node):
-    """Calls the teammate each 30 ms; `took` holds (one way, round trip) in ns."""
+    """Calls the teammate each 30 ms; `took` holds (one way, round trip), ns."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__("calling", **options)
@@ -50,7 +49,7 @@ class Calling(Node):
         self._client = self.create_client(JOIN, f"/{CALLED}/search/join")
 
     def call(self) -> None:
-        """Call once."""
+        """Calls the teammate once."""
         request = invitation()
         sent_ns = time.monotonic_ns()
 
@@ -65,12 +64,12 @@ class Calling(Node):
 
 
 def invitation() -> Any:
-    """A finder's call to a place beyond the area: who is called looks on and searches on."""
+    """Returns a call to a position beyond the area, which does not interrupt the search."""
     return message_type(f"{JOIN}_Request")(time_from_ns(1), CALLING, Point(-9.0, -9.0, 0.0))
 
 
 def answer_calls(host: NodeHost, over: threading.Event) -> None:
-    """Fly and answer until the input ends."""
+    """Flies and responds until the input ends."""
     Called(
         context=host.context(),
         namespace=f"/{CALLED}",
@@ -81,7 +80,7 @@ def answer_calls(host: NodeHost, over: threading.Event) -> None:
 
 
 def make_calls(host: NodeHost, calls: int) -> None:
-    """Call one after the other, and say how long each took."""
+    """Makes calls one after the other, and prints their durations."""
     node = Calling(context=host.context(), namespace=f"/{CALLING}")
     end = time.monotonic() + _LIMIT_S
     while len(node.took) < calls and time.monotonic() < end:
@@ -122,7 +121,7 @@ def _open_link(via: str, port: int, name: str) -> GraphConnection:
 
 
 def main() -> None:
-    """Do what the command line says."""
+    """Runs the command line."""
     via, port, what, calls = sys.argv[1:]
     link = _open_link(via, int(port), what)
     host = NodeHost(link)

@@ -1,7 +1,7 @@
-"""From typing a command to the first LIDAR scan of the main job, and the memory of the whole job.
+"""Measures the time from a command to the main job's first LIDAR scan, and the job's memory.
 
-Each figure is taken from processes of their own: one with an empty folder of compiled kernels, some
-with a filled one, one that flies the main job with log and report.
+Each figure comes from separate processes: one with an empty cache of compiled kernels, some with a
+filled cache, one that runs the main job with log and report.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ while not scans:
 
 
 def measure() -> dict[str, float]:
-    """Figures of the bench `start`."""
+    """Returns the figures of the bench `start`."""
     with tempfile.TemporaryDirectory() as folder:
         cache = Path(folder) / "cache"
         cold = _first_frame_s(cache)
@@ -47,7 +47,7 @@ def _first_frame_s(cache: Path) -> float:
 
 
 def _main_job(folder: Path, cache: Path) -> tuple[float, float]:
-    """Wall seconds and peak resident memory (MB, 1e6 bytes) of the main job in its own process."""
+    """Returns wall time, s, and peak resident memory (MB, 1e6 bytes) of the main job's process."""
     command = [sys.executable, "-P", "-m", "volery.cli", "run", "forest_survey"]
     command += ["--record", str(folder / "flight.mcap"), "--report", str(folder / "report")]
     before = time.perf_counter()

@@ -1,8 +1,8 @@
-"""Whole swarms and many copies, the engine with contacts, downwash and events included.
+"""Measures whole swarms and many environments, with contacts, downwash and events.
 
-The scenario `swarm_100` flies 100 Crazyflies in two tiers to and fro by position commands, with
-physics and position control at 500 Hz. The copies are 1,024 times one Crazyflie under velocity
-commands, ten a second, at 1 kHz physics, on two threads.
+The scenario `swarm_100` flies 100 Crazyflies in two tiers back and forth by position commands, with
+physics and position control at 500 Hz. The environments are 1,024 times one Crazyflie under
+velocity commands, ten a second, at 1 kHz physics, on two threads.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _LONE = {
 
 
 def real_time_factor_of_swarm() -> float:
-    """Simulated over wall seconds of `swarm_100`, the median of a few rounds."""
+    """Returns the median real-time factor of `swarm_100` over a few rounds."""
     factors = []
     with Simulation(load_scenario("swarm_100"), threads=1) as simulation:
         homes = {name: uav.position_map for name, uav in simulation.uavs.items()}
@@ -44,7 +44,7 @@ def real_time_factor_of_swarm() -> float:
 
 
 def steps_a_second_of_copies(threads: int = 2) -> float:
-    """Physics steps of all copies in a second of wall time, the median of a few rounds."""
+    """Returns the median of all environments' physics steps per second of wall time."""
     rng = np.random.default_rng(1)
     rates = []
     with VectorizedSimulation(parse_scenario(_LONE), _COPIES, threads=threads) as copies:

@@ -1,4 +1,4 @@
-"""From a scenario to a running system: the only place that joins all branches."""
+"""Builds a running simulation from a scenario and joins all branches of the package."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
-    """Import what is asked for, not its neighbours with it."""
+    """Imports the requested name only, without its neighbours."""
     if name in _HOMES:
         return getattr(import_module(_HOMES[name]), name)
     raise AttributeError(f"module 'volery.runtime' has no attribute '{name}'")

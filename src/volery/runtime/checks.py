@@ -1,4 +1,4 @@
-"""What a user may say in numbers."""
+"""Checks numbers that users pass."""
 
 from __future__ import annotations
 
@@ -12,35 +12,35 @@ from volery.scenario.schema import Scenario
 
 
 def check_steps(steps: Any) -> None:
-    """`CommandError` unless `steps` is a whole number, not negative."""
+    """Raises `CommandError` if `steps` is not a whole number or is negative."""
     if not _is_whole(steps) or steps < 0:
         raise CommandError(f"steps must be a whole number, not negative, not {steps!r}")
 
 
 def check_seconds(seconds: Any) -> None:
-    """`CommandError` unless `seconds` is finite and not negative."""
+    """Raises `CommandError` if `seconds` is not finite or is negative."""
     number = isinstance(seconds, int | float | np.number)
     if not (number and math.isfinite(seconds) and seconds >= 0.0):
         raise CommandError(f"seconds must be finite and not negative, not {seconds!r}")
 
 
 def check_reset_seed(scenario: Scenario, seed: Any) -> None:
-    """`CommandError` unless a reset to `seed` gives what a fresh run with it does.
+    """Raises `CommandError` if a reset to `seed` would differ from a fresh run with it.
 
-    A reset keeps the world; it cannot where the scenario's seed grows the world.
+    A reset keeps the world, so the seed cannot change if it also generates the world.
     """
     check_seed(seed)
     if scenario.has_seeded_world and seed != scenario.seed:
         raise CommandError(
-            f"a reset keeps the world, which scenario '{scenario.name}' grows from its seed "
-            f"{scenario.seed}, so it cannot go on with seed {seed}. For another world make a new "
-            f"simulation of scenario.with_(seed={seed}). For resets in this world fix it first: "
+            f"a reset keeps the world, which scenario '{scenario.name}' generates from its seed "
+            f"{scenario.seed}, so a reset to seed {seed} is not possible. For another world make a "
+            f"new simulation of scenario.with_(seed={seed}). To reset in this world, fix it first: "
             f'scenario.with_(world={{"seed": {scenario.seed}}})'
         )
 
 
 def check_seed(seed: Any) -> None:
-    """`CommandError` unless `seed` is one that a scenario may have."""
+    """Raises `CommandError` if `seed` is not a valid scenario seed (0 to 2^63 - 1)."""
     if not (_is_whole(seed) and 0 <= seed < 2**63):
         raise CommandError(f"a seed must be a whole number from 0 to 2^63 - 1, not {seed!r}")
 

@@ -1,7 +1,7 @@
-"""What happens where a scenario ends while clients are connected: the simulation waits for them.
+"""Pauses a simulation at the end of its scenario while clients are connected.
 
-It stays paused at its end until a client resets it, restores a snapshot, continues past the end or
-loads another scenario. Meanwhile commands that would have no effect are refused with a reason.
+It stays paused until a client resets it, restores a snapshot, continues past the end or loads
+another scenario. Meanwhile it refuses commands that would have no effect, with a reason.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from volery.runtime.run_loop import RunLoop
 
 _PERIOD_S = 0.02
-"""Wall time between two looks at what clients want."""
+"""Wall time between two checks of client requests, s."""
 
 
 class EndOfRun:
@@ -37,14 +37,14 @@ class EndOfRun:
 
     @property
     def notice(self) -> str:
-        """What clients read whose commands are refused."""
+        """Reason that clients receive for refused commands."""
         return (
             f"the scenario ended at {s_from_ns(self._engine.time_ns):.1f} s: reset it, "
             "or call /volery/continue_run to fly on"
         )
 
     def wait(self, process: Callable[[], None]) -> None:
-        """Stay at the end until it is no longer one; `process` handles what clients send."""
+        """Waits while the run is at its end; `process` handles client requests meanwhile."""
         self._pacer.pause()
         self.waits = True
         try:
@@ -55,7 +55,7 @@ class EndOfRun:
             self.waits = False
 
     def fly_on(self) -> None:
-        """Continue past the end. `CommandError` where the scenario has not ended."""
+        """Continues past the end. Raises `CommandError` if the scenario has not ended."""
         if not self.waits:
             raise CommandError("the scenario has not ended")
         self._loop.past_end = True
@@ -63,9 +63,9 @@ class EndOfRun:
         self._pacer.resume()
 
     def left(self) -> None:
-        """Another state was restored: commands have effect again."""
+        """Accepts commands again after another state was restored."""
         self.waits = self.waits and self._loop.finished
 
     def _refusal(self, command: ClientCommand) -> str:
-        """Return why a client's command is refused; empty: it is not."""
+        """Returns why a client's command is refused; empty: accepted."""
         return self.notice if self.waits and not restarts(command) else ""

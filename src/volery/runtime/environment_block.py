@@ -1,4 +1,4 @@
-"""A block of copies: their UAVs as rows of one fleet, driven by one engine in one thread."""
+"""Runs a block of environments: their UAVs are rows of one fleet in one engine and thread."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ Reading: TypeAlias = dict[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class EnvironmentEvent:
-    """Something that happened in one copy."""
+    """Describes an event of one environment (`copy`)."""
 
     copy: int
     event: Event
 
 
 class EnvironmentBlock:
-    """Copies `first`, `first` + 1, ... of a scenario, one for each of `seeds`."""
+    """Runs the environments `first`, `first` + 1, ... of a scenario, one for each of `seeds`."""
 
     def __init__(
         self,
@@ -88,33 +88,33 @@ class EnvironmentBlock:
 
     @property
     def step(self) -> int:
-        """Physics steps done."""
+        """Number of physics steps done."""
         return self.fleet.step
 
     @property
     def dt_ns(self) -> int:
-        """Physics step."""
+        """Length of a physics step, ns."""
         return self.fleet.dt_ns
 
     @property
     def time_ns(self) -> int:
-        """Time since the block began."""
+        """Simulated time since construction, ns."""
         return self._engine.time_ns
 
     @property
     def common_period_s(self) -> float:
-        """Period after which guidance and all sensors fire together again."""
+        """Period after which guidance and all sensors fire together again, s."""
         periods = [Fraction(self.fleet.guidance_period_ns, NS_PER_S)]
         periods += [1 / bank.schedule.rate_hz for bank in self._engine.banks]
         down = math.lcm(*(p.denominator for p in periods))
         return math.lcm(*(int(p * down) for p in periods)) / down
 
     def age_s(self) -> NDArray[np.float64]:
-        """(copies,) time since each began."""
+        """Returns the simulated time (copies,), s, since the last reset of each environment."""
         return (self.time_ns - self._began_ns) / NS_PER_S
 
     def advance_to(self, step: int) -> None:
-        """Advance all copies. `DivergenceError` names the copy whose state is not physical."""
+        """Advances to `step`. Raises `DivergenceError` with the environment that diverges."""
         try:
             self._engine.advance_to(step)
             self._engine.state_check.glance()
@@ -122,7 +122,7 @@ class EnvironmentBlock:
             raise self._of_copy(error) from None
 
     def reset(self, copies: NDArray[np.int64], seeds: Sequence[int] | None) -> None:
-        """Put some copies back to their start."""
+        """Resets the environments `copies`, numbered within the block."""
         if seeds is not None:
             for k, seed in zip(copies, seeds, strict=True):
                 self.seeds[k] = seed
@@ -138,7 +138,7 @@ class EnvironmentBlock:
         self._take_off(rows)
 
     def get_state(self) -> dict[str, Any]:
-        """Everything that changes."""
+        """Returns everything that changes."""
         try:
             self._engine.state_check.look()
         except DivergenceError as error:
@@ -152,24 +152,27 @@ class EnvironmentBlock:
         }
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a state that `get_state` returned."""
         self._engine.set_state(state["engine"])
         self._latest = list(state["latest"])
         self._events = list(state["events"])
         self._began_ns = state["began"].copy()
         self.seeds = list(state["seeds"])
 
-    # ---------------------------------------------------------------------------- what is known
+    # -------------------------------------------------------------------------------- observations
 
     def uav(self, copy: int, name: str) -> Uav:
-        """Handle on one UAV."""
+        """Returns the handle on one UAV."""
         place = [start.name for start in self._starts].index(name)
         row = copy * len(self._starts) + place
         flight = self._scenario.types[self._starts[place].type_name].flight
         return Uav(self.fleet, row, name, flight)
 
     def reading(self, uav: str, sensor: str) -> Reading | None:
-        """Last measurement of one sensor of each copy; arrays are (copies, ...)."""
+        """Returns the last sample of one sensor of each environment; arrays are (copies, ...).
+
+        Raises `CommandError` if there is no such sensor.
+        """
         try:
             bank, rows = self._places[uav, sensor]
         except KeyError:
@@ -181,40 +184,40 @@ class EnvironmentBlock:
         return {name: array[rows] for name, array in _arrays(samples).items()}
 
     def drain_events(self) -> list[EnvironmentEvent]:
-        """Events since the last call."""
+        """Returns and clears the events since the last call."""
         events, self._events = self._events, []
         return events
 
     # ------------------------------------------------------------------------ the engine's sink
 
     def advanced(self, first_step: int, last_step: int) -> None:
-        """Take in computed steps: nobody asks."""
+        """Ignores computed steps."""
 
     def sampled(self, samples: Samples) -> None:
-        """Keep the last measurement of every bank."""
+        """Stores the last samples of every bank."""
         self._latest[self._bank_of[id(samples.sensors)]] = samples
 
     def happened(self, event: Event) -> None:
-        """Keep an event under its copy."""
+        """Stores an event under its environment."""
         copy, name = event.uav.split("/")
         partner = event.partner.split("/")[-1]
         own = replace(event, uav=name, partner=partner)
         self._events.append(EnvironmentEvent(self._first + int(copy), own))
 
     def deliver(self) -> None:
-        """Nothing is queued."""
+        """Does nothing: there is no message queue."""
 
     # ------------------------------------------------------------------------------------- inside
 
     def _of_copy(self, error: DivergenceError) -> DivergenceError:
-        """The error with the number that the copy has among all, not in this block."""
+        """Returns the error with the environment's number among all, not in this block."""
         number, name = error.uav.split("/")
         copy = self._first + int(number)
-        text = str(error).replace(error.uav, f"{name} of copy {copy}", 1)
+        text = str(error).replace(error.uav, f"{name} of environment {copy}", 1)
         return DivergenceError(f"{copy}/{name}", error.time_s, text)
 
     def _renew(self, samples: Samples, rows: NDArray[np.int64]) -> None:
-        """Put the measurements of restarted sensors in the place of those of their former life."""
+        """Replaces the samples of restarted sensors."""
         bank = self._bank_of[id(samples.sensors)]
         last = self._latest[bank]
         if last is not None:
@@ -228,7 +231,7 @@ class EnvironmentBlock:
         return refit(self._fitted, self.seeds[copy], copy * len(self._starts))
 
     def _take_off(self, rows: NDArray[np.int64]) -> None:
-        """Let those of the UAVs `rows` take off that do so by themselves."""
+        """Takes off with those of the UAVs `rows` that start with a take-off."""
         for row in rows.tolist():
             start = self._starts[row % len(self._starts)]
             if start.takes_off:
@@ -236,14 +239,14 @@ class EnvironmentBlock:
                 self.fleet.take_off(row, flight.take_off_altitude_m)
 
     def _stir_air(self, copies: NDArray[np.int64]) -> None:
-        """Give each copy the turbulence of its own seed."""
+        """Seeds the turbulence of each environment."""
         crew = len(self._starts)
         names = [start.name for start in self._starts]
         for k in copies:
             self.fleet.seed_turbulence(self.seeds[k], k * crew + np.arange(crew), names)
 
     def _keys_of(self, copies: NDArray[np.int64]) -> dict[tuple[int, str], np.uint64]:
-        """Noise streams by UAV row and name of the sensor."""
+        """Returns the noise streams by UAV row and sensor name."""
         return {(f.id.uav, f.id.name): f.key for k in copies for f in self._fit(int(k))}
 
 
@@ -252,7 +255,7 @@ def _arrays(samples: Samples) -> dict[str, NDArray[Any]]:
 
 
 def _places(banks: Sequence[Bank]) -> dict[tuple[str, str], tuple[int, NDArray[np.int64]]]:
-    """Bank and its rows of each sensor that a copy has, by names of UAV and sensor."""
+    """Returns the bank and rows of each sensor, by UAV name and sensor name."""
     places: dict[tuple[str, str], tuple[int, list[int]]] = {}
     for k, bank in enumerate(banks):
         if bank.name == "joints":

@@ -1,4 +1,4 @@
-"""The grid map of a running simulation: which one stands there, how high, how large."""
+"""Manages the grid map of a running simulation: its name, block height and cell size."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from volery.world.scene import Solid
 
 
 class GridMapManager:
-    """Shows one grid map at a time in the world of an engine, from one physics step to the next.
+    """Shows one grid map at a time in the world of an engine; changes act from the next step.
 
-    All maps of the scenario are read at the start, so that a broken file shows then. A change is
-    an event of kind `world`. Whoever is in a new block touches it with the next step.
+    It reads all maps of the scenario at the start, so that a broken file fails then. A change is
+    an event of kind `world`. A UAV inside a new block touches it with the next step.
     """
 
     def __init__(self, scenario: Scenario, engine: Engine) -> None:
         world = scenario.world.grid_map
         self._engine = engine
         self.tell: Callable[[GridMap], None] = lambda _grid: None
-        """Called with each map that is shown; it must change nothing."""
+        """Callback with each map that is shown; it must change nothing."""
         self.on_blocks: Callable[[], object] = lambda: None
-        """Called when other blocks stand there, also after a restore; it must change nothing."""
+        """Callback after the blocks changed, also after a restore; it must change nothing."""
         entries = () if world is None else world.maps
         self._maps = {entry.called: read_grid_map(scenario, entry) for entry in entries}
         starting = None if world is None or world.starting is None else self._maps[world.starting]
@@ -34,17 +34,17 @@ class GridMapManager:
         solids = engine.scene.solids
         count = 0 if starting is None or starting.bounds_of_blocks() is None else 1
         self._others = solids[: len(solids) - count]
-        """What else stands in the world."""
+        """All other solids of the world."""
         self._blocks: tuple[Solid, ...] = solids[len(solids) - count :]
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Maps of the scenario, and the last one that came over the graph."""
+        """Names of the scenario's maps, and of the last one received over the graph."""
         return tuple(self._maps)
 
     @property
     def current(self) -> GridMap | None:
-        """The map that stands there; None before there is any."""
+        """Present map; None before the first."""
         return self._current
 
     def change(
@@ -54,12 +54,11 @@ class GridMapManager:
         block_height_m: float | None = None,
         cell_size_m: float | None = None,
     ) -> GridMap:
-        """Show another map, or the present one higher, lower, larger or smaller.
+        """Shows another map, or changes block height or cell size of the present one.
 
-        Without a height, blocks stay as high as they are now; without a cell size, cells are as
-        large as those of that map were last. The origin stays where it is. Raises `CommandError`
-        for an unknown map, a size that cannot be, and blocks beyond the terrain; nothing changes
-        then.
+        Without a height, blocks keep their present height; without a cell size, cells keep the size
+        that they last had in that map. The origin is fixed. Raises `CommandError`, and changes
+        nothing, if the map is unknown, a size is invalid or blocks exceed the terrain.
         """
         if name is not None and name not in self._maps:
             known = ", ".join(self._maps) or "none"
@@ -78,7 +77,7 @@ class GridMapManager:
         return changed
 
     def show(self, grid: GridMap) -> None:
-        """Let the blocks of `grid` stand in the world; its name can be chosen again later."""
+        """Puts the blocks of `grid` into the world; its name stays available for `change`."""
         blocks = blocks_of(grid, self._engine.ground)
         self._maps = {**self._maps, grid.name: grid}
         self._stand(grid, blocks)
@@ -86,15 +85,15 @@ class GridMapManager:
         self.tell(grid)
 
     def refuse(self, reason: str) -> None:
-        """Tell in an event why a map that came over the graph is not shown."""
+        """Logs an event with the reason why a received map is not shown."""
         self._engine.note_world(f"a grid map was refused: {reason}")
 
     def get_state(self) -> object:
-        """What a snapshot keeps: which map stands there, and its blocks."""
+        """Returns the present map, its blocks and all maps, for a snapshot."""
         return self._current, self._blocks, self._maps
 
     def set_state(self, state: object) -> None:
-        """Go back to a kept state. Whoever calls this puts the engine's state back afterwards."""
+        """Restores a saved state. The caller must restore the engine's state afterwards."""
         assert isinstance(state, tuple)
         current, blocks, self._maps = state
         if current is not self._current:

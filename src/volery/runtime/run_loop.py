@@ -1,4 +1,4 @@
-"""The loop of a run: pieces of simulated time, between which others are heard."""
+"""Runs a simulation in pieces of simulated time and processes clients in between."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from volery.runtime.monitoring.progress import Progress, ProgressPublisher
 
 
 class RunLoop:
-    """Advances `engine` at the pace of `pacer` until `duration_s`, or until `has_ended()`.
+    """Advances `engine` at the rate of `pacer` until `duration_s`, or until `has_ended()`.
 
-    `has_ended` must follow from the simulated world alone. `look` is called between two pieces and
-    all along while the run is held; it must change nothing. With `past_end` or `replays` set, the
-    duration does not end the run.
+    `has_ended` must depend on the simulated world alone. `look` is called between two pieces and
+    repeatedly while the run is held; it must change nothing. With `past_end` or `replays` set,
+    the duration does not end the run.
     """
 
     def __init__(
@@ -29,21 +29,21 @@ class RunLoop:
         self._has_ended = has_ended
         self.look: Callable[[], None] = _nothing
         self.owed_ns = 0
-        """Parts of physics steps that runs have asked for and not got yet."""
+        """Simulated time, ns, requested from runs but shorter than a physics step, still due."""
         self.quitting = False
-        """Whether runs are to end at once, now and later."""
+        """Whether the present and all later runs end at once."""
         self.past_end = False
         """Whether runs continue past the scenario's end, until another state is restored."""
         self.replays = False
-        """Whether recorded commands decide where the run ends."""
+        """Whether recorded commands determine the end of the run."""
 
     @property
     def finished(self) -> bool:
-        """Whether the end has come, or somebody quit."""
+        """Whether the run has reached its end or was quit."""
         return self.quitting or self._has_come()
 
     def quit(self) -> None:
-        """End the present run and all later ones at their start; any thread may call it."""
+        """Ends the present run, and all later ones at their start; thread-safe."""
         self.quitting = True
         self._pacer.drop_steps("the simulation quits")
         self._pacer.wake()
@@ -54,7 +54,7 @@ class RunLoop:
         speed: float | None,
         on_progress: Callable[[Progress], None] | None,
     ) -> None:
-        """Advance by `seconds`, None: to the end."""
+        """Advances by `seconds`; None advances to the end."""
         engine, pacer = self._engine, self._pacer
         start_ns = engine.time_ns
         if seconds is None:
@@ -88,16 +88,16 @@ class RunLoop:
             teller.tell(s_from_ns(engine.time_ns) - s_from_ns(start_ns), last=over)
         engine.state_check.look()
         if self.finished:
-            pacer.drop_steps("the scenario has come to its end")
+            pacer.drop_steps("the scenario has ended")
 
     def _is_held(self) -> bool:
-        """Whether the run must wait; it does so for a moment, unless commands wait already."""
+        """Returns whether the run must wait; waits a moment unless commands are pending."""
         if self._engine.inbox.has_waiting:
             self._pacer.wake()
         return self._pacer.wait(self._engine.time_ns)
 
     def _ends_here(self) -> bool:
-        """Whether the run has ended, a recorded one by the last of its commands."""
+        """Returns whether the run has ended; a replay ends with its last command."""
         self._engine.take_repeats()
         return self._has_come()
 
@@ -114,14 +114,14 @@ class RunLoop:
         return self.past_end or self.replays
 
     def _has_come(self) -> bool:
-        """Whether the duration is over, or the world says so."""
+        """Returns whether the duration is over or the world has ended the run."""
         if self.past_end:
             return False
         over = s_from_ns(self._engine.time_ns) >= self._duration_s and not self.replays
         return over or self._has_ended()
 
     def _last_step(self) -> int:
-        """Physics step at which the duration is over."""
+        """Returns the physics step at which the duration is over."""
         if self._has_no_end:
             return sys.maxsize
         return -(-ns_from_s(self._duration_s) // self._engine.dt_ns)
@@ -132,4 +132,4 @@ class RunLoop:
 
 
 def _nothing() -> None:
-    """Nobody looks."""
+    """Does nothing."""

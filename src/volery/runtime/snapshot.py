@@ -1,4 +1,4 @@
-"""A kept state of a simulation, to which it can go back exactly."""
+"""Saves the state of a simulation and restores it exactly."""
 
 from __future__ import annotations
 
@@ -16,33 +16,33 @@ from volery.graph.nodes.node import Node
 from volery.runtime.build.placement import StartPose
 
 NodeKey = tuple[str, int]
-"""Namespace of a node, and which of those there it is."""
+"""Namespace of a node, and its index among the nodes of that namespace."""
 NodeStates = dict[NodeKey, Any]
 
 
 @dataclass(frozen=True)
 class Snapshot:
-    """State of one simulation at `time_ns`; only that simulation can go back to it.
+    """Holds the state of one simulation at `time_ns`; only that simulation can restore it.
 
-    It holds plants and controllers, sensors and their noise, wind, contacts, faults, what is due
-    when, undelivered messages, the fingerprint, events and the state of every node. Outside it are
-    log files, and outside programs, which see the clock jump.
+    The state contains plants and controllers, sensors and their noise, wind, contacts, faults,
+    scheduled tasks, undelivered messages, the digest, events and the state of every node. It
+    excludes log files and external programs, which see the clock jump.
     """
 
     time_ns: int
     owner: int
     starts: tuple[StartPose, ...]
-    """The UAVs that it is of."""
+    """UAVs of the simulation at that time."""
     state: dict[str, Any]
 
     @property
     def time_s(self) -> float:
-        """Simulated time of the state."""
+        """Simulated time of the state, s."""
         return s_from_ns(self.time_ns)
 
 
 def keep_nodes(nodes: Sequence[Node]) -> NodeStates:
-    """States of nodes, None of one that does not offer it, and what every node has."""
+    """Returns the state of each node (None without `get_state`) and its base state."""
     for node in nodes:
         node.join()
     return {
@@ -54,7 +54,7 @@ def keep_nodes(nodes: Sequence[Node]) -> NodeStates:
 
 
 def put_back_nodes(nodes: Sequence[Node], states: NodeStates) -> None:
-    """Give all nodes back what `keep_nodes` kept."""
+    """Restores the node states that `keep_nodes` returned."""
     for key, node in _keyed(nodes):
         state, base = copy.deepcopy(states[key])
         node.join()
@@ -72,28 +72,28 @@ def _keyed(nodes: Sequence[Node]) -> Iterator[tuple[NodeKey, Node]]:
 
 
 def without_state(nodes: Sequence[Node]) -> list[Node]:
-    """The nodes that do not offer their state: a start has them made anew."""
+    """Returns the nodes without `get_state`/`set_state`; a reset constructs them again."""
     return [node for node in nodes if not isinstance(node, Stateful)]
 
 
 def check_nodes(nodes: Sequence[Node], what: str) -> None:
-    """Refuse `what` where nodes cannot take part in it."""
+    """Raises `SnapshotError` if some node lacks the state that `what` requires."""
     lacking = ", ".join(node.full_name for node in without_state(nodes))
     if lacking:
         raise SnapshotError(
-            f"{what} in mid-flight needs the state of every node; without get_state() and "
-            f"set_state(state): {lacking}. A reset to the start needs none"
+            f"{what} in mid-flight needs the state of every node. These nodes lack get_state() and "
+            f"set_state(state): {lacking}. A reset to the start needs neither"
         )
 
 
 def check_partners(partners: Sequence[Partner], what: str, *, to_start: bool = False) -> None:
-    """Refuse `what` while an outside program takes part whose state nobody can keep.
+    """Raises `SnapshotError` if a lock-step partner prevents `what`, as its state is external.
 
-    to_start: it goes back to the start, where those can come along that begin anew.
+    With `to_start`, partners that support a reset are allowed.
     """
     for partner in partners:
         if not (partner.has_left or (to_start and partner.supports_reset)):
             raise SnapshotError(
-                f"{what} is not possible: the state of lock-step partner '{partner.name}' is its "
-                "own; it must leave first"
+                f"{what} is not possible: the state of lock-step partner '{partner.name}' is "
+                "external; it must leave first"
             )

@@ -1,4 +1,4 @@
-"""What a simulation keeps of itself, and how it goes back to it."""
+"""Saves and restores the state of a simulation."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ from volery.runtime.vehicles.manager import VehicleManager
 
 @dataclass
 class SnapshotManager:
-    """Keeps and puts back the parts of one simulation.
+    """Saves and restores the parts of one simulation.
 
-    Make it when all parts stand at their start: that state is what `reset` goes back to.
+    Construct it when all parts are in their initial state: `reset` restores that state.
     """
 
     engine: Engine
@@ -54,7 +54,7 @@ class SnapshotManager:
     _start: dict[str, Any] = field(init=False)
     _starts: tuple[StartPose, ...] = field(init=False)
     _new_nodes: NodeStates = field(init=False)
-    """States of nodes that have done nothing yet."""
+    """States of nodes before their first step."""
 
     def __post_init__(self) -> None:
         self._start = self._state()
@@ -63,39 +63,39 @@ class SnapshotManager:
 
     @property
     def spawned(self) -> list[str]:
-        """Names of UAVs that were not there at the start."""
+        """Names of UAVs that were spawned after the start."""
         return [start.name for start in self.crew.starts if start not in self._starts]
 
     def enlist(self, name: str) -> None:
-        """Know the nodes of a UAV that has just begun."""
+        """Records the initial node states of a UAV that was just spawned."""
         self._new_nodes.update(keep_nodes(self._nodes_of(name)))
 
     def snapshot(self) -> Snapshot:
-        """The present state."""
+        """Returns the present state. Raises `SnapshotError` if it cannot be saved."""
         check_nodes(self.crew.nodes, "a snapshot")
         self._check("a snapshot")
         self.engine.state_check.look()
         return Snapshot(self.engine.time_ns, id(self), self.crew.starts, self._state())
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go to a kept state."""
+        """Restores `snapshot`. Raises `SnapshotError` if it is not of this simulation and fleet."""
         check_nodes(self.crew.nodes, "to restore a state")
         self._check("to restore a state")
         if not isinstance(snapshot, Snapshot):
-            raise SnapshotError(f"not a snapshot: {snapshot!r}")
+            raise SnapshotError(f"not a snapshot: {snapshot!r}; pass what snapshot() returned")
         if snapshot.owner != id(self):
-            raise SnapshotError("the snapshot is of another simulation")
+            raise SnapshotError("the snapshot belongs to another simulation")
         if snapshot.starts != self.crew.starts:
             then = ", ".join(start.name for start in snapshot.starts)
-            raise SnapshotError(f"UAVs have come or gone since the snapshot, which holds {then}")
+            raise SnapshotError(f"UAVs were spawned or deleted since the snapshot of {then}")
         self._put_back(snapshot.state)
 
     def reset(self, seed: int) -> None:
-        """Go back to the start and the UAVs of the start, with other random streams."""
+        """Restores the start and its UAVs, with the random streams of `seed`."""
         self._check("a reset", to_start=True)
         changed = self.crew.starts != self._starts
         if changed or without_state(self.crew.nodes):
-            self.crew.end_nodes()  # all of them, so that they are started in the same order
+            self.crew.end_nodes()  # all, so that they start in the same order again
         if changed:
             self.crew.regroup(self._starts)
         self._put_back(self._start)
@@ -114,7 +114,7 @@ class SnapshotManager:
         self.crew.take_off(fleet.names)
 
     def reset_uav(self, row: int) -> None:
-        """Put one UAV back to its start while the others fly on."""
+        """Resets one UAV to its start while the others continue."""
         fleet = self.engine.fleet
         name = fleet.names[row]
         self._check("a reset")

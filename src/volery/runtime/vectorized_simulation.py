@@ -1,9 +1,8 @@
-"""Many independent copies of a scenario, stepped together: for learning and Monte Carlo.
+"""Steps many independent environments of one scenario together, for learning and Monte Carlo.
 
-All copies share the world and one clock; each has its own UAVs, noise and wind, set by its own
-seed, and goes back to the start by itself. Copies neither see nor touch one another. They are dealt
-out to the threads in blocks, and a block's UAVs are rows of one fleet: one kernel call moves them
-all.
+All environments share the world and one clock. Each has its own UAVs, noise and wind, set by its
+own seed, and resets independently. Environments do not sense or touch one another. Each thread runs
+one block of environments; the UAVs of a block are rows of one fleet, which one kernel call moves.
 
     with VectorizedSimulation(load_scenario("hover"), 1024) as copies:
         copies.command_velocity(np.tile([1.0, 0.0, 0.0], (1024, 1, 1)))
@@ -11,7 +10,7 @@ all.
         height = copies.state().position_map[:, 0, 2]
         copies.reset(np.flatnonzero(height < 0.5))
 
-There is no graph: commands and readings are arrays. Nodes of the scenario do not run.
+There is no graph: commands and samples are arrays. The scenario's nodes do not run.
 """
 
 from __future__ import annotations
@@ -42,13 +41,13 @@ Array = NDArray[np.float64]
 
 
 class VectorizedSimulation:
-    """`count` copies of `scenario`, each with `n` UAVs.
+    """Holds `count` environments (copies) of `scenario`, each with `n` UAVs.
 
-    seeds: one for each copy; by default the scenario's and those after it. threads: results do not
-    depend on their number. All copies share the world that the scenario's seed grows: `scenario` is
-    the one given with that world fixed (`world.seed`), and a copy of seed s does what
-    `Simulation(copies.scenario.with_(seed=s))` does. Raises `ScenarioError` where the scenario
-    cannot be built.
+    `seeds` has one seed per environment; the default is the scenario's seed and those after it.
+    Results do not depend on the number of `threads`. All environments share the world that the
+    scenario's seed generates: the attribute `scenario` has that world fixed (`world.seed`), and an
+    environment with seed s equals `Simulation(copies.scenario.with_(seed=s))`. Raises
+    `ScenarioError` if the scenario cannot be built.
     """
 
     def __init__(
@@ -60,7 +59,9 @@ class VectorizedSimulation:
         threads: int = 2,
     ) -> None:
         if count < 1 or threads < 1:
-            raise ScenarioError(f"at least 1 copy and 1 thread (found {count} and {threads})")
+            raise ScenarioError(
+                f"at least 1 environment and 1 thread (found {count} and {threads})"
+            )
         if seeds is None:
             seeds = range(scenario.seed, scenario.seed + count)
         if len(seeds) != count:
@@ -87,40 +88,40 @@ class VectorizedSimulation:
 
     @property
     def count(self) -> int:
-        """Number of copies."""
+        """Number of environments, K."""
         return sum(len(block.seeds) for block in self._blocks)
 
     @property
     def uav_names(self) -> tuple[str, ...]:
-        """The n UAVs of each copy."""
+        """Names of the n UAVs of each environment."""
         return tuple(start.name for start in self._starts)
 
     @property
     def time_ns(self) -> int:
-        """Time since all copies began; a copy that was reset began later."""
+        """Simulated time since construction, ns; resets do not change it."""
         return self._blocks[0].time_ns
 
     @property
     def time_s(self) -> float:
-        """`time_ns` in seconds."""
+        """Simulated time since construction, s."""
         return s_from_ns(self.time_ns)
 
     @property
     def age_s(self) -> Array:
-        """(K,) simulated time of each copy since its start or last reset."""
+        """Simulated time (K,), s, of each environment since its start or last reset."""
         return np.concatenate([block.age_s() for block in self._blocks])
 
     @property
     def common_period_s(self) -> float:
-        """A reset at a multiple of this is exact: guidance and sensors all fire there.
+        """Period, s, after which guidance and all sensors fire together.
 
-        At another time a copy's state and noise are those of a fresh one as well, but its guidance
-        and sensors keep the phase that they have for all copies.
+        A reset at a multiple of this period is exact. At another time, state and noise equal those
+        of a fresh environment too, but guidance and sensors keep the phase common to all.
         """
         return self._blocks[0].common_period_s
 
     def step(self, steps: int = 1) -> None:
-        """Advance by physics steps."""
+        """Advances all environments by physics steps. Raises `CommandError` if closed."""
         self._check_open()
         check_steps(steps)
         target = self._blocks[0].step + steps
@@ -130,7 +131,7 @@ class VectorizedSimulation:
             other.result()
 
     def run(self, seconds: float) -> None:
-        """Advance by `seconds`; parts of a step are owed to the next call."""
+        """Advances by `seconds`; a remaining part of a step counts for the next call."""
         self._check_open()
         check_seconds(seconds)
         dt_ns = self._blocks[0].dt_ns
@@ -138,7 +139,7 @@ class VectorizedSimulation:
         self.step(steps)
 
     def reset(self, copies: ArrayLike | None = None, seeds: Sequence[int] | None = None) -> None:
-        """Put `copies` (all by default) back to the start, with the seeds they have or new ones."""
+        """Resets `copies` (default: all), by numbers or mask (K,), optionally with new `seeds`."""
         chosen = self._chosen(copies)
         for seed in seeds or ():
             check_reset_seed(self.scenario, seed)
@@ -151,17 +152,17 @@ class VectorizedSimulation:
                 block.reset(chosen[here] - first, own)
 
     def get_state(self) -> list[Any]:
-        """The present state of all copies, for `set_state`."""
+        """Returns the present state of all environments, for `set_state`."""
         return [self._owed_ns, *(block.get_state() for block in self._blocks)]
 
     def set_state(self, state: Sequence[Any]) -> None:
-        """Go back to a state that `get_state` of this object gave."""
+        """Restores a state that `get_state` of this object returned."""
         self._owed_ns = state[0]
         for block, kept in zip(self._blocks, state[1:], strict=True):
             block.set_state(kept)
 
     def close(self) -> None:
-        """Give threads and scene memory back; nothing can be simulated afterwards."""
+        """Releases threads and scene memory; nothing can be simulated afterwards."""
         if not self._closed:
             self._closed = True
             self._pool.shutdown()
@@ -173,10 +174,10 @@ class VectorizedSimulation:
     def __exit__(self, *_exception: object) -> None:
         self.close()
 
-    # ---------------------------------------------------------------------------- what is known
+    # -------------------------------------------------------------------------------- observations
 
     def state(self) -> FleetState:
-        """States of all UAVs now; each array is (K, n, ...) and a copy."""
+        """Returns copies of the present states of all UAVs; each array is (K, n, ...)."""
         parts = [block.fleet.state for block in self._blocks]
         shape = (self.count, len(self._starts))
         return FleetState(
@@ -187,9 +188,10 @@ class VectorizedSimulation:
         )
 
     def reading(self, uav: str, sensor: str) -> Reading | None:
-        """What that sensor of each copy measured last; None before its first measurement.
+        """Returns the last sample of one sensor of each environment, None before the first.
 
-        Arrays by the names of `sensors.samples`, each (K, ...): `reading["ranges"]`.
+        Arrays are (K, ...), with the field names of `sensors.samples`: `reading["ranges"]`. Raises
+        `CommandError` if there is no such sensor.
         """
         parts = [block.reading(uav, sensor) for block in self._blocks]
         found = [part for part in parts if part is not None]
@@ -198,12 +200,12 @@ class VectorizedSimulation:
         return {name: np.concatenate([part[name] for part in found]) for name in found[0]}
 
     def drain_events(self) -> list[EnvironmentEvent]:
-        """What has happened since the last call, by time and copy."""
+        """Returns and clears the events since the last call, sorted by time and environment."""
         events = [event for block in self._blocks for event in block.drain_events()]
         return sorted(events, key=lambda e: (e.event.time_ns, e.copy))
 
     def uav(self, copy: int, name: str) -> Uav:
-        """Handle on one UAV of one copy."""
+        """Returns the handle on one UAV of environment number `copy`."""
         self._chosen([copy])
         k = bisect.bisect_right(self._first, copy) - 1
         return self._blocks[k].uav(copy - self._first[k], name)
@@ -211,10 +213,10 @@ class VectorizedSimulation:
     # --------------------------------------------------------------------------------- commands
 
     def command_velocity(self, velocity: ArrayLike, yaw_rate: ArrayLike = 0.0) -> None:
-        """Fly all UAVs at `velocity` (K, n, 3) m/s in their level heading frames (FLU).
+        """Flies all UAVs at `velocity` (K, n, 3), m/s, in their level heading frames (FLU).
 
-        They turn at `yaw_rate` (K, n) rad/s. UAVs on the ground, wrecks and those that take off do
-        not heed it.
+        They turn at `yaw_rate` (K, n), rad/s. UAVs that are landed, crashed or taking off ignore
+        the command. Raises `CommandError` if values are not finite or do not broadcast.
         """
         shape = (self.count, len(self._starts))
         velocity = _spread("velocity", velocity, (*shape, 3))
@@ -227,33 +229,36 @@ class VectorizedSimulation:
 
     def _check_open(self) -> None:
         if self._closed:
-            raise CommandError("the copies are closed; make new ones")
+            raise CommandError("the environments are closed; make a new VectorizedSimulation")
 
     def _chosen(self, copies: ArrayLike | None) -> NDArray[np.int64]:
         chosen = np.arange(self.count) if copies is None else np.atleast_1d(np.asarray(copies))
         if chosen.dtype == bool:
             if chosen.shape != (self.count,):
                 raise CommandError(
-                    f"a mask of copies has one entry for each of {self.count}, not {chosen.shape}"
+                    f"a mask of environments has shape ({self.count},), not {chosen.shape}"
                 )
             chosen = np.flatnonzero(chosen)
         if len(chosen) and (chosen.ndim != 1 or not np.issubdtype(chosen.dtype, np.integer)):
-            raise CommandError(f"copies are named by whole numbers or a mask, not {copies!r}")
+            raise CommandError(f"environments are given by whole numbers or a mask, not {copies!r}")
         if len(chosen) and not 0 <= chosen.min() <= chosen.max() < self.count:
-            raise CommandError(f"copies are numbered 0 to {self.count - 1}")
+            raise CommandError(f"environments are numbered 0 to {self.count - 1}")
         return chosen.astype(np.int64)
 
 
 def _spread(what: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
-    """Finite numbers for all UAVs from as many, or from fewer that stand for several."""
+    """Broadcasts finite numbers to `shape`. Raises `CommandError` if they do not fit."""
     try:
         spread = np.broadcast_to(np.asarray(values, dtype=np.float64), shape)
     except (TypeError, ValueError):
-        raise CommandError(f"{what}: numbers that fit {shape} are needed") from None
+        raise CommandError(f"{what}: numbers that broadcast to {shape} are needed") from None
     if not np.isfinite(spread).all():
         raise CommandError(f"{what} must be finite")
     return spread
 
 
 def _without_seeds(copies: int, seeds: int) -> str:
-    return f"{counted(copies, 'copy', 'copies')} with {counted(seeds, 'seed')}: each needs one"
+    return (
+        f"{counted(copies, 'environment', 'environments')} with "
+        f"{counted(seeds, 'seed')}: each needs one"
+    )

@@ -108,7 +108,7 @@ def test_figures_of_a_team_and_one() -> None:
     assert figures["ate_rmse_m_worst"] == pytest.approx(0.0, abs=1e-6)
     assert figures["trunks"] == 6.0  # a tree and the post, three times
     assert figures["trunks_within_half_m"] == 0.5
-    assert measured.failures == {"target_delay_s_worst": "nothing was found"}
+    assert measured.failures == {"target_delay_s_worst": "no target was found"}
 
 
 def test_quick_is_for_benches_that_can() -> None:

@@ -135,7 +135,7 @@ def test_words_and_answers(tmp_path: Path) -> None:
     [
         (BROKEN, "ended: ImportError: no such engine"),
         (BROKEN_LATER, "ended: RuntimeError: out of batteries"),
-        (SLOW, "no answer to 'round' within 0.5 s"),
+        (SLOW, "no response to 'round' within 0.5 s"),
     ],
 )
 def test_failures_of_a_script_are_told(tmp_path: Path, script: str, message: str) -> None:
@@ -181,8 +181,8 @@ def test_both_keep_to_one_core_meanwhile(tmp_path: Path) -> None:
     ("script", "reason"),
     [
         (BROKEN, "ended: ImportError: no such engine"),
-        (FALLEN, "a drone is 9.5 m from its place; up to 0.5 m is hovering"),
-        (NOT_A_NUMBER, "does not tell position_error_m"),
+        (FALLEN, "a drone is 9.5 m from its position; up to 0.5 m is hovering"),
+        (NOT_A_NUMBER, "does not report position_error_m"),
     ],
 )
 def test_ours_is_measured_where_the_peer_fails(tmp_path: Path, script: str, reason: str) -> None:
@@ -220,7 +220,7 @@ def test_ours_holds_its_places(tmp_path: Path) -> None:
     assert len(task.request["places"]) == 4
     assert task.check({"position_error_m": 0.1}) == {}
     assert task.check(None) == {}
-    with pytest.raises(PeerError, match="nan m from its place"):
+    with pytest.raises(PeerError, match="nan m from its position"):
         task.check({"position_error_m": float("nan")})
 
 

@@ -111,7 +111,7 @@ def test_speaking_out_of_turn_is_refused(simulate, flat_data):
 def test_states_are_not_kept_while_a_partner_takes_part(simulate, flat_data):
     simulation = airborne(simulate, flat_data)
     simulation.add_partner("px4", period_s=0.01)
-    with pytest.raises(SnapshotError, match="partner 'px4' is its own"):
+    with pytest.raises(SnapshotError, match="partner 'px4' is external"):
         simulation.snapshot()
 
 
@@ -127,7 +127,7 @@ def test_partners_that_begin_anew_come_along_in_a_reset(simulate, flat_data):
     partner = simulation.add_partner("operator", period_s=0.02, supports_reset=True)
     operator(partner, simulation.uavs["uav1"], times)
     simulation.run(0.05)
-    with pytest.raises(SnapshotError, match="partner 'operator' is its own"):
+    with pytest.raises(SnapshotError, match="partner 'operator' is external"):
         simulation.snapshot()
     simulation.reset()
     simulation.run(0.05)

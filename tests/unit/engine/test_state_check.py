@@ -85,10 +85,10 @@ def test_vectorized_simulations_name_the_copy(flat_data):
     with VectorizedSimulation(parse_scenario(flat_data), 5, threads=2) as copies:
         copies.run(0.1)
         copies._blocks[1].fleet.state.velocity_map[1] = math.nan
-        with pytest.raises(DivergenceError, match="uav1 of copy 3") as caught:
+        with pytest.raises(DivergenceError, match="uav1 of environment 3") as caught:
             copies.run(0.05)
         assert caught.value.uav == "3/uav1"
-        with pytest.raises(DivergenceError, match="uav1 of copy 3"):
+        with pytest.raises(DivergenceError, match="uav1 of environment 3"):
             copies.get_state()
         copies.reset([3])
         copies.run(0.1)

@@ -50,7 +50,7 @@ def test_where_the_seed_grows_the_world_other_seeds_are_refused_with_what_to_do(
         with pytest.raises(CommandError) as caught:
             simulation.reset(seed=7)
         text = str(caught.value)
-        assert "a reset keeps the world, which scenario 'gusty' grows from its seed 1" in text
+        assert "a reset keeps the world, which scenario 'gusty' generates from its seed 1" in text
         assert simulation.time_s == pytest.approx(0.1)
         simulation.reset(seed=1)
         simulation.reset()

@@ -183,7 +183,7 @@ def test_a_mount_that_nothing_tells_is_asked_for(flown, tmp_path):
     flown.write(tmp_path / "flight.mcap", tells="nothing")
     refused = slam(tmp_path / "flight.mcap", tmp_path / "out")
     assert refused.exit_code == 2
-    assert f"nothing in it tells where {NODDING_FRAME} sits" in refused.output
+    assert f"the log has no transform from {NODDING_FRAME}" in refused.output
     assert "--nodding-mount" in refused.output
     assert not (tmp_path / "out").exists()
     told = slam(tmp_path / "flight.mcap", tmp_path / "out", "--nodding-mount", "0.1,0,-0.08")

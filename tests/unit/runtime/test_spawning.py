@@ -283,7 +283,7 @@ def test_snapshots_are_of_one_fleet(simulate, flat_data):
     simulation.run(0.2)
     kept = simulation.snapshot()
     simulation.spawn_uav("extra", "f450", [20.0, 0.0, 0.0])
-    with pytest.raises(SnapshotError, match=r"come or gone.*holds uav1"):
+    with pytest.raises(SnapshotError, match=r"spawned or deleted.*snapshot of uav1"):
         simulation.restore(kept)
     both = simulation.snapshot()
     simulation.run(0.5)

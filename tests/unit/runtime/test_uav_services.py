@@ -52,7 +52,7 @@ def test_disarming_lets_nothing_fall(pair):
     assert ask(pair, "/uav1/disarm").success
     response = ask(pair, "/uav2/disarm")
     assert not response.success
-    assert "stop" in response.message
+    assert "kill" in response.message
 
 
 def test_take_off_to_a_height(pair):

@@ -169,7 +169,7 @@ def test_kept_states_are_bounded(simulate, flat_data):
     simulation = simulate(flat_data)
     for k in range(16):
         assert ask(simulation, "/volery/save_snapshot", name=f"state {k}").success
-    refused(ask(simulation, "/volery/save_snapshot", name="one more"), "forget")
+    refused(ask(simulation, "/volery/save_snapshot", name="one more"), "delete one")
     assert ask(simulation, "/volery/save_snapshot", name="state 3").success
 
 

@@ -1,4 +1,4 @@
-"""The bench `bridge`: latencies of messages through bridges, with clients in other processes."""
+"""Measures message latencies through bridges, with clients in other processes."""
 
 from volery.bench.bridge.measuring import measure
 

@@ -1,8 +1,8 @@
-"""Latencies of others: the published ROS + Unity3D platform, and Unity's ROS-TCP-Endpoint.
+"""Holds published latencies: the ROS + Unity3D platform, and Unity's ROS-TCP-Endpoint.
 
 The platform's are those of its article of 2025: ROS and Unity3D joined by ROS-TCP-Connector and
-ROS-TCP-Endpoint, commands of ten trials of ten, on a desktop and on a laptop. Of its first table we
-have the fitted line, not the single sizes; of its machines, the names.
+ROS-TCP-Endpoint, commands of ten trials of ten, on a desktop and on a laptop. Of its first table
+only the fitted line is available, not the single sizes; of its machines, the names.
 
 Those of ROS-TCP-Endpoint 0.7.0 were measured by us: rospy 1.15.15 publishes `sensor_msgs/Image` to
 a plain client, from the publisher's stamp to the client; Debian 12, Python 3.11, two cores.
@@ -16,19 +16,19 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Line:
-    """L = alpha S + beta: latency over the size of a message. s/MB, s."""
+    """Line L = alpha S + beta: latency over the size of a message, in s/MB and s."""
 
     alpha_s_per_mb: float
     beta_s: float
 
     def latency_ms(self, size_bytes: float) -> float:
-        """Latency of a message of that size."""
+        """Returns the latency of a message of that size, ms."""
         return 1e3 * (self.alpha_s_per_mb * size_bytes / 1e6 + self.beta_s)
 
 
 @dataclass(frozen=True)
 class EndPoints:
-    """Mean latencies of a command on one machine, ms; None where there is none."""
+    """Mean latencies of a command on one machine, ms; None: not available."""
 
     machine: str
     round_trip: float | None
@@ -45,12 +45,12 @@ ARTICLE = (
 
 @dataclass(frozen=True)
 class Reference:
-    """A bridge that was measured once, as the module's docstring tells."""
+    """Describes a bridge that was measured once; see the module's docstring."""
 
     name: str
     line: Line
     medians_ms: Mapping[int, float] = field(default_factory=dict)
-    """Median latency by size in bytes."""
+    """Median latency, ms, by size in bytes."""
     round_trip_ms: float | None = None
 
 

@@ -1,8 +1,8 @@
-"""Turns results of the bench `bridge` into docs/bridge_latency.md and its picture.
+"""Renders results of the bench `bridge` as docs/bridge_latency.md and its plot.
 
     python -m volery.bench.bridge.latency_page DOCS result.json ...
 
-DOCS is the folder of the page; each result of `bridge` is a machine, the first one is drawn.
+DOCS is the folder of the page; each result of `bridge` is a machine; the plot shows the first.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ Ten trials of ten commands each, ms: the mean of the trials' means, ± their sta
 
 
 def render(results: Sequence[Result]) -> str:
-    """The page, in Markdown. `VoleryError` where a result lacks figures."""
+    """Returns the page in Markdown. Raises `VoleryError` if a result lacks figures."""
     first = results[0]
     parts = [
         _HEAD,
@@ -76,9 +76,9 @@ def render(results: Sequence[Result]) -> str:
 
 
 def bridge_results(paths: Sequence[Path]) -> list[Result]:
-    """Results of the bench `bridge` in files that `volery bench --out` wrote.
+    """Returns the results of the bench `bridge` in files that `volery bench --out` wrote.
 
-    `VoleryError` where there is none.
+    Raises `VoleryError` if there is none.
     """
     found = [r for path in paths for r in read_results(path) if r.bench == "bridge"]
     if not found:
@@ -87,7 +87,7 @@ def bridge_results(paths: Sequence[Path]) -> list[Result]:
 
 
 def write(docs: Path, results: Sequence[Result]) -> None:
-    """Write the page and its picture below the folder `docs`."""
+    """Writes the page and its plot below the folder `docs`."""
     text = render(results)
     picture = docs / PICTURE
     picture.parent.mkdir(parents=True, exist_ok=True)
@@ -96,7 +96,7 @@ def write(docs: Path, results: Sequence[Result]) -> None:
 
 
 def fitted_line(result: Result) -> Line:
-    """The line through the measured medians."""
+    """Returns the line through the measured medians."""
     return Line(_figure(result, "ros_tcp_alpha_s_per_mb"), _figure(result, "ros_tcp_beta_s"))
 
 
@@ -180,7 +180,7 @@ def _figure(result: Result, name: str) -> float:
         return result.figures[name]
     except KeyError:
         raise VoleryError(
-            f"the result has no figure '{name}'; measure anew: volery bench bridge"
+            f"the result has no figure '{name}'; measure again: volery bench bridge"
         ) from None
 
 
@@ -193,7 +193,7 @@ def _bytes(size: int) -> str:
 
 
 def main() -> None:
-    """Do what the command line says."""
+    """Runs the command line."""
     docs, *files = map(Path, sys.argv[1:])
     write(docs, bridge_results(files))
 

@@ -1,4 +1,4 @@
-"""Latency against size of a message as a picture: ours, the article's, ROS-TCP-Endpoint's."""
+"""Plots latency against message size: Volery, the article and ROS-TCP-Endpoint."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _SETTINGS: Any = {
 
 
 def latency_plot(result: Result, ours: Line) -> str:
-    """SVG: medians as dots, fitted lines; the same figures give the same text."""
+    """Returns SVG: medians as dots, fitted lines; equal figures give equal text."""
     with rc_context(_SETTINGS):
         figure = Figure(figsize=(7.2, 4.2), layout="constrained")
         axes = figure.add_subplot()

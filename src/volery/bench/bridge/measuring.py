@@ -1,4 +1,4 @@
-"""The simulation's side of the bench: worlds that run in real time while clients measure."""
+"""Runs the simulations of the bench in real time while clients measure."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _IMAGE_PERIOD_S = 0.02
 _ROUND_TRIPS = 1000
 _STOPS = 100
 _SAFE_HEIGHT_M = 50.0
-"""It falls a little at each stop."""
+"""Height at which the UAV recovers, m; it falls a little at each stop."""
 _STREAM_S = 10.0
 _CLIENT_TIMEOUT_S = 120.0
 _IMAGE = "sensor_msgs/msg/Image"
@@ -47,7 +47,7 @@ _TRIGGER = "std_srvs/srv/Trigger"
 
 
 def measure() -> Measured:
-    """Figures of the bench `bridge`."""
+    """Returns the figures of the bench `bridge`."""
     figures: dict[str, float] = {}
     failures: dict[str, str] = {}
     with running(load_scenario("hover")) as world:
@@ -74,7 +74,7 @@ def measure() -> Measured:
 
 
 class World:
-    """A simulation in real time, in a thread of its own, with two bridges open."""
+    """Runs a simulation in real time in its own thread, with two bridges open."""
 
     def __init__(self, simulation: Simulation, bridges: BridgeHost) -> None:
         self.simulation = simulation
@@ -85,15 +85,15 @@ class World:
         self._ports = {"plain_ros_tcp": tcp.port, "plain_rosbridge": web.port}
 
     def ros_tcp(self, *words: object) -> Any:
-        """What the plain ROS-TCP client measured."""
+        """Returns the measurements of the plain ROS-TCP client."""
         return self.start("plain_ros_tcp", *words)()
 
     def rosbridge(self, *words: object) -> Any:
-        """What the plain rosbridge client measured."""
+        """Returns the measurements of the plain rosbridge client."""
         return self.start("plain_rosbridge", *words)()
 
     def start(self, client: str, *words: object) -> Any:
-        """Start a client; the function returned waits for its result."""
+        """Starts a client; the returned function waits for its result."""
         module = f"volery.bench.bridge.{client}"
         command = [sys.executable, "-P", "-m", module, str(self._ports[client]), *map(str, words)]
         process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
@@ -114,16 +114,16 @@ class World:
 
 @contextmanager
 def running(scenario: Scenario) -> Iterator[World]:
-    """Run `scenario` in real time until the block ends."""
+    """Runs `scenario` in real time until the block ends."""
     with in_real_time(scenario) as (simulation, bridges):
         yield World(simulation, bridges)
 
 
 @contextmanager
 def in_real_time(scenario: Scenario) -> Iterator[tuple[Simulation, BridgeHost]]:
-    """Run `scenario` in real time, in a thread of its own, until the block ends."""
+    """Runs `scenario` in real time, in its own thread, until the block ends."""
     with Simulation(scenario) as simulation:
-        simulation.step(1)  # what compiles does so before anybody measures
+        simulation.step(1)  # compile before any measurement
         with BridgeHost(simulation.gateway) as bridges:
             simulation.use_low_latency()
             over = threading.Event()
@@ -142,7 +142,7 @@ def _run(simulation: Simulation, over: threading.Event) -> None:
 
 
 def image_latencies(world: World) -> list[tuple[int, float]]:
-    """(bytes, s) of images published by the simulation's thread, one size after the other."""
+    """Returns (bytes, s) of images from the simulation's thread, one size after the other."""
     publisher = advertise_images(world.simulation)
     count = IMAGES_A_SIZE * len(IMAGE_BYTES)
     finish = world.start("plain_ros_tcp", "sizes", IMAGE_TOPIC, count)
@@ -152,14 +152,14 @@ def image_latencies(world: World) -> list[tuple[int, float]]:
 
 
 def advertise_images(simulation: Simulation) -> Publisher:
-    """Announce `IMAGE_TOPIC`."""
+    """Advertises `IMAGE_TOPIC`."""
     advertising = simulation.gateway.post(lambda: simulation.graph.advertise(IMAGE_TOPIC, _IMAGE))
     publisher: Publisher = advertising.result()
     return publisher
 
 
 def publish_images(simulation: Simulation, publisher: Publisher, sizes: Sequence[int]) -> None:
-    """`IMAGES_A_SIZE` pictures of each size (bytes), stamped when the simulation's thread sends."""
+    """Publishes `IMAGES_A_SIZE` images per size (bytes), stamped in the simulation's thread."""
     image = message_type(_IMAGE)
     for size in sizes:
         pixels = np.zeros(size, np.uint8)
@@ -176,7 +176,7 @@ def publish_images(simulation: Simulation, publisher: Publisher, sizes: Sequence
 
 
 def command_figures(world: World) -> dict[str, float]:
-    """Ten trials of ten commands: until applied, and until the report of that is back."""
+    """Runs ten trials of ten commands: until applied, and until that report is back."""
     applied_ns: dict[float, int] = {}
 
     def note(published: Any) -> None:
@@ -198,7 +198,7 @@ def command_figures(world: World) -> dict[str, float]:
 
 
 def stop_latencies(world: World) -> list[float]:
-    """Seconds from a stop request sent until a step has ended with all rotors commanded to 0."""
+    """Returns the time, s, from each stop request to the first step with rotors commanded to 0."""
     simulation = world.simulation
     uav, response = simulation.uavs["uav1"], message_type(f"{_TRIGGER}_Response")
     stopped_ns: list[int] = []
@@ -222,7 +222,7 @@ def stop_latencies(world: World) -> list[float]:
 
 
 def stream_scenario() -> Scenario:
-    """Ten UAVs with two LIDARs each over a forest."""
+    """Returns ten UAVs with two LIDARs each over a forest."""
     lidars = [{"kind": "lidar", "name": name} for name in ("horizontal", "nodding")]
     return parse_scenario(
         {
@@ -252,7 +252,7 @@ def stream_scenario() -> Scenario:
 
 
 def stream_figures() -> dict[str, float]:
-    """The scans of `stream_scenario`, to one client of either kind at once."""
+    """Streams the scans of `stream_scenario` to one client of each kind at once."""
     with running(stream_scenario()) as world:
         topics = [
             f"/{uav}/laser/{name}/scan"
@@ -281,7 +281,7 @@ def stream_figures() -> dict[str, float]:
 def stream_ages(
     results: list[list[tuple[str, int, int]]], published: dict[tuple[str, int], int]
 ) -> dict[str, float]:
-    """Age of scans on arrival, and how many of those between a client's first and last are lost."""
+    """Returns the age of scans on arrival, and the losses between first and last per client."""
     ages: list[int] = []
     lost = 0
     for got in results:
@@ -304,4 +304,4 @@ def _wait_for_subscriber(simulation: Simulation, topic: str, timeout_s: float = 
         if any(t.name == topic and t.subscribers for t in simulation.graph.topics()):
             return
         time.sleep(0.02)
-    raise RuntimeError(f"nobody subscribed '{topic}' within {timeout_s} s")
+    raise RuntimeError(f"no client subscribed to '{topic}' within {timeout_s} s")

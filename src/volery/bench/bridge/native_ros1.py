@@ -1,4 +1,4 @@
-"""One way to a plain rospy subscriber: from the simulation, and from plain rospy, by turns."""
+"""Measures one-way latency to a rospy subscriber: from the simulation and from rospy, in turns."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ _START_TIMEOUT_S = 20.0
 
 
 def one_way_figures(simulation: Simulation, bridges: BridgeHost) -> dict[str, float]:
-    """Median ms by size and way, and the geometric mean of their ratios.
+    """Returns median ms by size and path, and the geometric mean of their ratios.
 
-    simulation: one that runs. `VoleryError` where ROS 1 is not installed.
+    `simulation` must be running. Raises `VoleryError` if ROS 1 is not installed.
     """
     if shutil.which("rosmaster") is None or not rospy_is_installed():
         raise VoleryError("ROS 1 is not installed; .ci/install_ros1 does it on Debian")
@@ -48,7 +48,7 @@ def one_way_figures(simulation: Simulation, bridges: BridgeHost) -> dict[str, fl
 
 
 def _exchange(simulation: Simulation, plain: _Program) -> None:
-    """Send images both ways, by turns."""
+    """Publishes images on both paths, in turns."""
     graph, image = simulation.graph, message_type(_IMAGE)
     topic = simulation.post(lambda: graph.advertise("/one_way/graph", _IMAGE)).result()
 
@@ -84,7 +84,7 @@ def _summarize(taken: list[tuple[str, int, float]]) -> dict[str, float]:
 
 @contextlib.contextmanager
 def ros1_master() -> Iterator[None]:
-    """A rosmaster on a free port of loopback, which this process's environment names."""
+    """Runs a rosmaster on a free loopback port and sets the environment to it."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
@@ -108,7 +108,7 @@ def ros1_master() -> Iterator[None]:
 
 
 class _Program:
-    """A plain rospy program; use it as a context manager."""
+    """Runs a plain rospy program; use it as a context manager."""
 
     def __init__(self, what: str) -> None:
         command = [_SYSTEM_PYTHON, str(_PEER), what]
@@ -116,13 +116,13 @@ class _Program:
         self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True)
 
     def tell(self, line: str) -> None:
-        """Send a line."""
+        """Sends a line."""
         assert self._process.stdin is not None
         self._process.stdin.write(f"{line}\n")
         self._process.stdin.flush()
 
     def ask(self) -> Any:
-        """What it reports."""
+        """Requests and returns its report."""
         self.tell("report")
         return self._next()
 
@@ -138,7 +138,7 @@ class _Program:
         return self
 
     def __exit__(self, *_exception: object) -> None:
-        self._process.kill()  # rospy takes seconds to leave in good order
+        self._process.kill()  # rospy takes seconds to shut down cleanly
         self._process.communicate()
 
 
@@ -152,5 +152,5 @@ def _wait_until(condition: Any) -> None:
     end = time.monotonic() + _START_TIMEOUT_S
     while not condition():
         if time.monotonic() > end:
-            raise VoleryError(f"nothing came within {_START_TIMEOUT_S:.0f} s")
+            raise VoleryError(f"ROS 1 is not ready within {_START_TIMEOUT_S:.0f} s")
         time.sleep(0.02)

@@ -1,4 +1,4 @@
-"""A ROS-TCP client of the standard library alone, run as a process of its own.
+"""Runs a ROS-TCP client of the standard library alone, in its own process.
 
     python -m volery.bench.bridge.plain_ros_tcp PORT sizes TOPIC COUNT
     python -m volery.bench.bridge.plain_ros_tcp PORT round_trips UAV COUNT
@@ -25,7 +25,7 @@ _FALL_S = 0.01
 
 
 class Client:
-    """One connection; frames go out whole and are read one by one."""
+    """Connects to the endpoint; sends whole frames and reads frames one by one."""
 
     def __init__(self, port: int) -> None:
         self._socket = socket.create_connection(("127.0.0.1", port))
@@ -33,17 +33,17 @@ class Client:
         self._file = self._socket.makefile("rb", buffering=1 << 16)
 
     def send(self, destination: str, payload: bytes) -> None:
-        """Send one frame."""
+        """Sends one frame."""
         name = destination.encode()
         head = struct.pack("<I", len(name)) + name + struct.pack("<I", len(payload))
         self._socket.sendall(head + payload)
 
     def command(self, name: str, **fields: Any) -> None:
-        """Send a system command."""
+        """Sends a system command."""
         self.send(name, json.dumps(fields).encode())
 
     def frames(self) -> Iterator[tuple[str, bytes]]:
-        """Frames as they come."""
+        """Yields frames as they arrive."""
         while True:
             (length,) = struct.unpack("<I", self._read(4))
             name = self._read(length).decode()
@@ -51,7 +51,7 @@ class Client:
             yield name, self._read(length)
 
     def wait_for(self, destination: str) -> bytes:
-        """Payload of the next frame to `destination`."""
+        """Returns the payload of the next frame to `destination`."""
         return next(payload for name, payload in self.frames() if name == destination)
 
     def _read(self, count: int) -> bytes:
@@ -62,7 +62,7 @@ class Client:
 
 
 def receive_images(client: Client, topic: str, count: int) -> dict[str, Any]:
-    """(size, latency s) of images whose stamp is the wall time at which they were published."""
+    """Returns (size, latency s) of images stamped with the wall time of publishing."""
     client.command("__subscribe", topic=topic, message_name="sensor_msgs/Image")
     got = []
     for name, payload in client.frames():
@@ -76,9 +76,9 @@ def receive_images(client: Client, topic: str, count: int) -> dict[str, Any]:
 
 
 def round_trips(client: Client, uav: str, count: int) -> dict[str, Any]:
-    """Seconds from a Twist sent to the report, stamped by the step that applies it, received.
+    """Returns the time, s, from sending a Twist to receiving the report of its application.
 
-    Also when each was sent, ns of the monotonic clock, after the number that it carries.
+    Also returns the sending times, ns of the monotonic clock, by the number in each command.
     """
     command, applied = f"/{uav}/cmd_vel", f"/{uav}/cmd_vel/applied"
     client.command("__publish", topic=command, message_name=_TWIST)
@@ -100,7 +100,7 @@ def round_trips(client: Client, uav: str, count: int) -> dict[str, Any]:
 
 
 def stops(client: Client, uav: str, count: int) -> dict[str, Any]:
-    """When stop requests were sent, ns of the monotonic clock; between them the UAV recovers."""
+    """Returns the sending times of stop requests, ns, monotonic; the UAV recovers in between."""
     service = f"/{uav}/kill"
     client.command("__ros_service", topic=service, message_name="std_srvs/Trigger")
     client.command("__ros_service", topic="/bench/recover", message_name="std_srvs/Trigger")
@@ -110,7 +110,7 @@ def stops(client: Client, uav: str, count: int) -> dict[str, Any]:
         time.sleep(draw.uniform(0.15, 0.25))
         sent.append(time.monotonic_ns())
         _request(client, service, 101 + 2 * k)
-        time.sleep(_FALL_S)  # the answer says that it is commanded: the next step does it
+        time.sleep(_FALL_S)  # the response confirms the command: the next step executes it
         _request(client, "/bench/recover", 102 + 2 * k)
     return {"sent_ns": sent}
 
@@ -122,7 +122,7 @@ def _request(client: Client, service: str, number: int) -> None:
 
 
 def streams(client: Client, seconds: float, topics: list[str]) -> dict[str, Any]:
-    """Sequence numbers and ages of scans; `/bench/epoch` tells the wall time of simulated 0."""
+    """Returns topic, stamp (ns) and arrival time (ns, monotonic clock) of each scan."""
     for topic in topics:
         client.command("__subscribe", topic=topic, message_name="sensor_msgs/LaserScan")
     wanted = set(topics)
@@ -138,7 +138,7 @@ def streams(client: Client, seconds: float, topics: list[str]) -> dict[str, Any]
 
 
 def main() -> None:
-    """Do what the command line says."""
+    """Runs the command line."""
     port, what, *rest = sys.argv[1:]
     client = Client(int(port))
     if what == "sizes":

@@ -1,9 +1,9 @@
-"""A rosbridge client of `websockets` and `cbor2` alone, run as a process of its own.
+"""Runs a rosbridge client of `websockets` and `cbor2` alone, in its own process.
 
     python -m volery.bench.bridge.plain_rosbridge PORT round_trips UAV COUNT
     python -m volery.bench.bridge.plain_rosbridge PORT streams SECONDS TOPIC...
 
-It prints one JSON object. Commands go out as JSON, what comes back is CBOR.
+It prints one JSON object. It sends JSON and receives CBOR.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _SETTLE_S = 0.5
 
 
 def round_trips(client: ClientConnection, uav: str, count: int) -> dict[str, Any]:
-    """Seconds from a Twist sent to the report, stamped by the step that applies it, received."""
+    """Returns the time, s, from sending a Twist to receiving the report of its application."""
     command, applied = f"/{uav}/cmd_vel", f"/{uav}/cmd_vel/applied"
     _send(client, op="advertise", topic=command, type="geometry_msgs/Twist")
     _subscribe(client, applied, "geometry_msgs/TwistStamped")
@@ -39,7 +39,7 @@ def round_trips(client: ClientConnection, uav: str, count: int) -> dict[str, Any
 
 
 def streams(client: ClientConnection, seconds: float, topics: list[str]) -> dict[str, Any]:
-    """Topic, stamp (ns) and time of arrival (ns of the monotonic clock) of each scan."""
+    """Returns topic, stamp (ns) and arrival time (ns, monotonic clock) of each scan."""
     for topic in topics:
         _subscribe(client, topic, "sensor_msgs/LaserScan")
     got: list[tuple[str, int, int]] = []
@@ -64,7 +64,7 @@ def _send(client: ClientConnection, **words: Any) -> None:
 
 
 def _receive(client: ClientConnection, timeout_s: float | None = None) -> Any:
-    """The next publication."""
+    """Returns the next publication."""
     while True:
         data = client.recv(timeout=timeout_s)
         message = cbor2.loads(data) if isinstance(data, bytes) else json.loads(data)
@@ -73,7 +73,7 @@ def _receive(client: ClientConnection, timeout_s: float | None = None) -> Any:
 
 
 def main() -> None:
-    """Do what the command line says."""
+    """Runs the command line."""
     port, what, *rest = sys.argv[1:]
     with connect(f"ws://127.0.0.1:{port}", compression=None, max_size=None) as client:
         if what == "round_trips":

@@ -1,9 +1,9 @@
-"""Plain rospy programs, run by the system's Python: nothing of Volery is imported.
+"""Runs plain rospy programs with the system's Python, without importing Volery.
 
     python3 plain_rospy.py publish|subscribe
 
-`publish` sends an image of each size (bytes) that it reads, `subscribe` reports for each line the
-[path, size, ms] of all images received, from the publisher's stamp to the callback.
+`publish` publishes an image for each size (bytes) that it reads; `subscribe` prints for each line
+the [path, size, ms] of all images received, from the publisher's stamp to the callback.
 """
 
 import json
@@ -17,13 +17,13 @@ from sensor_msgs.msg import Image
 
 
 def say(value: Any) -> None:
-    """Print a value as JSON."""
+    """Prints a value as JSON."""
     sys.stdout.write(json.dumps(value) + "\n")
     sys.stdout.flush()
 
 
 def publish() -> None:
-    """Send what is asked for."""
+    """Publishes images of the requested sizes."""
     publisher = rospy.Publisher("/one_way/plain", Image, queue_size=10)
     say("ready")
     for line in sys.stdin:
@@ -35,7 +35,7 @@ def publish() -> None:
 
 
 def subscribe() -> None:
-    """Receive from both."""
+    """Receives images from both publishers."""
     taken = []
 
     def take(message: Any, path: str) -> None:
@@ -50,7 +50,7 @@ def subscribe() -> None:
 
 
 def main() -> None:
-    """Do what the command line says."""
+    """Runs the command line."""
     what = sys.argv[1]
     rospy.init_node(f"one_way_{what}", argv=["peer"], disable_rostime=True)
     work = {"publish": publish, "subscribe": subscribe}[what]

@@ -1,4 +1,4 @@
-"""Clients that ask for too much of a simulation, and what that leaves for others."""
+"""Measures how clients that overload a simulation affect other clients."""
 
 from __future__ import annotations
 

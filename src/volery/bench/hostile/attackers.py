@@ -1,10 +1,10 @@
-"""Clients that ask for too much of a server on loopback, run as a process of their own.
+"""Runs clients that overload a server on loopback, in their own process.
 
     python -m volery.bench.hostile.attackers ATTACK ROSBRIDGE_PORT ROS_TCP_PORT SECONDS
     python -m volery.bench.hostile.attackers mavlink_flood TCP_PORT UDP_PORT SECONDS
 
-It ends by itself after SECONDS and prints how much it has sent as a JSON object. An attacker that
-is disconnected connects again.
+It ends after SECONDS and prints how much it has sent as a JSON object. An attacker that is
+disconnected reconnects.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ _SERVICES: Sequence[tuple[str, Any]] = (
 
 
 def stalled(port: int, _ros_tcp: int, ends: float) -> int:
-    """Clients that subscribe to everything and never read."""
+    """Subscribes to everything with many clients and never reads."""
     clients = [open_websocket(port, receive_buffer=4096) for _ in range(STALLED_CLIENTS)]
     topics = ("/clock", "/tf", "/uav1/odom", "/uav1/imu", "/uav1/ground_truth/odom")
     for client in clients:
@@ -58,7 +58,7 @@ def stalled(port: int, _ros_tcp: int, ends: float) -> int:
 
 
 def publisher(port: int, _ros_tcp: int, ends: float) -> int:
-    """One client that publishes velocities 10,000 times a second."""
+    """Publishes velocities 10,000 times a second with one client."""
     told = {"op": "publish", "topic": "/uav1/cmd_vel", "msg": {"angular": {"z": 0.1}}}
     burst = frame(json.dumps(told).encode()) * _BURST
 
@@ -77,18 +77,18 @@ def publisher(port: int, _ros_tcp: int, ends: float) -> int:
 
 
 def large_cbor(port: int, _ros_tcp: int, ends: float) -> int:
-    """Arrays of 60 million numbers as CBOR."""
+    """Sends arrays of 60 million numbers as CBOR."""
     head = b"\xa1\x62op\x9a" + struct.pack(">I", LARGE_BYTES)
     return _large(port, head + bytes(LARGE_BYTES), BINARY, ends)
 
 
 def large_json(port: int, _ros_tcp: int, ends: float) -> int:
-    """Lists of 30 million numbers as JSON."""
+    """Sends lists of 30 million numbers as JSON."""
     return _large(port, b'{"op":[' + b"1," * (LARGE_BYTES // 2) + b"1]}", TEXT, ends)
 
 
 def large_image(port: int, _ros_tcp: int, ends: float) -> int:
-    """Images as large as the server takes, as CBOR, without a pause."""
+    """Sends images of the server's max size, as CBOR, without a pause."""
     topic = {"op": "advertise", "topic": "/hostile/image", "type": "sensor_msgs/Image"}
     pixels = LARGEST_TAKEN_BYTES
     parts = (
@@ -100,7 +100,7 @@ def large_image(port: int, _ros_tcp: int, ends: float) -> int:
 
 
 def large_tf(_rosbridge: int, port: int, ends: float) -> int:
-    """60 MB of transforms over ROS-TCP."""
+    """Sends 60 MB of transforms over ROS-TCP."""
     count = LARGE_BYTES // 76
     payload = struct.pack("<I", count) + bytes(76 * count)
     told = json.dumps({"topic": "/tf", "message_name": "tf2_msgs/TFMessage"}).encode()
@@ -118,7 +118,7 @@ def large_tf(_rosbridge: int, port: int, ends: float) -> int:
 
 
 def storm(port: int, ros_tcp: int, ends: float) -> int:
-    """Connections that say nothing, or half a request, as many as there may be."""
+    """Opens as many connections as allowed that send nothing, or half a request."""
     count, half_open = 0, []
     while time.monotonic() < ends:
         client = socket.socket()
@@ -136,12 +136,12 @@ def storm(port: int, ros_tcp: int, ends: float) -> int:
 
 
 def services(port: int, _ros_tcp: int, ends: float) -> int:
-    """Four clients that call a service each, again and again."""
+    """Calls services in a loop with four clients, one service each."""
     return _call_services(port, ends, _SERVICES)
 
 
 def pattern(port: int, _ros_tcp: int, ends: float) -> int:
-    """A client that searches by a pattern over which backtracking takes for ever."""
+    """Filters entities by a pattern for which backtracking takes exponential time."""
     args = {"filters": {"filter": "(|||||||||){14}x"}}
     return _call_services(port, ends, (("/get_entities", args),))
 
@@ -177,9 +177,9 @@ ATTACKS: dict[str, Callable[[int, int, float], int]] = {
     "service_pattern": pattern,
     "mavlink_flood": mavlink_flood.flood,
 }
-"""By name; an attack takes two ports and the time at which it ends."""
+"""Attacks by name; each takes two ports and its end time."""
 MAVLINK_ATTACKS = frozenset({"mavlink_flood"})
-"""Those whose ports are MAVLink's by TCP and UDP."""
+"""Attacks whose ports are MAVLink's by TCP and UDP."""
 
 
 def _large(port: int, payload: bytes, kind: int, ends: float, first: bytes = b"") -> int:
@@ -196,7 +196,7 @@ def _large(port: int, payload: bytes, kind: int, ends: float, first: bytes = b""
 
 
 def _send(client: socket.socket, data: bytes, ends: float) -> None:
-    """Send all of it, or as much as the server takes until the end. `OSError` as of sockets."""
+    """Sends all data, or as much as the server accepts until the end. Raises `OSError`."""
     client.settimeout(0.1)
     rest = memoryview(data)
     while rest and time.monotonic() < ends:
@@ -205,7 +205,7 @@ def _send(client: socket.socket, data: bytes, ends: float) -> None:
 
 
 def _drain(client: socket.socket) -> None:
-    """Read what is there, so that the server's answers do not hold it back."""
+    """Reads pending data, so that the server's responses do not block it."""
     client.setblocking(False)
     with suppress(BlockingIOError):
         while client.recv(_CHUNK_BYTES):
@@ -213,7 +213,7 @@ def _drain(client: socket.socket) -> None:
 
 
 def _until(ends: float, attack: Callable[[], Iterator[int]]) -> int:
-    """How much was sent until the end, over as many connections as that takes."""
+    """Returns how much was sent until the end, over as many connections as necessary."""
     sent = 0
     while time.monotonic() < ends:
         with suppress(OSError):
@@ -231,7 +231,7 @@ def _ros_tcp_frame(destination: bytes, payload: bytes) -> bytes:
 
 
 def main() -> None:
-    """Do what the command line says."""
+    """Runs the command line."""
     attack, first_port, second_port, seconds = sys.argv[1:]
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     ends = time.monotonic() + float(seconds)

@@ -1,4 +1,4 @@
-"""A MAVLink client that sends 10,000 frames a second by TCP and UDP, and noise between them."""
+"""Sends 10,000 MAVLink frames a second by TCP and UDP, with noise in between."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def flood(tcp_port: int, udp_port: int, ends: float) -> int:
 
 
 def _send(stream: socket.socket, datagrams: socket.socket, ends: float) -> int:
-    """Sends half of the frames each way; what TCP does not take waits here. `OSError` as of TCP."""
+    """Sends half of the frames each way and buffers what TCP does not accept. Raises `OSError`."""
     chosen, half = frames(), FRAMES_HZ // _BURSTS_HZ // 2
     sent, waiting, due = 0, b"", time.monotonic()
     while time.monotonic() < ends:

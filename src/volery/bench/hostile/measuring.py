@@ -1,8 +1,8 @@
-"""A simulation in real time while clients attack its bridges.
+"""Measures a simulation in real time while clients attack its bridges.
 
-The victim is `volery run hover --speed 1` with rosbridge and ROS-TCP, attackers are a process each,
-pinned to the last core of the machine, so that the figures measure the server and not that the
-attackers, too, compute. An ordinary client in a third process tells what is left for others.
+The victim is `volery run hover --speed 1` with rosbridge and ROS-TCP. Each attacker is a process
+pinned to the last core of the machine, so that the figures exclude the attackers' own load. An
+ordinary client in a third process measures the service that other clients get.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ _log = logging.getLogger(__name__)
 ATTACK_S = 8.0
 _QUICK_ATTACK_S = 1.5
 _LEAD_S = 1.0
-"""An attack begins so long before the witness looks."""
+"""Lead of an attack before the witness measures, s."""
 _SETTLE_S = 1.0
 _START_S = 120.0
 _ENDING_S = 20.0
 _NOT_ANSWERED_S = 10.0
-"""Delay that calls without an answer count with."""
+"""Delay that counts for calls without a response, s."""
 
 
 def measure(*, quick: bool = False) -> Measured:
-    """Figures of the bench `hostile`. `BridgeError` where pymavlink is missing."""
+    """Returns the figures of the bench `hostile`. Raises `BridgeError` without pymavlink."""
     dialect()
     figures: dict[str, float] = {}
     seconds = _QUICK_ATTACK_S if quick else ATTACK_S
@@ -54,7 +54,7 @@ def measure(*, quick: bool = False) -> Measured:
 
 
 def worst_figures(figures: dict[str, float]) -> dict[str, float]:
-    """What the attacks do at worst."""
+    """Returns the worst figures of all attacks."""
 
     def of_attacks(figure: str) -> list[float]:
         return [figures[f"{attack}_{figure}"] for attack in ATTACKS]
@@ -67,7 +67,7 @@ def worst_figures(figures: dict[str, float]) -> dict[str, float]:
 
 
 def call_figures(answers: list[tuple[float, float, float]], asked: int) -> dict[str, float]:
-    """Real-time factor and delay of what the witness noted."""
+    """Returns real-time factor and delay from the witness's responses."""
     if len(answers) < 2:
         return {"rtf": 0.0, "delay_p99_ms": 1e3 * _NOT_ANSWERED_S}
     due, came, sim = np.array(answers).T
@@ -83,7 +83,7 @@ def call_figures(answers: list[tuple[float, float, float]], asked: int) -> dict[
 def _attack(
     name: str, pid: int, rosbridge: int, attacked: tuple[int, int], seconds: float
 ) -> dict[str, float]:
-    """Figures of one attack, named after it; `none` is none."""
+    """Returns the figures of one attack, named after it; `none` means no attack."""
     before = _resident_mb(pid)
     attacker = None
     if name in ATTACKS:
@@ -117,9 +117,9 @@ def _result(process: subprocess.Popen[str], seconds: float) -> Any:
 
 @contextmanager
 def _victim(*, with_mavlink: bool) -> Iterator[tuple[int, int, tuple[int, int]]]:
-    """Process id, rosbridge port and attacked ports of a run in real time.
+    """Runs a victim in real time; yields process id, rosbridge port and attacked ports.
 
-    Those are rosbridge's and ROS-TCP's, or those of MAVLink by TCP and UDP.
+    The attacked ports are rosbridge's and ROS-TCP's, or those of MAVLink by TCP and UDP.
     """
     rosbridge, ros_tcp = _free_port(), _free_port()
     attacked = (_free_port(), _free_mavlink_port()) if with_mavlink else (rosbridge, ros_tcp)
@@ -154,12 +154,12 @@ def _wait_until_open(process: subprocess.Popen[bytes], port: int) -> None:
 
 
 def _wait_until_answered(port: int) -> None:
-    """Until a witness gets its answers: kernels are compiled, what happens once has happened."""
+    """Waits until a witness gets its responses: kernels are compiled, setup is over."""
     ends = time.monotonic() + _START_S
     while time.monotonic() < ends:
         if len(_result(_start("witness", port, _LEAD_S), _LEAD_S)) * PERIOD_S > 0.9 * _LEAD_S:
             return
-    raise VoleryError("hostile: the simulation under attack does not answer")
+    raise VoleryError("hostile: the simulation under attack does not respond")
 
 
 def _free_port() -> int:
@@ -169,7 +169,7 @@ def _free_port() -> int:
 
 
 def _free_mavlink_port() -> int:
-    """A PORT for the bridge `mavlink=PORT`: both ports of its first vehicle are free."""
+    """Returns a PORT for the bridge `mavlink=PORT` with both ports of its first vehicle free."""
     for port in range(ports.ONBOARD_TO + 5000, ports.ONBOARD_TO + 40_000, 97):
         with suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as onboard:
             shift = port - ports.ONBOARD_TO

@@ -1,6 +1,6 @@
-"""A WebSocket client of one socket, for clients that behave as no library would.
+"""Provides a WebSocket client of one socket, for clients that misbehave as no library would.
 
-Source: RFC 6455. Frames go out with the mask 0, so that what is sent is what was prepared.
+Source: RFC 6455. Frames use the mask 0, so that the prepared bytes are sent unchanged.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ TEXT, BINARY = 0x81, 0x82
 def open_websocket(
     port: int, *, receive_buffer: int | None = None, timeout_s: float = 10.0
 ) -> socket.socket:
-    """A connection after its handshake. `OSError` where the server does not take it.
+    """Returns a socket after the handshake. Raises `OSError` if the server refuses it.
 
-    receive_buffer: bytes that the system keeps for a reader who does not read.
+    `receive_buffer`: size of the system's receive buffer, bytes.
     """
     sock = socket.socket()
     try:
@@ -44,12 +44,12 @@ def open_websocket(
 
 
 def frame(payload: bytes, kind: int = TEXT) -> bytes:
-    """One whole frame of a client."""
+    """Returns one whole client frame."""
     return frame_head(len(payload), kind) + payload
 
 
 def frame_head(length: int, kind: int = TEXT) -> bytes:
-    """All of a client's frame before its payload."""
+    """Returns the header of a client frame."""
     if length < 126:
         head = struct.pack(">BB", kind, 0x80 | length)
     elif length < 1 << 16:
@@ -60,7 +60,7 @@ def frame_head(length: int, kind: int = TEXT) -> bytes:
 
 
 def read_frame(sock: socket.socket) -> bytes:
-    """Payload of the server's next frame. `OSError` where the connection ends."""
+    """Returns the payload of the server's next frame. Raises `OSError` at the connection's end."""
     _, length = _exactly(sock, 2)
     if length == 126:
         (length,) = struct.unpack(">H", _exactly(sock, 2))

@@ -1,9 +1,9 @@
-"""An ordinary client that asks the simulation for its time, run as a process of its own.
+"""Requests the simulation's time as an ordinary client, in its own process.
 
     python -m volery.bench.hostile.witness ROSBRIDGE_PORT SECONDS
 
-It asks fifty times a second, at instants that do not depend on the answers, and prints for each
-call when it was due, when its answer came (s of the monotonic clock) and the simulated time (s).
+It sends fifty requests a second, at instants that do not depend on the responses, and prints for
+each call its due time, the time of its response (s of the monotonic clock) and the simulated time.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _LAST_ANSWER_S = 5.0
 
 
 def ask(port: int, seconds: float) -> list[tuple[float, float, float]]:
-    """Due time, time of the answer, simulated time of each call that was answered."""
+    """Returns due time, response time and simulated time, s, of each answered call."""
     answered: list[tuple[float, float, float]] = []
     with connect(f"ws://127.0.0.1:{port}", compression=None, open_timeout=_LAST_ANSWER_S) as client:
         start, asked, count = time.monotonic(), 0, round(seconds / PERIOD_S)
@@ -45,11 +45,11 @@ def ask(port: int, seconds: float) -> list[tuple[float, float, float]]:
 
 
 def main() -> None:
-    """Do what the command line says."""
+    """Runs the command line."""
     port, seconds = sys.argv[1:]
     try:
         answered = ask(int(port), float(seconds))
-    except OSError:  # the server does not let it in any more, or has ended
+    except OSError:  # the server refuses connections, or has ended
         answered = []
     sys.stdout.write(json.dumps(answered))
 

@@ -1,4 +1,4 @@
-"""The bench `page`: how fast the page is, how honest, and what it costs the simulation."""
+"""Measures the page's speed, the age of its data and its cost for the simulation."""
 
 from volery.bench.page.measuring import measure
 

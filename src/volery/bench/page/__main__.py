@@ -1,4 +1,4 @@
-"""`python -m volery.bench.page [SECONDS]`: the bench with a shorter watch over memory."""
+"""Runs the bench with a shorter memory measurement: `python -m volery.bench.page [SECONDS]`."""
 
 import logging
 import sys

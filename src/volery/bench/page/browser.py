@@ -1,4 +1,4 @@
-"""Headless Chromium that draws WebGL in software."""
+"""Starts headless Chromium that draws WebGL in software."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ _NAMES = ("chromium", "chromium-browser", "google-chrome")
 
 
 def browser_path() -> str | None:
-    """Where a Chromium is: what VOLERY_BROWSER names, or one on the path."""
+    """Returns the path of a Chromium: VOLERY_BROWSER, or one on the search path."""
     return os.environ.get("VOLERY_BROWSER") or next(filter(None, map(shutil.which, _NAMES)), None)
 
 
 @contextmanager
 def open_browser(*flags: str) -> Iterator[Browser]:
-    """One browser, for many pages. `VoleryError` where there is none.
+    """Opens one browser, for many pages. Raises `VoleryError` if there is none.
 
-    flags: of Chromium, besides `FLAGS`.
+    `flags` are Chromium's, besides `FLAGS`.
     """
     try:
         from playwright.sync_api import sync_playwright

@@ -1,7 +1,7 @@
-"""Other clients beside the page, over plain WebSockets: many that read, one that stops.
+"""Runs clients beside the page, over plain WebSockets, that read all messages.
 
 python -m volery.bench.page.clients URL CLIENTS SECONDS TOPIC...   prints a line when all are
-connected, and at the end what they lost, as JSON
+connected, and at the end the losses as JSON
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _SETTLING_S = 1.0
 
 
 def main() -> None:
-    """Read for so long and print how many messages were lost."""
+    """Reads for SECONDS and prints how many messages were lost."""
     url, clients, seconds, *topics = sys.argv[1:]
     print(json.dumps(asyncio.run(_read(url, int(clients), float(seconds), topics))))  # noqa: T201
 
@@ -39,7 +39,7 @@ async def _read(url: str, clients: int, seconds: float, topics: list[str]) -> di
 async def _stamps(
     url: str, seconds: float, topics: list[str], there: asyncio.Barrier
 ) -> dict[str, list[int]]:
-    """Stamps of what comes from when all are there, ns, by topic."""
+    """Returns stamps, ns, by topic, of messages that arrive after all clients are connected."""
     stamps: dict[str, list[int]] = defaultdict(list)
     async with connect(url, max_size=None) as socket:
         for topic in topics:

@@ -1,4 +1,4 @@
-"""What pages and other clients cost the simulation."""
+"""Measures the cost of pages and other clients for the simulation."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _STATUS = "/volery/status"
 
 
 def stall_figures(server: PageProcess, topics: list[str]) -> dict[str, float]:
-    """Real-time factor and memory while a client that has subscribed to `topics` stops reading."""
+    """Returns real-time factor and memory while a client of `topics` has stopped reading."""
     free, before = pace(server, _STALL_S / 3)
     with connect(server.rosbridge, max_size=None, close_timeout=1.0) as stalled:
         for topic in topics:
             stalled.send(subscription(topic))
-        stalled.recv()  # and no more: what follows fills the buffers on its way
+        stalled.recv()  # the last read: what follows fills the buffers
         held, after = pace(server, _STALL_S)
     return {
         "real_time_factor": free,
@@ -35,13 +35,13 @@ def stall_figures(server: PageProcess, topics: list[str]) -> dict[str, float]:
 
 
 def clients_figures(server: PageProcess, topics: list[str]) -> dict[str, float]:
-    """What nine clients lose that read everything of `topics`, and the pace meanwhile."""
+    """Returns the losses of nine clients that read all `topics`, and the real-time factor."""
     module = "volery.bench.page.clients"
     words = [server.rosbridge, str(_CLIENTS), str(_CLIENTS_S), *topics]
     command = [sys.executable, "-P", "-m", module, *words]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as clients:
         assert clients.stdout is not None
-        clients.stdout.readline()  # all are there
+        clients.stdout.readline()  # all clients are connected
         factor, _ = pace(server, _CLIENTS_S)
         out, _ = clients.communicate(timeout=10 * _CLIENTS_S)
     told = json.loads(out)
@@ -53,7 +53,7 @@ def clients_figures(server: PageProcess, topics: list[str]) -> dict[str, float]:
 
 
 def pace(server: PageProcess, seconds: float) -> tuple[float, float]:
-    """Simulated seconds a second over so long, and memory at its end, MB."""
+    """Returns the real-time factor over `seconds`, and the memory at the end, MB."""
     with connect(server.rosbridge) as socket:
         socket.send(json.dumps({"op": "subscribe", "topic": _STATUS, "queue_length": 1}))
         first = last = _status(socket.recv())

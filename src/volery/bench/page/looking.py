@@ -1,4 +1,4 @@
-"""What is measured inside the browser."""
+"""Measures the page inside the browser."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _SCRIPT_OF_FRAMES = """async (frames) => {
 
 @contextmanager
 def looking(browser: Browser, url: str, width: int = 640, height: int = 360) -> Iterator[Page]:
-    """The page in a window of its own, with panels closed, from when its picture is there."""
+    """Opens the page in its own window, panels closed; yields after the first frame."""
     context = browser.new_context(viewport={"width": width, "height": height})
     context.set_default_timeout(_PATIENCE_MS)
     try:
@@ -51,14 +51,14 @@ def looking(browser: Browser, url: str, width: int = 640, height: int = 360) -> 
 
 
 def wait_for_picture(page: Page) -> None:
-    """Until the world has been drawn."""
+    """Waits until the world has been drawn."""
     wait_until(page, "window.volery !== undefined && window.volery.firstPictureMs > 0")
 
 
 def wait_until(page: Page, condition: str, patience_s: float = _PATIENCE_MS / 1000.0) -> None:
-    """Until an expression holds in the page; `VoleryError` where it never does.
+    """Waits until an expression holds in the page. Raises `VoleryError` after `patience_s`.
 
-    Playwright's own way of waiting is forbidden by the page's content policy.
+    The page's content policy forbids Playwright's own waiting.
     """
     end = time.monotonic() + patience_s
     while not page.evaluate(condition):
@@ -68,12 +68,12 @@ def wait_until(page: Page, condition: str, patience_s: float = _PATIENCE_MS / 10
 
 
 def first_picture_s(page: Page) -> float:
-    """From the request for the page to the first picture with the world in it, s."""
+    """Returns the time from the request to the first frame with the world, s."""
     return float(page.evaluate("window.volery.firstPictureMs")) / 1000.0
 
 
 def initial_script_mb(page: Page) -> float:
-    """Scripts that were fetched until the first picture, each compressed by gzip, MB."""
+    """Returns the size of the scripts fetched until the first frame, compressed by gzip, MB."""
     fetched = page.evaluate(
         """() => performance.getEntriesByType("resource")
             .filter(({name, startTime}) => name.endsWith(".js")
@@ -89,7 +89,7 @@ def initial_script_mb(page: Page) -> float:
 
 
 def frame_work(page: Page) -> dict[str, float]:
-    """Work of the frame loop: medians of `script_ms`, `update_ms`; most `draw_calls`."""
+    """Returns the frame loop's load: medians of `script_ms`, `update_ms`; max of `draw_calls`."""
     found = np.array(page.evaluate(_SCRIPT_OF_FRAMES, _FRAMES))
     return {
         "script_ms": float(np.median(found[:, 0])),
@@ -99,7 +99,7 @@ def frame_work(page: Page) -> dict[str, float]:
 
 
 def shown_age_ms(page: Page, seconds: float) -> float:
-    """Age that 95 % of frames stay below, as the page's own meter tells it, ms."""
+    """Returns the median of the page's own figure for the age of 95 % of its frames, ms."""
     meter = page.get_by_role("button", name=re.compile("^Health"))
     ages, ends = [], time.monotonic() + seconds
     while time.monotonic() < ends:
@@ -108,12 +108,12 @@ def shown_age_ms(page: Page, seconds: float) -> float:
         if found:
             ages.append(float(found[1]))
     if not ages:
-        raise VoleryError("the page does not know how old what it shows is")
+        raise VoleryError("the page does not show the age of its data")
     return float(np.median(ages))
 
 
 def heap_bytes(page: Page) -> float:
-    """Live memory of the page's script, after a collection of garbage."""
+    """Returns the live memory of the page's script after garbage collection, bytes."""
     devtools = page.context.new_cdp_session(page)
     devtools.send("HeapProfiler.enable")
     devtools.send("HeapProfiler.collectGarbage")
@@ -123,5 +123,5 @@ def heap_bytes(page: Page) -> float:
 
 
 def _workers() -> set[str]:
-    """Scripts of workers, which the page's own list of resources leaves out."""
+    """Returns the worker scripts, which the page's own list of resources lacks."""
     return {path.name for path in (_STATIC / "assets").glob("worker-*.js")}

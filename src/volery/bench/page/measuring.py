@@ -1,4 +1,4 @@
-"""The bench `page`: each figure with a server and a page of its own, one after the other."""
+"""Measures the bench `page`: each figure with its own server and page, one after the other."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
 SOAK_S = 900.0
-"""Time over which the memory of an open page is watched."""
+"""Time over which the memory of an open page is measured, s."""
 _WARM_S = 30.0
-"""What a page allocates once, such as buffers that fill, is there by then."""
+"""Time after which one-time allocations of a page, such as buffers, are complete, s."""
 _OPENINGS = 3
 _AGE_S = 10.0
 _LOG = logging.getLogger("volery.bench.page")
 
 
 def measure(soak_s: float = SOAK_S) -> Measured:
-    """Figures of the bench `page`; what cannot be measured is told as a failure."""
+    """Returns the figures of the bench `page`; parts that fail are listed as failures."""
     figures: dict[str, float] = {}
     failures: dict[str, str] = {}
     with open_browser("--enable-precise-memory-info") as browser:
@@ -72,7 +72,7 @@ def _timeout() -> type[Exception]:
 
 @contextmanager
 def _serving(toml: str) -> Iterator[PageProcess]:
-    """A server that flies the scenario of a text."""
+    """Runs a server with the scenario of a text."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scenario.toml"
         path.write_text(toml, encoding="utf-8")
@@ -95,7 +95,7 @@ def _age(browser: Browser) -> dict[str, float]:
         _serving(worlds.crowd(10)) as server,
         looking(browser, server.url, 320, 180) as page,
     ):
-        page.wait_for_timeout(1000 * _AGE_S)  # until the clocks are compared
+        page.wait_for_timeout(1000 * _AGE_S)  # until the clocks are synchronized
         return {"age_p95_ms": shown_age_ms(page, _AGE_S)}
 
 
@@ -121,7 +121,7 @@ def _others(browser: Browser) -> dict[str, float]:
     ):
         figures = stall_figures(server, topics)
         figures |= clients_figures(server, topics)
-        page.evaluate("window.volery.frames")  # the page still stands
+        page.evaluate("window.volery.frames")  # the page still responds
     return figures
 
 

@@ -1,4 +1,4 @@
-"""`volery serve` in a process of its own."""
+"""Runs `volery serve` in its own process."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from typing import Any
 from volery.core.errors import VoleryError
 
 _STARTING_S = 600.0
-"""The first start compiles, and the machine may be busy."""
+"""Max start time, s: the first start compiles, and the machine may be busy."""
 _ENDING_S = 20.0
 _URL = re.compile(r"http://127\.0\.0\.1:(\d+)/")
 
 
 class PageProcess:
-    """A server and its simulation. Use it as a context manager, or call `start` and `stop`.
+    """Runs a server and its simulation, as a context manager or with `start` and `stop`.
 
     Parameters
     ----------
     scenario
         A name, or the path of a TOML file.
     options
-        Words of the command line.
+        Command-line options.
     port
-        Where to listen; 0: a free one, the same after a restart.
+        Port to listen on; 0: a free one, the same after a restart.
 
     """
 
@@ -44,23 +44,23 @@ class PageProcess:
 
     @property
     def url(self) -> str:
-        """Of the page."""
+        """URL of the page."""
         return f"http://127.0.0.1:{self.port}/"
 
     @property
     def rosbridge(self) -> str:
-        """Of the graph."""
+        """URL of the graph's rosbridge."""
         return f"ws://127.0.0.1:{self.port}/rosbridge"
 
     @property
     def pid(self) -> int:
-        """Of the process."""
+        """Id of the server's process."""
         if self._process is None:
             raise VoleryError("the server does not run")
         return self._process.pid
 
     def start(self) -> None:
-        """Start it and wait until it flies. `VoleryError` with what it said if it does not."""
+        """Starts the server and waits until it flies. Raises `VoleryError` with its output."""
         self._process = subprocess.Popen(
             [*self._command, "--port", str(self.port)],
             stdin=subprocess.DEVNULL,
@@ -82,7 +82,7 @@ class PageProcess:
             raise
 
     def stop(self) -> None:
-        """End it."""
+        """Ends the server."""
         process, self._process = self._process, None
         if process is None:
             return
@@ -97,33 +97,33 @@ class PageProcess:
             process.stdout.close()
 
     def restart(self) -> None:
-        """End it and start it anew at the same port."""
+        """Restarts the server on the same port."""
         self.stop()
         self.start()
 
     def status(self) -> dict[str, Any]:
-        """What `./api/status` says."""
+        """Returns the content of `./api/status`."""
         with urllib.request.urlopen(f"{self.url}api/status", timeout=10.0) as answer:
             told: dict[str, Any] = json.load(answer)
             return told
 
     def wait_until_flying(self) -> None:
-        """Until a simulation is there."""
+        """Waits until a simulation runs."""
         ends = time.monotonic() + _STARTING_S
         while time.monotonic() < ends:
             with suppress(OSError):
                 if self.status()["state"] == "flying":
                     return
             time.sleep(0.05)
-        raise VoleryError(f"no simulation flies: {''.join(self._said)}")
+        raise VoleryError(f"no simulation runs: {''.join(self._said)}")
 
     def __enter__(self) -> PageProcess:
-        """Start it."""
+        """Starts the server."""
         self.start()
         return self
 
     def __exit__(self, *_exception: object) -> None:
-        """Stop it."""
+        """Ends the server."""
         self.stop()
 
     def _read(self, process: subprocess.Popen[str], listening: threading.Event) -> None:

@@ -1,4 +1,4 @@
-"""What a client asks for, and what it lost of it."""
+"""Builds subscriptions and counts lost messages."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 
 
 def subscription(topic: str) -> str:
-    """What subscribes to all messages of a topic."""
+    """Returns a request that subscribes to all messages of a topic."""
     return json.dumps({"op": "subscribe", "topic": topic, "queue_length": 100})
 
 
 def lost(stamps: list[int]) -> int:
-    """How many messages of a periodic topic are missing between the first and the last."""
+    """Returns the number of messages missing between the first and last of a periodic topic."""
     steps = np.diff(stamps)
     if steps.size == 0:
         return 0

@@ -1,4 +1,4 @@
-"""Scenarios for the bench, as TOML."""
+"""Builds scenarios for the bench, as TOML."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SPACING_M = 4.0
 
 
 def crowd(uavs: int) -> str:
-    """So many UAVs that hold their places, in rows."""
+    """Returns a scenario of UAVs that hold their positions, in rows."""
     columns = math.isqrt(uavs - 1) + 1
     text = f'name = "crowd_{uavs}"\nduration_s = 1e6\n' + _UAV.format(plant="kinematic")
     for row in range(math.ceil(uavs / columns)):
@@ -36,7 +36,7 @@ on_start = "take_off"
 
 
 def forest() -> str:
-    """One UAV in a forest of 5,000 trees."""
+    """Returns a scenario of one UAV in a forest of 5,000 trees."""
     return (
         'name = "forest"\nduration_s = 1e6\n'
         + _UAV.format(plant="rigid_body")

@@ -1,7 +1,7 @@
-"""Other simulators of the field measured beside Volery; see docs/peers.md.
+"""Measures other simulators beside Volery; see docs/peers.md.
 
-Each peer lives in a virtual environment of its own (`environments`) and is driven through a pipe
-(`conversation`, `host`), because several of them need other versions of numpy than Volery does. The
+Each peer has its own virtual environment (`environments`) and is driven through a pipe
+(`conversation`, `host`), because several of them need other versions of numpy than Volery. The
 files `*_rays.py` and `*_hover.py` run with a peer's interpreter and never import volery.
 """
 
@@ -11,7 +11,7 @@ from volery.bench.registry import Measured
 
 
 def measure() -> Measured:
-    """Figures of the bench `peers`."""
+    """Returns the figures of the bench `peers`."""
     from volery.bench.peers.contests import measure_peers
 
     return measure_peers()

@@ -1,4 +1,4 @@
-"""The peers, the versions they are measured in, and what they are measured at."""
+"""Lists the peers, their pinned versions and their contests."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 RATE_HZ = 500
-"""Physics steps, and control steps of the innermost layer, a second of simulated time."""
+"""Rate of physics and of the innermost control layer in simulated time, Hz."""
 
 
 @dataclass(frozen=True)
 class RayContest:
-    """Beams of `uavs` UAVs with two scanners cast into a piece of forest, one UAV a call."""
+    """Casts beams of `uavs` UAVs with two LIDARs into a piece of forest, one UAV per call."""
 
     uavs: int = 20
     unit: ClassVar[str] = "rays"
 
     @property
     def case(self) -> str:
-        """Name within the peer."""
+        """Name of the contest within the peer."""
         return "forest"
 
     def __str__(self) -> str:
@@ -27,22 +27,22 @@ class RayContest:
 
 @dataclass(frozen=True)
 class HoverContest:
-    """UAVs that hold their places at `RATE_HZ`: `drones` in each of `worlds`."""
+    """Holds UAVs at their positions at `RATE_HZ`: `drones` in each of `worlds`."""
 
     drones: int
     worlds: int
     steps: int
-    """Physics steps that the peer does in a round."""
+    """Number of physics steps of the peer in a round."""
     unit: ClassVar[str] = "steps"
 
     @property
     def vehicles(self) -> int:
-        """UAVs altogether."""
+        """Number of UAVs in all worlds."""
         return self.drones * self.worlds
 
     @property
     def case(self) -> str:
-        """Name within the peer."""
+        """Name of the contest within the peer."""
         return f"{self.drones}_drones" if self.worlds == 1 else f"{self.worlds}_worlds"
 
     def __str__(self) -> str:
@@ -56,10 +56,10 @@ Contest = RayContest | HoverContest
 
 @dataclass(frozen=True)
 class Peer:
-    """A simulator of others.
+    """Describes another simulator.
 
-    requirements: what pip installs, each pinned; the peer itself first. script: file of this folder
-    that drives it.
+    `requirements`: pinned packages that pip installs, the peer itself first. `script`: file of
+    this folder that drives the peer.
     """
 
     name: str
@@ -73,7 +73,7 @@ class Peer:
         return tuple(requirement.partition("==")[0] for requirement in self.requirements)
 
     def figure(self, contest: Contest, what: str) -> str:
-        """Name of a figure of one of its contests."""
+        """Returns the name of a figure of one of the peer's contests."""
         return f"{self.name}_{contest.case}_{what}"
 
 

@@ -1,4 +1,4 @@
-"""Measures every peer beside ours, in turns, on one and the same core."""
+"""Measures every peer beside Volery, in turns, on one core."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ _SCRIPTS = Path(__file__).parent
 _LOG = logging.getLogger(__name__)
 _FEWEST_ROUNDS, _MOST_ROUNDS = 5, 40
 _SECONDS = 15.0
-"""Of repeated rounds for each contest."""
+"""Time of repeated rounds for each contest, s."""
 
 
 def prepare(contest: Contest, folder: Path) -> Task:
-    """The contest made ready; what the peer needs is written into `folder`."""
+    """Prepares a contest; writes the peer's files into `folder`."""
     if isinstance(contest, HoverContest):
         from volery.bench.peers.hover import hover_task
 
@@ -44,9 +44,9 @@ def measure_peers(
     scripts: Path = _SCRIPTS,
     seconds: float = _SECONDS,
 ) -> Measured:
-    """Figures of all contests; ours takes part in each, with or without its peer.
+    """Returns the figures of all contests; Volery takes part in each, with or without a peer.
 
-    What goes wrong with a peer is told in `failures` under its name, or that of the contest.
+    Errors of a peer are listed in `failures` under its name, or that of the contest.
     """
     figures: dict[str, float] = {}
     failures: dict[str, str] = {}
@@ -74,14 +74,14 @@ def measure_peers(
 
 
 class _Match:
-    """One contest of one peer with ours."""
+    """Measures one contest of one peer and Volery."""
 
     def __init__(self, peer: Peer, contest: Contest, task: Task, seconds: float) -> None:
         self._peer, self._contest, self._task = peer, contest, task
         self._seconds = seconds
 
     def play(self, python: Path | None, script: Path, folder: Path) -> Measured:
-        """Take turns with the peer; ours alone where there is none, or where it fails."""
+        """Measures in turns with the peer; Volery alone if there is none, or if it fails."""
         failures = {}
         if python is not None:
             request = {**self._task.request, "packages": self._peer.packages}
@@ -124,7 +124,7 @@ class _Match:
 
 
 def _medians(rounds: Sequence[Callable[[], float]], seconds: float) -> list[float]:
-    """Median seconds of each, which tell their own; in turns, after a round to warm up."""
+    """Returns the median of the returned times of each, s; in turns, after a warm-up round."""
     taken: list[list[float]] = [[] for _ in rounds]
     for each in rounds:
         each()
@@ -139,7 +139,7 @@ def _medians(rounds: Sequence[Callable[[], float]], seconds: float) -> list[floa
 
 @contextmanager
 def _one_core() -> Iterator[None]:
-    """Keep the calling thread, and processes that it starts meanwhile, to one core."""
+    """Pins the calling thread, and processes that it starts, to one core."""
     cores = os.sched_getaffinity(0)
     os.sched_setaffinity(0, {max(cores)})
     try:

@@ -1,4 +1,4 @@
-"""A peer at work in a process of its own: words go in, JSON lines come out (see `host`)."""
+"""Drives a peer in its own process: command words in, JSON lines out (see `host`)."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from volery.bench.peers.failure import PeerError, last_line
 
 _HOST = Path(__file__).with_name("host.py")
 START_TIMEOUT_S = 300.0
-"""For imports, building the scene and the first answer."""
+"""For imports, building the scene and the first response, s."""
 ROUND_TIMEOUT_S = 180.0
 
 
 class Conversation:
-    """Starts `script` with the interpreter `python`; everything fails as PeerError.
+    """Runs `script` with the interpreter `python`; all errors are PeerErrors.
 
-    request: what the script's `prepare` gets, as plain data. folder: where it is written.
+    `request` is the plain data for the script's `prepare`; it is written into `folder`.
     """
 
     def __init__(
@@ -72,24 +72,24 @@ class Conversation:
         self.close()
 
     def versions(self) -> dict[str, str]:
-        """Versions of the packages that the request names; waits until the peer is ready."""
+        """Returns the versions of the request's packages; waits until the peer is ready."""
         found = {str(k): str(v) for k, v in self._ask("versions").items()}
         self._timeout_s = self._round_timeout_s
         return found
 
     def round(self) -> float:
-        """Let it do a round; seconds that it took by the peer's own clock."""
+        """Runs a round; returns the seconds that it took by the peer's own clock."""
         try:
             return float(self._ask("round")["seconds"])
         except (KeyError, TypeError, ValueError):
-            raise PeerError("answered a round without its seconds") from None
+            raise PeerError("responded to a round without its seconds") from None
 
     def facts(self) -> dict[str, Any]:
-        """What the script tells for checking."""
+        """Returns the script's data for checks."""
         return self._ask("facts")
 
     def close(self) -> None:
-        """End it, and whatever it started."""
+        """Ends the peer and all processes that it started."""
         if self._process.poll() is None:
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
@@ -105,14 +105,14 @@ class Conversation:
         self._lines.put("")
 
     def _ask(self, word: str) -> dict[str, Any]:
-        # where it has ended, its last line on standard error, read below, says why
+        # if the peer has ended, the last line of its standard error, read below, has the reason
         with contextlib.suppress(BrokenPipeError):
             self._words.write(word + "\n")
             self._words.flush()
         try:
             line = self._lines.get(timeout=self._timeout_s)
         except queue.Empty:
-            raise PeerError(f"no answer to '{word}' within {self._timeout_s:g} s") from None
+            raise PeerError(f"no response to '{word}' within {self._timeout_s:g} s") from None
         if not line:
             raise PeerError(self._last_complaint())
         try:

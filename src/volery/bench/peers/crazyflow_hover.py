@@ -1,4 +1,4 @@
-"""Crazyflow with its state controller on the CPU; runs with its own interpreter (see `host`)."""
+"""Drives Crazyflow with its state controller on the CPU, with its own interpreter."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from crazyflow.dynamics import Dynamics
 from crazyflow.sim import Sim
 
 _POSITION_HZ = 100
-"""Of its position layer, as it comes; attitude and torques run at every step."""
+"""Default rate of its position layer, Hz; attitude and torques run at every step."""
 _COMMAND = 16
-"""Place, velocity, acceleration, attitude (x y z w), body rates."""
+"""Position, velocity, acceleration, attitude (x y z w), body rates."""
 _QUATERNION_W = 12
 
 
 def prepare(request: dict[str, Any]) -> tuple[Callable[[], Any], Callable[[], dict[str, Any]]]:
-    """A round is one call of `steps`; facts are how far drones are from their places."""
+    """Returns functions: a round of `steps` in one call; the drones' max position error, m."""
     rate = request["rate_hz"]
     sim = Sim(
         n_worlds=request["worlds"],

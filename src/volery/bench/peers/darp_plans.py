@@ -1,4 +1,4 @@
-"""DARP and spanning-tree coverage of github.com/alice-st/DARP; runs with its own interpreter.
+"""Drives DARP and spanning-tree coverage of github.com/alice-st/DARP, with its interpreter.
 
 The folder with its modules is the user's; see `host` and `volery.bench.coverage`.
 """
@@ -14,7 +14,7 @@ import numpy as np
 
 
 def prepare(request: dict[str, Any]) -> tuple[Callable[[], Any], Callable[[], dict[str, Any]]]:
-    """A round plans one case; facts are the sub-cells of each tour."""
+    """Returns functions: a round that plans one case; the number of sub-cells of each tour."""
     sys.path.insert(0, request["folder"])
     from multiRobotPathPlanner import MultiRobotPathPlanner
 

@@ -1,4 +1,4 @@
-"""A virtual environment for each peer, made once and kept below the user's cache folder."""
+"""Installs a virtual environment for each peer, once, below the user's cache folder."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from volery.bench.peers.failure import PeerError, last_line
 from volery.core.compiled import cache_root
 
 INSTALL_TIMEOUT_S = 900.0
-"""For a peer that has no wheel for this machine and must be compiled."""
+"""For a peer without a wheel for this machine, which must be compiled, s."""
 _DONE = "requirements.txt"
 
 
 def environment(peer: Peer, root: Path | None = None, timeout_s: float = INSTALL_TIMEOUT_S) -> Path:
-    """Interpreter with the pinned requirements of `peer`. PeerError if they cannot be had.
+    """Returns an interpreter with the pinned requirements of `peer`. Raises `PeerError`.
 
-    root: folder of all such environments; by default in the user's cache. One with the same
-    requirements is used again.
+    `root` is the folder of all such environments, by default in the user's cache. An environment
+    with the same requirements is reused.
     """
     root = cache_root() / "peers" if root is None else root
     wanted = "\n".join((f"# Python {sys.version}", *peer.requirements))
@@ -45,7 +45,7 @@ def environment(peer: Peer, root: Path | None = None, timeout_s: float = INSTALL
 
 
 def _make(folder: Path, python: Path, requirements: Sequence[str], timeout_s: float) -> None:
-    """A new environment, or none if it fails."""
+    """Creates an environment; removes it if that fails."""
     shutil.rmtree(folder, ignore_errors=True)
     pip = [str(python), "-I", "-m", "pip", "--disable-pip-version-check", "--no-input"]
     try:
@@ -57,7 +57,7 @@ def _make(folder: Path, python: Path, requirements: Sequence[str], timeout_s: fl
 
 
 def _run(command: Sequence[str], timeout_s: float) -> None:
-    """Run to the end with everything it starts. PeerError with its last line otherwise."""
+    """Runs a command with all its processes. Raises `PeerError` with the last line of output."""
     with tempfile.TemporaryFile() as log:
         process = subprocess.Popen(
             command,

@@ -1,4 +1,4 @@
-"""What goes wrong with a peer: reported beside the figures, never the end of the bench."""
+"""Defines the error of a peer, which is reported beside the figures."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from volery.core.errors import VoleryError
 
 
 class PeerError(VoleryError):
-    """A peer cannot be installed, started or driven, or computes something else than ours."""
+    """Reports that a peer cannot be installed, started or driven, or that its results differ."""
 
 
 def last_line(text: str) -> str:
-    """The last line that is not blank, shortened; "" if there is none."""
+    """Returns the last line that is not blank, shortened; "" if there is none."""
     lines = [line.strip() for line in text.splitlines() if line.strip()]
     return lines[-1][:300] if lines else ""

@@ -1,13 +1,13 @@
 """Drives one peer; runs with the peer's own interpreter and never imports volery.
 
 python -I host.py SCRIPT REQUEST: loads SCRIPT and calls its `prepare(request)` with the JSON object
-in the file REQUEST. It gets back two functions: one that does a round of work, and one that tells
-facts by which the work can be checked. Then each line of standard input, a word, is answered by a
-line of JSON on standard output:
+in the file REQUEST. It returns two functions: one that runs a round of work, and one that returns
+facts for checking the work. Then the program responds to each line of standard input, a word, with
+a line of JSON on standard output:
 
     versions   version of each package of request["packages"]
-    round      {"seconds": s}: a round was done, and how long it took
-    facts      what the script tells
+    round      {"seconds": s}: a round was run, and its duration
+    facts      the script's facts
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from typing import Any
 
 
 def main(script: str, request_file: str) -> None:
-    """Answer until standard input ends."""
-    # peers greet and warn on standard output, so it is theirs and the answers get a copy
+    """Responds until standard input ends."""
+    # peers print on standard output, so they keep it and the responses use a copy
     with os.fdopen(os.dup(1), "w", encoding="utf-8") as answers:
         os.dup2(2, 1)
         with open(request_file, encoding="utf-8") as file:

@@ -1,8 +1,8 @@
-"""Vehicles beside a peer: UAVs that hold their places, 2 m apart and 10 m above ground.
+"""Measures hovering beside a peer: UAVs that hold positions 2 m apart, 10 m above ground.
 
-Ours does one physics step at the peer's rate, rotor lag, drag, wind and contact with the ground
-included; rates are controlled at every step, attitude and position at half and a quarter of that
-rate. UAVs of a `Fleet` do not touch or disturb each other, so a row is also a world of its own.
+Volery runs one physics step at the peer's rate, including rotor lag, drag, wind and ground contact;
+rates are controlled at every step, attitude and position at half and a quarter of that rate. UAVs
+of a `Fleet` do not touch or disturb each other, so a row is also a world of its own.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from volery.vehicle.airframe import load_airframe
 from volery.world.terrain import Terrain
 
 FARTHEST_M = 0.5
-"""A drone farther from its place does not hover; its speed is not compared. Modelling choice."""
+"""Max position error of a hover, m; beyond it speeds are not compared. Modelling choice."""
 _APART_M, _ALTITUDE_M = 2.0, 10.0
 _STEPS = 500
 
@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 
 def hover_task(contest: HoverContest) -> Task:
-    """The contest made ready."""
+    """Prepares the contest."""
     places = _places(contest.vehicles)
     fleet = _fleet(places)
     terrain = Terrain.flat(4000.0, 0.0, (-2000.0, -2000.0)).grid
@@ -42,7 +42,7 @@ def hover_task(contest: HoverContest) -> Task:
     def check(facts: Mapping[str, Any] | None) -> dict[str, float]:
         ours = float(np.linalg.norm(fleet.state.position_map - places, axis=1).max())
         if not ours <= FARTHEST_M:
-            raise AssertionError(f"a UAV of ours is {ours:.3g} m from its place")
+            raise AssertionError(f"a UAV of ours is {ours:.3g} m from its position")
         if facts is not None:
             check_hover(facts)
         return {}
@@ -65,18 +65,18 @@ def hover_task(contest: HoverContest) -> Task:
 
 
 def check_hover(facts: Mapping[str, Any]) -> None:
-    """PeerError unless the peer's drones are at their places."""
+    """Raises `PeerError` unless the peer's drones are at their positions."""
     error = facts.get("position_error_m")
     if not isinstance(error, int | float):
-        raise PeerError("does not tell position_error_m")
+        raise PeerError("does not report position_error_m")
     if not error <= FARTHEST_M:
         raise PeerError(
-            f"a drone is {error:.3g} m from its place; up to {FARTHEST_M:g} m is hovering"
+            f"a drone is {error:.3g} m from its position; up to {FARTHEST_M:g} m is hovering"
         )
 
 
 def _places(count: int) -> Array:
-    """(count, 3) m."""
+    """Returns positions (count, 3), m."""
     across = int(np.ceil(np.sqrt(count)))
     row, column = np.divmod(np.arange(count), across)
     altitude = np.full(count, _ALTITUDE_M)

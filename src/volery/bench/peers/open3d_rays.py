@@ -1,6 +1,6 @@
-"""Open3D's `RaycastingScene`; runs with its own interpreter (see `host`).
+"""Drives Open3D's `RaycastingScene`, with its own interpreter (see `host`).
 
-All meshes of the request are one. Its call knows no reach; hits beyond are dropped for the check.
+All meshes of the request are one. Its call has no max range; the check drops farther hits.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import open3d
 
 
 def prepare(request: dict[str, Any]) -> tuple[Callable[[], Any], Callable[[], dict[str, Any]]]:
-    """A round casts all batches on one thread; facts leave the distances in a file."""
+    """Returns functions: a round on one thread; facts that save the distances to a file."""
     data = np.load(request["arrays"])
     scene = open3d.t.geometry.RaycastingScene(nthreads=1)
     scene.add_triangles(open3d.core.Tensor(data["vertices"]), open3d.core.Tensor(data["triangles"]))

@@ -1,6 +1,6 @@
-"""PyBullet's `rayTestBatch`; runs with its own interpreter (see `host`).
+"""Drives PyBullet's `rayTestBatch`, with its own interpreter (see `host`).
 
-Each mesh of the request is a body that cannot move, with its triangles as they are.
+Each mesh of the request is an immovable body with its triangles unchanged.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import pybullet
 
 
 def prepare(request: dict[str, Any]) -> tuple[Callable[[], Any], Callable[[], dict[str, Any]]]:
-    """A round casts all batches on one thread; facts leave the distances in a file."""
+    """Returns functions: a round on one thread; facts that save the distances to a file."""
     data = np.load(request["arrays"])
     reach = request["reach_m"]
     pybullet.connect(pybullet.DIRECT)
@@ -29,7 +29,7 @@ def prepare(request: dict[str, Any]) -> tuple[Callable[[], Any], Callable[[], di
         )
         pybullet.createMultiBody(0, shape)
     origins, ends = data["origins"], data["origins"] + reach * data["directions"]
-    # lists, which it takes faster than arrays; making them is not measured
+    # lists, which PyBullet processes faster than arrays; their conversion is not measured
     batches = [
         (origins[i : i + request["batch"]].tolist(), ends[i : i + request["batch"]].tolist())
         for i in range(0, len(origins), request["batch"])

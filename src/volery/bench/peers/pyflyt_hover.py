@@ -1,4 +1,4 @@
-"""PyFlyt's `Aviary` with position control; runs with its own interpreter (see `host`)."""
+"""Drives PyFlyt's `Aviary` with position control, with its own interpreter (see `host`)."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 from PyFlyt.core import Aviary
 
 _POSITION = 7
-"""Its flight mode for x, y, yaw, z."""
+"""Flight mode for x, y, yaw, z."""
 
 
 def prepare(request: dict[str, Any]) -> tuple[Callable[[], Any], Callable[[], dict[str, Any]]]:
-    """A round is `steps` of physics and control; facts are how far drones are from their places."""
+    """Returns functions: a round of `steps`; the drones' max position error, m."""
     if request["worlds"] != 1:
         raise ValueError("an Aviary is one world")
     places = np.array(request["places"])

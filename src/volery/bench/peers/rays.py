@@ -1,9 +1,9 @@
-"""Ray casting beside a peer: the same beams into the same piece of forest.
+"""Measures ray casting beside a peer: the same beams into the same piece of forest.
 
 The piece has 150 m x 150 m and 450 trees at the sensors' detail (375,000 triangles; the 5,000 trees
-of the bench `lidar` would be 4 million, too many for peers that store each tree as often as it
-stands). Ours instances its trees; the peer gets their triangles. Two scanners of a UAV make a batch
-of 2162 rays, cast by one call on one thread: distance, normal and object of each closest hit.
+of the bench `lidar` would be 4 million, too many for peers that store every tree separately).
+Volery instances its trees; the peer gets their triangles. Two LIDARs of a UAV make a batch of 2162
+rays, cast by one call on one thread: distance, normal and object of each closest hit.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from volery.world.terrain import Terrain
 
 TOLERANCE_M = 0.01
 LEAST_AGREEMENT = 0.99
-"""Share of rays that must agree before speeds are compared; the rest graze edges of leaves.
-Modelling choice."""
+"""Min fraction of rays that must agree before speeds are compared; the rest graze edges of
+leaves. Modelling choice."""
 
 Array = NDArray[np.float64]
 
 
 def ray_task(contest: RayContest, folder: Path) -> Task:
-    """The contest made ready; arrays for the peer are written into `folder`."""
+    """Prepares the contest; writes the peer's arrays into `folder`."""
     terrain = Terrain.flat(extent_m=PIECE_M)
     forest = forest_of(PIECE_M, terrain)
     scene = Scene(terrain, forest)
@@ -74,7 +74,7 @@ def ray_task(contest: RayContest, folder: Path) -> Task:
 
 
 def write_rays(path: Path, meshes: list[Mesh], origins: Array, directions: Array) -> None:
-    """Meshes and rays as an .npz file.
+    """Writes meshes and rays as an .npz file.
 
     vertices (V, 3) float32, triangles (T, 3) uint32 rows of all vertices, first_vertex and
     first_triangle (M + 1,) where each mesh begins, origins and directions (R, 3), m, map.
@@ -94,7 +94,7 @@ def write_rays(path: Path, meshes: list[Mesh], origins: Array, directions: Array
 
 
 def read_distances(path: Path, count: int) -> Array:
-    """Distances (R,) that a peer left, m; infinity for a miss. PeerError unless all are there."""
+    """Returns a peer's distances (R,), m; infinity for a miss. Raises `PeerError`."""
     try:
         found = np.asarray(np.load(path), dtype=np.float64)
     except (OSError, ValueError) as error:
@@ -105,7 +105,7 @@ def read_distances(path: Path, count: int) -> Array:
 
 
 def agreement(ours: Array, theirs: Array) -> float:
-    """Share of rays that both miss, or that hit within `TOLERANCE_M` of each other."""
+    """Returns the fraction of rays that both miss, or hit within `TOLERANCE_M`."""
     hit = np.isfinite(ours) & np.isfinite(theirs)
     near = np.abs(np.subtract(ours, theirs, out=np.full(len(ours), np.inf), where=hit))
     return float(((near <= TOLERANCE_M) | (np.isposinf(ours) & np.isposinf(theirs))).mean())

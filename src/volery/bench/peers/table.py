@@ -1,4 +1,4 @@
-"""Figures of the bench `peers` as a table of Markdown: a row for each contest."""
+"""Renders the figures of the bench `peers` as a Markdown table: one row per contest."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _HEAD = """\
 def peers_table(
     figures: Mapping[str, float], versions: Mapping[str, str], peers: Sequence[Peer] = PEERS
 ) -> str:
-    """The table, and the versions measured below it; "-" where there is no figure."""
+    """Returns the table with the measured versions below; "-" where a figure is missing."""
     rows = [_row(figures, peer, contest) for peer in peers for contest in peer.contests]
     lines = [f"- {name}: {text}\n" for name, text in versions.items()]
     return _HEAD + "".join(rows) + ("\n" + "".join(lines) if lines else "")

@@ -1,4 +1,4 @@
-"""A contest made ready: what ours does in a round, what the peer is asked, how it is checked."""
+"""Defines a prepared contest: Volery's round, the peer's request and the check."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Task:
-    """One contest, from our side.
+    """Describes one contest from Volery's side.
 
-    ours: does one round. amount, peer_amount: rays or drone-steps in a round of ours and of the
-    peer's. request: plain data for the peer's script. check: after the rounds, judges ours and the
-    peer's facts (None without a peer); returns further figures, raises PeerError where the peer
-    computes something else. close: lets go of what the contest holds. simulated_per_s: drone-steps
-    in a second of simulated time; None where no time passes.
+    `ours` runs one round. `amount` and `peer_amount` are rays or drone-steps in a round of Volery
+    and of the peer. `request` is plain data for the peer's script. `check` judges Volery and the
+    peer's facts (None without a peer) after the rounds; it returns further figures and raises
+    `PeerError` if the peer's results differ. `close` releases resources. `simulated_per_s` is the
+    number of drone-steps per simulated second; None if no time passes.
     """
 
     ours: Callable[[], object]

@@ -1,4 +1,4 @@
-"""From a scenario's things to what moves through its world."""
+"""Builds the actors of a scenario."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from volery.world.actors.motions import (
 from volery.world.terrain import Terrain
 
 _TURN_M = {"person": 0.3, "car": 2.0, "bird": 2.0}
-"""How far ahead of a waypoint, and behind it, a thing turns: a modelling choice."""
+"""Distance before and after a waypoint within which an actor turns, m: a modelling choice."""
 
 
 def build_actors(scenario: Scenario, terrain: Terrain) -> MovingActors | None:
-    """Things of the scenario, None without any."""
+    """Returns the actors of the scenario; None without any."""
     if not scenario.world.actors:
         return None
     shapes = {name: SHAPES[name]() for name in {actor.shape for actor in scenario.world.actors}}

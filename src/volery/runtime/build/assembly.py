@@ -1,4 +1,4 @@
-"""Everything of a simulation that is built for a given set of UAVs."""
+"""Builds everything of a simulation that depends on the set of UAVs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Assembly:
-    """A fleet at its start, with sensors and estimators."""
+    """Holds a fleet at its start, with sensors and estimators."""
 
     fleet: Fleet
     fitted: list[SensorInstance]
@@ -31,10 +31,10 @@ class Assembly:
 
 
 def assemble(scenario: Scenario, starts: Sequence[StartPose], scene: Scene) -> Assembly:
-    """Build the UAVs of `starts`, whose bodies take the place of those in `scene`.
+    """Builds the UAVs of `starts` and replaces the bodies in `scene` by theirs.
 
-    Raises `ScenarioError` and `DataFileError` for what cannot be built; the scene is unchanged
-    then.
+    Raises `ScenarioError` or `DataFileError` if a part cannot be built; the scene is then
+    unchanged.
     """
     fleet = build_fleet(scenario, starts, tuple(start.name for start in starts))
     fitted = fit_sensors(scenario, starts)

@@ -1,4 +1,4 @@
-"""Estimators of a scenario: what each listens to, and what it knows of its sensors."""
+"""Builds the estimators of a scenario: their inputs and their sensor parameters."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ if TYPE_CHECKING:
 
 _AIDS = ("imu", "gnss", "barometer", "magnetometer", "sonar")
 _START_M, _START_M_S, _START_TILT_RAD, _START_HEADING_RAD = 0.5, 0.02, 0.01, 0.03
-"""How near the truth estimates begin, one standard deviation (modelling choices): a UAV is put on a
-surveyed place, at rest, and aligned by gravity and compass."""
+"""Standard deviations of the initial estimate's error (modelling choices): a UAV starts on a
+surveyed position, at rest, aligned by gravity and compass."""
 
 
 def build_estimation(
     scenario: Scenario, fitted: Sequence[SensorInstance], fleet: Fleet
 ) -> Estimation | None:
-    """Estimators of the UAVs that have a sensor of kind "estimate"; None where there are none."""
+    """Returns the estimators of the UAVs with a sensor of kind "estimate"; None without any."""
     wanted = [sensor for sensor in fitted if sensor.spec.kind == "estimate"]
     if not wanted:
         return None
-    # Late: their kernels take seconds to compile and most scenarios need none of them.
+    # Late import: the kernels take seconds to compile and most scenarios need none of them.
     from volery.control.estimator.estimator import Estimator
     from volery.control.estimator.settings import StartSigmas
     from volery.engine.estimation import Estimation, EstimationSetup
@@ -75,7 +75,7 @@ def build_estimation(
 
 
 class _Knowledge:
-    """What estimators know of their sensors: the numbers of the data files, each read once."""
+    """Reads the sensor parameters of estimators from the data files, each once."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._model = scenario.access.find_model
@@ -84,19 +84,19 @@ class _Knowledge:
         self._gnss: dict[str, GnssModel] = {}
 
     def settings(self, aids: Mapping[str, SensorInstance]) -> EstimatorSettings:
-        """Settings of an estimator that listens to `aids`."""
+        """Returns the settings of an estimator that uses `aids`."""
         key = tuple((kind, aid.spec) for kind, aid in sorted(aids.items()))
         if key not in self._settings:
             self._settings[key] = self._make_settings(aids)
         return self._settings[key]
 
     def gyro_variance(self, aids: Mapping[str, SensorInstance]) -> float:
-        """rad^2/s^2 of one gyroscope reading."""
+        """Returns the variance of one gyroscope sample, rad^2/s^2."""
         settings = self.settings(aids)
         return settings.gyro_noise_density_rad_s_sqrt_hz**2 * settings.imu_rate_hz
 
     def drift_variance(self, aids: Mapping[str, SensorInstance]) -> tuple[float, float, float]:
-        """m^2 of the receiver's slow error, east, north, up; zero without one."""
+        """Returns the variance of the receiver's drift, m^2, east, north, up; zero without one."""
         horizontal, _, vertical = self._drift(aids)
         return horizontal**2, horizontal**2, vertical**2
 

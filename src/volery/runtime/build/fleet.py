@@ -1,4 +1,4 @@
-"""Fleet and bodies of a scenario."""
+"""Builds the fleet and the bodies of a scenario."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from volery.world.terrain import Terrain
 
 
 def place(scenario: Scenario, scene: Scene, terrain: Terrain) -> tuple[StartPose, ...]:
-    """Where every UAV starts. Raises `ScenarioError` for what cannot be."""
+    """Returns the start pose of every UAV. Raises `ScenarioError` for invalid ones."""
     return place_uavs(scenario, airframes_of(scenario), scene, terrain)
 
 
 def check_types(scenario: Scenario) -> None:
-    """Raise a `ScenarioError` where UAVs of some type could not be built, in whatever world."""
+    """Raises `ScenarioError` if UAVs of some type cannot be built, in any world."""
     for name, airframe in airframes_of(scenario).items():
         plant_of_type(scenario, name, airframe)
 
 
 def airframes_of(scenario: Scenario) -> dict[str, Airframe]:
-    """Airframe of each type. Raises `ScenarioError` for one that cannot be, or wear of another."""
+    """Returns the airframe of each type. Raises `ScenarioError` if it, or its wear, is invalid."""
     airframes: dict[str, Airframe] = {}
     for name, kind in scenario.types.items():
         try:
@@ -59,9 +59,9 @@ def airframes_of(scenario: Scenario) -> dict[str, Airframe]:
 def build_fleet(
     scenario: Scenario, starts: Sequence[StartPose], names: Sequence[str], *, copies: int = 1
 ) -> Fleet:
-    """The UAVs at their places in the scenario's weather, `names` in messages.
+    """Returns the fleet at its start in the scenario's weather, with `names` in messages.
 
-    `copies`: how often `starts` holds the scenario's UAVs, copy after copy.
+    `copies` is the number of environments in `starts`, one after the other.
     """
     physics = scenario.physics
     fleet = Fleet(
@@ -87,7 +87,7 @@ def build_fleet(
 
 
 def check_free(fleet: Fleet, row: int, position_map: NDArray[np.float64]) -> None:
-    """`CommandError` where another UAV is too near to `position_map` (3,) m for UAV `row`."""
+    """Raises `CommandError` if another UAV is too near to `position_map` (3,), m, for UAV `row`."""
     radius = np.array([airframe.body.collision_radius_m for airframe in fleet.airframes])
     apart = np.linalg.norm(fleet.state.position_map - position_map, axis=1)
     apart[row] = np.inf
@@ -99,7 +99,7 @@ def check_free(fleet: Fleet, row: int, position_map: NDArray[np.float64]) -> Non
 
 
 def add_bodies(scene: Scene, starts: Sequence[StartPose], *, copies: int = 1) -> None:
-    """Make the UAVs' bodies visible to the sensors of their own copy."""
+    """Makes the UAVs' bodies visible to the sensors of their own environment."""
     kinds: list[Airframe] = []
     for start in starts:
         if start.airframe not in kinds:  # files may give two airframes one name

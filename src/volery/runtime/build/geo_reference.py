@@ -1,4 +1,4 @@
-"""What a scenario says about the map's place on the earth, its magnetic field and GNSS denial."""
+"""Builds the map's geographic frame, magnetic field and GNSS denial of a scenario."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from volery.world.magnetic_field import angles_of_field, field_enu, field_of_ang
 
 
 def local_frame(world: World) -> LocalFrame:
-    """The map as a frame on the earth."""
+    """Returns the map as a local frame on the earth."""
     origin = world.origin
     return LocalFrame.from_degrees(origin.latitude_deg, origin.longitude_deg, origin.altitude_m)
 
 
 def magnetic_field_map(world: World) -> NDArray[np.float64]:
-    """Field over the map (3,), T: the earth's at the origin, but for what the scenario states."""
+    """Returns the field in the map frame (3,), T: the scenario's, by default the earth's."""
     wanted = world.magnetic_field
     declination, inclination, strength = angles_of_field(field_enu(local_frame(world)))
     if wanted.declination_deg is not None:
@@ -34,7 +34,7 @@ def magnetic_field_map(world: World) -> NDArray[np.float64]:
 
 
 def denial(world: World) -> GnssDenial:
-    """Where the scenario denies satellite signals."""
+    """Returns the areas in which the scenario denies satellite signals."""
     return GnssDenial(world.gnss_denied, tuple(_prism(area) for area in world.gnss_denied_areas))
 
 

@@ -1,4 +1,4 @@
-"""What stands in a running world: the parts that a picture of it is made of, and its name."""
+"""Defines the geometry of a running world, and its id."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from volery.world.terrain import Terrain
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """Ground, trees and solids of a world at one time; no part is ever written to."""
+    """Holds ground, trees and solids of a world at one time; no part is ever modified."""
 
     terrain: Terrain
     forest: Forest | None = None
@@ -29,7 +29,7 @@ class Geometry:
 
     @cached_property
     def id(self) -> str:
-        """24 hexadecimal digits, the same wherever and whenever the same things stand there."""
+        """24 hexadecimal digits, equal for equal geometry on any machine at any time."""
         taken = hashlib.blake2b(digest_size=12)
         for part in self._parts():
             taken.update(repr(part).encode() if not isinstance(part, np.ndarray) else part.data)
@@ -50,7 +50,7 @@ class Geometry:
 
 
 def _plain(parts: tuple[Any, ...]) -> Iterator[Any]:
-    """Arrays as they lie in memory, after their shapes; other values as they are."""
+    """Yields the shape and memory of arrays, and other values unchanged."""
     for part in parts:
         if isinstance(part, np.ndarray):
             yield part.shape
@@ -60,7 +60,7 @@ def _plain(parts: tuple[Any, ...]) -> Iterator[Any]:
 
 
 class WorldTopic:
-    """Tells on `/volery/world`, latched, the id of the geometry that stands there."""
+    """Publishes the id of the present geometry on `/volery/world`, latched."""
 
     def __init__(self, graph: Graph, geometry: Callable[[], Geometry]) -> None:
         self._publisher = graph.advertise("/volery/world", String, latched=True)
@@ -68,7 +68,7 @@ class WorldTopic:
         self._told = ""
 
     def tell(self) -> None:
-        """Publish the id where it has changed; for the simulation's thread."""
+        """Publishes the id if it has changed; call it in the simulation's thread."""
         present = self._geometry().id
         if present != self._told:
             self._told = present

@@ -1,4 +1,4 @@
-"""What of a scenario takes part in the graph: sensors' topics, nodes, faults and the end."""
+"""Connects a scenario to the graph: sensor topics, nodes, faults and the end of the run."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from volery.sensors.samples import JointAngles
 
 
 def announce_sensors(publisher: GraphPublisher, fitted: Sequence[SensorInstance]) -> None:
-    """Advertise what the sensors publish."""
+    """Advertises the topics of the sensors."""
     for sensor in fitted:
         if sensor.lidar is not None:
             publisher.announce_lidar(sensor.id, sensor.lidar, sensor.topic, sensor.mount)
@@ -41,7 +41,7 @@ def announce_sensors(publisher: GraphPublisher, fitted: Sequence[SensorInstance]
 
 
 START_POSE = "{start_pose}"
-"""A node's parameter with this value gets the place of take-off, as people measure it."""
+"""Placeholder in a node's parameters for the UAV's start pose: x, y, z, m, and yaw, rad."""
 
 
 def start_nodes(
@@ -51,7 +51,7 @@ def start_nodes(
     engine: Engine,
     now_ns: Callable[[], int],
 ) -> list[Node]:
-    """The nodes that run beside the UAVs, in fleet order."""
+    """Starts the nodes of the UAVs `starts`, in fleet order."""
     nodes = []
     for start in starts:
         for k, entry in enumerate(scenario.types[start.type_name].nodes):
@@ -63,7 +63,7 @@ def start_nodes(
 
 
 def _with_start(entry: NodeEntry, start: StartPose) -> NodeEntry:
-    """An entry whose parameters know where the UAV begins: x, y, z, m, and yaw, rad, in the map."""
+    """Returns the entry with the start pose in place of `START_POSE`: x, y, z, m; yaw, rad; map."""
     if START_POSE not in entry.parameters.values():
         return entry
     pose = [*start.position_map.tolist(), float(rotations.yaw_of(start.attitude))]
@@ -74,7 +74,7 @@ def _with_start(entry: NodeEntry, start: StartPose) -> NodeEntry:
 def start_system_nodes(
     scenario: Scenario, graph: Graph, engine: Engine, now_ns: Callable[[], int]
 ) -> list[Node]:
-    """The nodes of the whole system, in the order of the scenario."""
+    """Starts the nodes of the whole system, in the order of the scenario."""
     nodes = []
     for k, entry in enumerate(scenario.nodes):
         context = _context(scenario, entry, graph, engine, now_ns)
@@ -97,7 +97,7 @@ def _context(
 
 
 def plan_faults(plan: FaultPlan, scenario: Scenario) -> None:
-    """Plan the scenario's faults; `ScenarioError` names the one that cannot be."""
+    """Plans the scenario's faults. Raises `ScenarioError` with the key of an invalid one."""
     for k, fault in enumerate(scenario.faults):
         try:
             plan.add(fault)
@@ -106,7 +106,7 @@ def plan_faults(plan: FaultPlan, scenario: Scenario) -> None:
 
 
 def all_down(uavs: Mapping[str, Uav], events: Sequence[Event]) -> bool:
-    """Whether every UAV has flown and is down for good."""
+    """Returns whether every UAV has crashed, or has flown and landed."""
     modes = [uav.mode for uav in uavs.values()]
     flown = {event.uav for event in events}
     return all(

@@ -1,4 +1,4 @@
-"""From a scenario's grid maps to the blocks that stand in its world."""
+"""Builds the blocks of a scenario's grid maps."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from volery.world.scene import Solid
 from volery.world.terrain import Terrain
 
 BLOCK_NAME = "block"
-"""What a contact with any of the blocks is told of."""
+"""Name of all blocks in contact events."""
 
 
 def read_grid_map(scenario: Scenario, entry: GridMapFile) -> GridMap:
-    """A map as the scenario shows it at the start. Raises `ScenarioError`, `DataFileError`."""
+    """Returns a map as at the start. Raises `ScenarioError` or `DataFileError`."""
     world = scenario.world.grid_map
     assert world is not None
     key = f"{scenario.name}: world.grid_map.maps: '{entry.called}'"
@@ -32,7 +32,7 @@ def read_grid_map(scenario: Scenario, entry: GridMapFile) -> GridMap:
 
 
 def starting_grid_map(scenario: Scenario) -> GridMap | None:
-    """The map at the start; None without one."""
+    """Returns the map at the start; None without one."""
     world = scenario.world.grid_map
     if world is None or world.starting is None:
         return None
@@ -41,7 +41,7 @@ def starting_grid_map(scenario: Scenario) -> GridMap | None:
 
 
 def starting_blocks(scenario: Scenario, terrain: Terrain) -> tuple[Solid, ...]:
-    """Blocks at the start. Raises `ScenarioError` where they cannot stand there."""
+    """Returns the blocks at the start. Raises `ScenarioError` if they exceed the terrain."""
     grid = starting_grid_map(scenario)
     if grid is None:
         return ()
@@ -52,10 +52,10 @@ def starting_blocks(scenario: Scenario, terrain: Terrain) -> tuple[Solid, ...]:
 
 
 def blocks_of(grid: GridMap, terrain: Terrain) -> tuple[Solid, ...]:
-    """The blocks of a map as one solid, or none where nothing is blocked.
+    """Returns the blocks of a map as one solid; no solid if no cell is blocked.
 
-    They stand on the ground; where that is uneven they reach from its lowest point below them to
-    `block_height_m` above its highest. Raises `CommandError` where they would stand beyond it.
+    They stand on the ground and extend from its lowest point below them to `block_height_m` above
+    its highest one. Raises `CommandError` if they exceed the terrain.
     """
     bounds = grid.bounds_of_blocks()
     if bounds is None:
@@ -65,8 +65,8 @@ def blocks_of(grid: GridMap, terrain: Terrain) -> tuple[Solid, ...]:
     if not inside:
         reach = "({:g}, {:g}) to ({:g}, {:g})".format(*bounds)
         raise CommandError(
-            f"grid map '{grid.name}': its blocks reach from {reach} m, beyond the terrain, which "
-            f"reaches from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m"
+            f"grid map '{grid.name}': its blocks extend from {reach} m, beyond the terrain, which "
+            f"extends from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m"
         )
     lowest, highest = _heights_below(bounds, terrain)
     mesh = block_mesh(grid, lowest, highest + grid.block_height_m)
@@ -76,7 +76,7 @@ def blocks_of(grid: GridMap, terrain: Terrain) -> tuple[Solid, ...]:
 def _heights_below(
     bounds: tuple[float, float, float, float], terrain: Terrain
 ) -> tuple[float, float]:
-    """Lowest and highest z of the terrain's grid points around a rectangle on it."""
+    """Returns the min and max z of the terrain's grid points around a rectangle."""
     heights, x0, y0, spacing = terrain.grid
     j0, j1 = math.floor((bounds[0] - x0) / spacing), math.ceil((bounds[2] - x0) / spacing)
     i0, i1 = math.floor((bounds[1] - y0) / spacing), math.ceil((bounds[3] - y0) / spacing)

@@ -1,4 +1,4 @@
-"""What stands between two antennas: a ray from surface to surface, and the crowns it passes."""
+"""Traces the line of sight between antennas through surfaces and tree crowns."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from volery.world.scene import Hits, Scene
 Array = NDArray[np.float64]
 
 _MOST_SURFACES = 192
-"""What is behind so many counts as clear: by then no signal is left."""
+"""Max number of surfaces; behind more of them no signal is left, and they are not counted."""
 _PAST_LEAF_M, _PAST_SURFACE_M = 0.25, 0.02
-"""So far behind a leaf, or another surface, the ray goes on."""
+"""Distances behind a leaf, and another surface, at which a ray continues."""
 _TRUNK_M = 2.0
-"""Wood of one tree within so much of the ray is one trunk. Modelling choice."""
+"""Wood of one tree within this distance along the ray is one trunk. Modelling choice."""
 _NEAREST_M = 0.05
 
 
 class LineOfSight:
-    """Looks along straight lines through the static world; UAVs and things do not count."""
+    """Traces straight lines through the static world, without UAVs and actors."""
 
     def __init__(self, scene: Scene, forest: Forest | None) -> None:
         self._scene = scene
@@ -32,7 +32,7 @@ class LineOfSight:
         self._solids = scene.solids
 
     def __call__(self, starts: Array, ends: Array) -> Paths:
-        """What stands between places (P, 3) and (P, 3), m, map."""
+        """Returns the obstacles between positions (P, 3) and (P, 3), m, in the map frame."""
         if self._scene.solids is not self._solids:  # a grid map has changed
             self._twin, self._solids = self._scene.twin(), self._scene.solids
         rays = _Rays(starts, ends)
@@ -48,7 +48,7 @@ class LineOfSight:
 
 
 class _Rays:
-    """P rays on their way; `going` are the numbers of those that have not arrived."""
+    """Traces P rays; `going` holds the indices of those that have not reached their end."""
 
     def __init__(self, starts: Array, ends: Array) -> None:
         count = len(starts)
@@ -57,21 +57,21 @@ class _Rays:
         self._starts = starts
         self._direction = (ends - starts) / np.maximum(self.length, _NEAREST_M)[:, None]
         self._at = np.zeros(count)
-        """Travelled so far, m."""
+        """Distance travelled, m."""
         self._wood = np.full(count, -np.inf)
-        """Where the last wood was."""
+        """Distance of the last wood, m."""
         self._tree = np.full(count, -1)
-        """Whose wood that was."""
+        """Tree of the last wood."""
         self.going = np.flatnonzero(self.length > _NEAREST_M)
 
     def here(self) -> tuple[Array, Array]:
-        """Where the rays that go on begin anew, and which way."""
+        """Returns the origins and directions, (K, 3) each, from which the active rays continue."""
         g = self.going
         direction = self._direction[g]
         return self._starts[g] + self._at[g, None] * direction, direction
 
     def take(self, hits: Hits) -> None:
-        """Go on to the next surfaces."""
+        """Counts the surfaces that were hit and continues behind them."""
         met = self._at[self.going] + hits.distance
         before_end = met < self.length[self.going]
         g, met = self.going[before_end], met[before_end]

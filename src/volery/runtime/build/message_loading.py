@@ -1,4 +1,4 @@
-"""Message packages that a scenario names."""
+"""Loads the message packages that a scenario names."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from volery.scenario.schema import Scenario
 
 
 def learn_messages(scenario: Scenario) -> list[str]:
-    """Make the types of the scenario's message folders known; their names.
+    """Registers the types of the scenario's message folders and returns their names.
 
-    Folders are looked for beside the scenario and in the working folder. `ScenarioError` names the
-    key and, for a broken definition, its file and line.
+    Folders are searched beside the scenario and in the working folder. Raises `ScenarioError`
+    with the key and, for an invalid definition, its file and line.
     """
     learned = []
     for k, name in enumerate(scenario.message_packages):

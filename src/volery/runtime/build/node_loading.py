@@ -1,13 +1,14 @@
 """Starts the nodes that a scenario or a launch profile names.
 
-Importing a module runs its code. Which modules may be imported is said by `ScenarioAccess`:
+Importing a module runs its code. `ScenarioAccess` determines which modules may be imported:
 
-- one that a program makes, or a trusted one: all that there are, also in its folder and the working
+- for a scenario made by a program, or a trusted one: all, also in its folder and the working
   folder;
-- a file of the user's own: shipped and installed ones;
-- a confined one, from a log or an upload: shipped ones, and those that the user's own file names.
+- for a file of the user: shipped and installed ones;
+- for a confined one, from a log or an upload: shipped ones, and those that the user's own file
+  names.
 
-Installed is what Python finds without the scenario's folder and without the working folder.
+Installed modules are those that Python finds without the scenario's folder and the working folder.
 """
 
 from __future__ import annotations
@@ -31,13 +32,13 @@ from volery.scenario.node_names import node_module, node_path
 from volery.scenario.schema import NodeEntry, Scenario
 
 _SHIPPED = ("volery.autonomy.", "volery.comms.", "volery.mavlink.")
-"""Packages with nodes; some other modules of Volery are programs, which an import would start."""
+"""Packages with nodes; some other modules of Volery are programs that an import would start."""
 
 
 def start_node(
     entry: NodeEntry, context: Context, namespace: str, where: str, access: ScenarioAccess
 ) -> Node:
-    """Import and construct a node. Raises `ScenarioError` naming the key in the scenario."""
+    """Imports and constructs a node. Raises `ScenarioError` with the key in the scenario."""
     node_class = find_node(entry, where, access)
     try:
         node: Node = make_node(node_class, Launch(context, namespace, entry.parameters))
@@ -55,7 +56,7 @@ def start_node(
 
 
 def _check_base(node: object, entry: NodeEntry, where: str) -> None:
-    """`ScenarioError` for a node whose `__init__` does not call that of `Node` first."""
+    """Raises `ScenarioError` for a node whose `__init__` does not call that of `Node` first."""
     if isinstance(node, Node) and not hasattr(node, "_context"):
         name = type(node).__name__
         raise ScenarioError(
@@ -66,7 +67,7 @@ def _check_base(node: object, entry: NodeEntry, where: str) -> None:
 
 
 def find_node(entry: NodeEntry, where: str, access: ScenarioAccess) -> type[Any]:
-    """Import a node's class. `ScenarioError` where it may not be imported, or is none."""
+    """Imports a node's class. Raises `ScenarioError` if it is forbidden or not a node."""
     try:
         path = node_path(entry.node)
     except ScenarioError as error:
@@ -85,7 +86,7 @@ def find_node(entry: NodeEntry, where: str, access: ScenarioAccess) -> type[Any]
 
 
 def local_nodes(scenario: Scenario) -> tuple[str, ...]:
-    """Return the scenario's nodes that lie beside it or in the working folder. Imports nothing."""
+    """Returns the scenario's nodes beside it or in the working folder. Imports nothing."""
     access, names = scenario.access, [entry.node for entry in scenario.node_entries]
     return tuple(n for n in dict.fromkeys(names) if is_local(node_module(n), access))
 
@@ -131,7 +132,7 @@ def _is_found(top: str) -> bool:
 
 @contextmanager
 def _also_from(*folders: Path) -> Iterator[None]:
-    """Let imports find modules in these folders, after the installed ones."""
+    """Adds these folders to the import path, after the installed modules."""
     added = [str(folder.resolve()) for folder in folders]
     sys.path.extend(added)
     try:
@@ -143,7 +144,7 @@ def _also_from(*folders: Path) -> Iterator[None]:
 
 @contextmanager
 def _installed_only(access: ScenarioAccess) -> Iterator[None]:
-    """Let imports find no modules in a scenario's folder nor in the working folder.
+    """Removes a scenario's folder and the working folder from the import path.
 
     The latter is on the path of `python -m` and `python -c`.
     """
@@ -187,7 +188,7 @@ def _hint(found: Any) -> str:
 
 
 def _broken(what: str, error: Exception) -> ScenarioError:
-    """An error of the node's code, with its line and the frames of the user's files."""
+    """Returns an error of the node's code, with its line and the frames of the user's files."""
     kind = "" if isinstance(error, VoleryError) else f"{type(error).__name__}: "
     failure = ScenarioError(f"{what}: {kind}{error}{place_of(error)}")
     add_frames(failure, error)

@@ -1,4 +1,4 @@
-"""Where UAVs stand at the start, and whether they can stand there."""
+"""Places UAVs at the start and checks that they fit there."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ _SEARCH_STEP_M = 1.0
 _SEARCH_RADIUS_M = 30.0
 _ROOM_TO_STAND_M = 1.5
 _SINK_M = 0.002
-"""Height above the ground at which a UAV is put down."""
+"""Height above the ground at which a UAV is placed, m."""
 _DROP_M = 0.3
-"""A UAV that is put down no higher than this above the ground counts as standing."""
+"""Max height above the ground at which a UAV still counts as landed, m."""
 _PRESSED_M = 0.02
-"""How deep feet sink in where a UAV has landed, and more."""
-_HINT = ' (placement = "nearest_free" finds a place by itself)'
+"""Max depth of the feet below the ground, more than after any landing, m."""
+_HINT = ' (placement = "nearest_free" finds a free position)'
 _CLIMB_LOOKS = 4
-"""Heights at which `nearest_free` wants room, from the ground to the take-off altitude."""
+"""Number of heights up to the take-off altitude at which `nearest_free` requires room."""
 
 
 @dataclass(frozen=True, eq=False)
 class StartPose:
-    """One UAV before the first step; two of them are never the same UAV."""
+    """Describes one UAV before the first step; instances are compared by identity."""
 
     name: str
     type_name: str
@@ -48,10 +48,10 @@ class StartPose:
 def place_uavs(
     scenario: Scenario, airframes: dict[str, Airframe], scene: Scene, terrain: Terrain
 ) -> tuple[StartPose, ...]:
-    """Places of all UAVs, numbered from uav1 through the groups.
+    """Returns the start poses of all UAVs, numbered from uav1 through the groups.
 
-    Raises `PlacementError` naming the UAV, its key and what it stands in: a tree, a building,
-    the ground, another UAV.
+    Raises `PlacementError` with the UAV, its key and the obstacle: a tree, a building, the
+    ground, another UAV.
     """
     starts: list[StartPose] = []
     for g, group in enumerate(scenario.uavs):
@@ -89,7 +89,7 @@ def _nominal_place(group: UavGroup, k: int, airframe: Airframe, terrain: Terrain
 
 
 def _standing(xy: Array, airframe: Airframe, terrain: Terrain) -> Array:
-    """Body position with all feet at or above the ground."""
+    """Returns the body position (3,), m, with all feet at or above the ground."""
     z = max(
         float(terrain.height(xy[0] + foot[0], xy[1] + foot[1])) - foot[2]
         for foot in airframe.ground.feet_m
@@ -106,7 +106,7 @@ def _nearest_free(
     others: list[StartPose],
     where: str,
 ) -> Array:
-    """Nearest place on a spiral with room to stand, to climb and to keep from the others."""
+    """Returns the nearest position on a spiral with room to stand, to climb and to other UAVs."""
     for radius in np.arange(0.0, _SEARCH_RADIUS_M, _SEARCH_STEP_M):
         around = max(1, int(2.0 * math.pi * radius / _SEARCH_STEP_M))
         for i in range(around):
@@ -122,24 +122,24 @@ def _nearest_free(
             if apart and room.min() >= _ROOM_TO_STAND_M and scene.enclosing(candidate[None])[0] < 0:
                 return candidate
     raise PlacementError(
-        f"{where}: no free place within {_SEARCH_RADIUS_M:g} m of "
-        f"({place[0]:.1f}, {place[1]:.1f}) m; allowed is a place with {_ROOM_TO_STAND_M} m of room"
+        f"{where}: no free position within {_SEARCH_RADIUS_M:g} m of "
+        f"({place[0]:.1f}, {place[1]:.1f}) m with {_ROOM_TO_STAND_M} m of room; choose another one"
     )
 
 
 def stands_on_ground(place: Array, airframe: Airframe, terrain: Terrain) -> bool:
-    """Whether a UAV at `place` (3,) m stands, or falls so little that it may as well."""
+    """Returns whether a UAV at `place` (3,), m, stands, or is less than 0.3 m above standing."""
     return bool(place[2] - _standing(place[:2], airframe, terrain)[2] < _DROP_M)
 
 
 def lifted(place: Array, airframe: Airframe, terrain: Terrain) -> Array:
-    """`place` (3,) m, with feet that stick in the ground as deep as those of one that lands out."""
+    """Returns `place` (3,), m, raised onto the ground if the feet are at most 2 cm below it."""
     standing = _standing(place[:2], airframe, terrain)
     return standing if 0.0 < standing[2] - place[2] < _PRESSED_M else place
 
 
 def on_ground(place: Array, airframe: Airframe, terrain: Terrain) -> Array:
-    """`place` (3,) m, or one on its feet above it where that lies between feet and ground."""
+    """Returns `place` (3,), m, raised onto its feet if it lies between feet and ground."""
     ground = float(terrain.height(place[0], place[1]))
     standing = _standing(place[:2], airframe, terrain)
     return standing if ground - _PRESSED_M <= place[2] < standing[2] else place
@@ -155,15 +155,15 @@ def check_place(
     *,
     hint: str = "",
 ) -> None:
-    """`PlacementError` where a UAV cannot be at `place` (3,) m, map, among `others`.
+    """Raises `PlacementError` if a UAV cannot be at `place` (3,), m, map, among `others`.
 
-    where: what the message begins with. hint: what a user may do about it.
+    `where` begins the message; `hint` ends it with a remedy.
     """
     at = f"position_m ({place[0]:.2f}, {place[1]:.2f}, {place[2]:.2f})"
     x0, y0, x1, y1 = terrain.bounds
     if not (x0 <= place[0] <= x1 and y0 <= place[1] <= y1):
         raise PlacementError(
-            f"{where}: {at} lies beyond the terrain, which reaches from ({x0:g}, {y0:g}) to "
+            f"{where}: {at} is beyond the terrain, which extends from ({x0:g}, {y0:g}) to "
             f"({x1:g}, {y1:g}) m"
         )
     check_room(place, airframe, scene, terrain, f"{where}: {at}", hint=hint)
@@ -181,9 +181,9 @@ def check_place(
 def check_room(
     place: Array, airframe: Airframe, scene: Scene, terrain: Terrain, what: str, *, hint: str = ""
 ) -> None:
-    """`PlacementError` where a position (3,) m, map, is under the ground or in an obstacle.
+    """Raises `PlacementError` if a position (3,), m, map, is below the ground or in an obstacle.
 
-    what: what the message begins with. hint: what a user may do about it.
+    `what` begins the message; `hint` ends it with a remedy.
     """
     standing = float(_standing(place[:2], airframe, terrain)[2])
     if place[2] < standing - _SINK_M:

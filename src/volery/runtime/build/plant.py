@@ -1,4 +1,4 @@
-"""The plant of each type of UAV."""
+"""Builds the plant of each UAV type."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from volery.vehicle.plant_types import Plant, RigidBody
 
 
 def plant_of_type(scenario: Scenario, type_name: str, airframe: Airframe) -> Plant:
-    """Plant of the UAVs of a type; `DataFileError` where its model is missing or broken."""
+    """Returns the plant of a type. Raises `DataFileError` if its model is missing or invalid."""
     kind = scenario.types[type_name]
     if kind.plant == "rigid_body":
         return RigidBody()

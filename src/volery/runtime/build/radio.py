@@ -1,4 +1,4 @@
-"""The radio of a scenario in a running simulation."""
+"""Builds the radio network of a scenario."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 def build_radio(
     scenario: Scenario, graph: Graph, engine: Engine, forest: Forest | None
 ) -> RadioNetwork | None:
-    """The network that UAVs of a scenario join; None where it has no radio."""
+    """Returns the network that the scenario's UAVs join; None without a radio."""
     radio = scenario.radio
     if radio is None:
         return None

@@ -1,4 +1,4 @@
-"""How much foliage lies along a line: crowns as upright ellipsoids around their leaves."""
+"""Computes the foliage along a line: crowns are upright ellipsoids around their leaves."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from volery.world.trees.model import TreeModel
 Array = NDArray[np.float64]
 
 _WITHIN = 0.9
-"""Share of a crown's leaves that its ellipsoid reaches to. Modelling choice."""
+"""Fraction of a crown's leaves inside its ellipsoid. Modelling choice."""
 _THINNEST_M = 0.05
 
 
 class Crowns:
-    """The crowns of a forest's trees. Those without leaves have none."""
+    """Holds the crowns of a forest's trees; trees without leaves have none."""
 
     def __init__(self, forest: Forest) -> None:
         shapes = np.array([_shape(model) for model in forest.models]).reshape(-1, 3)
@@ -32,10 +32,10 @@ class Crowns:
         self._radii = np.stack([across, across, upward], axis=1)[has_leaves]
 
     def along(self, start: Array, end: Array) -> float:
-        """Length of the line from `start` (3,) to `end` (3,), m, that lies in crowns."""
+        """Returns the length, m, of the line from `start` (3,) to `end` (3,) inside crowns."""
         if not len(self._centre):
             return 0.0
-        # the unit sphere of each crown: |o + s d| = 1 where the line enters and leaves, s in 0..1
+        # the unit sphere of each crown: |o + s d| = 1 at entry and exit of the line, s in 0..1
         o = (start - self._centre) / self._radii
         d = (end - start) / self._radii
         a, b = (d * d).sum(axis=1), (o * d).sum(axis=1)
@@ -49,7 +49,7 @@ class Crowns:
 
 
 def _shape(model: TreeModel) -> tuple[float, float, float]:
-    """Radius, height of the middle, half the height of a model's crown; zeros without leaves."""
+    """Returns radius, middle height and half height of a crown, m; zeros without leaves."""
     level = min(model.levels.values(), key=lambda tree: len(tree.leaves.vertices))
     leaves = np.asarray(level.leaves.vertices, np.float64)
     if not len(leaves):
@@ -60,7 +60,7 @@ def _shape(model: TreeModel) -> tuple[float, float, float]:
 
 
 def _length_of_union(enter: Array, leave: Array) -> float:
-    """Length that intervals cover together."""
+    """Returns the length of the union of intervals."""
     covered, end = 0.0, 0.0
     for k in np.argsort(enter, kind="stable"):
         covered += max(float(leave[k]) - max(float(enter[k]), end), 0.0)

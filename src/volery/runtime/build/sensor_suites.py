@@ -1,4 +1,4 @@
-"""Which sensors every UAV carries, where, and with which stream of noise."""
+"""Assigns sensors to every UAV, with their mounts and noise streams."""
 
 from __future__ import annotations
 
@@ -50,29 +50,29 @@ RESULT_OF: dict[str, type[Samples]] = {
     "magnetometer": MagneticReadings,
     "battery": BatteryReadings,
 }
-"""What each kind of sensor measures."""
+"""Samples of each kind of sensor."""
 
 
 PICTURE = ("width", "height", "horizontal_fov_deg", "samples")
-"""What a scenario may change of a camera's model."""
+"""Keys of a camera's model that a scenario may override."""
 
 
 @dataclass(frozen=True)
 class SensorInstance:
-    """One sensor on one UAV, before it joins a bank."""
+    """Describes one sensor on one UAV, before it joins a bank."""
 
     id: SensorId
     spec: Any
     mount: Mount
     key: np.uint64
     lidar: LidarModel | None = None
-    """What kind of LIDAR it is, if it is one."""
+    """Model of a LIDAR; None for other sensors."""
     left: SensorId | None = None
-    """The left camera of a stereo pair, of which this is the right one."""
+    """For the right camera of a stereo pair: the left camera."""
 
     @property
     def bank_key(self) -> tuple[Any, ...]:
-        """Sensors with equal keys are sampled together."""
+        """Key of the bank: sensors with equal keys are sampled together."""
         spec = self.spec
         rate, model = getattr(spec, "rate_hz", None), getattr(spec, "model", None)
         noise, intensities = getattr(spec, "noise", None), getattr(spec, "intensities", None)
@@ -81,16 +81,16 @@ class SensorInstance:
 
     @property
     def topic(self) -> str:
-        """Where a LIDAR's scans or points go."""
+        """Topic of a LIDAR's scans or points."""
         assert self.lidar is not None
         return lidar_topic(self.id, self.lidar, self.spec.topic)
 
 
 def fit_sensors(scenario: schema.Scenario, starts: Sequence[StartPose]) -> list[SensorInstance]:
-    """Every sensor of every UAV, in fleet order.
+    """Returns every sensor of every UAV, in fleet order.
 
-    Raises `DataFileError` for a LIDAR model that cannot be loaded, `ScenarioError` where two LIDARs
-    of a UAV have one topic.
+    Raises `DataFileError` if a LIDAR model cannot be loaded, `ScenarioError` if two LIDARs of a
+    UAV share a topic.
     """
     models = _LidarModels(scenario)
     fitted = [
@@ -110,7 +110,7 @@ def fit_sensors(scenario: schema.Scenario, starts: Sequence[StartPose]) -> list[
 
 
 def _pair(seed: int, sensor: SensorInstance) -> list[SensorInstance]:
-    """The left and the right camera of a stereo pair; any other sensor as it is."""
+    """Returns the left and right camera of a stereo pair; any other sensor unchanged."""
     spec = sensor.spec
     if not isinstance(spec, CameraSensor) or spec.stereo is None:
         return [sensor]
@@ -129,13 +129,13 @@ def _pair(seed: int, sensor: SensorInstance) -> list[SensorInstance]:
 
 
 def _moved(mount: Mount, y: float) -> Mount:
-    """The mount, `y` m further along its own y axis."""
+    """Returns the mount shifted by `y` m along its own y axis."""
     offset = rotations.rotate(mount.attitude_body, np.array([0.0, y, 0.0]))
     return mount._replace(position_body=mount.position_body + offset)
 
 
 def refit(fitted: Sequence[SensorInstance], seed: int, first_row: int = 0) -> list[SensorInstance]:
-    """The same sensors with the noise of a run of `seed`, on UAVs from `first_row` on."""
+    """Returns the same sensors with the noise of `seed`, on UAVs from `first_row` on."""
     return [
         replace(
             sensor,
@@ -147,7 +147,7 @@ def refit(fitted: Sequence[SensorInstance], seed: int, first_row: int = 0) -> li
 
 
 def noise_key(seed: int, kind: str, sensor: SensorId) -> np.uint64:
-    """Noise stream of a sensor in a run with `seed`; `kind` is the name of its bank."""
+    """Returns the noise stream of a sensor in a run with `seed`; `kind` is the bank's name."""
     return stream_key(seed, f"{sensor.uav_name}/{kind}/{sensor.name}")
 
 
@@ -159,7 +159,7 @@ class _LidarModels:
         self._loaded: dict[str, LidarModel] = {}
 
     def load(self, spec: schema.LidarSensor) -> LidarModel:
-        """Model of a LIDAR; errors name the scenario and the sensor."""
+        """Returns the model of a LIDAR; errors contain the scenario and the sensor."""
         if spec.model not in self._loaded:
             try:
                 self._loaded[spec.model] = load_lidar(self._scenario.access.find_model(spec.model))
@@ -170,7 +170,7 @@ class _LidarModels:
 
 
 def _check_topics(scenario: schema.Scenario, fitted: Sequence[SensorInstance]) -> None:
-    """Refuse LIDARs that would publish on one topic."""
+    """Raises `ScenarioError` if two LIDARs of a UAV publish on one topic."""
     taken: dict[str, str] = {}
     for sensor in fitted:
         if sensor.lidar is None:
@@ -184,7 +184,7 @@ def _check_topics(scenario: schema.Scenario, fitted: Sequence[SensorInstance]) -
 
 
 def lidar_mounts(fitted: Sequence[SensorInstance], *, planar: bool) -> Mapping[str, Mount]:
-    """Topics of LaserScans, or of PointCloud2s, and how their LIDARs are mounted."""
+    """Returns the mounts of LIDARs by topic, of LaserScans or of PointCloud2s."""
     return MappingProxyType(
         {
             sensor.topic: sensor.mount

@@ -1,4 +1,4 @@
-"""Gathers the sensors of all UAVs into banks that are sampled together."""
+"""Groups the sensors of all UAVs into banks that are sampled together."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def build_banks(
     scene: Scene,
     estimation: Estimation | None = None,
 ) -> list[SensorBank]:
-    """Banks of all sensors, in a fixed order: estimates last, after what they are made of."""
+    """Returns the banks in a fixed order; estimates come last, after their inputs."""
     groups: dict[tuple[Any, ...], list[SensorInstance]] = defaultdict(list)
     for sensor in sorted(fitted, key=lambda sensor: sensor.spec.kind == "estimate"):
         groups[sensor.bank_key].append(sensor)

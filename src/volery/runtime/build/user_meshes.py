@@ -1,4 +1,4 @@
-"""Meshes of the user's own as solids of a scenario's world."""
+"""Loads the user's meshes as solids of a scenario's world."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from volery.world.scene import Look, Solid
 
 
 def mesh_solids(scenario: Scenario) -> tuple[Solid, ...]:
-    """A solid for each of `world.meshes`; a file that stands several times is read once.
+    """Returns a solid for each of `world.meshes`; each file is read once.
 
-    Raises `DataFileError` that names scenario and key.
+    Raises `DataFileError` with scenario and key.
     """
     read: dict[tuple[Path, str | None], MeshFile] = {}
     solids = []
@@ -39,7 +39,7 @@ def _solid(entry: UserMesh, path: Path, file: MeshFile) -> Solid:
     far = float(np.abs(mesh.vertices).max())
     if not far <= FARTHEST_M:
         raise DataFileError(
-            f"{path} reaches {far:.3g} m from the map's origin, at most {FARTHEST_M:g} m is "
+            f"{path} extends to {far:.3g} m from the map's origin, at most {FARTHEST_M:g} m is "
             "allowed; is `scale` right?"
         )
     colour = entry.colour or file.colour
@@ -48,7 +48,7 @@ def _solid(entry: UserMesh, path: Path, file: MeshFile) -> Solid:
 
 
 def _placing(entry: UserMesh) -> NDArray[np.float64]:
-    """(3, 4) map from file."""
+    """Returns the transform (3, 4) from the file to the map frame."""
     turn = rotations.from_rpy(*np.radians(entry.rpy_deg))
     axes = np.stack([rotations.rotate(turn, axis) for axis in np.eye(3)], axis=1)
     return np.column_stack([axes * np.broadcast_to(entry.scale, 3), entry.position_m])

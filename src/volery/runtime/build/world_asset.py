@@ -1,4 +1,4 @@
-"""The geometry of a running world as glTF for those who draw it, with what else they need."""
+"""Exports the geometry of a running world as glTF for renderers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from volery.world.trees.model import DetailLevel
 def asset_of(
     scenario: Scenario, geometry: Geometry, detail: DetailLevel = DetailLevel.SENSING
 ) -> bytes:
-    """Binary glTF; its asset's `extras` hold bounds, sun, geographic origin and kind of world."""
+    """Returns binary glTF; the asset's `extras` hold bounds, sun, geographic origin and kind."""
     return instanced_glb_of(
         geometry.terrain,
         geometry.forest,
@@ -30,7 +30,7 @@ def asset_of(
 
 
 def kind_of(scenario: Scenario) -> str:
-    """`grid_map`, `city`, `forest` or `open`."""
+    """Returns `grid_map`, `city`, `forest` or `open`."""
     world = scenario.world
     kinds = {"grid_map": world.grid_map, "city": world.city, "forest": world.forest}
     return next((kind for kind, part in kinds.items() if part is not None), "open")
@@ -53,7 +53,7 @@ def _extras(scenario: Scenario, geometry: Geometry, detail: DetailLevel) -> dict
 
 
 def _bounds(geometry: Geometry) -> tuple[list[float], list[float]]:
-    """Lowest and highest corner of all that stands there, m, map."""
+    """Returns the min and max corner of the geometry, m, map."""
     x0, y0, x1, y1 = geometry.terrain.bounds
     heights = geometry.terrain.grid.heights
     corners = [np.array([x0, y0, heights.min()]), np.array([x1, y1, heights.max()])]

@@ -1,4 +1,4 @@
-"""The world of a scenario as a file."""
+"""Exports the world of a scenario to a file."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ from volery.world.trees.model import DetailLevel
 def export_world(
     scenario: Scenario, path: Path, *, detail: DetailLevel = DetailLevel.SENSING
 ) -> int:
-    """Write ground, trees and solids as binary glTF; the number of bytes.
+    """Writes ground, trees and solids as binary glTF and returns the number of bytes.
 
-    Raises `VoleryError` where the world cannot be built, `OSError` where the file cannot be
-    written.
+    Raises `VoleryError` if the world cannot be built, `OSError` if the file cannot be written.
     """
     stands = geometry_of(scenario)
     content = glb_of(

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
 
 def build_terrain(scenario: Scenario) -> Terrain:
-    """Ground of the scenario."""
+    """Returns the ground of the scenario. Raises `DataFileError`."""
     terrain = scenario.world.terrain
     if isinstance(terrain, GridTerrain):
         try:
@@ -57,7 +57,7 @@ def build_terrain(scenario: Scenario) -> Terrain:
 
 
 def build_city(scenario: Scenario, terrain: Terrain) -> City | None:
-    """City of the scenario, None where it has none. Raises `DataFileError`."""
+    """Returns the city of the scenario; None without one. Raises `DataFileError`."""
     city, origin = scenario.world.city, scenario.world.origin
     if city is None:
         return None
@@ -80,9 +80,9 @@ def build_city(scenario: Scenario, terrain: Terrain) -> City | None:
 
 
 def build_forest(scenario: Scenario, terrain: Terrain, city: City | None = None) -> Forest | None:
-    """Trees of the scenario, those of a city's streets last; None where it has no forest.
+    """Returns the trees of the scenario, those of city streets last; None without a forest.
 
-    Raises `ScenarioError` where the forest cannot grow, has no trees or reaches beyond the terrain.
+    Raises `ScenarioError` if the forest cannot grow, has no trees or exceeds the terrain.
     """
     try:
         forest = _grow(scenario, terrain)
@@ -97,7 +97,7 @@ def build_forest(scenario: Scenario, terrain: Terrain, city: City | None = None)
         if outside:
             raise ScenarioError(
                 f"{scenario.name}: world.forest: {counted(outside, 'tree')} beyond the "
-                f"terrain, which reaches from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m; "
+                f"terrain, which extends from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m; "
                 "region_m crops an inventory"
             )
     return joined(forest, _street_trees(scenario, terrain, city))
@@ -141,9 +141,9 @@ def _grow(scenario: Scenario, terrain: Terrain) -> Forest | None:
 def build_solids(
     scenario: Scenario, terrain: Terrain, city: City | None = None
 ) -> tuple[Solid, ...]:
-    """What stands in the scenario's world beside the trees, one kind after the other."""
+    """Returns all solids of the world except trees: buildings, meshes, grid-map blocks."""
     buildings = city.solids if city is not None else ()
-    blocks = starting_blocks(scenario, terrain)  # last: they can change, others keep numbers
+    blocks = starting_blocks(scenario, terrain)  # last: they can change, others keep their index
     return (*buildings, *mesh_solids(scenario), *blocks)
 
 
@@ -155,7 +155,7 @@ def build_scene(
     *,
     threads: int = 1,
 ) -> Scene:
-    """All that sensors of the scenario can see but for the UAVs."""
+    """Returns all that sensors can see except the UAVs."""
     scene = Scene(
         terrain,
         forest,
@@ -172,7 +172,7 @@ def build_scene(
 def build_world(
     scenario: Scenario, threads: int
 ) -> tuple[Terrain, City | None, Forest | None, Scene]:
-    """Everything that stands in the world of a scenario, and the scene that holds it."""
+    """Returns terrain, city, forest and scene of a scenario."""
     terrain = build_terrain(scenario)
     city = build_city(scenario, terrain)
     forest = build_forest(scenario, terrain, city)
@@ -180,7 +180,7 @@ def build_world(
 
 
 def geometry_of(scenario: Scenario) -> Geometry:
-    """What stands in the world of a scenario at its beginning, for a picture of it."""
+    """Returns the geometry of a scenario's world at its start."""
     terrain = build_terrain(scenario)
     city = build_city(scenario, terrain)
     forest = build_forest(scenario, terrain, city)
@@ -189,7 +189,7 @@ def geometry_of(scenario: Scenario) -> Geometry:
 
 
 def build_weather(scenario: Scenario) -> Weather:
-    """Air of the scenario. Raises `DataFileError` where its wind field cannot be read."""
+    """Returns the weather of the scenario. Raises `DataFileError` if the wind field is invalid."""
     wind = scenario.world.wind
     return Weather(
         wind.velocity_m_s,
@@ -203,14 +203,14 @@ def build_weather(scenario: Scenario) -> Weather:
 
 
 def sun_in(world: World, weather: Weather) -> tuple[float, float]:
-    """Elevation and azimuth, deg, of the sun in a weather."""
+    """Returns the sun's elevation and azimuth in a weather, deg."""
     if weather.hour_of_day is None:
         return world.light.sun_elevation_deg, world.light.sun_azimuth_deg
     return sun_angles(world.origin.latitude_deg, world.light.date, weather.hour_of_day)
 
 
 def light_of(world: World) -> LightOfTheHour:
-    """The light that cameras see by, by weather and hour."""
+    """Returns the light for cameras, by weather and hour."""
     from volery.sensors.cameras.weather_light import LightOfTheHour
 
     return LightOfTheHour(partial(sun_in, world), world.light.visibility_m)

@@ -1,4 +1,4 @@
-"""What people who watch are told of a running simulation: places, vehicles, how it runs."""
+"""Publishes the state of a running simulation: poses, vehicles, progress, load."""
 
 from __future__ import annotations
 

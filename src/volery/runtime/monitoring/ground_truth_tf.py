@@ -1,6 +1,6 @@
-"""`/ground_truth/tf`: where all UAVs and things truly are, in one message.
+"""Publishes `/ground_truth/tf`: the true poses of all UAVs and actors, in one message.
 
-For pages and renderers. Autonomy must not read it: on a robot there is nothing like it.
+It is for pages and renderers. Autonomy must not subscribe: a real robot has no such topic.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ Array = NDArray[np.float64]
 TOPIC = "/ground_truth/tf"
 _PERIOD_S = 0.02
 _LEAST_S = 0.05
-"""Between two messages that are shown: smooth enough to the eye at a twentieth of real time."""
+"""Min wall time between two external messages, s: smooth at a twentieth of real time."""
 
 
 def tell_poses(graph: Graph, engine: Engine) -> LiveTopic:
-    """Tell `map -> uavN/base_link` of every UAV in fleet order, then `map -> NAME` of things."""
+    """Publishes `map -> uavN/base_link` of every UAV in order, then `map -> NAME` of actors."""
     publisher = graph.advertise(TOPIC, TFMessage)
     return LiveTopic(
         publisher, lambda: _message(engine), lambda: _content(engine), _PERIOD_S, _LEAST_S
@@ -53,7 +53,7 @@ def _message(engine: Engine) -> TFMessage:
 
 
 def _transforms(stamp: Any, frames: list[str], poses: Array) -> Iterator[TransformStamped]:
-    """One a frame; poses (N, 7) of x y z qx qy qz qw."""
+    """Yields one transform per frame; poses (N, 7) are x y z qx qy qz qw, m."""
     for frame, (x, y, z, *turn) in zip(frames, poses.tolist(), strict=True):
         yield TransformStamped(stamp, frame, Transform(Vector3(x, y, z), Quaternion(*turn)))
 

@@ -1,8 +1,8 @@
-"""A topic that tells of the present: on a grid of simulated time, and again where that stands.
+"""Publishes a state on a grid of simulated time, and to external clients also in between.
 
-On the grid it is an ordinary topic, which nodes and recorders may read. In between, while the
-simulation is paused, stepped or slow, clients outside are shown what has changed, and whoever is
-new is shown how things are. Nothing in the simulation sees these extra messages.
+On the grid the topic is an ordinary one, for nodes and recorders. In between, while the simulation
+is paused, stepped or slow, external clients receive changes, and new clients the present state.
+Nothing in the simulation receives these extra messages.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from typing import Any
 from volery.graph.graph import Publisher
 
 Timers = Callable[..., None]
-"""`every(period_s, callback, wanted=...)` has something done in simulated time."""
+"""`every(period_s, callback, wanted=...)` schedules a callback in simulated time."""
 
 
 @dataclass
 class LiveTopic:
-    """Tells what `message()` says each `period_s` of simulated time, and between where it changed.
+    """Publishes `message()` each `period_s` of simulated time, and in between on changes.
 
-    `content()` is cheap to make and differs from the last one where the message would. Shown are
-    changes that nobody was told for `least_s` of wall time.
+    `content()` is cheap and differs from the last one if the message would. External clients
+    receive changes after at least `least_s` of wall time without a message.
     """
 
     publisher: Publisher
@@ -36,11 +36,11 @@ class LiveTopic:
     _now_s: float = 0.0
 
     def begin(self, every: Timers) -> None:
-        """Tell from now on."""
+        """Starts publishing."""
         every(self.period_s, self._tell, wanted=lambda: self.publisher.wanted)
 
     def look(self, now_s: float) -> None:
-        """Show what is new at `now_s` of wall time; between ticks."""
+        """Publishes changes to external clients at wall time `now_s`; call it between ticks."""
         self._now_s = now_s
         if not self.publisher.watched:
             return

@@ -1,4 +1,4 @@
-"""How much memory this process holds."""
+"""Measures the memory of this process."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _STATM = Path("/proc/self/statm")
 
 
 def resident_mb() -> float:
-    """Resident memory, MB of 1e6 bytes; where the system does not tell, the most there ever was."""
+    """Returns the resident memory, MB of 1e6 bytes; its peak where the system has no statm."""
     try:
         pages = int(_STATM.read_text(encoding="ascii").split()[1])
     except (OSError, IndexError, ValueError):

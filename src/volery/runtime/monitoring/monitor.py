@@ -1,4 +1,4 @@
-"""All topics for people who watch, looked after by the thread that runs the simulation."""
+"""Publishes all monitoring topics from the thread that runs the simulation."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Monitor:
-    """Tells of places, vehicles and the run itself; changes nothing of what is simulated."""
+    """Publishes poses, vehicles and run state; changes nothing in the simulation."""
 
     def __init__(self, simulation: Simulation, engine: Engine, told: StatusSources) -> None:
         self._graph = simulation.graph
@@ -28,14 +28,14 @@ class Monitor:
             present.begin(engine.every)
 
     def look(self) -> None:
-        """Show what is new; between ticks, as often as one likes."""
+        """Publishes changes to external clients; call it between ticks, at any rate."""
         now_s = time.perf_counter()
         for present in self._present:
             present.look(now_s)
         self._status.look(now_s)
 
     def jumped(self) -> None:
-        """Tell everything anew: another state was restored, or the start."""
+        """Publishes everything again after another state, or the start, was restored."""
         self._graph.show_kept()
         self._status.jumped()
         self.look()

@@ -1,4 +1,4 @@
-"""Where the engine's steps, measurements and events go: digest, graph and list."""
+"""Passes the engine's steps, samples and events to digest, graph and event list."""
 
 from __future__ import annotations
 
@@ -13,24 +13,25 @@ from volery.runtime.monitoring.digest import Digest
 from volery.sensors.samples import Samples
 
 NOT_OF_THE_WORLD = ("/volery/", "/ground_truth/tf", "/rosout")
-"""Topics of the simulation and its clients, of poses that are in already, and of nodes' logs."""
+"""Topics outside the digest: of the simulation and its clients, of poses that enter with the
+states, and of nodes' logs."""
 
 
 class OutputSink:
-    """The engine's `Sink` in a simulation."""
+    """Implements the engine's `Sink` in a simulation."""
 
     def __init__(self, fleet: Fleet, graph: Graph, publisher: GraphPublisher) -> None:
         self.fleet = fleet
         self._graph = graph
         self._publisher = publisher
         self.events: list[Event] = []
-        """Everything that happened so far, oldest first."""
+        """All events so far, oldest first."""
         self.digest: Digest | None = None
         self.watch: Callable[[], None] | None = None
-        """Called after each call of the fused step, for measurements; it must change nothing."""
+        """Callback after each call of the fused step, for measurements; it must change nothing."""
 
     def enable_digest(self) -> None:
-        """Fingerprint all states and messages from now on."""
+        """Hashes all states and messages from now on."""
         if self.digest is None:
             self.digest = Digest()
             self._graph.subscribe_all(self._fingerprint)
@@ -40,26 +41,26 @@ class OutputSink:
             self.digest.add_message(published)
 
     def take_fingerprint(self) -> None:
-        """Take the present states into the digest, if there is one."""
+        """Adds the present states to the digest, if there is one."""
         if self.digest is not None:
             self.digest.add_states(self.fleet)
 
     def advanced(self, first_step: int, last_step: int) -> None:
-        """Take in computed steps."""
+        """Adds computed steps to the digest."""
         if self.digest is not None:
             self.digest.add_steps(self.fleet.history, first_step, last_step)
         if self.watch is not None:
             self.watch()
 
     def sampled(self, samples: Samples) -> None:
-        """Publish measurements."""
+        """Publishes samples."""
         self._publisher.publish(samples)
 
     def happened(self, event: Event) -> None:
-        """Keep and publish an event."""
+        """Stores and publishes an event."""
         self.events.append(event)
         self._publisher.publish_event(event)
 
     def deliver(self) -> None:
-        """Hand out queued messages."""
+        """Delivers queued messages."""
         self._graph.deliver()

@@ -1,4 +1,4 @@
-"""How far a run has come, told about ten times a second of wall time."""
+"""Reports the progress of a run, about ten times a second of wall time."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ _PERIOD_S = 0.1
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a run has come."""
+    """Describes the progress of a run."""
 
     time_s: float
-    """Simulated time since the run began, or since the last reset."""
+    """Simulated time since the run began, or since the last reset, s."""
     duration_s: float
     wall_s: float
-    """Wall time since the run began, pauses left out."""
+    """Wall time since the run began, without pauses, s."""
     paused: bool = False
     before_s: float = 0.0
-    """Simulated time that had gone by before the last reset, from all resets together."""
+    """Simulated time before the last reset, summed over all resets, s."""
 
     @property
     def real_time_factor(self) -> float:
-        """Simulated over wall time of this run."""
+        """Simulated time over wall time of this run."""
         return (self.before_s + self.time_s) / self.wall_s if self.wall_s > 0.0 else 0.0
 
 
 class ProgressPublisher:
-    """Calls `on_progress`, if there is one, where enough wall time has gone by."""
+    """Calls `on_progress`, if given, each 0.1 s of wall time."""
 
     def __init__(
         self, on_progress: Callable[[Progress], None] | None, duration_s: float, pacer: Pacer
@@ -44,8 +44,8 @@ class ProgressPublisher:
         self._last_s = self._before_s = 0.0
 
     def tell(self, time_s: float, *, last: bool = False) -> None:
-        """Tell that the run has come to `time_s`; the `last` time in any case."""
-        if time_s < self._last_s:  # the clock was set back
+        """Reports that the run has reached `time_s`; the `last` time in any case."""
+        if time_s < self._last_s:  # a reset or restore
             self._before_s += self._last_s
         self._last_s = time_s
         now = time.perf_counter()

@@ -1,6 +1,6 @@
-"""`/volery/status`: how the simulation runs, in wall time.
+"""Publishes `/volery/status`: the state of the simulation and its speed in wall time.
 
-Shown to clients outside alone, from the thread that runs the simulation; see `Publisher.show`.
+Only external clients receive it, from the thread that runs the simulation; see `Publisher.show`.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ TOPIC = "/volery/status"
 _TYPE = "volery_interfaces/msg/SimulationStatus"
 _PERIOD_S = 0.2
 _WINDOW_S = 1.0
-"""Of wall time, over which rates are told."""
+"""Wall time over which rates are averaged, s."""
 
 
 class Pace(NamedTuple):
-    """How fast a simulation has been."""
+    """Describes the speed of a simulation."""
 
     real_time_factor: float
     load: list[float]
-    """s of wall time a simulated second, by stage."""
+    """Wall time per simulated second, by stage, s."""
 
 
 class _Sample(NamedTuple):
@@ -42,13 +42,13 @@ class _Sample(NamedTuple):
 
 
 class Speedometer:
-    """Measures the pace over the last second of wall time."""
+    """Measures the real-time factor over the last second of wall time."""
 
     def __init__(self) -> None:
         self._samples: deque[_Sample] = deque()
 
     def read(self, wall_s: float, time_ns: int, stage_seconds: Mapping[str, float]) -> Pace:
-        """The pace at `wall_s`, where simulated `time_ns` is reached; 0 where nothing moves."""
+        """Returns the speed at wall time `wall_s` and simulated `time_ns`; 0 without progress."""
         samples = self._samples
         if samples and time_ns < samples[-1].time_ns:  # an earlier state was restored
             samples.clear()
@@ -64,13 +64,13 @@ class Speedometer:
         return Pace(simulated_s / (now.wall_s - then.wall_s), load)
 
     def forget(self) -> None:
-        """Begin anew: simulated time has jumped."""
+        """Discards all samples after a jump of simulated time."""
         self._samples.clear()
 
 
 @dataclass
 class StatusSources:
-    """What the status tells that services know."""
+    """Provides the parts of the status that services know."""
 
     state: Callable[[], int]
     recording: Callable[[], str]
@@ -78,7 +78,7 @@ class StatusSources:
 
 
 class Status:
-    """Shows how a simulation runs, five times a second of wall time."""
+    """Publishes the status five times a second of wall time."""
 
     def __init__(self, simulation: Simulation, told: StatusSources) -> None:
         self._simulation = simulation
@@ -88,7 +88,7 @@ class Status:
         self._next_s = 0.0
 
     def look(self, now_s: float) -> None:
-        """Show the status if it is time to, at `now_s` of wall time."""
+        """Publishes the status at wall time `now_s` if it is due."""
         if now_s < self._next_s:
             return
         self._next_s = now_s + _PERIOD_S
@@ -99,7 +99,7 @@ class Status:
             self._publisher.show(self._message(pace, list(stages)))
 
     def jumped(self) -> None:
-        """Simulated time has jumped."""
+        """Discards rates after a jump of simulated time."""
         self._speedometer.forget()
         self._next_s = 0.0
 

@@ -1,4 +1,4 @@
-"""`/volery/vehicles`: mode, place, battery and operator of every UAV, for people who watch."""
+"""Publishes `/volery/vehicles`: mode, position, battery and operator of every UAV."""
 
 from __future__ import annotations
 
@@ -31,19 +31,19 @@ NEVER_S = -1.0
 
 @dataclass(frozen=True, eq=False)
 class _Build:
-    """What of a fleet stays as it is."""
+    """Constant properties of a fleet."""
 
     fleet: Fleet
     airframes: list[str]
     full_speed: NDArray[np.float64]
-    """(N,) rad/s: of all rotors together."""
+    """Sum of the rotors' full speeds (N,), rad/s."""
     has_battery: NDArray[np.bool_]
 
 
 class VehicleTopic:
-    """Tells of all UAVs of an engine.
+    """Publishes all UAVs of an engine.
 
-    `uavs` are their handles, `gateway` knows their clients, `holder` tells who steers a UAV.
+    `uavs` are their handles, `gateway` knows their clients, `holder` returns a UAV's operator.
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class VehicleTopic:
         self.present = LiveTopic(publisher, self.message, self.content, _PERIOD_S, _LEAST_S)
 
     def message(self) -> Any:
-        """All UAVs as they are now, as a VehicleStates."""
+        """Returns the present state of all UAVs as a VehicleStates."""
         build, state = self._present_build(), self._engine.fleet.state
         modes = self._engine.fleet.modes
         in_air = (modes != FlightMode.LANDED) & ~state.on_ground & ~state.asleep
@@ -87,7 +87,7 @@ class VehicleTopic:
         return message_type(_ALL)(header(self._engine.time_ns, "map"), vehicles)
 
     def content(self) -> tuple[Any, ...]:
-        """What the message tells, in a form that is quick to make and to compare."""
+        """Returns the content of the message in a form that is quick to build and to compare."""
         engine, state = self._engine, self._engine.fleet.state
         return (
             engine.time_ns,
@@ -103,7 +103,7 @@ class VehicleTopic:
 
     def _command_age_s(self, name: str) -> float:
         now_ns, commanded_ns = self._engine.time_ns, self._gateway.commanded_ns.get(name)
-        if commanded_ns is None or commanded_ns > now_ns:  # it has gone back since
+        if commanded_ns is None or commanded_ns > now_ns:  # an earlier state was restored
             return NEVER_S
         return s_from_ns(now_ns - commanded_ns)
 
@@ -114,7 +114,7 @@ class VehicleTopic:
 
 
 def _vehicles(*columns: Any) -> Iterator[Any]:
-    """One VehicleState a row; columns in the order of its fields, place and velocity in one."""
+    """Yields one VehicleState per row; columns are its fields, position and velocity in one."""
     one = message_type(_ONE)
     for *head, motion, rotors, age_s, holder in zip(*columns, strict=True):
         x, y, z, *velocity = motion.tolist()

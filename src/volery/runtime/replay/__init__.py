@@ -1,1 +1,1 @@
-"""Recorded flights: played back, flown again by their commands, mapped by a SLAM."""
+"""Replays recorded flights: playback, command replay, offline SLAM."""

@@ -1,4 +1,4 @@
-"""What clients do, by what it means for the flight."""
+"""Classifies client commands by their effect on the flight."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from enum import Enum
 from volery.graph.session import ClientCommand
 
 _STOPPED = 0
-"""Of `simulation_interfaces/msg/SimulationState`: setting it resets, the others change the pace."""
+"""`simulation_interfaces/msg/SimulationState`: this one resets, the others change the pace."""
 
 _PACE = {
     f"{package}/srv/{name}"
@@ -32,7 +32,7 @@ _AT_THE_END = {
     "volery_interfaces/srv/ReleaseControl",
     "volery_interfaces/srv/HandOver",
 }
-"""Services that lead away from the end of a scenario, or that are about people."""
+"""Services that leave the end of a scenario, or concern operators."""
 CONTINUE_RUN = "/volery/continue_run"
 _AT_THE_END_BY_NAME = {
     CONTINUE_RUN,
@@ -44,22 +44,22 @@ _SETS_PARAMETERS = {"rosapi_msgs/srv/SetParam", "rosapi_msgs/srv/DeleteParam"}
 
 
 class CommandEffect(Enum):
-    """What a command may do to the flight."""
+    """Classifies the effect of a command on the flight."""
 
-    ASKS = "nothing: it only asks"
-    PACES = "its pace, its files, its end, its audience, but no result"
-    CHANGES = "its results"
+    ASKS = "nothing: a query"
+    PACES = "the pace, files, end or audience of the run, but no result"
+    CHANGES = "the results"
 
 
 def restarts(taken: ClientCommand) -> bool:
-    """Return whether a command has effect where a scenario has ended."""
+    """Returns whether a command has an effect after the end of a scenario."""
     if taken.kind == "call" and (taken.type in _AT_THE_END or taken.name in _AT_THE_END_BY_NAME):
         return True
     return weight_of(taken) is not CommandEffect.CHANGES
 
 
 def weight_of(taken: ClientCommand) -> CommandEffect:
-    """How much hangs on a command; of services that nobody knows: the results."""
+    """Returns the effect of a command; unknown services count as changing the results."""
     if taken.kind in ("publish", "answer", "failure"):
         return CommandEffect.CHANGES
     if taken.kind != "call":

@@ -1,8 +1,8 @@
-"""What clients do, told on `/volery/log` and kept for logs that are begun later.
+"""Publishes client commands on `/volery/log` and stores them for logs that start later.
 
-Everything that comes from outside is taken by the simulation's thread between two ticks, or in a
-meeting with lock-step partners. Each command is noted there with its moment
-(`engine.command_queue`), at which `runtime.replay.command_replay` takes it again.
+The simulation's thread processes all external input between two ticks, or during a barrier with
+lock-step partners. It records each command with its time (`engine.command_queue`), at which
+`runtime.replay.command_replay` repeats it.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from volery.graph.subscription_queue import array_bytes
 from volery.runtime.replay.command_effects import CommandEffect, weight_of
 
 MOST_KEPT_BYTES = 32 * 1024 * 1024
-"""Of commands that logs begun later are given (modelling choice); beyond that none are kept."""
+"""Max size of the stored commands (modelling choice), bytes; beyond it all are discarded."""
 _OVERHEAD_BYTES = 400
-"""What a kept command needs besides its content."""
+"""Memory of a stored command besides its content, bytes."""
 
 
 class _Kept(NamedTuple):
@@ -31,12 +31,12 @@ class _Kept(NamedTuple):
     time_ns: int
     moment: CommandTime
     taken: ClientCommand
-    """Without its content where `cdr` has that."""
+    """The command, without its content if `cdr` holds that."""
     cdr: bytes | None
 
 
 class CommandLog:
-    """The watch of a simulation's gateway; see `graph.session`."""
+    """Records the commands of a simulation's gateway; see `graph.session`."""
 
     def __init__(self, graph: Graph, engine: Engine) -> None:
         self._graph = graph
@@ -49,12 +49,12 @@ class CommandLog:
         self._next_number = 0
         self._ended = False
         self.repeats = False
-        """Whether a recorded flight is repeated: clients may look on, and change nothing."""
+        """Whether a replay is running: clients may observe, and change nothing."""
         self.refuse: Callable[[ClientCommand], str] = _accept
-        """Returns why a command is refused at present; empty: it is not."""
+        """Returns why a command is refused at present; empty: accepted."""
 
     def watch(self, taken: ClientCommand) -> None:
-        """Note what a client does. `GraphError` where that must not be."""
+        """Records a command. Raises `GraphError` if it is refused."""
         weight = weight_of(taken)
         if self.repeats and weight is CommandEffect.CHANGES:
             raise GraphError("a recorded flight is repeated; nothing else may change it")
@@ -64,7 +64,7 @@ class CommandLog:
             self.note(taken, weight)
 
     def note(self, taken: ClientCommand, weight: CommandEffect) -> None:
-        """Tell of a command that is about to take effect."""
+        """Publishes and stores a command that is about to take effect."""
         cdr = None if records.is_large(taken) else records.content_bytes(taken)
         moment = self._engine.moment
         kept = _Kept(self._next_number, self._engine.time_ns, moment, taken, cdr)
@@ -76,17 +76,17 @@ class CommandLog:
             self._engine.count_command()
 
     def end(self) -> None:
-        """Tell that the flight is over; a second time nothing happens."""
+        """Records the end of the flight, once."""
         if not self._ended:
             self._ended = True
             self.note(ClientCommand("", "end", "", ""), CommandEffect.PACES)
             self._graph.deliver()
 
     def earlier(self) -> Iterator[Published]:
-        """Messages of all commands so far, for a log that is begun now.
+        """Yields the messages of all commands so far, for a log that starts now.
 
-        Where they were too many to be kept, only the last one, without its content: by its number
-        a reader sees that others are missing.
+        If they exceeded the memory limit, it yields the last one alone, without its content: its
+        number shows that others are missing.
         """
         for kept in self._kept:
             yield Published(records.TOPIC, records.TYPE, self._engine.time_ns, _whole(kept))
@@ -109,17 +109,17 @@ class CommandLog:
 
 
 def _accept(_taken: ClientCommand) -> str:
-    """Refuse nothing."""
+    """Refuses nothing."""
     return ""
 
 
 def _bare(kept: _Kept) -> _Kept:
-    """A command without its content."""
+    """Returns a command without its content."""
     return kept._replace(taken=kept.taken._replace(content=None), cdr=b"")
 
 
 def _whole(kept: _Kept) -> object:
-    """The message of a kept command, its content in it."""
+    """Returns the message of a stored command with its content."""
     if kept.cdr is None:
         return _message(kept._replace(cdr=records.content_bytes(kept.taken)))
     content = records.content_of(kept.taken.kind, kept.taken.type, kept.cdr)

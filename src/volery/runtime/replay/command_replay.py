@@ -1,12 +1,12 @@
-"""A recorded flight flown again: every command of its clients, at the moment at which it was taken.
+"""Repeats a recorded flight: every client command, at the simulated time of the original.
 
     flight = read_flight(Path("flight.mcap"))
     with Simulation(scenario_of(flight.origin, load_scenario("mine.toml"))) as simulation:
         simulation.replay_commands(flight)
         simulation.run()
 
-Pauses, speeds and single steps change no results and are not repeated; the flight goes as fast as
-it is asked to and ends where the recorded one did.
+Pauses, speeds and single steps change no results and are not repeated; the flight runs at the
+requested speed and ends where the recorded one did.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _SET_STATE = "simulation_interfaces/srv/SetSimulationState"
 
 
 class CommandReplay:
-    """Takes the commands of a recorded flight; the `Repeats` of an engine."""
+    """Repeats the commands of a recorded flight; implements an engine's `Repeats`."""
 
     def __init__(
         self,
@@ -51,23 +51,23 @@ class CommandReplay:
         self._clients = _Clients(gateway.graph)
         self._stopped = False
         self.over = False
-        """Whether the recorded flight ended here."""
+        """Whether the replay has reached the end of the recorded flight."""
         if any(command.taken.name.startswith("/rosapi/") for command in self._commands):
             from volery.bridges.rosbridge.rosapi import RosApi
 
             RosApi(gateway, "ros2", gateway.graph.now_ns).start()
 
     def next_step(self) -> int | None:
-        """Physics step of the next command, or of the end; None once it is over."""
+        """Returns the physics step of the next command, or of the end; None afterwards."""
         if self._next < len(self._commands):
             return self._commands[self._next].step
         return None if self.over else max(self._end_step, self._engine.fleet.step)
 
     def take(self) -> bool:
-        """Take the commands of the engine's moment; whether there were any.
+        """Repeats the commands of the engine's present time; returns whether there were any.
 
-        Raises `CommandError` where the flight does not come by the moment of the next one: then it
-        is not the recorded flight.
+        Raises `CommandError` if the engine is past the time of the next command: then the flight
+        differs from the recorded one.
         """
         first = self._next
         while (command := self._due()) is not None:
@@ -98,14 +98,14 @@ class CommandReplay:
             return
         self._log.note(taken, weight_of(taken))
         paused = self._pacer.paused
-        # What broke in the hands of a service, or was refused, broke and was refused then too.
+        # A command that failed or was refused here did so in the recorded flight too.
         with suppress(Exception), self._graph.on_behalf_of(taken.client):
             self._clients.do(taken)
         if self._pacer.paused and not paused:
             self._pacer.resume()
 
     def _is_left_out(self, taken: ClientCommand) -> bool:
-        """Whether a command changed only the pace, or was refused because of the pace."""
+        """Returns whether a command changed only the pace, or was refused because of it."""
         if taken.kind == "call" and taken.type == _SET_STATE:
             state = RunState.STOPPED if taken.content is None else taken.content.state.state
             again = self._stopped and self._engine.time_ns == 0
@@ -117,7 +117,7 @@ class CommandReplay:
 
 
 class _Clients:
-    """Does what the clients of a recorded flight did."""
+    """Repeats the actions of the clients of a recorded flight."""
 
     def __init__(self, graph: Graph) -> None:
         self._graph = graph
@@ -135,7 +135,7 @@ class _Clients:
         }
 
     def do(self, taken: ClientCommand) -> None:
-        """Do it again; raises whatever a service that it calls raises."""
+        """Repeats one command; raises whatever a service that it calls raises."""
         self._deeds[taken.kind](taken)
 
     def _call(self, taken: ClientCommand) -> None:
@@ -177,4 +177,4 @@ class _Clients:
 
 
 def _nobody_hears(_answer: object) -> None:
-    """The client is not here."""
+    """Discards the response: the client is not connected."""

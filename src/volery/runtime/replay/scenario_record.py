@@ -1,4 +1,4 @@
-"""Which scenario a log's flight was of: told by the simulation, and made into a scenario again."""
+"""Publishes the scenario of a flight for logs, and restores it from a log."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from volery.scenario.schema import Scenario
 
 
 def tell_origin(graph: Graph, scenario: Scenario) -> None:
-    """Publish what is flown on `/volery/scenario`, latched: the first message of every log."""
+    """Publishes the scenario on `/volery/scenario`, latched: the first message of every log."""
     publisher = graph.advertise(ORIGIN_TOPIC, String, latched=True)
     publisher.publish(String(origin_of_scenario(scenario).to_json()))
 
 
 def origin_of_scenario(scenario: Scenario) -> RecordedScenario:
-    """What a log is told of a scenario."""
+    """Returns the record of a scenario for a log."""
     content = scenario.model_dump(exclude_unset=True)
     return RecordedScenario(scenario.name, scenario.seed, version("volery"), content)
 
@@ -32,14 +32,14 @@ def origin_of_scenario(scenario: Scenario) -> RecordedScenario:
 def scenario_of(
     origin: RecordedScenario, own: Scenario | None = None, *, folder: Path | None = None
 ) -> Scenario:
-    """Return the scenario that a log tells of.
+    """Returns the scenario of a log.
 
-    A log may be another person's, so the scenario is confined: it reads only below `folder`, that
-    of the log, and among shipped data, and starts shipped nodes only. `own` is the user's own
-    scenario of that name: the log's one then reads below the folder of that one, and what `own`
-    names itself, files and nodes, it may read and start as `own` may.
+    The log may come from another user, so the scenario is confined: it reads files only below
+    `folder`, that of the log, and among shipped data, and starts shipped nodes only. `own` is the
+    user's own scenario of that name: the log's one then reads below the folder of `own`, and may
+    use the files and nodes that `own` names with the permissions of `own`.
 
-    Raises `ScenarioError` where `own` is another scenario, or the log's content is none.
+    Raises `ScenarioError` if `own` has another name, or the log's content is invalid.
     """
     if own is not None and own.name != origin.name:
         raise ScenarioError(f"the log is of a flight of '{origin.name}', not of '{own.name}'")
@@ -51,7 +51,7 @@ def scenario_of(
 
 
 def _lent(own: Scenario) -> ScenarioAccess:
-    """The access of a log's scenario whose user has it as a scenario of his own."""
+    """Returns the access of a log's scenario for a user who has it as an own scenario."""
     access = own.access
     if access.is_confined:
         return access
@@ -64,7 +64,7 @@ def _lent(own: Scenario) -> ScenarioAccess:
 
 
 def _texts(data: Any) -> Iterator[str]:
-    """All texts in plain data, file names among them."""
+    """Yields all strings in plain data, file names among them."""
     if isinstance(data, str):
         yield data
     elif isinstance(data, dict):

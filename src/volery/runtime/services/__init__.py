@@ -1,4 +1,4 @@
-"""Services that control the simulation and its UAVs, on the graph."""
+"""Creates the services on the graph that control the simulation and its UAVs."""
 
 from __future__ import annotations
 

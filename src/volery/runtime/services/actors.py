@@ -1,4 +1,4 @@
-"""Things that move, on the graph: where they are, and where something outside puts them."""
+"""Publishes the poses of actors and receives poses of externally moved ones."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ _PERIOD_S = 0.02
 
 
 def offer_actors(simulation: Simulation, actors: MovingActors, every: Callable[..., None]) -> None:
-    """Tell of all things on `/tf`, 50 times a second; listen to `/actors/NAME/pose`.
+    """Publishes all actors on `/tf`, 50 times a second; subscribes to `/actors/NAME/pose`.
 
-    A pose in the map that comes there is that of the thing from now on; a rotation of zeros keeps
-    its heading. What is none, or for a thing that goes its own way, is ignored: there is nobody to
-    tell.
+    A pose there, in the map frame, becomes the actor's pose; a zero quaternion keeps its heading.
+    Invalid poses are ignored, as a topic has no response; actors that move by themselves have no
+    such topic.
     """
     graph = simulation.graph
     transforms = graph.advertise("/tf", TFMessage)

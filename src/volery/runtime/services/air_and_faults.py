@@ -1,4 +1,4 @@
-"""Weather, gusts and faults, while the simulation runs: `/volery/...`."""
+"""Serves weather, gusts and faults while the simulation runs: `/volery/...`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _OURS = "volery_interfaces/srv"
 
 
 def offer_air_and_faults(simulation: Simulation) -> None:
-    """Offer set_weather, get_weather, gust, inject_fault and end_fault."""
+    """Creates the services set_weather, get_weather, gust, inject_fault and end_fault."""
 
     def set_weather(request: Any) -> None:
         simulation.set_weather(changed(simulation.weather, request, request.only))

@@ -1,4 +1,4 @@
-"""Services by which operators agree who steers which UAV."""
+"""Creates the services by which operators take and hand over control authority."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ TAKE, RELEASE, HAND_OVER = (
 
 
 def offer_piloting(graph: Graph, operators: ControlAuthority) -> None:
-    """Offer taking, releasing and handing over; see `ControlAuthority`."""
+    """Creates the services to take, release and hand over control; see `ControlAuthority`."""
 
     def take(request: Any) -> Fields:
         operators.take(request.uav, request.operator)

@@ -1,4 +1,4 @@
-"""Entities of the standard: UAVs and things, what is known of them, where they may be put."""
+"""Serves the entities of the standard, UAVs and actors: states, properties, teleports."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ _MSG = "simulation_interfaces/msg"
 _SRV = "simulation_interfaces/srv"
 _INVALID_POSE = 101
 _FASTEST = 100.0
-"""m/s or rad/s that can be set."""
+"""Max speed that can be set, m/s or rad/s."""
 
 
 class Entities:
-    """Answers questions about UAVs and things of a simulation, and moves them."""
+    """Serves the states and properties of UAVs and actors, and moves them."""
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
 
     def offer(self) -> None:
-        """Offer the services of entities."""
+        """Creates the services for entities."""
         graph = self._simulation.graph
         for name, srvtype, handler in (
             ("get_entities", "GetEntities", self._names),
@@ -51,7 +51,7 @@ class Entities:
         ):
             offer_result(graph, f"/{name}", f"{_SRV}/{srvtype}", handler)
 
-    # ---------------------------------------------------------------------------------- questions
+    # ------------------------------------------------------------------------------------ queries
 
     def _names(self, request: Any) -> Fields:
         return {"entities": [entity.name for entity in self._chosen(request.filters)]}
@@ -81,14 +81,14 @@ class Entities:
         return {"bounds": filled(f"{_MSG}/Bounds", {"type": BoundsType.BOX, "points": points})}
 
     def _all(self) -> Iterator[Entity]:
-        """UAVs in fleet order, then things."""
+        """Yields UAVs in fleet order, then actors."""
         simulation = self._simulation
         for uav in simulation.uavs.values():
             yield entity_of_uav(uav, simulation.types)
         yield from entities_of_actors(simulation.actors, simulation.time_ns)
 
     def _chosen(self, filters: Any) -> list[Entity]:
-        """Those that pass all filters."""
+        """Returns the entities that pass all filters."""
         is_named, is_tagged = name_filter(filters.filter), tag_filter(filters.tags)
         is_inside = bounds_filter(filters.bounds)
         categories = {int(c.category) for c in filters.categories}
@@ -156,7 +156,7 @@ class Entities:
             attitude = np.array([turn.x, turn.y, turn.z, turn.w])
         if request.set_twist:
             if any(_numbers(request.state.twist.angular)):
-                raise RefusedError(ResultCode.FEATURE_UNSUPPORTED, "things do not turn by a twist")
+                raise RefusedError(ResultCode.FEATURE_UNSUPPORTED, "actors do not turn by a twist")
             velocity = np.array(_numbers(request.state.twist.linear))
         self._simulation.set_actor_pose(entity.name, position, attitude, velocity)
 
@@ -170,7 +170,7 @@ class Entities:
 
 
 def pose_message(position: Array, attitude: Array) -> Pose:
-    """Pose of (3,) m and (4,) x y z w."""
+    """Returns a Pose from (3,), m, and (4,), x y z w."""
     return Pose(Point(*position.tolist()), Quaternion(*attitude.tolist()))
 
 

@@ -1,4 +1,4 @@
-"""What there is to know of an entity of the standard, be it a UAV or a thing that moves."""
+"""Describes an entity of the standard: a UAV or an actor."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from volery.world.scene_content import BodyShape
 Array = NDArray[np.float64]
 
 _CATEGORIES = {"person": Category.HUMAN}
-"""Of kinds of things; all others are dynamic objects."""
+"""Categories of actor kinds; all others are dynamic objects."""
 
 
 @dataclass(frozen=True, eq=False)
 class Entity:
-    """One entity now; vectors in the map."""
+    """Describes one entity at the present time; vectors are in the map frame, SI units."""
 
     name: str
     category: Category
     description: str
     tags: tuple[str, ...]
     make_shape: Callable[[], BodyShape]
-    """Returns its surface in its body frame; that of a UAV takes half a millisecond."""
+    """Returns the surface in the body frame; takes half a millisecond for a UAV."""
     radius_m: float
-    """Of a ball that stands for it."""
+    """Radius of the entity's bounding ball, m."""
     position: Array
     attitude: Array
     velocity: Array
@@ -44,7 +44,7 @@ class Entity:
 
 
 def entity_of_uav(uav: Uav, types: Mapping[str, UavType]) -> Entity:
-    """A UAV."""
+    """Returns a UAV as an entity."""
     kind = types[uav.type_name]
     turn, spin = (
         rotations.rotate(uav.attitude, v) for v in (uav.omega_body, uav.angular_acceleration_body)
@@ -66,7 +66,7 @@ def entity_of_uav(uav: Uav, types: Mapping[str, UavType]) -> Entity:
 
 
 def entities_of_actors(actors: MovingActors | None, time_ns: int) -> Iterator[Entity]:
-    """All things, in order."""
+    """Yields all actors as entities, in order."""
     if actors is None:
         return
     poses, still = actors.poses_at(time_ns), np.zeros(3)
@@ -74,7 +74,7 @@ def entities_of_actors(actors: MovingActors | None, time_ns: int) -> Iterator[En
         yield Entity(
             name=actor.name,
             category=_CATEGORIES.get(actor.kind, Category.DYNAMIC_OBJECT),
-            description=f"{actor.kind} that moves by itself",
+            description=f"actor of kind {actor.kind}",
             tags=("actor", actor.kind),
             make_shape=partial(_shape_of, actor),
             radius_m=actor.shape.radius,

@@ -1,4 +1,4 @@
-"""What this simulator can do, in the words of the standard."""
+"""Serves the feature list of this simulator, by the standard."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _SRV = "simulation_interfaces/srv/GetSimulatorFeatures"
 
 
 class Feature(IntEnum):
-    """`simulation_interfaces/msg/SimulatorFeatures`, those that can be had here."""
+    """Lists the supported values of `simulation_interfaces/msg/SimulatorFeatures`."""
 
     SPAWNING = 0
     DELETING = 1
@@ -64,20 +64,20 @@ PLAYER_FEATURES = frozenset(
         Feature.AVAILABLE_WORLDS,
     }
 )
-"""What can be done with a flight that is over."""
+"""Features that the playback of a log supports."""
 
 
 def offer_features(
     graph: Graph, *, loads_worlds: bool, offered: Collection[Feature] = tuple(Feature)
 ) -> None:
-    """Offer `/get_simulator_features`."""
+    """Creates `/get_simulator_features`."""
     features = [f for f in Feature if f in offered and (f not in _ON_CONDITION or loads_worlds)]
     told = filled(
         "simulation_interfaces/msg/SimulatorFeatures",
         {
             "features": np.array(features, dtype=np.uint16),
-            "custom_info": "Volery: entities are UAVs and things, worlds are scenarios, "
-            "/volery/* is beside the standard",
+            "custom_info": "Volery: entities are UAVs and actors, worlds are scenarios, "
+            "/volery/* services extend the standard",
         },
     )
     response = message_type(f"{_SRV}_Response")

@@ -1,4 +1,4 @@
-"""Which entities a request means: names, categories, tags, places."""
+"""Filters entities by names, categories, tags and bounds."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 class Category(IntEnum):
-    """`simulation_interfaces/msg/EntityCategory`."""
+    """Enumerates `simulation_interfaces/msg/EntityCategory`."""
 
     OBJECT = 0
     ROBOT = 1
@@ -27,7 +27,7 @@ class Category(IntEnum):
 
 
 class BoundsType(IntEnum):
-    """`simulation_interfaces/msg/Bounds`."""
+    """Enumerates `simulation_interfaces/msg/Bounds`."""
 
     EMPTY = 0
     BOX = 1
@@ -36,9 +36,9 @@ class BoundsType(IntEnum):
 
 
 def name_filter(pattern: str) -> Callable[[str], bool]:
-    """Whether a name holds a match of a POSIX extended regular expression; all, where it is empty.
+    """Returns whether a name contains a match of a POSIX extended regular expression.
 
-    Raises `RefusedError` for one that is none.
+    An empty pattern matches all. Raises `RefusedError` if the expression is invalid.
     """
     if not pattern:
         return lambda _name: True
@@ -49,7 +49,7 @@ def name_filter(pattern: str) -> Callable[[str], bool]:
 
 
 def tag_filter(tags: Any) -> Callable[[Sequence[str]], bool]:
-    """Whether something with such tags passes a `TagsFilter`: any (0) or all (1) of its own."""
+    """Returns whether tags pass a `TagsFilter`: any (0) or all (1) of the filter's tags."""
     wanted = set(tags.tags)
     if not wanted:
         return lambda _own: True
@@ -62,9 +62,9 @@ def tag_filter(tags: Any) -> Callable[[Sequence[str]], bool]:
 
 
 def bounds_filter(bounds: Any) -> Callable[[Array, float], bool]:
-    """Whether a ball (position (3,) m, map; radius, m) reaches into `Bounds`; all into empty ones.
+    """Returns whether a ball (position (3,), m, map; radius, m) intersects `Bounds`.
 
-    Raises `RefusedError` for convex hulls, and for bounds that are none.
+    Empty bounds contain all. Raises `RefusedError` for convex hulls and invalid bounds.
     """
     kind = int(bounds.type)
     points = np.array([[p.x, p.y, p.z] for p in bounds.points], dtype=np.float64).reshape(-1, 3)
@@ -77,12 +77,12 @@ def bounds_filter(bounds: Any) -> Callable[[Array, float], bool]:
     if kind not in (BoundsType.BOX, BoundsType.SPHERE):
         raise RefusedError(ResultCode.OPERATION_FAILED, f"there are no bounds of type {kind}")
     if len(points) != 2 or not np.isfinite(points).all():
-        raise RefusedError(ResultCode.OPERATION_FAILED, "these bounds need two finite points")
+        raise RefusedError(ResultCode.OPERATION_FAILED, "bounds need two finite points")
     if kind == BoundsType.SPHERE:
         center, reach = points[0], float(points[1, 0])
         if reach < 0.0:
             raise RefusedError(
-                ResultCode.OPERATION_FAILED, "the radius of a sphere is not negative"
+                ResultCode.OPERATION_FAILED, "the radius of a sphere must not be negative"
             )
         return lambda position, radius: _distance(position, center) <= reach + radius
     low, high = points.min(axis=0), points.max(axis=0)

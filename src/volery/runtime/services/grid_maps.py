@@ -1,4 +1,4 @@
-"""The grid map on the graph: `/map`, `/map_command` and services that change it."""
+"""Publishes the grid map on `/map`, receives `/map_command` and serves changes of the map."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ _BLOCKED, _FREE = 100, 0
 _BLOCKED_FROM = 50
 """Occupancy, in per cent, from which a cell is blocked."""
 _LARGEST = 1e6
-"""Component of a quaternion that need not be of unit length."""
+"""Max component of a quaternion, which need not be of unit length."""
 _LEVEL = 1e-3
-"""Largest x and y of the quaternion of an origin that counts as level."""
+"""Max x and y, relative to the norm, of the quaternion of a level origin."""
 
 
 def offer_grid_maps(
     graph: Graph, world: GridMapManager, settings: GridMapWorld, now_ns: Callable[[], int]
 ) -> None:
-    """Tell of the map on `/map`, latched; take others on `/map_command`; offer the services."""
+    """Publishes the map on `/map`, latched; receives `/map_command`; creates the services."""
     publisher = graph.advertise("/map", OccupancyGrid, latched=True)
 
     def tell(grid: GridMap) -> None:
@@ -86,7 +86,7 @@ def offer_grid_maps(
 
 
 def occupancy_of(grid: GridMap, time_ns: int) -> OccupancyGrid:
-    """The map as a message: 100 blocked, 0 free."""
+    """Returns the map as a message: 100 blocked, 0 free."""
     data = np.where(grid.blocked, np.int8(_BLOCKED), np.int8(_FREE)).ravel()
     data.flags.writeable = False
     turn = rotations.from_rpy(0.0, 0.0, grid.yaw_rad)
@@ -101,10 +101,10 @@ def occupancy_of(grid: GridMap, time_ns: int) -> OccupancyGrid:
 
 
 def grid_of(message: Any, block_height_m: float, *, unknown_is_blocked: bool = False) -> GridMap:
-    """The map that a message means. Raises `CommandError` for one that is none.
+    """Returns the map of a message. Raises `CommandError` if it is invalid.
 
-    Cells of 50 per cent and more are blocked, unknown ones (-1) as `unknown_is_blocked` says. The
-    origin's height is of no account: blocks stand on the ground.
+    Cells of 50 per cent and more are blocked, unknown ones (-1) if `unknown_is_blocked`. The
+    height of the origin is ignored: blocks stand on the ground.
     """
     info, place = message.info, message.info.origin.position
     if message.header.frame_id not in ("", "map"):
@@ -133,7 +133,7 @@ def _yaw(turn: Any) -> float:
     if not (np.abs(q) < _LARGEST).all():
         raise CommandError(f"the origin of a map is turned by {q.tolist()}, which is no rotation")
     length = float(np.linalg.norm(q))
-    if length == 0.0:  # a message that was not filled in
+    if length == 0.0:  # the message has no orientation
         return 0.0
     if max(abs(q[0]), abs(q[1])) > _LEVEL * length:
         raise CommandError(f"the origin of a map turns about z alone, not by {q.tolist()}")

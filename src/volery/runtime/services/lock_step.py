@@ -1,11 +1,11 @@
-"""Lock-step partners over bridges: the simulation waits for programs in other processes.
+"""Serves lock-step partners over bridges: the simulation waits for programs in other processes.
 
-A client calls `/volery/join_lock_step`, subscribes `/volery/lock_step/NAME/go` and publishes on
-`/volery/lock_step/NAME/done`, both `rosgraph_msgs/Clock`. At each meeting the simulation sends the
-time on `go`, after everything that it has published until then, and stands still until the same
-time comes back on `done`; what the client published before is in force from the next physics step.
-A client that joins before the first step may ask to be met at time 0 too.
-Who unadvertises `done`, or loses the connection, has left. After a reset the times begin anew.
+A client calls `/volery/join_lock_step`, subscribes to `/volery/lock_step/NAME/go` and publishes on
+`/volery/lock_step/NAME/done`, both `rosgraph_msgs/Clock`. At each barrier the simulation publishes
+the time on `go`, after all messages up to then, and waits until the same time arrives on `done`;
+commands that the client published before act from the next physics step. A client that joins before
+the first step may request a barrier at time 0 too. A client that unadvertises `done`, or loses the
+connection, has left. A reset sets the times back to 0.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ TYPE = "volery_interfaces/srv/JoinLockStep"
 
 
 def open_lock_step(simulation: Any) -> None:
-    """Offer `SERVICE` on the graph of a `Simulation`."""
+    """Creates `SERVICE` on the graph of a `Simulation`."""
     response = message_type(f"{TYPE}_Response")
 
     def join(request: Any) -> Any:
@@ -37,17 +37,17 @@ def open_lock_step(simulation: Any) -> None:
 
 
 class _Meetings:
-    """The meetings with one client."""
+    """Runs the barriers with one client."""
 
     def __init__(self, simulation: Any, request: Any) -> None:
         name = request.name
         if not name.isidentifier():
-            raise CommandError(f"'{name}' is no name for a partner: letters, digits and _")
+            raise CommandError(f"'{name}' is no name for a partner: use letters, digits and _")
         graph: Graph = simulation.graph
         self._graph = graph
         self._done = f"/volery/lock_step/{name}/done"
         if graph.publishers(self._done) == 0:
-            raise CommandError(f"advertise {self._done} before joining, and subscribe .../go")
+            raise CommandError(f"advertise {self._done} before joining, and subscribe to .../go")
         self._partner: Partner = simulation.add_partner(
             name,
             period_s=request.period_s,
@@ -63,7 +63,7 @@ class _Meetings:
         self._meeting_ns = -1
 
     def _is_there(self) -> bool:
-        """Whether the client can still answer; what it left behind is cleared away."""
+        """Returns whether the client can still respond; cleans up after one that left."""
         there = self._graph.publishers(self._done) > 0
         if not there:
             self._clear_away()

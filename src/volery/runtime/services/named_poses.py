@@ -1,4 +1,4 @@
-"""Named poses of the standard: where the UAVs started."""
+"""Serves the named poses of the standard: the start poses of the UAVs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _SUFFIX = "_start"
 
 
 def offer_named_poses(graph: Graph, starts: Sequence[StartPose]) -> None:
-    """Offer `/get_named_poses` and `/get_named_pose_bounds`: `uav1_start`, `uav2_start`, ..."""
+    """Creates `/get_named_poses` and `/get_named_pose_bounds`: `uav1_start`, `uav2_start`, ..."""
     by_name = {f"{start.name}{_SUFFIX}": start for start in starts}
 
     def poses(request: Any) -> Fields:
@@ -43,7 +43,7 @@ def offer_named_poses(graph: Graph, starts: Sequence[StartPose]) -> None:
 def _named(name: str, start: StartPose) -> Any:
     fields = {
         "name": name,
-        "description": f"where {start.name} starts",
+        "description": f"start pose of {start.name}",
         "tags": ["start", start.type_name],
         "pose": pose_message(np.asarray(start.position_map), np.asarray(start.attitude)),
     }

@@ -1,4 +1,4 @@
-"""What clients can ask of a log that is being played: `/volery/player/...`, and the standard's."""
+"""Serves the playback of a log: `/volery/player/...` and services of the standard."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _MOST_STEPS = 1_000_000_000
 
 
 class PlayerServices:
-    """The services of one player, and the topic that tells how it stands."""
+    """Provides the services of one playback and publishes its state."""
 
     def __init__(
         self,
@@ -69,7 +69,7 @@ class PlayerServices:
             offer_command(graph, f"/volery/{name}", srvtype, handler)
 
     def tell_state(self) -> None:
-        """Publish how it stands."""
+        """Publishes the playback state."""
         self._state.publish(filled(_STATE, self._present()))
 
     def _present(self) -> Fields:
@@ -102,7 +102,7 @@ class PlayerServices:
         elif wanted == RunState.QUITTING:
             player.quit()
         else:
-            raise RefusedError(WRONG_TRANSITION, f"state {wanted} cannot be asked for")
+            raise RefusedError(WRONG_TRANSITION, f"state {wanted} cannot be requested")
 
     def _step(self, request: Any) -> None:
         steps = int(request.steps)

@@ -1,4 +1,4 @@
-"""Recording while the simulation runs, into one folder and nowhere else."""
+"""Records logs while the simulation runs, into one folder."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _OURS = "volery_interfaces/srv"
 
 
 class RecordingServices:
-    """Offers `/volery/start_recording` and `/volery/stop_recording`: one log at a time."""
+    """Provides `/volery/start_recording` and `/volery/stop_recording`: one log at a time."""
 
     def __init__(self, graph: Graph, folder: Path | None, commands: CommandLog) -> None:
         self._graph = graph
@@ -28,29 +28,29 @@ class RecordingServices:
         self._subscription: Subscription | None = None
         self._failure: RecordingError | None = None
         self._room = 0
-        """Bytes that the present log may have."""
+        """Max size of the present log, bytes."""
 
     def offer(self) -> None:
-        """Offer the services."""
+        """Creates the services."""
         graph = self._graph
         offer_command(graph, "/volery/start_recording", f"{_OURS}/StartRecording", self._start)
         offer_command(graph, "/volery/stop_recording", f"{_OURS}/StopRecording", self._stop)
 
     @property
     def name(self) -> str:
-        """The file that is being recorded, below the folder; empty: none."""
+        """Path of the log being recorded, below the folder; empty: none."""
         if self._log is None or self._folder is None:
             return ""
         return self._log.path.relative_to(self._folder.resolve()).as_posix()
 
     def close(self) -> None:
-        """End a recording that is still running."""
+        """Ends a recording that is still running."""
         if self._log is not None:
             try:
                 self._commands.end()
                 self._end()
             except RecordingError:
-                return  # nobody is left to be told; whole chunks are in the file
+                return  # no client is left to report to; whole chunks are in the file
 
     def _start(self, request: Any) -> Fields:
         if self._log is not None:
@@ -88,7 +88,7 @@ class RecordingServices:
             self._subscription = None
 
     def _write(self, published: Published) -> None:
-        """A full disk must not end the run: whoever stops the recording is told."""
+        """Records a message; an error ends the recording, and stop_recording reports it."""
         try:
             if self._log is not None and self._failure is None:
                 self._log.write(published)
@@ -109,5 +109,5 @@ class RecordingServices:
         folder = self._folder.resolve()
         path = (folder / name).resolve()
         if path == folder or not path.is_relative_to(folder):
-            raise RecordingError(f"'{name}' lies outside of the folder for recordings")
+            raise RecordingError(f"'{name}' is outside the folder for recordings")
         return path

@@ -1,4 +1,4 @@
-"""How services answer: with a result code of the standard, or with success and a message."""
+"""Builds service responses: with a result code of the standard, or with success and message."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from volery.graph.messages import message_type
 from volery.graph.service_reply import ServiceReply
 
 Fields = Mapping[str, Any]
-"""Fields of a response by name; those that are missing stay zero."""
+"""Fields of a response by name; missing ones stay zero."""
 Handler = Callable[[Any], "Fields | None"]
 Close = Callable[[], None]
-"""Gives back what was opened."""
+"""Undoes what was opened."""
 Settle = Callable[["Fields | Exception"], None]
-"""Gives the answer: its fields, or what went wrong."""
+"""Passes the response: its fields, or the error."""
 
 _MAX_CHARACTERS = 1_000
-"""Of the reason of a refusal."""
+"""Max length of a refusal's reason."""
 
 
 class ResultCode(IntEnum):
-    """`simulation_interfaces/msg/Result`, what every service of the standard answers with."""
+    """Enumerates `simulation_interfaces/msg/Result`, the codes of all standard services."""
 
     FEATURE_UNSUPPORTED = 0
     OK = 1
@@ -35,7 +35,7 @@ class ResultCode(IntEnum):
 
 
 class RefusedError(Exception):
-    """A request that is not fulfilled, with its result code and a reason for people."""
+    """Refuses a request, with a result code and a reason in plain text."""
 
     def __init__(self, code: int, reason: str) -> None:
         super().__init__(reason)
@@ -43,12 +43,12 @@ class RefusedError(Exception):
 
 
 def result(code: int = ResultCode.OK, reason: str = "") -> Any:
-    """A `simulation_interfaces/msg/Result`."""
+    """Returns a `simulation_interfaces/msg/Result`."""
     return message_type("simulation_interfaces/msg/Result")(result=int(code), error_message=reason)
 
 
 def filled(name: str, fields: Fields | None = None) -> Any:
-    """A new message of type `name` with `fields`; all others are zero or empty."""
+    """Returns a new message of type `name` with `fields`; all others are zero or empty."""
     message = zero_message(name)
     for key, value in (fields or {}).items():
         setattr(message, key, value)
@@ -56,13 +56,13 @@ def filled(name: str, fields: Fields | None = None) -> Any:
 
 
 def failed(error: Exception) -> Any:
-    """The Result that tells of an error."""
+    """Returns the Result for an error."""
     code = error.code if isinstance(error, RefusedError) else ResultCode.OPERATION_FAILED
     return result(code, reason_of(error))
 
 
 def reason_of(error: Exception) -> str:
-    """What an error says, shortened: a message may repeat what a client sent."""
+    """Returns the text of an error, shortened, as a message may contain client data."""
     text = str(error)
     if len(text) <= _MAX_CHARACTERS:
         return text
@@ -71,7 +71,7 @@ def reason_of(error: Exception) -> str:
 
 
 def offer_result(graph: Graph, name: str, srvtype: str, handler: Handler) -> None:
-    """Offer a service of the standard; what `handler` refuses becomes its `result`."""
+    """Creates a service of the standard; errors of `handler` become its `result`."""
 
     def handle(request: Any) -> Any:
         try:
@@ -86,7 +86,7 @@ def offer_result(graph: Graph, name: str, srvtype: str, handler: Handler) -> Non
 def offer_result_later(
     graph: Graph, name: str, srvtype: str, ask: Callable[[Any, Settle], None]
 ) -> None:
-    """Offer a service of the standard that `ask(request, settle)` answers some time."""
+    """Creates a service of the standard that `ask(request, settle)` answers later."""
 
     def handle(request: Any, reply: ServiceReply) -> None:
         def settle(outcome: Fields | Exception) -> None:
@@ -102,9 +102,9 @@ def offer_result_later(
 
 
 def offer_command(graph: Graph, name: str, srvtype: str, handler: Handler) -> Close:
-    """Offer a service of ours: `success`, and a `message` that says why not.
+    """Creates a service of `volery_interfaces`, with `success` and, on errors, a `message`.
 
-    What is returned withdraws it.
+    The returned function destroys the service.
     """
 
     def handle(request: Any) -> Any:

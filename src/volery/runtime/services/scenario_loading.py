@@ -1,4 +1,4 @@
-"""Scenarios that clients load with changes: how many fly, what they carry, how dense a wood is."""
+"""Loads scenarios with the changes that clients request: fleet size, sensors, forest density."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ def offer_choices(
     find: Callable[[str], Scenario],
     change: Callable[[WorldRequest], None],
 ) -> None:
-    """Offer `/volery/load_scenario` and `/volery/get_scenario_options`.
+    """Creates `/volery/load_scenario` and `/volery/get_scenario_options`.
 
-    names, find: scenarios that can be had. change: has another one flown, or refuses.
+    `names` and `find` return the available scenarios; `change` loads one, or raises.
     """
 
     def load(request: Any) -> Fields:
@@ -56,7 +56,7 @@ def offer_choices(
 
 @cache
 def _changes_schema() -> str:
-    """JSON schema of what can be changed; building it takes tens of milliseconds."""
+    """Returns the JSON schema of changes, cached: building it takes tens of milliseconds."""
     return json.dumps(Changes.model_json_schema())
 
 
@@ -71,7 +71,7 @@ def _descriptions() -> tuple[str, ...]:
 
 
 def _check_airframe(changes: Changes) -> None:
-    """Clients choose among those that ship: a name may not become a path."""
+    """Raises `CommandError` unless the airframe ships with Volery: names must not become paths."""
     if changes.airframe is not None and changes.airframe not in airframe_names():
         known = ", ".join(airframe_names())
         raise CommandError(

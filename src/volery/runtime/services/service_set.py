@@ -1,4 +1,4 @@
-"""Everything that clients can ask of a simulation, offered in one place."""
+"""Creates all services of a simulation."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class ServiceSet:
-    """What the services of one simulation hold on to."""
+    """Holds the state of one simulation's services."""
 
     def __init__(self, playing: SimulationStateServices, recording: RecordingServices) -> None:
         self._playing = playing
@@ -39,11 +39,11 @@ class ServiceSet:
 
     @property
     def recording(self) -> str:
-        """What a client is recording, below the folder of recordings; empty: nothing."""
+        """Path of the log that a client records, below the folder of recordings; empty: none."""
         return self._recording.name
 
     def close(self) -> None:
-        """Give it back."""
+        """Ends a recording that is still running."""
         self._recording.close()
 
 
@@ -55,9 +55,9 @@ def open_services(
     shelf: ScenarioCatalog | None = None,
     every: Callable[..., None],
 ) -> ServiceSet:
-    """Offer the standard's services and ours; what the arguments mean, `Simulation` says.
+    """Creates the standard's services and Volery's own; see `Simulation` for the arguments.
 
-    `every(period_s, callback, wanted=...)` has something done in simulated time.
+    `every(period_s, callback, wanted=...)` schedules a callback in simulated time.
     """
     graph = simulation.graph
     offer_features(graph, loads_worlds=on_load is not None)

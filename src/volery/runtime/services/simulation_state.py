@@ -1,4 +1,4 @@
-"""Playing, pausing, stopping, quitting and resetting a simulation, by the standard."""
+"""Plays, pauses, stops, quits and resets a simulation, by the standard."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _TIME, _STATE, _SPAWNED, _ALL = 1, 2, 4, 255
 
 
 class RunState(IntEnum):
-    """`simulation_interfaces/msg/SimulationState`."""
+    """Enumerates `simulation_interfaces/msg/SimulationState`."""
 
     STOPPED = 0
     PLAYING = 1
@@ -38,14 +38,14 @@ class RunState(IntEnum):
 
 
 class SimulationStateServices:
-    """The state of a simulation: stopped is paused at the start, after a reset."""
+    """Serves the state of a simulation; stopped means paused at the start, after a reset."""
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
         self._stopped = False
 
     def offer(self) -> None:
-        """Offer the services of the simulation's state."""
+        """Creates the services of the simulation's state."""
         graph = self._simulation.graph
         for name, srvtype, handler in (
             ("get_simulation_state", "GetSimulationState", self._get),
@@ -61,7 +61,7 @@ class SimulationStateServices:
 
     @property
     def state(self) -> RunState:
-        """The present state."""
+        """Present state."""
         simulation = self._simulation
         if simulation.quitting:
             return RunState.QUITTING
@@ -78,7 +78,7 @@ class SimulationStateServices:
         if wanted == state:
             raise RefusedError(_ALREADY_THERE, f"the simulation is {state.name} already")
         if state is RunState.QUITTING:
-            raise RefusedError(WRONG_TRANSITION, "the simulation quits")
+            raise RefusedError(WRONG_TRANSITION, "the simulation is quitting")
         if wanted == RunState.PLAYING:
             if self._simulation.end.waits:
                 raise RefusedError(WRONG_TRANSITION, self._simulation.end.notice)
@@ -93,7 +93,7 @@ class SimulationStateServices:
         elif wanted == RunState.QUITTING:
             self._simulation.quit()
         else:
-            raise RefusedError(WRONG_TRANSITION, f"state {wanted} cannot be asked for")
+            raise RefusedError(WRONG_TRANSITION, f"state {wanted} cannot be requested")
 
     def _stop(self) -> None:
         try:
@@ -104,7 +104,7 @@ class SimulationStateServices:
         self._simulation.pause()
 
     def _reset(self, request: Any) -> None:
-        """Time and state go back together, and take the UAVs with them that were spawned."""
+        """Resets time and state together, and deletes spawned UAVs."""
         scope = int(request.scope)
         if scope != _ALL and scope & ~(_TIME | _STATE | _SPAWNED):
             raise RefusedError(ResultCode.OPERATION_FAILED, f"there is no scope {scope}")
@@ -115,6 +115,6 @@ class SimulationStateServices:
             reason = "time and state are reset together: SCOPE_DEFAULT, SCOPE_ALL, or both bits"
             raise RefusedError(ResultCode.FEATURE_UNSUPPORTED, reason)
         if scope == _TIME | _STATE and self._simulation.spawned:
-            reason = "spawned UAVs go with a reset: add SCOPE_SPAWNED, or delete them first"
+            reason = "a reset deletes spawned UAVs: add SCOPE_SPAWNED, or delete them first"
             raise RefusedError(ResultCode.FEATURE_UNSUPPORTED, reason)
         self._simulation.reset()

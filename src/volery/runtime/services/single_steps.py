@@ -1,4 +1,4 @@
-"""Steps of a paused simulation: a service that answers when they are made, and the action."""
+"""Steps a paused simulation: a service that responds after the last step, and an action."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ CANCELLED = "cancelled"
 
 
 def offer_steps(simulation: Simulation) -> None:
-    """Offer the service `/step_simulation` and the action `/simulate_steps`.
+    """Creates the service `/step_simulation` and the action `/simulate_steps`.
 
-    Steps are physics steps. They are made by the thread that runs the simulation.
+    Steps are physics steps; the thread that runs the simulation makes them.
     """
 
     def step(request: Any, settle: Settle) -> None:
@@ -53,11 +53,11 @@ def _begin(simulation: Simulation, steps: int, tell: Any) -> StepRequest:
         raise RefusedError(ResultCode.INCORRECT_STATE, simulation.end.notice)
     if not simulation.paused:
         raise RefusedError(
-            ResultCode.INCORRECT_STATE, "steps are made while paused; pause it first"
+            ResultCode.INCORRECT_STATE, "steps need a paused simulation; pause it first"
         )
     try:
         return simulation.single_step(steps, tell)
-    except CommandError as error:  # it went on meanwhile
+    except CommandError as error:  # the simulation was resumed meanwhile
         raise RefusedError(ResultCode.INCORRECT_STATE, str(error)) from None
 
 
@@ -84,7 +84,7 @@ def _take(simulation: Simulation, goal: Goal) -> None:
 
 
 def _interrupted(steps: StepRequest) -> RefusedError | None:
-    """Why not all steps were made; None where they were."""
+    """Returns why not all steps were made; None if all were."""
     if not steps.left:
         return None
     reason = f"{steps.made} of {counted(steps.steps, 'step')} made: {steps.reason}"

@@ -1,4 +1,4 @@
-"""States of the simulation, kept by name in memory; its speed; single UAVs begun anew."""
+"""Saves and restores snapshots by name, in memory; sets the speed; resets single UAVs."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ _LONGEST_NAME = 100
 
 
 class SnapshotServices:
-    """Offers `/volery/save_snapshot`, `restore_snapshot`, `delete_snapshot` and their kin."""
+    """Provides `/volery/save_snapshot`, `restore_snapshot`, `delete_snapshot` and more."""
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
         self._kept: dict[str, Snapshot] = {}
 
     def offer(self) -> None:
-        """Offer the services."""
+        """Creates the services."""
         graph = self._simulation.graph
         for name, handler in (
             ("save_snapshot", self._keep),
@@ -40,16 +40,16 @@ class SnapshotServices:
     def _keep(self, request: Any) -> Fields:
         name = request.name
         if not 0 < len(name) <= _LONGEST_NAME:
-            raise CommandError(f"the name of a state has 1 to {_LONGEST_NAME} characters")
+            raise CommandError(f"the name of a snapshot has 1 to {_LONGEST_NAME} characters")
         if name not in self._kept and len(self._kept) >= _MOST_STATES:
-            raise CommandError(f"{_MOST_STATES} states are kept; forget one first")
+            raise CommandError(f"{_MOST_STATES} snapshots are saved; delete one first")
         kept = self._kept[name] = self._simulation.snapshot()
-        return {"message": f"kept the state at {kept.time_s:.3f} s"}
+        return {"message": f"saved the state at {kept.time_s:.3f} s"}
 
     def _restore(self, request: Any) -> Fields:
         kept = self._find(request.name)
         self._simulation.restore(kept)
-        return {"message": f"back at {kept.time_s:.3f} s"}
+        return {"message": f"restored the state at {kept.time_s:.3f} s"}
 
     def _forget(self, request: Any) -> None:
         self._find(request.name)
@@ -62,7 +62,7 @@ class SnapshotServices:
     def _find(self, name: str) -> Snapshot:
         if name not in self._kept:
             known = ", ".join(self._kept) or "none"
-            raise CommandError(f"no state '{name}' is kept; known: {known}")
+            raise CommandError(f"there is no snapshot '{name}'; known: {known}")
         return self._kept[name]
 
     def _set_speed(self, request: Any) -> None:

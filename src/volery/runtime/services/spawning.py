@@ -1,4 +1,4 @@
-"""Spawning and deleting UAVs, by the standard."""
+"""Spawns and deletes UAVs, by the standard."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ _CODES = {
 
 
 class SpawnServices:
-    """Answers what can be spawned, spawns and deletes."""
+    """Serves the list of spawnable types; spawns and deletes UAVs."""
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
 
     def offer(self) -> None:
-        """Offer the services."""
+        """Creates the services."""
         graph = self._simulation.graph
         offer_result(graph, "/get_spawnables", f"{_SRV}/GetSpawnables", self._spawnables)
         offer_result(graph, "/spawn_entity", f"{_SRV}/SpawnEntity", self._spawn)
@@ -65,7 +65,7 @@ class SpawnServices:
         if request.entity_resource.resource_string:
             raise RefusedError(_UNSUPPORTED_FORMAT, "UAVs are spawned by type, not from a string")
         if not request.entity_resource.uri:
-            raise RefusedError(_NO_RESOURCE, "uri must be one of those of /get_spawnables")
+            raise RefusedError(_NO_RESOURCE, "uri must be an entity_resource of /get_spawnables")
         if pose.header.frame_id not in ("", "map"):
             reason = f"poses are in 'map', not in '{pose.header.frame_id}'"
             raise RefusedError(_INVALID_POSE, reason)
@@ -91,7 +91,7 @@ class SpawnServices:
         return {"entity_name": name}
 
     def _spawn_each(self, request: Any) -> Fields:
-        """All that can be; the others are told of one by one."""
+        """Spawns all that can be spawned; each of the others has its own error."""
         results = []
         for each in request.spawn_requests:
             try:
@@ -111,7 +111,7 @@ class SpawnServices:
         self._simulation.delete_uav(request.entity)
 
     def _name(self, request: Any) -> str:
-        """The wished name, or a free one where that is allowed or none was wished."""
+        """Returns the requested name, or a free one where that is allowed or no name is given."""
         wished, taken = str(request.name), self._simulation.uavs
         if wished and not (wished in taken and request.allow_renaming):
             return wished
@@ -123,5 +123,5 @@ class SpawnServices:
 
 
 def resource(uri: str) -> Any:
-    """A `Resource` that is found under a name."""
+    """Returns a `Resource` with a name as its URI."""
     return filled(f"{_MSG}/Resource", {"uri": uri})

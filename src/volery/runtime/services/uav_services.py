@@ -1,4 +1,4 @@
-"""Services of one UAV that take arguments, and those of readiness: `/uavN/...`."""
+"""Serves commands with arguments, and the readiness, of one UAV: `/uavN/...`."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ _OURS = "volery_interfaces/srv"
 
 
 def offer_uav_services(graph: Graph, uav: Uav) -> list[Close]:
-    """Offer what `runtime.vehicles.command_interface` does not: the plain commands stand there.
+    """Creates the services of a UAV beside those of `runtime.vehicles.command_interface`.
 
-    What is returned withdraws it.
+    The returned functions destroy them.
     """
     services: tuple[tuple[str, str, Handler], ...] = (
         ("arm", _TRIGGER, lambda _request: _arm(uav)),
@@ -54,7 +54,7 @@ def offer_uav_services(graph: Graph, uav: Uav) -> list[Close]:
 
 
 def _arm(uav: Uav) -> Fields:
-    """There is no armed state: a landed UAV is ready for a take-off, with its rotors at rest."""
+    """Returns a message: no armed state exists, a landed UAV is ready for a take-off."""
     if uav.mode is FlightMode.CRASHED:
         raise CommandError(f"{uav.name} has crashed")
     if uav.mode is FlightMode.LANDED:
@@ -64,8 +64,8 @@ def _arm(uav: Uav) -> Fields:
 
 def _disarm(uav: Uav) -> Fields:
     if uav.mode in (FlightMode.LANDED, FlightMode.CRASHED):
-        return {"message": f"the rotors of {uav.name} stand still"}
-    raise CommandError(f"{uav.name} flies ({uav.mode.name}); land, or stop, which lets it fall")
+        return {"message": f"the rotors of {uav.name} do not turn"}
+    raise CommandError(f"{uav.name} flies ({uav.mode.name}); land it, or kill it: it then falls")
 
 
 def _go_to(uav: Uav, request: Any) -> None:

@@ -1,4 +1,4 @@
-"""The weather as messages: what is told of it, and what of a message or request is taken."""
+"""Converts the weather to messages, and messages and requests to a weather."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ _PARTICLES = {
 
 
 class WeatherTopics:
-    """Tells the weather on `/weather`, latched, and takes another one from `/weather_command`.
+    """Publishes the weather on `/weather`, latched; subscribes to `/weather_command`.
 
-    What is told holds all that can be set while running: a log's `/weather`, played back into
-    `/weather_command`, sets the same weather at the same times. A command that cannot be is
-    ignored: on a topic there is nobody to tell.
+    The message holds everything that can be set while running: a log's `/weather`, played back
+    into `/weather_command`, sets the same weather at the same times. Invalid commands are ignored,
+    as a topic has no response.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class WeatherTopics:
         graph.subscribe("/weather_command", take, _TYPE)
 
     def tell(self, weather: Weather) -> None:
-        """Publish the weather."""
+        """Publishes the weather."""
         gusts = [_gust_message(gust) for gust in weather.gusts]
         fields = {**fields_of(self._world, weather), "gusts": gusts}
         stamp = header(self._graph.now_ns(), "map")
@@ -65,7 +65,7 @@ class WeatherTopics:
 
 
 def fields_of(world: World, weather: Weather) -> dict[str, Any]:
-    """All that is told of a weather but for its gusts, by the names of the message's fields."""
+    """Returns all fields of the weather message except the gusts."""
     elevation, azimuth = sun_in(world, weather)
     particles = weather.particles
     fading = 1.0 / world.light.visibility_m + 1.0 / particles.visibility_m
@@ -85,9 +85,9 @@ def fields_of(world: World, weather: Weather) -> dict[str, Any]:
 
 
 def changed(weather: Weather, message: Any, only: Collection[str] = ()) -> Weather:
-    """The weather with the fields `only` of a message, or with all of them if none are named.
+    """Returns the weather with the fields `only` of a message, or all fields if `only` is empty.
 
-    Raises `CommandError` for a name or value that cannot be.
+    Raises `CommandError` for unknown names and invalid values.
     """
     for name in only:
         if name not in _SETTABLE:
@@ -109,7 +109,7 @@ def changed(weather: Weather, message: Any, only: Collection[str] = ()) -> Weath
 
 
 def _hour_of(weather: Weather) -> float:
-    """As messages count it: midnight is 24, and 0 stands for none."""
+    """Returns the hour as messages count it: midnight is 24, and 0 means none."""
     return 0.0 if weather.hour_of_day is None else weather.hour_of_day or 24.0
 
 

@@ -1,4 +1,4 @@
-"""Worlds of the standard: the scenarios of the library."""
+"""Serves the worlds of the standard: the scenarios of the library."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _PARSE_ERROR = 103
 _NO_WORLD = 101
 
 OnLoad = Callable[[WorldRequest | LogRequest | None], None]
-"""Has another scenario flown, or a log played, instead of the present one; for None nothing."""
+"""Loads another scenario or log in place of the present one; None unloads."""
 
 
 def offer_worlds(
@@ -41,17 +41,17 @@ def offer_worlds(
     on_load: OnLoad | None,
     shelf: ScenarioCatalog | None = None,
 ) -> None:
-    """Offer what is known of worlds, and loading and unloading them where `on_load` does that.
+    """Creates the services that list worlds, and load and unload them where `on_load` is given.
 
-    That is the owner's business: the process builds another simulation, or none. `loaded`: the
-    present scenario. `shelf`: where scenarios and logs come from, None: the library alone.
+    The owner of the simulation implements `on_load`: the process builds another simulation, or
+    none. `loaded` is the present scenario; `shelf` provides scenarios and logs, None: the library.
     """
     shelf = shelf or ScenarioCatalog()
 
     def available(request: Any) -> Fields:
         passes = tag_filter(request.filter)
         if list(request.additional_sources) and not request.continue_on_error:
-            reason = "there are no sources of worlds but the library of scenarios"
+            reason = "there are no sources of worlds except the library of scenarios"
             raise RefusedError(ResultCode.FEATURE_UNSUPPORTED, reason)
         names = shelf.names()
         worlds = [_read(shelf, name) for name in names]
@@ -94,7 +94,7 @@ def offer_worlds(
 
 
 def tags_of(scenario: Scenario) -> list[str]:
-    """What a world can be found by: its ground, `forest` where trees stand, `grid_map`."""
+    """Returns the tags of a world: its ground, `forest` if it has trees, `grid_map`."""
     world = scenario.world
     parts = {"forest": world.forest, "grid_map": world.grid_map}
     there = [name for name, part in parts.items() if part is not None]

@@ -1,1 +1,1 @@
-"""The UAVs of a running simulation: handles, commands, spawning, control authority."""
+"""Manages the UAVs of a running simulation: handles, commands, spawning, control authority."""

@@ -1,4 +1,4 @@
-"""The topics and services by which the graph commands UAVs."""
+"""Subscribes to the topics and creates the services that command UAVs over the graph."""
 
 from __future__ import annotations
 
@@ -32,24 +32,24 @@ _POSITION_TARGET = "mavros_msgs/msg/PositionTarget"
 _ATTITUDE_TARGET = "mavros_msgs/msg/AttitudeTarget"
 _DOWN = (FlightMode.LANDED, FlightMode.CRASHED)
 _BUSY = (FlightMode.TAKE_OFF, FlightMode.LAND, FlightMode.RETURN)
-"""Modes that no topic ends: who asks for a landing gets it while a stream of Twists goes on."""
+"""Modes that no topic ends: a landing continues while a stream of Twists arrives."""
 
 _log = logging.getLogger(__name__)
 
 
 def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> list[Close]:
-    """Listen to the topics that command one UAV, offer its plain services.
+    """Subscribes to the command topics of one UAV and creates its Trigger services.
 
-    `cmd_vel`, `goal_pose`, `trajectory`, `setpoint_raw/local` and `setpoint_raw/attitude`
-    (`vehicles.raw_setpoints`), `rotor_speeds` (fractions of full speed) and, for a kinematic UAV
-    that something outside moves, `pose_command`: its pose from the next step on.
+    Topics are `cmd_vel`, `goal_pose`, `trajectory`, `setpoint_raw/local` and
+    `setpoint_raw/attitude` (`vehicles.raw_setpoints`), `rotor_speeds` (fractions of full speed)
+    and, for an externally moved kinematic UAV, `pose_command`: its pose from the next step on.
 
-    A Twist is taken in the level heading frame, a pose and a trajectory in the map. On the ground,
-    during take-off, landing and return they are ignored. One that is none, with nan in it or in
-    another frame, is not flown: whoever sent it cannot be told, so a warning is logged, once a
-    topic. A Twist that is taken comes out again on `cmd_vel/applied`, stamped with the simulated
-    time from which it is in force, by which clients measure round trips. The services take_off,
-    hold, land and return_home answer with `success` and a reason. What is returned ends all that.
+    A Twist is in the level heading frame, a pose and a trajectory in the map frame. The UAV
+    ignores all of them on the ground and during take-off, landing and return. An invalid message
+    (nan, another frame) is discarded with a logged warning, once per topic. An accepted Twist is
+    published on `cmd_vel/applied` with the simulated time from which it acts; clients measure
+    round trips with it. The services take_off, hold, land and return_home respond with `success`
+    and a reason. The returned functions undo all that.
     """
     applied = graph.advertise(f"/{uav.name}/cmd_vel/applied", TwistStamped)
 
@@ -86,9 +86,9 @@ def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> list[Clo
 
 
 def go_to_message(uav: Uav, message: Any) -> None:
-    """Send `uav` to a PoseStamped in the map; a rotation of zeros keeps the heading.
+    """Sends `uav` to a PoseStamped in the map frame; a zero quaternion keeps the heading.
 
-    Raises `CommandError`, also for another frame.
+    Raises `CommandError` if the goal is invalid or in another frame.
     """
     if message.header.frame_id not in ("", "map"):
         raise CommandError(f"goals are in 'map', not in '{message.header.frame_id}'")
@@ -101,7 +101,7 @@ def go_to_message(uav: Uav, message: Any) -> None:
 
 
 def stand_at_message(uav: Uav, message: Any) -> None:
-    """Put a kinematic `uav` at a PoseStamped in the map. Raises `CommandError`."""
+    """Sets the pose of a kinematic `uav` from a PoseStamped in the map. Raises `CommandError`."""
     if message.header.frame_id not in ("", "map"):
         raise CommandError(f"poses are in 'map', not in '{message.header.frame_id}'")
     place, turn = message.pose.position, message.pose.orientation

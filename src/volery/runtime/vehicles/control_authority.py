@@ -1,8 +1,8 @@
-"""Who steers which UAV, where several operators are there at once.
+"""Manages which operator controls which UAV, where several operators share a simulation.
 
-This is an agreement between people, not part of what is simulated: a reset or a snapshot leaves it
-as it is. Programs of bridges, and nodes of the scenario, command UAVs without asking here; clients
-of the page's server are held to it (`volery.server.access_policy`).
+Control authority is an agreement between operators, not simulated: resets and snapshots leave it
+unchanged. Nodes, and programs of bridges, command UAVs without it; it binds clients of the page's
+server (`volery.server.access_policy`).
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from collections.abc import Callable, Collection
 from volery.core.errors import CommandError
 
 MOST_CHARACTERS = 40
-"""Of an operator's name."""
+"""Max length of an operator's name."""
 
 
 def operator_name(text: str) -> str:
-    """An operator's name in its normal form.
+    """Returns an operator's name in its normal form.
 
-    Unicode NFKC, without control and format characters, without space at its ends, with single
-    spaces inside. Names that differ in case alone are one operator (`same_operator`).
+    The form is Unicode NFKC without control and format characters, without space at its ends,
+    with single spaces inside. Names that differ in case alone are equal (`same_operator`).
     """
     plain = unicodedata.normalize("NFKC", text)
     kept = (
@@ -30,19 +30,19 @@ def operator_name(text: str) -> str:
 
 
 def same_operator(one: str, other: str) -> bool:
-    """Whether two names are those of one operator."""
+    """Returns whether two names denote one operator."""
     return operator_key(one) == operator_key(other)
 
 
 def operator_key(name: str) -> str:
-    """What is equal for all spellings of an operator's name."""
+    """Returns a key that is equal for all spellings of an operator's name."""
     return unicodedata.normalize("NFKC", operator_name(name).casefold())
 
 
 class ControlAuthority:
-    """The operators of one simulation; `names` gives its UAVs.
+    """Holds the control authority of one simulation; `names` returns its UAVs.
 
-    Any thread may ask; changes are made in the simulation's thread.
+    Any thread may query it; only the simulation's thread changes it.
     """
 
     def __init__(self, names: Callable[[], Collection[str]]) -> None:
@@ -50,21 +50,21 @@ class ControlAuthority:
         self._holders: dict[str, str] = {}
 
     def holder_of(self, uav: str) -> str:
-        """Name of the operator who holds a UAV; empty: nobody does."""
+        """Returns the name of the operator in control of a UAV; empty: none."""
         return self._holders.get(uav, "")
 
     def held_by(self, operator: str) -> tuple[str, ...]:
-        """UAVs that an operator holds."""
+        """Returns the UAVs that an operator controls."""
         return tuple(uav for uav, by in self._holders.items() if same_operator(by, operator))
 
     def take(self, uav: str, operator: str) -> None:
-        """Let an operator hold a UAV that nobody else holds; `CommandError` otherwise."""
+        """Gives control of a UAV to an operator. Raises `CommandError` if another one has it."""
         name = _checked_name(operator)
         self._check_free(uav, name)
         self._holders[uav] = name
 
     def release(self, uav: str, operator: str) -> None:
-        """Let go of a UAV, or, where none is named, of all; `CommandError` if it is another's."""
+        """Releases a UAV, or all if none is named. Raises `CommandError` if another one has it."""
         if not uav:
             self.leave(operator)
             return
@@ -72,13 +72,13 @@ class ControlAuthority:
         del self._holders[uav]
 
     def hand_over(self, uav: str, operator: str, to: str) -> None:
-        """Give a UAV that an operator holds to another operator; `CommandError` if he does not."""
+        """Hands a UAV over to another operator. Raises `CommandError` if `operator` lacks it."""
         name = _checked_name(to)
         self._check_held(uav, operator)
         self._holders[uav] = name
 
     def leave(self, operator: str) -> None:
-        """Let go of everything: the operator has gone."""
+        """Releases all UAVs of an operator who has left."""
         for uav in self.held_by(operator):
             del self._holders[uav]
 
@@ -93,7 +93,9 @@ class ControlAuthority:
     def _check_held(self, uav: str, operator: str) -> None:
         self._check_free(uav, operator)
         if uav not in self._holders:
-            raise CommandError(f"{operator or 'who has no name'} does not hold {uav}; nobody does")
+            raise CommandError(
+                f"{operator or 'an operator without a name'} does not hold {uav}; take it first"
+            )
 
 
 def _checked_name(operator: str) -> str:

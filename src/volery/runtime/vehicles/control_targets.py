@@ -1,7 +1,7 @@
-"""Which UAVs a name of the graph, or the arguments of a request, are about.
+"""Determines which UAVs a graph name, or the arguments of a request, concern.
 
-The one place that decides it, for topics, services, actions and parameters. It finds at least every
-UAV that the graph would resolve a spelling to: what is doubtful counts as about the UAV.
+This is the only module that decides it, for topics, services, actions and parameters. It finds at
+least every UAV that the graph would resolve a spelling to; doubtful cases count as matches.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from volery.core.errors import CommandError
 
 _SEPARATORS = re.compile(r"[/:#~.\s]+")
 _MAX_DEPTH = 16
-"""Of arguments; no message is nested so deeply."""
+"""Max nesting depth of arguments; no message is nested so deeply."""
 
 
 def parts_of(name: str) -> frozenset[str]:
-    """All parts of a name of a topic, service, action, node or parameter, however it is spelled.
+    """Returns all parts of a topic, service, action, node or parameter name, in any spelling.
 
-    `/uav1/odom`, `uav1/gap_following:height_m`, `//uav1/land#3`, `/uav2/../uav1` are about `uav1`.
+    `/uav1/odom`, `uav1/gap_following:height_m`, `//uav1/land#3`, `/uav2/../uav1` concern `uav1`.
     """
     return frozenset(
         part for text in {name, unicodedata.normalize("NFKC", name)} for part in _split(text)
@@ -30,9 +30,9 @@ def parts_of(name: str) -> frozenset[str]:
 
 
 def names_in(value: Any, depth: int = 0) -> Iterator[str]:
-    """Parts of all texts in the arguments of a request, also of those that are JSON in a text.
+    """Yields the name parts in all strings of a request's arguments, including JSON in strings.
 
-    Raises `CommandError` for arguments that are nested too deeply to be looked through.
+    Raises `CommandError` if the arguments are nested too deeply to be checked.
     """
     if depth > _MAX_DEPTH:
         raise CommandError("the arguments are nested too deeply")

@@ -1,4 +1,4 @@
-"""Odometry that nodes make of their own sensors, on its way to the estimators of their UAVs."""
+"""Passes odometry that nodes estimate from sensors to the estimators of their UAVs."""
 
 from __future__ import annotations
 
@@ -24,28 +24,29 @@ Array = NDArray[np.float64]
 
 _LOOK_S = 0.1
 _SILENT_S, _TOLD_S = 2.0, 5.0
-"""Poses that have not come for so long are missed, and told of. Modelling choices."""
+"""Times without poses, s: after the first the estimate of a landed UAV is kept at rest, after the
+second an event is logged. Modelling choices."""
 
 
 class ExternalOdometry:
-    """The odometry topics that estimators of UAVs listen to; `start` has them watched.
+    """Subscribes estimators to external odometry; `start` monitors the topics.
 
-    Where none is heard, a UAV that stands with its rotors off is known not to move: without that
-    its estimate would run away. Silence is an event, since in flight nothing helps.
+    Without odometry, the estimate of a landed UAV is constrained to zero motion, as it would drift
+    otherwise. In flight nothing compensates, so missing odometry is logged as an event.
     """
 
     def __init__(self, graph: Graph, engine: Engine) -> None:
         self._graph = graph
         self._engine = engine
         self._watched: dict[str, tuple[str, int]] = {}
-        """Topic of a UAV, and since when it is listened to, ns."""
+        """Topic of each UAV, and the time of its subscription, ns."""
 
     def start(self, every: Callable[..., None]) -> None:
-        """Look after them each `_LOOK_S` of simulated time."""
+        """Starts to check the topics each `_LOOK_S` of simulated time."""
         every(_LOOK_S, self._look, wanted=lambda: bool(self._watched))
 
     def open(self, uav_name: str, sensors: Iterable[Sensor]) -> list[Close]:
-        """Feed the estimator of a UAV with the odometry that its sensor "estimate" names."""
+        """Feeds the estimator of a UAV with the odometry that its "estimate" sensor names."""
         aids = [
             s.external_odometry
             for s in sensors
@@ -74,8 +75,10 @@ class ExternalOdometry:
             silent_s = (now - since) / NS_PER_S
             if silent_s >= _SILENT_S and engine.fleet.mode(row) is FlightMode.LANDED:
                 estimation.stand_still(row, now)
-            if _TOLD_S <= silent_s < _TOLD_S + _LOOK_S:  # once, without anything to remember
-                engine.note(row, EventKind.FAULT, f"hears no poses on {topic}: its estimate drifts")
+            if _TOLD_S <= silent_s < _TOLD_S + _LOOK_S:  # once, without state to save
+                engine.note(
+                    row, EventKind.FAULT, f"receives no poses on {topic}: its estimate drifts"
+                )
 
 
 def _taker(

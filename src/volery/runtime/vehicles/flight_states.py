@@ -1,8 +1,8 @@
-"""`/uavN/flight_state` and `/uavN/get_vehicle_info`: data for autopilots on the graph.
+"""Publishes `/uavN/flight_state` and serves `/uavN/get_vehicle_info`, for autopilots.
 
-The state is what the controllers fly on, an estimate where the UAV has one that flies. It comes at
-a fixed rate where a node of the simulation subscribes to it, and who records everything gets it
-only then; clients outside alone are shown it.
+The state is the one that the controllers use: an estimate where the UAV flies on one. It is
+published at a fixed rate if a node of the simulation subscribes, and only then recorded; without
+one, only external clients receive it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from volery.scenario.navigation import Origin
 from volery.vehicle.airframe import GRAVITY
 
 PERIOD_S = 0.01
-"""As often as the fastest stream of PX4's onboard link (ATTITUDE, 100 Hz)."""
+"""Period, s: the rate of the fastest stream of PX4's onboard link (ATTITUDE, 100 Hz)."""
 _TYPE = "volery_interfaces/msg/FlightState"
 _BUILD = "volery_interfaces/srv/GetVehicleInfo"
 _NO_BATTERY = (math.nan, math.nan, math.nan)
@@ -31,7 +31,7 @@ _MODES = tuple(FlightMode(k).name for k in range(len(FlightMode)))
 
 
 class FlightStates:
-    """Tells of the UAVs of an engine; `start` has them told of at their rate."""
+    """Publishes the flight states of an engine's UAVs; `start` schedules them."""
 
     def __init__(self, graph: Graph, engine: Engine, origin: Origin) -> None:
         self._graph = graph
@@ -40,11 +40,11 @@ class FlightStates:
         self._publishers: dict[str, Publisher] = {}
 
     def start(self, every: Callable[..., None]) -> None:
-        """Tell each `PERIOD_S` of simulated time from now on."""
+        """Publishes each `PERIOD_S` of simulated time from now on."""
         every(PERIOD_S, self._tell, wanted=lambda: bool(self._wanted()))
 
     def open(self, uav: Uav) -> list[Close]:
-        """Tell of one more; what is returned ends that."""
+        """Adds a UAV; the returned functions remove it."""
         publisher = self._graph.advertise(f"/{uav.name}/flight_state", _TYPE)
         self._publishers[uav.name] = publisher
 
@@ -58,7 +58,7 @@ class FlightStates:
         return [close, offered]
 
     def _wanted(self) -> list[tuple[int, Publisher]]:
-        """Rows of the UAVs that somebody wants to know of."""
+        """Returns the rows and publishers of UAVs whose topic has subscribers."""
         told = [(k, self._publishers[name]) for k, name in enumerate(self._engine.names)]
         return [(k, publisher) for k, publisher in told if publisher.heard or publisher.watched]
 

@@ -1,4 +1,4 @@
-"""The UAVs of a running simulation with all that is theirs, and how they come and go."""
+"""Manages the UAVs of a running simulation with their sensors, commands and nodes."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _ROOT = "/"
 
 @dataclass
 class InitialState:
-    """How a UAV begins: its row in a state of a fleet that has not moved yet."""
+    """Initial state of a UAV: its row in the state of a fleet before the first step."""
 
     fleet: dict[str, Any]
     row: int
@@ -48,27 +48,27 @@ class InitialState:
 
 @dataclass
 class VehicleManager:
-    """The UAVs of an engine: starts, sensors, handles, commands on the graph, nodes.
+    """Manages the UAVs of an engine: starts, sensors, handles, commands on the graph, nodes.
 
-    `open(parts)` makes the first ones; `regroup(starts)` replaces them by others, of whom those
-    that were there already go on undisturbed.
+    `open(parts)` creates the first UAVs; `regroup(starts)` replaces them, and UAVs present before
+    and after continue undisturbed.
     """
 
     scenario: Scenario
-    """With every type that may be flown."""
+    """Scenario with every type that can be spawned."""
     engine: Engine
     graph: Graph
     publisher: GraphPublisher
     outlet: OutputSink
     faults: FaultPlan
     starts: tuple[StartPose, ...]
-    """In fleet order."""
+    """Start poses, in fleet order."""
     terrain: Terrain
     radio: RadioNetwork | None = None
     fitted: list[SensorInstance] = field(default_factory=list)
     uavs: dict[str, Uav] = field(default_factory=dict)
     nodes: list[Node] = field(default_factory=list)
-    """In fleet order, then those of the whole system."""
+    """Nodes in fleet order, then those of the whole system."""
     beginnings: dict[str, InitialState] = field(default_factory=dict)
     flight_states: FlightStates = field(init=False)
     pose_aids: ExternalOdometry = field(init=False)
@@ -80,16 +80,16 @@ class VehicleManager:
         self.flight_states = FlightStates(self.graph, self.engine, origin)
 
     def open(self, parts: Assembly) -> None:
-        """Let the UAVs that the engine was made with take part in the graph."""
+        """Connects the engine's first UAVs to the graph."""
         self.flight_states.start(self.engine.every)
         self.pose_aids.start(self.engine.every)
         self._take_over(parts, self.starts)
         self.start_nodes()
 
     def regroup(self, starts: Sequence[StartPose]) -> None:
-        """Fly with the UAVs `starts` from now on; nodes of new ones wait for `start_nodes`."""
+        """Replaces the UAVs by `starts`; call `start_nodes` for the nodes of new UAVs."""
         if not self.engine.stands:
-            raise CommandError("UAVs come and go between ticks; use post()")
+            raise CommandError("UAVs are spawned and deleted between ticks; use post()")
         if not starts:
             raise CommandError("a simulation needs at least one UAV")
         parts = assemble(self.scenario, starts, self.engine.scene)
@@ -102,7 +102,7 @@ class VehicleManager:
         self._take_over(parts, new, going_on)
 
     def start_nodes(self) -> None:
-        """Start the nodes of UAVs that have none yet, and those of the system if none runs."""
+        """Starts the nodes of UAVs without nodes, and those of the system if none runs."""
         served = {node.get_namespace() for node in self.nodes}
         alone = [start for start in self.starts if f"/{start.name}" not in served]
         now_ns = self._now_ns
@@ -113,25 +113,25 @@ class VehicleManager:
         self.nodes.sort(key=lambda node: order.get(node.get_namespace(), len(order)))
 
     def take_off(self, names: Iterable[str]) -> None:
-        """Let those of the UAVs take off that do so by themselves."""
+        """Takes off with those of the UAVs that start with a take-off."""
         chosen = set(names)
         for start in self.starts:
             if start.takes_off and start.name in chosen:
                 self.uavs[start.name].take_off()
 
     def reseed(self, seed: int) -> None:
-        """Let sensors that begin anew, and UAVs that come, have the random streams of `seed`."""
+        """Uses the random streams of `seed` for sensors that restart and UAVs that are spawned."""
         if seed != self.scenario.seed:
             self.scenario = self.scenario.model_copy(update={"seed": seed})
             self.fitted = refit(self.fitted, seed)
 
     def restart_nodes(self, name: str) -> None:
-        """Make the nodes of one UAV anew."""
+        """Constructs the nodes of one UAV again."""
         self._end_nodes_of(name)
         self.start_nodes()
 
     def end_nodes(self) -> None:
-        """End all nodes."""
+        """Destroys all nodes."""
         while self.nodes:
             self.nodes.pop().destroy_node()
 
@@ -179,7 +179,7 @@ class VehicleManager:
             closes.append(self.radio.join(start.name))
 
     def _check_goal(self, position: Array, airframe: Airframe) -> None:
-        """`CommandError` for a goal under the ground or in an obstacle."""
+        """Raises `CommandError` if a goal is below the ground or inside an obstacle."""
         at = ", ".join(f"{coordinate:.2f}" for coordinate in position)
         scene, terrain = self.engine.scene, self.terrain
         try:

@@ -1,8 +1,8 @@
-"""Setpoints as MAVROS's raw topics carry them: which fields count says a mask.
+"""Executes the raw setpoints of MAVROS, whose mask selects the fields that count.
 
-`PositionTarget` and `AttitudeTarget` are ROS messages in ROS frames: places, velocities and
-accelerations in the map (ENU), or, with the frame BODY_NED, in the level heading frame (FLU);
-attitudes FLU to map; thrust is a share of all that the rotors give.
+`PositionTarget` and `AttitudeTarget` are ROS messages in ROS frames: positions, velocities and
+accelerations in the map frame (ENU), or, with the frame BODY_NED, in the level heading frame (FLU);
+attitudes from FLU to map; thrust is a fraction of the max thrust of all rotors.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ IGNORE_YAW = 1024
 IGNORE_YAW_RATE = 2048
 """Bits of a PositionTarget's mask, as MAVLink's POSITION_TARGET_TYPEMASK."""
 MAP_FRAME, HEADING_FRAME = 1, 8
-"""MAV_FRAME_LOCAL_NED and MAV_FRAME_BODY_NED; MAVROS keeps the names although axes are ROS's."""
+"""MAV_FRAME_LOCAL_NED and MAV_FRAME_BODY_NED; MAVROS uses the names, but with ROS axes."""
 IGNORE_RATES = 1 | 2 | 4
 IGNORE_THRUST = 64
 IGNORE_ATTITUDE = 128
@@ -31,14 +31,14 @@ IGNORE_ATTITUDE = 128
 
 
 def steer_to_message(uav: Uav, message: Any) -> None:
-    """Have `uav` follow a PositionTarget. Raises `CommandError`, also for masks of half a vector.
+    """Commands `uav` by a PositionTarget. Raises `CommandError`, also if a mask splits a vector.
 
-    A place alone is flown to and held; with a velocity it is a point of a trajectory; velocities
-    and accelerations are held until the next command, velocities no longer than the time-out.
+    A position alone is a goal to hold; with a velocity it is a trajectory setpoint. The UAV holds
+    velocities and accelerations until the next command, velocities at most until the timeout.
     """
     mask = int(message.type_mask)
     if mask & FORCE:
-        raise CommandError("setpoints of forces are not flown")
+        raise CommandError("force setpoints are not supported; clear the FORCE bit of type_mask")
     place = _vector(message.position, mask, IGNORE_POSITION, "position")
     velocity = _vector(message.velocity, mask, IGNORE_VELOCITY, "velocity")
     push = _vector(message.acceleration_or_force, mask, IGNORE_ACCELERATION, "acceleration")
@@ -46,7 +46,7 @@ def steer_to_message(uav: Uav, message: Any) -> None:
     rate = 0.0 if mask & IGNORE_YAW_RATE else float(message.yaw_rate)
     if message.coordinate_frame == HEADING_FRAME:
         if place is not None:
-            raise CommandError("places are in the map")
+            raise CommandError("positions are in the map frame; use coordinate_frame 1")
         turn = rotations.from_rpy(0.0, 0.0, rotations.yaw_of(uav.attitude))
         velocity = None if velocity is None else rotations.rotate(turn, velocity)
         push = None if push is None else rotations.rotate(turn, push)
@@ -63,11 +63,11 @@ def steer_to_message(uav: Uav, message: Any) -> None:
     elif push is not None:
         uav.command_acceleration(push, yaw, rate)
     else:
-        raise CommandError("a setpoint without place, velocity and acceleration says nothing")
+        raise CommandError("a setpoint needs a position, a velocity or an acceleration")
 
 
 def turn_to_message(uav: Uav, message: Any) -> None:
-    """Have `uav` hold an AttitudeTarget. Raises `CommandError`."""
+    """Commands `uav` by an AttitudeTarget. Raises `CommandError`."""
     mask, thrust = int(message.type_mask), float(message.thrust)
     if mask & IGNORE_THRUST:
         raise CommandError("an attitude needs a thrust")
@@ -86,9 +86,9 @@ def turn_to_message(uav: Uav, message: Any) -> None:
 
 
 def turn_rotors(uav: Uav, message: Any) -> None:
-    """Turn the rotors of `uav` at the shares of full speed of a Float32MultiArray, one each.
+    """Sets the rotor speeds of `uav` from a Float32MultiArray of fractions of full speed.
 
-    Numbers beyond those of its rotors are passed over. Raises `CommandError`.
+    Surplus numbers are ignored. Raises `CommandError` if there are fewer numbers than rotors.
     """
     rotors = uav.airframe.rotors
     shares = np.asarray(message.data, dtype=np.float64)
@@ -98,10 +98,12 @@ def turn_rotors(uav: Uav, message: Any) -> None:
 
 
 def _vector(value: Any, mask: int, bits: int, what: str) -> Any:
-    """The vector (3,), None where all of it is to be ignored."""
+    """Returns the vector (3,), or None if the mask ignores all of it."""
     ignored = mask & bits
     if ignored == bits:
         return None
     if ignored:
-        raise CommandError(f"the {what} is ignored in part; it counts as a whole or not at all")
+        raise CommandError(
+            f"the mask ignores a part of the {what}; set all of its ignore bits or none"
+        )
     return np.array([value.x, value.y, value.z])

@@ -1,4 +1,4 @@
-"""The rotors of a simulation's UAVs, as bridges to autopilots get them from the gateway."""
+"""Returns the rotor layouts of a simulation's UAVs, for bridges to autopilots."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def rotor_layouts(uavs: Mapping[str, Uav]) -> dict[str, RotorLayout]:
-    """Returns the rotors of each UAV by its name; any thread may call it."""
+    """Returns the rotors of each UAV by its name; thread-safe."""
     return {name: _layout(uav) for name, uav in dict(uavs).items()}
 
 

@@ -1,4 +1,4 @@
-"""UAVs that come and go while the simulation runs."""
+"""Spawns and deletes UAVs while the simulation runs."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ from volery.world.terrain import Terrain
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 _TAKEN = ("volery", "tf", "tf_static", "clock", "events", "rosapi", "map", "map_command", "actors")
-"""What else stands at the root of the graph."""
+"""Other names at the root of the graph."""
 
 
 class Spawner:
-    """Adds UAVs to a crew and takes them out."""
+    """Adds UAVs to a fleet and removes them."""
 
     def __init__(
         self, crew: VehicleManager, keeper: SnapshotManager, scene: Scene, terrain: Terrain
@@ -50,12 +50,12 @@ class Spawner:
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """What can be spawned: the scenario's types, and airframes with the usual sensors."""
+        """Types that can be spawned: scenario types, and airframes with the usual sensors."""
         types = self._crew.scenario.types
         return (*types, *(name for name in airframe_names() if name not in types))
 
     def spawn(self, name: str, kind: str, position_map: ArrayLike, attitude: ArrayLike) -> Uav:
-        """Add a UAV; what the arguments mean and what is raised, `Simulation.spawn_uav` says."""
+        """Adds a UAV; see `Simulation.spawn_uav` for arguments and errors."""
         self._check_name(name)
         airframe = self._airframe_of(kind)
         start = self._start(name, kind, airframe, position_map, attitude)
@@ -71,7 +71,7 @@ class Spawner:
         return self._crew.uavs[name]
 
     def delete(self, names: Collection[str]) -> None:
-        """Take UAVs out. Raises `CommandError` where none would be left."""
+        """Removes UAVs. Raises `CommandError` if none would be left."""
         if names:
             self._crew.regroup([start for start in self._crew.starts if start.name not in names])
 
@@ -86,7 +86,7 @@ class Spawner:
             raise SpawnError(SpawnFault.NAME_TAKEN, f"there is a UAV '{name}' already")
         actors = self._scene.actors
         if actors is not None and name in actors.names:
-            raise SpawnError(SpawnFault.NAME_TAKEN, f"there is a thing '{name}' already")
+            raise SpawnError(SpawnFault.NAME_TAKEN, f"there is an actor '{name}' already")
 
     def _airframe_of(self, kind: str) -> Airframe:
         if kind not in self.kinds:
@@ -121,7 +121,7 @@ class Spawner:
 
 
 def usual_type(airframe: Airframe) -> UavType:
-    """A type for an airframe that no scenario describes: with IMU, odometry and ground truth."""
+    """Returns a type for an airframe without one: with IMU, odometry and ground truth."""
     sensors: list[Sensor] = [
         ImuSensor(kind="imu"),
         OdometrySensor(kind="odometry"),

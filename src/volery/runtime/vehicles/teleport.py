@@ -1,4 +1,4 @@
-"""UAVs that are put somewhere else while the simulation runs."""
+"""Teleports UAVs while the simulation runs."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from volery.world.terrain import Terrain
 Array = NDArray[np.float64]
 
 _REACH_M = 10.0
-"""Larger than any two UAVs."""
+"""Larger than the distance at which any two UAVs touch, m."""
 
 
 class Teleporter:
-    """Puts UAVs of an engine where there is room for them."""
+    """Teleports UAVs of an engine to free positions."""
 
     def __init__(
         self,
@@ -38,10 +38,10 @@ class Teleporter:
         self._crew = crew
 
     def place(self, row: int, position_map: ArrayLike, attitude: ArrayLike) -> None:
-        """Put UAV `row` at (3,) m with (4,) x y z w, map from body; its motion goes on there.
+        """Teleports UAV `row` to (3,), m, and (4,), x y z w, map from body; its velocity continues.
 
-        One that flies holds there; one that stood hovers if that is in the air. Its estimate
-        begins anew. Raises `PlacementError` with the reason where it cannot be.
+        A flying UAV holds there; a landed one hovers if the position is in the air. Its estimate
+        restarts. Raises `PlacementError` with the reason if the pose is not possible.
         """
         position = np.asarray(position_map, dtype=np.float64)
         if position.shape != (3,) or not np.isfinite(position).all():
@@ -60,9 +60,9 @@ class Teleporter:
             self._engine.estimation.restart({row: streams[row]})
 
     def move(self, row: int, velocity_map: ArrayLike, omega_map: ArrayLike) -> None:
-        """Let UAV `row` move at (3,) m/s and turn at (3,) rad/s, both map, from now on.
+        """Sets the velocity (3,), m/s, and rate (3,), rad/s, of UAV `row`, both in the map frame.
 
-        Its controllers take it from there. Raises `CommandError` for what cannot be.
+        Its controllers continue from there. Raises `CommandError` if the values are not possible.
         """
         attitude = self._engine.fleet.state.attitude[row]
         omega_body = rotations.rotate(rotations.conjugate(attitude), np.asarray(omega_map))
@@ -77,6 +77,6 @@ class Teleporter:
 
 
 def near(starts: Sequence[StartPose], present: Array, position: Array) -> list[StartPose]:
-    """Those of the UAVs that are within reach of `position` (3,) m, at their `present` (N, 3) m."""
+    """Returns the UAVs within 10 m of `position` (3,), m, moved to their `present` (N, 3), m."""
     rows = np.flatnonzero(np.linalg.norm(present - position, axis=1) < _REACH_M).tolist()
     return [replace(starts[row], position_map=present[row]) for row in rows]

@@ -1,4 +1,4 @@
-"""Trajectories of the graph: trajectory_msgs/MultiDOFJointTrajectory as a UAV takes them."""
+"""Converts trajectory_msgs/MultiDOFJointTrajectory to trajectory commands."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ Array = NDArray[np.float64]
 
 
 def follow_message(uav: Uav, message: Any) -> None:
-    """Command `uav` by a MultiDOFJointTrajectory, whose first joint is the vehicle.
+    """Commands `uav` by a MultiDOFJointTrajectory, whose first joint is the vehicle.
 
-    One point at time 0 is a trajectory setpoint; else the points are flown from now on, whatever
-    the stamp. Transforms, velocities and accelerations are those of `base_link` in `map`, headings
-    come from the rotations. Raises CommandError, also for another frame.
+    One point at time 0 is a trajectory setpoint; else the UAV flies the points from now on and
+    ignores the stamp. Transforms, velocities and accelerations are those of `base_link` in `map`;
+    yaw comes from the rotations. Raises `CommandError`, also for another frame.
     """
     if message.header.frame_id not in ("", "map"):
         raise CommandError(f"trajectories are in 'map', not in '{message.header.frame_id}'")
@@ -57,7 +57,7 @@ def _held(times: list[float], position: Array, yaw: Array) -> tuple[list[float],
 
 
 def _of_all(parts: list[Any], name: str) -> Array | None:
-    """Vectors (K, 3) of the first joint where every point has one; None where some lacks it."""
+    """Returns vectors (K, 3) of the first joint, or None if some point lacks one."""
     if not all(len(part) for part in parts):
         return None
     return np.array([_vector(getattr(part[0], name)) for part in parts])

@@ -1,4 +1,4 @@
-"""A handle on one UAV of a running simulation."""
+"""Defines the handle on one UAV of a running simulation."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from volery.vehicle.airframe import Airframe
 
 Array = NDArray[np.float64]
 CheckGoal = Callable[[Array, Airframe], None]
-"""Raises `CommandError` where a UAV cannot be at a position (3,) m, map."""
+"""Raises `CommandError` if a UAV cannot be at a position (3,), m, in the map frame."""
 
 
 class Uav:
@@ -41,7 +41,7 @@ class Uav:
         self._check_goal = check_goal
 
     def move_to(self, place: tuple[Fleet, int] | None) -> None:
-        """Take over where the fleet has changed: fleet and row, or None where it was deleted."""
+        """Follows the UAV to another fleet and row, or marks the UAV as deleted (None)."""
         self._place = place
 
     @property
@@ -59,60 +59,60 @@ class Uav:
 
     @property
     def airframe(self) -> Airframe:
-        """What it is made of."""
+        """Airframe of the UAV."""
         return self._fleet.airframes[self._row]
 
     # ------------------------------------------------------------------------------------- state
 
     @property
     def position_map(self) -> Array:
-        """(3,) m."""
+        """Position (3,), m, in the map frame."""
         return np.array(self._fleet.state.position_map[self._row])
 
     @property
     def velocity_map(self) -> Array:
-        """(3,) m/s."""
+        """Velocity (3,), m/s, in the map frame."""
         return np.array(self._fleet.state.velocity_map[self._row])
 
     @property
     def attitude(self) -> Array:
-        """(4,) quaternion x y z w, map from body."""
+        """Quaternion (4,), x y z w, from the body frame to the map frame."""
         return np.array(self._fleet.state.attitude[self._row])
 
     @property
     def omega_body(self) -> Array:
-        """(3,) rad/s, FLU."""
+        """Angular velocity (3,), rad/s, in the body frame (FLU)."""
         return np.array(self._fleet.state.omega_body[self._row])
 
     @property
     def acceleration_map(self) -> Array:
-        """(3,) m/s^2, the mean over the last step."""
+        """Acceleration (3,), m/s^2, in the map frame, averaged over the last step."""
         return np.array(self._fleet.state.acceleration_map[self._row])
 
     @property
     def angular_acceleration_body(self) -> Array:
-        """(3,) rad/s^2, FLU, the mean over the last step."""
+        """Angular acceleration (3,), rad/s^2, in the body frame (FLU), mean of the last step."""
         return np.array(self._fleet.state.angular_acceleration_body[self._row])
 
     @property
     def rotor_speed(self) -> Array:
-        """(R,) rad/s."""
+        """Rotor speeds (R,), rad/s."""
         rotors = len(self._fleet.airframes[self._row].rotors.places)
         return np.array(self._fleet.state.rotor_speed[self._row, :rotors])
 
     @property
     def rotor_reference(self) -> Array:
-        """(R,) rad/s: what the controllers ask of the rotors."""
+        """Rotor speeds (R,), rad/s, that the controllers command."""
         return self._fleet.rotor_reference(self._row)
 
     @property
     def battery_charge(self) -> float:
-        """Share of the battery's capacity that is left; 1 without a battery."""
+        """Remaining fraction of the battery capacity; 1 without a battery."""
         return float(self._fleet.state.battery_charge[self._row])
 
     @property
     def battery_voltage(self) -> float:
-        """V under the present load; 0 without a battery."""
+        """Voltage under the present load, V; 0 without a battery."""
         return float(self._fleet.state.battery_voltage[self._row])
 
     @property
@@ -122,61 +122,65 @@ class Uav:
 
     @property
     def crashed(self) -> bool:
-        """Whether its rotors have stopped for good."""
+        """Whether the UAV has crashed; its rotors do not start again."""
         return bool(self._fleet.state.crashed[self._row])
 
     # ------------------------------------------------------------------------------------- faults
 
     def set_rotor_health(self, rotor: int, factor: float) -> None:
-        """Let rotor number `rotor` give `factor` (0 to 1) of a new one's thrust; 0: it stops."""
+        """Scales the max thrust of rotor `rotor` by `factor` (0 to 1); 0 stops the rotor."""
         self._fleet.set_rotor_health(self._row, rotor, factor)
 
     # ------------------------------------------------------------------------------ flight modes
 
     def take_off(self, altitude_m: float | None = None) -> None:
-        """Climb to `altitude_m` above the present place (default: the scenario's) and hold."""
+        """Climbs by `altitude_m` (default: the scenario's) and holds."""
         altitude = self._flight.take_off_altitude_m if altitude_m is None else altitude_m
         self._fleet.take_off(self._row, float(checked("altitude", altitude, (), MAX_COORDINATE)))
 
     def hold(self) -> None:
-        """Stop and stay."""
+        """Stops and holds the position."""
         self._fleet.hold(self._row)
 
     def go_to(self, position_map: ArrayLike, yaw: float | None = None) -> None:
-        """Fly to `position_map` (3,) m and hold there; `yaw` in rad, None keeps the heading.
+        """Flies to `position_map` (3,), m, in the map frame and holds there.
 
-        `CommandError` for a position under the ground or in an obstacle.
+        `yaw` is in rad; None keeps the heading. Raises `CommandError` if the position is below the
+        ground or inside an obstacle.
         """
         if self._check_goal is not None:
             self._check_goal(checked("position", position_map, (3,), MAX_COORDINATE), self.airframe)
         self._fleet.command_position(self._row, position_map, yaw)
 
     def follow_trajectory(self, trajectory: Trajectory) -> None:
-        """Fly along `trajectory`, whose times count from now, then hold at its end."""
+        """Flies along `trajectory`, whose time starts now, then holds at its end."""
         self._fleet.command_trajectory(self._row, trajectory)
 
     def land(self) -> None:
-        """Descend here and stop the rotors on the ground."""
+        """Descends at the present position and stops the rotors on the ground."""
         self._fleet.land(self._row)
 
     def set_landing_speed(self, speed_m_s: float) -> None:
-        """Sink at this speed, m/s, but no faster than the airframe may, until it has landed."""
+        """Sets the descent speed until touchdown, m/s, limited to that of the airframe.
+
+        Raises `CommandError` if the speed is not finite.
+        """
         if math.isinf(speed_m_s):
             raise CommandError(f"landing speed = {speed_m_s} m/s is not finite")
         self._fleet.set_landing_speed(self._row, min(speed_m_s, self.airframe.limits.descent_m_s))
 
     def return_home(self) -> None:
-        """Climb, fly back to where it took off and land there."""
+        """Climbs, flies back to the take-off position and lands there."""
         self._fleet.return_home(self._row, self._flight.return_altitude_m)
 
     def set_command_timeout(self, seconds: float) -> None:
-        """Time (s, up to 60) without a velocity command or setpoint after which it holds."""
+        """Sets the time (s, max 60) without velocity command or setpoint after which it holds."""
         self._fleet.set_command_timeout(seconds, self._row)
 
     def stop_rotors(self) -> None:
-        """Stop the rotors with the next physics step, in the air too: it falls.
+        """Stops the rotors with the next physics step, also in the air, where the UAV then falls.
 
-        A flight mode starts them again. A kinematic UAV stands still in the air.
+        A flight mode starts the rotors again. A kinematic UAV stops in the air instead of falling.
         """
         if self.mode not in (FlightMode.LANDED, FlightMode.CRASHED):
             self._fleet.stop_rotors(self._row)
@@ -184,22 +188,22 @@ class Uav:
     # ------------------------------------------------------------------------ lower-level commands
 
     def command_velocity(self, velocity: ArrayLike, yaw_rate: float = 0.0) -> None:
-        """Fly at `velocity` (3,) m/s in the level heading frame (FLU), turning at `yaw_rate` rad/s.
+        """Flies at `velocity` (3,), m/s, in the level heading frame (FLU), `yaw_rate` in rad/s.
 
-        Holds when no further command comes within the scenario's `command_timeout_s`.
+        The UAV holds if no further command arrives within the scenario's `command_timeout_s`.
         """
         self._fleet.command_velocity_body(self._row, velocity, yaw_rate)
 
     def command_velocity_map(
         self, velocity: ArrayLike, yaw_rate: float = 0.0, *, yaw: float | None = None
     ) -> None:
-        """Fly at `velocity` (3,) m/s in the map, turning at `yaw_rate` rad/s or to `yaw` rad."""
+        """Flies at `velocity` (3,), m/s, in the map; `yaw_rate` in rad/s or `yaw` in rad."""
         self._fleet.command_velocity_map(self._row, velocity, yaw_rate, yaw=yaw)
 
     def command_acceleration(
         self, acceleration_map: ArrayLike, yaw: float | None = None, yaw_rate: float = 0.0
     ) -> None:
-        """Accelerate by (3,) m/s^2 in the map, facing `yaw` rad (None: as it is)."""
+        """Accelerates by (3,), m/s^2, in the map frame at `yaw`, rad (None keeps the heading)."""
         self._fleet.command_acceleration(self._row, acceleration_map, yaw=yaw, yaw_rate=yaw_rate)
 
     def command_setpoint(
@@ -210,10 +214,11 @@ class Uav:
         yaw: float | None = None,
         yaw_rate: float = 0.0,
     ) -> None:
-        """Be at a place now, with this velocity and acceleration: a point of a trajectory.
+        """Commands one point of a trajectory: position, velocity and acceleration in the map frame.
 
-        (3,) m, m/s, m/s^2; rad, None keeps the heading; rad/s. Moves on by itself until the next
-        one, or holds after the scenario's `command_timeout_s`.
+        Vectors are (3,), in m, m/s and m/s^2; `yaw` is in rad (None keeps the heading), `yaw_rate`
+        in rad/s. The UAV extrapolates until the next setpoint, or holds after the scenario's
+        `command_timeout_s`.
         """
         self._fleet.command_setpoint(
             self._row, position_map, velocity_map, acceleration_map, yaw, yaw_rate
@@ -226,17 +231,17 @@ class Uav:
         velocity_map: ArrayLike = (0.0, 0.0, 0.0),
         omega_body: ArrayLike = (0.0, 0.0, 0.0),
     ) -> None:
-        """Stand at a pose (m; x y z w, map from body) with the next step; kinematic UAVs only."""
+        """Sets the pose (m; x y z w, map from body) with the next step; kinematic UAVs only."""
         self._fleet.command_pose(self._row, position_map, attitude, velocity_map, omega_body)
 
     def command_attitude(self, attitude: ArrayLike, thrust: float) -> None:
-        """Hold `attitude` (4,) with `thrust` N along the body's z axis."""
+        """Holds `attitude` (4,), x y z w, with a thrust in N along the body's z axis."""
         self._fleet.command_attitude(self._row, attitude, thrust)
 
     def command_rates(self, omega_body: ArrayLike, thrust: float) -> None:
-        """Turn at `omega_body` (3,) rad/s with `thrust` N along the body's z axis."""
+        """Turns at `omega_body` (3,), rad/s, with a thrust in N along the body's z axis."""
         self._fleet.command_rates(self._row, omega_body, thrust)
 
     def command_rotor_speeds(self, speeds: ArrayLike) -> None:
-        """Turn the rotors at `speeds` (R,) rad/s."""
+        """Turns the rotors at `speeds` (R,), rad/s."""
         self._fleet.command_rotor_speeds(self._row, speeds)

@@ -1,13 +1,13 @@
-"""What is compiled before a run: a scenario's kernels, at its first start, in two processes.
+"""Compiles a scenario's kernels before a run: at its first start, in two processes.
 
-On two cores the wait is halved: numba compiles one function at a time in a process. What the other
-one compiles reaches this process through the cache on disk; marks there tell later starts that
-nothing is left to do.
+On two cores this halves the wait, as numba compiles one function at a time per process. This
+process loads the helper's kernels from the cache on disk; marks there tell later starts that no
+work is left.
 
     python -m volery.runtime.warmup
 
-compiles all that ships ahead of time, as before parallel test workers.
+compiles everything that ships ahead of time, for example before parallel test workers.
 
-Each room knows its own kernels: a node's are named by `Node.warmup_tasks`, those of the simulation
-itself by `parts`; `needs` tells which of them a scenario needs.
+Each package names its own kernels: `Node.warmup_tasks` those of a node, `core_tasks` those of the
+simulation itself; `requirements` collects the tasks of a scenario.
 """

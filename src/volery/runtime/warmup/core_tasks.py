@@ -1,4 +1,4 @@
-"""Tasks that compile what the simulation itself calls: dynamics, sensors, estimators."""
+"""Defines the tasks that compile the simulation's kernels: dynamics, sensors, estimators."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ from volery.world.weather import Particles, Weather
 
 
 def dynamics() -> None:
-    """The fused step, for rigid bodies alone, and what places UAVs on the ground."""
+    """Compiles the fused step for rigid bodies, and the placement of UAVs on the ground."""
     terrain = Terrain.flat(extent_m=10.0)
     terrain.height([0.0], [0.0])
     _fleet().advance(0, terrain.grid)
 
 
 def sensing() -> None:
-    """Contacts, and sensors of the kinds that most UAVs have."""
-    for count in (2, 1):  # views of a single one have another memory layout: some more kernels
+    """Compiles contacts, and sensors of the kinds that most UAVs have."""
+    for count in (2, 1):  # views of a single row have another memory layout: some more kernels
         _look_and_measure(count)
 
 
@@ -67,14 +67,14 @@ def _look_and_measure(count: int) -> None:
 
 
 def point_clouds() -> None:
-    """LIDARs with many rings, and their points."""
+    """Compiles LIDARs with many rings, and their points."""
     fleet, scene = _fleet(), _scene()
     PointMaker(_clouds(scene).sample(0, 0, fleet)).points(0)
     scene.close()
 
 
 def falling_drops() -> None:
-    """Echoes of what falls and hangs in the air."""
+    """Compiles LIDAR echoes of rain, snow, fog and dust."""
     fleet, scene = _fleet(), _scene()
     fleet.set_weather(_RAIN)
     _clouds(scene).sample(0, 0, fleet)
@@ -82,12 +82,12 @@ def falling_drops() -> None:
 
 
 def pictures() -> None:
-    """Cameras, and the points of their pictures."""
+    """Compiles cameras, and the points of their images."""
     _take_pictures(Weather())
 
 
 def pictures_in_rain() -> None:
-    """Drops and flakes in pictures."""
+    """Compiles drops and flakes in images."""
     _take_pictures(_RAIN)
 
 
@@ -111,7 +111,7 @@ def _take_pictures(weather: Weather) -> None:
 
 
 def fixes() -> None:
-    """GNSS."""
+    """Compiles GNSS."""
     gnss, schedule, keys = (
         load_gnss_model("gnss_m8"),
         Schedule.from_hz(10.0),
@@ -122,7 +122,7 @@ def fixes() -> None:
 
 
 def magnetic_fields() -> None:
-    """Magnetometers."""
+    """Compiles magnetometers."""
     compass, schedule = load_magnetometer_model("magnetometer_px4"), Schedule.from_hz(10.0)
     keys = np.zeros(2, np.uint64)
     bank = MagnetometerBank(compass, schedule, _sensors(), _level(), keys, np.zeros(3))
@@ -130,7 +130,7 @@ def magnetic_fields() -> None:
 
 
 def estimates() -> None:
-    """The UAVs' estimators."""
+    """Compiles the UAVs' estimators."""
     from volery.control.estimator.estimator import Estimator
     from volery.control.estimator.settings import EstimatorSettings
 
@@ -143,7 +143,7 @@ def estimates() -> None:
 
 
 def other_plants() -> None:
-    """The fused step with plants other than rigid bodies."""
+    """Compiles the fused step with plants other than rigid bodies."""
     _fleet(plant=Kinematic()).advance(0, Terrain.flat(extent_m=10.0).grid)
 
 
@@ -173,7 +173,7 @@ def _fleet(count: int = 2, plant: Plant | None = None) -> Fleet:
 
 
 ALWAYS = dynamics, sensing
-"""What each scenario needs; the longest ones, to begin with."""
+"""Tasks of every scenario; they take longest, so they come first."""
 SOMETIMES = (
     pictures,
     estimates,

@@ -1,4 +1,4 @@
-"""Two processes share what a first start compiles: this one and a helper."""
+"""Compiles a first start's kernels in two processes: this one and a helper."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ sys.modules["scipy"] = None
 from volery.runtime.warmup.parallel_compilation import help_with
 help_with(sys.argv[1:])
 """
-"""What the helper runs. Where scipy is installed, numba imports its linear algebra for products of
-matrices: no kernel of ours has one."""
+"""Program of the helper. Where scipy is installed, numba imports its linear algebra for matrix
+products, which no kernel of ours has."""
 _IS_HELPER = "VOLERY_COMPILES_FOR_ANOTHER"
 _AT_ONCE = 255
-"""Tasks whose number fits into a byte."""
+"""Max number of tasks; an index fits into a byte."""
 
 
 @contextmanager
 def compiled(tasks: Sequence[Task]) -> Iterator[None]:
-    """Do what of `tasks` has not been done; the helper may still be at its last one in the body.
+    """Runs the missing tasks; in the body, the helper may still be running its last one.
 
-    At the end all is done. Those of other packages this process does itself, at each start.
+    All tasks are done at the end. This process runs those of other packages itself, at each start.
     """
     missing = [task for task in tasks if is_own(task) and not is_done(task)][:_AT_ONCE]
     if not missing or os.environ.get(_IS_HELPER):
@@ -39,26 +39,26 @@ def compiled(tasks: Sequence[Task]) -> Iterator[None]:
             yield
             helper.wait()
     for task in tasks:
-        # What a helper that failed has left undone, too.
+        # Also tasks that a failed helper has left undone.
         if not (is_own(task) and is_done(task)):
             do(task)
 
 
 def compile_all(tasks: Sequence[Task]) -> None:
-    """Do what of `tasks` has not been done, and nothing beside."""
+    """Runs the missing ones of `tasks`."""
     with compiled(tasks):
         pass
 
 
 def help_with(names: Sequence[str]) -> None:
-    """In the helper: do some of the tasks of such names, whose numbers come through stdin."""
+    """Runs some of the named tasks in the helper; their indices arrive through stdin."""
     for number in _taken_from(sys.stdin.fileno()):
         do(task_of(names[number]))
 
 
 @contextmanager
 def _helper(tasks: Sequence[Task]) -> Iterator[tuple[subprocess.Popen[bytes], int]]:
-    """A process that works on `tasks`, and the pipe from which it takes the number of the next."""
+    """Starts a process that works on `tasks`, and the pipe from which it reads indices."""
     numbers, end = os.pipe()
     try:
         os.write(end, bytes(range(len(tasks))))
@@ -80,6 +80,6 @@ def _helper(tasks: Sequence[Task]) -> Iterator[tuple[subprocess.Popen[bytes], in
 
 
 def _taken_from(numbers: int) -> Iterator[int]:
-    """Numbers of a pipe from which others may take some, too."""
+    """Yields indices from a pipe that several processes read."""
     while number := os.read(numbers, 1):
         yield number[0]

@@ -1,4 +1,4 @@
-"""What a scenario needs compiled, and what all that ships does."""
+"""Collects the tasks that a scenario, and everything that ships, requires."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ _BY_SENSOR: dict[str, Task] = {
     "gnss": core_tasks.fixes,
     "magnetometer": core_tasks.magnetic_fields,
 }
-"""Of kinds of sensors that not every UAV has."""
+"""Tasks of sensor kinds that not every UAV has."""
 
 
 def needs_of(scenario: Scenario, *, nodes: bool = True) -> list[Task]:
-    """What a flight of a scenario calls, its `nodes` included or not; dynamics come first."""
+    """Returns the tasks of a scenario, with or without its `nodes`; dynamics come first."""
     found: list[Task] = list(core_tasks.ALWAYS)
     kinds = scenario.types.values()
     for kind in kinds:
@@ -37,7 +37,7 @@ def needs_of(scenario: Scenario, *, nodes: bool = True) -> list[Task]:
 
 
 def all_needs() -> list[Task]:
-    """What compiles everything that ships."""
+    """Returns the tasks that compile everything that ships."""
     from volery.autonomy.mapping.warmup import drawn_scans
 
     found: list[Task] = [*core_tasks.ALWAYS, *core_tasks.SOMETIMES, drawn_scans]
@@ -75,7 +75,7 @@ def _has_rings(sensor: LidarSensor, scenario: Scenario) -> bool:
     try:
         model = load_lidar(scenario.access.find_model(sensor.model))
     except DataFileError:
-        return False  # who builds the sensor tells of it
+        return False  # building the sensor raises the error
     return not isinstance(model.scan, PlanarScan)
 
 
@@ -83,7 +83,7 @@ def _of_node(entry: NodeEntry, scenario: Scenario) -> Iterator[Task]:
     try:
         node = find_node(entry, scenario.name, scenario.access)
     except ScenarioError:
-        return  # who starts the node tells of it
+        return  # starting the node raises the error
     try:
         yield from node.warmup_tasks()
     except Exception as error:

@@ -1,4 +1,4 @@
-"""Functions that compile some kernels each: run, by name if need be, and marked when done."""
+"""Runs functions that compile kernels, by name if necessary, and marks them as done."""
 
 from __future__ import annotations
 
@@ -13,43 +13,43 @@ from volery.core.errors import NodeError
 from volery.core.typing_cache import remembered_types
 
 Task = Callable[[], None]
-"""A function of a module, without arguments."""
+"""A module's function without arguments."""
 
 _OWN = "volery."
 
 
 def name_of(task: Task) -> str:
-    """`module:function`."""
+    """Returns the name of a task, `module:function`."""
     return f"{task.__module__}:{task.__qualname__}"
 
 
 def task_of(name: str) -> Task:
-    """The function of such a name."""
+    """Returns the task of a name."""
     module, function = name.split(":")
     task: Task = getattr(import_module(module), function)
     return task
 
 
 def is_own(task: Task) -> bool:
-    """Whether it is Volery's, whose kernels' cache is known to be of this version."""
+    """Returns whether a task is Volery's, whose cached kernels match this version."""
     return task.__module__.startswith(_OWN)
 
 
 def is_done(task: Task) -> bool:
-    """Whether the cache holds the kernels of one of Volery's own."""
+    """Returns whether the cache holds the kernels of one of Volery's tasks."""
     return _mark(task).exists()
 
 
 def do(task: Task) -> None:
-    """Compile what the cache lacks, and mark it as done.
+    """Compiles what the cache lacks, and marks the task as done.
 
-    `NodeError` where one of another package fails.
+    Raises `NodeError` if a task of another package fails.
     """
     try:
         with _quicker():
             task()
     except NodeError:
-        return  # a library is missing: a node that needs it says so when it starts
+        return  # a library is missing: a node that needs it reports that when it starts
     except Exception as error:
         if is_own(task):
             raise
@@ -64,9 +64,9 @@ def _mark(task: Task) -> Path:
 
 @contextmanager
 def _quicker() -> Iterator[None]:
-    """Compile without what repeats itself, and without searching for garbage.
+    """Compiles without repeated type inference and without garbage collection.
 
-    Compiling makes millions of small objects: a sixth of its time would go into searching.
+    Compiling makes millions of small objects; garbage collection would take a sixth of its time.
     """
     was_on = gc.isenabled()
     gc.disable()

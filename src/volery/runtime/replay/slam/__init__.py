@@ -1,1 +1,1 @@
-"""The SLAM over a recorded log: what it hears, what it says, and the map that follows."""
+"""Runs the SLAM over a recorded log: inputs, node, trajectory and map."""

@@ -1,4 +1,4 @@
-"""Where the LIDARs of a log sit in the body, by the first that tells it of a few."""
+"""Reads the LIDARs' extrinsics of a log, from the first of several sources that has them."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from volery.runtime.replay.scenario_record import scenario_of
 from volery.runtime.replay.slam.sources import SlamInput
 
 _BODIES = ("base_link", "base_footprint", "base")
-"""Last parts of names that the body's frame goes by."""
+"""Last parts of names of body frames."""
 _STRING = "std_msgs/msg/String"
 
 
 class ExtrinsicsLog(Protocol):
-    """What is asked of a log here."""
+    """Provides the messages of a log."""
 
     path: Path
 
     @property
     def topics(self) -> dict[str, str]:
-        """Types by topic."""
+        """Message types by topic."""
 
     def messages(self, wanted: set[str]) -> Iterator[SlamInput]:
-        """Those of some topics in the order of the file."""
+        """Yields the messages of the topics `wanted` in the order of the file."""
 
 
 def frames_of(source: ExtrinsicsLog, topics: dict[str, str]) -> dict[str, str]:
-    """Frames of scanners, topics by name, as their first messages have them.
+    """Returns the frames of LIDARs, given their topics by name, from their first messages.
 
-    Names whose topics say nothing are left out.
+    Names of topics without messages are missing.
     """
     names = {topic: name for name, topic in topics.items()}
     frames: dict[str, str] = {}
@@ -49,10 +49,10 @@ def frames_of(source: ExtrinsicsLog, topics: dict[str, str]) -> dict[str, str]:
 
 
 def read_joints(source: ExtrinsicsLog, frames: set[str]) -> tuple[StaticTransforms, set[str]]:
-    """Joints between frames of scanners and the body, and the frames of which nothing tells.
+    """Returns the transforms between LIDAR frames and the body, and the frames without any.
 
-    First counts `/tf_static`, then `/tf`, of whose moving joints the place alone is taken (what
-    they turn by is not the mount's), then the scenario that the log tells.
+    Sources in order: `/tf_static`; `/tf`, of moving transforms the translation alone (their
+    rotation is not the mount's); the scenario in the log.
     """
     joints = StaticTransforms()
     for _, _, message in source.messages({"/tf_static"} & set(source.topics)):
@@ -67,7 +67,7 @@ def read_joints(source: ExtrinsicsLog, frames: set[str]) -> tuple[StaticTransfor
 
 
 def _chain(joints: StaticTransforms, frame: str) -> list[str]:
-    """The frame and those before it."""
+    """Returns the frame and its ancestors."""
     chain = [frame]
     while chain[-1] in joints.joints and len(chain) < 17:
         chain.append(joints.joints[chain[-1]][0])
@@ -83,10 +83,10 @@ def _is_in_body(joints: StaticTransforms, frame: str) -> bool:
 
 
 def _join_moving(source: ExtrinsicsLog, joints: StaticTransforms, frames: set[str]) -> None:
-    """Add what `/tf` tells of these frames, or of those that they hang on.
+    """Adds the transforms of `/tf` for these frames and their ancestors.
 
-    Where no frame goes by a body's name, a joint of the frame itself counts alone: those before it
-    may be the vehicle's own motion.
+    If no frame has the name of a body, only the transform of the frame itself counts: those of
+    its ancestors may be the vehicle's own motion.
     """
     both = StaticTransforms()
     both.joints = dict(joints.joints)
@@ -108,7 +108,7 @@ def _join_moving(source: ExtrinsicsLog, joints: StaticTransforms, frames: set[st
 
 
 def _join_by_scenario(source: ExtrinsicsLog, joints: StaticTransforms, frames: set[str]) -> None:
-    """Add the mounts of the scenario that was flown."""
+    """Adds the mounts of the scenario in the log."""
     for _, _, message in source.messages({ORIGIN_TOPIC}):
         try:
             scenario = scenario_of(RecordedScenario.from_json(message.data))

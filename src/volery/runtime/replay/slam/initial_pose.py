@@ -1,4 +1,4 @@
-"""Where the UAV of a log of Volery's stood when the log begins."""
+"""Reads the UAV's pose at the start of a log that Volery recorded."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from volery.runtime.replay.scenario_record import scenario_of
 from volery.runtime.replay.slam.extrinsics import ExtrinsicsLog
 
 Pose = tuple[float, float, float, float]
-"""x, y, z in m and yaw in rad, in the map."""
+"""x, y, z in m and yaw in rad, in the map frame."""
 
 _STRING, _ODOMETRY = "std_msgs/msg/String", "nav_msgs/msg/Odometry"
 _MAP = "map"
 _BEGINNING_NS = NS_PER_S
-"""A log whose first scan is later does not begin where the scenario does."""
+"""Max time of the first scan, ns, for a log that starts with its scenario."""
 
 
 def beginning_of(source: ExtrinsicsLog, uav: str, scan: str) -> Pose | None:
-    """The pose of `uav`; None where the log is none of Volery's, or does not tell it.
+    """Returns the initial pose of `uav`; None if the log has none or is not of Volery.
 
-    First counts the ground truth in the log, then, of a log that begins with the flight, the place
-    at which its scenario puts the UAV. scan: topic of the scans that are mapped.
+    Sources in order: the ground truth in the log; for a log that starts with the flight, the
+    scenario's start pose. `scan` is the topic of the mapped scans.
     """
     if source.topics.get(ORIGIN_TOPIC) != _STRING:
         return None
@@ -49,7 +49,7 @@ def _true_pose(source: ExtrinsicsLog, topic: str) -> Pose | None:
 
 
 def _scenario_pose(source: ExtrinsicsLog, uav: str) -> Pose | None:
-    """Where `{start_pose}` is in the scenario that was flown; its world is built for that."""
+    """Returns `{start_pose}` in the scenario of the log, whose world is built for that."""
     for _, _, message in source.messages({ORIGIN_TOPIC}):
         try:
             scenario = scenario_of(

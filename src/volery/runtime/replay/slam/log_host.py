@@ -1,4 +1,4 @@
-"""A graph for nodes whose clock is that of a log's messages."""
+"""Hosts a graph for nodes whose clock is that of a log's messages."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from volery.graph.messages import Published
 from volery.graph.nodes.node import Context
 
 _LEAP_NS = 60_000_000_000
-"""After a longer gap timers ring once, not for all of it."""
+"""Max gap in the log, ns, during which timers fire at their period; once after a longer one."""
 
 
 class LogHost:
-    """Nodes hear messages at the times of a log, and their timers ring between them."""
+    """Publishes messages to nodes at the times of a log, and fires their timers in between."""
 
     def __init__(self) -> None:
         self._now_ns: int | None = None
@@ -28,11 +28,11 @@ class LogHost:
         self._publishers: dict[str, Any] = {}
 
     def now_ns(self) -> int:
-        """Time of the newest message."""
+        """Returns the time of the newest message, ns."""
         return self._now_ns or 0
 
     def context(self) -> Context:
-        """What a node stands on."""
+        """Returns the context for a node."""
         return Context(self.graph, self, self.now_ns)
 
     def every(
@@ -42,7 +42,7 @@ class LogHost:
         *,
         wanted: Callable[[], bool] | None = None,
     ) -> None:
-        """Call `callback` each period of the log's time."""
+        """Calls `callback` each period of the log's time."""
 
         def ring() -> None:
             if callback not in self._forgotten and (wanted is None or wanted()):
@@ -52,15 +52,15 @@ class LogHost:
         heapq.heappush(self._alarms, (self.now_ns() + period, next(self._numbers), period, ring))
 
     def forget(self, callback: Callable[[], None]) -> None:
-        """Call `callback`, which `every` was given, no more."""
+        """Cancels a `callback` that was passed to `every`."""
         self._forgotten.append(callback)
 
     def at(self, time_ns: int, action: Callable[[], Any]) -> None:
-        """Call `action` once, at `time_ns` of the log's time."""
+        """Calls `action` once, at `time_ns` of the log's time."""
         heapq.heappush(self._alarms, (time_ns, next(self._numbers), 0, action))
 
     def listen(self, topic: str, callback: Callable[[Any], None]) -> None:
-        """Call back with each message that a node publishes on a topic."""
+        """Calls `callback` with each message that a node publishes on a topic."""
 
         def take(published: Published) -> None:
             callback(published.message)
@@ -68,7 +68,7 @@ class LogHost:
         self.graph.subscribe(topic, take)
 
     def hear(self, topic: str, time_ns: int, message: Any) -> None:
-        """Let nodes hear a message at a time; due timers ring before."""
+        """Publishes a message to nodes at a time; fires the timers that are due before."""
         self._run_to(time_ns)
         publisher = self._publishers.get(topic)
         if publisher is None:
@@ -79,7 +79,7 @@ class LogHost:
         self.graph.deliver()
 
     def wait(self, seconds: float, until: Callable[[], bool]) -> None:
-        """Let timers ring for some more seconds of the log's time, or until `until()` is true."""
+        """Fires timers for some more seconds of the log's time, or until `until()` is true."""
         for _ in range(round(2.0 * seconds)):
             if until():
                 return
@@ -88,7 +88,7 @@ class LogHost:
     def _run_to(self, time_ns: int) -> None:
         now = self._now_ns
         if now is None or time_ns < now or time_ns > now + _LEAP_NS:
-            # The clock was set, or nobody recorded: timers go on from there.
+            # The clock was set, or the recording paused: timers continue from there.
             shift = time_ns - (now or 0)
             self._alarms = [(due + shift, n, p, ring) for due, n, p, ring in self._alarms]
             heapq.heapify(self._alarms)

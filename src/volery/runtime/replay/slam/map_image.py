@@ -1,4 +1,4 @@
-"""The map of a run as a picture: walls, free space, and the way."""
+"""Renders the map of a run as an image: walls, free space and the path."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ Array = NDArray[np.float64]
 _FREE, _UNKNOWN, _WALL = (255, 255, 255), (226, 228, 230), (20, 24, 28)
 _WAY, _BEGIN, _END = (214, 80, 48), (46, 140, 80), (40, 90, 190)
 _LEAST_SIDE = 900
-"""Pixels; smaller maps are drawn larger."""
+"""Min side length, pixels; smaller maps are enlarged."""
 
 
 def write_picture(
     path: Path, values: NDArray[np.int8], origin: Array, cell_m: float, way: Array
 ) -> None:
-    """Write a PNG of a grid (rows, columns) and a way (N, 2) m in the map, y up.
+    """Writes a PNG of an occupancy grid (rows, columns) and a path (N, 2), m, map, y up.
 
-    A green dot marks where it began, a blue one where it ended. `DataFileError` where it cannot be
+    A green dot marks the start, a blue one the end. Raises `DataFileError` if the file cannot be
     written.
     """
     from PIL import Image, ImageDraw
@@ -45,4 +45,4 @@ def write_picture(
     try:
         image.save(path, format="PNG")
     except OSError as error:
-        raise DataFileError(f"{path}: the picture cannot be written: {error.strerror}") from None
+        raise DataFileError(f"{path}: the image cannot be written: {error.strerror}") from None

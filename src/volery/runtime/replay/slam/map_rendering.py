@@ -1,4 +1,4 @@
-"""The map that scans at their final poses make."""
+"""Builds the map from scans at their final poses."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ _NEAREST_M = 0.05
 _MARGIN_M = 1.0
 _MOST_CELLS = 100_000_000
 _COARSEST_M = 2.0
-"""Width of cells in which a map says nothing any more: it is of a way that ran away."""
+"""Max cell width, m; a map that needs larger cells comes from a diverged trajectory."""
 _SLAB_M = 0.5
-"""Returns so far above or below the scanner, along a leaning scan, are of other things: ground,
-branches."""
+"""Max height difference between a return and a tilted scanner, m; beyond it the return is of
+other objects: ground, branches."""
 
 
 _OVER_GROUND_M = 0.6
-"""What a flying scanner meets lower than this may be the ground."""
+"""Max height above ground of returns that may be of the ground, m."""
 _EVERY, _NEAREST_GROUND_M, _FARTHEST_GROUND_M = 4, 0.6, 20.0
-"""Beams of the nodding LIDAR that tell where the ground is: each fourth, m."""
+"""Beams of the nodding LIDAR that measure the ground: each fourth, between these ranges, m."""
 
 
 def draw_map(outcome: SlamResult, cell_m: float, reach_m: float) -> LogOddsGrid:
-    """The grid of a run; returns beyond `reach_m` are free space up to there.
+    """Returns the occupancy grid of a run; returns beyond `reach_m` are free space up to there.
 
-    Its cells are `cell_m` wide, or so many times doubled that it needs no more memory than there
-    may be. `RecordingError` where that makes them too coarse.
+    Cells are `cell_m` wide, doubled as often as the memory limit requires. Raises
+    `RecordingError` if that makes them too coarse.
     """
     ground = _ground(outcome)
     rays = [
@@ -55,9 +55,9 @@ def draw_map(outcome: SlamResult, cell_m: float, reach_m: float) -> LogOddsGrid:
 
 
 def fitting_cell(size: Array, cell_m: float) -> float:
-    """Width of the cells that a map of a size (2,) m can have, the one wished for or a coarser.
+    """Returns the cell width for a map of size (2,), m: `cell_m`, or a multiple that fits.
 
-    `RecordingError` where there is none.
+    Raises `RecordingError` if none fits.
     """
     wished = cell_m
     while np.isfinite(size).all() and cell_m <= max(_COARSEST_M, wished):
@@ -65,7 +65,7 @@ def fitting_cell(size: Array, cell_m: float) -> float:
             return cell_m
         cell_m *= 2.0
     raise RecordingError(
-        f"a map of {size[0]:.0f} m x {size[1]:.0f} m is too large: the way ran away"
+        f"a map of {size[0]:.0f} m x {size[1]:.0f} m is too large: the trajectory diverged"
     )
 
 
@@ -77,7 +77,7 @@ def _rays(
     reach_m: float,
     ground: VerticalStructures | None,
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Starts and ends (K, 2) of a scan in the map, and which end in something."""
+    """Returns starts and ends (K, 2), m, of a scan's rays in the map, and whether they hit."""
     ranges = np.asarray(scan.ranges, np.float64)
     nearest = max(_NEAREST_M, float(scan.range_min))
     most = float(scan.range_max)
@@ -93,13 +93,13 @@ def _rays(
     short = np.minimum(_SLAB_M / np.maximum(rise, 1e-9), 1.0)[:, None]
     ends = starts + short * (ends - starts)
     hits &= short[:, 0] >= 1.0
-    if ground is not None:  # where it has not been seen a return may well be one of it
+    if ground is not None:  # unmapped ground: the return may be of the ground
         hits[hits] = ground.heights_m(ends[hits]) > _OVER_GROUND_M
     return starts[:, :2], ends[:, :2], hits
 
 
 def _ground(outcome: SlamResult) -> VerticalStructures | None:
-    """Where the ground is, by the nodding LIDAR; None where there is none."""
+    """Returns the ground measured by the nodding LIDAR; None without one."""
     if not outcome.nodding or not len(outcome.nods):
         return None
     found = [np.zeros((0, 3))]
@@ -122,7 +122,7 @@ def _ground(outcome: SlamResult) -> VerticalStructures | None:
 def _poses(
     trajectory: EstimatedTrajectory, row: int, scan: LaserScan, beams: NDArray[np.int64]
 ) -> tuple[Array, Array]:
-    """Where the body was at each beam: positions (K, 3), attitudes (K, 4)."""
+    """Returns the body's positions (K, 3), m, and attitudes (K, 4), x y z w, at each beam."""
     first = stamp_of(scan) - int(trajectory.time_ns[row]) + int(trajectory.clock_ns[row])
     when = first + beams * (float(scan.time_increment) * 1e9)
     clock = trajectory.clock_ns

@@ -1,4 +1,4 @@
-"""Running the SLAM node over a log: everything that it says, and the scans that make the map."""
+"""Runs the SLAM node over a log and collects its outputs and the scans of the map."""
 
 from __future__ import annotations
 
@@ -35,21 +35,21 @@ Array = NDArray[np.float64]
 
 _JOINT = "laser_nodding"
 _APART_M, _APART_RAD = 0.25, 0.2
-"""Between scans that are drawn into the map."""
+"""Min motion between scans that are drawn into the map, m and rad."""
 _NODDING_NS = 175_000_000
-"""Between nodding scans that tell where the ground is; a second is no multiple of it."""
+"""Time between nodding scans that measure the ground, ns; 1 s is no multiple of it."""
 _PROGRESS_S = 0.5
 _PATIENCE_S = 60.0
-"""In which the node tells of its last corrections; the first path is that of the log's end."""
+"""Max simulated time to wait for the final path, s; the first path is that of the log's end."""
 
 
 @dataclass(frozen=True)
 class SlamOptions:
-    """What the user may say beside the log."""
+    """Options of a run besides the log."""
 
     asked: RequestedTopics = field(default_factory=RequestedTopics)
     start: tuple[float, float, float, float] | None = None
-    """x, y, z in m and yaw in rad; None: as a log of Volery's tells it, else the map's origin."""
+    """x, y, z in m and yaw in rad; None: from the log if Volery recorded it, else the origin."""
     level_mount: tuple[float, float, float] | None = None
     nodding_mount: tuple[float, float, float] | None = None
     reach_m: float = 30.0
@@ -58,50 +58,50 @@ class SlamOptions:
 
 @dataclass
 class SlamResult:
-    """What came of a run."""
+    """Holds the outcome of a run."""
 
     channels: TopicSelection
     trajectory: EstimatedTrajectory
     scans: list[tuple[int, LaserScan]]
-    """Row of the trajectory, and the scan of then."""
+    """Row in the trajectory, and the scan at that time."""
     mount: Callable[[str], Mount]
-    """Of a scanner, by its frame."""
+    """Returns the mount of a LIDAR frame."""
     heard: int
-    """Scans."""
+    """Number of scans."""
     lasted_s: float
-    """Time of the log."""
+    """Duration of the log, s."""
     cpu_s: float
-    """Of the node alone."""
+    """CPU time of the node alone, s."""
     status: dict[str, Any]
-    """The last one."""
+    """Last status message."""
     states: dict[str, float] = field(default_factory=dict)
-    """Seconds in each state."""
+    """Time in each state, s."""
     problems: dict[str, float] = field(default_factory=dict)
-    """Seconds with each problem."""
+    """Time with each problem, s."""
     nodding: list[tuple[int, LaserScan]] = field(default_factory=list)
-    """As `scans`, of the nodding LIDAR; empty where there is none."""
+    """As `scans`, of the nodding LIDAR; empty without one."""
     nods: Array = field(default_factory=lambda: np.zeros((0, 2)))
-    """(J, 2) times, s, and angles of its mount, rad, positive down; times rise."""
+    """Times, s, rising, and mount angles, rad, positive down (J, 2)."""
     wheels_m: float | None = None
-    """Way over ground by the odometry that was heard; None: none was."""
+    """Length of the log's odometry over ground, m; None without odometry."""
 
 
 class OfflineSlam:
-    """Feeds a node with a log. `RecordingError` where the log has not what it needs."""
+    """Feeds the node with a log. Raises `RecordingError` if the log lacks a required input."""
 
     def __init__(self, source: LogSource | TextSource, options: SlamOptions) -> None:
         self._source, self._options = source, options
         self.channels = choose(source.path, source.topics, options.asked)
         self.start = options.start or beginning_of(source, self.channels.uav, self.channels.scan)
-        """Where it begins; None: at the map's origin."""
+        """Initial pose; None: the map's origin."""
         self._joints = StaticTransforms()
         self._frames: dict[str, str] = {}
-        """Of the LIDARs, level and nodding, that the node hears."""
+        """Frames of the LIDARs that the node uses, horizontal and nodding."""
         self._host = LogHost()
         self._odometry: list[tuple[float, ...]] = []
         self._times: list[int] = []
         self._wheels: list[tuple[float, float]] = []
-        """Places of the log's odometry."""
+        """Positions of the log's odometry."""
         self._scans: list[tuple[int, LaserScan]] = []
         self._nodding: list[tuple[int, LaserScan]] = []
         self._next_nodding_ns = 0
@@ -116,7 +116,7 @@ class OfflineSlam:
         self._status_ns = 0
 
     def run(self, tell: Callable[[int, float], None] | None = None) -> SlamResult:
-        """Go through the whole log; `tell` hears of scans and seconds of the log so far."""
+        """Processes the whole log; `tell` receives the scans and seconds of the log so far."""
         uav, host = self.channels.uav, self._host
         self._start_node()
         host.listen(f"/{uav}/slam/odom", self._on_odometry)
@@ -180,7 +180,7 @@ class OfflineSlam:
         Slam(**options, parameter_overrides=parameters)
 
     def _find_mounts(self) -> None:
-        """Where the LIDARs sit must be known before the node begins."""
+        """Finds the LIDARs' mounts, which the node needs at its start."""
         o, names, uav = self._options, self.channels.names, self.channels.uav
         topics = {"level": f"/{uav}/{LEVEL}", "nodding": f"/{uav}/{NODDING}"}
         self._frames = frames_of(
@@ -192,11 +192,11 @@ class OfflineSlam:
         for name, frame in self._frames.items():
             if frame in unknown & asked:
                 raise RecordingError(
-                    f"{self._source.path}: nothing in it tells where {frame} sits in the body "
-                    f"(/tf_static, /tf, /volery/scenario): --{name}-mount X,Y,Z says it"
+                    f"{self._source.path}: the log has no transform from {frame} to the body "
+                    f"(/tf_static, /tf, /volery/scenario): give --{name}-mount X,Y,Z"
                 )
 
-    # ------------------------------------------------------------------------------ what it tells
+    # ------------------------------------------------------------------------------ subscriptions
 
     def _on_odometry(self, message: Any) -> None:
         p, q = message.pose.pose.position, message.pose.pose.orientation
@@ -219,7 +219,7 @@ class OfflineSlam:
         self._status = json.loads(message.data)
 
     def _count_time(self) -> None:
-        """Add the time since the last status to what that one said."""
+        """Adds the time since the last status to that status's state and problems."""
         now = self._host.now_ns()
         if self._status and now > self._status_ns:
             seconds = (now - self._status_ns) / NS_PER_S
@@ -235,7 +235,7 @@ class OfflineSlam:
                 self._tilt = np.array([q.x, q.y, q.z, q.w])
 
     def _end(self) -> None:
-        """Wait for the whole path at last."""
+        """Waits for the final path."""
         told: list[Any] = []
         self._count_time()
         status, self._status = self._status, {}
@@ -245,13 +245,13 @@ class OfflineSlam:
         self._status = {**status, **self._last_counts()}
 
     def _last_counts(self) -> dict[str, Any]:
-        """What has come to count since the log's end."""
+        """Returns the counts that changed after the log's end."""
         return {k: v for k, v in self._status.items() if k in ("closures", "keyframes")}
 
     def _outcome(self, heard: int, lasted_s: float, cpu_s: float) -> SlamResult:
         if not self._times:
             reason = ", ".join(self._status.get("problems", ())) or "no scan was usable"
-            raise RecordingError(f"{self._source.path}: the SLAM never began ({reason})")
+            raise RecordingError(f"{self._source.path}: the SLAM did not start ({reason})")
         poses = [] if self._path is None else self._path.poses
         keyframe_ns = np.array([stamp_of(one) for one in poses], np.int64)
         keyframes = np.array([_four(one.pose) for one in poses]).reshape(-1, 4)

@@ -1,7 +1,7 @@
-"""ROS 2 bags, a folder or its SQLite file, within the bounds of logs.
+"""Reads ROS 2 bags, a folder or its SQLite file, within the limits for logs.
 
-MCAP files in a bag's folder are read as any MCAP; SQLite files by `rosbags`, after a look at what
-they are made of.
+MCAP files in a bag's folder are read as any MCAP; SQLite files by `rosbags`, after a check of their
+contents.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _TABLES = ("messages", "topics", "message_definitions", "metadata", "schema")
 
 
 def bag_topics(path: Path) -> dict[str, str]:
-    """Types by topic. `RecordingError` where there is no such bag, or it is beyond the bounds."""
+    """Returns types by topic. Raises `RecordingError` if there is no bag or it exceeds limits."""
     if parts := _mcap_parts(path):
         return {t.topic: t.msgtype for part in parts for t in summarize(part).topics}
     from rosbags.rosbag2 import Reader
@@ -37,12 +37,12 @@ def bag_topics(path: Path) -> dict[str, str]:
             return {one.topic: one.msgtype for one in reader.connections}
     except RecordingError:
         raise
-    except Exception as error:  # whatever the reader makes of a folder that is no bag
+    except Exception as error:  # the reader's errors on a folder that is no bag
         raise RecordingError(f"{path}: cannot be read as a ROS 2 bag: {error}") from None
 
 
 class BagWalk:
-    """The records of a ROS 2 bag; afterwards `problem` says what was wrong, if anything."""
+    """Iterates over the records of a ROS 2 bag; afterwards `problem` describes any damage."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -71,7 +71,7 @@ class BagWalk:
                     yield LogRecord(topics[connection.id], time_ns, bytes(data), 0)
         except RecordingError:
             raise
-        except Exception as error:  # whatever the reader makes of damaged bytes
+        except Exception as error:  # the reader's errors on damaged bytes
             self.problem = f"cut off or damaged: {error}"
 
 
@@ -82,7 +82,7 @@ def _topic(connection: Any) -> LogTopic:
 
 
 def _mcap_parts(path: Path) -> list[Path]:
-    """The MCAP files of a bag's folder, in their order: `x_0.mcap` to `x_10.mcap`."""
+    """Returns the MCAP files of a bag's folder in order: `x_0.mcap` to `x_10.mcap`."""
     found = path.glob("*.mcap") if path.is_dir() else ()
     return sorted(found, key=lambda part: (len(part.name), part.name))
 
@@ -93,11 +93,11 @@ def _size(path: Path) -> int:
 
 
 def _check_metadata(path: Path) -> None:
-    """Refuse what `rosbags` would unpack without a bound: packed files, MCAP of other names."""
+    """Refuses what `rosbags` would decompress without limit: compressed files, renamed MCAP."""
     try:
         text = (path / "metadata.yaml").read_text(encoding="utf-8") if path.is_dir() else ""
     except (OSError, UnicodeDecodeError):
-        return  # the reader says why
+        return  # the reader reports the reason
     if _PACKED.search(text) or _MCAP.search(text):
         raise RecordingError(
             f"{path}: is compressed, or of files that are not named .mcap; `ros2 bag convert` "
@@ -106,7 +106,7 @@ def _check_metadata(path: Path) -> None:
 
 
 def _check_files(path: Path) -> None:
-    """Refuse SQLite files whose tables are none: a view makes rows without end of nothing."""
+    """Refuses SQLite files with views in place of tables: a view can generate endless rows."""
     for file in path.glob("*.db3") if path.is_dir() else (path,):
         try:
             with closing(sqlite3.connect(f"{file.resolve().as_uri()}?mode=ro", uri=True)) as base:
@@ -118,7 +118,7 @@ def _check_files(path: Path) -> None:
                     _TABLES,
                 ).fetchone()
         except sqlite3.Error:
-            continue  # the reader says why
+            continue  # the reader reports the reason
         except UnicodeDecodeError:  # in the text of SQLite's own error
             raise RecordingError(
                 f"{file}: the tables are damaged; this is no bag of ROS 2"

@@ -1,4 +1,4 @@
-"""Messages of any log: MCAP, ROS 1 bag, ROS 2 bag, or a scanner's text."""
+"""Reads messages of any log: MCAP, ROS 1 bag, ROS 2 bag, or a LIDAR's text log."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from volery.runtime.replay.slam.ros2_bags import BagWalk, bag_topics
 
 
 class SlamInput(NamedTuple):
-    """A message of a log."""
+    """Describes a message of a log."""
 
     topic: str
     time_ns: int
@@ -27,21 +27,21 @@ class SlamInput(NamedTuple):
 
 @dataclass
 class LogSource:
-    """A log with messages of types; afterwards `problem` says what was wrong, if anything."""
+    """Reads a log of typed messages; afterwards `problem` describes any damage."""
 
     path: Path
     topics: dict[str, str]
-    """Types by topic."""
+    """Message types by topic."""
     problem: str = ""
     refused: int = 0
-    """Messages that cannot be read."""
+    """Number of messages that cannot be decoded."""
     damage: str = ""
-    """What can be seen of the file without reading its messages."""
+    """Damage that is visible without reading the messages."""
     doubts: tuple[str, ...] = ()
     _walk: Any = field(default=None, repr=False)
 
     def messages(self, wanted: set[str]) -> Iterator[SlamInput]:
-        """Those of some topics in the order of the file."""
+        """Yields the messages of the topics `wanted` in the order of the file."""
         decoder = LogDecoder()
         walk = self._walk(self.path)
         for record in walk:
@@ -59,20 +59,20 @@ class LogSource:
 
 @dataclass
 class TextSource:
-    """A scanner's text log; its topics are those that `volery convert` writes."""
+    """Reads a LIDAR's text log; its topics are those that `volery convert` writes."""
 
     path: Path
     layout: TextLayout
     problem: str = ""
     refused: int = 0
-    """Lines left out."""
+    """Number of lines left out."""
     damage: str = ""
     doubts: list[str] = field(default_factory=list)
-    """What may be wrong with the layout."""
+    """Possible errors of the layout."""
 
     @property
     def topics(self) -> dict[str, str]:
-        """Types by topic."""
+        """Message types by topic."""
         uav = f"/{self.layout.uav}"
         found = {
             f"{uav}/{self.layout.topic}": "sensor_msgs/msg/LaserScan",
@@ -83,7 +83,7 @@ class TextSource:
         return found
 
     def messages(self, wanted: set[str]) -> Iterator[SlamInput]:
-        """Those of some topics in the order of the lines."""
+        """Yields the messages of the topics `wanted` in the order of the lines."""
         scans = TextScans(self.path, self.layout)
         for published in scans:
             if published.topic in wanted:
@@ -94,12 +94,12 @@ class TextSource:
 
 
 def open_source(path: Path, layout: TextLayout | None = None) -> LogSource | TextSource:
-    """The log at a path: text where a layout is given.
+    """Opens the log at a path, as text if a layout is given.
 
     Raises
     ------
     RecordingError
-        There is no such log, or it is none.
+        The log does not exist or has an unknown format.
 
     """
     if layout is not None:

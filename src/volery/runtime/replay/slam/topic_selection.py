@@ -1,4 +1,4 @@
-"""Which topics of a log the SLAM hears as what."""
+"""Selects the topics of a log that the SLAM subscribes to."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _NOT_SENSED = ("ground_truth/odom", "slam/odom")
 
 @dataclass(frozen=True)
 class RequestedTopics:
-    """What the user says of a log's topics; None: as they are called here, or the only ones."""
+    """Topics requested by the user; None: those with the usual names, or the only ones."""
 
     uav: str | None = None
     scan: str | None = None
@@ -22,12 +22,12 @@ class RequestedTopics:
     imu: str | None = None
     has_odometry: bool = True
     has_imu: bool | None = None
-    """None: where the log has an IMU and a nodding LIDAR."""
+    """None: whether the log has an IMU and a nodding LIDAR."""
 
 
 @dataclass(frozen=True)
 class TopicSelection:
-    """Topics by what they are for; `names` are those of the log by those that the node hears."""
+    """Selected topics; `names` maps the node's topics to those of the log."""
 
     uav: str
     names: dict[str, str]
@@ -35,12 +35,12 @@ class TopicSelection:
 
     @property
     def scan(self) -> str:
-        """The level LIDAR's in the log."""
+        """Topic of the horizontal LIDAR in the log."""
         return self.names[f"/{self.uav}/{LEVEL}"]
 
 
 def choose(path: Path, topics: dict[str, str], asked: RequestedTopics) -> TopicSelection:
-    """The topics of a log, types by topic. `RecordingError` where it cannot be said which."""
+    """Selects among a log's topics, types by topic. Raises `RecordingError` if ambiguous."""
     _check_uav(path, topics, asked)
     scan = _one(path, topics, SCAN, asked.scan, asked.uav, LEVEL)
     assert scan is not None
@@ -63,12 +63,12 @@ def choose(path: Path, topics: dict[str, str], asked: RequestedTopics) -> TopicS
 
 
 def other_uavs(topics: dict[str, str], uav: str) -> list[str]:
-    """UAVs of a log, besides one, that have a level LIDAR."""
+    """Returns the UAVs of a log, except `uav`, that have a horizontal LIDAR."""
     return sorted({t.split("/")[1] for t in topics if t.endswith(f"/{LEVEL}")} - {"", uav})
 
 
 def _check_uav(path: Path, topics: dict[str, str], asked: RequestedTopics) -> None:
-    """Refuse a UAV of which the log has nothing."""
+    """Raises `RecordingError` if the log has no topic of the requested UAV."""
     uav = asked.uav
     if uav is None or asked.scan is not None or any(t.startswith(f"/{uav}/") for t in topics):
         return
@@ -86,7 +86,7 @@ def _one(
     *,
     needed: bool = True,
 ) -> str | None:
-    """The topic of a type that is meant."""
+    """Returns the topic of a type: the requested, the usual or the only one."""
     known = sorted(t for t, what in topics.items() if what == kind and not t.endswith(_NOT_SENSED))
     if name is not None:
         if name in known:

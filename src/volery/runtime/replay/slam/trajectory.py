@@ -1,4 +1,4 @@
-"""The whole way in the map, as it is known at the end."""
+"""Computes the trajectory in the map from odometry and the final keyframes."""
 
 from __future__ import annotations
 
@@ -15,46 +15,46 @@ Array = NDArray[np.float64]
 Times = NDArray[np.int64]
 
 _NEAR_NS = 100_000_000
-"""A keyframe and the odometry of its time."""
+"""Max time between a keyframe and its odometry, ns."""
 
 
 class EstimatedTrajectory(NamedTuple):
-    """Poses in the map."""
+    """Holds poses in the map frame."""
 
     time_ns: Times
-    """(N,) as in the log."""
+    """Times (N,), ns, as in the log."""
     clock_ns: Times
-    """(N,) without the steps of a clock that was set back; rising."""
+    """Times (N,), ns, without backward steps of the clock; rising."""
     position: Array
-    """(N, 3) m"""
+    """Positions (N, 3), m."""
     attitude: Array
-    """(N, 4) x y z w"""
+    """Attitudes (N, 4), x y z w."""
 
     @property
     def length_m(self) -> float:
-        """Over ground."""
+        """Path length over ground, m."""
         return way_m(self.position)
 
 
 def way_m(places: Array) -> float:
-    """Way over ground along places (N, 2+), m."""
+    """Returns the path length over ground along positions (N, 2+), m."""
     return float(np.hypot(*np.diff(places[:, :2], axis=0).T).sum())
 
 
 def rising(time_ns: Times) -> Times:
-    """Times without the steps back in them."""
+    """Returns the times without backward steps."""
     steps = np.diff(time_ns, prepend=time_ns[:1])
     back = np.where(steps < 0, 1_000_000 - steps, 0)
     return np.asarray(time_ns + np.cumsum(back))
 
 
 def rows_of_keyframes(keyframe_ns: Times, time_ns: Times) -> NDArray[np.int64]:
-    """Rows (K,) of the odometry's times (N,) that keyframes stand at, in order; -1: none."""
+    """Returns the rows (K,) of the odometry times (N,) that match keyframes; -1: none."""
     rows, at = np.full(len(keyframe_ns), -1, np.int64), 0
     for k, wanted in enumerate(keyframe_ns):
         near = np.flatnonzero(np.abs(time_ns[at:] - wanted) < _NEAR_NS)
         if len(near):
-            ends = np.flatnonzero(np.diff(near) > 1)  # of the first time that it was then
+            ends = np.flatnonzero(np.diff(near) > 1)  # of the first pass of the clock
             first = near[: ends[0] + 1] if len(ends) else near
             best = first[np.argmin(np.abs(time_ns[at + first] - wanted))]
             rows[k] = at = at + int(best)
@@ -69,10 +69,10 @@ def corrected(
     keyframes: Array,
     tilt: Array,
 ) -> EstimatedTrajectory:
-    """The odometry's way, laid onto the keyframes' poses (K, 4) x, y, z, yaw in the map.
+    """Returns the odometry corrected to the keyframes' poses (K, 4): x, y, z, m, yaw, rad, map.
 
-    Between two keyframes it goes from the one's correction to the other's. tilt: (4,) of the
-    odometry's frame in the map, whose heading does not count.
+    Between two keyframes the correction is interpolated. `tilt` is the attitude (4,), x y z w, of
+    the odometry frame in the map; its heading is irrelevant.
     """
     position, attitude = rotations.rotate(tilt, position), rotations.multiply(tilt, attitude)
     rows = rows_of_keyframes(keyframe_ns, time_ns)
@@ -96,7 +96,7 @@ def corrected(
 def _laid(
     position: Array, attitude: Array, rows: NDArray[np.int64], keyframes: Array, turns: Array
 ) -> tuple[Array, Array]:
-    """All poses (N,), each carried along with its keyframe."""
+    """Returns all poses (N,), each moved rigidly with its keyframe."""
     about = np.zeros((len(turns), 4))
     about[:, 2], about[:, 3] = np.sin(0.5 * turns), np.cos(0.5 * turns)
     moved = rotations.rotate(about, position - position[rows]) + keyframes[:, :3]
@@ -104,7 +104,7 @@ def _laid(
 
 
 def write_tum(path: Path, trajectory: EstimatedTrajectory) -> None:
-    """Write it as text: a pose a line, `timestamp x y z qx qy qz qw`, s and m."""
+    """Writes the poses as text, one per line: `timestamp x y z qx qy qz qw`, s and m."""
     try:
         with path.open("w", encoding="utf-8") as file:
             file.write("# timestamp x y z qx qy qz qw\n")
