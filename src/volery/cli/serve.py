@@ -34,7 +34,7 @@ _log = logging.getLogger(__name__)
 
 _THREADS = 2
 _GLANCE_S = 0.02
-"""How often a world that stands still looks for clients, and a idle for Ctrl-C."""
+"""Wall seconds between looks at clients of a paused world, and at Ctrl-C without a world."""
 _FAREWELL_S = 0.1
 """Time for the last answer to reach its client."""
 

@@ -76,7 +76,7 @@ if TYPE_CHECKING:
 _CLOCK_PERIOD_S = 0.01
 _DIGEST_PERIOD_S = 0.01
 _FARTHEST_M, _FASTEST_M_S = 1e5, 100.0
-"""Of things that are put somewhere."""
+"""Limits of poses and velocities of actors."""
 
 
 class Simulation:
@@ -540,7 +540,7 @@ class Simulation:
         attitude: ArrayLike | None = None,
         velocity_map: ArrayLike = (0.0, 0.0, 0.0),
     ) -> None:
-        """Put a thing at (3,) m with (4,) x y z w, map from body, from now on.
+        """Moves an external actor to (3,) m with (4,) x y z w, map from body, from now on.
 
         It goes on from there at `velocity_map` (3,) m/s; without an attitude it keeps its own.
         `CommandError` for one that does not exist, that goes its own way, or for such a place.
@@ -548,7 +548,7 @@ class Simulation:
         self._check_open()
         if self.actors is None or name not in self.actors.names:
             known = "none" if self.actors is None else ", ".join(self.actors.names)
-            raise CommandError(f"there is no thing '{name}'; known: {known}")
+            raise CommandError(f"there is no actor '{name}'; known: {known}")
         row = self.actors.names.index(name)
         if attitude is None:
             attitude = self.actors.poses_at(self.time_ns)[row, 3:]

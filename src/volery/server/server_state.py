@@ -40,7 +40,7 @@ class ServerActivity(StrEnum):
     """A simulation waits at the end of its scenario."""
     NO_WORLD = "no_world"
     FAILED = "failed"
-    """As in the idle, because the scenario could not be built."""
+    """No world, because the scenario could not be built."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class ServerSituation:
 
 
 class World(Protocol):
-    """What clients can join: a simulation, a idle, a recording.
+    """What clients can join: a simulation, an idle server, a recording.
 
     Where it has a `scenario`, `geometry` and `operators`, as a `Simulation` has, they are served
     too. Where it has no scenario but a `name`, as a log of unknown origin has, that is told.
