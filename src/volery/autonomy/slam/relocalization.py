@@ -69,9 +69,7 @@ class Relocalization:
     def find(
         self, closer: LoopCloser, frames: Sequence[Keyframe], poses: Sequence[Array]
     ) -> PoseGraphEdge | None:
-        """Tries some keyframes of earlier sessions in turn, newest first; returns a closure or
-        None.
-        """
+        """Tries some keyframes of earlier sessions, newest first; returns a closure or None."""
         newest = len(frames) - 1
         session = frames[newest].session
         old = [

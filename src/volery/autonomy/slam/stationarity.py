@@ -96,9 +96,7 @@ def first_state(start: Array, up: Array, settling: Array) -> Array:
 
 
 def first_covariance(noise: ImuNoise, turn: Array) -> Array:
-    """Returns the covariance (17, 17) of a `first_state`; `turn` (3, 3) is its attitude's
-    matrix.
-    """
+    """Returns the covariance (17, 17) of a `first_state` with attitude matrix `turn` (3, 3)."""
     sigma = np.array(
         [1e-3] * 3 + [0.01] * 3 + [1e-4] * 3
         + [noise.gyro_turn_on_rad_s] * 3 + [noise.accel_turn_on_m_s2] * 3 + [2e-3] * 2

@@ -40,9 +40,7 @@ class Sweep(NamedTuple):
         return self.nod != 0.0 or self.last_nod != 0.0
 
     def points(self, nearest_m: float, reach_m: float, times: Times, states: Array) -> Array:
-        """Returns points (K, 3) between two ranges, m in the body at the newest state; see
-        `unskew`.
-        """
+        """Returns points (K, 3) between two ranges, m in the newest body frame; see `unskew`."""
         points = np.empty((len(self.ranges), 3))
         count = unskew(
             self.ranges, nearest_m, reach_m, self.angle_min, self.angle_step, self.first_ns,
