@@ -35,9 +35,7 @@ class Alignment(NamedTuple):
 
 
 def umeyama(places: Array, onto: Array) -> Alignment:
-    """Returns the transform of positions (N, 3) with the least squared distances to `onto` (N,
-    3).
-    """
+    """Returns the least-squares transform of positions (N, 3) to `onto` (N, 3)."""
     from_mean, to_mean = places.mean(axis=0), onto.mean(axis=0)
     covariance = (onto - to_mean).T @ (places - from_mean) / len(places)
     u, _, vt = np.linalg.svd(covariance)

@@ -73,9 +73,7 @@ def _beams_of_scan(scan: Any) -> tuple[Array, Array]:
 
 
 def _beams_of_cloud(cloud: Any) -> tuple[Array, Array]:
-    """Returns points (n, 3) of a PointCloud2 in the sensor frame, and fractions of the sweep
-    (n,).
-    """
+    """Returns points (n, 3) of a PointCloud2, sensor frame, and fractions of the sweep (n,)."""
     points = cloud_points(cloud)
     along = np.stack([points[name].astype(np.float64) for name in ("x", "y", "z")], -1)
     near = np.linalg.norm(along, axis=1) <= MAX_RANGE_M

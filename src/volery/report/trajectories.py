@@ -42,9 +42,7 @@ class RecordedTrajectory:
         return float(np.hypot(*np.diff(self.position[:, :2], axis=0).T).sum())
 
     def pose_at(self, time_s: float) -> tuple[Array, Array] | None:
-        """Returns position (3,) and attitude (4,) at a time, interpolated; None outside of the
-        poses.
-        """
+        """Interpolates position (3,) and attitude (4,) at a time; None outside of the poses."""
         k = int(np.searchsorted(self.time_s, time_s))
         if k < len(self.time_s) and self.time_s[k] == time_s:
             return self.position[k], self.attitude[k]

@@ -129,7 +129,7 @@ def _estimate_section(uav: LoggedUav, trunks: TrueTrunks) -> list[str]:
     told = "Trajectory and trunk map."
     if len(uav.trunks):
         told = (
-            f"Trajectory, and {counted(len(uav.trunks), 'trunk')} that the level LIDAR detected three "
+            f"Trajectory, and {counted(len(uav.trunks), 'trunk')} detected by the level LIDAR three "
             "times or more, where the estimate puts them."
         )
         if not uav.is_founded:
@@ -151,7 +151,7 @@ def _trunks_text(found: Array, near: TrueTrunks) -> str:
     if not len(near.places):
         return " No tree of the scenario is within 15 m of the trajectory."
     told = (
-        f" Rings: {counted(len(near.places), 'tree')} of the scenario within 15 m of the trajectory, by "
+        f" Rings: {counted(len(near.places), 'tree')} of the scenario within 15 m of it, by "
         "the width of trunks (thin ones enlarged)."
     )
     away = near.distances_m(found)
@@ -220,7 +220,7 @@ def _laid_over(uav: LoggedUav, real: RecordedTrajectory, log: Path) -> _Laid:
         raise VoleryError(f"{log}: too few poses for a comparison with {uav.name}")
     if real.lasts_s > _MOST_S:
         raise VoleryError(
-            f"{log}: its poses span {real.lasts_s / 3600.0:.0f} hours; was its clock set during the flight?"
+            f"{log}: its poses span {real.lasts_s / 3600.0:.0f} hours; was its clock set in flight?"
         )
     shift = time_shift(simulated.time_s, simulated.position, real.time_s, real.position)
     times = real.time_s + shift.seconds

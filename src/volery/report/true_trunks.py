@@ -41,8 +41,9 @@ class TrueTrunks(NamedTuple):
         return TrueTrunks(self.places[seen], self.widths_m[seen], self.why_none)
 
     def distances_m(self, found: Array) -> Array:
-        """Returns distances (F,) m from positions (F, 2 or 3) to the nearest trunk; empty without
-        trunks.
+        """Returns distances (F,) m to the nearest trunk; empty without trunks.
+
+        found: positions (F, 2 or 3) m.
         """
         if not len(self.places):
             return np.zeros(0)

@@ -136,7 +136,7 @@ class StationCore:
         Raises
         ------
         CommsError
-            The payload is too long, the kind is no message, or the buffer for that destination is full
+            The payload is too long, the kind is no message, or that destination's buffer is full
             when a command is sent. Measurements replace the oldest one instead.
 
         """
