@@ -129,7 +129,7 @@ def _estimate_section(uav: LoggedUav, trunks: TrueTrunks) -> list[str]:
     told = "Trajectory and trunk map."
     if len(uav.trunks):
         told = (
-            f"Trajectory, and {counted(len(uav.trunks), 'trunk')} detected by the level LIDAR three "
+            f"Trajectory and {counted(len(uav.trunks), 'trunk')} detected by the level LIDAR three "
             "times or more, where the estimate puts them."
         )
         if not uav.is_founded:
