@@ -63,10 +63,10 @@ def run_bounded(module: str, words: Sequence[str], bounds: ProcessBounds) -> Any
             env=few,
         )
     except subprocess.TimeoutExpired:
-        raise BoundedError("it takes too long to read") from None
+        raise BoundedError("the file takes too long to read") from None
     try:
         return json.loads(ran.stdout)
     except ValueError:
         if ran.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
-            raise BoundedError("it takes too long to read") from None
+            raise BoundedError("the file takes too long to read") from None
         raise BoundedError("the file cannot be read: its reader failed") from None

@@ -42,4 +42,4 @@ def _detail_of(text: str) -> DetailLevel:
         return DetailLevel(text)
     except ValueError:
         known = ", ".join(DetailLevel)
-        raise RefusedError(400, f"detail is one of {known}, not '{text[:40]}'") from None
+        raise RefusedError(400, f"detail must be one of {known}, not '{text[:40]}'") from None

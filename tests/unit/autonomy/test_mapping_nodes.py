@@ -182,8 +182,8 @@ def test_it_says_what_is_wrong():
     assert status(told)["state"] == "mapping"
     fly(bench, 3.5, lambda t: scan(t, np.full(720, np.inf)), begin_ns=3 * S)
     assert status(told)["problems"] == [
-        "the level LIDAR sees nothing",
-        "the nodding LIDAR sees nothing",
+        "the level LIDAR has no returns",
+        "the nodding LIDAR has no returns",
     ]
 
 

@@ -64,7 +64,9 @@ class RegionAvoidance(DepthCourse):
         )
         self._region = declare_numbers(self, "region", [0.3, 0.2], "[width, height]")
         if not all(0.0 < share <= 1.0 for share in self._region):
-            raise NodeError(f"region is [width, height], above 0 to 1, not {self._region}")
+            raise NodeError(
+                f"region must be [width, height], each above 0 and at most 1, not {self._region}"
+            )
         self._sidestep = float(
             self.declare_parameter("sidestep_m_s", 0.8, min_value=0.0, max_value=100.0).value
         )

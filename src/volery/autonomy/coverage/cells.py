@@ -56,17 +56,17 @@ class CoverageCells:
     def of(cls, mask: Mask) -> CoverageCells:
         """Returns the cells of `mask` (rows, columns). Raises PlanError if there are too many."""
         if mask.ndim != 2 or 0 in mask.shape:
-            raise PlanError(f"a map needs rows and columns, not the shape {mask.shape}")
+            raise PlanError(f"a map must have rows and columns, not the shape {mask.shape}")
         if mask.size > MOST_MAP_CELLS:
             raise PlanError(
                 f"the map has {mask.shape[1]} x {mask.shape[0]} cells; at most "
-                f"{MOST_MAP_CELLS:,} (4096 x 4096) can be planned: make its cells larger"
+                f"{MOST_MAP_CELLS:,} (4096 x 4096) can be planned: increase the cell size"
             )
         count = int(np.count_nonzero(mask))
         if count > MOST_CELLS:
             raise PlanError(
-                f"the map has {count:,} free cells; at most {MOST_CELLS:,} can be planned: make "
-                "its cells larger"
+                f"the map has {count:,} free cells; at most {MOST_CELLS:,} can be planned: increase "
+                "the cell size"
             )
         flat = np.flatnonzero(mask).astype(np.int32)
         index = np.full(mask.size, -1, np.int32)
@@ -164,7 +164,7 @@ def _label(neighbours: Ints, labels: Ints) -> int:
 
 @kernel
 def _spread(neighbours: Ints, sources: Ints, out: Any) -> None:
-    """Dijkstra's algorithm with buckets (Dial 1969) on 5-7 chamfer lengths (Borgefors 1986)."""
+    """Runs Dijkstra's algorithm by buckets (Dial 1969) on 5-7 chamfers (Borgefors 1986)."""
     count = neighbours.shape[0]
     far = np.iinfo(np.int32).max
     length = np.full(count, far, np.int32)

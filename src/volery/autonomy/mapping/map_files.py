@@ -78,7 +78,9 @@ def read_map(path: Path, limits: MapLimits) -> MapFile:
         raise DataFileError(f"{path}: {error}") from None
     said, found = int(_number(path, head, "size")), node_count(data)
     if said != found:
-        raise DataFileError(f"{path}: the head says {counted(said, 'node')}, the file has {found}")
+        raise DataFileError(
+            f"{path}: the head declares {counted(said, 'node')}, the file has {found}"
+        )
     _check_size(path, voxels, limits)
     return MapFile(resolution, data, voxels)
 

@@ -240,7 +240,7 @@ class Mapping(Node):
             elif intake.stuck:
                 found.append(f"the {name} LIDAR repeats itself")
             elif seen is None or now - seen > _SILENT_S * NS_PER_S:
-                found.append(f"the {name} LIDAR sees nothing")
+                found.append(f"the {name} LIDAR has no returns")
         return found
 
     # ------------------------------------------------------------------------------------ services

@@ -29,7 +29,7 @@ def depth_of(image: Image) -> Picture:
     if image.encoding == "16UC1":
         millimetres = image.data.view(np.uint16).reshape(shape).astype(np.float32)
         return np.where(millimetres > 0.0, millimetres * np.float32(1e-3), np.float32(np.nan))
-    raise GraphError(f"depth pictures are 32FC1 or 16UC1, not '{image.encoding}'")
+    raise GraphError(f"depth images must be 32FC1 or 16UC1, not '{image.encoding}'")
 
 
 def region_of(depth: Picture, width: float, height: float, aside: float = 0.0) -> Picture:

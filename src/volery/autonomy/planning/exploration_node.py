@@ -178,7 +178,7 @@ class Exploration(Node):
         info = message.info
         values = np.asarray(message.data, np.int8)
         if info.resolution <= 0.0 or values.size != info.height * info.width:
-            self._reason = "the map's size does not fit its data"
+            self._reason = "the map's size does not match its data"
             return
         corner = np.array([info.origin.position.x, info.origin.position.y])
         self._grid = (values.reshape(info.height, info.width), corner, float(info.resolution))
@@ -242,7 +242,7 @@ class Exploration(Node):
         if next_viewpoint(area, place[:2], heading, self._view, self._visited) is not None:
             self._become(
                 ExplorationState.BLOCKED,
-                f"{counted(len(self._refused), 'place')} cannot be reached",
+                f"{counted(len(self._refused), 'viewpoint')} cannot be reached",
             )
         else:
             self._become(ExplorationState.DONE, "")

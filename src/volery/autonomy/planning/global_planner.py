@@ -75,7 +75,7 @@ class GlobalPlanner(Node):
         self._height = float(self.declare_parameter("height_m", 3.0, min_value=0.1).value)
         low, high = declare_numbers(self, "heights_m", [2.2, 4.2], "[least, most]")
         if not low < high:
-            raise NodeError(f"heights_m is [least, most], not {[low, high]}")
+            raise NodeError(f"heights_m must be [min, max] with min < max, not {[low, high]}")
         self._search = PathSearch(
             radius_m=float(self.declare_parameter("radius_m", 0.8, min_value=0.05).value),
             heights_m=(low, high),
@@ -131,7 +131,7 @@ class GlobalPlanner(Node):
         if message.header.frame_id not in ("", MAP):
             self._give_up("refused", f"goals are in 'map', not in '{message.header.frame_id}'")
         elif not np.isfinite(goal).all():
-            self._give_up("refused", "the goal's place is not finite")
+            self._give_up("refused", "the goal's position is not finite")
         elif self._goal is None or not np.array_equal(goal, self._goal) or self._way is None:
             self._goal, self._tries = goal, 0
             self._plan()
@@ -161,7 +161,7 @@ class GlobalPlanner(Node):
 
     def _on_stop(self, _request: Any, response: Any) -> Any:
         self._goal = None
-        self._give_up("waiting", "told to stop")
+        self._give_up("waiting", "stopped by request")
         response.success, response.message = True, ""
         return response
 
@@ -182,7 +182,7 @@ class GlobalPlanner(Node):
         elif now - self._since_ns > _STUCK_S * NS_PER_S:
             self._tries += 1
             if self._tries > _TRIES:
-                self._give_up("unreachable", f"no way to the goal in {_TRIES} attempts")
+                self._give_up("unreachable", f"no path to the goal after {_TRIES} attempts")
             else:
                 self._plan()
 
@@ -206,7 +206,7 @@ class GlobalPlanner(Node):
         self._best_m = float(np.hypot(*(goal[:2] - place[:2])))
         self._send(way)
         length = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
-        self._tell("planned", "" if space is not None else "nothing is known: straight", length)
+        self._tell("planned", "" if space is not None else "no map there: straight path", length)
 
     def _space(self, place: Array) -> VoxelSpace | None:
         """Returns the space of the map around vehicle and goal; None where the map holds nothing.

@@ -166,7 +166,8 @@ class LocalPlanner(Node):
         found = np.array(places, dtype=np.float64).reshape(-1, 3)
         if message.header.frame_id not in ("", MAP) or not np.isfinite(found).all():
             self._tell(
-                "refused", ["a path that is not in 'map', or with places that are not finite"]
+                "refused",
+                ["a path whose frame is not 'map', or with positions that are not finite"],
             )
             return
         self._way_map = found if len(found) else None

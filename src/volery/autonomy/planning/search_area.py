@@ -30,7 +30,9 @@ class SearchArea:
         self.low = np.floor(corners.min(axis=0) / cell_m) * cell_m
         shape = np.ceil((corners.max(axis=0) - self.low) / cell_m).astype(np.int64)
         if int(shape.prod()) > _MOST_CELLS:
-            raise PlanError(f"an area of {int(shape.prod())} cells; {_MOST_CELLS} are allowed")
+            raise PlanError(
+                f"an area of {int(shape.prod())} cells; at most {_MOST_CELLS} are allowed"
+            )
         self.inside = _inside(corners, self.middles(tuple(shape.tolist())))
         if not self.inside.any():
             raise PlanError("the area holds no cell")

@@ -131,7 +131,7 @@ class Surroundings:
                 what = "repeats itself" if name in self._stuck else "is silent"
                 found.append(f"the {name} LIDAR {what}")
         if not any(self._is_fresh(self._seen_ns.get(name), now_ns) for name in self._makers):
-            found.append("no LIDAR sees anything")
+            found.append("no LIDAR has returns")
         return found
 
     def warnings(self) -> list[str]:

@@ -98,7 +98,7 @@ class TrajectoryFollower(Node):
             return
         samples = samples_of(message)
         if samples is None:
-            self._tell("refused", "a plan without points, or with numbers that are not finite")
+            self._tell("refused", "a plan without points, or with values that are not finite")
             return
         self._next = samples
 

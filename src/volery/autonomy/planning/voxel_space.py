@@ -74,7 +74,7 @@ class VoxelSpace:
             )
         near = ((solid.middle[:, :2] >= self._low) & (solid.middle[:, :2] <= high)).all(axis=1)
         if not near.any():
-            raise PlanError("nothing is known of the map between start and goal")
+            raise PlanError("the map is empty between start and goal")
         middle, side = solid.middle[near], solid.side[near]
         lowest = middle - np.stack([0.0 * side, 0.0 * side, 0.5 * (side - side.min())], -1)
         self.ground = _ground(lowest, self._low, shape)
@@ -146,7 +146,7 @@ def _ground(middle: Array, low: Array, shape: NDArray[np.int64]) -> Array:
     inside = ((cells >= 0) & (cells < shape)).all(axis=1)
     np.minimum.at(ground, tuple(cells[inside].T), middle[inside, 2])
     if not np.isfinite(ground).any():
-        raise PlanError("the map shows no ground")
+        raise PlanError("the map holds no ground")
     while not np.isfinite(ground).all():
         around = _neighbours(ground)
         found = np.isfinite(around)

@@ -67,7 +67,8 @@ def places_around(place: Array, count: int, apart_m: float, area: Area) -> Array
         if len(found) >= count:
             return np.array(found[:count])
     raise GraphError(
-        f"search: area {list(area)} m has no room for {counted(count, 'place')} {apart_m} m apart"
+        f"search: area {list(area)} m has no room for {counted(count, 'position')} "
+        f"{apart_m} m apart"
     )
 
 

@@ -58,7 +58,9 @@ class SearchSettings:
         def number(name: str, default: float, least: float = -math.inf) -> float:
             value = float(node.declare_parameter(name, default).value)
             if not (math.isfinite(value) and value >= least):
-                raise GraphError(f"search: {name} must be a number from {least:g}, not {value}")
+                raise GraphError(
+                    f"search: {name} must be a number of at least {least:g}, not {value}"
+                )
             return value
 
         def numbers(name: str, default: Sequence[float]) -> tuple[float, ...]:
@@ -70,7 +72,7 @@ class SearchSettings:
         name = node.get_namespace().strip("/")
         team = tuple(node.declare_parameter("team", [name]).value)
         if name not in team or len(set(team)) != len(team):
-            raise GraphError(f"search: team must name '{name}' itself, each UAV once, not {team}")
+            raise GraphError(f"search: team must contain '{name}', and each UAV once, not {team}")
         first_hue, last_hue = numbers("hue_deg", ColourRange()[:2])
         least = number("saturation", 0.5, 0.0), number("value", 0.2, 0.0)
         return cls(

@@ -97,6 +97,6 @@ def load_gtsam() -> Any:
         import gtsam
     except ImportError as error:
         raise NodeError(
-            'loop closures need gtsam: pip install "volery[autonomy]", or loop_closures = false'
+            'loop closures need gtsam: pip install "volery[autonomy]", or set loop_closures = false'
         ) from error
     return gtsam

@@ -40,7 +40,7 @@ class TeamSettings:
         def number(name: str, default: float, least: float, most: float = math.inf) -> float:
             value = float(node.declare_parameter(name, default).value)
             if not (math.isfinite(value) and least <= value <= most):
-                within = f"{least:g} to {most:g}" if math.isfinite(most) else f"from {least:g} on"
+                within = f"{least:g} to {most:g}" if math.isfinite(most) else f"at least {least:g}"
                 raise GraphError(f"task_manager: {name} must be {within}, not {value}")
             return value
 

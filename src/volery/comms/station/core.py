@@ -141,7 +141,7 @@ class StationCore:
 
         """
         if kind not in MESSAGES:
-            raise CommsError(f"{kind.name} is no message: COMMAND and SENSING are")
+            raise CommsError(f"{kind.name} is not a message kind: use COMMAND or SENSING")
         sequence = self._sequence + 1
         data = encode_frame(
             kind,

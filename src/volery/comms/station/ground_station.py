@@ -32,15 +32,15 @@ from volery.graph.messages import Point, message_type
 Send = Callable[[StationFrameKind, int, bytes], int]
 
 HELP = """\
-list                        state of each UAV; of those that tell it, mission and SLAM
-take_off WHO [ALTITUDE]     m above where it stands
-land WHO                    where it is
-hold WHO                    where it is; a mission waits until resume
-resume WHO                  go on with the mission
-return WHO                  home, and land; by its mission where it has one, else straight
-go_to WHO X Y Z [HEADING]   m in the map; degrees from its x axis to the left
-help                        this
-quit                        leave
+list                        state of each UAV, with mission and SLAM if reported
+take_off WHO [ALTITUDE]     take off; altitude in m above its position
+land WHO                    land at its position
+hold WHO                    hold its position; a mission waits until resume
+resume WHO                  continue the mission
+return WHO                  return home and land; through its mission, else straight
+go_to WHO X Y Z [HEADING]   m in the map; degrees counterclockwise from its x axis
+help                        show this help
+quit                        leave the station
 
 WHO: a linear id such as 3, batch.plane such as 0.3, a name such as uav4, batch1, or all."""
 

@@ -62,7 +62,7 @@ def toml_of(kind: str, path: Path, name: str, called: str) -> str:
     shown = "".join(c if c.isascii() and c.isprintable() else "?" for c in called)[:80]
     return _SCENARIO.format(
         name=name,
-        description=json.dumps(f"Two F450s and what is in {shown}."),
+        description=json.dumps(f"Two F450s and the content of {shown}."),
         extent=float(extent),
         world=part.world,
         first=_numbers(part.first_m),
