@@ -65,8 +65,8 @@ class CoverageCells:
         count = int(np.count_nonzero(mask))
         if count > MOST_CELLS:
             raise PlanError(
-                f"the map has {count:,} free cells; at most {MOST_CELLS:,} can be planned: increase "
-                "the cell size"
+                f"the map has {count:,} free cells; at most {MOST_CELLS:,} can be planned: "
+                "increase the cell size"
             )
         flat = np.flatnonzero(mask).astype(np.int32)
         index = np.full(mask.size, -1, np.int32)
