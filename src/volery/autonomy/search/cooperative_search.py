@@ -46,7 +46,7 @@ _SEARCHING = frozenset({SearchPhase.SEARCH, SearchPhase.LOOK})
 
 
 class CooperativeSearch(TeamFlight):
-    """Searches its area by its own camera; calls teammates, and is called, by `search/come`.
+    """Searches its area by its own camera; calls teammates, and is called, by `search/join`.
 
     Parameters
     ----------
