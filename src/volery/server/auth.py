@@ -52,7 +52,7 @@ def check_rights(host: str, tokens: Tokens, *, anywhere: bool) -> None:
     check_address(host, anywhere=anywhere, flag="--allow-remote and --token")
     check_token(host, tokens.operator)
     if tokens.viewer is not None and (not tokens.needed or tokens.viewer == tokens.operator):
-        raise BridgeError("--viewer-token needs a different --token for operators")
+        raise BridgeError("--viewer-token needs a --token for operators, different from it")
 
 
 class Sessions:
