@@ -98,7 +98,7 @@ def plan_coverage(
 def _checked_starts(ways: CoverageCells, starts: NDArray[np.int64]) -> Ints:
     """Returns the numbers of the start cells."""
     if starts.ndim != 2 or starts.shape[1] != 2 or not len(starts):
-        raise PlanError("starts must be an array (R, 2) of rows and columns, R > 0")
+        raise PlanError("starts must be an array (R, 2) of rows and columns for at least one UAV")
     if not len(ways):
         raise PlanError("the map has no free cell")
     numbers = np.empty(len(starts), np.int32)
