@@ -185,7 +185,7 @@ def test_coverage_has_heights_at_which_something_flies(flat_data, key, value, wo
 def test_a_route_is_of_points(flat_data, route):
     entry = {"node": "gap_following", "parameters": {"route": route}}
     flat_data["types"]["f450"]["nodes"] = [entry]
-    with pytest.raises(ScenarioError, match=r"route is a list of \[x, y\]"):
+    with pytest.raises(ScenarioError, match=r"route must be a list of \[x, y\]"):
         Simulation(parse_scenario(flat_data), threads=1)
 
 

@@ -1,1 +1,1 @@
-"""Autonomy: nodes on the graph. None of them knows whether it flies in a simulation."""
+"""Autonomy: nodes on the graph. They run unchanged in simulation and on real vehicles."""

@@ -1,1 +1,1 @@
-"""Radio communication between UAVs and ground: stations, and the server that joins them."""
+"""Radio communication between UAVs and ground: stations, and the server that connects them."""

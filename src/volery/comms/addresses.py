@@ -1,4 +1,4 @@
-"""Who is spoken to: stations by batch and plane, batches, everybody.
+"""Addresses: stations by batch and plane, batches, all stations.
 
 An address is a u16:
 
@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from volery.core.errors import CommsError
 
 PLANES_PER_BATCH = 4
-"""As of the ROSUnitySim article: linear id = 4 x batch + plane."""
+"""As in the ROSUnitySim article: linear id = 4 x batch + plane."""
 FIRST_GROUND = 0x7F00
 FIRST_BATCH = 0x8000
 LAST_BATCH = 0xBFFF
@@ -27,7 +27,7 @@ ALL_GROUND = 0xC000
 SERVER = 0xFFFE
 ALL = 0xFFFF
 GROUND_BATCH = 0xFFFF
-"""What ground stations tell as their batch."""
+"""The batch of ground stations in HELLO."""
 
 
 @dataclass(frozen=True)
@@ -39,20 +39,20 @@ class Identity:
 
     @classmethod
     def ground(cls, number: int = 0) -> Identity:
-        """A ground station."""
+        """Returns the identity of a ground station."""
         return cls(GROUND_BATCH, number)
 
     @classmethod
     def of(cls, address: int, planes_per_batch: int = PLANES_PER_BATCH) -> Identity:
-        """Of a station's address. `CommsError` where it is none."""
+        """Returns the identity of an address. Raises CommsError if it is not a station's."""
         if not is_station(address):
-            raise CommsError(f"{address} is no station: 0 to {FIRST_BATCH - 1} are")
+            raise CommsError(f"{address} is not a station: stations are 0 to {FIRST_BATCH - 1}")
         if address >= FIRST_GROUND:
             return cls.ground(address - FIRST_GROUND)
         return cls(*divmod(address, planes_per_batch))
 
     def address(self, planes_per_batch: int = PLANES_PER_BATCH) -> int:
-        """The linear id. `CommsError` where batch and plane do not fit."""
+        """Returns the linear id. Raises CommsError if batch or plane are out of range."""
         if self.batch == GROUND_BATCH:
             if 0 <= self.plane < FIRST_BATCH - FIRST_GROUND:
                 return FIRST_GROUND + self.plane
@@ -71,19 +71,19 @@ class Identity:
 
 
 def is_station(address: int) -> bool:
-    """Whether an address is that of one station."""
+    """Returns whether an address is that of one station."""
     return 0 <= address < FIRST_BATCH
 
 
 def batch_address(batch: int) -> int:
-    """Address of all stations of a batch. `CommsError` where there is no such batch."""
+    """Returns the address of all stations of a batch. Raises CommsError if it is out of range."""
     if not 0 <= batch <= LAST_BATCH - FIRST_BATCH:
         raise CommsError(f"batches are numbered 0 to {LAST_BATCH - FIRST_BATCH}, not {batch}")
     return FIRST_BATCH + batch
 
 
 def is_meant(station: int, address: int, planes_per_batch: int = PLANES_PER_BATCH) -> bool:
-    """Whether what is sent to `address` is meant for a station."""
+    """Returns whether `address` includes a station."""
     if FIRST_BATCH <= address <= LAST_BATCH:
         return station < FIRST_GROUND and station // planes_per_batch == address - FIRST_BATCH
     if address == ALL_GROUND:

@@ -1,4 +1,4 @@
-"""The bridge of this package; `pyproject.toml` gives it its name."""
+"""The bridge kind of this package; `pyproject.toml` names it."""
 
 from __future__ import annotations
 

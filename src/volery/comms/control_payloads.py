@@ -1,4 +1,4 @@
-"""Payloads of the frames that stations and server exchange about the messages.
+"""Payloads of the control frames between stations and server.
 
 Numbers are little-endian and packed; `text` is a u8 length and so many bytes of UTF-8.
 
@@ -9,13 +9,13 @@ WELCOME (2): u32 boot, drawn by the server when it started · u32 last, the high
 has of this session · then u32 each: those up to `last` that are not settled yet.
 
 REFUSAL (3): u8 reason, see `Reason` · u32 sequence of the refused message, 0: the connection itself
-· the rest is UTF-8 for people.
+· the rest is a UTF-8 text for users.
 
-RECEIVED (4), station to server: 10 bytes each: u16 source · u32 session · u32 sequence: all that
-this source sent here up to this sequence has come.
+RECEIVED (4), station to server: 10 bytes each: u16 source · u32 session · u32 sequence: all
+messages of this source up to this sequence have arrived.
 
-SETTLED (5), server to station: u32 each: sequences of messages with which the server is done: every
-station that they were meant for has told that they came, or a rule has disposed of them.
+SETTLED (5), server to station: u32 each: sequences of settled messages: every addressed station has
+acknowledged them, or a rule has dropped them.
 
 PING (6) and PONG (7): empty.
 """
@@ -35,33 +35,33 @@ _REFUSAL = struct.Struct("<BI")
 _RECEIVED = struct.Struct("<HII")
 _LONGEST_TEXT_BYTES = 255
 MOST_SEQUENCES = 4000
-"""In one frame, so that it stays below the limit of payloads."""
+"""Max number in one frame, below the limit of payloads."""
 
 
 class Reason(IntEnum):
-    """Why the server refuses."""
+    """Reason of a refusal."""
 
     IDENTITY = 1
-    """Batch, plane and address do not fit each other."""
+    """Batch, plane and address do not match."""
     BATCH_SIZE = 2
-    """The station counts other planes a batch than the server."""
+    """The station's number of planes per batch differs from the server's."""
     TOKEN = 3
     REPLACED = 4
-    """Somebody else came with the same identity; the newest wins."""
+    """Another station connected with the same identity; the newest one replaces the others."""
     PROTOCOL = 5
-    """Something other than HELLO first, a forged source, too many corrupt frames."""
+    """The first frame was not HELLO, a source was forged, or too many frames were corrupt."""
     UNKNOWN = 6
-    """No such station has ever been here."""
+    """No such station has connected."""
     FULL = 7
-    """Too many commands wait for that station already."""
+    """Too many commands wait for that station."""
     RATE = 8
-    """More messages than the rate that is allowed."""
+    """The message exceeds the allowed rate."""
     EXPIRED = 9
-    """The station did not come back in time."""
+    """The station did not reconnect in time."""
 
 
 class Hello(NamedTuple):
-    """A station's first words."""
+    """First frame of a station."""
 
     batch: int
     plane: int
@@ -71,7 +71,7 @@ class Hello(NamedTuple):
 
 
 class Welcome(NamedTuple):
-    """The server's answer."""
+    """Response of the server to HELLO."""
 
     boot: int
     last: int
@@ -79,7 +79,7 @@ class Welcome(NamedTuple):
 
 
 class Refusal(NamedTuple):
-    """What the server does not do; sequence 0: it speaks of the connection."""
+    """A refused message; sequence 0: the connection is refused."""
 
     reason: Reason
     sequence: int
@@ -87,7 +87,7 @@ class Refusal(NamedTuple):
 
 
 class Received(NamedTuple):
-    """Up to where one source's messages have come."""
+    """Last received message of one source."""
 
     source: int
     session: int
@@ -95,7 +95,7 @@ class Received(NamedTuple):
 
 
 def encode_hello(hello: Hello) -> bytes:
-    """Payload of a HELLO. `CommsError` for texts above 255 bytes."""
+    """Returns the payload of a HELLO. Raises CommsError for texts above 255 bytes."""
     texts = b""
     for text in (hello.name, hello.token):
         data = text.encode()
@@ -106,7 +106,7 @@ def encode_hello(hello: Hello) -> bytes:
 
 
 def decode_hello(payload: bytes) -> Hello:
-    """A HELLO's payload. `CommsError` where it is none."""
+    """Returns the HELLO of a payload. Raises CommsError if it is invalid."""
     try:
         batch, plane, planes = _HELLO.unpack_from(payload)
         name, rest = _text(payload[_HELLO.size :])
@@ -121,18 +121,18 @@ def decode_hello(payload: bytes) -> Hello:
 def _text(data: bytes) -> tuple[str, bytes]:
     end = 1 + data[0]
     if end > len(data):
-        raise IndexError("it ends within a text")
+        raise IndexError("the payload ends within a text")
     return data[1:end].decode(), data[end:]
 
 
 def encode_welcome(welcome: Welcome) -> bytes:
-    """Payload of a WELCOME."""
+    """Returns the payload of a WELCOME."""
     head = _WELCOME.pack(welcome.boot, welcome.last)
     return head + encode_settled(welcome.unsettled)
 
 
 def decode_welcome(payload: bytes) -> Welcome:
-    """A WELCOME's payload. `CommsError` where it is none."""
+    """Returns the WELCOME of a payload. Raises CommsError if it is invalid."""
     if len(payload) < _WELCOME.size:
         raise CommsError(f"not a WELCOME: {len(payload)} bytes")
     boot, last = _WELCOME.unpack_from(payload)
@@ -140,12 +140,12 @@ def decode_welcome(payload: bytes) -> Welcome:
 
 
 def encode_refusal(refusal: Refusal) -> bytes:
-    """Payload of a REFUSAL."""
+    """Returns the payload of a REFUSAL."""
     return _REFUSAL.pack(refusal.reason, refusal.sequence) + refusal.text.encode()
 
 
 def decode_refusal(payload: bytes) -> Refusal:
-    """A REFUSAL's payload. `CommsError` where it is none."""
+    """Returns the REFUSAL of a payload. Raises CommsError if it is invalid."""
     try:
         reason, sequence = _REFUSAL.unpack_from(payload)
         text = payload[_REFUSAL.size :].decode(errors="replace")
@@ -155,25 +155,25 @@ def decode_refusal(payload: bytes) -> Refusal:
 
 
 def encode_received(entries: Iterable[Received]) -> bytes:
-    """Payload of a RECEIVED."""
+    """Returns the payload of a RECEIVED."""
     return b"".join(_RECEIVED.pack(*entry) for entry in entries)
 
 
 def decode_received(payload: bytes) -> Iterator[Received]:
-    """Entries of a RECEIVED. `CommsError` where the length does not fit."""
+    """Returns the entries of a RECEIVED. Raises CommsError if the length is invalid."""
     if len(payload) % _RECEIVED.size:
         raise CommsError(f"not a RECEIVED: {len(payload)} bytes")
     return map(Received._make, _RECEIVED.iter_unpack(payload))
 
 
 def encode_settled(sequences: Iterable[int]) -> bytes:
-    """Payload of a SETTLED."""
+    """Returns the payload of a SETTLED."""
     numbers = tuple(sequences)
     return struct.pack(f"<{len(numbers)}I", *numbers)
 
 
 def decode_settled(payload: bytes) -> tuple[int, ...]:
-    """Sequences of a SETTLED. `CommsError` where the length does not fit."""
+    """Returns the sequences of a SETTLED. Raises CommsError if the length is invalid."""
     if len(payload) % 4:
         raise CommsError(f"not a SETTLED: {len(payload)} bytes")
     return struct.unpack(f"<{len(payload) // 4}I", payload)

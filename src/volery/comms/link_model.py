@@ -1,8 +1,8 @@
-"""Whether and when a message gets through between two stations: the place of a radio model.
+"""The interface of radio models: loss and delay of a message between two stations.
 
-The router asks once for each message and each station that it is meant for. A radio model answers
-from the stations' places, what stands between them and its own random stream; without one the link
-is ideal.
+The router calls it once for each message and each addressed station. A radio model computes the
+result from the stations' positions, the obstacles between them and its own random stream; without a
+model the link is ideal.
 """
 
 from __future__ import annotations
@@ -14,22 +14,22 @@ from volery.comms.protocol import StationFrame
 
 
 class Delivery(NamedTuple):
-    """Fate of one message on its way to one station."""
+    """Loss and delay of one message to one station."""
 
     lost: bool = False
     delay_ns: int = 0
-    """From the server's taking it to its being handed over; those behind it never overtake."""
+    """Time between its arrival at the server and its delivery; later messages never overtake it."""
 
 
 Link = Callable[[int, int, int, StationFrame], Delivery]
-"""Decides over one message: from time in ns by the router's clock, source, destination and frame.
+"""Returns the `Delivery` of a message: time, ns by the router's clock, source, destination, frame.
 
-The destination is the station, also where the frame is addressed to many.
+The destination is the station, also if the frame is addressed to many.
 """
 
 AT_ONCE = Delivery()
 
 
 def ideal_link(_time_ns: int, _source: int, _destination: int, _frame: StationFrame) -> Delivery:
-    """Everything comes at once."""
+    """Delivers every message at once."""
     return AT_ONCE

@@ -1,11 +1,11 @@
-"""Router and stations in one process, under whatever clock the caller has: a run's, or a test's.
+"""Router and stations in one process, with the caller's clock: a run's, or a test's.
 
-    exchange = Exchange(RouterSettings(), link=radio)
-    one, other = exchange.join(Identity(0, 0)), exchange.join(Identity(0, 1))
-    one.send(Kind.SENSING, other.address, b"...", now_ns)
-    for address, frame in exchange.advance(now_ns): ...
+    network = LocalNetwork(RouterSettings(), link=radio)
+    one, other = network.join(Identity(0, 0)), network.join(Identity(0, 1))
+    one.send(StationFrameKind.SENSING, other.address, b"...", now_ns)
+    for address, frame in network.advance(now_ns): ...
 
-Nothing here draws numbers or reads a clock: the same calls give the same messages.
+The module draws no random numbers and reads no clock: the same calls give the same messages.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ _BOOT = 1
 
 
 class LocalNetwork:
-    """Stations joined by a router, without bytes ever leaving the process.
+    """Connects stations to a router within the process.
 
-    settings, link: as of `Router`. now_ns: the clock at the start.
+    settings, link: as in `Router`. now_ns: the clock at the start.
     """
 
     def __init__(
@@ -38,17 +38,19 @@ class LocalNetwork:
         self._link = link
         self._router = Router(self._settings, now_ns, _BOOT, self._decide)
         self._stations: dict[int, StationCore] = {}
-        """By connection."""
+        """Stations by connection."""
         self._joined = 0
-        """Stations so far: each is a session of its own, also where it follows another one."""
+        """Number of stations so far; each gets a session of its own, also if it replaces another
+        one.
+        """
 
     @property
     def statistics(self) -> Statistics:
-        """What the router has counted."""
+        """Statistics of the router."""
         return self._router.statistics
 
     def join(self, identity: Identity, now_ns: int = 0) -> StationCore:
-        """A new station. `CommsError` where there is no room for it."""
+        """Returns a new station. Raises CommsError if there are too many."""
         core = StationCore(
             identity,
             self._joined + 1,
@@ -57,7 +59,7 @@ class LocalNetwork:
         )
         connection = self._router.connect(now_ns)
         if connection is None:
-            raise CommsError(f"{self._settings.most_connections} stations are the most")
+            raise CommsError(f"no more than {self._settings.most_connections} stations can join")
         self._joined += 1
         self._stations[connection] = core
         core.connected(now_ns)
@@ -65,30 +67,30 @@ class LocalNetwork:
         return core
 
     def leave(self, address: int, now_ns: int) -> None:
-        """End a station for good. `CommsError` where there is none with this address."""
+        """Removes a station. Raises CommsError if the address is unknown."""
         connection = self._connection_of(address)
         del self._stations[connection]
         self._router.forget(connection, now_ns)
 
     def station(self, address: int) -> StationCore:
-        """The station with an address. `CommsError` where there is none."""
+        """Returns the station with an address. Raises CommsError if it is unknown."""
         return self._stations[self._connection_of(address)]
 
     @property
     def next_due_ns(self) -> int | None:
-        """When something that is under way is due; None: nothing is."""
+        """Time at which the next delayed message is due, ns; None: there is none."""
         return self._router.next_due_ns
 
     def get_state(self) -> Any:
-        """Everything that changes, but for what the link keeps itself."""
+        """Returns the state of router and stations; the link saves its own."""
         return self._copied((self._router, self._stations, self._joined))
 
     def set_state(self, state: Any) -> None:
-        """Go back to a kept state; stations are others than before: ask `station` for them."""
+        """Restores a saved state; it creates new stations: get them by `station`."""
         self._router, self._stations, self._joined = self._copied(state)
 
     def _copied(self, parts: Any) -> Any:
-        return copy.deepcopy(parts, {id(self): self})  # whom the router asks for the link
+        return copy.deepcopy(parts, {id(self): self})  # the router calls it for the link
 
     def _decide(self, time_ns: int, source: int, destination: int, frame: StationFrame) -> Delivery:
         return self._link(time_ns, source, destination, frame)
@@ -100,14 +102,14 @@ class LocalNetwork:
         raise CommsError(f"there is no station {address}")
 
     def advance(self, now_ns: int) -> list[tuple[int, StationFrame]]:
-        """Pass on what is due: stations that get something, and what, in a fixed order."""
+        """Delivers what is due; returns receivers and frames in a fixed order."""
         for core in self._stations.values():
             core.tick(now_ns)
         self._router.tick(now_ns)
         return self._pass(now_ns)
 
     def _pass(self, now_ns: int) -> list[tuple[int, StationFrame]]:
-        """Carry bytes to and fro until nobody has anything to say."""
+        """Transfers bytes in both directions until none are left."""
         came: list[tuple[int, StationFrame]] = []
         moved = True
         while moved:

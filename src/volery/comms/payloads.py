@@ -1,17 +1,17 @@
-"""What stands in messages between stations: a named message of the graph.
+"""Payloads of messages between stations: a named message of the graph.
 
 Payload of COMMAND and SENSING: text name · text type · CDR with its four bytes of header; `text` is
-a u8 length and so many bytes of UTF-8. The name is what would follow the UAV's in the graph:
+a u8 length and so many bytes of UTF-8. The name is the topic or service name below the UAV's:
 
 | kind | name | type | meaning |
 |---|---|---|---|
-| SENSING | `state` | `volery_interfaces/msg/VehicleState` | how a UAV fares |
-| SENSING | `mission` | `volery_interfaces/msg/MissionStatus` | how its mission fares |
-| SENSING | `slam` | `std_msgs/msg/String` | what its SLAM says of itself, JSON |
-| SENSING | `reply` | `std_msgs/msg/String` | what became of a command, for people |
+| SENSING | `state` | `volery_interfaces/msg/VehicleState` | state of a UAV |
+| SENSING | `mission` | `volery_interfaces/msg/MissionStatus` | status of its mission |
+| SENSING | `slam` | `std_msgs/msg/String` | status of its SLAM, JSON |
+| SENSING | `reply` | `std_msgs/msg/String` | result of a command, as text |
 | COMMAND | one of `COMMANDS` | the service's request | call that service of the UAV |
 
-Programs may send any other message of the graph under a name of their own.
+Programs may send any other message of the graph under another name.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ COMMANDS = {
 }
 """Services of a UAV that stations may call, and their types."""
 MISSION_COMMANDS = frozenset({"land", "hold", "return_home", "resume"})
-"""Those that its mission takes, where it has one; `resume` is of missions alone."""
+"""Services of its mission, if it has one; `resume` exists for missions only."""
 
 _LONGEST_TEXT_BYTES = 255
 
@@ -51,7 +51,7 @@ class Named(NamedTuple):
 
 
 def encode_named(name: str, msgtype: str, message: Any) -> bytes:
-    """Payload of a message.
+    """Returns the payload of a message.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def encode_named(name: str, msgtype: str, message: Any) -> bytes:
 
 
 def decode_named(payload: bytes) -> Named:
-    """Message of a payload. `CommsError` where it is none."""
+    """Returns the message of a payload. Raises CommsError if it is invalid."""
     try:
         texts, rest = [], payload
         for _ in range(2):

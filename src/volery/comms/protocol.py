@@ -1,4 +1,4 @@
-"""The frames of the radio network: bytes to frames and back, without any socket.
+"""Encodes and parses the frames of the radio network, without sockets.
 
 All numbers are little-endian and packed without padding:
 
@@ -12,12 +12,12 @@ All numbers are little-endian and packed without padding:
 | 10 | 2 | u16 | n, bytes of payload, at most 16,384 |
 | 12 | 4 | u32 | session: drawn by the source when it starts |
 | 16 | 4 | u32 | sequence: 1, 2, ... over all messages of the source in this session; else 0 |
-| 20 | 8 | i64 | time at the source when it sent this, ns |
+| 20 | 8 | i64 | send time by the source's clock, ns |
 | 28 | 2 | u16 | CRC of bytes 4 to 27 |
-| 30 | n | | payload, see `bodies` |
+| 30 | n | | payload, see `control_payloads` and `payloads` |
 | 30 + n | 2 | u16 | CRC of all bytes from 4 to 29 + n |
 
-CRC and search for frames are those of `core.framing`; addresses stand in `addresses`.
+CRC and synchronization are those of `core.framing`; for addresses see `addresses`.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ SYNC = b"\xaaVCM"
 VERSION = 1
 HEAD_BYTES = 30
 PAYLOAD_LIMIT_BYTES = 16 << 10
-"""Modelling choice: a packet radio's message, not a map; larger things go in pieces."""
+"""Modelling choice: the message of a packet radio, not a map; larger data is split."""
 LONGEST_BYTES = HEAD_BYTES + PAYLOAD_LIMIT_BYTES + CRC_BYTES
-"""Of a whole frame."""
+"""Max size of a whole frame, bytes."""
 
 _HEAD = struct.Struct("<BBHHHIIq")
 
@@ -58,7 +58,7 @@ MESSAGES = frozenset({StationFrameKind.COMMAND, StationFrameKind.SENSING})
 
 
 class StationFrame(NamedTuple):
-    """One frame, its checks passed; `kind` may be one that is not known here."""
+    """A valid frame; `kind` may be unknown."""
 
     kind: int
     source: int
@@ -68,7 +68,7 @@ class StationFrame(NamedTuple):
     time_ns: int
     payload: bytes
     data: bytes = b""
-    """All of its bytes, to be passed on."""
+    """All bytes of the frame, to be forwarded."""
 
 
 def encode_frame(
@@ -80,7 +80,7 @@ def encode_frame(
     time_ns: int = 0,
     payload: bytes = b"",
 ) -> bytes:
-    """A whole frame. `CommsError` where the payload is too long or a number does not fit."""
+    """Returns a whole frame. Raises CommsError if the payload or a number is too large."""
     if len(payload) > PAYLOAD_LIMIT_BYTES:
         raise CommsError(
             f"a payload of {len(payload)} bytes is too long: {PAYLOAD_LIMIT_BYTES} is the limit"
@@ -96,20 +96,20 @@ def encode_frame(
 
 
 class StationFrameParser(FrameScanner[StationFrame]):
-    """Finds the radio network's frames in a stream of bytes."""
+    """Finds frames of the radio network in a stream of bytes."""
 
     def __init__(self) -> None:
         super().__init__(SYNC, HEAD_BYTES)
 
     def payload_bytes(self, head: bytes | bytearray) -> int | Flaw:
-        """Length that a head tells, within the limit."""
+        """Returns the payload length of a head, within the limit, or the flaw."""
         version, _, _, _, length, _, _, _ = _HEAD.unpack(head)
         if version != VERSION:
             return Flaw.VERSION
         return Flaw.LENGTH if length > PAYLOAD_LIMIT_BYTES else int(length)
 
     def frame_of(self, view: memoryview) -> StationFrame:
-        """The frame of whole bytes."""
+        """Returns the frame of its bytes."""
         data = bytes(view)
         _, kind, source, destination, _, session, sequence, time_ns = _HEAD.unpack_from(
             data, len(SYNC)

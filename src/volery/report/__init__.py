@@ -1,5 +1,5 @@
-"""The illustrated report of a flight: collect while it runs, then one HTML page.
+"""The illustrated report of a flight: data collected during the run, then one HTML page.
 
-`FlightCollector` listens to the graph of a running simulation and gives plain `FlightData`;
-`figures` draws them, `page` sets them in one self-contained file.
+`FlightCollector` subscribes to the graph of a running simulation and returns plain `FlightData`;
+`charts` and `maps` draw them, `page` combines them in one self-contained file.
 """

@@ -1,7 +1,7 @@
-"""How far an estimated way is from the true one: alignment in time and space, and what is left.
+"""Error of an estimated trajectory: alignment in time and space, and the residual.
 
 The rigid alignment is that of S. Umeyama, Least-squares estimation of transformation parameters
-between two point patterns, IEEE PAMI 13(4), 1991, without scale; the RMSE of what is left is the
+between two point patterns, IEEE PAMI 13(4), 1991, without scale; the RMSE of the residual is the
 absolute trajectory error (J. Sturm et al., A benchmark for the evaluation of RGB-D SLAM systems,
 IROS 2012).
 """
@@ -21,7 +21,7 @@ _LEAST_SPREAD = 1e-12
 
 
 class Alignment(NamedTuple):
-    """y = rotation x + translation."""
+    """Rigid transform y = rotation x + translation."""
 
     rotation: Array
     """(3, 3)"""
@@ -29,13 +29,13 @@ class Alignment(NamedTuple):
     """(3,)"""
 
     def apply(self, places: Array) -> Array:
-        """Places (N, 3) in the other frame."""
+        """Returns positions (N, 3) in the other frame."""
         moved: Array = places @ self.rotation.T + self.translation
         return moved
 
 
 def umeyama(places: Array, onto: Array) -> Alignment:
-    """The rotation and translation that bring (N, 3) as near to (N, 3) as may be."""
+    """Returns the least-squares transform of positions (N, 3) to `onto` (N, 3)."""
     from_mean, to_mean = places.mean(axis=0), onto.mean(axis=0)
     covariance = (onto - to_mean).T @ (places - from_mean) / len(places)
     u, _, vt = np.linalg.svd(covariance)
@@ -47,18 +47,18 @@ def umeyama(places: Array, onto: Array) -> Alignment:
 
 
 def ate_rmse_m(estimate: Array, truth: Array) -> float:
-    """Root mean square distance, m, of places (N, 3) from the true ones after alignment."""
+    """Returns the RMSE, m, of positions (N, 3) from the true ones after alignment."""
     left = umeyama(estimate, truth).apply(estimate) - truth
     return float(np.sqrt((left * left).sum(axis=1).mean()))
 
 
 def at_times(time_s: Array, places: Array, wanted_s: Array) -> Array:
-    """Places (M, 3) at `wanted_s` (M,) of a way with places (N, 3) at `time_s` (N,), rising."""
+    """Interpolates positions (N, 3) at increasing `time_s` (N,) to `wanted_s` (M,); (M, 3)."""
     return np.stack([np.interp(wanted_s, time_s, column) for column in places.T], axis=1)
 
 
 def common_times(one_s: Array, other_s: Array) -> NDArray[np.bool_]:
-    """(N,) which of the times `one_s` lie within those of `other_s`."""
+    """Returns which of the times `one_s` (N,) lie within those of `other_s`."""
     if not len(other_s):
         return np.zeros(len(one_s), np.bool_)
     within: NDArray[np.bool_] = (one_s >= other_s[0]) & (one_s <= other_s[-1])
@@ -66,20 +66,19 @@ def common_times(one_s: Array, other_s: Array) -> NDArray[np.bool_]:
 
 
 class TimeShift(NamedTuple):
-    """How the times of two ways lie to each other."""
+    """Time alignment of two trajectories."""
 
     seconds: float
-    """To be added to the times of the other way."""
+    """To be added to the times of the other trajectory, s."""
     alike: float
-    """Correlation of the speeds then: 1 where they are the same, 0 where neither tells of the
-    other."""
+    """Correlation of the speeds after the shift: 1 for equal ones, 0 for unrelated ones."""
 
 
 def time_shift(one_s: Array, one: Array, other_s: Array, other: Array) -> TimeShift:
-    """What to add to the times of the other way so that both are flown at the same time.
+    """Returns the shift of the other trajectory's times that aligns both.
 
-    The shift at which their speeds, over a second, are most alike (by their correlation, where at
-    least three tenths of the shorter way are in common); frames need not agree.
+    It maximizes the correlation of their speeds over a second, with an overlap of at least three
+    tenths of the shorter trajectory; their frames may differ.
     """
     mine, theirs = _speeds(one_s, one), _speeds(other_s, other)
     least = max(round(_LEAST_COMMON * min(len(mine), len(theirs))), 3)
@@ -96,7 +95,7 @@ def time_shift(one_s: Array, one: Array, other_s: Array, other: Array) -> TimeSh
 
 
 def _speeds(time_s: Array, places: Array) -> Array:
-    """Ten a second, each over the second that follows, of a way smoothed over half a second."""
+    """Returns ten speeds a second, each over the next second, smoothed over half a second."""
     times = np.arange(time_s[0], time_s[-1], 1.0 / _RATE_HZ)
     rough = at_times(time_s, places, times)
     window = np.full(_SMOOTHED, 1.0 / _SMOOTHED)

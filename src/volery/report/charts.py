@@ -1,6 +1,6 @@
-"""Line and bar charts as SVG, in the reader's own light or dark colours.
+"""Line and bar charts as SVG, in the reader's light or dark colours.
 
-matplotlib's object interface only: no global state, nothing to close.
+It uses matplotlib's object interface only: no global state, nothing to close.
 """
 
 from __future__ import annotations
@@ -24,22 +24,22 @@ Array = NDArray[np.float64]
 
 _LEGEND_LIMIT = len(UAV_COLORS)
 _POINTS = 1200
-"""Points a line is thinned to; a chart is about half as many pixels wide."""
+"""Max points of a line; a chart is about half as many pixels wide."""
 _WIDTH, _HEIGHT = 5.6, 2.9
 
 
 def height_chart(flight: FlightData) -> str:
-    """Height above the ground below, over time."""
+    """Draws the height above ground over time."""
     return _over_time(flight, lambda uav: uav.height_m, "height above ground, m", floor=0.0)
 
 
 def speed_chart(flight: FlightData) -> str:
-    """Speed over time."""
+    """Draws the speed over time."""
     return _over_time(flight, lambda uav: uav.speed_m_s, "speed, m/s", floor=0.0)
 
 
 def clearance_chart(flight: FlightData) -> str:
-    """Distance to the nearest tree or solid over time, up to the reach that was searched."""
+    """Draws the distance to the nearest tree or solid over time, up to the searched range."""
     reach = flight.clearance_reach_m
     return _over_time(
         flight,
@@ -52,7 +52,7 @@ def clearance_chart(flight: FlightData) -> str:
 
 
 def load_chart(flight: FlightData) -> str:
-    """Share of the computing time a stage, and its fraction of real time."""
+    """Draws each stage's fraction of the computing time, and of real time."""
     stages = sorted(flight.stage_seconds.items(), key=lambda pair: pair[1])
     names = [name.replace("_", " ") for name, _ in stages]
     seconds = np.array([value for _, value in stages])
@@ -71,7 +71,7 @@ def load_chart(flight: FlightData) -> str:
             fontsize=9,
         )
     axes.set_xlim(0.0, float(seconds.max(initial=1e-9)) / total * 100.0 * 1.5)
-    axes.set_xlabel("share of the wall time, %")
+    axes.set_xlabel("fraction of the wall time, %")
     axes.grid(visible=False, axis="y")
     axes.tick_params(axis="y", length=0, labelcolor=INK)
     return as_svg(figure)
@@ -122,7 +122,7 @@ def _over_time(
 
 
 def _thinned(values: Array, *, lowest: bool) -> NDArray[np.int64]:
-    """Indices to draw: evenly spread, or the lowest value of every stretch."""
+    """Returns indices to draw: evenly spread, or the lowest value of every stretch."""
     if len(values) <= _POINTS:
         return np.arange(len(values))
     edges = np.linspace(0, len(values), _POINTS + 1).astype(np.int64)
@@ -132,7 +132,7 @@ def _thinned(values: Array, *, lowest: bool) -> NDArray[np.int64]:
 
 
 def new_axes(width: float = _WIDTH, height: float = _HEIGHT) -> tuple[Figure, Axes]:
-    """A figure, in inches, with axes in the style of the report."""
+    """Returns a figure, in inches, with axes in the style of the report."""
     figure = Figure(figsize=(width, height), layout="constrained")
     figure.patch.set_alpha(0.0)
     axes = figure.add_subplot()
@@ -150,7 +150,7 @@ def new_axes(width: float = _WIDTH, height: float = _HEIGHT) -> tuple[Figure, Ax
 
 
 def as_svg(figure: Figure) -> str:
-    """The drawing as an inline <svg> that scales with the page and uses its font and colours."""
+    """Returns the drawing as an inline <svg> that scales with the page and uses its style."""
     file = io.StringIO()
     with rc_context({"svg.fonttype": "none", "svg.hashsalt": "volery"}):
         figure.savefig(file, format="svg", metadata={"Date": None})
@@ -160,7 +160,7 @@ def as_svg(figure: Figure) -> str:
         text = text.replace(stand_in, name)
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     text = re.sub(r"font: (\d+(?:\.\d+)?)px [^;\"]*", r"font-size: \1px", text)
-    # one page holds several drawings: their inner names must not meet
+    # one page holds several drawings: their ids must be unique
     prefix = f"c{zlib.crc32(text.encode()):08x}"
     text = re.sub(r'id="([^"]+)"', rf'id="{prefix}\1"', text)
     text = re.sub(r'(href="#|url\(#)', rf"\g<1>{prefix}", text)

@@ -1,8 +1,8 @@
-"""Listens to a running simulation and keeps, in bounded memory, what its report will show.
+"""Collects the data of a report from a running simulation, in bounded memory.
 
-Tracks come from the ground-truth odometry, at most 20 samples a second each. Of the LIDAR scans a
-few a second are turned into map points, every beam from the pose it had (ground truth and mount),
-and thinned to one point a voxel.
+Tracks come from the ground-truth odometry, at most 20 samples a second each. A few LIDAR scans a
+second become map points, every beam from the pose at its time (ground truth and mount), thinned to
+one point a voxel.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ Array = NDArray[np.float64]
 
 TRACK_PERIOD_NS = NS_PER_S // 20
 SCANS_PER_S = 24.0
-"""Scans of the whole fleet that are mapped in a simulated second."""
+"""Scans of the whole fleet that are mapped per simulated second."""
 CLOUDS_PER_S = 4.0
-"""Clouds of the whole fleet that are mapped in a simulated second; each holds many scans' worth."""
+"""Clouds of the whole fleet that are mapped per simulated second; each is worth many scans."""
 NODDING_WEIGHT = 4.0
-"""A nodding scanner sees the third dimension: it gets more of the scans than a level one."""
+"""Weight of a nodding scanner, which observes the third dimension, against a level one."""
 VOXEL_M = 0.25
 CLEARANCE_REACH_M = 10.0
 _POSES_KEPT = 64
@@ -50,7 +50,7 @@ _CLEARANCE_BATCH = 4096
 
 @dataclass
 class _Uav:
-    """What is gathered of one UAV."""
+    """Data of one UAV."""
 
     poses: deque[tuple[int, Any]] = field(default_factory=lambda: deque(maxlen=_POSES_KEPT))
     times_ns: list[int] = field(default_factory=list)
@@ -61,10 +61,10 @@ class _Uav:
 
 
 class FlightCollector:
-    """Subscribes to a simulation; `finish` gives the flight as data.
+    """Subscribes to a simulation; `finish` returns the flight as data.
 
-    `simulation` is a `volery.Simulation`: its graph, mounts, terrain, forest, scene, events and
-    times are read.
+    `simulation` is a `volery.Simulation`: the collector reads its graph, mounts, terrain, forest,
+    scene, events and times.
     """
 
     def __init__(self, simulation: Any) -> None:
@@ -140,7 +140,7 @@ class FlightCollector:
         machine: Mapping[str, str] | None = None,
         versions: Mapping[str, str] | None = None,
     ) -> FlightData:
-        """Return everything up to now and stop; call it before the simulation is closed."""
+        """Returns everything up to now and stops; call it before the simulation is closed."""
         for subscription in self._subscriptions:
             subscription.cancel()
         simulation = self._simulation
@@ -183,7 +183,7 @@ class FlightCollector:
         )
 
     def _ground(self, points: NDArray[np.floating]) -> Array:
-        """Height of the ground below points (n, 3)."""
+        """Returns the height of the ground below points (n, 3)."""
         x, y = points[:, 0].astype(np.float64), points[:, 1].astype(np.float64)
         return np.asarray(self._simulation.terrain.height(x, y), dtype=np.float64)
 
@@ -213,7 +213,7 @@ def _event(event: Any) -> FlightEvent:
 
 
 def trees_of(forest: Any) -> Trees | None:
-    """What is drawn of a forest; None without trees."""
+    """Returns the drawn properties of a forest; None without trees."""
     if forest is None or not len(forest.position_map):
         return None
     crowns = np.array([_crown_radius(model) for model in forest.models])
@@ -226,7 +226,7 @@ def trees_of(forest: Any) -> Trees | None:
 
 
 def _crown_radius(model: Any) -> float:
-    """Radius that holds nine tenths of the crown's vertices; of the wood where it is bare."""
+    """Returns the radius of nine tenths of the crown's vertices; of the wood if it is bare."""
     level = min(model.levels.values(), key=lambda tree: len(tree.leaves.vertices))
     vertices = level.leaves.vertices if len(level.leaves.vertices) else level.wood.vertices
     if not len(vertices):

@@ -20,12 +20,12 @@ from volery.world.grid_maps.reading import read_cells
 
 _MAP = Path(__file__).parent.parent / "world/data/gridmaps/random-32-32-10.map"
 _STARTS = [(1, 1), (1, 11), (1, 20), (1, 30)]
-"""About those of the scenario `coverage`."""
+"""Start cells near those of the scenario `coverage`."""
 _BLOCKED = "#5a5a5a"
 
 
 def draw_plan(plan: CoveragePlan, free: NDArray[np.bool_], starts: list[tuple[int, int]]) -> Figure:
-    """Areas as tints, tours as lines, starts as dots; one unit is a cell."""
+    """Draws areas as tints, tours as lines, starts as dots; one unit is a cell."""
     figure = Figure(figsize=(7.0, 7.0), layout="constrained")
     axes = figure.add_subplot()
     picture = np.ones((*free.shape, 3))

@@ -1,4 +1,4 @@
-"""Plain data of a flight, all that the figures and the page need."""
+"""Plain data of a flight for the figures and the page."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ class UavTrack:
     height_m: Array
     """(n,) above the ground below."""
     clearance_m: Array
-    """(n,) to the nearest tree or solid; inf where nothing is within the reach searched."""
+    """(n,) to the nearest tree or solid; inf beyond the searched range."""
 
     @property
     def distance_m(self) -> float:
-        """Length of the path."""
+        """Length of the path, m."""
         return float(np.linalg.norm(np.diff(self.position_map, axis=0), axis=1).sum())
 
     @property
     def minimum_clearance_m(self) -> float:
-        """Least clearance; inf if nothing came within reach."""
+        """Min clearance, m; inf if nothing came within range."""
         return float(self.clearance_m.min(initial=np.inf))
 
 
@@ -62,9 +62,9 @@ class Trees:
     position_map: Array
     """(N, 3) foot, m"""
     crown_radius_m: Array
-    """(N,)"""
+    """(N,) m."""
     dbh_m: Array
-    """(N,) trunk diameter at breast height"""
+    """(N,) m, trunk diameter at breast height."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class Structures:
 
 @dataclass(frozen=True)
 class LidarMap:
-    """What the LIDARs saw, one point a voxel, M points."""
+    """Map of LIDAR returns, one point per voxel, M points."""
 
     points_map: NDArray[np.float32]
     """(M, 3) m"""
@@ -87,12 +87,12 @@ class LidarMap:
     """(M,) above the ground below"""
     voxel_m: float
     scans: int
-    """How many scans went into it."""
+    """Number of scans in it."""
 
 
 @dataclass(frozen=True)
 class FlightEvent:
-    """Something worth telling: a contact, a landing."""
+    """An event of the flight, such as a contact or a landing."""
 
     time_s: float
     kind: str
@@ -101,13 +101,13 @@ class FlightEvent:
 
     @property
     def is_contact(self) -> bool:
-        """Whether a UAV touched something it should not."""
+        """Whether a UAV hit an obstacle or another UAV."""
         return self.kind in {"impact", "collision"}
 
 
 @dataclass(frozen=True)
 class FlightData:
-    """Everything about one flight."""
+    """All data of one flight."""
 
     scenario: str
     description: str
@@ -126,7 +126,7 @@ class FlightData:
     clearance_reach_m: float = 10.0
     digest: str = ""
     interrupted: str = ""
-    """Why the flight ended before its time; empty if it did not."""
+    """Why the flight ended early; empty if it did not."""
     log_path: Path | None = None
     log_messages: int = 0
     machine: Mapping[str, str] = field(default_factory=dict)
@@ -134,7 +134,7 @@ class FlightData:
 
     @property
     def real_time_factor(self) -> float:
-        """Simulated seconds a wall second."""
+        """Simulated seconds per wall second."""
         return self.simulated_s / self.wall_s if self.wall_s > 0.0 else 0.0
 
     @property

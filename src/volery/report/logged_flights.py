@@ -1,4 +1,4 @@
-"""Ways and trunk maps of the UAVs in a log, of a simulated flight or a real one."""
+"""Reads trajectories and trunk maps of the UAVs in a log, of a simulated or a real flight."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 TRUTH = "ground_truth/odom"
 ESTIMATES = ("slam/pose", "slam/odom", "odom")
-"""Where a UAV's own idea of its pose is looked for, the first that there is."""
+"""Topics of a UAV's own pose estimate, in order of preference."""
 _SCAN_TYPE, _JOINTS_TYPE = "sensor_msgs/msg/LaserScan", "sensor_msgs/msg/JointState"
 _POSE_TYPES = (
     "nav_msgs/msg/Odometry",
@@ -33,42 +33,42 @@ _POSE_TYPES = (
     "geometry_msgs/msg/PoseWithCovarianceStamped",
 )
 _WISHES = ("goal", "setpoint", "target", "waypoint", "command")
-"""Words in topics of poses that tell where a vehicle should be, not where it was."""
+"""Words in pose topics that are commands rather than measurements."""
 _POSE_NS = 50_000_000
 
 
 @dataclass(frozen=True)
 class LoggedUav:
-    """What a log tells of one UAV."""
+    """Data of one UAV in a log."""
 
     name: str
     truth: RecordedTrajectory | None
     estimate: RecordedTrajectory | None
     trunks: Array
-    """(T, 3) m, where the estimate puts them; of those seen three times."""
+    """(T, 3) m, by the estimated poses; detected three times or more."""
     is_founded: bool
-    """Whether it is known of the trunks that they stand on the ground; else by shape alone."""
+    """Whether nodding scans confirm that the trunks reach the ground; else by shape alone."""
 
 
 @dataclass(frozen=True)
 class LoggedFlight:
-    """What a log tells of a flight."""
+    """Data of a flight in a log."""
 
     uavs: list[LoggedUav]
-    """By name."""
+    """Sorted by name."""
     scenario: str
-    """Name, if it is told."""
+    """Name, if recorded."""
     description: str
     lasts_s: float
     origin: RecordedScenario | None = None
-    """The scenario, where the log tells it."""
+    """The recorded scenario, if any."""
     problem: str = ""
-    """What is wrong with the file: cut off, damaged chunks; empty for a whole one."""
+    """Problem of the file: cut off, damaged chunks; empty for an intact one."""
 
 
 @dataclass(frozen=True)
 class LoggedTrajectory:
-    """A way of a log, and what is wrong with the file."""
+    """A trajectory of a log, and the problem of the file."""
 
     way: RecordedTrajectory
     problem: str
@@ -80,24 +80,24 @@ class _Rows:
     next_ns: int = 0
 
     def take(self, message: Any, time_ns: int) -> None:
-        """Keep a pose, twenty a second."""
+        """Stores a pose, twenty a second."""
         if time_ns < self.next_ns:
             return
         pose = message.pose.pose if hasattr(message.pose, "pose") else message.pose
         p, q = pose.position, pose.orientation
         numbers = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
-        if all(map(math.isfinite, numbers)):  # filters that are lost tell NaN
+        if all(map(math.isfinite, numbers)):  # lost filters publish NaN
             self.next_ns = time_ns + _POSE_NS
             self.poses.append((time_ns * 1e-9, *numbers))
 
     def way(self) -> RecordedTrajectory:
-        """All of them."""
+        """Returns the trajectory of all poses."""
         return RecordedTrajectory.of_rows(self.poses)
 
 
 @dataclass
 class _Log:
-    """What is kept of a log's messages."""
+    """Data from a log's messages."""
 
     ways: dict[str, _Rows] = field(default_factory=dict)
     """By topic."""
@@ -112,7 +112,7 @@ class _Log:
     last_ns: int = 0
 
     def take(self, record: LogRecord, decoder: LogDecoder) -> None:
-        """Keep what is needed of a message; `GraphError` where its type is not known here."""
+        """Processes a message. Raises GraphError if its type is unknown."""
         topic, time_ns = record.topic.topic, record.time_ns
         self.first_ns = time_ns if self.first_ns is None else self.first_ns
         self.last_ns = max(self.last_ns, time_ns)
@@ -139,7 +139,7 @@ class _Log:
         return self.surveys.setdefault(name, TrunkSurvey(self.joints))
 
     def uav(self, name: str) -> LoggedUav | None:
-        """One of the UAVs; None where nothing tells where it was."""
+        """Returns one of the UAVs; None without poses."""
         truth = self.ways.get(f"/{name}/{TRUTH}")
         own = next((f"/{name}/{t}" for t in ESTIMATES if f"/{name}/{t}" in self.ways), None)
         if truth is None and own is None:
@@ -153,35 +153,35 @@ class _Log:
 
 
 def read_flight(path: Path) -> LoggedFlight:
-    """The UAVs of a log by the topics that Volery gives them.
+    """Returns the UAVs of a log by Volery's topic names.
 
-    `RecordingError` where the file is no log, `VoleryError` where there is no UAV in it.
+    Raises RecordingError if the file is no log, VoleryError if it holds no UAV.
     """
     log = _read(path)
     names = sorted({topic.split("/")[1] for topic in log.ways if topic.count("/") > 1})
     uavs = [uav for name in names if (uav := log.uav(name)) is not None]
     if not uavs:
         what = f"; the file is {log.problem}" if log.problem else ""
-        raise VoleryError(f"{path}: no UAV tells its pose in it (/NAME/{ESTIMATES[-1]}){what}")
+        raise VoleryError(f"{path}: the log holds no UAV's poses (/NAME/{ESTIMATES[-1]}){what}")
     told = {word: str(log.scenario.get(word) or "") for word in ("name", "description")}
     lasts_s = (log.last_ns - (log.first_ns or 0)) / NS_PER_S
     return LoggedFlight(uavs, told["name"], told["description"], lasts_s, log.origin, log.problem)
 
 
 def read_way(path: Path, topic: str | None = None) -> LoggedTrajectory:
-    """One way of a log: that of `topic`, or of the only topic that there is to choose.
+    """Returns one trajectory of a log: that of `topic`, or of its only pose topic.
 
-    `VoleryError` names the topics where that cannot be said.
+    Raises VoleryError, which lists the topics, if that is not possible.
     """
     log = _read(path)
     known = [name for name, rows in log.ways.items() if rows.poses and _tells_a_way(name)]
     if topic is None and len(known) == 1:
         return LoggedTrajectory(log.ways[known[0]].way(), log.problem)
     if topic is None or topic not in log.ways:
-        what = "which way is meant?" if topic is None else f"there is no {topic}."
+        what = "the topic of the poses is ambiguous." if topic is None else f"there is no {topic}."
         if topic in log.types:
-            what = f"{topic} tells no poses: it is a {log.types[topic]}."
-        raise VoleryError(f"{path}: {what} Poses stand on: {', '.join(sorted(known)) or 'nothing'}")
+            what = f"{topic} holds no poses: it is a {log.types[topic]}."
+        raise VoleryError(f"{path}: {what} Topics with poses: {', '.join(sorted(known)) or 'none'}")
     return LoggedTrajectory(log.ways[topic].way(), log.problem)
 
 
@@ -196,13 +196,13 @@ def _read(path: Path) -> _Log:
         try:
             log.take(record, decoder)
         except GraphError:
-            continue  # of a type that is not known here
+            continue  # unknown type
     log.problem = walk.problem
     return log
 
 
 def _content(message: Any) -> dict[str, Any]:
-    """The scenario that a run tells, empty where it is none."""
+    """Returns the scenario that a run recorded, empty if there is none."""
     try:
         told = json.loads(message.data)
         return dict(told["content"])

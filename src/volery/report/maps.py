@@ -1,4 +1,4 @@
-"""Maps as PNG: the forest with the paths, and what the LIDARs saw from above and aslant."""
+"""Maps as PNG: the forest with the paths, and the LIDAR map from above and in oblique view."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ _NIGHT_INK = "#c9d1d9"
 _GROUND = LinearSegmentedColormap.from_list("ground", ["#dfe5d3", "#f1eee0", "#e6d9c2"])
 _GROUND_RETURN = (70, 81, 94)
 _ASPECT = 1.15
-"""Width over height that a map should have at least."""
+"""Min width over height of a map."""
 _DARKEST = 0.25
-"""Where on the colour scale the lowest plants begin: the darkest colours drown in the night."""
+"""Start of the colour scale for plants: darker colours are invisible on the dark background."""
 _TREE_M = 0.6
-"""LIDAR points higher than this above the ground are taken for plants."""
+"""Height above ground above which LIDAR points count as plants."""
 
 Box = tuple[float, float, float, float]
 
 
 def top_view(flight: FlightData) -> bytes:
-    """Terrain, solids, trees by the size of their crowns, and the paths."""
+    """Draws terrain, solids, trees by the size of their crowns, and the paths."""
     box = _frame(flight, margin_m=35.0)
     figure, axes = _map(box, "white")
     _draw_ground(axes, flight.ground, box)
@@ -68,7 +68,7 @@ def top_view(flight: FlightData) -> bytes:
 
 
 def lidar_view(flight: FlightData) -> bytes | None:
-    """LIDAR points from above, coloured by height, with the paths; None without points."""
+    """Draws LIDAR points from above, coloured by height, with the paths; None without points."""
     if flight.lidar is None:
         return None
     box = _frame(flight, margin_m=30.0)
@@ -94,7 +94,7 @@ def lidar_view(flight: FlightData) -> bytes | None:
 
 
 def aslant_view(flight: FlightData) -> bytes | None:
-    """LIDAR points seen aslant from the south, near ones over far ones; None without points."""
+    """Draws LIDAR points obliquely from the south, near ones over far ones; None without points."""
     if flight.lidar is None:
         return None
     lidar = flight.lidar
@@ -149,7 +149,7 @@ def aslant_view(flight: FlightData) -> bytes | None:
 
 
 def _frame(flight: FlightData, margin_m: float) -> Box:
-    """The rectangle to show: the paths with a margin, inside the world, not too slim."""
+    """Returns the rectangle to show: the paths with a margin, inside the world, not too slim."""
     x0, y0, x1, y1 = flight.ground.bounds
     tracks = [uav.position_map[:, :2] for uav in flight.uavs if len(uav.position_map)]
     if not tracks:
@@ -158,7 +158,7 @@ def _frame(flight: FlightData, margin_m: float) -> Box:
     low, high = flown.min(axis=0) - margin_m, flown.max(axis=0) + margin_m
     size = high - low
     size = np.maximum(size, (_ASPECT * size[1], 0.45 * size[0]))
-    # inside the world where it is large enough, else around the paths
+    # inside the world if it is large enough, else around the paths
     world_low, world_high = np.array([x0, y0]), np.array([x1, y1])
     least = flown.max(axis=0) - flown.min(axis=0) + 10.0
     size = np.maximum(np.minimum(size, world_high - world_low), least)
@@ -307,7 +307,7 @@ def _shape(box: Box, pixel: float) -> tuple[int, int]:
 def _raster(
     points: NDArray[np.floating], height: NDArray[np.floating], box: Box, pixel: float
 ) -> NDArray[np.float64]:
-    """Greatest height in every pixel; -inf where nothing was seen."""
+    """Returns the max height in every pixel; -inf in empty ones."""
     image = np.full(_shape(box, pixel), -np.inf)
     keep = _inside(points, box, 0.0)
     column = ((points[keep, 0] - box[0]) / pixel).astype(np.int64)
@@ -317,7 +317,7 @@ def _raster(
 
 
 def _plant_colors(share: Any) -> NDArray[np.uint8]:
-    """Colours (n, 4) of heights given as shares (n,) of the tallest."""
+    """Returns colours (n, 4) of heights given as fractions (n,) of the max height."""
     scale = _DARKEST + (1.0 - _DARKEST) * np.asarray(share)
     return np.asarray(colormaps["viridis"](scale, bytes=True))
 
@@ -327,7 +327,7 @@ def _tall(heights: NDArray[np.floating]) -> float:
 
 
 def _round_step(value: float) -> float:
-    """The nearest of 1, 2, 5 times a power of ten that is not above `value`."""
+    """Returns the largest of 1, 2, 5 times a power of ten that is not above `value`."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(max(m * power for m in (1.0, 2.0, 5.0) if m * power <= value * 1.0001))
 

@@ -18,13 +18,13 @@ _EVENTS_SHOWN = 60
 
 
 class ReportError(VoleryError):
-    """The report cannot be written."""
+    """Raised if the report cannot be written."""
 
 
 def check_folder(folder: Path) -> None:
-    """Try to write there, or where it would be made, before a long flight rather than after it.
+    """Checks that the folder can be written to, before a long flight.
 
-    Leaves nothing behind. Raises ReportError that says what the system objects to.
+    Leaves no file behind. Raises ReportError with the system's error.
     """
     place = folder
     try:
@@ -38,7 +38,7 @@ def check_folder(folder: Path) -> None:
 
 
 def write_report(flight: FlightData, folder: str | Path) -> Path:
-    """Write `index.html` into `folder` (made if missing) and return its path."""
+    """Writes `index.html` into `folder` (created if missing) and returns its path."""
     path = Path(folder) / "index.html"
     text = page(flight)
     try:
@@ -50,7 +50,7 @@ def write_report(flight: FlightData, folder: str | Path) -> Path:
 
 
 def page(flight: FlightData) -> str:
-    """The whole page as text."""
+    """Returns the whole page as text."""
     title = escape(flight.scenario)
     count = len(flight.uavs)
     fleet = counted(count, "UAV")

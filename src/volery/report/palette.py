@@ -14,11 +14,11 @@ UAV_COLORS = (
 )
 
 INK, FAINT, GRID = "#010203", "#010204", "#010205"
-"""Stand-ins that a chart is drawn with; the page gives them the reader's light or dark colours."""
+"""Placeholder colours of charts; the page replaces them by its light or dark colours."""
 
 CSS_NAMES = {INK: "var(--ink)", FAINT: "var(--faint)", GRID: "var(--grid)"}
 
 
 def uav_color(number: int) -> str:
-    """Colour of the number-th UAV, from 0; they repeat."""
+    """Returns the colour of UAV `number`, from 0; the colours repeat."""
     return UAV_COLORS[number % len(UAV_COLORS)]

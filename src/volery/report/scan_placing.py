@@ -1,4 +1,4 @@
-"""Puts the returns of LIDAR messages in the map, each from the pose that its UAV had then."""
+"""Transforms the returns of LIDAR messages to the map, each by the UAV's pose at its time."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from volery.publishing.lidar_publishing import cloud_points
 Array = NDArray[np.float64]
 
 MAX_RANGE_M = 28.0
-"""Beams longer than that are not mapped: heading errors and dropouts spoil them."""
+"""Longer beams are not mapped, because of heading errors and dropouts."""
 _LONGEST_PIECE_NS = 20_000_000
 
 
 def scan_points(scan: Any, mount: Any, poses: deque[tuple[int, Any]]) -> NDArray[np.float64] | None:
-    """Map points (n, 3) of a LaserScan or PointCloud2; None without poses.
+    """Returns map points (n, 3) of a LaserScan or PointCloud2; None without poses.
 
     Each beam is placed from the body's poses before and after it, which come from `poses` (time in
-    ns, geometry_msgs/Pose), and the two places are interpolated.
+    ns, geometry_msgs/Pose); the two positions are interpolated.
     """
     start_ns = stamp_ns(scan)
     if not poses or poses[0][0] > start_ns:
@@ -41,14 +41,14 @@ def scan_points(scan: Any, mount: Any, poses: deque[tuple[int, Any]]) -> NDArray
 
 
 def _knots(start_ns: int, scan: Any) -> list[int]:
-    """Instants of a sweep between which a body's turn, some hundredths of a radian, is linear."""
+    """Returns times of a sweep between which a body's rotation, below 0.1 rad, is linear."""
     duration = end_ns(scan) - start_ns
     pieces = max(1, -(-duration // _LONGEST_PIECE_NS))
     return [start_ns + duration * k // pieces for k in range(pieces + 1)]
 
 
 def _in_map(in_body: Array, fraction: Array, ends: list[tuple[Array, Array]]) -> Array:
-    """Points (n, 3) from the body to the map, each between the two poses that enclose its time."""
+    """Transforms points (n, 3) from body to map, between the two poses around their time."""
     pieces = len(ends) - 1
     piece = np.minimum((fraction * pieces).astype(np.int64), pieces - 1)
     share = (fraction * pieces - piece)[:, None]
@@ -61,7 +61,7 @@ def _in_map(in_body: Array, fraction: Array, ends: list[tuple[Array, Array]]) ->
 
 
 def _beams_of_scan(scan: Any) -> tuple[Array, Array]:
-    """Returns of a LaserScan in the sensor frame (n, 3), and at which share of the sweep (n,)."""
+    """Returns points (n, 3) of a LaserScan in the sensor frame, and fractions of the sweep (n,)."""
     ranges = np.asarray(scan.ranges, dtype=np.float64)
     beams = np.flatnonzero(
         (ranges >= scan.range_min) & (ranges <= min(scan.range_max, MAX_RANGE_M))
@@ -73,7 +73,7 @@ def _beams_of_scan(scan: Any) -> tuple[Array, Array]:
 
 
 def _beams_of_cloud(cloud: Any) -> tuple[Array, Array]:
-    """Points of a PointCloud2 in the sensor frame (n, 3), and at which share of the sweep (n,)."""
+    """Returns points (n, 3) of a PointCloud2, sensor frame, and fractions of the sweep (n,)."""
     points = cloud_points(cloud)
     along = np.stack([points[name].astype(np.float64) for name in ("x", "y", "z")], -1)
     near = np.linalg.norm(along, axis=1) <= MAX_RANGE_M
@@ -92,7 +92,7 @@ def _nodding_angles(mount: Any, first_ns: int, last_ns: int, fraction: Array) ->
 
 
 def _pose_at(poses: deque[tuple[int, Any]], time_ns: int) -> tuple[Array, Array]:
-    """Position (3,) and attitude (4,) at a time between the first pose and the last."""
+    """Returns position (3,) and attitude (4,) at a time, clamped to the poses."""
     later = next((k for k, (t, _) in enumerate(poses) if t >= time_ns), len(poses) - 1)
     before = max(later - 1, 0)
     (t0, a), (t1, b) = poses[before], poses[later]
@@ -109,13 +109,13 @@ def _arrays(pose: Any) -> tuple[Array, Array]:
 
 
 def stamp_ns(message: Any) -> int:
-    """Stamp of a message."""
+    """Returns the stamp of a message, ns."""
     stamp = message.header.stamp
     return int(stamp.sec) * NS_PER_S + int(stamp.nanosec)
 
 
 def end_ns(scan: Any) -> int:
-    """Time of the last beam of a LaserScan or PointCloud2."""
+    """Returns the time of the last beam of a LaserScan or PointCloud2, ns."""
     if _is_cloud(scan):
         sweep_s = float(cloud_points(scan)["time"].max(initial=0.0))
     else:

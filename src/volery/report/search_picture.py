@@ -1,4 +1,4 @@
-"""Flies the scenario `cooperative_search` and draws it: ways, what was found, who met where.
+"""Runs the scenario `cooperative_search` and draws paths, detection and meeting positions.
 
 python -m volery.report.search_picture docs/pictures/cooperative_search.png
 """
@@ -27,12 +27,12 @@ _AFTER = ("come", "hold", "home", "over_home", "land", "done")
 
 @dataclass
 class RecordedSearch:
-    """What is drawn of one flight."""
+    """Data of one flight to draw."""
 
     ways: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
-    """Until each UAV broke off its search ..."""
+    """Path of each UAV during its search."""
     calls: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
-    """... and from there to its place at the object."""
+    """Path of each UAV from the end of its search to its position at the object."""
     found: tuple[float, float] | None = None
     finder: str = ""
     found_s: float = 0.0
@@ -40,7 +40,7 @@ class RecordedSearch:
 
 
 def fly(scenario: Scenario) -> RecordedSearch:
-    """Fly until all have met."""
+    """Runs the scenario until all UAVs have met."""
     told, phases = RecordedSearch(), dict[str, str]()
 
     def on_found(name: str, published: Any) -> None:
@@ -69,7 +69,7 @@ def fly(scenario: Scenario) -> RecordedSearch:
 
 
 def draw(search: RecordedSearch, scenario: Scenario) -> Figure:
-    """The area from above."""
+    """Draws the area from above."""
     figure = Figure(figsize=(8.0, 6.4), layout="constrained")
     axes = figure.add_subplot()
     x_min, y_min, x_max, y_max = _area_of(scenario)

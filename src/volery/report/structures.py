@@ -1,4 +1,4 @@
-"""Solids as seen from above: their tops and the edges of these."""
+"""Solids as seen from above: their tops and the edges of the tops."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from volery.report.flight_data import Structures
 from volery.world.mesh import Mesh
 
 _CORNER_M = 1e-3
-"""Corners of triangles count as one within this."""
+"""Tolerance within which corners of triangles coincide, m."""
 
 
 def seen_from_above(meshes: Iterable[Mesh]) -> Structures | None:
-    """Tops of solids; None without any."""
+    """Returns the tops of solids; None without any."""
     tops, edges = [], []
     for mesh in meshes:
         top = mesh.corners[mesh.face_normals[:, 2] > 0.1].astype(np.float64)
@@ -26,7 +26,7 @@ def seen_from_above(meshes: Iterable[Mesh]) -> Structures | None:
 
 
 def _rim(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Edges (E, 2, 2) that only one of the triangles (K, 3, 3) has."""
+    """Returns the edges (E, 2, 2) that belong to only one of the triangles (K, 3, 3)."""
     _, number = np.unique(
         np.round(triangles.reshape(-1, 3) / _CORNER_M).astype(np.int64), axis=0, return_inverse=True
     )

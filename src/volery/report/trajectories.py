@@ -1,4 +1,4 @@
-"""The way of one UAV: poses by time."""
+"""The trajectory of one UAV: poses by time."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _LONGEST_GAP_S = 0.5
-"""Poses farther apart than this have nothing between them."""
+"""Gap between poses above which there is no interpolation, s."""
 
 
 @dataclass(frozen=True)
 class RecordedTrajectory:
-    """N poses, their times rising."""
+    """N poses with increasing times."""
 
     time_s: Array
-    """(N,)"""
+    """(N,) s."""
     position: Array
     """(N, 3) m"""
     attitude: Array
@@ -27,22 +27,22 @@ class RecordedTrajectory:
 
     @classmethod
     def of_rows(cls, rows: Sequence[Sequence[float]]) -> RecordedTrajectory:
-        """Of rows of time, position and attitude."""
+        """Returns the trajectory of rows of time, position and attitude."""
         table = np.array(rows, np.float64).reshape(-1, 8)
         return cls(table[:, 0], table[:, 1:4], table[:, 4:])
 
     @property
     def lasts_s(self) -> float:
-        """From the first pose to the last one."""
+        """Time from the first pose to the last one, s."""
         return float(self.time_s[-1] - self.time_s[0]) if len(self.time_s) else 0.0
 
     @property
     def length_m(self) -> float:
-        """Over ground."""
+        """Horizontal length, m."""
         return float(np.hypot(*np.diff(self.position[:, :2], axis=0).T).sum())
 
     def pose_at(self, time_s: float) -> tuple[Array, Array] | None:
-        """Position and attitude at a time, between the poses around it; None outside of them."""
+        """Interpolates position (3,) and attitude (4,) at a time; None outside of the poses."""
         k = int(np.searchsorted(self.time_s, time_s))
         if k < len(self.time_s) and self.time_s[k] == time_s:
             return self.position[k], self.attitude[k]

@@ -1,4 +1,4 @@
-"""Pictures of ways: simulated against estimated, or a real flight over the simulated one."""
+"""Charts of trajectories: simulated against estimated, or a real flight over the simulated one."""
 
 from __future__ import annotations
 
@@ -20,15 +20,17 @@ Array = NDArray[np.float64]
 _MAP_SIZE = (7.2, 6.4)
 _POINTS = 1500
 _LEAST_SHARE = 0.012
-"""Least width of a ring as a share of the map's."""
+"""Min width of a ring, as a fraction of the map's."""
 _DATES_S = 1e8
-"""Seconds that no run lasts, and that had passed since 1970 in 1973."""
+"""Threshold between run times and Unix times, s: no run lasts as long; Unix time passed it in
+1973.
+"""
 _STYLES = ("-", (0, (4, 2)))
-"""Lines come in pairs, the second of each dashed."""
+"""Line styles of pairs; the second line of each is dashed."""
 
 
 class ChartLine(NamedTuple):
-    """A way as it is drawn."""
+    """A trajectory to draw."""
 
     label: str
     time_s: Array
@@ -38,7 +40,7 @@ class ChartLine(NamedTuple):
 
 
 def ways_from_above(lines: Sequence[ChartLine], trunks: Array, true: TrueTrunks) -> str:
-    """Ways over the map of trunks (T, 2 or 3) and the true ones, rings, as SVG."""
+    """Draws trajectories over the map of trunks (T, 2 or 3) and true ones, rings; returns SVG."""
     figure, axes = new_axes(*_MAP_SIZE)
     if len(true.places):
         _rings(axes, true)
@@ -56,7 +58,7 @@ def ways_from_above(lines: Sequence[ChartLine], trunks: Array, true: TrueTrunks)
 
 
 def over_time(lines: Sequence[ChartLine], axis: int) -> str:
-    """One coordinate of ways over time, as SVG; axis 0 is x, 1 is y, 2 is z."""
+    """Draws one coordinate of trajectories over time; axis 0 is x, 1 y, 2 z. Returns SVG."""
     figure, axes = new_axes()
     start_s, clock = _clock_of(lines)
     for number, line in enumerate(lines):
@@ -70,17 +72,17 @@ def over_time(lines: Sequence[ChartLine], axis: int) -> str:
 
 
 def is_date(time_s: float) -> bool:
-    """Whether a time counts from 1970, as clocks of computers do, and not from a run's start."""
+    """Returns whether a time is Unix time rather than time since a run's start."""
     return time_s > _DATES_S
 
 
 def date_text(time_s: float) -> str:
-    """A time that counts from 1970, in words."""
+    """Returns a Unix time as text."""
     return f"{datetime.fromtimestamp(time_s, UTC):%Y-%m-%d %H:%M:%S} UTC"
 
 
 def _clock_of(lines: Sequence[ChartLine]) -> tuple[float, str]:
-    """Where the axis of time begins, s, and what stands below it."""
+    """Returns the origin of the time axis, s, and its label."""
     starts = [float(line.time_s[0]) for line in lines if len(line.time_s)]
     if not starts or not is_date(min(starts)):
         return 0.0, "time, s"
@@ -89,7 +91,7 @@ def _clock_of(lines: Sequence[ChartLine]) -> tuple[float, str]:
 
 
 def _rings(axes: Any, true: TrueTrunks) -> None:
-    """True trunks as rings of their width, or of the least that can be seen."""
+    """Draws true trunks as rings of their width, or of the min visible width."""
     spread = float(np.ptp(true.places, axis=0).max())
     widths = np.maximum(true.widths_m, _LEAST_SHARE * spread)
     axes.add_collection(

@@ -1,4 +1,4 @@
-"""The report of a log: where each UAV was, where it thought it was, and a real flight beside it."""
+"""The report of a log: true and estimated trajectories, optionally with a real flight."""
 
 from __future__ import annotations
 
@@ -35,28 +35,30 @@ from volery.report.true_trunks import TrueTrunks, true_trunks
 Array = NDArray[np.float64]
 
 _LEAST = 10
-"""Poses in common that an error can be told from."""
+"""Min number of common poses for an error."""
 _APART = ".chart + .pair { margin-top: 1.2rem; }\n"
-"""Between the way from above and the charts below it, as between these."""
+"""Space between the map and the charts below it, as between these."""
 _ALIKE, _LEFT_SHARE = 0.95, 0.1
-"""Speeds less alike, or ways farther apart by the spread of one, may be of two flights. Between two
-UAVs of one forest search, whose missions begin alike, 0.85 to 0.91 and 0.12 to 0.15 were measured;
-between truth and estimate of one flight 1.00 and less than 0.01."""
+"""Thresholds of the correlation of speeds, and of the distance relative to the spread, beyond which
+the flights may differ. Between two UAVs of one forest search, whose missions begin alike, 0.85 to
+0.91 and 0.12 to 0.15 were measured; between ground truth and estimate of one flight 1.00 and less
+than 0.01.
+"""
 _TRUE_M = 0.5
-"""So near to a tree a mapped trunk is that tree's."""
+"""Max distance between a mapped trunk and its tree."""
 _LONG_SHIFT_S = 86_400.0
 _LEAST_S, _MOST_S = 3.0, 86_400.0
-"""Seconds that a common time can be found from, and is looked for in."""
+"""Min duration for a time alignment, and max duration searched, s."""
 
 
 class LogReport(NamedTuple):
-    """What was written."""
+    """Result of writing a report."""
 
     path: Path
     warnings: list[str]
-    """What whoever reads it should know."""
+    """Warnings for the reader."""
     fit: str = ""
-    """How well a real flight fits the simulated one, where it is compared."""
+    """Fit of a real flight to the simulated one, if compared."""
 
 
 def write_log_report(
@@ -68,16 +70,16 @@ def write_log_report(
     uav: str | None = None,
     overwrite: bool = False,
 ) -> LogReport:
-    """Write `index.html` into `folder`; one that is there already only with `overwrite`.
+    """Writes `index.html` into `folder`; replaces an existing one only with `overwrite`.
 
-    compare: log of a real flight, laid over that of `uav` (None: the first) in `log`, aligned in
+    compare: log of a real flight, drawn over that of `uav` (None: the first) in `log`, aligned in
     time by their speeds and in space by rotation and translation. compare_topic: its poses; None:
-    the only ones there. Without it `uav` alone is drawn, None: all. `VoleryError` for logs that do
-    not hold what is asked for.
+    the only ones. Without compare, `uav` alone is drawn, None: all. Raises VoleryError for logs
+    without the requested data.
     """
     path, warnings, fit = folder / "index.html", list[str](), ""
     if compare is None and compare_topic is not None:
-        raise ReportError(f"--compare-topic {compare_topic}: of which log? --compare names it")
+        raise ReportError(f"--compare-topic {compare_topic}: name its log by --compare")
     if path.exists() and not overwrite:
         raise ReportError(f"{path} exists; --overwrite replaces it")
     flight = read_flight(log)
@@ -102,7 +104,7 @@ def write_log_report(
 
 
 def _problem_notes(log: Path, problem: str, warnings: list[str]) -> list[str]:
-    """A note for the page where something is wrong with a log's file; a warning, too."""
+    """Returns a note for the page about a problem of a log's file, and adds a warning."""
     if not problem:
         return []
     warnings.append(f"{log}: {problem}; the report shows what can be read")
@@ -114,11 +116,11 @@ def _chosen(uavs: Sequence[LoggedUav], name: str | None, log: Path) -> LoggedUav
         if name in (None, each.name):
             return each
     known = ", ".join(each.name for each in uavs)
-    raise VoleryError(f"{log}: there is no {name} in it; known: {known}")
+    raise VoleryError(f"{log}: no UAV {name}; known: {known}")
 
 
 def _estimate_section(uav: LoggedUav, trunks: TrueTrunks) -> list[str]:
-    """Simulated against estimated: from above with the trunks, x and y over time."""
+    """Draws simulated against estimated: from above with the trunks, x and y over time."""
     lines = []
     if uav.truth is not None:
         lines.append(ChartLine("simulated", uav.truth.time_s, uav.truth.position))
@@ -127,12 +129,12 @@ def _estimate_section(uav: LoggedUav, trunks: TrueTrunks) -> list[str]:
     told = "Trajectory and trunk map."
     if len(uav.trunks):
         told = (
-            f"Trajectory, and {counted(len(uav.trunks), 'trunk')} that the level LIDAR saw three "
+            f"Trajectory and {counted(len(uav.trunks), 'trunk')} detected by the level LIDAR three "
             "times or more, where the estimate puts them."
         )
         if not uav.is_founded:
             told += (
-                " No nodding LIDAR tells what stands on the ground: crowns and rises of the "
+                " Without a nodding LIDAR shapes alone count: crowns and rises of the "
                 "ground may be among them."
             )
     near = trunks.near(np.concatenate([line.position for line in lines]))
@@ -143,20 +145,20 @@ def _estimate_section(uav: LoggedUav, trunks: TrueTrunks) -> list[str]:
 
 
 def _trunks_text(found: Array, near: TrueTrunks) -> str:
-    """What the rings are, and how well mapped trunks fit them."""
+    """Explains the rings, and how well mapped trunks fit them."""
     if near.why_none:
         return f" {escape(near.why_none)}"
     if not len(near.places):
-        return " No tree of the scenario stands within 15 m of the way."
+        return " No tree of the scenario is within 15 m of the trajectory."
     told = (
-        f" Rings: {counted(len(near.places), 'tree')} of the scenario within 15 m of the way, by "
-        "the width of trunks (thin ones wider, so that they can be seen)."
+        f" Rings: {counted(len(near.places), 'tree')} of the scenario within 15 m of it, by "
+        "the width of trunks (thin ones enlarged)."
     )
     away = near.distances_m(found)
     if len(away):
         told += (
-            f" {(away <= _TRUE_M).mean():.0%} of the mapped trunks stand within {_TRUE_M} m of "
-            "one, as the estimate puts them."
+            f" {(away <= _TRUE_M).mean():.0%} of the mapped trunks are within {_TRUE_M} m of "
+            "one, by the estimated poses."
         )
     return told
 
@@ -169,44 +171,44 @@ def _error_text(estimate: RecordedTrajectory, truth: RecordedTrajectory) -> str:
     true = at_times(truth.time_s, truth.position, estimate.time_s[known])
     raw = _rms(own - true)
     return (
-        f" Root mean square error {raw:.2f} m as it stands, {ate_rmse_m(own, true):.2f} m after "
+        f" Root mean square error {raw:.2f} m without, {ate_rmse_m(own, true):.2f} m after "
         "rigid alignment (Umeyama), over "
         f"{float(np.linalg.norm(np.diff(true, axis=0), axis=1).sum()):.0f} m."
     )
 
 
 class _Laid(NamedTuple):
-    """A real way laid over a simulated one."""
+    """A real trajectory aligned with a simulated one."""
 
     lines: list[ChartLine]
     shift: TimeShift
     left_m: float
-    """Root mean square distance."""
+    """Root mean square distance, m."""
     size_m: float
-    """That of the simulated way from its middle."""
+    """Root mean square distance of the simulated trajectory from its centroid, m."""
     share: float
-    """Of the real way's poses that have a time in common."""
+    """Fraction of the real trajectory's poses within common times."""
 
     @property
     def fit(self) -> str:
-        """How well they fit, in figures."""
+        """Fit of the two trajectories, as text."""
         return (
             f"correlation of speeds {self.shift.alike:.2f}, {self.left_m:.2f} m apart (root mean "
             f"square) over {self.share:.0%} of it"
         )
 
     def doubts(self, log: Path) -> list[str]:
-        """Why the two may not be of one flight; empty where they fit."""
+        """Returns the reasons why the two may be different flights."""
         found = []
         if self.shift.alike < _ALIKE:
             found.append(
                 f"the speeds differ (correlation {self.shift.alike:.2f}: 1 is the same flight, and "
-                "two UAVs on missions that begin alike come to 0.9), so the shift in time may be "
+                "two UAVs on missions that begin alike reach 0.9), so the shift in time may be "
                 "wrong"
             )
         if self.left_m > _LEFT_SHARE * self.size_m:
             found.append(
-                f"the ways are {self.left_m:.2f} m apart (root mean square) where the simulated "
+                f"the trajectories are {self.left_m:.2f} m apart (root mean square), the simulated "
                 f"one spreads by {self.size_m:.1f} m"
             )
         return [f"{log}: it may be another flight: {doubt}" for doubt in found]
@@ -215,16 +217,16 @@ class _Laid(NamedTuple):
 def _laid_over(uav: LoggedUav, real: RecordedTrajectory, log: Path) -> _Laid:
     simulated = uav.truth or uav.estimate
     if simulated is None or min(real.lasts_s, simulated.lasts_s) < _LEAST_S:
-        raise VoleryError(f"{log}: too few poses to lay it over {uav.name}")
+        raise VoleryError(f"{log}: too few poses for a comparison with {uav.name}")
     if real.lasts_s > _MOST_S:
         raise VoleryError(
-            f"{log}: its poses span {real.lasts_s / 3600.0:.0f} hours; was its clock set meanwhile?"
+            f"{log}: its poses span {real.lasts_s / 3600.0:.0f} hours; was its clock set in flight?"
         )
     shift = time_shift(simulated.time_s, simulated.position, real.time_s, real.position)
     times = real.time_s + shift.seconds
     known = common_times(times, simulated.time_s)
     if known.sum() < _LEAST:
-        raise VoleryError(f"{log}: it has no time in common with {uav.name}")
+        raise VoleryError(f"{log}: no time in common with {uav.name}")
     there = at_times(simulated.time_s, simulated.position, times[known])
     aligned = umeyama(real.position[known], there).apply(real.position)
     lines = [
@@ -240,18 +242,18 @@ def _rms(offsets: Array) -> float:
 
 
 def _shift_text(laid: _Laid) -> str:
-    """By how much the real flight's clock was moved; far away ones by what they show."""
+    """Describes the shift of the real flight's clock; large shifts by the dates."""
     shift_s, begins_s = laid.shift.seconds, float(laid.lines[1].time_s[0])
     real_s = begins_s - shift_s
     if abs(shift_s) > _LONG_SHIFT_S and is_date(real_s):
         at = date_text(begins_s) if is_date(begins_s) else f"{begins_s:.2f} s"
         return f"its clock moved so that {date_text(real_s)}, its beginning, is {at}"
-    moved = round(shift_s, 2) + 0.0  # which is no -0.0
+    moved = round(shift_s, 2) + 0.0  # without -0.0
     return f"its clock moved by {moved:,.2f} s"
 
 
 def _comparison_section(uav: LoggedUav, laid: _Laid, log: Path, trunks: TrueTrunks) -> list[str]:
-    """A real flight over the simulated one."""
+    """Draws a real flight over the simulated one."""
     told = (
         f"The flight of {escape(log.name)} over that of {escape(uav.name)}: {_shift_text(laid)} "
         f"(where their speeds are most alike, with a correlation of "
@@ -265,7 +267,7 @@ def _comparison_section(uav: LoggedUav, laid: _Laid, log: Path, trunks: TrueTrun
 
 
 def _lead(flight: LoggedFlight) -> list[str]:
-    """What the log tells of the whole flight."""
+    """Returns the summary of the whole flight."""
     count = len(flight.uavs)
     fleet = counted(count, "UAV")
     scenario = f"Scenario {flight.scenario}, " if flight.scenario else ""

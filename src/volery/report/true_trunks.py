@@ -1,4 +1,4 @@
-"""The trunks that truly stood there: the forest of a log's scenario, grown once more."""
+"""True trunk positions: those of the forest of a log's scenario, generated again."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from volery.runtime.replay.scenario_record import scenario_of
 Array = NDArray[np.float64]
 
 _NEAR_M = 15.0
-"""Of the way, as far as trunks are looked for in scans."""
+"""Max distance to the trajectory, as in the detection by scans."""
 _EVERY = 20
-"""Poses between two that are looked from: a second."""
+"""Poses between two that are checked: a second."""
 
 
 class TrueTrunks(NamedTuple):
-    """Of T trees."""
+    """Trunks of T trees."""
 
     places: Array
     """(T, 2) m, in the map."""
     widths_m: Array
-    """(T,) at breast height."""
+    """(T,) m, diameter at breast height."""
     why_none: str = ""
-    """Why there are none, a sentence."""
+    """Why there are none, as a sentence."""
 
     def near(self, way: Array) -> TrueTrunks:
-        """Those within reach of the places (N, 2 or 3) of a way."""
+        """Returns the trunks near the positions (N, 2 or 3) of a trajectory."""
         if not len(self.places) or not len(way):
             return self
         seen = np.zeros(len(self.places), np.bool_)
@@ -41,27 +41,30 @@ class TrueTrunks(NamedTuple):
         return TrueTrunks(self.places[seen], self.widths_m[seen], self.why_none)
 
     def distances_m(self, found: Array) -> Array:
-        """(F,) from places (F, 2 or 3) to the nearest trunk; empty where there is none."""
+        """Returns distances (F,) m to the nearest trunk; empty without trunks.
+
+        found: positions (F, 2 or 3) m.
+        """
         if not len(self.places):
             return np.zeros(0)
         return np.array([np.hypot(*(self.places - place[:2]).T).min() for place in found])
 
 
 def no_trunks(why: str) -> TrueTrunks:
-    """None, and why."""
+    """Returns no trunks, with the reason."""
     return TrueTrunks(np.zeros((0, 2)), np.zeros(0), why)
 
 
 def true_trunks(origin: RecordedScenario | None, folder: Path | None = None) -> TrueTrunks:
-    """All trunks of the scenario that a log in `folder` tells of."""
+    """Returns all trunks of the recorded scenario of a log in `folder`."""
     if origin is None:
-        return no_trunks("The log tells of no scenario, so where trees truly stood is not known.")
+        return no_trunks("The log holds no scenario, so the true positions of trees are unknown.")
     try:
         scenario = scenario_of(origin, folder=folder)
         terrain = build_terrain(scenario)
         forest = build_forest(scenario, terrain, build_city(scenario, terrain))
     except VoleryError as error:
-        return no_trunks(f"The scenario's trees cannot be grown once more: {error}.")
+        return no_trunks(f"The scenario's trees cannot be generated again: {error}.")
     if not forest:
         return no_trunks("The scenario has no trees.")
     return TrueTrunks(forest.position_map[:, :2], np.asarray(forest.dbh_m, np.float64))

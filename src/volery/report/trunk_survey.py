@@ -1,7 +1,7 @@
-"""Trunks that one UAV has seen, from its own sensors and where it thought that it was.
+"""Trunk detection from one UAV's own sensors and its estimated trajectory.
 
-The level scan shows what stands out at flight height: trunks, but also crowns of saplings, and the
-ground where it rises or the UAV leans. The nodding LIDAR tells them apart: see
+Scans of the level LIDAR contain trunks at flight height, but also crowns of saplings, and the
+ground where it rises or the UAV tilts. The nodding LIDAR distinguishes them: see
 `autonomy.mapping.vertical_structures`.
 """
 
@@ -25,41 +25,42 @@ Array = NDArray[np.float64]
 LEVEL, NODDING = "laser/horizontal/scan", "laser/nodding/scan"
 _JOINT = "laser_nodding"
 _LEVEL_NS, _NODDING_NS = 500_000_000, 75_000_000
-"""Of 40 nodding scans a second each third: a period of a second is not met at the same angles."""
+"""Every third of 40 nodding scans a second, so that a period of a second does not repeat angles."""
 _NEAREST_M, _FARTHEST_M = 0.6, 20.0
 
 
 class TrunkSurvey:
-    """Gathers a UAV's messages, and makes a map of them when its way is known."""
+    """Collects a UAV's messages, and builds a trunk map once its trajectory is known."""
 
     def __init__(self, joints: StaticTransforms | None = None) -> None:
         self._seen: list[tuple[str, float, float, Array]] = []
         """Frame, time of the first beam and between beams, s, trunks (K, 3)."""
         self._nodding: list[tuple[str, float, Array, NDArray[np.float32]]] = []
         """Frame, time of the first beam, s; angle of the first beam, between beams, and time
-        between them (3,); ranges."""
+        between them (3,); ranges.
+        """
         self._nods: list[tuple[float, float]] = []
         self._next_ns = {LEVEL: 0, NODDING: 0}
         self.joints = joints or StaticTransforms()
-        """Where its LIDARs sit."""
+        """Mounts of its LIDARs."""
 
     @property
     def is_founded(self) -> bool:
-        """Whether a nodding LIDAR tells what stands on the ground; else shapes alone count."""
+        """Whether nodding scans can confirm that trunks reach the ground."""
         return bool(self._nodding and self._nods)
 
     def wants(self, scan: str, time_ns: int) -> bool:
-        """Whether a scan, `LEVEL` or `NODDING`, of a time is not one too many."""
+        """Returns whether a scan, `LEVEL` or `NODDING`, is due at a time."""
         return time_ns >= self._next_ns[scan]
 
     def add_nods(self, message: Any) -> None:
-        """A message of joint_states."""
+        """Adds a message of joint_states."""
         if _JOINT in message.name:
             angle = float(message.position[list(message.name).index(_JOINT)])
             self._nods.append((stamp_of(message) / NS_PER_S, angle))
 
     def add_scan(self, scan: str, time_ns: int, message: Any) -> None:
-        """A scan of the level or the nodding LIDAR, if it is due."""
+        """Adds a scan of the level or the nodding LIDAR, if it is due."""
         if not self.wants(scan, time_ns):
             return
         period = _LEVEL_NS if scan == LEVEL else _NODDING_NS
@@ -74,7 +75,7 @@ class TrunkSurvey:
             self._nodding.append((frame, first, beams, np.array(message.ranges, np.float32)))
 
     def trunks(self, way: RecordedTrajectory) -> TrunkMap:
-        """The map of trunks for a way that it was thought to have gone."""
+        """Returns the map of trunks for an estimated trajectory."""
         columns = VerticalStructures(self._returns(way)) if self.is_founded else None
         found = TrunkMap()
         for frame, first, step, seen in self._seen:
@@ -85,7 +86,7 @@ class TrunkSurvey:
         return found
 
     def _returns(self, way: RecordedTrajectory) -> Array:
-        """Returns (N, 3) of the nodding LIDAR in the map."""
+        """Returns the returns (N, 3) of the nodding LIDAR in the map."""
         nods = np.array(sorted(self._nods)).T
         found = [np.zeros((0, 3))]
         for frame, first, (angle, turn, step), ranges in self._nodding:
@@ -104,7 +105,7 @@ class TrunkSurvey:
 
 
 def _placed(trunk: Array, seconds: float, mount: Mount, way: RecordedTrajectory) -> Array | None:
-    """Where in the map (3,) a trunk stands that a level scanner saw; None: the pose is unknown."""
+    """Returns the map position (3,) of a trunk in a level scan; None if the pose is unknown."""
     pose = way.pose_at(seconds)
     if pose is None:
         return None

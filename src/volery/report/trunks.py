@@ -1,9 +1,9 @@
-"""What may be trunks in level scans, and a map of them.
+"""Detects trunk candidates in level scans, and maps them.
 
-A trunk is a short run of beams that stands apart: nearer than what is beside it, a few centimetres
-to a metre wide. It is taken for a circle whose visible width is its diameter. This is a yardstick
-for poses, not a mapping method of its own. Crowns and the ground can look the same in one scan;
-`trunk_survey` tells them apart.
+A trunk is a short run of beams that is nearer than its neighbours and a few centimetres to a metre
+wide. It is modelled as a circle whose visible width is its diameter. The map serves to check poses;
+it is no mapping method of its own. Crowns and the ground can look the same in one scan;
+`trunk_survey` distinguishes them.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ Array = NDArray[np.float64]
 
 _NEAREST_M, _FARTHEST_M = 0.6, 15.0
 _APART_M = 0.35
-"""Neighbouring beams that differ by more end on different things."""
+"""Range difference of neighbouring beams above which they hit different objects."""
 _STANDS_OUT_M = 0.6
-"""A trunk is nearer than what is beside it by so much."""
+"""Min range difference between a trunk and its neighbours."""
 _LEAST_BEAMS = 4
 _NARROWEST_M, _WIDEST_M = 0.06, 1.2
 _SAME_M = 0.8
-"""Nearer to each other than this, two sightings are of one trunk. All modelling choices."""
+"""Distance within which two detections are of one trunk. All modelling choices."""
 _SEEN_OFTEN = 3
 
 
 def trunks_of_scan(ranges: NDArray[np.floating], angle_min: float, increment: float) -> Array:
-    """(K, 3) middles x, y of what may be trunks in the scanner's frame, m, and the beam to each."""
+    """Returns candidates (K, 3): centre x, y in the scanner's frame, m, and index of the beam."""
     r = np.asarray(ranges, np.float64)
     r = np.where(np.isfinite(r) & (r > _NEAREST_M), r, np.inf)
     near = np.minimum(r, 2.0 * _FARTHEST_M)
@@ -51,20 +51,20 @@ def trunks_of_scan(ranges: NDArray[np.floating], angle_min: float, increment: fl
 
 @dataclass
 class TrunkMap:
-    """Trunks, each the mean of its sightings."""
+    """Trunks, each the mean of its detections."""
 
     places: Array = field(default_factory=lambda: np.zeros((0, 3)))
-    """(T, 3) m, map, at the height at which they were seen."""
+    """(T, 3) m, map, at the height of detection."""
     sightings: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
-    """(T,)"""
+    """(T,) numbers of detections."""
 
     @property
     def seen_often(self) -> Array:
-        """(S, 3) those that have been seen three times or more."""
+        """(S, 3) m, trunks detected three times or more."""
         return self.places[self.sightings >= _SEEN_OFTEN]
 
     def add(self, seen: Array) -> None:
-        """Take in the trunks (K, 3) of one scan."""
+        """Adds the trunks (K, 3) of one scan."""
         for place in seen:
             away = np.hypot(*(self.places - place)[:, :2].T)
             if len(away) and away.min() <= _SAME_M:

@@ -1,4 +1,4 @@
-"""A set of occupied voxels that stays bounded: past its limit the voxels grow."""
+"""A bounded set of occupied voxels: past its limit the voxels grow."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ class VoxelSet:
         self._count = 0
 
     def add(self, points: NDArray[np.floating]) -> None:
-        """Add points (n, 3) within a million voxels of the origin."""
+        """Adds points (n, 3) within a million voxels of the origin."""
         self._pending.append(_keys(points, self.voxel_m))
         self._count += len(points)
         if self._count > max(_PENDING, len(self._keys) // 2):
             self._merge()
 
     def centers(self) -> NDArray[np.float32]:
-        """Middle points (M, 3) of the voxels, m."""
+        """Returns the centres (M, 3) of the voxels, m."""
         self._merge()
         return _centers(self._keys, self.voxel_m).astype(np.float32)
 

@@ -1,4 +1,4 @@
-"""What a client of the page's rosbridge may do."""
+"""Access policies of the page's rosbridge clients."""
 
 from __future__ import annotations
 
@@ -21,30 +21,30 @@ from volery.server.operator_names import OperatorNames
 from volery.server.read_only import READ_ONLY_SERVICES
 
 _LOOKING = {"subscribe", "unsubscribe", "set_level", "status", "auth"}
-"""Operations that change nothing for others."""
+"""Operations without effect on other clients."""
 _TOLD_AGAIN_S = 1.0
-"""How often the sender of a stream of commands learns that it is refused."""
+"""Min period of refusals for a stream of commands."""
 _MOST_TOLD = 1000
 
 
 class ViewerPolicy:
-    """Lets a client look on."""
+    """Allows a client to watch only."""
 
     def check(self, operation: Operation) -> bool:
-        """`BridgeError` for whatever changes something."""
+        """Raises BridgeError for an operation that changes something."""
         op = operation["op"]
         if op in _LOOKING or (op == "call_service" and service_of(operation) in READ_ONLY_SERVICES):
             return True
         what = operation.get("service", operation.get("topic", operation.get("action", "")))
         doing = f"{op.replace('_', ' ')} {what}".strip()
-        raise BridgeError(f"a viewer may not {doing[:120]}; show the operators' token")
+        raise BridgeError(f"a viewer may not {doing[:120]}; connect with the operators' token")
 
 
 class OperatorPolicy:
-    """Lets a client command the UAVs that nobody else holds.
+    """Allows a client to command the UAVs that no other operator controls.
 
-    `name` is what the operator is called; `crew` are all who are connected to this server. What it
-    asks of the services of control it asks in its own name.
+    `name` is the operator's name; `crew` the names of all operators on this server. Requests to the
+    control services are signed with the operator's own name.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class OperatorPolicy:
         self._told_s: dict[str, float] = {}
 
     def check(self, operation: Operation) -> bool:
-        """`BridgeError` for a command to a UAV that another operator holds."""
+        """Raises BridgeError for a command to a UAV that another operator controls."""
         op = operation["op"]
         if op == "call_service":
             service = service_of(operation)
@@ -76,7 +76,7 @@ class OperatorPolicy:
         return True
 
     def _may_publish(self, operation: Operation) -> bool:
-        """Whether a publication passes; one of a stream that does not is told of now and then."""
+        """Returns whether a publication passes; refusals of a stream are reported periodically."""
         topic = _absolute(operation.get("topic", operation.get("service", operation.get("action"))))
         try:
             self._check_free(topic, {})
@@ -91,7 +91,7 @@ class OperatorPolicy:
         return True
 
     def _check_free(self, name: str, operation: Operation) -> None:
-        """Refuse what is below, or about, a UAV that another operator holds."""
+        """Raises BridgeError for a name below, or about, a UAV that another operator controls."""
         try:
             about = {*parts_of(name), *names_in(operation.get("args"))}
         except CommandError as error:
@@ -102,7 +102,10 @@ class OperatorPolicy:
                 raise BridgeError(f"{uav} is held by {holder}, who can hand it over")
 
     def _sign(self, service: str, operation: Operation) -> None:
-        """See to it that the operator speaks for nobody else."""
+        """Sets the operator's own name in a request to the control services.
+
+        Raises BridgeError if the request is made in another operator's name.
+        """
         args = operation.get("args")
         if not isinstance(args, dict):
             raise BridgeError(f"{service}: args must be an object with uav")
@@ -122,7 +125,7 @@ class OperatorPolicy:
 
 
 def service_of(operation: Operation) -> str:
-    """Name in the graph of what a client calls `/add` or, long ago, `/add#3`."""
+    """Returns the graph name of a called service: `/add`, or in old clients `/add#3`."""
     return _absolute(str(operation.get("service", "")).partition("#")[0])
 
 

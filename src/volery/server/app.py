@@ -1,4 +1,4 @@
-"""All that the server answers, in one table."""
+"""Routes of the server."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from volery.server.world_route import world_glb
 def make_app(
     site: ServerState, *, tokens: Tokens, origins: Origins, cookie: str, only_loopback: bool
 ) -> Starlette:
-    """The application; what the arguments after `site` mean, `AuthMiddleware` says."""
+    """Returns the application; for the arguments after `site` see `AuthMiddleware`."""
     guard = Middleware(
         AuthMiddleware, tokens=tokens, origins=origins, cookie=cookie, only_loopback=only_loopback
     )
@@ -64,5 +64,5 @@ async def _tell_refusal(_request: Request, error: Exception) -> Response:
 
 async def _tell_problem(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
-    known = {404: f"there is nothing at {request.url.path[:200]}"}
+    known = {404: f"nothing exists at {request.url.path[:200]}"}
     return refused(error.status_code, known.get(error.status_code, error.detail))

@@ -1,4 +1,4 @@
-"""Stands before all routes: who is asking, whose page, and what browsers may do with answers.
+"""Middleware before all routes: authentication, origin checks and security headers.
 
 Sources: OWASP Cheat Sheets on cross-site request forgery (Origin and Sec-Fetch-Site) and on DNS
 rebinding (Host); W3C, Content Security Policy Level 3.
@@ -30,8 +30,9 @@ POLICY = (
     "connect-src 'self' blob: data: ws: wss:; "
     "object-src 'none'; base-uri 'none'; form-action 'self'; frame-ancestors 'self'"
 )
-"""Blobs are what glTF readers hand their pictures through; style-src is for the widgets' library;
-ws: lets the page look at a robot's own rosbridge."""
+"""Blobs carry the images of glTF readers; style-src is for the widgets' library; ws: lets the page
+connect to a robot's own rosbridge.
+"""
 _HEADERS = {
     "Content-Security-Policy": POLICY,
     "X-Content-Type-Options": "nosniff",
@@ -41,9 +42,9 @@ _HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
 }
 _WRONG_TOKEN_S = 0.5
-"""What a wrong token costs its guesser, beside his turn (`TokenGuesses`)."""
+"""Delay after a wrong token, in addition to the turn (`TokenGuesses`)."""
 _GONE_S = 0.2
-"""How long a refused WebSocket has to go."""
+"""Time for a refused WebSocket to close."""
 _HARMLESS = {"GET", "HEAD", "OPTIONS"}
 _GUARDED = ("/api/", "/rosbridge")
 _FOR_ALL = "/api/status"
@@ -52,22 +53,22 @@ _FOR_ALL = "/api/status"
 class _Visitor(NamedTuple):
     role: Role | None
     ticket: str | None
-    """To be given to the browser; None: it has one, or needs none."""
+    """To be set as a cookie; None: the browser has one, or needs none."""
 
 
 class AuthMiddleware:
-    """ASGI middleware that refuses strangers; who passes has a role, in `scope["state"]`.
+    """ASGI middleware that authenticates clients; `scope["state"]` then holds the role.
 
     Parameters
     ----------
     app
-        What is guarded.
+        The application behind it.
     tokens, origins
-        Who is let in.
+        Accepted tokens and web origins.
     cookie
-        Name of the cookie that holds a session; other servers of this machine have other names.
+        Name of the session cookie; other servers of this machine have other names.
     only_loopback
-        Whether the server can be reached under names of loopback only.
+        Whether the server is reachable under names of loopback only.
 
     """
 
@@ -83,7 +84,7 @@ class AuthMiddleware:
         self._guesses = TokenGuesses()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Let a request pass, or refuse it."""
+        """Passes a request on, or refuses it."""
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
@@ -98,10 +99,10 @@ class AuthMiddleware:
         await self._app(scope, receive, self._polite(send, visitor.ticket))
 
     def _check_place(self, scope: Scope, headers: Headers) -> None:
-        """Refuse what a page of a stranger sends, and names that only pretend to be this machine.
+        """Refuses requests by other sites' pages, and host names that only point to this machine.
 
-        A stranger may let a name of his own point to 127.0.0.1: his page is then of the same origin
-        as this server, under that name.
+        DNS rebinding: an attacker may let a host name point to 127.0.0.1; a page under that name
+        then has the same origin as this server.
         """
         host, origin = headers.get("host", ""), headers.get("origin")
         named = name_of(host)
@@ -115,15 +116,18 @@ class AuthMiddleware:
         foreign = headers.get("sec-fetch-site") in ("cross-site", "same-site")
         if scope["type"] == "http" and scope["method"] in _HARMLESS:
             if foreign and headers.get("sec-fetch-mode") != "navigate" and _in_query(scope):
-                raise RefusedError(403, "pages of other sites may not show tokens")
+                raise RefusedError(403, "pages of other sites may not send tokens")
             return
         if not self._origins.let_in(origin, host):
-            raise RefusedError(403, f"pages of {origin} are not let in; allow them with --origin")
+            raise RefusedError(403, f"pages of {origin} are refused; allow them with --origin")
         if origin is None and foreign:
-            raise RefusedError(403, "pages of other sites are not let in")
+            raise RefusedError(403, "pages of other sites are refused")
 
     async def _recognize(self, scope: Scope, headers: Headers, receive: Receive) -> _Visitor:
-        """Whose token or session this is; `RefusedError` where one is needed and missing."""
+        """Returns role and ticket of a request.
+
+        Raises RefusedError if a token is needed and missing or wrong.
+        """
         if not self._tokens.needed:
             return _Visitor(Role.OPERATOR, None)
         given = _token_of(scope, headers)
@@ -133,27 +137,29 @@ class AuthMiddleware:
                 await asyncio.sleep(_WRONG_TOKEN_S)
                 if scope["path"].startswith(_GUARDED):
                     raise RefusedError(401, "wrong token")
-                return _Visitor(None, None)  # the page says so, and asks for another one
+                return _Visitor(None, None)  # the page reports it and asks for another one
             return _Visitor(role, self._sessions.ticket(role))
         role = self._sessions.role_of(_cookie_of(headers, self._cookie))
         path = scope["path"]
         if role is None and path.startswith(_GUARDED) and path != _FOR_ALL:
-            raise RefusedError(401, "show a token: ?token=, or the header Authorization: Bearer")
+            raise RefusedError(
+                401, "a token is needed: ?token=, or the header Authorization: Bearer"
+            )
         return _Visitor(role, None)
 
     async def _role_of(self, given: str, scope: Scope, receive: Receive) -> Role | None:
-        """The role of a token, in turn with others of the same address."""
+        """Returns the role of a token, after other attempts of the same address."""
         client: tuple[str, int] | None = scope.get("client")
         async with self._guesses.turn(client[0] if client else "?"):
             role = self._tokens.role_of(given)
             if role is None:
-                # of a WebSocket nothing may be read before it is accepted
+                # a WebSocket cannot be read before it is accepted
                 gone = partial(_wait_for_end, receive) if scope["type"] == "http" else None
                 await self._guesses.penalize(gone)
         return role
 
     def _polite(self, send: Send, ticket: str | None) -> Send:
-        """`send` that adds the headers, and the session."""
+        """Wraps `send` to add the headers and the session cookie."""
 
         async def polite(message: Message) -> None:
             kinds = ("http.response.start", "websocket.http.response.start", "websocket.accept")
@@ -162,7 +168,7 @@ class AuthMiddleware:
                 for name, value in _HEADERS.items():
                     headers.setdefault(name, value)
                 if ticket is not None:
-                    # Without a Path it holds for the folder of the page, below any prefix.
+                    # Without a Path it is valid for the folder of the page, below any prefix.
                     cookie = f"{self._cookie}={ticket}; HttpOnly; SameSite=Strict"
                     headers.append("Set-Cookie", cookie)
             await send(message)
@@ -171,13 +177,13 @@ class AuthMiddleware:
 
 
 async def _wait_for_end(receive: Receive) -> None:
-    """Returns when the client has left; what it has sent is passed over."""
+    """Waits until the client has left; discards its data."""
     while (await receive())["type"] != "http.disconnect":
         pass
 
 
 def _in_query(scope: Scope) -> str | None:
-    """Returns the token in the address that was asked for."""
+    """Returns the token in the URL."""
     query: str = scope["query_string"].decode("latin-1")
     given = parse_qs(query).get("token")
     return given[0] if given else None
@@ -205,7 +211,7 @@ async def _refuse(error: RefusedError, scope: Scope, receive: Receive, send: Sen
         await response(scope, receive, send)
         return
     await WebSocket(scope, receive, send).send_denial_response(response)
-    # uvicorn logs an error for who returns before the connection is gone
+    # uvicorn logs an error if this returns before the connection is closed
     with suppress(TimeoutError):
         async with asyncio.timeout(_GONE_S):
             while True:

@@ -1,7 +1,7 @@
-"""Reads a stranger's file in a process of its own, with bounds on its memory and time.
+"""Reads untrusted files in a separate process, with bounds on its memory and time.
 
-The child calls `bound_this_process` first and prints one JSON object; the page's process starts it
-with `run_bounded` and goes on whatever becomes of it.
+The child calls `bound_this_process` first and prints one JSON object; the server starts it with
+`run_bounded` and survives its failure.
 """
 
 from __future__ import annotations
@@ -19,26 +19,26 @@ from typing import Any
 from volery.core.errors import VoleryError
 
 _NICENESS = 5
-"""A run beside it, at full speed on all cores, keeps three quarters of them."""
+"""With this, a run at full speed on all cores retains three quarters of them."""
 
 
 @dataclass(frozen=True)
 class ProcessBounds:
-    """What a child may take."""
+    """Resource limits of a child."""
 
     memory_bytes: int
-    """Of addresses; libraries reserve more than they use."""
+    """Address space; libraries reserve more than they use."""
     cpu_s: int
     wall_s: float
-    """On a machine that has much else to do."""
+    """Longer than `cpu_s`, for a busy machine."""
 
 
 class BoundedError(VoleryError):
-    """A file cannot be read within the bounds, or its reader broke off."""
+    """Raised if a file cannot be read within the bounds, or its reader fails."""
 
 
 def bound_this_process(bounds: ProcessBounds) -> None:
-    """Give up priority, and all memory and processor time beyond the bounds."""
+    """Lowers the priority, and limits memory and processor time."""
     os.nice(_NICENESS)
     resource.setrlimit(resource.RLIMIT_AS, (bounds.memory_bytes, bounds.memory_bytes))
     resource.setrlimit(resource.RLIMIT_CPU, (bounds.cpu_s, 2 * bounds.cpu_s))
@@ -46,9 +46,9 @@ def bound_this_process(bounds: ProcessBounds) -> None:
 
 
 def run_bounded(module: str, words: Sequence[str], bounds: ProcessBounds) -> Any:
-    """What `python -m MODULE WORDS` prints, from JSON.
+    """Returns the JSON that `python -m MODULE WORDS` prints.
 
-    Raises `BoundedError` where it takes too long, or prints nothing: it ran out of memory.
+    Raises BoundedError if it takes too long, or prints nothing because it ran out of memory.
     """
     command = [sys.executable, "-P", "-m", module, *words]
     few = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
@@ -63,10 +63,10 @@ def run_bounded(module: str, words: Sequence[str], bounds: ProcessBounds) -> Any
             env=few,
         )
     except subprocess.TimeoutExpired:
-        raise BoundedError("it takes too long to read") from None
+        raise BoundedError("the file takes too long to read") from None
     try:
         return json.loads(ran.stdout)
     except ValueError:
         if ran.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
-            raise BoundedError("it takes too long to read") from None
-        raise BoundedError("the file cannot be read: its reader broke off") from None
+            raise BoundedError("the file takes too long to read") from None
+        raise BoundedError("the file cannot be read: its reader failed") from None

@@ -1,9 +1,9 @@
-"""Draws the pictures of the scenario cards with Volery's own camera.
+"""Renders the images of the scenario cards with Volery's own camera.
 
-    python -m volery.server.card_renderer              # all scenarios that ship
+    python -m volery.server.card_renderer              # all shipped scenarios
     python -m volery.server.card_renderer hover longleaf
 
-A photographer flies along: one UAV more, whose camera looks at the first one.
+An additional UAV, the photographer, carries a camera that looks at the first UAV.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ from volery.server.cards import CARDS
 
 WIDTH, HEIGHT = 480, 270
 _QUALITY = 85
-"""Of the JPEG file, as libjpeg counts it: about 25 kB a picture."""
+"""Quality of the JPEG file, as in libjpeg: about 25 kB an image."""
 _TYPE = "photographer"
 _STUDIO_M = 150.0
-"""Height above the highest ground at which the photographer waits."""
+"""Initial height of the photographer, above the highest ground."""
 _EXPOSURE_S = 0.3
 
 
 @dataclass(frozen=True)
 class CardView:
-    """When and from where a scenario is taken: the eye looks at the first UAV."""
+    """Time and viewpoint of a card; the camera looks at the first UAV."""
 
     at_s: float = 6.0
-    """Simulated time."""
+    """Simulated time, s."""
     eye_m: tuple[float, float, float] = (-5.0, -2.5, 1.8)
-    """From the first UAV, map axes."""
+    """Offset from the first UAV, map axes, m."""
     fov_deg: float = 60.0
 
 
@@ -62,7 +62,7 @@ VIEWS = {
 
 
 def draw(name: str) -> bytes:
-    """The card of a scenario that ships, as a JPEG file."""
+    """Returns the card of a shipped scenario as a JPEG file."""
     view = VIEWS.get(name, CardView())
     with Simulation(_with_photographer(load_scenario(name), view)) as simulation:
         simulation.run(view.at_s)
@@ -76,7 +76,7 @@ def draw(name: str) -> bytes:
 
 
 def _with_photographer(scenario: Scenario, view: CardView) -> Scenario:
-    """The scenario with one UAV more, whose camera looks against `eye_m`."""
+    """Returns the scenario with an additional UAV whose camera looks against `eye_m`."""
     x, y, z = (-side for side in view.eye_m)
     pitch_deg = -math.degrees(math.atan2(z, math.hypot(x, y)))
     camera = {
@@ -107,7 +107,7 @@ def _jpeg(message: Any) -> bytes:
 
 
 def main(names: list[str]) -> None:
-    """Draw the cards of some scenarios, or of all."""
+    """Renders the cards of some scenarios, or of all."""
     for name in names or library.names():
         (CARDS / f"{name}.jpg").write_bytes(draw(name))
         sys.stdout.write(f"{name}\n")

@@ -1,7 +1,7 @@
-"""HTTP connections of the page's server: a request must come whole within a time.
+"""HTTP connections of the page's server, with a deadline for requests.
 
-uvicorn waits without end for the head of a request, and for the rest of a body that it has answered
-already. A few hundred connections that send one byte now and then would keep all others out.
+uvicorn waits without limit for the head of a request, and for the rest of a body after the
+response. A few hundred connections that send one byte now and then would block all other clients.
 """
 
 from __future__ import annotations
@@ -14,9 +14,11 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from volery.core.listener import Listener
 
 HEAD_TIMEOUT_S = 10.0
-"""For the head of a request, and for the rest of a body after its answer (modelling choice)."""
+"""Deadline for the head of a request, and for the rest of a body after its response (modelling
+choice).
+"""
 READ_BYTES = 64 << 10
-"""At once, and so what is kept of requests that a client sends before the answer to another."""
+"""Max bytes of a read, and so of requests that are buffered before the response to another."""
 
 
 def http_protocol(listener: Listener) -> type[H11Protocol]:
@@ -31,20 +33,20 @@ def http_protocol(listener: Listener) -> type[H11Protocol]:
 
 
 class _DeadlineProtocol(H11Protocol):
-    """uvicorn's own, with a deadline for what the client has to send."""
+    """uvicorn's protocol with a deadline for the client's data."""
 
     _listener: Listener
     _deadline: asyncio.TimerHandle | None = None
     _proven = False
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """As of asyncio."""
+        """Implements asyncio.Protocol."""
         transport.max_size = READ_BYTES  # type: ignore[attr-defined]
         super().connection_made(transport)
         self._watch()
 
     def handle_events(self) -> None:
-        """As of uvicorn: there are new bytes, or the next request has its turn."""
+        """Overrides uvicorn's method: there are new bytes, or the next request begins."""
         super().handle_events()
         if not self._proven and self.conn.their_state not in (h11.IDLE, h11.ERROR):
             self._proven = True
@@ -52,17 +54,17 @@ class _DeadlineProtocol(H11Protocol):
         self._watch()
 
     def on_response_complete(self) -> None:
-        """As of uvicorn."""
+        """Overrides uvicorn's method."""
         super().on_response_complete()
         self._watch()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """As of asyncio."""
+        """Implements asyncio.Protocol."""
         self._stop_watch()
         super().connection_lost(exc)
 
     def _watch(self) -> None:
-        """Sets the deadline where the client has to send something, else takes it back."""
+        """Sets the deadline if the client has to send data, else cancels it."""
         if not self._is_client_due() or self.transport.is_closing():
             self._stop_watch()
         elif self._deadline is None:

@@ -1,9 +1,10 @@
-"""Looks into logs in a process of its own: how long each is, and whether it can be played.
+"""Reads logs in a separate process: their duration, and whether they can be played.
 
     python -m volery.server.log_check summary FILE ...
     python -m volery.server.log_check play FILE
 
-Prints a JSON list with an object for each file: `seconds`, `messages`, `problem`, or `error` alone.
+It prints a JSON list with an object for each file: `seconds`, `messages`, `problem`, or `error`
+alone.
 """
 
 from __future__ import annotations
@@ -23,15 +24,15 @@ from volery.server.bounded_process import (
 )
 
 BOUNDS = ProcessBounds(memory_bytes=3 << 30, cpu_s=60, wall_s=240.0)
-"""A chunk of the greatest size takes 1 GB; numpy and the codecs reserve another one."""
+"""A chunk of the max size takes 1 GB; numpy and the codecs reserve another one."""
 _FILES_AT_ONCE = 200
-"""In one process."""
+"""Max number of files in one process."""
 
 
 def look_into(paths: Sequence[Path], *, play: bool = False) -> list[dict[str, Any]]:
-    """What this module prints of each file; `error` too where the process came to an end.
+    """Returns this module's output for each file; `error` also if the process failed.
 
-    play: also open it as a player does.
+    play: also opens the file for playback.
     """
     found: list[dict[str, Any]] = []
     for first in range(0, len(paths), _FILES_AT_ONCE):
@@ -48,7 +49,7 @@ def look_into(paths: Sequence[Path], *, play: bool = False) -> list[dict[str, An
 
 
 def main(what: str, *files: str) -> None:
-    """Look into files, and print what is in them."""
+    """Reads files and prints their summaries."""
     bound_this_process(BOUNDS)
     told = [_of(Path(file), play=what == "play") for file in files]
     sys.stdout.write(json.dumps(told))

@@ -1,4 +1,4 @@
-"""Names of the operators who are connected to the page's server, no two the same."""
+"""Unique names of the operators on the page's server."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from volery.runtime.vehicles.control_authority import MOST_CHARACTERS, operator_
 
 
 class OperatorNames:
-    """Names that are in use, however they are spelled; its methods belong to the server's thread.
+    """Holds the names in use; call its methods in the server's thread.
 
-    See `operator_name`: `Anna`, `anna` and `Anna ` are one name.
+    Case and spaces do not count, see `operator_name`: `Anna`, `anna` and `Anna ` are one name.
     """
 
     def __init__(self) -> None:
@@ -19,7 +19,7 @@ class OperatorNames:
         return isinstance(name, str) and operator_key(name) in self._names
 
     def sign_in(self, wanted: str = "") -> str:
-        """A name of one's own: the wanted one if it is free, else one with a number."""
+        """Reserves and returns a name: the wanted one if it is free, else one with a number."""
         base = operator_name(wanted[: 4 * MOST_CHARACTERS])[: MOST_CHARACTERS - 5].strip()
         number, name = 1, base or "operator 1"
         while name in self:
@@ -29,12 +29,12 @@ class OperatorNames:
         return name
 
     def rename(self, old: str, new: str) -> None:
-        """Call oneself otherwise. `BridgeError` where another operator is called like that."""
+        """Renames an operator. Raises BridgeError if another operator has the new name."""
         if new in self and operator_key(new) != operator_key(old):
             raise BridgeError(f"another operator is called {new}")
         self._names.discard(operator_key(old))
         self._names.add(operator_key(new))
 
     def sign_out(self, name: str) -> None:
-        """Give a name back."""
+        """Releases a name."""
         self._names.discard(operator_key(name))

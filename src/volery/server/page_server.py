@@ -1,4 +1,4 @@
-"""The page's server in a thread of its own, which outlives the worlds it shows.
+"""The page's server in its own thread; it continues to run when the world changes.
 
 with PageServer(PageSettings(port=8080)) as server:
     server.building("hover", "One F450 ...")
@@ -35,18 +35,18 @@ from volery.server.settings import PageSettings
 from volery.server.websocket_protocol import PageWebSocket
 
 _KEEPALIVE_S = 20.0
-"""Between two pings, and how long an answer may take."""
+"""Period of pings, and timeout of their responses."""
 _LONGEST_CALL_S = 30.0
-"""Of the server's own work on a busy machine; nothing in it waits for a client longer."""
+"""Timeout of the server's own work on a busy machine; it waits for no client longer."""
 
 _REPEATS = RepeatFilter(bare=("Invalid UTF-8",))
-"""Clients can cause uvicorn's warnings without end."""
+"""Clients can cause uvicorn's warnings without limit."""
 
 
 class PageServer:
     """Serves the page. Use it as a context manager, or call `start` and `stop`.
 
-    shelf: the scenarios of the cards; those that ship and the uploads unless it is given.
+    shelf: the scenarios of the cards; default: shipped ones and uploads.
     """
 
     def __init__(self, settings: PageSettings, shelf: ScenarioCatalog | None = None) -> None:
@@ -59,24 +59,25 @@ class PageServer:
 
     @property
     def port(self) -> int:
-        """Where it listens."""
+        """Port of the server."""
         return self._settings.port if self._socket is None else self._socket.getsockname()[1]
 
     @property
     def url(self) -> str:
-        """What to open in a browser."""
+        """URL of the page."""
         host = self._settings.host
         return f"http://{f'[{host}]' if ':' in host else host}:{self.port}/"
 
-    # ---------------------------------------------------------------- for the owner, in his thread
+    # ----------------------------------------------------------------- called by the owner's thread
 
     def start(self) -> None:
-        """Begin to serve.
+        """Starts to serve.
 
         Raises
         ------
         BridgeError
-            The address is taken, not this machine's, or beyond loopback without consent and token.
+            The address is in use, not this machine's, or beyond loopback without permission and
+            token.
 
         """
         settings = self._settings
@@ -111,16 +112,16 @@ class PageServer:
         self._call(self._begin(self._server, self._socket))
 
     def building(self, scenario: str, description: str = "", message: str = "") -> None:
-        """Tell that a scenario is being built; `message`: what went wrong before."""
+        """Reports that a scenario is being built; `message`: an earlier error."""
         self._leave(
             ServerSituation(ServerActivity.BUILDING, scenario, description.strip(), message)
         )
 
     @contextmanager
     def showing(self, world: World, message: str = "") -> Iterator[None]:
-        """Let clients into a world, and send them out of it at the end.
+        """Connects clients to a world, and disconnects them at the end.
 
-        message: what went wrong before, such as that another world could not be built.
+        message: an earlier error, such as that another world could not be built.
         """
         scenario: Scenario | None = getattr(world, "scenario", None)
         name: str | None = getattr(world, "name", None) if scenario is None else scenario.name
@@ -140,7 +141,7 @@ class PageServer:
             )
 
     def stop(self) -> None:
-        """Let everybody go and end the thread; a second time nothing happens."""
+        """Disconnects all clients and ends the thread; further calls have no effect."""
         if self._thread.running:
             self._leave(ServerSituation(ServerActivity.NO_WORLD, message="the server ends"))
             if self._server is not None:
@@ -151,7 +152,7 @@ class PageServer:
         self._thread.end()
 
     def __enter__(self) -> PageServer:
-        """Start it."""
+        """Starts the server."""
         try:
             self.start()
         except BaseException:
@@ -160,17 +161,17 @@ class PageServer:
         return self
 
     def __exit__(self, *_exception: object) -> None:
-        """Stop it."""
+        """Stops the server."""
         self.stop()
 
-    # ------------------------------------------------------------------------------- its own thread
+    # ---------------------------------------------------------------------- in the server's thread
 
     async def _begin(self, server: uvicorn.Server, listening: Listener) -> None:
         self._serving = asyncio.create_task(server.serve([listening]))
         while not server.started:
             if self._serving.done():
                 self._serving.result()
-                raise BridgeError("the page's server ended before it began")
+                raise BridgeError("the page's server ended during its start")
             await asyncio.sleep(0.01)
 
     async def _end(self) -> None:
@@ -185,7 +186,7 @@ class PageServer:
 
 
 def _listen(host: str, port: int) -> Listener:
-    """A listening socket. `BridgeError` where there cannot be one."""
+    """Returns a listening socket. Raises BridgeError if the address cannot be used."""
     try:
         opening = Opening(look_at_http, HEAD_TIMEOUT_S)
         listening = open_listener(host, port, "page", opening=opening)
@@ -195,5 +196,5 @@ def _listen(host: str, port: int) -> Listener:
         raise BridgeError(
             f"the page's server cannot listen on {host}:{port}: "
             f"{getattr(error, 'strerror', None) or error}; "
-            "end the program that has the port, or choose another"
+            "stop the program that uses the port, or choose another port"
         ) from None

@@ -1,6 +1,6 @@
-"""Services that change nothing: all that viewers may call, and nobody's command to a UAV.
+"""Services that change nothing: viewers may call them, and they command no UAV.
 
-A new service joins this list, or is for operators.
+Add a new service to this list if viewers may call it; else only operators may.
 """
 
 from __future__ import annotations

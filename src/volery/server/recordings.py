@@ -1,4 +1,4 @@
-"""`./api/recordings`: logs that were made here, to fetch, and logs that visitors bring."""
+"""Route `./api/recordings`: downloads recorded logs and uploads others."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ from volery.server.request_bodies import check_operator, save_body
 from volery.server.server_state import ServerState
 
 MOST_BYTES = 2_000_000_000
-"""Of a log that somebody brings."""
+"""Max size of an uploaded log."""
 _SUFFIXES = (".mcap", ".bag")
 _NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9_. -]{0,99}\.(mcap|bag)$")
 _WAITING = ".incoming_"
 _STILL_S = 3.0
-"""A log that was written to since then may be growing."""
+"""A log changed within this time may still grow."""
 _MOST_KNOWN = 10_000
 
 
 async def recordings(request: Request) -> Response:
-    """All logs of the folder, the newest first."""
+    """Returns all logs of the folder, newest first."""
     site: ServerState = request.app.state.site
     told = [] if site.recordings is None else await asyncio.to_thread(_listed, site.recordings)
     return JSONResponse(told, headers={"Cache-Control": "no-store"})
 
 
 async def recording(request: Request) -> Response:
-    """One log, to keep."""
+    """Returns one log as a download."""
     site: ServerState = request.app.state.site
     name: str = request.path_params["name"]
     found = None if site.recordings is None else site.recordings / name
@@ -48,12 +48,12 @@ async def recording(request: Request) -> Response:
 
 
 async def bring_recording(request: Request) -> Response:
-    """Take a log, and look whether it is one."""
+    """Stores an uploaded log after a check."""
     check_operator(request)
     site: ServerState = request.app.state.site
     folder = site.recordings
     if folder is None:
-        raise RefusedError(409, "this server keeps no recordings; start it with --recordings-dir")
+        raise RefusedError(409, "this server stores no recordings; start it with --recordings-dir")
     called = request.query_params.get("name", "")[:200]
     suffix = PurePosixPath(called.replace("\\", "/")).suffix.lower()
     if suffix not in _SUFFIXES:
@@ -67,12 +67,12 @@ async def bring_recording(request: Request) -> Response:
     try:
         await save_body(request, waiting, most)
         lock: asyncio.Lock = request.app.state.upload_lock
-        async with lock:  # one after the other
+        async with lock:  # one at a time
             (found,) = await asyncio.to_thread(look_into, [waiting], play=True)
         if "error" in found:
             raise RefusedError(422, found["error"].replace(str(waiting), called))
         if not found["messages"]:
-            raise RefusedError(422, f"there is no message in it. {found['problem']}".strip())
+            raise RefusedError(422, f"the log holds no messages. {found['problem']}".strip())
         name = _free_name(folder, called, suffix)
         waiting.rename(folder / name)
     finally:
@@ -96,18 +96,18 @@ def _told(path: Path) -> dict[str, Any]:
 
 
 class _Durations:
-    """Remembers how long logs are, as long as they stay as they are."""
+    """Caches the durations of logs until the files change."""
 
     def __init__(self) -> None:
         self._known: OrderedDict[tuple[Path, int, int], float | None] = OrderedDict()
         self._looking = threading.Lock()
 
     def of(self, path: Path) -> float | None:
-        """Seconds; None where the log cannot be read, grows, or is being looked into."""
+        """Returns seconds; None if the log cannot be read, grows, or is being read."""
         return self._known.get(_version(path))
 
     def learn(self, paths: list[Path]) -> None:
-        """Look into those that are not known; not while another request does."""
+        """Reads new logs, unless another request does."""
         if not self._looking.acquire(blocking=False):
             return
         try:
@@ -128,14 +128,14 @@ def _version(path: Path) -> tuple[Path, int, int]:
 
 
 def _may_be_growing(path: Path) -> bool:
-    return time.time() - path.stat().st_mtime < _STILL_S  # its end would have to be looked for
+    return time.time() - path.stat().st_mtime < _STILL_S  # its end would have to be searched for
 
 
 _durations = _Durations()
 
 
 def _free_name(folder: Path, called: str, suffix: str) -> str:
-    """A name of our own that reminds of the client's."""
+    """Returns a safe, unused name similar to the client's."""
     stem = PurePosixPath(called.replace("\\", "/")).stem
     base = re.sub(r"[^A-Za-z0-9_-]+", "_", stem).strip("_-")[:60] or "log"
     number, name = 1, f"{base}{suffix}"

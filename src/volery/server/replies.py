@@ -1,4 +1,4 @@
-"""How the server answers."""
+"""Error responses of the server."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from volery.core.errors import VoleryError
 
 
 class RefusedError(VoleryError):
-    """A request that is not fulfilled: HTTP status, and one sentence for people."""
+    """A refused request: HTTP status, and one sentence for users."""
 
     def __init__(self, status: int, message: str) -> None:
         super().__init__(message)
@@ -16,5 +16,5 @@ class RefusedError(VoleryError):
 
 
 def refused(status: int, message: str) -> JSONResponse:
-    """`{"error": message}`."""
+    """Returns the response `{"error": message}`."""
     return JSONResponse({"error": message}, status, headers={"Cache-Control": "no-store"})

@@ -1,4 +1,4 @@
-"""Bodies of requests: written to a file as they come, and no more of them than allowed."""
+"""Writes request bodies to files, with limits on size and time."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from volery.server.auth import Role
 from volery.server.replies import RefusedError
 
 LONGEST_PAUSE_S = 30.0
-"""Between two pieces of a body (modelling choice)."""
+"""Max time between two pieces of a body (modelling choice)."""
 LEAST_BYTES_S = 1000.0
-"""Of a body on average, after the first such time (modelling choice)."""
+"""Min average rate of a body, after the first such time (modelling choice)."""
 
 
 async def save_body(request: Request, path: Path, most_bytes: int) -> int:
-    """Write the body of a request to `path`; the number of bytes.
+    """Writes the body of a request to `path`; returns the number of bytes.
 
-    Raises `RefusedError` where there are none, more than `most_bytes`, or where they come too
-    slowly; what was written stays.
+    Raises RefusedError if it is empty, larger than `most_bytes`, or too slow; the written part
+    remains.
     """
-    too_large = RefusedError(413, f"more than {_size(most_bytes)}; that is the most taken here")
+    too_large = RefusedError(413, f"the file is larger than the limit of {_size(most_bytes)}")
     announced = request.headers.get("content-length", "")
     if announced.isdecimal() and int(announced) > most_bytes:
         raise too_large
@@ -38,36 +38,36 @@ async def save_body(request: Request, path: Path, most_bytes: int) -> int:
                     raise too_large
                 file.write(chunk)
         except OSError as error:
-            raise RefusedError(507, f"the file cannot be kept: {reason_of(error)}") from None
+            raise RefusedError(507, f"the file cannot be saved: {reason_of(error)}") from None
         except ClientDisconnect:
-            raise RefusedError(400, "the file did not come whole") from None
+            raise RefusedError(400, "the upload was interrupted") from None
     if not size:
         raise RefusedError(400, "the file is empty")
     return size
 
 
 async def _pieces_in_time(request: Request) -> AsyncIterator[bytes]:
-    """Yields the pieces of a body; `RefusedError` for a client that sends them too slowly."""
+    """Yields the pieces of a body. Raises RefusedError for a client that sends too slowly."""
     pieces, size, began_s = aiter(request.stream()), 0, time.monotonic()
     while True:
         try:
             async with asyncio.timeout(LONGEST_PAUSE_S):
                 piece = await anext(pieces, None)
         except TimeoutError:
-            raise RefusedError(408, f"nothing has come for {LONGEST_PAUSE_S:g} s") from None
+            raise RefusedError(408, f"no data received for {LONGEST_PAUSE_S:g} s") from None
         if piece is None:
             return
         yield piece
         size += len(piece)
         elapsed_s = time.monotonic() - began_s
         if elapsed_s > LONGEST_PAUSE_S and size < LEAST_BYTES_S * elapsed_s:
-            raise RefusedError(408, f"the file comes with less than {LEAST_BYTES_S:g} bytes/s")
+            raise RefusedError(408, f"the upload is slower than {LEAST_BYTES_S:g} bytes/s")
 
 
 def check_operator(request: Request) -> None:
-    """`RefusedError` for a viewer: what is brought here changes something."""
+    """Raises RefusedError for a viewer: uploads change the server."""
     if request.state.role is not Role.OPERATOR:
-        raise RefusedError(403, "a viewer may not bring files; show the operators' token")
+        raise RefusedError(403, "a viewer may not upload files; use the operators' token")
 
 
 def _size(count: int) -> str:

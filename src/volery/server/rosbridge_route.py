@@ -1,4 +1,4 @@
-"""`./rosbridge`: clients of the graph, over starlette's WebSocket."""
+"""Route `./rosbridge`: clients of the graph, over starlette's WebSocket."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ _log = logging.getLogger(__name__)
 
 MOST_CLIENTS = 1000
 LONGEST_STALL_S = 60.0
-"""A client that lets a frame wait so long is given up; pings notice one that is gone earlier."""
+"""Max time to send a frame to a client; pings detect a lost client earlier."""
 _TRY_AGAIN_LATER = 1013
 """IANA's WebSocket Close Code Number Registry."""
 
 
 class _Channel:
-    """A WebSocket of starlette as a `Channel`."""
+    """Adapts a starlette WebSocket to a `WebSocketSession`."""
 
     def __init__(self, websocket: WebSocket) -> None:
         self._websocket = websocket
@@ -51,7 +51,7 @@ class _Channel:
 
 
 async def serve_rosbridge(websocket: WebSocket) -> None:
-    """Serve one client until it leaves or its world is gone."""
+    """Serves one client until it leaves or its world ends."""
     site: ServerState = websocket.app.state.site
     spoken = CBOR_PROTOCOL if CBOR_PROTOCOL in websocket.scope["subprotocols"] else None
     await websocket.accept(spoken)
@@ -71,7 +71,7 @@ async def serve_rosbridge(websocket: WebSocket) -> None:
 def _gate_of(
     websocket: WebSocket, site: ServerState, world: JoinedWorld
 ) -> Iterator[AccessPolicy | None]:
-    """Yields what the client may do; an operator that leaves releases its UAVs."""
+    """Yields the client's policy; releases an operator's UAVs when it leaves."""
     if websocket.state.role is not Role.OPERATOR:
         yield ViewerPolicy()
         return
@@ -92,7 +92,7 @@ def _gate_of(
 async def _serve(
     site: ServerState, world: JoinedWorld, channel: _Channel, name: str, gate: AccessPolicy | None
 ) -> None:
-    """Hold one conversation."""
+    """Runs one session."""
     loop = asyncio.get_running_loop()
     bell = Bell(loop)
     session = world.gateway.open(name)

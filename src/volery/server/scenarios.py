@@ -1,4 +1,4 @@
-"""Scenario cards: what can be loaded, told from the scenarios themselves without flying them."""
+"""Scenario cards: summaries of the scenarios that can be loaded."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ Card = dict[str, Any]
 
 
 async def scenarios(request: Request) -> Response:
-    """`./api/scenarios`: a card for each, those that ship first."""
+    """Returns `./api/scenarios`: a card for each scenario, shipped ones first."""
     site: ServerState = request.app.state.site
     told = await run_in_threadpool(cards_of, site.shelf)
     return JSONResponse(told, headers={"Cache-Control": "no-store"})
 
 
 async def picture(request: Request) -> Response:
-    """`./api/scenarios/NAME.jpg`: the picture of a card."""
+    """Returns `./api/scenarios/NAME.jpg`: the image of a card."""
     name: str = request.path_params["name"]
     if name not in library.names() or not (CARDS / f"{name}.jpg").is_file():
-        raise RefusedError(404, f"there is no picture of '{name[:80]}'")
+        raise RefusedError(404, f"there is no image of '{name[:80]}'")
     kept = {"Cache-Control": f"private, max-age={_DAY_S}"}
     return FileResponse(CARDS / f"{name}.jpg", headers=kept)
 
 
 def cards_of(shelf: ScenarioCatalog) -> list[Card]:
-    """Cards of all scenarios; one that cannot be read any more has none."""
+    """Returns the cards of all scenarios that can be read."""
     cards = [_shipped(name) for name in library.names()]
     cards += [_card(given, uploaded=False) for given in shelf.given()]
     for name in shelf.added():

@@ -1,6 +1,6 @@
-"""What the server knows of the run: its state, its world, and who is connected.
+"""State of the server: activity, current world, connected clients.
 
-Its owner, who builds and flies, tells through `PageServer`; the server's own thread reads.
+The owner, which builds and runs worlds, sets it through `PageServer`; the server's thread reads it.
 """
 
 from __future__ import annotations
@@ -28,48 +28,48 @@ from volery.scenario.schema import Scenario
 from volery.server.operator_names import OperatorNames
 
 _FAREWELL_S = 1.0
-"""Time for a client to take the news that its world is gone."""
+"""Time for a client to receive the close frame."""
 
 
 class ServerActivity(StrEnum):
-    """What goes on."""
+    """Activity of the server."""
 
     BUILDING = "building"
     FLYING = "flying"
     ENDED = "ended"
-    """A simulation waits at the end of its scenario."""
+    """A simulation has reached the end of its scenario and waits."""
     NO_WORLD = "no_world"
     FAILED = "failed"
-    """No world, because the scenario could not be built."""
+    """As NO_WORLD, because the scenario could not be built."""
 
 
 @dataclass(frozen=True)
 class ServerSituation:
-    """The present state, in words."""
+    """Activity and texts that the status reports."""
 
     state: ServerActivity = ServerActivity.BUILDING
     scenario: str | None = None
     description: str = ""
     message: str = ""
-    """What went wrong, if something did."""
+    """Last error; empty: none."""
 
 
 class World(Protocol):
-    """What clients can join: a simulation, an idle server, a recording.
+    """A world that clients can join: a simulation, an idle server, a log.
 
-    Where it has a `scenario`, `geometry` and `operators`, as a `Simulation` has, they are served
-    too. Where it has no scenario but a `name`, as a log of unknown origin has, that is told.
+    If it has a `scenario`, `geometry` and `operators`, like a `Simulation`, the server serves them
+    as well. A log of unknown origin has a `name` instead of a scenario.
     """
 
     graph: Graph
     gateway: Gateway
 
     def use_low_latency(self) -> None:
-        """Answer clients soon."""
+        """Reduces the latency of responses to clients."""
 
 
 class JoinedWorld:
-    """A world that clients have joined: what their conversations have in common."""
+    """A world that clients have joined, and the state that its sessions share."""
 
     def __init__(self, world: World) -> None:
         graph = world.graph
@@ -86,7 +86,7 @@ class JoinedWorld:
 
     @property
     def geometry(self) -> Geometry | None:
-        """What stands there at present; None: nothing that could be shown."""
+        """Current geometry of the world; None: nothing to show."""
         geometry: Geometry | None = getattr(self._world, "geometry", None)
         return geometry
 
@@ -97,7 +97,7 @@ class JoinedWorld:
         return end is not None and end.waits
 
     def leave(self) -> None:
-        """Take back what is offered to clients."""
+        """Stops the services for clients."""
         self._rosapi.stop()
         self._transforms.stop()
 
@@ -110,7 +110,7 @@ class Client:
     conversation: asyncio.Task[Exception | None]
 
     async def dismiss(self, reason: str) -> None:
-        """Have it connect again, to another world; who does not listen is left alone."""
+        """Closes the connection with a request to reconnect; ignores an unresponsive client."""
         with suppress(Exception):
             async with asyncio.timeout(_FAREWELL_S):
                 await self.channel.close(SERVICE_RESTART, reason)
@@ -120,10 +120,10 @@ class Client:
 
 @dataclass(eq=False)
 class ServerState:
-    """What all requests share. Written to in the server's thread only."""
+    """State that all requests share; only the server's thread changes it."""
 
     recordings: Path | None = None
-    """Folder of logs; None: there is none."""
+    """Folder of logs; None: no recordings."""
     shelf: ScenarioCatalog = field(default_factory=ScenarioCatalog)
     """Scenarios that can be loaded; its folder is that of uploads."""
     situation: ServerSituation = field(default_factory=ServerSituation)
@@ -132,11 +132,11 @@ class ServerState:
     crew: OperatorNames = field(default_factory=OperatorNames)
 
     async def join(self, world: World, situation: ServerSituation) -> None:
-        """Let clients into a world."""
+        """Connects clients to a world."""
         self.world, self.situation = JoinedWorld(world), situation
 
     async def leave(self, situation: ServerSituation) -> None:
-        """Send everybody out of the present world."""
+        """Disconnects all clients from the present world."""
         world, self.world, self.situation = self.world, None, situation
         farewell = situation.message or "the world changes"
         await asyncio.gather(*(client.dismiss(farewell) for client in tuple(self.clients)))

@@ -1,4 +1,4 @@
-"""Where the page's server listens, and whom it lets in."""
+"""Settings of the page's server: address, tokens, origins, folders."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 8080
 
 @dataclass(frozen=True)
 class PageSettings:
-    """Where the server listens and whom it lets in."""
+    """Address, tokens, origins and folders of the server."""
 
     host: str = DEFAULT_HOST
     port: int = DEFAULT_PORT
-    """0: a free one."""
+    """0: a free port."""
     tokens: Tokens = field(default_factory=Tokens)
     anywhere: bool = False
-    """Consent to listening beyond loopback."""
+    """Permission to listen beyond loopback."""
     origins: tuple[str, ...] = ()
-    """Further web origins to let in, such as that of a reverse proxy."""
+    """Additional web origins to accept, such as that of a reverse proxy."""
     recordings: Path | None = None
-    """Folder of the logs that clients make, fetch and bring; None: there is none."""
+    """Folder of recorded and uploaded logs; None: no recordings."""
     uploads: Path | None = None
-    """Folder of the scenarios that are made of files that clients bring; None: there is none."""
+    """Folder of uploaded scenarios; None: no uploads."""

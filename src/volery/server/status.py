@@ -1,4 +1,4 @@
-"""`./api/status`: what goes on."""
+"""Route `./api/status`: the state of the server."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from volery.server.server_state import ServerActivity, ServerState
 
 
 async def status(request: Request) -> Response:
-    """State, scenario and world; who has yet to show a token learns that and no more."""
+    """Returns state, scenario and world; to a client without a token only that it needs one."""
     site: ServerState = request.app.state.site
     role: Role | None = request.state.role
     return JSONResponse(_told(site, role), headers={"Cache-Control": "no-store"})

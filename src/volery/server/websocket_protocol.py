@@ -11,53 +11,53 @@ from websockets.frames import CloseCode, Frame
 from volery.bridges.frame_limits import MAX_FRAGMENTS, FrameLimits, HeldTransport
 
 READ_BYTES = 16 << 10
-"""At once; all frames in it are handled before another client has its turn."""
+"""Max bytes of a read; all frames in it are handled before another client has its turn."""
 
 
 class PageWebSocket(WebSocketsSansIOProtocol):
-    """uvicorn's own, with bounds for frames that are no whole message."""
+    """uvicorn's protocol with bounds for control frames and fragments."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """As of asyncio."""
+        """Implements asyncio.Protocol."""
         transport.max_size = READ_BYTES  # type: ignore[attr-defined]
         self._held = HeldTransport(cast("asyncio.Transport", transport))
         self._limits = FrameLimits(self._held, self.loop)
         super().connection_made(cast("asyncio.BaseTransport", self._held))
 
     def resume_writing(self) -> None:
-        """As of asyncio: the client has read."""
+        """Implements asyncio.Protocol: the client has read."""
         super().resume_writing()
         self._limits.answers_read()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """As of asyncio."""
+        """Implements asyncio.Protocol."""
         self._held.end()
         super().connection_lost(exc)
 
     def handle_ping(self) -> None:
-        """As of uvicorn; a client that does not read the answers is not read from."""
+        """Overrides uvicorn's method; does not read on while responses are unread."""
         super().handle_ping()
         if not self.writable.is_set():
             self._limits.unread_answer()
         self._limits.control_frame()
 
     def handle_pong(self, event: Frame) -> None:
-        """As of uvicorn."""
+        """Overrides uvicorn's method."""
         super().handle_pong(event)
         self._limits.control_frame()
 
     def handle_text(self, event: Frame) -> None:
-        """As of uvicorn."""
+        """Overrides uvicorn's method."""
         self._limits.message()
         super().handle_text(event)
 
     def handle_bytes(self, event: Frame) -> None:
-        """As of uvicorn."""
+        """Overrides uvicorn's method."""
         self._limits.message()
         super().handle_bytes(event)
 
     def handle_cont(self, event: Frame) -> None:
-        """As of uvicorn, for a bounded number of fragments."""
+        """Overrides uvicorn's method, for a bounded number of fragments."""
         if self._limits.fragment():
             super().handle_cont(event)
         elif not self.close_sent:

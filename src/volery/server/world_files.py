@@ -1,4 +1,4 @@
-"""The world as glTF, made once for each geometry, in a thread of its own."""
+"""Exports the world as glTF, once for each geometry, in a separate thread."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from volery.scenario.schema import Scenario
 from volery.world.trees.model import DetailLevel
 
 _KEPT = 6
-"""Files that are kept for those who come later."""
+"""Max number of cached files."""
 _EFFORT = 6
-"""Of gzip; 9 takes three times as long for one per cent."""
+"""Level of gzip; 9 takes three times as long for one per cent."""
 
 
 @dataclass(frozen=True)
 class WorldFile:
-    """One .glb file as it goes out."""
+    """One .glb file, plain and compressed."""
 
     plain: bytes
     zipped: bytes
 
 
 class WorldFiles:
-    """Makes and keeps the files. Its methods belong to one event loop."""
+    """Exports and caches the files. Its methods belong to one event loop."""
 
     def __init__(self) -> None:
         self._kept: dict[tuple[str, DetailLevel], asyncio.Task[WorldFile]] = {}
 
     async def get(self, scenario: Scenario, geometry: Geometry, detail: DetailLevel) -> WorldFile:
-        """The file of a geometry; those who ask meanwhile wait for the same one."""
+        """Returns the file of a geometry; concurrent requests share one export."""
         key = geometry.id, detail
         task = self._kept.get(key)
         if task is None or (task.done() and (task.cancelled() or task.exception())):

@@ -1,4 +1,4 @@
-"""`./api/world.glb`: what stands in the present world."""
+"""Route `./api/world.glb`: the geometry of the present world."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from volery.server.world_files import WorldFiles
 from volery.world.trees.model import DetailLevel
 
 _FOR_GOOD = "private, max-age=31536000, immutable"
-"""Where the address has the id (`?world=`): another world has another address."""
+"""For URLs with the id (`?world=`): another world has another URL."""
 _TYPE = "model/gltf-binary"
 
 
 async def world_glb(request: Request) -> Response:
-    """The geometry, or 304 where the browser has it; `?detail=` is that of the trees."""
+    """Returns the geometry, or 304 if the browser has it; `?detail=` is that of the trees."""
     site: ServerState = request.app.state.site
     files: WorldFiles = request.app.state.world_files
     detail = _detail_of(request.query_params.get("detail", DetailLevel.SENSING))
@@ -42,4 +42,4 @@ def _detail_of(text: str) -> DetailLevel:
         return DetailLevel(text)
     except ValueError:
         known = ", ".join(DetailLevel)
-        raise RefusedError(400, f"detail is one of {known}, not '{text[:40]}'") from None
+        raise RefusedError(400, f"detail must be one of {known}, not '{text[:40]}'") from None

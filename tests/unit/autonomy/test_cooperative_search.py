@@ -443,7 +443,7 @@ def test_a_kept_state_is_gone_back_to():
         ({"area_m": [0.0, 0.0, 8.0, 30.0]}, "12 m a side"),
         ({"area_m": [0.0, 0.0, 1.0, 30.0]}, "wider than its borders"),
         ({"area_m": [0.0, 0.0, 1.0]}, "area_m must be 4 numbers"),
-        ({"layer_m": 0.1}, "layer_m must be a number from 0.5"),
+        ({"layer_m": 0.1}, "layer_m must be a number of at least 0.5"),
     ],
 )
 def test_parameters_that_make_no_sense(parameters, reason):

@@ -182,8 +182,8 @@ def test_it_says_what_is_wrong():
     assert status(told)["state"] == "mapping"
     fly(bench, 3.5, lambda t: scan(t, np.full(720, np.inf)), begin_ns=3 * S)
     assert status(told)["problems"] == [
-        "the level LIDAR sees nothing",
-        "the nodding LIDAR sees nothing",
+        "the level LIDAR has no returns",
+        "the nodding LIDAR has no returns",
     ]
 
 
@@ -299,7 +299,7 @@ def test_maps_of_two_are_merged_where_tf_places_them():
     assert merge().success
     bench.graph.deliver()
     np.testing.assert_array_equal(np.asarray(merged[-1].data).view(np.uint8), data)
-    assert "nobody says where" in status(told)["left_out"]["/uav2/octomap_binary"]
+    assert "/tf holds no transform" in status(told)["left_out"]["/uav2/octomap_binary"]
     shift = Transform(Vector3(20.0, 0.0, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0))
     bench.send("/tf", TFMessage([TransformStamped(header(0, "map"), "uav2/odom", shift)]))
     assert merge().success

@@ -178,7 +178,7 @@ def test_files_come_back(room, tmp_path):
         (LIMITS._replace(extent_m=5.0), lambda b: b, "m wide; at most 5 m"),
         (LIMITS._replace(cubes=10), lambda b: b, "at most 10 are allowed"),
         (LIMITS, lambda b: b[:-40], "ends too early"),
-        (LIMITS, lambda b: b.replace(b"\nsize ", b"\nsize 9"), "the head says"),
+        (LIMITS, lambda b: b.replace(b"\nsize ", b"\nsize 9"), "the head declares"),
         (LIMITS, lambda b: b.replace(b"id OcTree", b"id ColorOcTree"), "kind 'ColorOcTree'"),
         (LIMITS, lambda b: b.replace(b"\nres 0.2", b""), "lacks a number 'res'"),
         (LIMITS, lambda b: b"PNG" + b, "not a map"),

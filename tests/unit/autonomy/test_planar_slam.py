@@ -133,7 +133,7 @@ def test_a_plain_corridor_does_not_hold_it_back(seed):
     assert true > 30.0
     assert 0.8 < x / true < 1.3
     assert np.abs(heard.poses()[:, 2]).max() < 0.5
-    assert "what is seen leaves the way along it open" in heard.last()["problems"]
+    assert "scans leave one direction unconstrained" in heard.last()["problems"]
     own = np.sqrt(heard.odom[-1].pose.covariance.reshape(6, 6).diagonal())
     assert own[0] > 1.0 > 5.0 * own[1]
     sigma = np.sqrt(heard.pose[-1].pose.covariance.reshape(6, 6).diagonal())
@@ -235,7 +235,7 @@ def test_silence_and_emptiness_are_named(short):
     for row in range(30, 50):
         heard.hear(scan_message(round(short.time_s[row] * S), blind, short.angles, short.reach))
     heard.bench.run_to(heard.bench.now_ns + 700 * MS)
-    assert "too few things in reach" in heard.last()["problems"]
+    assert "too few returns in range" in heard.last()["problems"]
     heard.settle(3.0)
     assert "the LIDAR is silent" in heard.last()["problems"]
 
@@ -256,9 +256,9 @@ def test_a_kept_state_goes_on_as_before(short):
 
 
 def test_parameters_of_the_wrong_length_are_refused():
-    with pytest.raises(NodeError, match="start is"):
+    with pytest.raises(NodeError, match="start must be"):
         Listening(start=[1.0])
-    with pytest.raises(NodeError, match="mount is"):
+    with pytest.raises(NodeError, match="mount must be"):
         Listening(mount=[1.0])
 
 

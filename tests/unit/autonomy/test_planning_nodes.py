@@ -115,7 +115,7 @@ def test_it_plans_towards_the_path_several_times_a_second():
     [
         ({"odom": False}, "no odometry"),
         ({"level": False}, "the level LIDAR is silent"),
-        ({"blind": True}, "no LIDAR sees anything"),
+        ({"blind": True}, "no LIDAR has returns"),
         ({"stuck": True}, "the level LIDAR repeats itself"),
     ],
 )

@@ -273,7 +273,7 @@ def unseeing(scan):
 def test_featureless_space_is_told_of():
     flat = messages(Flight(), np.zeros((0, 3)), 7.0)
     told = Listening().hear(flat)
-    assert "too few things in reach" in told.last_status()["problems"]
+    assert "too few returns in range" in told.last_status()["problems"]
     assert told.state() == "degraded"
     off, _ = errors(told.pose)
     assert np.abs(off[:, 2]).max() < 0.1  # the ground still tells its height

@@ -105,14 +105,14 @@ def test_no_way_is_said_after_a_bounded_search():
         ((6.0, 3.4, 0.0), (14.0, 4.0, 8.0)),
     ]
     space = VoxelSpace(solid(ring), 0.4, np.stack([START, GOAL]), 10.0)
-    with pytest.raises(PlanError, match="no way was found in 300 iterations"):
+    with pytest.raises(PlanError, match="no path was found in 300 iterations"):
         plan_way(space, START, GOAL, 3.0, SEARCH._replace(iterations=300), 1)
 
 
 def test_a_space_that_would_be_too_large_is_refused():
     with pytest.raises(PlanError, match="too far apart"):
         VoxelSpace(solid([]), 0.4, np.array([[0.0, 0.0], [9e3, 9e3]]), 10.0)
-    with pytest.raises(PlanError, match="nothing is known"):
+    with pytest.raises(PlanError, match="the map is empty"):
         VoxelSpace(solid([]), 0.4, np.array([[200.0, 200.0], [210.0, 200.0]]), 10.0)
 
 

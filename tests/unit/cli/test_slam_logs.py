@@ -292,4 +292,4 @@ def test_a_log_without_anything_in_reach_says_why(text, carried, tmp_path):
     path.write_text("\n".join(f"{k * 200_000} 0 0 0 {blind}" for k in range(20)))
     result = slam(path, "--layout", text / "layout.toml", "--out", tmp_path / "out")
     assert result.exit_code == 2
-    assert "the SLAM did not start (too few things in reach)" in result.output
+    assert "the SLAM did not start (too few returns in range)" in result.output

@@ -172,7 +172,7 @@ def test_commands_are_echoed_as_they_were_typed() -> None:
     assert desk.ground.command("return 0") == "sent: return to 0"
     done = String("return_home: goes home")
     assert desk.ground.take(frame(REPLY, REPLY_TYPE, done), 0) == "0.0: return: goes home"
-    assert desk.ground.command("land all").endswith(" (no UAV there has been heard so far)")
+    assert desk.ground.command("land all").endswith(" (no state of such a UAV received so far)")
     desk.ground.take(frame(STATE, STATE_TYPE, state()), 0)
     assert desk.ground.command("land all") == "sent: land to all"
     assert desk.ground.command("resume batch1").endswith("so far)")
@@ -228,7 +228,7 @@ def test_commands_without_a_server_are_queued_and_named_at_the_end() -> None:
     assert ground.command("hold 0").startswith("sent: hold to 0")
     said = ground.command("land 1")
     assert said.startswith("queued: land to 1")
-    assert said.endswith("it goes when the server is back")
+    assert said.endswith("sent when the server is back")
     assert ground.open_commands({7}.__contains__) == ["land to 1"]
 
 

@@ -211,7 +211,7 @@ def test_identities_that_cannot_be() -> None:
         Identity(0, 4).address()
     with pytest.raises(CommsError, match="no batch"):
         Identity(FIRST_GROUND, 0).address()
-    with pytest.raises(CommsError, match="no station"):
+    with pytest.raises(CommsError, match="not a station"):
         Identity.of(SERVER)
     assert Identity.of(Identity.ground(3).address()) == Identity.ground(3)
     assert not is_meant(Identity.ground().address(), batch_address(FIRST_GROUND // 4))

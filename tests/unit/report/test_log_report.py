@@ -88,10 +88,10 @@ def test_ways_and_trunks_of_a_log(log: Path) -> None:
 
 def test_the_page_tells_the_error(log: Path, tmp_path: Path) -> None:
     page = write_log_report(log, tmp_path / "new").path.read_text(encoding="utf-8")
-    assert "error 0.50 m as it stands, 0.00 m after" in page
+    assert "error 0.50 m without, 0.00 m after" in page
     assert page.count("<svg") == 3
-    assert "3 trunks that the level LIDAR saw" in page
-    assert "No nodding LIDAR tells" in page
+    assert "3 trunks detected by the level LIDAR" in page
+    assert "Without a nodding LIDAR" in page
     assert '<p class="lead">60.0 s with 1 UAV.</p>' in page.replace("59.9", "60.0")
 
 
@@ -105,7 +105,7 @@ def test_an_older_report_is_replaced_only_if_asked(log: Path, tmp_path: Path) ->
 
 
 def test_a_uav_that_is_not_there_is_told(log: Path, tmp_path: Path) -> None:
-    with pytest.raises(VoleryError, match="there is no uav9 in it; known: uav1"):
+    with pytest.raises(VoleryError, match="no UAV uav9; known: uav1"):
         write_log_report(log, tmp_path / "none", uav="uav9")
     assert not (tmp_path / "none").exists()
 
@@ -152,11 +152,11 @@ def test_the_true_trunks_are_drawn_beside_the_mapped_ones(tmp_path: Path) -> Non
     log = told_log(tmp_path / "flight.mcap", content, tmp_path)
     page = write_log_report(log, tmp_path / "out").path.read_text()
     assert "Rings: 3 trees of the scenario within 15 m" in page
-    assert "100% of the mapped trunks stand within 0.5 m of one" in page
+    assert "100% of the mapped trunks are within 0.5 m of one" in page
     assert ">true trunks<" in page
     (tmp_path / "trees.csv").unlink()
     page = write_log_report(log, tmp_path / "later").path.read_text()
-    assert "The scenario&#x27;s trees cannot be grown once more: " in page
+    assert "The scenario&#x27;s trees cannot be generated again: " in page
     assert ">true trunks<" not in page
     del content["world"]["forest"]
     bare = told_log(tmp_path / "bare.mcap", content)
@@ -166,7 +166,7 @@ def test_the_true_trunks_are_drawn_beside_the_mapped_ones(tmp_path: Path) -> Non
 
 def test_a_log_without_scenario_tells_no_true_trunks(log: Path, tmp_path: Path) -> None:
     page = write_log_report(log, tmp_path / "out").path.read_text()
-    assert "The log tells of no scenario" in page
+    assert "The log holds no scenario" in page
     assert ">true trunks<" not in page
 
 
@@ -181,12 +181,12 @@ def test_logs_that_are_cut_are_told(log: Path, tmp_path: Path) -> None:
         assert sum(why in text for text in written.warnings) == 1
         assert f'<p class="note">{why}, which begins at byte ' in written.path.read_text()
     cut.write_bytes(log.read_bytes()[:100])
-    with pytest.raises(VoleryError, match=r"no UAV tells its pose.*the file is cut off"):
+    with pytest.raises(VoleryError, match=r"the log holds no UAV's poses.*the file is cut off"):
         write_log_report(cut, tmp_path / "none")
 
 
 def test_a_topic_to_compare_needs_a_log(log: Path, tmp_path: Path) -> None:
-    with pytest.raises(ReportError, match="--compare-topic /odom: of which log"):
+    with pytest.raises(ReportError, match="--compare-topic /odom: name its log"):
         write_log_report(log, tmp_path / "none", compare_topic="/odom")
 
 
@@ -227,8 +227,8 @@ def test_where_it_should_be_is_not_where_it_was(tmp_path: Path) -> None:
             out.write(m.Published(topic, "geometry_msgs/msg/PoseStamped", S, pose))
         write(out, "/chat", S, m.String("x"))
     assert len(read_way(path).way.time_s) == 1
-    offered = r"Poses stand on: /mavros/local_position/pose$"
-    with pytest.raises(VoleryError, match=r"/chat tells no poses: it is a std_msgs/msg/String\. "):
+    offered = r"Topics with poses: /mavros/local_position/pose$"
+    with pytest.raises(VoleryError, match=r"/chat holds no poses: it is a std_msgs/msg/String\. "):
         read_way(path, "/chat")
     with pytest.raises(VoleryError, match=offered):
         read_way(path, "/none")
@@ -269,9 +269,9 @@ def test_a_real_flight_is_laid_over_it(log: Path, tmp_path: Path) -> None:
     (left,) = re.findall(r"Root mean square distance (\S+) m", page)
     assert float(left) == pytest.approx(0.1 * 3**0.5, abs=0.05)
     assert page.count("<svg") == 6
-    with pytest.raises(VoleryError, match="there is no uav7 in it; known: uav1"):
+    with pytest.raises(VoleryError, match="no UAV uav7; known: uav1"):
         write_log_report(log, tmp_path, compare=real, uav="uav7")
-    with pytest.raises(VoleryError, match=r"there is no /odom\. Poses stand on: /mavros/odom"):
+    with pytest.raises(VoleryError, match=r"there is no /odom\. Topics with poses: /mavros/odom"):
         read_way(real, "/odom")
 
 
@@ -290,9 +290,9 @@ def test_a_log_without_uavs(tmp_path: Path) -> None:
     path = tmp_path / "empty.mcap"
     with closing(open_log(path)) as log:
         write(log, "/talk", 0, m.String("x"))
-    with pytest.raises(VoleryError, match="no UAV tells its pose"):
+    with pytest.raises(VoleryError, match="the log holds no UAV's poses"):
         read_flight(path)
-    with pytest.raises(VoleryError, match="Poses stand on: nothing"):
+    with pytest.raises(VoleryError, match="Topics with poses: none"):
         read_way(path)
 
 

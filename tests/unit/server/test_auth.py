@@ -42,7 +42,7 @@ def test_a_ticket_is_worth_its_role_here_and_nowhere_else():
         ("0.0.0.0", Tokens("a"), False, "--allow-remote"),
         ("0.0.0.0", Tokens(), True, "set a --token"),
         ("127.0.0.1", Tokens(None, "b"), False, "needs a --token"),
-        ("127.0.0.1", Tokens("a", "a"), False, "another one"),
+        ("127.0.0.1", Tokens("a", "a"), False, "different from it"),
     ],
 )
 def test_half_rights_are_refused(host, tokens, anywhere, why):

@@ -110,7 +110,7 @@ def test_a_viewer_sees_and_is_told_why_not_more(flight):
         values, success = client.call("/uav1/land")
         assert (success, values) == (
             False,
-            "a viewer may not call service /uav1/land; show the operators' token",
+            "a viewer may not call service /uav1/land; connect with the operators' token",
         )
         client.send("publish", topic="/uav1/cmd_vel", msg={}, id="p")
         refused = client.until("status", id="p")

@@ -1,7 +1,7 @@
-"""Avoidance by the whole depth picture: every pixel becomes an obstacle that is remembered.
+"""Avoidance by the whole depth image: every pixel becomes an obstacle in a rolling map.
 
-The way leads through the gaps between what was seen in the last seconds (`gap_steering`); where
-that way lies beyond the picture's edge the UAV first turns and looks.
+The path leads through the gaps between the obstacles of the last seconds (`gap_steering`). If it
+leaves the field of view, the UAV first turns towards it.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from volery.graph.messages import CameraInfo, Image
 Array = NDArray[np.float64]
 
 _LEAST_HEIGHT_M = 0.5
-"""Above the place of take-off; what is lower is ground and herbs."""
+"""Min height above the take-off position; lower points are ground and herbs."""
 _SLAB_M = 0.9
-"""So far above and below the UAV things are in its way."""
+"""Height difference to the UAV within which points are obstacles."""
 _ASIDE_M_S = 0.15
-"""Speed while it looks to where it wants to go."""
+"""Speed during a turn towards the path."""
 
 
 class DepthAvoidance(DepthCourse):
-    """Flies a course (see `DepthCourse`) around all that its camera has seen.
+    """Flies a course (see `DepthCourse`) around all obstacles that its camera has observed.
 
     Parameters
     ----------
-    safe_radius_m: distance to keep between the UAV's centre and obstacles.
-    deceleration_m_s2: braking that the speed counts on.
-    view_deg: horizontal field of view that may be trusted.
+    safe_radius_m: min distance between the UAV's centre and obstacles.
+    deceleration_m_s2: braking that limits the speed.
+    view_deg: usable horizontal field of view.
 
     """
 
@@ -45,7 +45,7 @@ class DepthAvoidance(DepthCourse):
 
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Returns the tasks that compile its kernels."""
+        """Returns the tasks that compile the kernels of this node."""
         from volery.autonomy.avoidance.warmup import gaps
         from volery.autonomy.perception import warmup
 
@@ -61,7 +61,7 @@ class DepthAvoidance(DepthCourse):
         self._projector = DepthProjector(self.mount)
 
     def look(self, image: Image, info: CameraInfo, pose: OdometrySample) -> None:
-        """Remember what the picture shows at the height of flight."""
+        """Stores the obstacles of an image at flight height."""
         points = self._projector.points(image, info, pose)
         height = points[:, 2]
         in_the_way = np.abs(height - pose.position[2]) < _SLAB_M
@@ -69,6 +69,6 @@ class DepthAvoidance(DepthCourse):
         self._obstacles.add(points[in_the_way & above_ground], self.now_ns)
 
     def steer(self, pose: OdometrySample) -> tuple[Array, float]:
-        """Through the best gap."""
+        """Steers through the best gap."""
         goal = self.to_goal(pose)
         return self._steering.steer(pose, goal, self._obstacles, self.now_ns, self.speed)

@@ -1,4 +1,4 @@
-"""A straight course flown with a depth camera: what its nodes share, but for how they avoid."""
+"""A straight course with a depth camera: the common part of its nodes, without avoidance."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ Array = NDArray[np.float64]
 
 _PERIOD_S = 0.05
 _BLIND_AFTER_S = 0.5
-"""Without a picture for so long it stops."""
+"""Time without an image after which the UAV stops."""
 _STATE = ("phase", "pose", "_home", "_course", "_image_ns", "_info")
 
 
 class DepthCoursePhase(StrEnum):
-    """Where in its course the node is."""
+    """Phase of the course."""
 
     START = "start"
     CLIMB = "climb"
@@ -34,20 +34,20 @@ class DepthCoursePhase(StrEnum):
 
 
 class DepthCourse(Node):
-    """Takes off, flies `distance_m` ahead at a height, lands. Sees a depth camera and odometry.
+    """Takes off, flies `distance_m` ahead at a height, lands, with a depth camera and odometry.
 
     Parameters
     ----------
     distance_m: length of the course, along the heading at take-off.
-    height_m: height above the place of take-off.
+    height_m: height above the take-off position.
     speed_m_s: speed along the course.
     camera: name of the depth camera, whose topics are `CAMERA/depth` and `CAMERA/camera_info`.
-    mount: [x, y, z] of the camera in the body, m; it looks ahead.
+    mount: [x, y, z] of the camera in the body, m; it faces forward.
 
     """
 
     STATE: tuple[str, ...] = ()
-    """What changes in flight besides, in a subclass."""
+    """Additional attributes of a subclass that a snapshot stores."""
 
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
@@ -81,35 +81,35 @@ class DepthCourse(Node):
 
     @abstractmethod
     def look(self, image: Image, info: CameraInfo, pose: OdometrySample) -> None:
-        """Take in a depth picture."""
+        """Processes a depth image."""
 
     @abstractmethod
     def steer(self, pose: OdometrySample) -> tuple[Array, float]:
-        """Velocity (2,) m/s in the odometry frame and yaw rate, rad/s, while flying the course."""
+        """Returns velocity (2,) m/s in the odometry frame and yaw rate, rad/s, on the course."""
 
     @property
     def doing(self) -> str:
-        """What `~/phase` says while flying the course."""
+        """Value of `~/phase` on the course."""
         return str(self.phase)
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         return save_attributes(self, (*_STATE, *self.STATE))
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         restore_attributes(self, state)
 
     # --------------------------------------------------------------------------------- the course
 
     @property
     def now_ns(self) -> int:
-        """Time of the node's clock."""
+        """Time of the node's clock, ns."""
         return self.get_clock().now_ns()
 
     @property
     def ground_height(self) -> float:
-        """Height of the place of take-off, m in the odometry frame."""
+        """Height of the take-off position, m in the odometry frame."""
         return float(self._home[2])
 
     @property
@@ -118,12 +118,12 @@ class DepthCourse(Node):
         return self._course
 
     def to_goal(self, pose: OdometrySample) -> Array:
-        """The end of the course, (2,) m from the UAV, odometry frame."""
+        """Returns the end of the course, (2,) m from the UAV, odometry frame."""
         end = self._home[:2] + self._distance * self._ahead
         return np.asarray(end - pose.position[:2])
 
     def aside(self, pose: OdometrySample) -> float:
-        """How far to the left of the course the UAV is, m."""
+        """Returns the distance of the UAV to the left of the course, m."""
         offset = pose.position[:2] - self._home[:2]
         return float(self._ahead[0] * offset[1] - self._ahead[1] * offset[0])
 
@@ -131,7 +131,7 @@ class DepthCourse(Node):
     def _ahead(self) -> Array:
         return np.array([math.cos(self._course), math.sin(self._course)])
 
-    # -------------------------------------------------------------------------------- what it does
+    # ------------------------------------------------------------------------------------ behaviour
 
     def _on_odometry(self, message: Odometry) -> None:
         self.pose = OdometrySample.from_odometry(message)

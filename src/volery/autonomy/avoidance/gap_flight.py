@@ -1,11 +1,10 @@
-"""Flight through gaps: what nodes share that fly a forest by two LIDARs, a sonar and odometry.
+"""Flight through gaps: the common part of nodes that fly in a forest by LIDARs, sonar and odometry.
 
-The level scan shows the surroundings at flight height 40 times a second, the nodding scan fills in
-what is above and below. Returns become points in the odometry frame; the ground's slope is fitted
-to the lowest ones; points near the height of flight are remembered as obstacles; the heading goes
-through the gap that lies best towards the goal, at a speed from which the UAV can stop
-before whatever ends the gap. Returns that nothing confirms are left out: rain, snow, fog.
-Height above ground is held by the sonar and the slope ahead.
+The level scan shows the surroundings at flight height 40 times a second, the nodding scan covers
+the space above and below. Returns become points in the odometry frame. The ground's slope is fitted
+to the lowest ones; points near the flight height become obstacles. The heading leads through the
+best gap towards the goal, at a speed that allows the UAV to stop at the end of the gap. Unconfirmed
+returns are removed: rain, snow, fog. Sonar and slope control the height above ground.
 """
 
 from __future__ import annotations
@@ -34,16 +33,16 @@ _SONAR_MEMORY_S = 0.5
 
 
 class GapFlight(Node):
-    """Sees scans, range and odometry, and commands `cmd_vel`; a subclass says where to.
+    """Subscribes to scans, range and odometry, and commands `cmd_vel`; a subclass sets the goal.
 
     Parameters
     ----------
     height_m: height above ground to fly at.
-    speed_m_s: highest speed.
-    safe_radius_m: distance to keep between the UAV's centre and obstacles.
-    deceleration_m_s2: braking that the speed limit counts on.
+    speed_m_s: max speed.
+    safe_radius_m: min distance between the UAV's centre and obstacles.
+    deceleration_m_s2: braking that limits the speed.
     odometry: topic of the pose.
-    nodding_mount: [x, y, z] of the nodding LIDAR in the body, m; `level_mount` likewise.
+    nodding_mount, level_mount: [x, y, z] of the LIDARs in the body, m.
 
     `height_m` and `speed_m_s` may be set in flight.
 
@@ -60,11 +59,11 @@ class GapFlight(Node):
         "_level_filter",
         "_nodding_filter",
     )
-    """Everything that changes in flight."""
+    """Names of the attributes that a snapshot stores."""
 
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Returns the tasks that compile its kernels."""
+        """Returns the tasks that compile the kernels of this node."""
         from volery.autonomy.avoidance.warmup import gaps
         from volery.autonomy.perception import warmup
 
@@ -96,18 +95,18 @@ class GapFlight(Node):
         self._command = self.create_publisher(Twist, "cmd_vel", 1)
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         return save_attributes(self, self.STATE)
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         restore_attributes(self, state)
 
     @property
     def _height(self) -> float:
         return float(self._height_m.value)
 
-    # ------------------------------------------------------------------------------ what it sees
+    # ------------------------------------------------------------------------------ subscriptions
 
     def _on_odometry(self, message: Odometry) -> None:
         self._pose = OdometrySample.from_odometry(message)
@@ -142,14 +141,14 @@ class GapFlight(Node):
         below = tall & (above_ground < self._height)
         self._low_obstacles.add(points[below], now)
 
-    # ------------------------------------------------------------------------------ what it does
+    # ----------------------------------------------------------------------------------- steering
 
     def _go_towards(self, pose: OdometrySample, to_goal: Array) -> None:
         now, top_speed = self.get_clock().now_ns(), float(self._speed_m_s.value)
         velocity, yaw_rate = self._steering.steer(pose, to_goal, self._obstacles, now, top_speed)
         self._publish(pose, velocity, yaw_rate)
 
-    # -------------------------------------------------------------------------------- vertically
+    # ------------------------------------------------------------------------------ height control
 
     def _refit_ground(self, pose: OdometrySample) -> None:
         self._ground.fit(pose.position, self._ground_below(pose), self.get_clock().now_ns())
@@ -163,7 +162,7 @@ class GapFlight(Node):
         return float(pose.position[2]) - distance
 
     def _publish(self, pose: OdometrySample, velocity: Array, yaw_rate: float) -> None:
-        """Command a level velocity (odometry frame) together with the climb that holds height."""
+        """Commands a level velocity (odometry frame) and the climb rate that holds the height."""
         above = float(pose.position[2]) - float(self._ground.height_at(pose.position[:2]))
         climb = 1.2 * (self._height - above) + float(velocity @ self._ground.slope)
         climb = max(-1.0, min(2.0, climb))

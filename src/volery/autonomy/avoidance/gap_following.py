@@ -1,4 +1,4 @@
-"""Fly a route through a forest by what two LIDARs, a sonar and odometry tell; see `gap_flight`."""
+"""Flies a route through a forest by two LIDARs, a sonar and odometry; see `gap_flight`."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _LEAST_CLIMB_M = 1.0
 
 
 class GapFollowingPhase(StrEnum):
-    """Where in its mission the node is."""
+    """Phase of the mission."""
 
     START = "start"
     CLIMB = "climb"
@@ -35,7 +35,7 @@ class GapFollowing(GapFlight):
 
     Parameters
     ----------
-    route: list of [x, y] waypoints, m, relative to where the UAV took off.
+    route: list of [x, y] waypoints, m, relative to the take-off position.
 
     The others are those of `GapFlight`.
 
@@ -98,7 +98,7 @@ class GapFollowing(GapFlight):
         self._go_towards(pose, to_goal)
 
     def _settle(self, pose: OdometrySample) -> None:
-        """Move to a place without low growth, then land there."""
+        """Flies to a position without low growth, then lands there."""
         self._refit_ground(pose)
         assert self._settle_at is not None
         to_place = self._settle_at - pose.position[:2]
@@ -110,10 +110,10 @@ class GapFollowing(GapFlight):
         self._go_towards(pose, to_place)
 
     def _wait(self, pose: OdometrySample) -> None:
-        """The flight mode lands by itself."""
+        """Does nothing: the flight mode lands the UAV."""
 
     def _landing_place(self, pose: OdometrySample) -> Array:
-        """Nearest place within 8 m that has no growth within 1 m."""
+        """Returns the nearest position (2,) m within 8 m without growth within 1 m."""
         now = self.get_clock().now_ns()
         growth = self._low_obstacles.around(pose.position[:2], now, 10.0)
         best, best_cost = np.zeros(2), math.inf

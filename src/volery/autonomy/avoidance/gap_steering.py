@@ -1,7 +1,6 @@
-"""Flying towards a goal through the gaps between obstacles, at a speed from which one can stop.
+"""Steers towards a goal through the gaps between obstacles, at a speed that allows to stop.
 
-What nodes of different sensors share: they remember obstacles, this says which velocity and turn
-bring the UAV on.
+Nodes with different sensors share it: they store obstacles, this computes velocity and yaw rate.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from volery.autonomy.perception.scan_points import OdometrySample
 Array = NDArray[np.float64]
 
 REACH_M = 14.0
-"""Obstacles farther away do not matter yet."""
+"""Range of the obstacles that matter."""
 _STUCK_AFTER_S = 8.0
 _STUCK_PROGRESS_M = 2.0
 _DETOUR_S = 5.0
@@ -27,20 +26,20 @@ _DETOUR_S = 5.0
 
 @dataclass(frozen=True)
 class SpeedLimits:
-    """How a UAV keeps off obstacles."""
+    """Safety distance and braking."""
 
     safe_radius_m: float = 1.1
-    """Distance to keep between its centre and them."""
+    """Min distance between its centre and obstacles."""
     deceleration_m_s2: float = 2.0
-    """Braking that the speed counts on."""
+    """Braking that limits the speed."""
     aside_rad: float = math.radians(50.0)
-    """A way that lies farther aside is looked at before it is flown ..."""
+    """Angle between heading and path beyond which the UAV flies slowly."""
     aside_m_s: float = 0.5
-    """... at no more than this speed."""
+    """Max speed beyond `aside_rad`."""
 
 
 class GapSteering:
-    """Velocity and turn towards a goal, see `steer`; tries detours where there is no progress."""
+    """Computes velocity and yaw rate towards a goal; tries detours without progress."""
 
     def __init__(self, caution: SpeedLimits) -> None:
         self._caution = caution
@@ -50,7 +49,7 @@ class GapSteering:
         self._detours = 0
 
     def begin_leg(self, now: int) -> None:
-        """There is a new goal."""
+        """Resets the progress for a new goal."""
         self._progress = (now, math.inf)
 
     def steer(
@@ -61,7 +60,7 @@ class GapSteering:
         now: int,
         top_speed: float,
     ) -> tuple[Array, float]:
-        """Level velocity (2,) m/s in the odometry frame, and yaw rate, rad/s.
+        """Returns the level velocity (2,) m/s in the odometry frame, and the yaw rate, rad/s.
 
         to_goal: (2,) m from the UAV, odometry frame. now: ns.
         """
@@ -82,7 +81,7 @@ class GapSteering:
         return speed * direction, max(-1.2, min(1.2, 1.8 * aside))
 
     def is_stuck(self, distance: float, now: int) -> bool:
-        """Whether the goal, `distance` m away, has come no nearer for a while."""
+        """Returns whether the goal, `distance` m away, has come no nearer for a while."""
         since, best = self._progress
         if distance < best - _STUCK_PROGRESS_M:
             self._progress = (now, distance)
@@ -100,7 +99,7 @@ class GapSteering:
         return speed
 
     def _detoured(self, goal_angle: float, distance: float, now: int) -> float:
-        """Turn aside for a while, left and right in turn, when there is no progress."""
+        """Turns the goal direction for a while, left and right in turn, without progress."""
         if self._detour is not None and now < self._detour[0]:
             return goal_angle + self._detour[1]
         if self._detour is not None:

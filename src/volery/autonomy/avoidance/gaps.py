@@ -1,8 +1,8 @@
-"""Gaps between obstacles in a polar view, and the heading that leads through the best one.
+"""Finds gaps between obstacles in polar coordinates, and the heading through the best one.
 
 After the vector field histogram (Borenstein & Koren 1991; VFH+, Ulrich & Borenstein 1998): each
 obstacle, widened by the safe radius, blocks the headings that would touch it; a gap is a run of
-headings free out to some distance.
+headings free up to some distance.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ SECTOR_ANGLES: Array = np.linspace(-np.pi, np.pi, SECTORS, endpoint=False) + np.
 SECTOR_ANGLES.flags.writeable = False
 
 _LOOKS_AHEAD_M = (9.0, 6.0, 4.0, 2.5, 1.2)
-"""How far a way should be free: far ones are preferred, nearer ones will do."""
+"""Free distances to look for, in order of preference."""
 _LOYALTY = 0.35
 _OPENNESS = 0.25
 
 
 def free_distances(obstacles: Array, safe_radius: float, reach: float) -> Array:
-    """How far a disc of `safe_radius` could move along each of `SECTOR_ANGLES`, at most `reach`.
+    """Returns how far a disc of `safe_radius` can move along `SECTOR_ANGLES`, at most `reach`.
 
     `obstacles` is (K, 2), relative to the disc, m. An obstacle nearer than the safe radius blocks
-    only the half plane towards it, so that a way out stays open.
+    only the half plane towards it, so that the UAV can move away.
     """
     free = np.full(SECTORS, reach)
     _shorten(np.ascontiguousarray(obstacles, dtype=np.float64), safe_radius, free)
@@ -59,7 +59,7 @@ def _shorten(obstacles: Array, safe_radius: float, free: Array) -> None:
 
 @dataclass(frozen=True)
 class GapHeading:
-    """A chosen direction, rad in the frame of the obstacles, and how far it is free, m."""
+    """A chosen direction, rad in the frame of the obstacles, and its free distance, m."""
 
     angle: float
     free_m: float
@@ -68,10 +68,10 @@ class GapHeading:
 def choose_heading(
     free: Array, goal_angle: float, goal_distance: float, previous_angle: float | None
 ) -> GapHeading | None:
-    """Direction of the best gap, or None when every way is blocked.
+    """Returns the direction of the best gap, or None if all directions are blocked.
 
-    Wants gaps that are free far ahead and settles for nearer ones; within a gap it prefers what
-    lies nearest to the goal's direction, with some loyalty to the previous choice.
+    It prefers gaps with a long free distance, and within a gap directions near the goal's, with
+    some weight on the previous choice.
     """
     off_goal = np.abs(wrap(SECTOR_ANGLES - goal_angle))
     cost = off_goal + _OPENNESS * (1.0 - np.minimum(free / 12.0, 1.0))
@@ -83,11 +83,11 @@ def choose_heading(
             continue
         best = int(np.argmin(np.where(passable, cost, np.inf)))
         if off_goal[best] > 2.0 and wanted > 2.5:
-            continue  # rather a near gap ahead than a far one behind
+            continue  # a near gap ahead is better than a far one behind
         return GapHeading(float(SECTOR_ANGLES[best]), float(free[best]))
     return None
 
 
 def wrap(angle: Array) -> Array:
-    """Angles to [-pi, pi)."""
+    """Wraps angles to [-pi, pi)."""
     return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi)

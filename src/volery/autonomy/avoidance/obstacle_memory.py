@@ -1,4 +1,4 @@
-"""A rolling map of where obstacles were seen lately, around a moving vehicle."""
+"""A rolling map of recently observed obstacles around a moving vehicle."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ Integers = NDArray[np.int64]
 class ObstacleMemory:
     """Square cells that wrap around: the map follows the vehicle without copying.
 
-    A cell counts as occupied while it was seen within `keep_s`, in `looks_needed` different looks.
+    A cell is occupied if it was observed within `keep_s`, in at least `looks_needed` scans or
+    images.
     """
 
     def __init__(
@@ -36,11 +37,11 @@ class ObstacleMemory:
         self._looks = np.zeros((size, size), dtype=np.int64)
 
     def add(self, points: Array, time_ns: int) -> None:
-        """Mark the cells of the points (K, 2+) of one look, m in a fixed frame."""
+        """Marks the cells of the points (K, 2+) of one scan or image, m in a fixed frame."""
         _mark(points, time_ns, self._cell, self._keep_ns, self._address, self._seen_ns, self._looks)
 
     def around(self, center: Array, time_ns: int, radius_m: float) -> Array:
-        """Centres (K, 2) of occupied cells within `radius_m` of `center`, relative to it."""
+        """Returns the centres (K, 2) of occupied cells within `radius_m`, relative to `center`."""
         found = np.empty((self._looks.size, 2))
         count = _gather(
             center[0],

@@ -1,10 +1,9 @@
-"""Avoidance by the mean depth of one region of the picture, a machine of four states.
+"""Avoidance by the mean depth of one image region, a machine of four states.
 
-As the ROS + Unity3D platform of 2025 describes it: fly FORWARD until the mean depth of the region
-of interest falls below a threshold, be STOPPED, AVOID until the way is free, RETURN to the course.
-Its example threshold, .03, is of normalised depth, and its far plane is not told. Here depth is
-normalised by `far_m`; the defaults are those of five with which it fared best, see
-docs/avoidance.md.
+As described by the ROS + Unity3D platform of 2025: fly FORWARD until the mean depth of the region
+of interest falls below a threshold, be STOPPED, AVOID until the path is free, RETURN to the course.
+Its example threshold, .03, is of normalised depth, without its far plane. Here depth is normalised
+by `far_m`; the defaults are the best of five, see docs/avoidance.md.
 """
 
 from __future__ import annotations
@@ -28,13 +27,13 @@ Array = NDArray[np.float64]
 
 _STILL_M_S = 0.2
 _BACK_M = 0.3
-"""So near to the course it has returned."""
+"""Distance to the course at which the UAV has returned."""
 _GIVE_UP_S = 15.0
-"""After so long on one side it tries the other."""
+"""Time on one side after which it tries the other."""
 
 
 class RegionAvoidanceState(StrEnum):
-    """The states of the machine."""
+    """States of the machine."""
 
     FORWARD = "forward"
     STOPPED = "stopped"
@@ -43,15 +42,15 @@ class RegionAvoidanceState(StrEnum):
 
 
 class RegionAvoidance(DepthCourse):
-    """Flies a course (see `DepthCourse`); sidesteps what the region of interest shows.
+    """Flies a course (see `DepthCourse`); sidesteps obstacles in the region of interest.
 
     Parameters
     ----------
-    far_m: depth that counts 1, m; what is farther counts 1 too.
-    threshold: mean of the region, as a share of `far_m`, below which something is in the way.
-    region: [width, height] of the region of interest, shares of the picture, in its middle.
-    sidestep_m_s: speed aside.
-    margin_s: how long it goes on aside after the way is free.
+    far_m: depth that counts 1, m; larger depths count 1 too.
+    threshold: mean of the region, as a fraction of `far_m`, below which it is blocked.
+    region: [width, height] of the region of interest, fractions of the image, in its centre.
+    sidestep_m_s: lateral speed.
+    margin_s: time for which the sidestep continues after the path is free.
 
     """
 
@@ -65,7 +64,9 @@ class RegionAvoidance(DepthCourse):
         )
         self._region = declare_numbers(self, "region", [0.3, 0.2], "[width, height]")
         if not all(0.0 < share <= 1.0 for share in self._region):
-            raise NodeError(f"region is [width, height], above 0 to 1, not {self._region}")
+            raise NodeError(
+                f"region must be [width, height], each above 0 and at most 1, not {self._region}"
+            )
         self._sidestep = float(
             self.declare_parameter("sidestep_m_s", 0.8, min_value=0.0, max_value=100.0).value
         )
@@ -81,11 +82,11 @@ class RegionAvoidance(DepthCourse):
 
     @property
     def doing(self) -> str:
-        """The machine's state."""
+        """State of the machine."""
         return str(self._state)
 
     def look(self, image: Image, info: CameraInfo, pose: OdometrySample) -> None:  # noqa: ARG002
-        """Take the means of the region, and of the halves of the picture."""
+        """Computes the mean depth of the region, and of the halves of the image."""
         depth = depth_of(image)
         width, height = self._region
         self._mean = mean_depth(region_of(depth, width, height), self._far)
@@ -93,7 +94,7 @@ class RegionAvoidance(DepthCourse):
         self._sides = mean_depth(left, self._far), mean_depth(right, self._far)
 
     def steer(self, pose: OdometrySample) -> tuple[Array, float]:
-        """One turn of the machine."""
+        """Runs one step of the machine."""
         blocked = self._mean < self._threshold
         self._change(blocked, pose)
         aside = self.aside(pose)

@@ -9,7 +9,7 @@ from volery.autonomy.avoidance.obstacle_memory import ObstacleMemory
 
 
 def gaps() -> None:
-    """Kernels that see gaps between obstacles, whatever the sensor."""
+    """Compiles the kernels that find gaps between obstacles, for any sensor."""
     obstacles = ObstacleMemory()
     obstacles.add(np.zeros((1, 3)), 0)
     free_distances(obstacles.around(np.zeros(3), 0, 1.0), 1.0, 1.0)

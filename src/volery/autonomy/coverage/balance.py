@@ -1,4 +1,4 @@
-"""Areas made of exact size by cells that change hands across borders."""
+"""Balances areas to their exact sizes by moving cells across borders."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from volery.autonomy.coverage.joining import walk_part
 from volery.core.compiled import inner_kernel, kernel, owning_kernel
 
 _WALK_LOOKS = 4
-"""Looks that a step of a walk through an area counts for: it jumps about in memory."""
+"""Checks that a step of a walk through an area counts as, because of its random memory access."""
 _MOST_TRIES_A_PAIR = 40
 """Chains of exchanges tried for each pair of UAVs. Modelling choice: most maps need a handful."""
 
@@ -20,11 +20,11 @@ _MOST_TRIES_A_PAIR = 40
 def balance(
     neighbours: Ints, starts: Ints, targets: Any, distances: Any, owner: Ints, most_looks: int
 ) -> None:
-    """Move cells from areas that are too large to those that are too small, area by area.
+    """Moves cells from areas that are too large to those that are too small, area by area.
 
-    `owner` must hold connected areas; they stay so. Cells go along the shortest chain of areas that
-    touch. Of those at a border the ones that lie nearest to their new start, against their old
-    one, go first. It gives up after `most_looks` looks at cells.
+    `owner` must hold connected areas; they stay connected. Cells move along the shortest chain of
+    adjacent areas. At a border, cells that are nearest to their new start relative to their old one
+    move first. It stops after `most_looks` checks of cells.
     """
     count, robots = owner.shape[0], starts.shape[0]
     surplus = np.empty(robots, np.int64)
@@ -76,7 +76,7 @@ def balance(
 def _find_touching(neighbours: Ints, owner: Ints, touch: Any) -> None:
     touch[:] = False
     for k in range(owner.shape[0]):
-        for side in range(2):  # east and north: each border is met once
+        for side in range(2):  # east and north: each border once
             other = neighbours[k, side]
             if other >= 0 and owner[other] != owner[k]:
                 touch[owner[k], owner[other]] = True
@@ -85,9 +85,9 @@ def _find_touching(neighbours: Ints, owner: Ints, touch: Any) -> None:
 
 @owning_kernel
 def _find_chain(touch: Any, closed: Any, surplus: Any, chain: Ints) -> int:
-    """Areas from one that is too large to the nearest that is too small; how many, 0 for none.
+    """Finds areas from one that is too large to the nearest too small one; returns their number.
 
-    The largest surplus goes first.
+    The largest surplus comes first. 0: no chain.
     """
     robots = surplus.shape[0]
     before = np.empty(robots, np.int32)
@@ -139,10 +139,10 @@ def _hand_over(
     seen: Any,
     looks: Any,
 ) -> int:
-    """Move about `amount` cells from `giver` to `taker`; how many went.
+    """Moves about `amount` cells from `giver` to `taker`; returns the number moved.
 
-    Single cells go while any can. Then a cell goes with all that it alone holds to its area: up to
-    what is wanted, or somewhat more where that still leaves the two areas nearer to their sizes.
+    Single cells move first. Then a cell moves with all cells that only it connects to its area: up
+    to the wanted amount, or somewhat more if both areas still get nearer to their sizes.
     """
     moved = 0
     border = buffers[0]
@@ -184,7 +184,7 @@ def _find_border(
     border: Ints,
     gaps: Any,
 ) -> int:
-    """Cells of `giver` beside `taker`, and how much nearer the giver's start is; how many."""
+    """Fills the giver's cells beside `taker` and their gain in distance; returns their number."""
     found = 0
     for k in range(owner.shape[0]):
         if owner[k] == giver and k != start and _touches(neighbours, owner, k, taker):
@@ -206,9 +206,10 @@ def _hand_over_held(
     seen: Any,
     looks: Any,
 ) -> int:
-    """Move one cell of `border` with all that it alone holds to its area; how many cells went.
+    """Moves one cell of `border` with all that it alone connects; returns the number moved.
 
-    The first that takes `amount` at most along, else the one that takes least, below twice that.
+    It is the first that moves at most `amount` cells, else the one that moves fewest, below twice
+    that.
     """
     least, chosen = 2 * amount, -1
     for k in border:
@@ -241,7 +242,7 @@ def _touches(neighbours: Ints, owner: Ints, k: int, taker: int) -> bool:
 
 @inner_kernel
 def _is_loose(neighbours: Ints, owner: Ints, k: int) -> bool:
-    """Whether the area of k stays connected without it, by a look at the cells around it."""
+    """Returns whether the area of k stays connected without it, by the cells around it."""
     own = owner[k]
     sides, links = 0, 0
     for side in range(4):
@@ -257,7 +258,7 @@ def _is_loose(neighbours: Ints, owner: Ints, k: int) -> bool:
 
 @inner_kernel
 def _held_by(neighbours: Ints, start: int, owner: Ints, k: int, queue: Ints, seen: Any) -> int:
-    """How many cells its area loses with cell k, itself included; `seen` marks those that stay."""
+    """Returns how many cells its area loses with cell k, itself included; `seen` marks the rest."""
     own = owner[k]
     size = 0
     for other in range(owner.shape[0]):

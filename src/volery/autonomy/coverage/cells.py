@@ -1,8 +1,8 @@
-"""The cells to visit as a graph: who is beside whom, which hang together, how far it is.
+"""The cells to visit as a graph: neighbours, components, distances.
 
 Rows count from south to north and columns from west to east, as in nav_msgs/OccupancyGrid. Cells
-that share a side are neighbours. Distances also go across corners, but never past the corner of a
-cell that does not count: so they join the same cells that sides join.
+that share a side are neighbours. Distances also cross corners, but never past the corner of an
+excluded cell: so they connect the same cells as sides do.
 """
 
 from __future__ import annotations
@@ -23,23 +23,25 @@ EAST, NORTH, WEST, SOUTH = 0, 1, 2, 3
 """Columns of `CoverageCells.neighbours`; NE, NW, SW and SE follow."""
 
 MOST_MAP_CELLS = 4096 * 4096
-"""Largest map, free and blocked cells together: its index takes 64 MiB. Modelling choice."""
+"""Max map size, free and blocked cells together: its index takes 64 MiB. Modelling choice."""
 MOST_CELLS = 1 << 18
-"""Most cells to visit, as of 512 x 512 free ones: such a plan takes seconds. Modelling choice."""
+"""Max number of cells to visit, as of 512 x 512 free ones: a plan takes seconds. Modelling
+choice.
+"""
 
 _STRAIGHT, _DIAGONAL = 5, 7
 _BUCKETS = _DIAGONAL + 1
 FAR = np.float32(3.0e38)
-"""Distance of what cannot be reached."""
+"""Distance of unreachable cells."""
 
 
 @dataclass(frozen=True)
 class CoverageCells:
-    """The n cells of a grid that count, numbered row by row.
+    """The n included cells of a grid, numbered row by row.
 
     shape: rows, columns of the grid. flat: (n,) row * columns + column. index: (rows * columns,)
-    number of a cell, -1 for those that do not count. neighbours: (n, 8) numbers of the cells
-    around, -1 where there is none.
+    number of a cell, -1 for excluded ones. neighbours: (n, 8) numbers of the cells around, -1 for
+    none.
     """
 
     shape: tuple[int, int]
@@ -52,19 +54,19 @@ class CoverageCells:
 
     @classmethod
     def of(cls, mask: Mask) -> CoverageCells:
-        """The cells where `mask` (rows, columns) is true. `PlanError` where they are too many."""
+        """Returns the cells of `mask` (rows, columns). Raises PlanError if there are too many."""
         if mask.ndim != 2 or 0 in mask.shape:
-            raise PlanError(f"a map needs rows and columns, not the shape {mask.shape}")
+            raise PlanError(f"a map must have rows and columns, not the shape {mask.shape}")
         if mask.size > MOST_MAP_CELLS:
             raise PlanError(
                 f"the map has {mask.shape[1]} x {mask.shape[0]} cells; at most "
-                f"{MOST_MAP_CELLS:,} (4096 x 4096) can be planned: make its cells larger"
+                f"{MOST_MAP_CELLS:,} (4096 x 4096) can be planned: increase the cell size"
             )
         count = int(np.count_nonzero(mask))
         if count > MOST_CELLS:
             raise PlanError(
-                f"the map has {count:,} free cells; at most {MOST_CELLS:,} can be planned: make "
-                "its cells larger"
+                f"the map has {count:,} free cells; at most {MOST_CELLS:,} can be planned: "
+                "increase the cell size"
             )
         flat = np.flatnonzero(mask).astype(np.int32)
         index = np.full(mask.size, -1, np.int32)
@@ -74,14 +76,14 @@ class CoverageCells:
         return cls(mask.shape, flat, index, neighbours)
 
     def number(self, row: int, column: int) -> int:
-        """Number of the cell at (row, column); -1 where it does not count or lies outside."""
+        """Returns the number of the cell at (row, column); -1 if it is excluded or outside."""
         rows, columns = self.shape
         inside = 0 <= row < rows and 0 <= column < columns
         return int(self.index[row * columns + column]) if inside else -1
 
     def part(self, numbers: Ints) -> CoverageCells:
-        """These cells alone, numbered in this order; `numbers` must ascend."""
-        place = np.full(len(self) + 1, -1, np.int32)  # the last one answers for "none": -1
+        """Returns these cells alone, numbered in this order; `numbers` must ascend."""
+        place = np.full(len(self) + 1, -1, np.int32)  # the last one maps "none", -1, to itself
         place[numbers] = np.arange(len(numbers), dtype=np.int32)
         flat = self.flat[numbers]
         index = np.full(len(self.index), -1, np.int32)
@@ -89,16 +91,16 @@ class CoverageCells:
         return CoverageCells(self.shape, flat, index, place[self.neighbours[numbers]])
 
     def places(self) -> NDArray[np.int64]:
-        """(n, 2) row, column."""
+        """Returns row and column (n, 2)."""
         return np.stack(np.divmod(self.flat.astype(np.int64), self.shape[1]), axis=1)
 
     def components(self) -> tuple[Ints, int]:
-        """Component of each cell (n,), numbered by their first cells, and how many there are."""
+        """Returns components (n,), numbered by their first cells, and the number of components."""
         labels = np.full(len(self), -1, np.int32)
         return labels, int(_label(self.neighbours, labels))
 
     def distances(self, sources: Ints | list[int]) -> NDArray[np.float32]:
-        """(n,) length of the shortest way from the nearest source, in cells; `FAR` for no way.
+        """Returns shortest distances (n,) to the nearest source, in cells; `FAR` for no path.
 
         Steps to the side count 1, across a corner 1.4, which is within 8 % of straight lines.
         """
@@ -107,7 +109,7 @@ class CoverageCells:
         return out
 
     def way(self, start: int, goal: int) -> list[int]:
-        """Cells of a shortest way, both ends included; empty where there is none."""
+        """Returns the cells of a shortest path, both ends included; empty if there is none."""
         distance = self.distances([goal])
         if distance[start] == FAR:
             return []
@@ -162,7 +164,7 @@ def _label(neighbours: Ints, labels: Ints) -> int:
 
 @kernel
 def _spread(neighbours: Ints, sources: Ints, out: Any) -> None:
-    """Dijkstra's method with buckets (Dial 1969) on the 5-7 chamfer lengths (Borgefors 1986)."""
+    """Runs Dijkstra's algorithm by buckets (Dial 1969) on 5-7 chamfers (Borgefors 1986)."""
     count = neighbours.shape[0]
     far = np.iinfo(np.int32).max
     length = np.full(count, far, np.int32)

@@ -1,7 +1,7 @@
-"""Who visits which of the parts that do not hang together, and how many cells each UAV gets.
+"""Assigns disconnected parts to UAVs, and computes how many cells each UAV gets.
 
-UAVs share the part that they are in. A part without a UAV is visited as a whole by the UAV that is
-nearest to it, and so much less of its own part is left to that UAV, as far as that goes.
+UAVs share the part that they are in. A part without a UAV is visited as a whole by the nearest UAV,
+which gets fewer cells of its own part in exchange, as far as possible.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from volery.autonomy.coverage.cells import FAR, CoverageCells, Ints, Mask
 
 @dataclass(frozen=True)
 class CoverageVisit:
-    """A part that one UAV visits as a whole: the UAV, the part, the cell that it comes to first."""
+    """A part that one UAV visits as a whole: the UAV, the part, the first cell."""
 
     uav: int
     part: int
@@ -25,11 +25,10 @@ class CoverageVisit:
 
 @dataclass(frozen=True)
 class AreaShares:
-    """Who goes where.
+    """Assignment of UAVs to parts.
 
-    entries: (R,) the cell in which each UAV begins, -1 for one that finds no work. visits: parts
-    without a UAV, in the order in which they are visited. lost: numbers of parts that nobody can
-    reach.
+    entries: (R,) the cell in which each UAV begins, -1 for one without work. visits: parts without
+    a UAV, in the order of their visits. lost: numbers of unreachable parts.
     """
 
     entries: Ints
@@ -39,10 +38,10 @@ class AreaShares:
 
 @dataclass(frozen=True)
 class ReachableCells:
-    """How far UAVs have to the cells to visit.
+    """Distances of UAVs to the cells to visit.
 
-    ways: the cells through which they fly, which hold those to visit. flies_over: whether they may
-    also cross, in a straight line, what is blocked.
+    ways: the cells through which they fly, which include those to visit. flies_over: whether they
+    may also cross blocked cells in a straight line.
     """
 
     ways: CoverageCells
@@ -50,7 +49,7 @@ class ReachableCells:
     flies_over: bool
 
     def of(self, start: int) -> NDArray[np.float32]:
-        """(n,) from cell `start` of the ways to each cell to visit, in cells; `FAR` for no way."""
+        """Returns distances (n,) from cell `start` of the ways, in cells; `FAR` for no path."""
         along = self.ways.distances([start])[self.ways.index[self.to_visit.flat]]
         if self.flies_over:
             rows, columns = np.divmod(self.to_visit.flat, self.to_visit.shape[1])
@@ -61,10 +60,10 @@ class ReachableCells:
 
 
 def share_parts(reach: ReachableCells, starts: Ints, labels: Ints, parts: int) -> AreaShares:
-    """Find an entry for every UAV and a UAV for every part.
+    """Assigns an entry cell to every UAV and a UAV to every part.
 
-    starts: (R,) cells of `reach.ways`. labels: (n,) part of each cell to visit. A UAV that stands
-    in a cell to visit begins there, any other in the nearest one in which no UAV begins.
+    starts: (R,) cells of `reach.ways`. labels: (n,) part of each cell to visit. A UAV in a cell to
+    visit begins there, any other in the nearest cell where no UAV begins.
     """
     count = len(reach.to_visit)
     entries = reach.to_visit.index[reach.ways.flat[starts]].copy()
@@ -98,7 +97,7 @@ def share_parts(reach: ReachableCells, starts: Ints, labels: Ints, parts: int) -
 def _entries(
     away: NDArray[np.float32], labels: Ints, least: NDArray[np.float32], wanted: Mask
 ) -> Ints:
-    """The first cell of each wanted part at the part's least distance."""
+    """Returns the first cell of each wanted part at the part's min distance."""
     at_least = np.flatnonzero((away == least[labels]) & wanted[labels]).astype(np.int32)
     _, first = np.unique(labels[at_least], return_index=True)
     found: Ints = at_least[first]
@@ -106,10 +105,10 @@ def _entries(
 
 
 def level_shares(cells: int, carried: NDArray[np.int64]) -> NDArray[np.int64]:
-    """How many of `cells` each of R UAVs gets so that all carry as alike as can be.
+    """Returns the numbers of cells (R,) that make the UAVs' loads as equal as possible.
 
-    carried: (R,) cells that they visit elsewhere. Each gets one at least; those with the same load
-    differ by one at most, the first ones getting more.
+    cells: the cells to divide. carried: (R,) cells that they visit elsewhere. Each gets at least
+    one; those with the same load differ by one at most, the first ones getting more.
     """
     robots = len(carried)
     order = np.argsort(carried, kind="stable")

@@ -2,13 +2,13 @@
 
 The method of Kapoutsis, Chatzichristofis and Kosmatopoulos ("DARP: Divide Areas Algorithm for
 Optimal Multi-Robot Coverage Path Planning", J. Intell. Robot. Syst. 86, 2017): a field E_r for each
-UAV, at first the distance from its start; each cell belongs to the UAV whose field is least there;
-fields of UAVs with too many cells grow, those of UAVs with too few shrink, and a UAV whose area has
-fallen apart finds cells near the part with its start cheaper, and those near the others dearer.
+UAV, initially the distance from its start; each cell belongs to the UAV with the smallest field.
+Fields of UAVs with too many cells grow, those of UAVs with too few shrink. If an area is
+disconnected, its field shrinks near the part with its start and grows near the others.
 
-Two things differ from the article. Distances go around obstacles. And once the areas are nearly
-right, or get no better, `balance` gives cells across borders until the sizes are exact, where the
-article goes on with ever smaller corrections. Where that fails, `growth` tries another way.
+Two details differ from the article. Distances go around obstacles. And once the areas are nearly
+right, or stop improving, `balance` moves cells across borders until the sizes are exact, where the
+article continues with ever smaller corrections. If that fails, `growth` is the fallback.
 """
 
 from __future__ import annotations
@@ -27,29 +27,29 @@ from volery.core.rng import stream_key, uniform
 
 MOST_ITERATIONS = 600
 MOST_UPDATES = 300_000_000
-"""Cell updates of one division, some seconds on one core. Modelling choice."""
+"""Max cell updates of one division, some seconds on one core. Modelling choice."""
 _NEAR_ENOUGH = 0.02
-"""Share of the cells that `balance` may still have to move. Modelling choice."""
+"""Fraction of the cells that `balance` may still have to move. Modelling choice."""
 _LOOKS_A_CELL, _MOST_LOOKS = 3_000, 200_000_000
-"""Patience of `balance`, a few seconds at most. Modelling choice."""
+"""Limits of `balance`, a few seconds at most. Modelling choice."""
 _GAIN = 0.25
-"""Of the correction factors, against the relative error of a share. Modelling choice ..."""
+"""Initial gain of the correction factors on the relative error of a share. Modelling choice."""
 _LEAST_GAIN = 0.01
-"""... it is halved whenever a UAV goes from too many cells to too few, but not below this."""
+"""Min gain; it is halved whenever a UAV changes from too many cells to too few."""
 _VARIATION = 0.01
-"""Most that one iteration's connectivity factor differs from 1: the article's."""
+"""Max deviation of one iteration's connectivity factor from 1: the article's."""
 _NOISE = 1e-4
-"""Most that one iteration's random factor differs from 1: the article's."""
+"""Max deviation of one iteration's random factor from 1: the article's."""
 
 
 def divide(
     cells: CoverageCells, starts: Ints, targets: NDArray[np.int64], *, seed: int = 1
 ) -> Ints:
-    """(n,) the UAV of each cell, so that UAV r gets `targets[r]` connected cells around its start.
+    """Returns the UAV of each cell (n,): `targets[r]` connected cells around the start of UAV r.
 
     `cells` must be one component, `starts` (R,) different cells of it, `targets` positive with the
-    sum n. Where it cannot reach the targets it comes as near as it finds; areas are connected
-    always.
+    sum n. If it cannot reach the targets it returns the best division found; areas are always
+    connected.
     """
     fields = np.stack([cells.distances([int(start)]) for start in starts])
     distances = fields.copy()
@@ -71,7 +71,7 @@ def divide(
 
 
 def _missing(owner: Ints, targets: NDArray[np.int64]) -> int:
-    """How many cells are not where they should be."""
+    """Returns the number of cells beyond the targets."""
     sizes = np.bincount(owner, minlength=len(targets))
     return int(np.abs(sizes - targets).sum()) // 2
 
@@ -86,7 +86,7 @@ def _iterate(
     iterations: int,
     owner: Ints,
 ) -> int:
-    """Leave the best division in `owner`; how many iterations it took."""
+    """Stores the best division in `owner`; returns the number of iterations."""
     robots, count = fields.shape
     here = np.empty(count, np.int32)
     queue = np.empty(count, np.int32)
@@ -135,7 +135,7 @@ def _iterate(
 
 @inner_kernel
 def _assign(fields: Any, starts: Ints, here: Ints, sizes: Any) -> None:
-    """Each cell to the UAV whose field is least, each start to its own."""
+    """Assigns each cell to the UAV with the smallest field, each start to its own."""
     robots, count = fields.shape
     for k in range(count):
         least = 0
@@ -154,7 +154,7 @@ def _assign(fields: Any, starts: Ints, here: Ints, sizes: Any) -> None:
 def _hops_from(
     neighbours: Ints, here: Ints, part: Any, robot: int, own: bool, queue: Ints, hops: Ints
 ) -> None:
-    """Steps from UAV `robot`'s part with its start (own), or from its other parts."""
+    """Computes steps from the part of `robot` with its start (own), or from its other parts."""
     hops[:] = -1
     head, tail = 0, 0
     for k in range(hops.shape[0]):
@@ -175,7 +175,7 @@ def _hops_from(
 
 @inner_kernel
 def _normalise(fields: Any) -> None:
-    """Keep the fields' numbers in bounds: only their ratios count."""
+    """Rescales the fields: only their ratios matter."""
     middle = 0.0
     for r in range(fields.shape[0]):
         middle += np.log(fields[r, 0])

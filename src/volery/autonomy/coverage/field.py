@@ -1,4 +1,4 @@
-"""A map of the graph as a field to cover: which cells are free, and where they lie."""
+"""The field to cover, from a map on the graph: free cells and their positions."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ BLOCKED_FROM = 50
 class CoverageField:
     """Free cells (rows, columns), the side of a cell in m, the lower left corner (2,) m, map.
 
-    The grid is turned by `yaw` rad about its corner.
+    The grid is rotated by `yaw` rad about its corner.
     """
 
     free: Mask
@@ -34,7 +34,7 @@ class CoverageField:
 
     @classmethod
     def from_message(cls, message: Any) -> CoverageField:
-        """The field that a nav_msgs/OccupancyGrid means. `PlanError` for one that is none."""
+        """Returns the field of a nav_msgs/OccupancyGrid. Raises PlanError if it is invalid."""
         info, corner = message.info, message.info.origin.position
         data: NDArray[np.int8] = np.asarray(message.data, dtype=np.int8)
         rows, columns = int(info.height), int(info.width)
@@ -49,7 +49,7 @@ class CoverageField:
         return cls(free, float(info.resolution), (float(corner.x), float(corner.y)), yaw)
 
     def lies_like(self, other: CoverageField) -> bool:
-        """Whether cells are where they are in `other`."""
+        """Returns whether the cells coincide with those of `other`."""
         same = (self.cell_m, self.origin_map, self.yaw) == (
             other.cell_m,
             other.origin_map,
@@ -58,23 +58,23 @@ class CoverageField:
         return same and self.free.shape == other.free.shape
 
     def cells_at(self, position_map: ArrayLike) -> NDArray[np.int64]:
-        """(K, 2) row, column of the cells at positions (K, 2 or 3), also outside of the map."""
+        """Returns row, column (K, 2) of positions (K, 2 or 3) m, also outside of the map."""
         return self._grid_at(position_map, self.cell_m)
 
     def sub_cells_at(self, position_map: ArrayLike) -> NDArray[np.int64]:
-        """(K, 2) row, column on the grid twice as fine."""
+        """Returns row, column (K, 2) on the grid twice as fine."""
         return self._grid_at(position_map, 0.5 * self.cell_m)
 
     def centres(self, cells: ArrayLike) -> Array:
-        """(K, 2) m, map: middles of cells (K, 2) row, column."""
+        """Returns the centres (K, 2) m, map, of cells (K, 2) row, column."""
         return self._middles(cells, self.cell_m)
 
     def sub_centres(self, sub_cells: ArrayLike) -> Array:
-        """(K, 2) m, map: middles of cells of the grid twice as fine."""
+        """Returns the centres (K, 2) m, map, of cells of the grid twice as fine."""
         return self._middles(sub_cells, 0.5 * self.cell_m)
 
     def apart(self, cells: NDArray[np.int64]) -> NDArray[np.int64]:
-        """(R, 2) the nearest free cell to each of `cells` (R, 2), each another one while any is."""
+        """Returns the nearest free cells (R, 2) to `cells` (R, 2), all different if possible."""
         free = np.argwhere(self.free)
         found = cells.copy()
         for number, cell in enumerate(cells[: len(free)]):

@@ -1,4 +1,4 @@
-"""One UAV on its coverage flight: which waypoint is next, and whether it gets on."""
+"""One UAV's coverage flight: its next waypoint and its progress."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from volery.core.vectors import norm
 Array = NDArray[np.float64]
 
 _PROGRESS_M = 0.2
-"""Nearer by this much counts as getting on. Modelling choice."""
+"""Decrease of the distance that counts as progress. Modelling choice."""
 _CLIMBED_M, _STILL_M_S = 0.5, 0.2
-"""A take-off has ended when the UAV is so much higher and climbs no faster. Modelling choice."""
+"""Min rise and max climb rate at the end of a take-off. Modelling choice."""
 
 
 class CoveragePhase(StrEnum):
-    """Where in its flight a UAV is."""
+    """Phase of a UAV's flight."""
 
     GROUND = "ground"
-    """Has not been asked to take off."""
+    """Take-off not requested yet."""
     TAKE_OFF = "take_off"
     COVER = "cover"
     DONE = "done"
     """Has covered its area, or has none, and lands."""
     FAILED = "failed"
-    """Is silent or gets nowhere; takes no further part."""
+    """Timed out or makes no progress; takes no further part."""
 
 
 @dataclass
@@ -47,25 +47,25 @@ class CoverageFlight:
     following: int = 0
     """Number of the next waypoint."""
     told: int = -1
-    """Number of the waypoint that it was last told to go to."""
+    """Number of the last waypoint sent to it."""
     nearest_m: float = math.inf
-    """Least distance from it so far, and since when it has not become less."""
+    """Min distance to it so far, and since when it has not decreased."""
     since_ns: int = 0
 
     def moved(self, position_map: Array, climb_m_s: float, now_ns: int) -> None:
-        """Take in where it is."""
+        """Stores the current position."""
         self.position_map, self.climb_m_s, self.heard_ns = position_map, climb_m_s, now_ns
         if self.home_map is None:
             self.home_map = position_map.copy()
 
     def send(self, waypoints: WaypointProgress, now_ns: int) -> None:
-        """Follow other waypoints from now on."""
+        """Sets other waypoints."""
         self.waypoints, self.following, self.told = waypoints, 0, -1
         self._begin_leg(now_ns)
 
     @property
     def has_climbed(self) -> bool:
-        """Whether a take-off has come to its end."""
+        """Whether a take-off has ended."""
         assert self.position_map is not None
         assert self.home_map is not None
         risen = float(self.position_map[2] - self.home_map[2])
@@ -73,12 +73,12 @@ class CoverageFlight:
 
     @property
     def is_level(self) -> bool:
-        """Whether it neither climbs nor sinks to speak of."""
+        """Whether it neither climbs nor descends noticeably."""
         return abs(self.climb_m_s) < _STILL_M_S
 
     @property
     def covers(self) -> bool:
-        """Whether what it flies over now counts as covered."""
+        """Whether the cells below count as covered."""
         return (
             self.phase is CoveragePhase.COVER
             and self.waypoints is not None
@@ -86,7 +86,7 @@ class CoverageFlight:
         )
 
     def goal(self, arrival_m: float, now_ns: int) -> Array | None:
-        """(3,) the waypoint to fly to, next ones as they are reached; None when all are flown."""
+        """Returns the current waypoint (3,) m, advancing past reached ones; None at the end."""
         assert self.position_map is not None
         assert self.waypoints is not None
         while self.following < len(self.waypoints.places):
@@ -101,7 +101,7 @@ class CoverageFlight:
         return None
 
     def is_lost(self, patience_s: float, now_ns: int) -> bool:
-        """Whether it has been silent, or has not come nearer to its goal, for `patience_s`."""
+        """Returns whether odometry or progress have been missing for `patience_s`."""
         return now_ns - min(self.heard_ns, self.since_ns) > patience_s * 1e9
 
     def _begin_leg(self, now_ns: int) -> None:

@@ -1,8 +1,8 @@
-"""Areas that grow from their starts all at once and are kept in balance while they are small.
+"""Areas that grow from their starts simultaneously and stay balanced from the beginning.
 
-Where UAVs start side by side, an area that was hemmed in by its neighbours when all were large can
-hardly be freed. Here the map is taken in by and by, twice as much of it each time, nearest cells
-first: each area keeps its way out.
+If UAVs start side by side, a large area that its neighbours enclose can hardly be freed. Here the
+map is added step by step, twice as much of it each time, nearest cells first, so that each area can
+always expand.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from volery.autonomy.coverage.cells import CoverageCells, Ints
 from volery.autonomy.coverage.joining import join_parts
 
 _LOOKS_A_CELL, _MOST_LOOKS = 10_000, 600_000_000
-"""Patience of `balance`, some seconds at most for each doubling. Modelling choice."""
+"""Limits of `balance`, some seconds at most for each doubling. Modelling choice."""
 
 
 def grow(
     cells: CoverageCells, starts: Ints, targets: NDArray[np.int64], distances: NDArray[np.float32]
 ) -> Ints:
-    """(n,) the UAV of each cell; arguments as for `darp.divide`.
+    """Returns the UAV of each cell (n,); arguments as for `darp.divide`.
 
     distances: (R, n) from each start.
     """
@@ -47,7 +47,7 @@ def grow(
 def _present_targets(
     part: CoverageCells, begin: Ints, targets: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """What each UAV should have of the cells taken in so far: its share of where it is."""
+    """Returns each UAV's target among the cells so far: its fraction of its component."""
     labels, pieces = part.components()
     sizes = np.bincount(labels, minlength=pieces)
     home = labels[begin]

@@ -1,4 +1,4 @@
-"""Areas made connected: parts that hang loose go to areas beside them."""
+"""Makes areas connected: disconnected parts go to adjacent areas."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from volery.core.compiled import inner_kernel, kernel
 
 @kernel
 def join_parts(neighbours: Ints, starts: Ints, targets: Any, owner: Ints) -> None:
-    """Give parts of areas that do not hang together with their start to areas beside them.
+    """Gives parts that are disconnected from their start to adjacent areas.
 
-    An area grows into them by one ring of cells at a time, the one that lacks most first.
+    An area grows into them by one ring of cells at a time, the one with the largest deficit first.
     """
     count, robots = owner.shape[0], starts.shape[0]
     queue = np.empty(count, np.int32)
@@ -32,7 +32,7 @@ def join_parts(neighbours: Ints, starts: Ints, targets: Any, owner: Ints) -> Non
             ):
                 grower = r
         if grower < 0:
-            return  # cells are one component, so nothing is loose when all are stuck
+            return  # cells are one component, so none is loose when all are stuck
         tail = _ring_around(neighbours, owner, kept, grower, queue)
         for i in range(tail):
             owner[queue[i]] = grower
@@ -46,9 +46,9 @@ def join_parts(neighbours: Ints, starts: Ints, targets: Any, owner: Ints) -> Non
 
 @inner_kernel
 def walk_part(neighbours: Ints, owner: Ints, start: int, queue: Ints, seen: Any) -> int:
-    """Mark the cells of an area that hang together with its start; how many they are.
+    """Marks the cells of an area that are connected to its start; returns their number.
 
-    Cells that `seen` marks already are taken to be away.
+    Cells that `seen` already marks are excluded.
     """
     area = owner[start]
     seen[start] = True
@@ -68,7 +68,7 @@ def walk_part(neighbours: Ints, owner: Ints, start: int, queue: Ints, seen: Any)
 
 @inner_kernel
 def _ring_around(neighbours: Ints, owner: Ints, kept: Any, grower: int, ring: Ints) -> int:
-    """Fill `ring` with the loose cells beside an area; how many they are."""
+    """Fills `ring` with the loose cells beside an area; returns their number."""
     found = 0
     for k in range(owner.shape[0]):
         if kept[k]:

@@ -1,4 +1,4 @@
-"""What the coverage planner tells: areas, what is covered, paths, as messages."""
+"""Builds the messages of the coverage planner: areas, covered cells, paths, status."""
 
 from __future__ import annotations
 
@@ -29,24 +29,24 @@ from volery.graph.messages import (
 )
 
 KEEP_HEADING = Quaternion(0.0, 0.0, 0.0, 0.0)
-"""As the rotation of a goal: the heading stays as it is."""
+"""Rotation of a goal that leaves the heading unchanged."""
 _LEVEL = Quaternion(0.0, 0.0, 0.0, 1.0)
 
 
 def areas_message(field: CoverageField, owner: NDArray[np.int16], now_ns: int) -> OccupancyGrid:
-    """Number of the UAV of each cell from 1; 0: nobody can reach it; -1: nobody need visit it."""
+    """Returns UAV numbers of the cells from 1; 0: unreachable; -1: no visit needed."""
     return _grid(field, owner + 1, now_ns)
 
 
 def covered_message(field: CoverageField, covered: Mask, now_ns: int) -> OccupancyGrid:
-    """How much of each free cell is covered, in per cent; -1 for blocked ones."""
+    """Returns the covered percentage of each free cell; -1 for blocked ones."""
     rows, columns = field.free.shape
     quarters = covered.reshape(rows, 2, columns, 2).sum(axis=(1, 3))
     return _grid(field, np.where(field.free, 25 * quarters, -1), now_ns)
 
 
 def path_message(waypoints: WaypointProgress, now_ns: int) -> PathMessage:
-    """The waypoints of one UAV."""
+    """Returns the path of one UAV's waypoints."""
     stamp = header(now_ns, "map")
     return PathMessage(
         stamp, [PoseStamped(stamp, Pose(Point(*p), _LEVEL)) for p in waypoints.places]
@@ -54,14 +54,14 @@ def path_message(waypoints: WaypointProgress, now_ns: int) -> PathMessage:
 
 
 def goal_message(place: NDArray[np.float64], now_ns: int) -> PoseStamped:
-    """A goal in the map, the heading left as it is."""
+    """Returns a goal in the map that leaves the heading unchanged."""
     return PoseStamped(header(now_ns, "map"), Pose(Point(*place.tolist()), KEEP_HEADING))
 
 
 def status_message(
     flights: Sequence[CoverageFlight], plan: CoveragePlan | None, share: float, refused: str
 ) -> String:
-    """JSON: state, share covered, phase and cells of each UAV, what cannot be done and why."""
+    """Returns JSON: state, covered fraction, phase and cells of each UAV, reason of a refusal."""
     shares = [] if plan is None else plan.shares.tolist()
     told = {
         "state": "refused" if refused else "waiting" if plan is None else "flying",

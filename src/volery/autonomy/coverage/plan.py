@@ -1,7 +1,7 @@
-"""The plan of a coverage flight: who visits which cells, and in which order.
+"""The plan of a coverage flight: the cells of each UAV, and their order.
 
     plan = plan_coverage(free, starts)
-    plan.owner          # (rows, columns) whose cell it is
+    plan.owner          # (rows, columns) UAV of each cell
     plan.routes[0]      # the tours of the first UAV
 
 Steps: the cells to visit fall into parts (`components`); UAVs of one part divide it among them
@@ -31,19 +31,19 @@ from volery.core.plurals import counted
 NOT_TO_VISIT = -2
 """Owner of cells that are blocked, or that need no visit."""
 UNREACHABLE = -1
-"""Owner of cells that should be visited and that no UAV can reach."""
+"""Owner of cells to visit that no UAV can reach."""
 
 MOST_FIELD_NUMBERS = 1 << 24
-"""Most cells times UAVs in one part: 128 MiB for their fields. Modelling choice."""
+"""Max cells times UAVs in one part: 128 MiB for their fields. Modelling choice."""
 
 
 @dataclass(frozen=True)
 class CoveragePlan:
-    """Who visits what.
+    """Assignment and tours of a coverage flight.
 
-    owner: (rows, columns) number of the UAV, `UNREACHABLE` or `NOT_TO_VISIT`. routes: of each UAV
-    the tours that it flies one after the other, the one around its start first; none for a UAV that
-    has nothing to do. spread: largest difference between the cells of UAVs that divide a part.
+    owner: (rows, columns) number of the UAV, `UNREACHABLE` or `NOT_TO_VISIT`. routes: the
+    successive tours of each UAV, the one around its start first; empty for a UAV without work.
+    spread: largest difference between the cells of UAVs that divide a part.
     """
 
     owner: NDArray[np.int16]
@@ -52,12 +52,12 @@ class CoveragePlan:
 
     @property
     def shares(self) -> NDArray[np.int64]:
-        """(R,) cells of each UAV."""
+        """Numbers of cells (R,) of the UAVs."""
         return np.bincount(self.owner[self.owner >= 0], minlength=len(self.routes))
 
     @property
     def unreachable(self) -> int:
-        """How many cells no UAV can reach."""
+        """Number of unreachable cells."""
         return int(np.count_nonzero(self.owner == UNREACHABLE))
 
 
@@ -69,17 +69,17 @@ def plan_coverage(
     flies_over: bool = False,
     seed: int = 1,
 ) -> CoveragePlan:
-    """Divide a grid map among UAVs and plan a closed tour through each area.
+    """Divides a grid map among UAVs and plans a closed tour through each area.
 
-    free: (rows, columns) where a UAV may be, at flying height. starts: (R, 2) row and column of
-    each UAV; free, and no two the same. to_visit: the free cells that need a visit; None: all of
-    them. flies_over: whether a UAV may cross what is blocked, above it, to reach other parts.
-    seed: of the method's random numbers; the same seed gives the same plan.
+    free: (rows, columns) cells where a UAV may fly at its height. starts: (R, 2) row and column of
+    each UAV; free and distinct. to_visit: the free cells that need a visit; None: all of them.
+    flies_over: whether a UAV may cross blocked cells, above them, to reach other parts. seed: of
+    the method's random numbers; the same seed gives the same plan.
 
     Raises
     ------
     PlanError
-        A start is blocked, outside or taken twice; nothing is free; map or fleet are too large.
+        A start is blocked, outside or not unique; no cell is free; map or fleet are too large.
 
     """
     ways = CoverageCells.of(np.asarray(free, np.bool_))
@@ -96,9 +96,9 @@ def plan_coverage(
 
 
 def _checked_starts(ways: CoverageCells, starts: NDArray[np.int64]) -> Ints:
-    """Numbers of the start cells."""
+    """Returns the numbers of the start cells."""
     if starts.ndim != 2 or starts.shape[1] != 2 or not len(starts):
-        raise PlanError("starts are rows and columns of at least one UAV, an array (R, 2)")
+        raise PlanError("starts must be an array (R, 2) of rows and columns for at least one UAV")
     if not len(ways):
         raise PlanError("the map has no free cell")
     numbers = np.empty(len(starts), np.int32)
@@ -122,7 +122,7 @@ def _checked_starts(ways: CoverageCells, starts: NDArray[np.int64]) -> Ints:
 def _divide_parts(
     cells: CoverageCells, labels: Ints, shares: AreaShares, areas: Ints, seed: int
 ) -> int:
-    """Set `areas` (n,) to the UAV of each cell; the largest difference in a part."""
+    """Sets `areas` (n,) to the UAV of each cell; returns the largest difference in a part."""
     carried = np.zeros(len(shares.entries), np.int64)
     sizes = np.bincount(labels, minlength=1)
     owner_of_part = np.full(len(sizes), UNREACHABLE, np.int32)
@@ -154,11 +154,11 @@ def _divide_parts(
 def _routes(
     cells: CoverageCells, labels: Ints, shares: AreaShares, areas: Ints
 ) -> tuple[tuple[CoverageTour, ...], ...]:
-    """Tours of each UAV, that of its own part first."""
+    """Returns the tours of each UAV, that of its own part first."""
     first = [(int(u), int(shares.entries[u])) for u in np.flatnonzero(shares.entries >= 0)]
     legs: Sequence[tuple[int, int]] = first + [(v.uav, v.entry) for v in shares.visits]
     number = np.full(len(cells), -1, np.int32)
-    # an area is what one UAV has of one part: number areas so that trees do not mix
+    # an area is one UAV's cells of one part: number areas so that trees do not mix
     keys = labels.astype(np.int64) * (len(shares.entries) + 1) + areas + 1
     entries = np.array([entry for _, entry in legs], np.int32)
     known, inverse = np.unique(keys, return_inverse=True)

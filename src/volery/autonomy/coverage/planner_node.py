@@ -1,8 +1,8 @@
-"""Several UAVs cover a grid map together: one node that plans for all and streams waypoints.
+"""Covers a grid map by several UAVs: one node plans for all and publishes goals.
 
-It waits for a map and for where its UAVs are, divides the free cells, lets the UAVs take off, sends
-each from corner to corner of its tour, and lands it where it began. When the map changes, or a UAV
-falls silent or gets nowhere, what is not yet covered is divided anew.
+It waits for a map and for its UAVs' odometry, divides the free cells, requests the take-offs, sends
+each UAV the corners of its tour, and lands it at its start. If the map changes, or a UAV times out
+or makes no progress, it divides the uncovered cells again.
 """
 
 from __future__ import annotations
@@ -40,10 +40,11 @@ from volery.graph.nodes.service_client import Future
 
 _PERIOD_S = 0.1
 _REPEAT = 10
-"""A goal is sent again, and progress told, every so many periods: a UAV that takes off ignores
-goals."""
+"""Periods after which a goal and the progress are published again: a UAV ignores goals during
+take-off.
+"""
 _STATE = ("_field", "_flights", "_plan", "_covered", "_refused", "_ticks", "_told_covered")
-"""Everything that changes in flight."""
+"""Names of the attributes that a snapshot stores."""
 
 
 class CoveragePlanner(Node):
@@ -52,18 +53,18 @@ class CoveragePlanner(Node):
     Parameters
     ----------
     uavs: names of the UAVs.
-    height_m: z in the map at which they cover.
-    layer_m: how much higher each UAV flies in transit than the one before it.
+    height_m: z of the tours in the map.
+    layer_m: height difference between UAVs in transit.
     over_m: z at which blocked cells may be crossed to reach parts without a UAV; 0: never.
-    arrival_m: how near to a waypoint counts as there.
-    patience_s: how long a UAV may be silent, or not come nearer to its waypoint.
+    arrival_m: distance at which a waypoint is reached.
+    patience_s: timeout of a UAV's odometry, and of its progress.
     seed: of the division's random numbers.
 
     """
 
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Returns the tasks that compile its kernels."""
+        """Returns the tasks that compile the kernels of this node."""
         from volery.autonomy.coverage import warmup
 
         return (warmup.coverage_plans,)
@@ -84,7 +85,7 @@ class CoveragePlanner(Node):
         self._flights = [CoverageFlight(name) for name in names]
         self._plan: CoveragePlan | None = None
         self._covered: Mask = np.zeros((0, 0), np.bool_)
-        """Sub-cells (2 * rows, 2 * columns) that a UAV has come through."""
+        """Sub-cells (2 * rows, 2 * columns) that a UAV has flown through."""
         self._refused = ""
         self._ticks = 0
         self._told_covered = -1
@@ -106,14 +107,14 @@ class CoveragePlanner(Node):
         self.create_timer(_PERIOD_S, self._on_timer)
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         return save_attributes(self, _STATE)
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         restore_attributes(self, state)
 
-    # ------------------------------------------------------------------------------ what it hears
+    # ------------------------------------------------------------------------------ subscriptions
 
     def _listener(self, number: int) -> Any:
         def on_odometry(message: Odometry) -> None:
@@ -151,20 +152,20 @@ class CoveragePlanner(Node):
         if 0 <= row < rows and 0 <= column < columns and self._field.free[row // 2, column // 2]:
             self._covered[row, column] = True
 
-    # ------------------------------------------------------------------------------ what it plans
+    # ----------------------------------------------------------------------------------- planning
 
     def _plan_first(self) -> None:
-        """Plan from where the UAVs stand, all of which must be in free cells of their own."""
+        """Plans from the UAVs' positions, which must be in different free cells."""
         assert self._field is not None
         starts = self._field.cells_at(np.array([f.position_map for f in self._flights]))
         self._take_plan(self._flights, starts, self._field.free)
 
     def _plan_again(self) -> None:
-        """Divide what is left among those that can still fly, from wherever they are."""
+        """Divides the uncovered cells among the able UAVs, from their present positions."""
         assert self._field is not None
         able = [f for f in self._flights if f.phase is not CoveragePhase.FAILED]
         if not able:
-            self._refuse("no UAV is left that could go on")
+            self._refuse("no UAV is left to continue")
             return
         rows, columns = self._field.free.shape
         whole = self._covered.reshape(rows, 2, columns, 2).all(axis=(1, 3))
@@ -182,7 +183,7 @@ class CoveragePlanner(Node):
             self._refuse(str(error))
             return
         numbers = [self._flights.index(flight) for flight in able]
-        # the last two answer for the owners -2 and -1, who are no UAVs
+        # the last two map the owners -2 and -1, which are no UAVs
         owner = np.array([*numbers, NOT_TO_VISIT, UNREACHABLE], np.int16)[plan.owner]
         self._plan, self._refused = plan, ""
         ways = CoverageCells.of(free)
@@ -215,7 +216,7 @@ class CoveragePlanner(Node):
             self._refused = reason
             self._tell_status()
 
-    # ------------------------------------------------------------------------------- what it does
+    # ----------------------------------------------------------------------------------- behaviour
 
     def _on_timer(self) -> None:
         self._ticks += 1
@@ -261,7 +262,7 @@ class CoveragePlanner(Node):
         def on_answer(answer: Future) -> None:
             refused = answer.exception() is not None or not answer.result().success
             if refused and flight.is_level and flight.phase is CoveragePhase.TAKE_OFF:
-                self._begin(flight)  # it is in the air already; else it will be lost in time
+                self._begin(flight)  # already airborne; otherwise it will time out
 
         self._take_off[number].call_async().add_done_callback(on_answer)
 
@@ -274,11 +275,11 @@ class CoveragePlanner(Node):
         flies = flight.phase in (CoveragePhase.TAKE_OFF, CoveragePhase.COVER)
         return flies and flight.is_lost(self._patience_s, now)
 
-    # ------------------------------------------------------------------------------ what it tells
+    # ---------------------------------------------------------------------------------- publishers
 
     @property
     def _share(self) -> float:
-        """Share of the free cells' quarters that are covered."""
+        """Covered fraction of the free cells' quarters."""
         assert self._field is not None
         free = 4 * int(np.count_nonzero(self._field.free))
         fine = np.kron(self._field.free, np.ones((2, 2), np.bool_))

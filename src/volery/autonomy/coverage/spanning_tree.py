@@ -1,12 +1,12 @@
 """A closed tour of each area: around a spanning tree of its cells, on a grid twice as fine.
 
 Spanning-tree coverage (Gabriely and Rimon, "Spanning-tree based coverage of continuous areas by a
-mobile robot", Ann. Math. Artif. Intell. 31, 2001): each cell has four sub-cells; whoever keeps the
-tree at the left hand comes through each sub-cell of the area once and back to where it began.
+mobile robot", Ann. Math. Artif. Intell. 31, 2001): each cell has four sub-cells; a tour with the
+tree on its left passes each sub-cell of the area once and returns to its start.
 
-All edges are of one length, so any spanning tree is a minimum one; which of them is taken decides
-how often the tour turns. Four orders are tried: rows or columns first, what joins them at the one
-end or at the other.
+All edges have the same length, so any spanning tree is a minimum one; the choice determines the
+number of turns. Four orders are tried: rows or columns first, joined at the one end or at the
+other.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ ORDERS = 4
 
 @dataclass(frozen=True)
 class CoverageTour:
-    """A closed way through every sub-cell of an area.
+    """A closed tour through every sub-cell of an area.
 
-    sub_cells: (4 * cells, 2) row and column on the grid twice as fine; each is beside the one
-    before it, the first beside the last. turns: corners of the tour, its closing included.
+    sub_cells: (4 * cells, 2) row and column on the grid twice as fine; each is beside the previous
+    one, the first beside the last. turns: corners of the tour, including its closing.
     """
 
     sub_cells: Ints
     turns: int
 
     def begun_at(self, number: int) -> CoverageTour:
-        """The same tour from its sub-cell `number` on."""
+        """Returns the same tour from its sub-cell `number` on."""
         return CoverageTour(np.roll(self.sub_cells, -number, axis=0), self.turns)
 
     def corners(self) -> Ints:
-        """The sub-cells (K, 2) where it turns, after its first one: what a UAV must be told."""
+        """Returns the sub-cells (K, 2) where it turns, after its first one: the goals of a UAV."""
         way = self.sub_cells
         ahead = np.roll(way, -1, axis=0) - way
         behind = way - np.roll(way, 1, axis=0)
@@ -50,7 +50,7 @@ class CoverageTour:
 
 
 def tours(cells: CoverageCells, owner: Ints, starts: Ints) -> list[CoverageTour]:
-    """A tour of each area, from a sub-cell of its start; of the four the one with fewest turns.
+    """Returns a tour of each area, from a sub-cell of its start, with the fewest turns of four.
 
     owner: (n,) the area of each cell, -1 for none; all areas connected. starts: (R,) a cell of
     each.
@@ -72,7 +72,7 @@ def tours(cells: CoverageCells, owner: Ints, starts: Ints) -> list[CoverageTour]
 
 @kernel
 def _span(neighbours: Ints, owner: Ints, order: int, tree: NDArray[np.uint8]) -> None:
-    """A spanning tree of every area (Kruskal 1956): bit d of `tree[k]` for an edge to side d."""
+    """Spans a tree over every area (Kruskal 1956): bit d of `tree[k]` for an edge to side d."""
     count = owner.shape[0]
     root = np.arange(count).astype(np.int32)
     tree[:] = 0
@@ -104,7 +104,7 @@ def _root_of(root: Ints, k: int) -> int:
 def _walk_around(
     flat: Ints, index: Ints, tree: NDArray[np.uint8], columns: int, start: int, way: Ints
 ) -> int:
-    """Fill `way` with the tour around the tree from the south-west sub-cell of `start`; turns."""
+    """Fills `way` with the tour from the south-west sub-cell of `start`; returns its turns."""
     row, column = 2 * (flat[start] // columns), 2 * (flat[start] % columns)
     heading, turns, first = -1, 0, -1
     for i in range(way.shape[0]):
@@ -129,7 +129,7 @@ def _walk_around(
 
 @inner_kernel
 def _side_ahead(north: int, east: int, edges: Any) -> int:
-    """Where the tour leaves a sub-cell: out of the cell along the tree, else around its middle."""
+    """Returns the next side of a sub-cell: along the tree, else around the cell's centre."""
     if north == 0 and east == 0:
         return SOUTH if edges & (1 << SOUTH) else EAST
     if north == 0:

@@ -8,5 +8,5 @@ from volery.autonomy.coverage.plan import plan_coverage
 
 
 def coverage_plans() -> None:
-    """All of them: two UAVs share out a small map."""
+    """Compiles all kernels: two UAVs divide a small map."""
     plan_coverage(np.ones((4, 4), np.bool_), [[0, 0], [3, 3]])

@@ -1,4 +1,4 @@
-"""From tours on the grid to waypoints in the map: transits, tours, the way home."""
+"""Converts tours on the grid to waypoints in the map: transits, tours, the return."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ _HIGHEST = 1e4
 class HeightProfile:
     """Heights in the map, m.
 
-    cover: of the tours. layer: how much higher each UAV flies in transit than the one before it, so
-    that transits that cross do so apart. over: at which blocked cells may be crossed, 0: never.
+    cover: of the tours. layer: height difference between UAVs in transit, so that crossing transits
+    are separated. over: at which blocked cells may be crossed, 0: never.
     """
 
     cover: float
@@ -31,20 +31,20 @@ class HeightProfile:
     over: float
 
     def __post_init__(self) -> None:
-        """`PlanError` for heights at which nothing is flown."""
+        """Raises PlanError for heights out of range."""
         low = {"height_m": (self.cover, -_HIGHEST), "layer_m": (self.layer, 0.0)}
         for key, (height, least) in {**low, "over_m": (self.over, 0.0)}.items():
             if not least <= height <= _HIGHEST:
                 raise PlanError(f"{key} must be {least:g} to {_HIGHEST:g} m, not {height:g}")
 
     def transit(self, uav: int, *, over: bool) -> float:
-        """Of UAV number `uav` on its way between areas, over blocked cells or not."""
+        """Returns the transit height of UAV number `uav`, over blocked cells or not."""
         return (self.over if over else self.cover) + (uav + 1) * self.layer
 
 
 @dataclass(frozen=True)
 class WaypointProgress:
-    """Where a UAV goes: (K, 3) m, map, and whether it covers on the way to each, (K,)."""
+    """Waypoints (K, 3) m, map, and whether the leg to each covers cells, (K,)."""
 
     places: Array
     covering: NDArray[np.bool_]
@@ -59,10 +59,10 @@ def route_waypoints(
     home_map: Array,
     tours: Sequence[CoverageTour],
 ) -> WaypointProgress:
-    """The waypoints of one UAV: for each tour the transit and the tour, then home to land.
+    """Returns the waypoints of one UAV: for each tour the transit and the tour, then the return.
 
-    ways: the free cells of the field. position_map: (3,) where it is. home_map: (3,) where it
-    lands.
+    ways: the free cells of the field. position_map: (3,) m, current position. home_map: (3,) m,
+    landing position.
     """
     places: list[Array] = []
     covering: list[bool] = []
@@ -94,9 +94,9 @@ def _transit(
     start: Array,
     goal: Array,
 ) -> list[tuple[Array, float]]:
-    """Points (K, 2) and heights of the way between two areas; nothing within a cell or to the next.
+    """Returns points (K, 2) and heights of a transit; empty within a cell or to a neighbour.
 
-    Climb on the spot, fly there through free cells or over all, go down on the spot.
+    The UAV climbs vertically, flies through free cells or over all, and descends vertically.
     """
     cells = field.cells_at(np.stack([start, goal]))
     if int(np.abs(cells[0] - cells[1]).sum()) <= 1:
@@ -111,7 +111,7 @@ def _transit(
 
 
 def _corners(way: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The cells (K, 2) of a way at which it turns, ends excluded."""
+    """Returns the cells (K, 2) of a path at which it turns, without its ends."""
     steps = np.diff(way, axis=0)
     turns = (steps[1:] != steps[:-1]).any(axis=1)
     corners: NDArray[np.int64] = way[1:-1][turns]

@@ -1,4 +1,4 @@
-"""OctoMaps of what LIDARs see: built, sent, kept as files, merged, and seen from above.
+"""OctoMaps from LIDARs: built, published, saved to files, merged, and projected to grids.
 
-`mapping_node.Mapping` builds one, `merging_node.MapMerging` joins those of several UAVs.
+`mapping_node.Mapping` builds one, `merging_node.MapMerging` merges those of several UAVs.
 """

@@ -1,4 +1,4 @@
-"""Occupancy grids as ROS' map_server reads them: a picture `.pgm` and a `.yaml` beside it."""
+"""Writes occupancy grids for ROS' map_server: an image `.pgm` and a `.yaml` beside it."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from volery.core.errors import DataFileError
 Array = NDArray[np.float64]
 
 _FREE, _UNKNOWN, _OCCUPIED = 254, 205, 0
-"""Shades that map_saver writes and map_server reads back in mode trinary."""
+"""Grey values that map_saver writes and map_server reads in mode trinary."""
 
 
 def shades(values: NDArray[np.int8]) -> NDArray[np.uint8]:
-    """(rows, columns) grey, the first row at the top, of values of nav_msgs/OccupancyGrid."""
+    """Returns nav_msgs/OccupancyGrid values (rows, columns) as grey, first row at the top."""
     picture = np.full(values.shape, _UNKNOWN, np.uint8)
     picture[values == 0] = _FREE
     picture[values > 50] = _OCCUPIED
@@ -24,7 +24,7 @@ def shades(values: NDArray[np.int8]) -> NDArray[np.uint8]:
 
 
 def write_grid(stem: Path, values: NDArray[np.int8], origin: Array, cell_m: float) -> list[Path]:
-    """Write `stem`.pgm and `stem`.yaml; `origin` (2,) m is the lower left corner in the map.
+    """Writes `stem`.pgm and `stem`.yaml; `origin` (2,) m is the lower left corner in the map.
 
     Raises
     ------

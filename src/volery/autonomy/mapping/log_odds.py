@@ -1,8 +1,8 @@
-"""An occupancy grid from rays whose poses are known: log-odds of each cell, seen from above.
+"""An occupancy grid from rays with known poses: log-odds of each cell, seen from above.
 
-H. Moravec and A. Elfes, High resolution maps from wide angle sonar, ICRA 1985. Where a ray ends in
-something the cell is likelier occupied, along it free; within one scan a hit beats all rays that
-pass, so that thin things stay.
+H. Moravec and A. Elfes, High resolution maps from wide angle sonar, ICRA 1985. A hit makes its cell
+more likely occupied, a passing ray free; within one scan a hit outweighs all rays that pass its
+cell, so that thin objects remain.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _HIT, _MISS, _LEAST, _MOST = 0.85, 0.4, -4.0, 6.0
 OCCUPIED, FREE, UNKNOWN = 100, 0, -1
 """As in nav_msgs/OccupancyGrid."""
 _OCCUPIED, _FREE = 0.6, -0.3
-"""Odds' logarithms beyond which a cell counts as such: after one scan, unless others gainsay."""
+"""Log-odds beyond which a cell counts as such: after one scan, unless others contradict."""
 
 
 class LogOddsGrid:
@@ -38,7 +38,7 @@ class LogOddsGrid:
         self._number = 0
 
     def add(self, starts: Array, ends: Array, hits: NDArray[np.bool_]) -> None:
-        """Take in the rays of one scan, (K, 2) m in the map."""
+        """Adds the rays of one scan, (K, 2) m in the map."""
         self._number += 2
         _draw(
             np.ascontiguousarray(starts), np.ascontiguousarray(ends), hits, self.origin,
@@ -46,7 +46,7 @@ class LogOddsGrid:
         )  # fmt: skip
 
     def occupancy(self) -> NDArray[np.int8]:
-        """(rows, columns) `OCCUPIED`, `FREE` or `UNKNOWN`."""
+        """Returns `OCCUPIED`, `FREE` or `UNKNOWN` (rows, columns)."""
         values = np.full(self.odds.shape, UNKNOWN, np.int8)
         values[self.odds > _OCCUPIED] = OCCUPIED
         values[self.odds < _FREE] = FREE
@@ -64,7 +64,7 @@ def _draw(
     odds: NDArray[np.float32],
     scan: NDArray[np.int32],
 ) -> None:
-    """Hits first, stamped with `number`; then misses, with `number` - 1, once a cell and scan."""
+    """Adds hits first, stamped with `number`, then misses, with `number` - 1, once per cell."""
     rows, columns = odds.shape
     for k in range(len(hits)):
         i = math.floor((ends[k, 1] - origin[1]) / cell)

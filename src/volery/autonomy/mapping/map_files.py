@@ -1,4 +1,4 @@
-"""OctoMap's files `.bt`: a head in plain text, then a binary stream."""
+"""Reads and writes OctoMap's files `.bt`: a head in plain text, then a binary stream."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ Bytes = NDArray[np.uint8]
 _FIRST = b"# Octomap OcTree binary file"
 _DATA = b"\ndata\n"
 _HEAD_BYTES = 4096
-"""A head is shorter."""
+"""Max length of a head."""
 
 
 class MapFile(NamedTuple):
-    """What a `.bt` file holds."""
+    """Content of a `.bt` file."""
 
     resolution_m: float
     data: Bytes
-    """The binary stream."""
+    """Binary stream."""
     voxels: Voxels
 
 
 class MapLimits(NamedTuple):
-    """Which maps a node takes."""
+    """Limits of the maps that a node accepts."""
 
     resolution_m: float
     extent_m: float
-    """Most width, along each axis."""
+    """Max width, along each axis."""
     cubes: int
-    """Most known cubes."""
+    """Max number of known cubes."""
 
 
 def write_map(path: Path, data: Bytes, resolution_m: float) -> None:
-    """Write a binary stream as `.bt`. Raises DataFileError where the file cannot be written."""
+    """Writes a binary stream as `.bt`. Raises DataFileError if the file cannot be written."""
     head = f"{_FIRST.decode()}\n# written by Volery\nid OcTree\nsize {node_count(data)}\n"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -50,7 +50,7 @@ def write_map(path: Path, data: Bytes, resolution_m: float) -> None:
 
 
 def read_map(path: Path, limits: MapLimits) -> MapFile:
-    """Read a `.bt` file. Raises DataFileError that says what does not fit."""
+    """Reads a `.bt` file. Raises DataFileError if it is invalid or beyond the limits."""
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -78,13 +78,15 @@ def read_map(path: Path, limits: MapLimits) -> MapFile:
         raise DataFileError(f"{path}: {error}") from None
     said, found = int(_number(path, head, "size")), node_count(data)
     if said != found:
-        raise DataFileError(f"{path}: the head says {counted(said, 'node')}, the file has {found}")
+        raise DataFileError(
+            f"{path}: the head declares {counted(said, 'node')}, the file has {found}"
+        )
     _check_size(path, voxels, limits)
     return MapFile(resolution, data, voxels)
 
 
 def node_count(data: Bytes) -> int:
-    """Nodes of the tree of a binary stream."""
+    """Returns the number of tree nodes of a binary stream."""
     if len(data) == 0:
         return 0
     kinds = np.stack([(data >> shift) & 3 for shift in (0, 2, 4, 6)])

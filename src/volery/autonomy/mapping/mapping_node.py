@@ -1,4 +1,4 @@
-"""Maps what two LIDARs see: voxels for people and planners, a grid at the height of flight."""
+"""Maps the scans of two LIDARs: voxels for visualization and planning, a grid at flight height."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ Array = NDArray[np.float64]
 
 _SONAR_MEMORY_S = 0.5
 _SILENT_S = 2.0
-"""A sensor that says nothing, or sees nothing, for so long is told of."""
+"""Time without data, or without returns, after which a sensor is reported."""
 _LEAST_HEIGHT_M = 1.0
-"""Lower than this above ground nothing is drawn at the height of flight: it would be the ground."""
+"""Min height above ground for the grid; lower it would show the ground."""
 _MOST_FILES = 100
-"""In a folder of maps: clients of the graph name them. Modelling choice."""
+"""Max number of files in a map folder, as clients of the graph name them. Modelling choice."""
 _PLAIN_STATE = ("_motion", "_nod", "_intakes", "_ground", "_range", "_told", "_slab_z")
 
 
@@ -58,24 +58,23 @@ class Mapping(Node):
 
     Parameters
     ----------
-    odometry: topic of the pose; its frame is corrected by `map -> uavN/odom` of `/tf` where
-        `corrected` is true.
+    odometry: topic of the pose; `corrected`: whether `/tf` holds the pose of its frame in the map.
     level_mount, nodding_mount: [x, y, z] of the LIDARs in the body, m.
-    resolution_m: width of the cells of the octree; grid_cell_m: of the grid.
-    reach_m: farther returns are free space out to here.
-    scan_rate_hz: scans taken of each LIDAR a second; every: of their beams every so many.
+    resolution_m: cell size of the octree; grid_cell_m: of the grid.
+    reach_m: max range; beyond it returns count as free space up to it.
+    scan_rate_hz: scans processed per second and LIDAR; every: step between processed beams.
     max_nodes: bound of the octree; extent_m: of the grid, and of maps that are loaded.
     half_height_m: half the thickness of the slab that the grid shows.
-    voxels_period_s, grid_period_s: how often they are published.
-    folder: where maps are saved and loaded, made with the first one; empty: nowhere. Unless said
-        `maps/uavN` of the working folder.
-    map_file: a map in `folder` to begin with.
+    voxels_period_s, grid_period_s: periods of publication.
+    folder: where maps are saved and loaded, created with the first one; empty: nowhere. Default:
+        `maps/uavN` in the working directory.
+    map_file: initial map, a file in `folder`.
 
     """
 
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Returns the tasks that compile its kernels."""
+        """Returns the tasks that compile the kernels of this node."""
         from volery.autonomy.mapping import warmup
         from volery.autonomy.perception import warmup as seeing
 
@@ -141,17 +140,17 @@ class Mapping(Node):
         self.create_timer(1.0, self._tell_status)
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         parts = {name: getattr(self, name).get_state() for name in ("_octree", "_grid", "_frame")}
         return {"parts": parts, **save_attributes(self, _PLAIN_STATE)}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         for name, part in state["parts"].items():
             getattr(self, name).set_state(part)
         restore_attributes(self, {name: state[name] for name in _PLAIN_STATE})
 
-    # ------------------------------------------------------------------------------ what it hears
+    # ------------------------------------------------------------------------------ subscriptions
 
     def _on_odometry(self, message: Odometry) -> None:
         self._frame.hear(message)
@@ -198,7 +197,7 @@ class Mapping(Node):
         fresh = 0 <= self.get_clock().now_ns() - heard_ns <= _SONAR_MEMORY_S * NS_PER_S
         return z - distance if fresh else None
 
-    # ------------------------------------------------------------------------------ what it tells
+    # ---------------------------------------------------------------------------------- publishers
 
     def _tell_voxels(self) -> None:
         if self._voxels.wanted and self._octree.nodes:
@@ -227,7 +226,7 @@ class Mapping(Node):
         self._told = publish_status(self._status, told, self._told)
 
     def _problems(self) -> list[str]:
-        """What keeps the map from growing, in words."""
+        """Returns the problems that keep the map from growing, as text."""
         now, found = self.get_clock().now_ns(), []
         newest = self._motion.newest
         if newest is None or now - newest.time_ns > _SILENT_S * NS_PER_S:
@@ -241,10 +240,10 @@ class Mapping(Node):
             elif intake.stuck:
                 found.append(f"the {name} LIDAR repeats itself")
             elif seen is None or now - seen > _SILENT_S * NS_PER_S:
-                found.append(f"the {name} LIDAR sees nothing")
+                found.append(f"the {name} LIDAR has no returns")
         return found
 
-    # ------------------------------------------------------------------------------ what it offers
+    # ------------------------------------------------------------------------------------ services
 
     def _on_get(self, _request: Any, response: Any) -> Any:
         response.map = self._message()
@@ -281,9 +280,9 @@ class Mapping(Node):
         return f"{nodes} read from {path}: {found.voxels.size} known cubes and their branches"
 
     def _path(self, name: str) -> Path:
-        """A file in the node's folder: clients of the graph write and read nowhere else."""
+        """Returns a file in the node's folder: clients of the graph can access no other."""
         if not self._folder:
-            raise NodeError(f"node {self.full_name} keeps no maps: its parameter folder is empty")
+            raise NodeError(f"node {self.full_name} stores no maps: its parameter folder is empty")
         if not name.endswith(".bt") or Path(name).name != name:
-            raise NodeError(f"'{name}' is no name of a map: a plain file name that ends in .bt")
+            raise NodeError(f"'{name}' is not a map name: use a plain file name that ends in .bt")
         return Path(self._folder) / name

@@ -1,4 +1,4 @@
-"""One map of the maps of several UAVs."""
+"""Merges the maps of several UAVs into one."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Codes = NDArray[np.int64]
 _HALF = 1 << (DEPTH - 1)
 _STACK = 8 * DEPTH
 _SUB = 2
-"""A turned cell votes by so many points along each axis: half a cell apart they leave no gap."""
+"""Votes of a rotated cell along each axis: points half a cell apart leave no gap."""
 _HALVES = (
     (16, 0x0000FF0000FF),
     (8, 0x00F00F00F00F),
@@ -29,21 +29,21 @@ _HALVES = (
     (2, 0x249249249249),
 )
 _LEVEL_RAD, _LEVEL_CELLS = 1e-4, 1e-3
-"""A pose that differs from none by less is none."""
+"""Rotation and translation below which a pose counts as identity."""
 
 
 class PlacedMap(NamedTuple):
-    """A map and where its frame lies in that of the merged one; None: they are the same."""
+    """A map and its frame's pose in the merged map; None: identity."""
 
     voxels: Voxels
     placement: Pose | None = None
 
 
 def merged(maps: Sequence[PlacedMap], resolution_m: float, most_cells: int) -> Bytes:
-    """The binary stream of one map in which each cell is what most maps that know it say.
+    """Returns the binary stream of one map in which each cell has the majority's value.
 
-    A draw is an occupied cell. Raises PlanError where the maps have more than `most_cells` cells,
-    or a map lies beyond what an OctoMap can hold.
+    A tie is an occupied cell. Raises PlanError if the maps have more than `most_cells` cells, or a
+    map exceeds the range of an OctoMap.
     """
     cells = sum(int((m.voxels.side.astype(np.int64) ** 3).sum()) for m in maps)
     if cells > most_cells:
@@ -62,7 +62,7 @@ def merged(maps: Sequence[PlacedMap], resolution_m: float, most_cells: int) -> B
 
 
 def encode_cells(codes: Codes, occupied: NDArray[np.bool_]) -> Bytes:
-    """The binary stream of cells by growing Morton code (x lowest), equal ones joined."""
+    """Returns the binary stream of cells in Morton order (x lowest), equal ones joined."""
     if len(codes) == 0:
         return np.zeros(0, np.uint8)
     before = np.concatenate([[0], np.cumsum(occupied, dtype=np.int64)])
@@ -71,7 +71,10 @@ def encode_cells(codes: Codes, occupied: NDArray[np.bool_]) -> Bytes:
 
 
 def morton_codes(cells: NDArray[np.int64]) -> Codes:
-    """Codes (K,) of cells (K, 3) counted from the middle of the tree. Raises PlanError."""
+    """Returns codes (K,) of cells (K, 3) counted from the tree's centre.
+
+    Raises PlanError beyond the range of an OctoMap.
+    """
     key = cells + _HALF
     if ((key < 0) | (key >= 2 * _HALF)).any():
         raise PlanError("a map lies beyond the 65,536 cells that an OctoMap can hold")
@@ -79,7 +82,7 @@ def morton_codes(cells: NDArray[np.int64]) -> Codes:
 
 
 def _spread(value: Codes) -> Codes:
-    """Two empty bits after each of 16, by halves (S. E. Anderson, "Bit Twiddling Hacks")."""
+    """Inserts two zero bits after each of 16 (S. E. Anderson, "Bit Twiddling Hacks")."""
     v = value.astype(np.int64)
     for shift, mask in _HALVES:
         v = (v | v << shift) & mask
@@ -87,7 +90,7 @@ def _spread(value: Codes) -> Codes:
 
 
 def _cells(voxels: Voxels) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """All finest cells (K, 3) of cubes."""
+    """Returns all finest cells (K, 3) of cubes, and whether they are occupied."""
     parts, labels = [], []
     for side in np.unique(voxels.side).tolist():
         rows = voxels.side == side
@@ -103,7 +106,7 @@ def _cells(voxels: Voxels) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
 def _placed(
     cells: NDArray[np.int64], placement: Pose | None, resolution_m: float
 ) -> tuple[Codes, float]:
-    """Codes of cells in the merged frame, one or `_SUB`^3 of each, and the weight of each."""
+    """Returns codes of cells in the merged frame, one or `_SUB`^3 of each, and their weight."""
     if placement is None or _is_none(placement, resolution_m):
         return morton_codes(cells), float(_SUB**3)
     inside = (np.arange(_SUB) + 0.5) / _SUB
@@ -121,7 +124,7 @@ def _is_none(placement: Pose, resolution_m: float) -> bool:
 
 @kernel
 def _encode(codes: Codes, before: Codes, out: Bytes) -> int:
-    """Depth first; `before`: how many of the cells before each are occupied."""
+    """Encodes depth first; `before`: number of occupied cells before each."""
     stack = np.empty((_STACK, 3), np.int64)  # first and last cell of a node, bits below its own
     stack[0, 0], stack[0, 1], stack[0, 2] = 0, len(codes), 3 * DEPTH
     top, length = 1, 0

@@ -22,23 +22,23 @@ _STATE = ("_maps", "_placements", "_changed", "_told", "_reasons")
 
 
 class MapMerging(Node):
-    """Publishes `~/octomap_binary` (latched, `map`) of all `topics`; tells `~/status` (JSON).
+    """Publishes `~/octomap_binary` (latched, `map`) of all `topics`, and `~/status` (JSON).
 
-    A map in a frame other than `map` is placed by what `/tf` says of `map` and that frame; before
-    that is known it is left out, and the status says so. Service `~/merge`: merge now.
+    A map in a frame other than `map` is placed by the transform between both in `/tf`; without it
+    the map is left out, and the status reports it. Service `~/merge`: merge now.
 
     Parameters
     ----------
     topics: of the maps, such as `/uav1/octomap_binary`.
-    resolution_m: width of their cells; maps of another one are refused.
-    period_s: how often they are merged, where one has changed.
+    resolution_m: size of their cells; maps of another one are refused.
+    period_s: period of merging, after a change.
     max_cells: bound of all maps' known cells together.
 
     """
 
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Returns the tasks that compile its kernels."""
+        """Returns the tasks that compile the kernels of this node."""
         from volery.autonomy.mapping import warmup
 
         return warmup.read_maps, warmup.merged_maps
@@ -64,11 +64,11 @@ class MapMerging(Node):
         )
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         return save_attributes(self, _STATE)
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         restore_attributes(self, state)
 
     def _listener(self, topic: str) -> Callable[[Any], None]:
@@ -103,7 +103,7 @@ class MapMerging(Node):
         return response
 
     def _merge(self) -> str:
-        """Merge and publish; why not, if that fails."""
+        """Merges and publishes; returns the reason of a failure, or ""."""
         self._changed = False
         placed = [found for topic in sorted(self._maps) if (found := self._placed(topic))]
         reason = ""
@@ -122,7 +122,7 @@ class MapMerging(Node):
         frame = message.header.frame_id
         placement = self._placements.get(frame)
         if frame not in ("", MAP) and placement is None:
-            self._reasons[topic] = f"nobody says where '{frame}' lies in '{MAP}'"
+            self._reasons[topic] = f"/tf holds no transform of '{frame}' in '{MAP}'"
             return None
         try:
             voxels = voxels_of(message)

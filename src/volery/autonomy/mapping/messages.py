@@ -1,4 +1,4 @@
-"""Maps as messages."""
+"""Converts maps to messages and back."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ _LEVEL = Quaternion(0.0, 0.0, 0.0, 1.0)
 def octomap_message(
     data: NDArray[np.uint8], resolution_m: float, frame_id: str, now_ns: int
 ) -> Any:
-    """A binary stream as octomap_msgs/Octomap."""
+    """Returns a binary stream as octomap_msgs/Octomap."""
     signed = data.view(np.int8)
     signed.flags.writeable = False
     return OCTOMAP(header(now_ns, frame_id), True, "OcTree", resolution_m, signed)
 
 
 def voxels_of(message: Any) -> Voxels:
-    """Cubes of an octomap_msgs/Octomap. Raises DataFileError where it holds none."""
+    """Returns the cubes of an octomap_msgs/Octomap. Raises DataFileError if it is invalid."""
     if message.id != "OcTree":
         raise DataFileError(f"an octomap of kind '{message.id}'; only OcTree is read")
     data = np.asarray(message.data).view(np.uint8)
@@ -44,7 +44,7 @@ def voxels_of(message: Any) -> Voxels:
 
 
 def grid_message(grid: ProjectedGrid, height: float, frame_id: str, now_ns: int) -> OccupancyGrid:
-    """The known part of a grid; one unknown cell where nothing is known."""
+    """Returns the known part of a grid; one unknown cell for an empty grid."""
     box = grid.known_box()
     if box is None or grid.origin is None:
         empty = np.full((1, 1), -1, np.int8)
@@ -60,7 +60,7 @@ def grid_message(grid: ProjectedGrid, height: float, frame_id: str, now_ns: int)
 def grid_values_message(
     values: Scores, cell_m: float, corner: tuple[float, float, float], frame_id: str, now_ns: int
 ) -> OccupancyGrid:
-    """Values (rows, columns) as nav_msgs/OccupancyGrid with its lower left corner at `corner`."""
+    """Returns values (rows, columns) as nav_msgs/OccupancyGrid, lower left corner at `corner`."""
     data = values.astype(np.int8).ravel()
     data.flags.writeable = False
     rows, columns = values.shape

@@ -1,11 +1,11 @@
-"""OctoMap's streams of bytes as arrays of cubes, and back.
+"""Decodes OctoMap's byte streams to arrays of cubes, and encodes them.
 
 After `octomap::OcTree::writeBinaryData` and `OcTreeDataNode::writeData` (A. Hornung et al.,
 "OctoMap: an efficient probabilistic 3D mapping framework based on octrees", Autonomous Robots
-2013). The tree has 16 levels; a node's children stand in the order x + 2 y + 4 z of their halves.
-In a binary stream a node with children is 16 bits, two a child, the first child's lowest: 0
-unknown, 1 free, 2 occupied, 3 has children of its own, which follow depth first. In a full stream
-each node is a log-odds (float32) and a byte that tells which children follow, depth first too.
+2013). The tree has 16 levels; a node's children are in the order x + 2 y + 4 z of their halves. In
+a binary stream a node with children is 16 bits, two a child, the first child's lowest: 0 unknown, 1
+free, 2 occupied, 3 has children of its own, which follow depth first. In a full stream each node is
+a log-odds (float32) and a byte that flags the children that follow, depth first too.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Voxels(NamedTuple):
 
 
 def decode_binary(data: Bytes) -> Voxels:
-    """Cubes of a binary stream, empty for an empty one. Raises DataFileError where it is broken."""
+    """Returns the cubes of a binary stream. Raises DataFileError if it is invalid."""
     most = 4 * len(data)  # two bits a cube
     corner = np.empty((most, 3), np.int32)
     side, occupied = np.empty(most, np.int32), np.empty(most, np.bool_)
@@ -59,7 +59,10 @@ def decode_binary(data: Bytes) -> Voxels:
 
 
 def decode_full(data: Bytes) -> Voxels:
-    """Cubes of a full stream, occupied where the log-odds is above 0. Raises DataFileError."""
+    """Returns the cubes of a full stream, occupied if the log-odds is above 0.
+
+    Raises DataFileError if it is invalid.
+    """
     most = len(data) // 5
     corner = np.empty((most, 3), np.int32)
     side, occupied = np.empty(most, np.int32), np.empty(most, np.bool_)
@@ -71,7 +74,10 @@ def decode_full(data: Bytes) -> Voxels:
 
 
 def binary_from_full(data: Bytes) -> Bytes:
-    """The binary stream of a full one, equal cubes joined. Raises DataFileError."""
+    """Returns the binary stream of a full one, equal cubes joined.
+
+    Raises DataFileError if it is invalid.
+    """
     nodes = len(data) // 5
     label, size = np.empty(nodes, np.uint8), np.empty(nodes, np.int32)
     out = np.empty(2 * nodes + 2, np.uint8)
@@ -86,7 +92,7 @@ def _decode_binary(
 ) -> int:
     if len(data) == 0:
         return 0
-    stack = np.empty((_STACK, 4), np.int64)  # corner and width of nodes that are still to be read
+    stack = np.empty((_STACK, 4), np.int64)  # corner and width of unread nodes
     stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = -_HALF, -_HALF, -_HALF, 2 * _HALF
     top, at, count = 1, 0, 0
     while top > 0:
@@ -97,7 +103,7 @@ def _decode_binary(
             return -1
         bits = data[at] | (data[at + 1] << 8)
         at += 2
-        for child in range(7, -1, -1):  # the first child is to lie on top
+        for child in range(7, -1, -1):  # so that the first child is on top
             kind = (bits >> (2 * child)) & 3
             if kind == _UNKNOWN:
                 continue
@@ -131,7 +137,7 @@ def _decode_full(
         x, y, z, width = stack[top, 0], stack[top, 1], stack[top, 2], stack[top, 3]
         if at + 5 > length or width < 1:
             return -1
-        # A float32 is above 0 where its sign bit is clear and another bit is set.
+        # A float32 is above 0 if its sign bit is clear and another bit is set.
         positive = data[at + 3] < 128 and (data[at] | data[at + 1] | data[at + 2] | data[at + 3])
         children = data[at + 4]
         at += 5
@@ -154,7 +160,7 @@ def _decode_full(
 
 @kernel
 def _label(data: Bytes, label: Bytes, size: Integers) -> bool:
-    """From the last node to the first: how many nodes hang on it, and whether they are alike."""
+    """Computes, from the last node to the first, subtree sizes and whether all cells are equal."""
     nodes = len(label)
     for node in range(nodes - 1, -1, -1):
         at = 5 * node
@@ -185,7 +191,7 @@ def _label(data: Bytes, label: Bytes, size: Integers) -> bool:
 
 @kernel
 def _write_binary(data: Bytes, label: Bytes, size: Integers, out: Bytes) -> int:
-    """From the first node to the last, passing over what is alike; the root is always written."""
+    """Writes the nodes in order, skipping subtrees of equal cells; the root is always written."""
     nodes = len(label)
     length, node = 0, 0
     while node < nodes:

@@ -1,6 +1,7 @@
-"""Cutting an OctoMap down to what lies near a place.
+"""Trims an OctoMap to the surroundings of a position.
 
-octomap's own `deleteNode` frees only the topmost node of a branch, so the stream is cut instead.
+octomap's own `deleteNode` frees only the topmost node of a branch, so the stream is trimmed
+instead.
 """
 
 from __future__ import annotations
@@ -17,15 +18,15 @@ Bytes = NDArray[np.uint8]
 Integers = NDArray[np.int32]
 
 BLOCK_CELLS = 32
-"""Branches are kept or dropped in cubes so wide: 6.4 m at 0.2 m."""
+"""Size of the cubes in which branches are retained or dropped: 6.4 m at 0.2 m."""
 _HALF = 1 << (DEPTH - 1)
 _STACK = 8 * DEPTH
 
 
 def trimmed(data: Bytes, middle_cells: Array, radius_cells: float) -> Bytes:
-    """A full stream without the blocks whose middle lies farther than a radius in plan.
+    """Returns a full stream without the blocks whose centre is farther than a horizontal radius.
 
-    middle_cells: (3,), in cells. Raises DataFileError where the stream is broken.
+    middle_cells: (3,), in cells. Raises DataFileError if the stream is invalid.
     """
     nodes = len(data) // 5
     keep, size = np.zeros(nodes, np.bool_), np.empty(nodes, np.int32)
@@ -38,7 +39,7 @@ def trimmed(data: Bytes, middle_cells: Array, radius_cells: float) -> Bytes:
 
 @kernel
 def _choose(data: Bytes, middle: Array, radius: float, keep: NDArray[np.bool_]) -> bool:
-    """Forwards: which blocks, and which leaves above their level, are near enough."""
+    """Marks, forwards, blocks and leaves above their level that are near enough."""
     nodes = len(keep)
     if nodes == 0:
         return True
@@ -70,7 +71,7 @@ def _choose(data: Bytes, middle: Array, radius: float, keep: NDArray[np.bool_]) 
 
 @kernel
 def _spread_up(data: Bytes, keep: NDArray[np.bool_], size: Integers) -> None:
-    """Backwards: a branch stays where one of its children does."""
+    """Marks, backwards, a branch if one of its children is marked."""
     for node in range(len(keep) - 1, -1, -1):
         children = data[5 * node + 4]
         child = node + 1
@@ -83,7 +84,7 @@ def _spread_up(data: Bytes, keep: NDArray[np.bool_], size: Integers) -> None:
 
 @kernel
 def _cut(data: Bytes, keep: NDArray[np.bool_], size: Integers, out: Bytes) -> int:
-    """Write what stays; returns its length."""
+    """Writes the marked nodes; returns the length."""
     length, node = 0, 0
     while node < len(keep):
         if not keep[node]:

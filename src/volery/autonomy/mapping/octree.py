@@ -1,4 +1,4 @@
-"""The map that grows: an OctoMap tree of bounded size."""
+"""The growing map: an OctoMap tree of bounded size."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 
 _KEPT_SHARE = 0.7
-"""Of the cells that stay where the map has become too large (modelling choice)."""
+"""Fraction of the cells that is retained when the map is too large (modelling choice)."""
 _FREE_ABOVE_M = 1.5
 _DATA = b"\ndata\n"
 
@@ -28,8 +28,8 @@ _DATA = b"\ndata\n"
 class Octree:
     """Log-odds of occupied space by octomap's own sensor model (hit 0.7, miss 0.4).
 
-    `max_nodes` bounds its memory, some 30 bytes a node: when there are more, what lies farthest
-    from the vehicle is forgotten.
+    `max_nodes` bounds its memory, some 30 bytes a node: beyond it, the cells farthest from the
+    vehicle are dropped.
     """
 
     def __init__(self, resolution_m: float, max_nodes: int = 4_000_000) -> None:
@@ -37,20 +37,20 @@ class Octree:
         self._max_nodes = max_nodes
         self._tree = new_tree(resolution_m)
         self.forgotten = 0
-        """How often the farthest part was given up for want of room."""
+        """Number of times that the farthest part was dropped."""
 
     @property
     def nodes(self) -> int:
-        """Nodes of the tree."""
+        """Number of nodes of the tree."""
         return int(self._tree.size())
 
     def insert(self, rays: Rays, reach_m: float, above_m: float = 6.0) -> None:
-        """Take in the rays of one scan, all as cast from the middle one's start.
+        """Adds the rays of one scan, all as cast from the middle one's start.
 
-        Rays that end more than `above_m` over or below it are left out, and of those that meet
-        nothing all but the level ones: they fill the map with space that nobody flies in. The tree
-        knows free space only on the way to a point, so that rays that meet nothing end beyond the
-        reach, where octomap cuts them off without a hit; shorter ones are left out.
+        It ignores rays that end more than `above_m` over or below it, and rays without a hit that
+        are not level: they fill the map with space outside of the flight height. The tree marks
+        free space only along the ray to a point. So rays without a hit end beyond the max range,
+        where octomap cuts them off without a hit; shorter ones are ignored.
         """
         if len(rays.hits) == 0:
             return
@@ -63,26 +63,26 @@ class Octree:
             self._forget(origin)
 
     def voxels(self) -> Voxels:
-        """All known cells."""
+        """Returns all known cells."""
         return decode_full(self._full())
 
     def binary(self) -> Bytes:
-        """The binary stream of the map as it is now, equal cubes joined."""
+        """Returns the binary stream of the present map, equal cubes joined."""
         return binary_from_full(self._full())
 
     def take(self, path: Path) -> None:
-        """Become the map of a `.bt` file that `map_files.read_map` has accepted."""
+        """Loads a `.bt` file that `map_files.read_map` has accepted."""
         tree = new_tree(self.resolution_m)
         if not tree.readBinary(str(path)):
             raise NodeError(f"{path}: octomap cannot read the map")
         self._tree = tree
 
     def get_state(self) -> dict[str, Any]:
-        """The tree as octomap writes it."""
+        """Returns the state: the tree as octomap writes it."""
         return {"tree": bytes(self._tree.write()), "forgotten": self.forgotten}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept tree."""
+        """Restores a saved state."""
         self._tree, self.forgotten = self._tree_of(state["tree"]), state["forgotten"]
 
     def _full(self) -> Bytes:
@@ -90,7 +90,7 @@ class Octree:
         return np.frombuffer(written, np.uint8)[written.index(_DATA) + len(_DATA) :]
 
     def _forget(self, near: Array) -> None:
-        """Keep what lies nearest, in plan, to a place (m)."""
+        """Drops the cells farthest, horizontally, from a position (m)."""
         full = self._full()
         voxels = decode_full(full)
         middle = near / self.resolution_m
@@ -100,7 +100,7 @@ class Octree:
         self.forgotten += 1
 
     def _tree_of(self, written: bytes) -> Any:
-        """The tree of a full stream with its head; octomap reads files only."""
+        """Returns the tree of a full stream with its head; octomap reads files only."""
         with tempfile.NamedTemporaryFile(suffix=".ot") as file:
             file.write(written)
             file.flush()
@@ -116,7 +116,7 @@ def _with_head(full: Bytes, resolution_m: float) -> bytes:
 
 
 def new_tree(resolution_m: float) -> Any:
-    """An empty tree of pyoctomap. Raises NodeError where that is not installed."""
+    """Returns an empty tree of pyoctomap. Raises NodeError if it is not installed."""
     try:
         import pyoctomap
     except ImportError:
@@ -128,7 +128,7 @@ def new_tree(resolution_m: float) -> Any:
 def _choose(
     ends: Array, hits: NDArray[np.bool_], origin: Array, reach: float, above: float, chosen: Array
 ) -> int:
-    """Fill `chosen` with the ends that `Octree.insert` takes in; returns how many."""
+    """Fills `chosen` with the ends that `Octree.insert` uses; returns their number."""
     count = 0
     for k in range(len(ends)):
         x, y, z = ends[k, 0] - origin[0], ends[k, 1] - origin[1], ends[k, 2] - origin[2]

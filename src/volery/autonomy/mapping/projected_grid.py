@@ -1,8 +1,8 @@
-"""What is free and what is occupied at the height of flight, as a grid seen from above.
+"""Free and occupied cells at flight height, as a grid seen from above.
 
-A slab parallel to the ground through the vehicle: where a ray runs in it, cells are free; where it
-ends in it, the cell is occupied. Cells count the scans that saw them occupied against those that
-saw them free; within one scan a hit beats all rays that pass, so that thin trunks stay.
+A slab parallel to the ground through the vehicle: a ray inside of it frees cells, a hit inside of
+it occupies its cell. Cells count the scans with hits against those with passing rays; within one
+scan a hit outweighs all rays that pass its cell, so that thin trunks remain.
 """
 
 from __future__ import annotations
@@ -22,8 +22,9 @@ Scores = NDArray[np.int8]
 
 UNKNOWN = -128
 _HIT, _MISS, _LEAST, _MOST = 3, 1, -6, 12
-"""Score of a scan's hit and miss, and bounds: a trunk that moved away is forgotten after 12 scans
-(modelling choices)."""
+"""Score of a scan's hit and miss, and bounds: a trunk that moved away is cleared after 12 scans
+(modelling choices).
+"""
 
 
 class HeightSlab(NamedTuple):
@@ -35,7 +36,7 @@ class HeightSlab(NamedTuple):
 
 
 class ProjectedGrid:
-    """A square grid of bounded extent around the place where it began."""
+    """A square grid of bounded extent around its initial position."""
 
     def __init__(self, cell_m: float, extent_m: float) -> None:
         self.cell_m = cell_m
@@ -47,24 +48,24 @@ class ProjectedGrid:
         self.origin: NDArray[np.int64] | None = None
         """Column and row of the lower left cell, counted from the map's origin."""
         self.outside = 0
-        """Hits that lay beyond the grid."""
+        """Number of hits beyond the grid."""
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         return save_attributes(self, ("score", "_scan", "_number", "origin", "outside"))
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         restore_attributes(self, state)
 
     def begin_at(self, place: Array) -> None:
-        """Lie around `place` (2+,) m, if it lies nowhere yet."""
+        """Centres the grid on `place` (2+,) m, if it has no position yet."""
         if self.origin is None:
             middle = np.floor(place[:2] / self.cell_m).astype(np.int64)
             self.origin = middle - len(self.score) // 2
 
     def add(self, rays: Rays, slab: HeightSlab) -> None:
-        """Take in the rays of one scan, m in the map."""
+        """Adds the rays of one scan, m in the map."""
         assert self.origin is not None
         self._number += 2
         self.outside += _draw(
@@ -82,7 +83,7 @@ class ProjectedGrid:
         )
 
     def known_box(self) -> tuple[slice, slice] | None:
-        """Rows and columns that hold all known cells; None where nothing is known."""
+        """Returns rows and columns that contain all known cells; None for an empty grid."""
         known = self.score != UNKNOWN
         rows, columns = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
         if len(rows) == 0:
@@ -91,7 +92,7 @@ class ProjectedGrid:
 
 
 def occupancy(score: Scores) -> NDArray[np.int8]:
-    """Values of nav_msgs/OccupancyGrid: -1 unknown, 0 free, 100 occupied."""
+    """Returns values of nav_msgs/OccupancyGrid: -1 unknown, 0 free, 100 occupied."""
     values = np.where(score > 0, np.int8(100), np.int8(0))
     values[score == UNKNOWN] = -1
     return values
@@ -111,7 +112,7 @@ def _draw(
     score: Scores,
     scan: NDArray[np.int32],
 ) -> int:
-    """Hits first, stamped with `number`; then misses, with `number` - 1, once a cell and scan."""
+    """Adds hits first, stamped with `number`, then misses, with `number` - 1, once per cell."""
     rows, columns = score.shape
     outside = 0
     for k in range(len(hits)):
@@ -138,7 +139,7 @@ def _draw(
             px, py = x + share * dx, y + share * dy
             if abs(z + share * dz - height - slope[0] * px - slope[1] * py) > half:
                 if step > 0:
-                    break  # a straight ray that has left the slab does not come back
+                    break  # a straight ray that has left the slab does not return
                 continue
             i, j = math.floor(py / cell) - origin[1], math.floor(px / cell) - origin[0]
             if not (0 <= i < rows and 0 <= j < columns):

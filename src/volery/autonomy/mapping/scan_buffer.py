@@ -1,4 +1,4 @@
-"""Scans of one LIDAR on their way into a map: decimated, and kept until their motion is known."""
+"""Buffers the scans of one LIDAR for a map: decimates them, and waits for their motion."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from volery.core.clock import NS_PER_S
 from volery.graph.messages import LaserScan, stamp_of
 
 _WAITING = 8
-"""Scans that wait for odometry; more are dropped, the oldest first."""
+"""Max number of scans that wait for odometry; the oldest ones are dropped."""
 _JUMP_BACK_NS = NS_PER_S // 2
 _EARLY_NS = NS_PER_S // 200
-"""A scan may come so much before its turn."""
+"""Time by which a scan may be early."""
 
 
 class ScanBuffer:
-    """Takes about `rate_hz` scans a second of one LIDAR, gives their rays.
+    """Selects about `rate_hz` scans a second of one LIDAR, and returns their rays.
 
-    `counts` tells what happened to scans: taken, repeated, unusable, dropped (their motion never
-    became known), stuck (new ones with the ranges of the one before).
+    `counts` counts scans: taken, repeated, unusable, dropped (their motion never became known),
+    stuck (new ones with the ranges of the previous one).
     """
 
     def __init__(self, maker: RayMaker, rate_hz: float) -> None:
@@ -33,14 +33,14 @@ class ScanBuffer:
         self._last_taken_ns: int | None = None
         self.counts: Counter[str] = Counter()
         self.seen_ns: int | None = None
-        """When the newest scan with an echo was cast."""
+        """Stamp of the newest scan with a return, ns."""
         self.stuck = False
-        """Whether the LIDAR repeats itself."""
+        """Whether the LIDAR repeats its scans."""
         self.heard_ns: int | None = None
-        """When the newest scan was cast."""
+        """Stamp of the newest scan, ns."""
 
     def add(self, scan: LaserScan) -> None:
-        """Hear of a scan."""
+        """Adds a scan."""
         stamp = stamp_of(scan)
         if self._last_ns is not None and stamp < self._last_ns - _JUMP_BACK_NS:
             self._waiting.clear()
@@ -68,7 +68,7 @@ class ScanBuffer:
             self.counts["dropped"] += 1
 
     def ready(self, motion: MotionHistory, nod: NodHistory | None) -> list[Rays]:
-        """Rays of the scans whose whole sweep the odometry has passed."""
+        """Returns the rays of the scans whose whole sweep the odometry covers."""
         newest = motion.newest
         found: list[Rays] = []
         while newest is not None and self._waiting:

@@ -1,6 +1,7 @@
-"""What stands upright, told from returns at all heights: ground below, and something above it.
+"""Detects vertical structures from returns at all heights, above the ground below them.
 
-A crown hangs in the air and the ground lies flat; a trunk is met at several heights of one place.
+A crown is above free space and the ground is flat; a trunk has returns at several heights of one
+position.
 """
 
 from __future__ import annotations
@@ -11,19 +12,21 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _GROUND_WITHIN_M, _LOWEST_SHARE, _LEAST_GROUND = 1.5, 0.05, 6
-"""The ground is what lies lowest around a place, but for a few returns that are off."""
+"""Radius, quantile and min number of the lowest returns around a position that give the ground."""
 _BESIDE_M = 0.3
 _FOOT_M, _BAND_M, _BANDS = 0.6, 0.4, 4
-"""Above the ground: where undergrowth and errors of the ground end, and the bands beyond it."""
+"""Heights above ground: lower limit of the bands (undergrowth, errors of the ground), their height
+and number.
+"""
 _LEAST_RETURNS, _LEAST_BANDS = 2, 3
 _CLEAR_M = 1.0
-"""A level scan that meets something lower than this may have met the ground (modelling choices)."""
+"""Height below which a return of a level scan may be ground (modelling choices)."""
 _CELL_M = 0.5
-"""In which the ground counts as level, where many heights above it are asked for."""
+"""Cell size in which the ground counts as level, for many queries."""
 
 
 class _Cells:
-    """Points (N, 3) that can be asked for by their place in the plane."""
+    """Index of points (N, 3) by their horizontal position."""
 
     def __init__(self, points: Array, size_m: float) -> None:
         self._size = size_m
@@ -32,7 +35,7 @@ class _Cells:
         self._points, self._keys = points[order], _key(cells)[order]
 
     def near(self, place: Array) -> Array:
-        """Points (K, 3) within a cell's size of a place (2,)."""
+        """Returns the points (K, 3) within a cell's size of a position (2,)."""
         i, j = np.floor(place / self._size).astype(np.int64)
         low, high = (np.array([(i + a, j + b) for a in (-1, 0, 1)]) for b in (-1, 1))
         first = np.searchsorted(self._keys, _key(low), side="left")
@@ -42,26 +45,26 @@ class _Cells:
 
 
 def _key(cells: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Numbers of cells (N, 2); those of one column of cells follow each other."""
+    """Returns keys of cells (N, 2); those of one column are consecutive."""
     return np.asarray(cells[:, 0] * (1 << 32) + cells[:, 1])
 
 
 class VerticalStructures:
-    """Returns (N, 3) of the map, m, in a form that tells what stands upright among them."""
+    """Index of returns (N, 3) of the map, m, that detects vertical structures."""
 
     def __init__(self, points: Array) -> None:
         self._grounds: dict[tuple[int, int], float] = {}
         self._wide, self._slim = _Cells(points, _GROUND_WITHIN_M), _Cells(points, _BESIDE_M)
 
     def ground_m(self, place: Array) -> float:
-        """Height of the ground at a place (2,) of the map; nan where it has not been seen."""
+        """Returns the ground height at a position (2,) of the map; nan if unknown."""
         heights = self._wide.near(place)[:, 2]
         if len(heights) < _LEAST_GROUND:
             return float("nan")
         return float(np.quantile(heights, _LOWEST_SHARE))
 
     def heights_m(self, seen: Array) -> Array:
-        """Heights (K,) of points (K, 3) above the ground; nan where it has not been seen."""
+        """Returns the heights (K,) of points (K, 3) above the ground; nan if unknown."""
         cells = np.floor(seen[:, :2] / _CELL_M).astype(np.int64)
         _, first, of = np.unique(_key(cells), return_index=True, return_inverse=True)
         ground = np.array([self._cell_ground(int(i), int(j)) for i, j in cells[first]])
@@ -73,9 +76,9 @@ class VerticalStructures:
         return self._grounds[i, j]
 
     def stands(self, seen: Array) -> bool:
-        """Whether what was seen at a place (3,) is clear of the ground and reaches down to it."""
+        """Returns whether a point (3,) is above the ground and its structure reaches down to it."""
         ground = self.ground_m(seen[:2])
-        if not seen[2] - ground > _CLEAR_M:  # nor where the ground is not known
+        if not seen[2] - ground > _CLEAR_M:  # also if the ground is unknown
             return False
         above = self._slim.near(seen[:2])[:, 2] - ground
         bands = np.floor((above - _FOOT_M) / _BAND_M)

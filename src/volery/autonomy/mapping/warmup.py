@@ -15,7 +15,7 @@ _REACH_M = 15.0
 
 
 def growing_map() -> None:
-    """Kernels of a map that grows until something of it must be forgotten."""
+    """Compiles the kernels of a map that grows until cells are dropped."""
     rays = some_rays()
     tree = Octree(0.2, max_nodes=1)
     tree.insert(rays, _REACH_M)
@@ -26,19 +26,19 @@ def growing_map() -> None:
 
 
 def read_maps() -> None:
-    """Kernels that read what another node has published."""
+    """Compiles the kernels that read another node's maps."""
     empty = fixed(np.zeros(0, np.uint8))
     decode_binary(empty)
     decode_full(empty)
 
 
 def merged_maps() -> None:
-    """The kernel that writes the map of several."""
+    """Compiles the kernel that writes merged maps."""
     cell = np.zeros((1, 3), np.int32), np.ones(1, np.int32), np.ones(1, np.bool_)
     merged([PlacedMap(Voxels(*cell))], 0.2, 8)
 
 
 def drawn_scans() -> None:
-    """The kernel of the grids that reports draw."""
+    """Compiles the kernel of the grids that reports draw."""
     grid = LogOddsGrid(np.zeros(2), np.ones(2), 0.1)
     grid.add(np.zeros((1, 2)), np.ones((1, 2)), np.ones(1, np.bool_))

@@ -1,1 +1,1 @@
-"""What nodes make of their sensors' messages: points, rays, motion, frames."""
+"""Processing of sensor messages: points, rays, motion, frames."""

@@ -1,4 +1,4 @@
-"""What a forward-looking depth camera tells: mean depths of regions, and points in space."""
+"""Depth images of a forward-looking camera: mean depths of regions, and 3D points."""
 
 from __future__ import annotations
 
@@ -18,22 +18,25 @@ Array = NDArray[np.float64]
 Picture = NDArray[np.float32]
 
 _NEAREST_M = 0.3
-"""Nearer things are the vehicle's own."""
+"""Min depth; nearer points are on the vehicle itself."""
 
 
 def depth_of(image: Image) -> Picture:
-    """Depths (height, width), m, NaN where nothing is known. `GraphError` for other encodings."""
+    """Returns depths (height, width), m, NaN if unknown. Raises GraphError for other encodings."""
     shape = image.height, image.width
     if image.encoding == "32FC1":
         return image.data.view(np.float32).reshape(shape)
     if image.encoding == "16UC1":
         millimetres = image.data.view(np.uint16).reshape(shape).astype(np.float32)
         return np.where(millimetres > 0.0, millimetres * np.float32(1e-3), np.float32(np.nan))
-    raise GraphError(f"depth pictures are 32FC1 or 16UC1, not '{image.encoding}'")
+    raise GraphError(f"depth images must be 32FC1 or 16UC1, not '{image.encoding}'")
 
 
 def region_of(depth: Picture, width: float, height: float, aside: float = 0.0) -> Picture:
-    """The middle of a picture: so much of its width and height, moved aside by a share of it."""
+    """Returns the centre of an image, with these fractions of its width and height.
+
+    aside: shift to the right, as a fraction of the width.
+    """
     rows, columns = depth.shape
     half_r, half_c = max(round(rows * height / 2), 1), max(round(columns * width / 2), 1)
     r, c = rows // 2, round(columns * (0.5 + aside))
@@ -41,13 +44,13 @@ def region_of(depth: Picture, width: float, height: float, aside: float = 0.0) -
 
 
 def mean_depth(region: Picture, far_m: float) -> float:
-    """Mean of a region's depths as a share of `far_m`; what is farther, or unknown, counts 1."""
+    """Returns a region's mean depth as a fraction of `far_m`; larger or unknown depths count 1."""
     share = np.clip(np.nan_to_num(region, nan=np.inf) / far_m, 0.0, 1.0)
     return float(share.mean()) if share.size else 1.0
 
 
 class DepthProjector:
-    """Turns pictures of a camera at `mount` (3,) m in the body, looking ahead, into points."""
+    """Projects images of a camera at `mount` (3,) m in the body, facing forward, to points."""
 
     def __init__(self, mount: Sequence[float], reach_m: float = 12.0, keep_every: int = 2) -> None:
         self._mount = np.array(mount, dtype=np.float64)
@@ -55,9 +58,9 @@ class DepthProjector:
         self._every = keep_every
 
     def points(self, image: Image, info: CameraInfo, pose: OdometrySample) -> Array:
-        """What is within reach, as points (K, 3) m in the odometry frame.
+        """Returns points (K, 3) m within range in the odometry frame.
 
-        The pose is carried on to the picture's stamp. Lens distortion is not undone.
+        The pose is extrapolated to the image's stamp. Lens distortion is not corrected.
         """
         depth = np.ascontiguousarray(depth_of(image))
         stamp = image.header.stamp.sec * 1_000_000_000 + image.header.stamp.nanosec
@@ -90,7 +93,7 @@ def _project(
     velocity: Array,
     points: Array,
 ) -> int:
-    """Fill `points`, return their number. k: the intrinsic matrix, row by row."""
+    """Fills `points`, returns their number. k: the intrinsic matrix, row by row."""
     count = 0
     for v in range(0, depth.shape[0], every):
         for u in range(0, depth.shape[1], every):

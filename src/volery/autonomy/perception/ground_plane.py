@@ -1,4 +1,4 @@
-"""The slope of the ground ahead, from the lowest LIDAR returns."""
+"""Estimates the slope of the ground ahead from the lowest LIDAR returns."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ _CELLS = 16
 _RADIUS_M = 13.0
 _NOISE_M = 0.05
 _ENOUGH, _BELOW_M = 8, 0.5
-"""So many cells with returns so far below the vehicle tell the height where no sonar does."""
+"""Number of cells with returns so far below the vehicle that give the height without a sonar."""
 _RIDGE = 8.0
-"""Weight that pulls the slope to zero where few returns reach the ground."""
+"""Weight that regularizes the slope to zero if few returns are on the ground."""
 
 
 class GroundPlane:
@@ -33,19 +33,19 @@ class GroundPlane:
         self.slope: Array = np.zeros(2)
 
     def height_at(self, xy: Array) -> Array:
-        """Height of the plane below points (..., 2), m."""
+        """Returns the height of the plane below points (..., 2), m."""
         return np.asarray(self.height + (xy - self.anchor) @ self.slope)
 
     def add(self, points: Array, time_ns: int, hits: NDArray[np.bool_] | None = None) -> None:
-        """Take in points (K, 3), m in a fixed frame; where `hits` (K,) is False nothing was met."""
+        """Adds points (K, 3), m in a fixed frame; `hits` (K,) False: no return there."""
         if hits is None:
             hits = np.ones(len(points), np.bool_)
         _keep_lowest(points, hits, time_ns, self._keep_ns, self._low, self._seen_ns)
 
     def fit(self, position: Array, height_below: float | None, time_ns: int) -> None:
-        """Refit around `position` (3,); `height_below` is the ground's height there if known.
+        """Fits the plane around `position` (3,) m.
 
-        Where it is not, the returns tell that, too.
+        `height_below` is the ground height there; None: it is estimated from the returns.
         """
         near = _near(self._low, self._seen_ns, time_ns - self._keep_ns, position)
         offset, z = near[:, :2].copy(), near[:, 2].copy()
@@ -72,7 +72,7 @@ class GroundPlane:
 
 @brief_kernel
 def _near(low: Array, seen_ns: NDArray[np.int64], since_ns: int, position: Array) -> Array:
-    """(K, 3): points seen since then, their x and y from `position`."""
+    """Returns points (K, 3) seen since then, their x and y relative to `position`."""
     out, count = np.empty((low.shape[0] * low.shape[1], 3)), 0
     for i in range(low.shape[0]):
         for j in range(low.shape[1]):

@@ -1,4 +1,4 @@
-"""Parameters of nodes that are lists of numbers: poses, mounts of sensors."""
+"""Node parameters that are lists of numbers: poses, mounts of sensors."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ _FARTHEST_M = 1e6
 def declare_numbers(
     node: Node, name: str, default: list[float], form: str, *, or_empty: bool = False
 ) -> list[float]:
-    """Declare a parameter of as many finite numbers as `form` names, such as `[x, y, z]`.
+    """Declares a parameter of as many finite numbers as `form` names, such as `[x, y, z]`.
 
-    It may be empty where `or_empty` is true. `NodeError` for everything else.
+    It may be empty if `or_empty` is true. Raises NodeError for other values.
     """
     told = node.declare_parameter(name, default).value
     if (or_empty and not len(told)) or (
@@ -24,12 +24,12 @@ def declare_numbers(
     ):
         return [float(number) for number in told]
     raise NodeError(
-        f"{name} is {form}, finite numbers{', or empty' if or_empty else ''}, not {told!r}"
+        f"{name} must be {form}, finite numbers{', or empty' if or_empty else ''}, not {told!r}"
     )
 
 
 def declare_points(node: Node, name: str, default: list[list[float]]) -> list[list[float]]:
-    """Declare a parameter of points [x, y] in the map, m. `NodeError` for everything else."""
+    """Declares a parameter of points [x, y] in the map, m. Raises NodeError for other values."""
     told = node.declare_parameter(name, default).value
     if all(
         isinstance(point, list | tuple)
@@ -38,11 +38,11 @@ def declare_points(node: Node, name: str, default: list[list[float]]) -> list[li
         for point in told
     ):
         return [[float(x) for x in point] for point in told]
-    raise NodeError(f"{name} is a list of [x, y], m, within +-{_FARTHEST_M:g}, not {told!r}")
+    raise NodeError(f"{name} must be a list of [x, y], m, within +-{_FARTHEST_M:g}, not {told!r}")
 
 
 def declare_mount(node: Node, lidar: str) -> list[float]:
-    """Where a LIDAR sits in the body, m: the parameter `level_mount`, `nodding_mount`."""
+    """Declares the parameter `LIDAR_mount`: the LIDAR's position in the body, m."""
     return declare_numbers(node, f"{lidar}_mount", [0.0, 0.0, 0.0], "[x, y, z]")
 
 

@@ -1,7 +1,7 @@
-"""Where a UAV's odometry frame lies in the map, as `/tf` tells.
+"""The pose of a UAV's odometry frame in the map, from `/tf`.
 
-`map -> uavN/odom` is identity until a SLAM, or whoever corrects the drift, says otherwise
-(REP-105). A SLAM that has lost its place says nothing more.
+`map -> uavN/odom` is identity until a SLAM, or another drift correction, publishes it (REP-105). A
+SLAM that has lost tracking stops publishing it.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from volery.graph.messages import Odometry, TFMessage, stamp_of
 Array = NDArray[np.float64]
 
 MAP = "map"
-UNKNOWN_PLACE = "where in the map is not known"
+UNKNOWN_PLACE = "pose in the map unknown"
 _SILENT_NS = NS_PER_S
-"""What `/tf` has told once it must tell again within this time of the odometry's clock."""
+"""Timeout of a transform, by the odometry's clock."""
 
 
 class MapFrame:
@@ -38,11 +38,11 @@ class MapFrame:
         self._told_ns: dict[str, int] = {}
 
     def hear(self, message: Odometry) -> None:
-        """The frame of this odometry is the one looked up from now on."""
+        """Selects the frame of this odometry."""
         self.odom_frame, self._odom_ns = message.header.frame_id, stamp_of(message)
 
     def on_tf(self, message: TFMessage) -> None:
-        """Take in what `/tf` says; transforms that are not finite are left out."""
+        """Stores the transforms of a message; ignores those that are not finite."""
         for stamped in message.transforms:
             if stamped.header.frame_id != MAP or not stamped.child_frame_id.endswith("/odom"):
                 continue
@@ -55,17 +55,17 @@ class MapFrame:
 
     @property
     def map_from_odom(self) -> Pose | None:
-        """`T_map_odom`; None where it is identity."""
+        """`T_map_odom`; None: identity."""
         return self._known.get(self.odom_frame)
 
     @property
     def is_lost(self) -> bool:
-        """Whether `/tf` has fallen silent about a frame whose odometry goes on."""
+        """Whether the transform has timed out while the odometry continues."""
         told = self._told_ns.get(self.odom_frame)
         return told is not None and self._odom_ns - told > _SILENT_NS
 
     def to_map(self, points_odom: Array) -> Array:
-        """Points (..., 3) of the odometry frame in the map."""
+        """Transforms points (..., 3) from the odometry frame to the map."""
         at = self.map_from_odom
         if at is None:
             return points_odom
@@ -73,14 +73,14 @@ class MapFrame:
         return moved_points(flat, at.attitude, at.position).reshape(np.shape(points_odom))
 
     def to_odom(self, points_map: Array) -> Array:
-        """Points (..., 3) of the map in the odometry frame."""
+        """Transforms points (..., 3) from the map to the odometry frame."""
         at = self.map_from_odom
         if at is None:
             return points_map
         return rotations.rotate(rotations.conjugate(at.attitude), points_map - at.position)
 
     def pose_in_map(self, message: Odometry) -> OdometrySample:
-        """The pose that odometry tells, in the map; its frame is the one looked up from now on."""
+        """Returns the pose of odometry in the map, and selects its frame."""
         self.hear(message)
         pose, at = OdometrySample.from_odometry(message), self.map_from_odom
         if at is None:
@@ -94,11 +94,11 @@ class MapFrame:
         )
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         times = {"odom_ns": self._odom_ns, "told_ns": dict(self._told_ns)}
         return {"odom_frame": self.odom_frame, "known": dict(self._known), **times}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         self.odom_frame, self._known = state["odom_frame"], dict(state["known"])
         self._odom_ns, self._told_ns = state["odom_ns"], dict(state["told_ns"])

@@ -1,4 +1,4 @@
-"""Where a vehicle and its nodding mount were lately, so that each beam can be cast from there."""
+"""Recent poses of a vehicle and angles of its nodding mount, to place each beam."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from volery.core.vectors import norm
 Array = NDArray[np.float64]
 
 _KEPT = 64
-"""Poses and angles that are remembered: more than a second of each."""
+"""Number of stored poses and angles: more than a second of each."""
 _JUMP_BACK_NS = NS_PER_S // 2
-"""A stamp so far before the newest one is a clock that was set back; a smaller step is disorder."""
+"""Step back in stamps from which the clock has been set back; a smaller one is disorder."""
 
 
 class Pose(NamedTuple):
-    """Where a body is: position (3,) m, attitude (4,) x y z w."""
+    """Pose of a body: position (3,) m, attitude (4,) x y z w."""
 
     position: Array
     attitude: Array
 
 
 class MotionHistory:
-    """Poses by time. What is not finite, old, repeated or stuck is `refused`, and counted."""
+    """Stores poses by time; refuses those that are not finite, old, repeated or stuck."""
 
     def __init__(self) -> None:
         self._times: list[int] = []
@@ -39,11 +39,14 @@ class MotionHistory:
 
     @property
     def newest(self) -> OdometrySample | None:
-        """The pose with the latest stamp."""
+        """The pose with the latest stamp, or None."""
         return self._poses[-1] if self._poses else None
 
     def add(self, pose: OdometrySample) -> bool:
-        """Remember a pose; False where it cannot be used. A clock set back starts anew."""
+        """Adds a pose; returns False if it is refused.
+
+        A clock that is set back clears the stored poses.
+        """
         values = (pose.position, pose.attitude, pose.velocity, pose.omega_body)
         finite = all(np.isfinite(value).all() for value in values)
         if not finite or abs(norm(pose.attitude) - 1.0) > 0.01:
@@ -60,10 +63,10 @@ class MotionHistory:
         return True
 
     def at(self, time_ns: int, ahead_s: float = 0.25, gap_s: float = 0.5) -> Pose | None:
-        """Where it was at `time_ns`; None where nothing near is known.
+        """Returns the pose at `time_ns`; None if it is unknown.
 
-        Between two poses at most `gap_s` apart it is interpolated, after the newest one carried on
-        by its velocities for `ahead_s` at most.
+        It interpolates between two poses at most `gap_s` apart, and extrapolates the newest one by
+        its velocities for at most `ahead_s`.
         """
         row = bisect_right(self._times, time_ns) - 1
         if row < 0:
@@ -93,7 +96,7 @@ def _carried_on(pose: OdometrySample, seconds: float) -> Pose:
 
 
 class NodHistory:
-    """Angles (rad, positive down) of a nodding mount by time, with their rates (rad/s)."""
+    """Stores angles (rad, positive down) of a nodding mount by time, with their rates (rad/s)."""
 
     def __init__(self) -> None:
         self._times: list[int] = []
@@ -101,7 +104,7 @@ class NodHistory:
         self.refused = 0
 
     def add(self, time_ns: int, angle: float, rate: float) -> bool:
-        """Remember an angle; False where it is not finite, or not newer than the newest."""
+        """Adds an angle; returns False if it is not finite, or not newer than the newest."""
         if not (np.isfinite(angle) and np.isfinite(rate)):
             self.refused += 1
             return False
@@ -116,7 +119,7 @@ class NodHistory:
         return True
 
     def at(self, time_ns: int, ahead_s: float = 0.25) -> float | None:
-        """Angle at `time_ns`: interpolated, or carried on by the rate for `ahead_s` at most."""
+        """Returns the angle at `time_ns`: interpolated, or extrapolated by at most `ahead_s`."""
         row = bisect_right(self._times, time_ns) - 1
         if row < 0:
             return None

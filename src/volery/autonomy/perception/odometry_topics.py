@@ -1,4 +1,4 @@
-"""Where nodes that work in the map receive their pose from."""
+"""Subscribes nodes that work in the map to their pose."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ def subscribe_odometry(
 ) -> None:
     """Subscribes `node` to its odometry, and `frame` to `/tf`.
 
-    Declares the parameters `odometry`, the topic, and `corrected`: false where the odometry frame
-    is the map's, so that `/tf` does not count.
+    Declares the parameters `odometry`, the topic, and `corrected`: false if the odometry frame is
+    the map's, so that `/tf` is not used.
     """
     topic = str(node.declare_parameter("odometry", "odom").value)
     node.create_subscription(Odometry, topic, on_odometry, depth)

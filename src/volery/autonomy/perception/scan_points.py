@@ -1,4 +1,4 @@
-"""From a laser scan to points in the odometry frame, each beam from where it was cast."""
+"""Projects laser scans to points in the odometry frame, each beam from its pose."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from volery.graph.messages import LaserScan, Odometry
 Array = NDArray[np.float64]
 
 _NEAREST_M = 0.45
-"""Nearer returns are the vehicle's own or noise."""
+"""Min range; nearer returns are from the vehicle itself, or noise."""
 
 
 @dataclass(frozen=True)
 class OdometrySample:
-    """Latest odometry: position (3,), attitude (4,), velocity_odom (3,), omega_body (3,)."""
+    """A pose (3,) m, (4,), with velocity (3,) m/s in odom and angular velocity (3,) in the body."""
 
     time_ns: int
     position: Array
@@ -32,7 +32,7 @@ class OdometrySample:
 
     @classmethod
     def from_odometry(cls, message: Odometry) -> OdometrySample:
-        """Take over a message; its twist is in the body."""
+        """Converts a message; its twist is in the body."""
         p, q = message.pose.pose.position, message.pose.pose.orientation
         v, w = message.twist.twist.linear, message.twist.twist.angular
         attitude = np.array([q.x, q.y, q.z, q.w])
@@ -62,7 +62,7 @@ class ScanProjector:
     def points(
         self, scan: LaserScan, pose: OdometrySample, joint: tuple[int, float, float] = (0, 0.0, 0.0)
     ) -> Array:
-        """Returns within reach as points (K, 3).
+        """Returns points (K, 3) m within range.
 
         `joint` is stamp (ns), angle (rad) and rate (rad/s) of a nodding mount, positive downward.
         """
@@ -108,7 +108,7 @@ def _project(
     omega: Array,
     points: Array,
 ) -> int:
-    """Fill `points`, return their number; the turn since the pose is taken to first order."""
+    """Fills `points`, returns their number; the rotation since the pose is to first order."""
     count = 0
     for beam in range(0, len(ranges), every):
         distance = ranges[beam]

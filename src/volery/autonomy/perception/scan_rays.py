@@ -1,8 +1,8 @@
-"""From a laser scan to rays in the odometry frame, each beam from where it was cast.
+"""Converts laser scans to rays in the odometry frame, each beam from its pose.
 
-A ray tells of more than a return does: all along it the space is free. A beam without an echo
-(`inf`, REP-117) may have met nothing, or something that sent too little light back; it is believed
-for a shorter way.
+A ray holds more information than a return: all along it the space is free. A beam without a return
+(`inf`, REP-117) may have hit nothing, or a surface that reflects too little; it frees a shorter
+distance.
 """
 
 from __future__ import annotations
@@ -31,33 +31,33 @@ class Rays(NamedTuple):
     ends: Array
     """(K, 3)."""
     hits: NDArray[np.bool_]
-    """(K,): whether something was met at the end, or the space is free up to there."""
+    """(K,): whether the ray ends at an obstacle, or the space is free up to its end."""
 
 
 class Beams(NamedTuple):
-    """Which beams of a LIDAR count, and how far."""
+    """Selection and ranges of a LIDAR's beams."""
 
     reach_m: float = 15.0
-    """Farther returns are free space out to here."""
+    """Max range; beyond it returns count as free space up to it."""
     nearest_m: float = 0.45
-    """Nearer returns are the vehicle's own, or noise."""
+    """Min range; nearer returns are from the vehicle itself, or noise."""
     blank_m: float = 5.0
-    """A beam without an echo is free space out to here (modelling choice)."""
+    """Free distance of a beam without a return (modelling choice)."""
     every: int = 1
-    """Every so many beams."""
+    """Step between used beams."""
 
 
 class RayMaker:
-    """Rays of one LIDAR at `mount` (3,) m in the body, its axes along the body's."""
+    """Converts scans of one LIDAR at `mount` (3,) m in the body, its axes along the body's."""
 
     def __init__(self, mount: Sequence[float], beams: Beams) -> None:
         self._mount = np.array(mount, dtype=np.float64)
         self._beams = beams
 
     def rays(self, scan: LaserScan, motion: MotionHistory, nod: NodHistory | None) -> Rays | None:
-        """Rays of a scan; None where it has no beams or its motion is not known.
+        """Returns the rays of a scan; None if it has no beams or its motion is unknown.
 
-        `nod` is the mount's, None where it is fixed.
+        `nod` is the mount's, None for a fixed one.
         """
         first, last = scan_times(scan)
         tilt = (0.0, 0.0) if nod is None else (nod.at(first), nod.at(last))
@@ -98,20 +98,20 @@ class RayMaker:
 
 
 def scan_times(scan: LaserScan) -> tuple[int, int]:
-    """When the first and the last beam were cast, ns."""
+    """Returns the times of the first and the last beam, ns."""
     first = stamp_of(scan)
     sweep = float(scan.time_increment) * max(len(scan.ranges) - 1, 0)
     return first, first + (ns_from_s(sweep) if math.isfinite(sweep) else 0)
 
 
 def is_usable(scan: LaserScan) -> bool:
-    """Whether a scan has beams and finite angles."""
+    """Returns whether a scan has beams and finite angles."""
     numbers = (scan.angle_min, scan.angle_increment, scan.time_increment, scan.range_max)
     return len(scan.ranges) > 0 and all(math.isfinite(number) for number in numbers)
 
 
 def has_return(scan: LaserScan) -> bool:
-    """Whether any beam of a scan has met something."""
+    """Returns whether any beam of a scan has a return."""
     return bool(_is_any_finite(np.asarray(scan.ranges, np.float32)))
 
 
@@ -143,7 +143,7 @@ def _cast(
     ends: Array,
     hits: NDArray[np.bool_],
 ) -> int:
-    """Fill `starts`, `ends` and `hits`, return their number. Comparisons leave out nan."""
+    """Fills `starts`, `ends` and `hits`, returns their number. Comparisons exclude nan."""
     count = 0
     last = max(len(ranges) - 1, 1)
     for beam in range(0, len(ranges), every):

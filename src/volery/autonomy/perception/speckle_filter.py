@@ -1,12 +1,12 @@
-"""Leaving out returns of laser scans that nothing else confirms: rain, snow, fog and dust.
+"""Removes unconfirmed returns from laser scans: rain, snow, fog and dust.
 
-A drop or flake is met by one beam of one scan; a surface by beams side by side, and by the same
-beams again in the scan that follows. A return is confirmed by every other one that is near it in
-range and few beams aside, in its own scan or in the one before. One is enough where things may be
-thinner than the beams' spacing. Near by they are not, and there most of what particles send back
-comes from, so that more are needed: 2 cm are met by two beams of a UTM-30LX out to 2.3 m.
+A drop or flake is hit by one beam of one scan; a surface by adjacent beams, and by the same beams
+again in the next scan. A return is confirmed by every other one that is near it in range and few
+beams away, in its own scan or in the previous one. One is enough where objects may be thinner than
+the beams' spacing. At short range they are not, and most returns of particles come from there, so
+more are needed: 2 cm are hit by two beams of a UTM-30LX up to 2.3 m.
 
-In 12 mm/h of rain and fog of 300 m visibility (scenario `forest_rain`) this leaves none of the 8
+In 12 mm/h of rain and fog of 300 m visibility (scenario `forest_rain`) this retains none of the 8
 false returns of a scan, 99.9 % of a level and 97 % of a nodding UTM-30LX's true ones.
 """
 
@@ -20,28 +20,29 @@ from numpy.typing import NDArray
 from volery.graph.messages import LaserScan
 
 NEAR_M = 0.15
-"""In range: four standard deviations between two returns of a UTM-30LX (libpointmatcher: 0.018 m
-each) and what a UAV flies between two scans at 2 m/s."""
+"""Range difference: four standard deviations between two returns of a UTM-30LX (libpointmatcher:
+0.018 m each) and the flight between two scans at 2 m/s.
+"""
 _ASIDE = 2
-"""Beams in angle, to both sides."""
+"""Beams to both sides."""
 CLOSE_M = 2.0
 _NEEDED, _NEEDED_CLOSE = 1, 3
-"""Confirmations beyond and within `CLOSE_M`, of 9 that there can be (modelling choice)."""
+"""Confirmations needed beyond and within `CLOSE_M`, of at most 9 (modelling choice)."""
 
 
 class SpeckleFilter:
-    """Filter of the scans of one LIDAR, in their order."""
+    """Filters the scans of one LIDAR, in their order."""
 
     def __init__(self) -> None:
         self._before: NDArray[np.float32] = np.empty(0, np.float32)
 
     def left_out(self, scan: LaserScan) -> LaserScan:
-        """The scan with an infinite range wherever a return stands alone."""
+        """Returns the scan with an infinite range for every unconfirmed return."""
         ranges = np.asarray(scan.ranges, dtype=np.float32)
         before = self._before if len(self._before) == len(ranges) else np.full_like(ranges, np.inf)
         self._before = ranges
         found = np.zeros(len(ranges), dtype=np.int8)
-        with np.errstate(invalid="ignore"):  # infinite ranges are near nothing
+        with np.errstate(invalid="ignore"):  # infinite ranges confirm none
             for step in range(-_ASIDE, _ASIDE + 1):
                 here = slice(max(step, 0), len(ranges) + min(step, 0))
                 there = slice(max(-step, 0), len(ranges) + min(-step, 0))

@@ -1,4 +1,4 @@
-"""Where sensors sit in the body, as `/tf_static` tells it."""
+"""Mounts of sensors in the body, from `/tf_static`."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from volery.graph.messages import TFMessage
 Array = NDArray[np.float64]
 
 _JOINTS = 16
-"""Between body and sensor at most."""
+"""Max number of frames between body and sensor."""
 
 
 class Mount(NamedTuple):
-    """Where a sensor sits: position (3,) m, attitude (4,) x y z w."""
+    """Mount of a sensor: position (3,) m, attitude (4,) x y z w."""
 
     position: Array
     attitude: Array
@@ -28,13 +28,13 @@ LEVEL = Mount(np.zeros(3), rotations.IDENTITY)
 
 
 class StaticTransforms:
-    """Joints by the frame beyond them: the frame before, and where it sits there."""
+    """Transforms by child frame: parent frame and the child's pose in it."""
 
     def __init__(self) -> None:
         self.joints: dict[str, tuple[str, Mount]] = {}
 
     def add(self, message: TFMessage) -> None:
-        """Remember joints; what is not finite is left out."""
+        """Stores the transforms of a message; ignores those that are not finite."""
         for found in message.transforms:
             p, q = found.transform.translation, found.transform.rotation
             turn = np.array([q.x, q.y, q.z, q.w])
@@ -43,7 +43,10 @@ class StaticTransforms:
                 self.joints[found.child_frame_id] = found.header.frame_id, mount
 
     def mount_of(self, frame: str, own: Mount = LEVEL) -> Mount:
-        """Where a frame sits in the body, the first frame of its chain; `own` is beyond it."""
+        """Returns a frame's pose in the body, the root of its chain.
+
+        `own` is a pose in that frame to transform.
+        """
         for _ in range(_JOINTS):
             if frame not in self.joints:
                 break

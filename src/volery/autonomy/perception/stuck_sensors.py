@@ -1,7 +1,7 @@
-"""Sensors that repeat themselves: new stamps, old measurements.
+"""Detects stuck sensors: new stamps with old measurements.
 
-Two measurements of a real sensor are never alike to the last bit: all have noise. Those of a sonar
-are whole centimetres, so that many in a row must be alike.
+Two measurements of a real sensor are never equal to the last bit: all have noise. Those of a sonar
+are whole centimetres, so many in a row must be equal.
 """
 
 from __future__ import annotations
@@ -20,38 +20,38 @@ Ranges = NDArray[np.float32]
 
 _MOVES_M_S = 0.1
 _ALIKE = 15
-"""Ranges in a row: with noise of 1 cm it takes some hundred hours until that comes by chance."""
+"""Equal ranges in a row: with noise of 1 cm this happens by chance in some hundred hours."""
 
 
 class ScanRepeats:
-    """Whether scans of one LIDAR are those that came before."""
+    """Detects repeated scans of one LIDAR."""
 
     def __init__(self) -> None:
         self._ranges: Ranges = np.zeros(0, np.float32)
 
     def are_told_by(self, scan: LaserScan) -> bool:
-        """Whether a scan has the ranges of the one before; one without any return never does."""
+        """Returns whether a scan with returns repeats the ranges of the previous one."""
         ranges = np.asarray(scan.ranges, np.float32)
         before, self._ranges = self._ranges, ranges
         return len(ranges) == len(before) and bool(_repeat(ranges, before))
 
 
 class RangeRepeats:
-    """Whether a sonar goes on telling the same range."""
+    """Detects a sonar that repeats the same range."""
 
     def __init__(self) -> None:
         self._last = -1.0
         self._count = 0
 
     def are_told_by(self, distance: float) -> bool:
-        """Whether a range (m, finite) is the last of many that are alike."""
+        """Returns whether a range (m, finite) is the last of many equal ones."""
         self._count = self._count + 1 if distance == self._last else 1
         self._last = distance
         return self._count >= _ALIKE
 
 
 def is_stuck(pose: OdometrySample, before: OdometrySample | None) -> bool:
-    """Whether odometry says that it moves, and yet that it is where it was, to the last bit."""
+    """Returns whether odometry has a velocity, but the same pose as before to the last bit."""
     return (
         before is not None
         and bool(norm(pose.velocity) > _MOVES_M_S)
@@ -62,7 +62,7 @@ def is_stuck(pose: OdometrySample, before: OdometrySample | None) -> bool:
 
 @brief_kernel
 def _repeat(ranges: Ranges, before: Ranges) -> bool:
-    """Whether all are the same, NaN and NaN, too, and one of them is finite."""
+    """Returns whether all are equal, NaN included, and at least one is finite."""
     has_return = False
     for k in range(len(ranges)):
         one, other = ranges[k], before[k]

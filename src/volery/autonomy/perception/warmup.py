@@ -25,36 +25,36 @@ from volery.graph.messages import CameraInfo, Image, LaserScan
 
 
 def scan_returns() -> None:
-    """The kernel that tells whether a scan has met anything."""
+    """Compiles the kernel that checks whether a scan has returns."""
     has_return(a_scan())
 
 
 def scan_repeats() -> None:
-    """The kernel that tells whether a scan has come before."""
+    """Compiles the kernel that detects repeated scans."""
     repeats = ScanRepeats()
     for _ in range(2):
         repeats.are_told_by(a_scan())
 
 
 def scan_rays() -> None:
-    """The kernel that turns scans into rays."""
+    """Compiles the kernel that converts scans to rays."""
     some_rays()
 
 
 def ground() -> None:
-    """Kernels of `ground_plane`."""
+    """Compiles the kernels of `ground_plane`."""
     plane = GroundPlane()
     plane.add(np.zeros((1, 3)), 0)
     plane.fit(np.zeros(3), None, 0)
 
 
 def scan_points() -> None:
-    """The kernel that turns scans into points, lone returns left out."""
+    """Compiles the kernel that projects scans to points, after the speckle filter."""
     ScanProjector([0.0, 0.0, 0.0]).points(SpeckleFilter().left_out(a_scan()), a_pose(0))
 
 
 def depth_points() -> None:
-    """The kernel that turns depth pictures into points."""
+    """Compiles the kernel that projects depth images to points."""
     image, info = zero_message("sensor_msgs/msg/Image"), zero_message("sensor_msgs/msg/CameraInfo")
     image.height = image.width = 1
     image.encoding, image.data = "32FC1", fixed(np.zeros(4, np.uint8))
@@ -64,13 +64,13 @@ def depth_points() -> None:
 
 
 def fixed(array: NDArray[Any]) -> NDArray[Any]:
-    """The array, read-only as those of messages."""
+    """Makes an array read-only, as those of messages are, and returns it."""
     array.flags.writeable = False
     return array
 
 
 def a_scan() -> LaserScan:
-    """Three beams at time 0, of which two have met something."""
+    """Returns a scan of three beams at time 0, two with returns."""
     scan: Any = zero_message("sensor_msgs/msg/LaserScan")
     scan.ranges = fixed(np.array([1.0, 2.0, np.inf], np.float32))
     scan.angle_increment, scan.range_max = 0.1, 10.0
@@ -79,12 +79,12 @@ def a_scan() -> LaserScan:
 
 
 def a_pose(time_ns: int) -> OdometrySample:
-    """Level, at rest at the origin."""
+    """Returns a level pose at rest at the origin."""
     return OdometrySample(time_ns, np.zeros(3), rotations.IDENTITY.copy(), np.zeros(3), np.zeros(3))
 
 
 def some_rays() -> Rays:
-    """Those of `a_scan`, through the kernel that makes them."""
+    """Returns the rays of `a_scan`, through the kernel that computes them."""
     motion = MotionHistory()
     for time_ns in (0, NS_PER_S // 10):
         motion.add(a_pose(time_ns))

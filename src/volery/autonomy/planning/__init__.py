@@ -1,5 +1,5 @@
-"""Flying to a goal through what is known and what is seen.
+"""Planning and flying to a goal, from the map and from current sensor data.
 
-`exploration_node` chooses goals, `global_planner` a way through the map, `local_planner` what is
-flown in the next seconds, `follower` flies it.
+`exploration_node` chooses goals, `global_planner` plans a path through the map, `local_planner`
+plans the trajectory of the next seconds, `trajectory_follower` flies it.
 """

@@ -1,4 +1,4 @@
-"""How far it is to the next obstacle, and where something is known, around a vehicle."""
+"""Distances to the nearest obstacle and known space around a vehicle."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from volery.core.compiled import kernel
 Array = NDArray[np.float64]
 
 FAR_CELLS = 7
-"""Distances are measured so far."""
+"""Largest distance that is measured, cells."""
 
 
 class Clearance(NamedTuple):
-    """Distances in a window of cells."""
+    """Distances to obstacles in a window of cells."""
 
     square: Squares
     """(nx, ny, nz): squared distance to the nearest occupied cell, in cells, at most 49."""
     known: NDArray[np.bool_]
-    """(nx, ny, nz)."""
+    """(nx, ny, nz): whether a cell counts as observed."""
     low: NDArray[np.int64]
-    """(3,): the lowest cell, counted from the frame's origin."""
+    """(3,): index of the lowest cell, counted from the frame's origin."""
     cell_m: float
 
     @property
     def far_m(self) -> float:
-        """Distances at and beyond which nothing more is known."""
+        """Returns the largest distance that is measured, m."""
         return FAR_CELLS * self.cell_m
 
     def at(self, places: Array) -> Array:
-        """Distances (K,) m at places (K, 3); 0 outside of the window."""
+        """Returns the distances (K,) m at positions (K, 3) m; 0 outside of the window."""
         cells = np.floor(places / self.cell_m).astype(np.int64) - self.low
         inside = ((cells >= 0) & (cells < self.square.shape)).all(axis=1)
         cells[~inside] = 0
@@ -45,9 +45,10 @@ class Clearance(NamedTuple):
 def clearance_of(
     scores: Scores, low: NDArray[np.int64], cell_m: float, upright_cells: int
 ) -> Clearance:
-    """Distances from scores. A cell is known if one within `upright_cells` over or under it is.
+    """Returns the distances around a window of scores.
 
-    The nodding scan leaves gaps between its lines; what stands in a forest is upright.
+    A cell is known if one within `upright_cells` over or under it is. The nodding scan leaves gaps
+    between its lines; this closes them, as obstacles in a forest are upright.
     """
     occupied, known = np.empty(scores.shape, np.bool_), np.empty(scores.shape, np.bool_)
     _know(scores, upright_cells, occupied, known)
@@ -61,7 +62,7 @@ def _know(
     nx, ny, nz = scores.shape
     for i in range(nx):
         for j in range(ny):
-            last = -upright - 1  # the last cell from below that was seen
+            last = -upright - 1  # the last observed cell from below
             for k in range(nz):
                 if scores[i, j, k] != UNKNOWN:
                     last = k

@@ -1,8 +1,8 @@
-"""What it costs to come from each place near the vehicle to its goal: a navigation function.
+"""Computes the cost from each position near the vehicle to its goal: a navigation function.
 
-Dijkstra's method on the cells of the surface of flight, from the goal outwards. A metre costs one,
-more near obstacles and where nothing is known. What is flown follows its descent within the limits
-of the vehicle, as in O. Brock and O. Khatib, "High-speed navigation using the global dynamic window
+Dijkstra's algorithm on the cells of the flight surface, from the goal outwards. A metre costs 1,
+more near obstacles and in unknown space. The trajectory descends this function within the limits of
+the vehicle, as in O. Brock and O. Khatib, "High-speed navigation using the global dynamic window
 approach", ICRA 1999.
 """
 
@@ -23,43 +23,43 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 _SEED_M = 2.5
-"""Cells so near to the goal are where the search begins: the goal itself may be blocked."""
+"""Radius of the cells around the goal that seed the search: the goal itself may be blocked."""
 _SEED_COST = 2.0
-"""Cost of a metre between such a cell and the goal."""
+"""Cost of a metre between a seed cell and the goal."""
 
 
 class CellCosts(NamedTuple):
-    """What a metre costs, beside the one that it always costs."""
+    """Additional costs of a metre; the base cost is 1."""
 
     radius_m: float
-    """Nearer to obstacles than this it costs `squeeze`."""
+    """Distance to obstacles below which a metre costs `squeeze` more."""
     soft_m: float
-    """From here to `radius_m` it grows to `near`."""
+    """Distance to obstacles at which the cost begins to grow; it reaches `near` at `radius_m`."""
     near: float = 3.0
     squeeze: float = 30.0
     unknown: float = 0.6
-    """Where nothing is known: a way through is hoped for."""
+    """Cost in unknown space, which may be free."""
     aside: float = 0.5
-    """Over or under the wanted height."""
+    """Cost for each metre over or under the wanted height."""
 
 
 class CostToGo(NamedTuple):
     """Costs of the columns of a window."""
 
     cost: Array
-    """(nx, ny); inf where the goal is out of reach."""
+    """(nx, ny); inf where no path leads to the goal."""
     low: Integers
-    """(2,): the lowest cell, counted from the frame's origin."""
+    """(2,): index of the lowest cell, counted from the frame's origin."""
     cell_m: float
 
     def at(self, xy: Array) -> float:
-        """Cost at a place (2,); inf outside."""
+        """Returns the cost at a position (2,) m; inf outside of the window."""
         i, j = (np.floor(xy / self.cell_m).astype(np.int64) - self.low).tolist()
         rows, columns = self.cost.shape
         return float(self.cost[i, j]) if 0 <= i < rows and 0 <= j < columns else math.inf
 
     def descent(self, xy: Array, reach_m: float = 2.0) -> float | None:
-        """Direction (rad) of the cheapest cell at `reach_m`; None where none is cheaper."""
+        """Returns the direction (rad) of the cheapest cell at `reach_m`; None if none is lower."""
         angles = np.arange(0.0, 2.0 * math.pi, math.pi / 18.0)
         around = xy + reach_m * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
         costs = [self.at(place) for place in around]
@@ -70,7 +70,7 @@ class CostToGo(NamedTuple):
 def cost_to_go(
     clearance: Clearance, surface: Surface, offsets: Array, goal: Array, prices: CellCosts
 ) -> CostToGo:
-    """Costs of reaching `goal` (2,) m by heights of `surface` plus one of `offsets` (K,) m."""
+    """Returns the costs to `goal` (2,) m, at heights of `surface` plus one of `offsets` (K,) m."""
     nx, ny, _ = clearance.square.shape
     price, cost = np.empty((nx, ny)), np.full((nx, ny), np.inf)
     _price(
@@ -102,7 +102,7 @@ def _price(
     prices: Array,
     price: Array,
 ) -> None:
-    """Price of a metre in each column, at the best height; inf where all are occupied."""
+    """Computes the price of a metre in each column, at the best height; inf if all are occupied."""
     nx, ny, nz = square.shape
     radius, soft, near, squeeze, unknown, aside = prices
     for i in range(nx):
@@ -161,7 +161,7 @@ def _spread(
 
 @inner_kernel
 def _push(heap_cost: Array, heap_cell: Integers, size: int, cost: float, cell: int) -> int:
-    """Add to a binary heap; returns its new size."""
+    """Adds an element to a binary heap; returns its new size."""
     at = size
     while at > 0:
         above = (at - 1) // 2
@@ -175,7 +175,7 @@ def _push(heap_cost: Array, heap_cell: Integers, size: int, cost: float, cell: i
 
 @inner_kernel
 def _pop(heap_cost: Array, heap_cell: Integers, size: int) -> int:
-    """Remove the top of a binary heap; returns its new size."""
+    """Removes the top of a binary heap; returns its new size."""
     size -= 1
     cost, cell = heap_cost[size], heap_cell[size]
     at = 0

@@ -1,4 +1,4 @@
-"""Distances to the nearest occupied cell, exact up to a few cells, by one axis after the other."""
+"""Computes distances to the nearest occupied cell, exact up to a few cells, axis by axis."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ Squares = NDArray[np.int16]
 
 
 def squared_distances(occupied: NDArray[np.bool_], far_cells: int) -> Squares:
-    """Squared distance (nx, ny, nz), in cells, of each cell's middle to the next occupied one's.
+    """Returns squared distances (nx, ny, nz), in cells, to the nearest occupied cell.
 
-    Nothing beyond `far_cells` counts: there the value is its square.
+    They are between the cells' centres. Distances beyond `far_cells` are clipped to it.
     """
     square = np.empty(occupied.shape, np.int16)
     _measure(occupied, far_cells, square, np.empty_like(square))
@@ -51,7 +51,7 @@ def _copy(square: NDArray[np.int16], into: NDArray[np.int16]) -> None:
 
 @inner_kernel
 def _along_column(occupied: NDArray[np.bool_], far: int, square: NDArray[np.int16]) -> None:
-    """Squared distances within one column, from below and from above."""
+    """Computes squared distances within one column, from below and from above."""
     since = far
     for k in range(len(occupied)):
         since = 0 if occupied[k] else min(since + 1, far)

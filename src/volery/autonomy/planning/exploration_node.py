@@ -1,4 +1,4 @@
-"""Searches an area: goes from place to place until all of it has been looked at."""
+"""Searches an area: sends goals until all of the area has been observed."""
 
 from __future__ import annotations
 
@@ -43,11 +43,13 @@ POLYGON: type[Any] = message_type("geometry_msgs/msg/PolygonStamped")
 _LEVEL = Quaternion(0.0, 0.0, 0.0, 1.0)
 _PERIOD_S = 0.5
 _NEAR = 0.3
-"""Share of the sight's radius at which a goal counts as reached: the flight does not stop there."""
+"""Fraction of the view radius at which a goal counts as reached, so that the flight does not
+stop.
+"""
 _STALE = 0.15
-"""A goal is given up when only this share of what it promised is still new."""
+"""A goal is dropped when only this fraction of its expected gain is still new."""
 _BLOCKED_S = 8.0
-"""Without coming nearer to a goal for so long it is given up."""
+"""A goal is given up after this time without progress towards it."""
 _NEARER_M = 1.0
 _STATE = (
     "_motion",
@@ -66,7 +68,7 @@ _STATE = (
 
 
 class ExplorationState(StrEnum):
-    """How far the search is."""
+    """State of the search."""
 
     WAITING = "waiting"
     SEARCHING = "searching"
@@ -75,25 +77,24 @@ class ExplorationState(StrEnum):
 
 
 class Exploration(Node):
-    """Takes a `search_area`, sends `planning/goal`; tells `exploration/status` and `/covered`.
+    """Searches `search_area` by `planning/goal`; publishes `exploration/status` and `/covered`.
 
-    `search_area` is geometry_msgs/PolygonStamped in the map; another one replaces it, an empty one
+    `search_area` is geometry_msgs/PolygonStamped in the map; a new one replaces it, an empty one
     ends the search. The status is JSON: state (waiting, searching, done, blocked), reason, covered
-    (share), area_m2, searched_m2, goal, given_up. `exploration/covered` is std_msgs/Float32, the
-    share; `exploration/searched` nav_msgs/OccupancyGrid: 0 to be looked at, 100 looked at, -1
-    outside.
+    (fraction), area_m2, searched_m2, goal, given_up. `exploration/covered` is std_msgs/Float32, the
+    fraction; `exploration/searched` nav_msgs/OccupancyGrid: 0 unobserved, 100 observed, -1 outside.
 
     Parameters
     ----------
-    odometry: topic of the pose; `corrected`: whether `/tf` tells where its frame lies in the map.
-    view_m: how far around the vehicle counts as looked at.
-    cell_m: of the area.
+    odometry: topic of the pose; `corrected`: whether `/tf` holds the pose of its frame in the map.
+    view_m: radius around the vehicle that counts as observed.
+    cell_m: cell size of the area.
 
     """
 
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Returns the tasks that compile its kernels."""
+        """Returns the tasks that compile the kernels of this node."""
         from volery.autonomy.planning import warmup
 
         return (warmup.searched_area,)
@@ -106,13 +107,15 @@ class Exploration(Node):
         self._motion: OdometrySample | None = None
         self._area: SearchArea | None = None
         self._grid: tuple[NDArray[np.int8], Array, float] | None = None
-        """Values of the map at flight height, its lower left corner, its cells' width."""
+        """Values of the map at flight height, (2,) m lower left corner, cell size in m."""
         self._goal: Viewpoint | None = None
         self._since_ns = 0
         self._best_m = math.inf
         self._refused: list[Array] = []
         self._visited: list[Array] = []
-        """Places that could not be reached, and those that have been looked from."""
+        """Goals that could not be reached, and viewpoints that have been visited; (2,) m in the
+        map.
+        """
         self._state, self._reason = ExplorationState.WAITING, "no area"
         self._told = ""
         self._sent = 0
@@ -133,15 +136,15 @@ class Exploration(Node):
         self.create_timer(2.0, self._tell_searched)
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         return {"frame": self._frame.get_state(), **save_attributes(self, _STATE)}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         self._frame.set_state(state["frame"])
         restore_attributes(self, {name: state[name] for name in _STATE})
 
-    # ------------------------------------------------------------------------------ what it hears
+    # ------------------------------------------------------------------------------ subscriptions
 
     def _on_odometry(self, message: Odometry) -> None:
         self._frame.hear(message)
@@ -175,13 +178,13 @@ class Exploration(Node):
         info = message.info
         values = np.asarray(message.data, np.int8)
         if info.resolution <= 0.0 or values.size != info.height * info.width:
-            self._reason = "the map's size does not fit its data"
+            self._reason = "the map's size does not match its data"
             return
         corner = np.array([info.origin.position.x, info.origin.position.y])
         self._grid = (values.reshape(info.height, info.width), corner, float(info.resolution))
 
     def _on_goal_status(self, message: String) -> None:
-        """The planner cannot come to the goal: try another one."""
+        """Gives up the goal if the planner cannot reach it."""
         try:
             told = json.loads(message.data)
             state, goal = told["state"], told["goal"]
@@ -192,14 +195,14 @@ class Exploration(Node):
         if goal is not None and np.hypot(*(self._goal.place - goal[:2])) < 0.1:
             self._give_up()
 
-    # ------------------------------------------------------------------------------- what it does
+    # ------------------------------------------------------------------------------------- search
 
     def _on_timer(self) -> None:
         if self._area is None or self._motion is None or self._grid is None:
             self._tell()
             return
         if self._frame.is_lost:
-            self._since_ns = self.get_clock().now_ns()  # no goal is blocked by that
+            self._since_ns = self.get_clock().now_ns()  # a goal is not blocked by lost tracking
             return
         place = self._frame.to_map(self._motion.position)
         self._area.look(place, *self._grid, self._view)
@@ -239,7 +242,7 @@ class Exploration(Node):
         if next_viewpoint(area, place[:2], heading, self._view, self._visited) is not None:
             self._become(
                 ExplorationState.BLOCKED,
-                f"{counted(len(self._refused), 'place')} cannot be reached",
+                f"{counted(len(self._refused), 'viewpoint')} cannot be reached",
             )
         else:
             self._become(ExplorationState.DONE, "")
@@ -250,7 +253,7 @@ class Exploration(Node):
         self._refused.append(self._goal.place)
         self._goal = None
 
-    # ------------------------------------------------------------------------------ what it tells
+    # ---------------------------------------------------------------------------------- publishers
 
     def _send(self, place: Array) -> None:
         stamp = header(self.get_clock().now_ns(), MAP)

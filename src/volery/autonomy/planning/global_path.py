@@ -1,13 +1,12 @@
-"""A way through the map: OMPL's RRT-Connect over the ground, then straightened.
+"""Plans a path through the map: OMPL's RRT-Connect over the ground, then shortcuts.
 
-States are (x, y, h): places and the height above ground there, so that ways follow uneven ground.
-J. Kuffner, S. LaValle, "RRT-connect: an efficient approach to single-query path planning", ICRA
-2000; I. Sucan, M. Moll, L. Kavraki, "The Open Motion Planning Library", 2012.
+States are (x, y, h): a position and its height above ground, so that paths follow uneven ground. J.
+Kuffner, S. LaValle, "RRT-connect: an efficient approach to single-query path planning", ICRA 2000;
+I. Sucan, M. Moll, L. Kavraki, "The Open Motion Planning Library", 2012.
 
-The search is bounded by iterations, never by wall time. OMPL hands each random generator of a
-planner a seed out of one sequence of the process: that sequence is started anew for each plan,
-under a lock that is held until the plan is made, so that a plan follows from its input and its seed
-alone, whatever else plans in other threads.
+The search is bounded by iterations, never by wall time. OMPL seeds the random generators of each
+planner from one sequence of the process. Each plan reseeds that sequence and holds a lock until it
+is complete, so that a plan depends on its input and its seed only, whatever other threads plan.
 """
 
 from __future__ import annotations
@@ -28,27 +27,27 @@ _OMPL = threading.Lock()
 
 
 class PathSearch(NamedTuple):
-    """How a way is searched for."""
+    """Settings of the path search."""
 
     radius_m: float = 0.8
-    """Least distance to obstacles."""
+    """Min distance to obstacles."""
     heights_m: tuple[float, float] = (2.0, 4.5)
-    """Least and most height above ground."""
+    """Min and max height above ground."""
     iterations: int = 4000
     range_m: float = 10.0
     """Longest leg that the search adds at once."""
     straighten: int = 60
-    """Attempts to leave out a bend."""
+    """Attempts to shorten the path."""
 
 
 def plan_way(
     space: VoxelSpace, start: Array, goal: Array, height_m: float, search: PathSearch, seed: int
 ) -> Array:
-    """Places (K, 3) m from `start` to `goal` (3,), `height_m` above ground at the goal.
+    """Returns positions (K, 3) m from `start` to `goal` (3,), `height_m` above ground at the goal.
 
-    Both are moved aside, up to 3 m, where they are too near to obstacles. Raises PlanError that
-    says why there is none: start or goal deep inside of obstacles or off the map, or no way found
-    within the iterations.
+    Start and goal are moved, by up to 3 m, if they are too near to obstacles. Raises PlanError if
+    one of them is deep inside of obstacles or off the map, or if no path is found within the
+    iterations.
     """
     low, high = search.heights_m
     here = float(start[2] - space.ground_at(start[:2]))
@@ -69,7 +68,7 @@ def plan_way(
 
 
 def _search(space: VoxelSpace, begin: Array, end: Array, search: PathSearch, seed: int) -> Array:
-    """States (K, 3) of a way, by OMPL. The caller holds `_OMPL`."""
+    """Returns the states (K, 3) of a path, by OMPL. The caller holds `_OMPL`."""
     try:
         from ompl import base, geometric, util
     except ImportError:
@@ -88,7 +87,7 @@ def _search(space: VoxelSpace, begin: Array, end: Array, search: PathSearch, see
     setup.setStateValidityChecker(lambda s: space.is_free(s[0], s[1], s[2], radius))
 
     class CompiledMotionValidator(base.MotionValidator):  # type: ignore[misc]
-        """Looks along a leg in one compiled call."""
+        """Checks a leg in one compiled call."""
 
         def checkMotion(self, a: Any, b: Any, *_last: Any) -> bool:  # noqa: N802
             return space.is_free_leg(a[0], a[1], a[2], b[0], b[1], b[2], radius)
@@ -112,7 +111,7 @@ def _search(space: VoxelSpace, begin: Array, end: Array, search: PathSearch, see
         not setup.solve(base.PlannerTerminationCondition(spent))
         or not setup.haveExactSolutionPath()
     ):
-        raise PlanError(f"no way was found in {search.iterations} iterations")
+        raise PlanError(f"no path was found in {search.iterations} iterations")
     path = setup.getSolutionPath()
     simplifier = geometric.PathSimplifier(information)
     simplifier.reduceVertices(path, search.straighten)

@@ -1,4 +1,4 @@
-"""Plans a way through the map to a goal, and anew when the map or the flight says so."""
+"""Plans a path through the map to a goal, and again when the map changes or progress stalls."""
 
 from __future__ import annotations
 
@@ -39,32 +39,32 @@ _LEVEL = Quaternion(0.0, 0.0, 0.0, 1.0)
 _PERIOD_S = 1.0
 _STUCK_S = 6.0
 _STUCK_M = 1.0
-"""Without coming so much nearer to the goal for so long, the way is planned anew ..."""
+"""The path is planned again after `_STUCK_S` without coming `_STUCK_M` nearer to the goal."""
 _MARGIN_M = 25.0
 _TRIES = 3
-"""... so often; then the goal is given up."""
+"""Attempts after which the goal is given up."""
 _STATE = ("_goal", "_way", "_place", "_since_ns", "_best_m", "_tries", "_plans", "_told", "_map")
 
 
 class GlobalPlanner(Node):
-    """`planning/goal` (PoseStamped, map) becomes `planning/path`; tells `planning/goal_status`.
+    """Plans `planning/path` to `planning/goal` (PoseStamped, map).
 
-    The status is JSON: state (waiting, planned, refused, unreachable), reason, goal, length_m,
-    plans. Where nothing is known of the map the way is straight. Service `~/stop` and
-    `planning/pause` (std_msgs/Bool, true): forget the goal and stay.
+    `planning/goal_status` is JSON: state (waiting, planned, refused, unreachable), reason, goal,
+    length_m, plans. Without a map the path is straight. Service `~/stop` and `planning/pause`
+    (std_msgs/Bool, true) cancel the goal; the UAV holds its position.
 
     Parameters
     ----------
-    odometry: topic of the pose; `corrected`: whether `/tf` tells where its frame lies in the map.
-    height_m: height above ground of the goal; heights_m: [least, most] on the way.
-    radius_m: distance to keep from obstacles. cell_m: of the space that is planned in.
+    odometry: topic of the pose; `corrected`: whether `/tf` holds the pose of its frame in the map.
+    height_m: height above ground of the goal; heights_m: [min, max] along the path.
+    radius_m: min distance to obstacles. cell_m: cell size of the planning space.
     iterations: bound of the search. seed: of its random numbers.
 
     """
 
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Returns the tasks that compile its kernels."""
+        """Returns the tasks that compile the kernels of this node."""
         from volery.autonomy.mapping import warmup as mapping
         from volery.autonomy.planning import warmup
 
@@ -75,7 +75,7 @@ class GlobalPlanner(Node):
         self._height = float(self.declare_parameter("height_m", 3.0, min_value=0.1).value)
         low, high = declare_numbers(self, "heights_m", [2.2, 4.2], "[least, most]")
         if not low < high:
-            raise NodeError(f"heights_m is [least, most], not {[low, high]}")
+            raise NodeError(f"heights_m must be [min, max] with min < max, not {[low, high]}")
         self._search = PathSearch(
             radius_m=float(self.declare_parameter("radius_m", 0.8, min_value=0.05).value),
             heights_m=(low, high),
@@ -85,14 +85,14 @@ class GlobalPlanner(Node):
         self._seed = int(self.declare_parameter("seed", 1).value)
         self._frame = MapFrame()
         self._map: SolidVoxels | None = None
-        """What is occupied in the newest map."""
+        """Occupied voxels of the newest map."""
         self._goal: Array | None = None
         self._way: Array | None = None
         self._place: Array | None = None
-        """Where the vehicle is, (3,) m in the map."""
+        """Position of the vehicle, (3,) m in the map."""
         self._since_ns = 0
         self._best_m = math.inf
-        """How near to the goal it has come, and since when no nearer."""
+        """Smallest distance to the goal so far, and since when it has not decreased."""
         self._tries = 0
         self._plans = 0
         self._told = ""
@@ -109,15 +109,15 @@ class GlobalPlanner(Node):
         self.create_timer(_PERIOD_S, self._on_timer)
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         return {"frame": self._frame.get_state(), **save_attributes(self, _STATE)}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         self._frame.set_state(state["frame"])
         restore_attributes(self, {name: state[name] for name in _STATE})
 
-    # ------------------------------------------------------------------------------ what it hears
+    # ------------------------------------------------------------------------------ subscriptions
 
     def _on_odometry(self, message: Odometry) -> None:
         self._frame.hear(message)
@@ -131,13 +131,13 @@ class GlobalPlanner(Node):
         if message.header.frame_id not in ("", MAP):
             self._give_up("refused", f"goals are in 'map', not in '{message.header.frame_id}'")
         elif not np.isfinite(goal).all():
-            self._give_up("refused", "the goal's place is not finite")
+            self._give_up("refused", "the goal's position is not finite")
         elif self._goal is None or not np.array_equal(goal, self._goal) or self._way is None:
             self._goal, self._tries = goal, 0
             self._plan()
 
     def _on_map(self, message: Any) -> None:
-        """Plan anew where the new map shows that the way is not clear any more."""
+        """Plans again if the new map shows that the path is no longer clear."""
         try:
             self._map = SolidVoxels.of(voxels_of(message), float(message.resolution))
         except DataFileError as error:
@@ -154,21 +154,21 @@ class GlobalPlanner(Node):
             self._plan()
 
     def _on_pause(self, message: Bool) -> None:
-        """Whoever pauses the flight says anew where to, afterwards."""
+        """Cancels the goal: after a pause the client sends a goal again."""
         if message.data:
             self._goal = None
             self._give_up("waiting", "paused")
 
     def _on_stop(self, _request: Any, response: Any) -> Any:
         self._goal = None
-        self._give_up("waiting", "told to stop")
+        self._give_up("waiting", "stopped by request")
         response.success, response.message = True, ""
         return response
 
-    # ------------------------------------------------------------------------------- what it does
+    # ----------------------------------------------------------------------------------- planning
 
     def _on_timer(self) -> None:
-        """Plan anew where the flight comes no nearer to the goal."""
+        """Plans again if the vehicle comes no nearer to the goal."""
         if self._goal is None or self._place is None:
             return
         now = self.get_clock().now_ns()
@@ -182,7 +182,7 @@ class GlobalPlanner(Node):
         elif now - self._since_ns > _STUCK_S * NS_PER_S:
             self._tries += 1
             if self._tries > _TRIES:
-                self._give_up("unreachable", f"no way to the goal in {_TRIES} attempts")
+                self._give_up("unreachable", f"no path to the goal after {_TRIES} attempts")
             else:
                 self._plan()
 
@@ -206,13 +206,12 @@ class GlobalPlanner(Node):
         self._best_m = float(np.hypot(*(goal[:2] - place[:2])))
         self._send(way)
         length = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
-        self._tell("planned", "" if space is not None else "nothing is known: straight", length)
+        self._tell("planned", "" if space is not None else "no map there: straight path", length)
 
     def _space(self, place: Array) -> VoxelSpace | None:
-        """The known map as a space; None where nothing is known there.
+        """Returns the space of the map around vehicle and goal; None where the map holds nothing.
 
-        After each attempt in vain it is wider. Raises PlanError where start and goal are too far
-        apart.
+        Each failed attempt widens it. Raises PlanError if vehicle and goal are too far apart.
         """
         assert self._goal is not None
         if self._map is None:
@@ -223,7 +222,7 @@ class GlobalPlanner(Node):
         return VoxelSpace(self._map, self._cell, around, margin)
 
     def _is_clear(self, space: VoxelSpace, way: Array, place: Array) -> bool:
-        """Whether what is left of a way is free."""
+        """Returns whether the rest of a path is free."""
         heights = np.array([space.ground_at(p[:2]) for p in way])
         states = way.copy()
         states[:, 2] -= heights
@@ -232,10 +231,10 @@ class GlobalPlanner(Node):
         legs = zip(states[nearest:-1], states[nearest + 1 :], strict=True)
         return all(space.is_free_between(a, b, radius) for a, b in legs)
 
-    # ------------------------------------------------------------------------------ what it tells
+    # ---------------------------------------------------------------------------------- publishers
 
     def _give_up(self, state: str, reason: str) -> None:
-        """Say why, and let the vehicle stop."""
+        """Publishes the reason and an empty path, so that the vehicle stops."""
         self._tries, self._way = max(self._tries, 1), None
         self._send(np.zeros((0, 3)))
         self._tell(state, reason, 0.0)

@@ -1,7 +1,7 @@
-"""A grid of cubes around a moving vehicle: free, occupied or not known, from rays.
+"""Local occupancy grid around a moving vehicle: cells are free, occupied or unknown, from rays.
 
-Cells wrap around, so that the grid follows the vehicle without copying. Within one scan a hit beats
-all rays that pass its cell, so that trunks thinner than a cell stay.
+Cells wrap around, so that the grid follows the vehicle without copying. Within one scan a hit
+outweighs all rays that pass its cell, so that trunks thinner than a cell remain.
 """
 
 from __future__ import annotations
@@ -22,12 +22,13 @@ Scores = NDArray[np.int8]
 
 UNKNOWN = -128
 _HIT, _MISS, _LEAST, _MOST = 4, 1, -3, 12
-"""Score of a scan's hit and miss, and bounds (modelling choices): what moves away is forgotten
-after 12 scans that look through it."""
+"""Score of a scan's hit and miss, and bounds (modelling choices): an obstacle that moves away is
+cleared after 12 scans that pass through it.
+"""
 
 
 class LocalGrid:
-    """`shape` cells of `cell_m` around the vehicle; above 0 is occupied, `UNKNOWN` is not known."""
+    """Holds `shape` cells of `cell_m` around the vehicle; above 0: occupied, `UNKNOWN`: unknown."""
 
     def __init__(self, cell_m: float, shape: tuple[int, int, int]) -> None:
         self.cell_m = cell_m
@@ -35,18 +36,18 @@ class LocalGrid:
         self._scan = np.zeros(shape, np.int32)
         self._number = 0
         self._low: Integers | None = None
-        """Lowest cell (3,), counted from the frame's origin."""
+        """Index of the lowest cell (3,), counted from the frame's origin."""
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         return save_attributes(self, ("_score", "_scan", "_number", "_low"))
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         restore_attributes(self, state)
 
     def move_to(self, place: Array) -> None:
-        """Lie around `place` (3,) m; cells that come in anew are not known."""
+        """Centres the grid on `place` (3,) m; cells that enter it are unknown."""
         shape = np.array(self._score.shape)
         low = np.floor(place / self.cell_m).astype(np.int64) - shape // 2
         if self._low is None:
@@ -68,7 +69,7 @@ class LocalGrid:
         self._low = low
 
     def add(self, rays: Rays, *, clears: bool = True) -> None:
-        """Take in the rays of one scan; `clears`: not only its hits, but what they pass, too."""
+        """Adds the rays of one scan; `clears`: they also clear the cells that they pass."""
         assert self._low is not None
         self._number += 2
         ends, number = rays.ends / self.cell_m, self._number
@@ -78,12 +79,12 @@ class LocalGrid:
             _cast(starts, ends, self._low, number, self._score, self._scan)
 
     def clear_around(self, place: Array, radius_m: float) -> None:
-        """The vehicle itself is at `place`: what is not known there is free."""
+        """Marks unknown cells around the vehicle, at `place` (3,) m, as free."""
         assert self._low is not None
         _clear(place / self.cell_m, radius_m / self.cell_m, self._low, self._score)
 
     def window(self, place: Array, shape: tuple[int, int, int]) -> tuple[Scores, Integers]:
-        """Scores of the `shape` cells around `place`, and the lowest one's number (3,)."""
+        """Returns the scores of the cells around `place`, and the lowest cell's index (3,)."""
         assert self._low is not None
         low = np.floor(place / self.cell_m).astype(np.int64) - np.array(shape) // 2
         low = np.clip(low, self._low, self._low + np.array(self._score.shape) - shape)
@@ -116,7 +117,7 @@ def _mark(
     score: Scores,
     scan: NDArray[np.int32],
 ) -> None:
-    """Ends of rays (K, 3) that hit something, in units of cells."""
+    """Marks the ends (K, 3) of rays that hit something, in cells."""
     nx, ny, nz = score.shape
     for k in range(len(hits)):
         if not hits[k]:
@@ -139,7 +140,7 @@ def _cast(
     score: Scores,
     scan: NDArray[np.int32],
 ) -> None:
-    """Rays in units of cells; cells on the way after Amanatides and Woo (Eurographics 1987)."""
+    """Clears the cells along rays, in cells, after Amanatides and Woo (Eurographics 1987)."""
     nx, ny, nz = score.shape
     for k in range(len(starts)):
         x, y, z = starts[k, 0], starts[k, 1], starts[k, 2]

@@ -1,4 +1,4 @@
-"""Plans what is flown in the next seconds, from what the sensors see."""
+"""Plans the trajectory of the next seconds from sensor data."""
 
 from __future__ import annotations
 
@@ -43,42 +43,42 @@ from volery.graph.nodes.node import Node
 Array = NDArray[np.float64]
 
 _CARROT_M = 9.0
-"""How far ahead on its way the vehicle looks: the window of the plan reaches 12 m."""
+"""Distance of the lookahead point along the path; the planning window extends to 12 m."""
 _LEAST_HEIGHT_M = 1.0
-"""Lower than this nothing is planned: it takes off or lands."""
+"""Height above ground below which the planner is inactive: the vehicle takes off or lands."""
 _TELL_S = 1.0
-"""The status is told at each change of state or problems, else so often."""
+"""Period of the status; changes of state or problems are published at once."""
 _STATE = ("_way", "_way_map", "_neighbours", "_told", "_told_ns", "_plans", "_frame_was", "_paused")
 
 
 class LocalPlanner(Node):
-    """Follows `planning/path` by `planning/trajectory`; tells `planning/status`.
+    """Follows `planning/path` by `planning/trajectory`; publishes `planning/status`.
 
-    An empty path: stay. The status is JSON: state (waiting, holding, flying, turning, blocked,
-    arrived, paused), problems, left_m, clearance_m, plans. While `planning/pause` (std_msgs/Bool)
-    says so it plans nothing; the way is forgotten.
+    An empty path makes the UAV hold. The status is JSON: state (waiting, holding, flying, turning,
+    blocked, arrived, paused), problems, left_m, clearance_m, plans. `planning/pause`
+    (std_msgs/Bool, true) stops planning and clears the path.
 
     Parameters
     ----------
-    odometry: topic of the pose; `corrected`: whether `/tf` tells where its frame lies in the map.
+    odometry: topic of the pose; `corrected`: whether `/tf` holds the pose of its frame in the map.
     level_mount, nodding_mount: [x, y, z] of the LIDARs in the body, m.
-    height_m: height above ground to fly at; speed_m_s: highest speed. Both may be set in flight.
-    acceleration_m_s2: highest horizontal acceleration.
-    radius_m: least distance of the UAV's centre to obstacles, at rest; 0.1 m more for each m/s.
-    unknown_stops: whether plans keep out of space that is not known.
-    period_s: time between plans. ahead_s: so long after its input a plan takes over; not less than
-        the node's latency.
-    arrival_m: so near to its end the way is done.
-    scan_rate_hz: scans taken of each LIDAR a second, at best no multiple of a nodding mount's rate,
-        or it is always looked at the same angles; of a nodding LIDAR the hits of all scans count.
-    cell_m: of the local grid.
-    separation_m: to keep in plan from the UAVs that are heard on `radio/team`.
+    height_m: height above ground to fly at; speed_m_s: max speed. Both may be set in flight.
+    acceleration_m_s2: max horizontal acceleration.
+    radius_m: min distance of the UAV's centre to obstacles, at rest; 0.1 m more for each m/s.
+    unknown_stops: whether plans avoid unknown space.
+    period_s: time between plans. ahead_s: time from a plan's input to its start; not less than the
+        node's latency.
+    arrival_m: distance to the end at which the path is done.
+    scan_rate_hz: scans processed per second and LIDAR. It should be no multiple of a nodding
+        mount's rate, else all scans show the same angles. All scans of a nodding LIDAR add hits.
+    cell_m: cell size of the local grid.
+    separation_m: horizontal distance to keep from the UAVs that report on `radio/team`.
 
     """
 
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Returns the tasks that compile its kernels."""
+        """Returns the tasks that compile the kernels of this node."""
         from volery.autonomy.perception import warmup as seeing
         from volery.autonomy.planning import warmup
 
@@ -110,7 +110,7 @@ class LocalPlanner(Node):
         self._frame_was: Any = None
         self._way: PathLookahead | None = None
         self._way_map: Array | None = None
-        """The places of the way in the map, from which `_way` is made."""
+        """Positions of the path in the map, (K, 3) m; `_way` is computed from them."""
         self._neighbours = Neighbours()
         self._told = ""
         self._told_ns = 0
@@ -137,19 +137,19 @@ class LocalPlanner(Node):
         self.create_timer(period, self._on_timer)
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         parts = {
             name: getattr(self, name).get_state() for name in ("_sight", "_planning", "_frame")
         }
         return {"parts": parts, **save_attributes(self, _STATE)}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         for name, part in state["parts"].items():
             getattr(self, name).set_state(part)
         restore_attributes(self, {name: state[name] for name in _STATE})
 
-    # ------------------------------------------------------------------------------ what it hears
+    # ------------------------------------------------------------------------------ subscriptions
 
     def _on_odometry(self, message: Odometry) -> None:
         self._frame.hear(message)
@@ -166,7 +166,8 @@ class LocalPlanner(Node):
         found = np.array(places, dtype=np.float64).reshape(-1, 3)
         if message.header.frame_id not in ("", MAP) or not np.isfinite(found).all():
             self._tell(
-                "refused", ["a path that is not in 'map', or with places that are not finite"]
+                "refused",
+                ["a path whose frame is not 'map', or with positions that are not finite"],
             )
             return
         self._way_map = found if len(found) else None
@@ -179,7 +180,7 @@ class LocalPlanner(Node):
     def _on_report(self, report: Any) -> None:
         self._neighbours.hear(report, self.get_clock().now_ns())
 
-    # ------------------------------------------------------------------------------- what it does
+    # ----------------------------------------------------------------------------------- planning
 
     def _on_timer(self) -> None:
         now = self.get_clock().now_ns()
@@ -231,7 +232,7 @@ class LocalPlanner(Node):
         self._tell(str(self._planning.doing), self._sight.warnings())
 
     def _way_here(self) -> PathLookahead | None:
-        """The way in the odometry frame, made anew where that has been moved in the map."""
+        """Returns the path in the odometry frame; recomputes it if that frame has moved."""
         if self._way_map is None:
             return None
         at = self._frame.map_from_odom
@@ -245,7 +246,7 @@ class LocalPlanner(Node):
         limits = MotionLimits(float(self._speed.value), self._acceleration, 1.5, 1.5, 1.4)
         return PlannerSettings(limits, radius_m=self._radius, unknown_stops=self._unknown_stops)
 
-    # ------------------------------------------------------------------------------ what it tells
+    # ---------------------------------------------------------------------------------- publishers
 
     def _publish(self, path: PrimitivePath, begins_ns: int) -> None:
         frame = self._frame.odom_frame

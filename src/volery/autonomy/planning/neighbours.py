@@ -1,4 +1,4 @@
-"""The other UAVs near by, as their team reports tell over the radio."""
+"""Tracks the other UAVs nearby by their team reports, received over the radio."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from volery.core.clock import NS_PER_S
 from volery.graph.messages import stamp_of
 
 _RESTART_NS = 10 * NS_PER_S
-"""After so long a silence an older stamp is that of a clock that began anew."""
+"""Age of a report after which an older stamp is accepted: the sender's clock has restarted."""
 
 
 class Neighbours:
-    """What was last heard of each UAV, in the map; aged by the hearer's own clock."""
+    """Stores the last report of each UAV, in the map; its age is by the receiver's clock."""
 
     def __init__(self) -> None:
         self._heard: dict[str, Neighbour] = {}
         self._sent_ns: dict[str, int] = {}
 
     def hear(self, report: Any, now_ns: int) -> None:
-        """Take in a `TeamReport`; what is not finite, repeated or overtaken is left out."""
+        """Adds a `TeamReport`; ignores one that is not finite, repeated or out of order."""
         p, v = report.position, report.velocity
         if not np.isfinite([p.x, p.y, p.z, v.x, v.y, v.z]).all():
             return
@@ -36,7 +36,7 @@ class Neighbours:
         self._sent_ns[report.name] = sent_ns
 
     def in_odom(self, frame: MapFrame) -> list[Neighbour]:
-        """All of them, by name, in the odometry frame."""
+        """Returns all neighbours, sorted by name, in the odometry frame."""
         moved = []
         for _, other in sorted(self._heard.items()):
             place = frame.to_odom(other.position)

@@ -1,4 +1,4 @@
-"""Which primitive to fly: those that are safe by what is known, and the cheapest of them."""
+"""Selects the primitive to fly: the cheapest of those that are safe."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 _STEP_S = 0.08
-"""Primitives are looked at so often: 0.24 m at 3 m/s, a cell."""
+"""Time between checked points: 0.24 m at 3 m/s, a cell."""
 
 
 class PrimitiveVerdicts(NamedTuple):
-    """What became of each candidate, all (C,)."""
+    """Verdict on each candidate, all (C,)."""
 
     nearest_m: Array
-    """Least distance to an obstacle."""
+    """Min distance to an obstacle."""
     unknown: NDArray[np.bool_]
-    """Whether it comes through space that is not known."""
+    """Whether it passes through unknown space."""
     most_m_s2: Array
-    """Most horizontal acceleration."""
+    """Max horizontal acceleration."""
     cost: Array
-    """Cost to go at the end of the cruise, and what closeness to obstacles costs on the way."""
+    """Cost to go at the end of the cruise, plus the cost of closeness to obstacles."""
 
 
 def judge(
@@ -41,7 +41,7 @@ def judge(
     soft_m: float,
     near: float,
 ) -> PrimitiveVerdicts:
-    """Look along each candidate, to its very end at rest."""
+    """Checks each candidate along its whole length, until rest."""
     count = len(candidates.rise_s)
     verdicts = PrimitiveVerdicts(
         np.empty(count), np.empty(count, np.bool_), np.empty(count), np.empty(count)
@@ -134,9 +134,9 @@ def _after_rise(
     w: Array,
     rest: Array,
 ) -> None:
-    """Carry the state at the end of the rise on by `t`: it cruises, then brakes to rest.
+    """Advances the state at the end of the rise by `t`: it cruises, then brakes to rest.
 
-    `q`, `w`: room for where the braking begins; `rest`: zeros.
+    `q`, `w`: scratch for the start of the braking; `rest`: zeros.
     """
     cruised = min(t, cruise_s)
     for axis in range(3):
@@ -160,7 +160,7 @@ def _change(
     v: Array,
     a: Array,
 ) -> None:
-    """`primitives.changed`, into `p`, `v`, `a`."""
+    """Computes `primitives.changed` into `p`, `v`, `a`."""
     for axis in range(3):
         v0, a0 = velocity[axis], acceleration[axis]
         dv = wanted[axis] - v0 - a0 * duration

@@ -1,9 +1,9 @@
-"""Motion primitives that end at rest: speed up, fly on, brake.
+"""Motion primitives that end at rest: accelerate, cruise, brake.
 
-The parts that change the velocity are the minimum-jerk polynomials with free end position of
-M. W. Mueller, M. Hehn, R. D'Andrea, "A computationally efficient motion primitive for quadrocopter
+The parts that change the velocity are the minimum-jerk polynomials with free end position of M. W.
+Mueller, M. Hehn, R. D'Andrea, "A computationally efficient motion primitive for quadrocopter
 trajectory generation", IEEE Transactions on Robotics 31(6), 2015: from (p, v, a) to a velocity
-without acceleration. A change of velocity by dv in time T then needs 1.5 dv / T at most.
+without acceleration. A change of velocity by dv in time T needs 1.5 dv / T at most.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _LEAST_S = 0.5
-"""Shortest change of velocity: below it the attitude loop would not follow (modelling choice)."""
+"""Shortest change of velocity: the attitude loop cannot follow a shorter one (modelling choice)."""
 
 
 class PrimitiveState(NamedTuple):
-    """A motion at one time, all (3,): m, m/s, m/s^2."""
+    """Motion at one time, all (3,): m, m/s, m/s^2."""
 
     position: Array
     velocity: Array
@@ -30,7 +30,7 @@ class PrimitiveState(NamedTuple):
 
 
 class MotionLimits(NamedTuple):
-    """What trajectories may ask of a vehicle."""
+    """Motion limits of trajectories: m/s and m/s^2."""
 
     speed: float
     acceleration: float
@@ -46,14 +46,14 @@ class PrimitiveCandidates(NamedTuple):
     start: PrimitiveState
     velocity: Array
     offset: Array
-    """(C,): height over the surface of flight, relative to the wanted one, m."""
+    """(C,): height over the flight surface, relative to the wanted one, m."""
     rise_s: Array
-    """(C,): how long the velocity changes."""
+    """(C,): duration of the change of velocity."""
     cruise_s: Array
     brake_s: Array
 
     def path(self, index: int) -> PrimitivePath:
-        """One of them as a trajectory."""
+        """Returns one candidate as a trajectory."""
         return PrimitivePath(
             self.start,
             self.velocity[index],
@@ -64,7 +64,7 @@ class PrimitiveCandidates(NamedTuple):
 
 
 def change_s(dv: Array, limits: MotionLimits) -> Array:
-    """Time (C,) in which velocities may change by (C, 3)."""
+    """Returns the times (C,) s that changes of velocity `dv` (C, 3) m/s need."""
     level = 1.5 * np.hypot(dv[:, 0], dv[:, 1]) / limits.acceleration
     upright = 1.5 * np.abs(dv[:, 2]) / limits.climb_acceleration
     return np.maximum(np.maximum(level, upright), _LEAST_S)
@@ -72,7 +72,7 @@ def change_s(dv: Array, limits: MotionLimits) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class PrimitivePath:
-    """Speeds up from `start` in `rise_s`, flies `velocity` for `cruise_s`, brakes in `brake_s`."""
+    """Accelerates from `start` in `rise_s`, cruises for `cruise_s`, brakes in `brake_s`."""
 
     start: PrimitiveState
     velocity: Array
@@ -82,11 +82,11 @@ class PrimitivePath:
 
     @property
     def duration_s(self) -> float:
-        """Until it is at rest."""
+        """Returns the time until rest."""
         return self.rise_s + self.cruise_s + self.brake_s
 
     def at(self, time_s: float) -> PrimitiveState:
-        """The motion after some time; at rest at the end after the end."""
+        """Returns the motion at `time_s`; after the end it is at rest."""
         if time_s < self.rise_s:
             return changed(self.start, self.velocity, self.rise_s, max(time_s, 0.0))
         risen = changed(self.start, self.velocity, self.rise_s, self.rise_s)
@@ -103,7 +103,7 @@ class PrimitivePath:
 def changed(
     start: PrimitiveState, velocity: Array, duration_s: float, time_s: float
 ) -> PrimitiveState:
-    """`time_s` into the change of velocity that takes `duration_s`."""
+    """Returns the motion `time_s` into a change of velocity that takes `duration_s`."""
     dv = velocity - start.velocity - start.acceleration * duration_s
     da = -start.acceleration
     beta = (-12.0 * dv + 6.0 * duration_s * da) / duration_s**3
@@ -118,13 +118,13 @@ def changed(
 
 
 def at_rest(position: Array) -> PrimitivePath:
-    """Staying at a place."""
+    """Returns a trajectory that holds a position (3,) m."""
     rest = PrimitiveState(position.copy(), np.zeros(3), np.zeros(3))
     return PrimitivePath(rest, np.zeros(3), 0.5, 0.0, 0.5)
 
 
 def braking(start: PrimitiveState, limits: MotionLimits) -> PrimitivePath:
-    """The shortest stop."""
+    """Returns the shortest stop."""
     seconds = float(change_s(-start.velocity[None], limits)[0])
     return PrimitivePath(start, np.zeros(3), seconds, 0.0, _LEAST_S)
 
@@ -137,9 +137,10 @@ def fan(
     rises: Array,
     limits: MotionLimits,
 ) -> PrimitiveCandidates:
-    """Primitives along `directions` (D,) rad at `speeds` (S,), to heights of `offsets` (O,) m.
+    """Returns primitives along `directions` (D,) rad at `speeds` (S,) m/s.
 
-    rises: (D, S, O) m/s: vertical velocity of each, positive up. The last one stops.
+    They lead to heights of `offsets` (O,) m. rises: (D, S, O) m/s: vertical velocity of each,
+    positive up. The last primitive stops.
     """
     d, s, o = np.meshgrid(directions, speeds, offsets, indexing="ij")
     climb = np.clip(rises, -limits.climb, limits.climb)
@@ -153,5 +154,5 @@ def fan(
 
 
 def reach_of(speed: float, limits: MotionLimits) -> float:
-    """Way (m) of the longest primitive at `speed`: how far must be seen ahead."""
+    """Returns the length (m) of the longest primitive at `speed`: the range to observe."""
     return speed * (limits.horizon_s + 0.75 * speed / limits.acceleration + math.sqrt(0.5))

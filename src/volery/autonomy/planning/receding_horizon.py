@@ -1,10 +1,10 @@
-"""The next seconds of a flight, planned anew several times a second; each plan ends at rest.
+"""Plans the next seconds of a flight several times a second; each plan ends at rest.
 
-A plan is flown on from where it will be when the new one takes over. The new one is taken only if
-it is safe to its end by what is known then, else the old one, which was, is flown to its end. So
-there is always a stop ahead within space that was seen to be free (the plan of last resort of
-T. Schouwenaars, E. Feron, J. How, "Safe receding horizon path planning for autonomous vehicles",
-Allerton 2002).
+A new plan starts from the state that the current plan has when the new one takes effect. It
+replaces the current plan only if it is safe until its end by the newest data; else the current
+plan, which was safe, is flown to its end. So a stop within space that was observed as free always
+lies ahead (the plan of last resort of T. Schouwenaars, E. Feron, J. How, "Safe receding horizon
+path planning for autonomous vehicles", Allerton 2002).
 """
 
 from __future__ import annotations
@@ -39,30 +39,30 @@ Array = NDArray[np.float64]
 
 _DIRECTIONS = np.arange(-math.pi, math.pi, math.pi / 20.0)
 _SPEEDS = np.array([1.0, 0.7, 0.4, 0.15])
-"""Shares of the top speed."""
+"""Fractions of the max speed."""
 _OFFSETS = np.array([0.0, 0.75, -0.75])
-"""Heights over the surface of flight, relative to the wanted one, m."""
+"""Heights over the flight surface, relative to the wanted one, m."""
 _AHEAD_RAD = math.radians(60.0)
-"""Ways farther aside from the nose are flown slowly ..."""
+"""Max angle between heading and velocity above `_ASIDE_M_S`."""
 _ASIDE_M_S = 0.8
 _PEAK = 1.25
-"""Acceleration may exceed the limit so much where the present one leaves no choice."""
+"""Factor by which the acceleration may exceed the limit if the present state leaves no choice."""
 _KEEP_APART = 8.0
-"""Cost of each m/s outside of what keeps vehicles apart ..."""
+"""Cost of each m/s outside of the velocities that keep vehicles apart."""
 _KEEP_RIGHT = 1.0
-"""... and of each m/s to the left, where the cheapest way comes too near."""
+"""Cost of each m/s to the left if the cheapest primitive comes too near to another vehicle."""
 _LEVEL_COST, _TURN_COST = 0.4, 0.25
-"""Of each m over or under the wanted height; of each m/s that the velocity changes by."""
+"""Cost of each m over or under the wanted height; of each m/s of velocity change."""
 _LOST_M = 1.0
-"""Farther away from its plan the vehicle begins anew from where it is."""
+"""Distance from the plan beyond which planning restarts from the vehicle's state."""
 _HARD = 1.7
-"""In need it brakes so much harder than the limit; the F450 can (modelling choice)."""
+"""Factor of the acceleration limit in emergency braking; the F450 can (modelling choice)."""
 _MATTER = 0.05
-"""Improvement of the cost for which it is worth not to stay."""
+"""Min improvement of the cost that justifies moving."""
 
 
 class PlannerState(StrEnum):
-    """What the planner does."""
+    """State of the planner."""
 
     HOLDING = "holding"
     FLYING = "flying"
@@ -72,25 +72,25 @@ class PlannerState(StrEnum):
 
 @dataclass(frozen=True)
 class PlannerSettings:
-    """How careful plans are."""
+    """Safety margins and costs of plans."""
 
     limits: MotionLimits
     radius_m: float = 0.6
-    """Least distance to obstacles at rest ..."""
+    """Min distance to obstacles at rest."""
     radius_s: float = 0.1
-    """... and so much more for each m/s."""
+    """Additional distance for each m/s."""
     soft_m: float = 1.6
-    """Up to this distance farther is better."""
+    """Distance up to which obstacles add cost."""
     near: float = 3.0
-    """What closeness costs a metre."""
+    """Cost of closeness to obstacles, for each metre."""
     unknown_stops: bool = True
-    """Whether plans keep out of space that is not known."""
+    """Whether plans avoid unknown space."""
     unknown_cost: float = 0.6
-    """What a metre of unknown space costs in the guidance, which hopes for a way through."""
+    """Cost of a metre of unknown space in the guidance, which may lead through it."""
 
 
 class Observations(NamedTuple):
-    """What is known at the time of planning."""
+    """Observations at the time of planning."""
 
     clearance: Clearance
     surface: Surface
@@ -98,7 +98,7 @@ class Observations(NamedTuple):
 
 
 class RecedingHorizonPlanner:
-    """The plan that is in force, and how the next one is found."""
+    """Holds the current plan and computes the next one."""
 
     def __init__(self, policy: PlannerSettings) -> None:
         self.policy = policy
@@ -106,20 +106,20 @@ class RecedingHorizonPlanner:
         self._path: PrimitivePath | None = None
         self._began_ns = 0
         self.yaw = 0.0
-        """Where the nose shall point, rad."""
+        """Wanted heading, rad."""
         self.least_m = math.inf
-        """Distance to obstacles along the plan in force."""
+        """Min distance to obstacles along the current plan, m."""
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         return save_attributes(self, ("doing", "_path", "_began_ns", "yaw", "least_m"))
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         restore_attributes(self, state)
 
     def state_at(self, time_ns: int) -> PrimitiveState | None:
-        """The planned motion; None before the first plan."""
+        """Returns the planned motion; None before the first plan."""
         if self._path is None:
             return None
         return self._path.at((time_ns - self._began_ns) / NS_PER_S)
@@ -127,9 +127,9 @@ class RecedingHorizonPlanner:
     def start(
         self, present: PrimitiveState, yaw: float, now_ns: int, then_ns: int
     ) -> PrimitiveState:
-        """The motion from which to plan: where the plan will be, or where the vehicle is.
+        """Returns the motion to plan from: that of the current plan at `then_ns`.
 
-        It begins anew, from the present motion, where the vehicle is far from its plan.
+        If the vehicle is far from its plan, planning restarts from the present motion.
         """
         planned = self.state_at(now_ns)
         if planned is None or norm(planned.position - present.position) > _LOST_M:
@@ -141,11 +141,11 @@ class RecedingHorizonPlanner:
         return state
 
     def forget(self) -> None:
-        """There is no plan: somebody else flies."""
+        """Drops the plan while another source controls the vehicle."""
         self._path, self.doing = None, PlannerState.HOLDING
 
     def hold(self, start: PrimitiveState, then_ns: int) -> PrimitivePath:
-        """Stop, by the shortest way."""
+        """Returns and commits the shortest stop."""
         self.doing = PlannerState.HOLDING
         moves = norm(start.velocity) > 0.05
         return self._commit(
@@ -155,7 +155,7 @@ class RecedingHorizonPlanner:
     def plan(
         self, start: PrimitiveState, goal: Array, sight: Observations, then_ns: int
     ) -> PrimitivePath:
-        """The plan from `start` at `then_ns` towards `goal` (2,) m."""
+        """Returns and commits the plan from `start` at `then_ns` towards `goal` (2,) m."""
         policy, surface = self.policy, sight.surface
         prices = CellCosts(policy.radius_m, policy.soft_m, policy.near, unknown=policy.unknown_cost)
         costs = cost_to_go(sight.clearance, surface, _OFFSETS, goal, prices)
@@ -168,7 +168,7 @@ class RecedingHorizonPlanner:
             return self._last_resort(start, sight, then_ns)
         best = int(np.argmin(np.where(safe, total, np.inf)))
         if not np.isfinite(total[best]):
-            best = int(np.flatnonzero(safe)[-1])  # to stay, where that is safe
+            best = int(np.flatnonzero(safe)[-1])  # the last candidate stays, if that is safe
         moves = bool(np.hypot(*candidates.velocity[best, :2]) > 0.0)
         self.doing = PlannerState.FLYING if moves else PlannerState.TURNING
         stays = len(safe) - 1
@@ -191,7 +191,7 @@ class RecedingHorizonPlanner:
         wanted = surface.height_at(end) + o
         rises = (wanted - start.position[2]) / limits.horizon_s
         found = fan(start, _DIRECTIONS, limits.speed * _SPEEDS, _OFFSETS, rises, limits)
-        # The last one stays where it is in plan, and comes to the wanted height.
+        # The last candidate holds its horizontal position and goes to the wanted height.
         rise = float(surface.height_at(start.position[:2]) - start.position[2])
         found.velocity[-1, 2] = float(np.clip(rise, -limits.climb, limits.climb))
         found.cruise_s[-1] = 0.0 if abs(rise) < 0.1 else 0.3
@@ -204,7 +204,7 @@ class RecedingHorizonPlanner:
         verdicts: PrimitiveVerdicts,
         clearance: Clearance,
     ) -> NDArray[np.bool_]:
-        """Far enough from obstacles, or no nearer than now; within limits; in known space."""
+        """Returns the candidates within limits, in known space, not too near to obstacles."""
         policy = self.policy
         speed = np.hypot(candidates.velocity[:, 0], candidates.velocity[:, 1])
         wanted = policy.radius_m + policy.radius_s * speed
@@ -236,9 +236,9 @@ class RecedingHorizonPlanner:
 
     @staticmethod
     def _apart(total: Array, velocity: Array, planes: list[HalfPlane]) -> Array:
-        """Price what comes too near to others; where the cheapest does, ways to the right of it.
+        """Adds cost near other vehicles and, if the cheapest comes too near, to the left of it.
 
-        Without a side that all prefer, those who meet head-on could come to a stand together.
+        Without a common side to prefer, vehicles that meet head-on could stop each other.
         """
         crowded = violation(planes, velocity)
         cheapest = int(np.argmin(total))
@@ -251,7 +251,7 @@ class RecedingHorizonPlanner:
     def _last_resort(
         self, start: PrimitiveState, sight: Observations, then_ns: int
     ) -> PrimitivePath:
-        """Fly the plan in force to its end if that is still clear, else stop: hard, if need be."""
+        """Flies the current plan to its end if it is still clear; else brakes, hard if needed."""
         assert self._path is not None
         self.doing = PlannerState.BLOCKED
         limits, radius = self.policy.limits, self.policy.radius_m
@@ -271,7 +271,7 @@ class RecedingHorizonPlanner:
         return path
 
     def _turn_nose(self, start: PrimitiveState, goal: Array, costs: CostToGo) -> None:
-        """Towards where it flies, or shall fly."""
+        """Turns the heading towards the flight direction, or the wanted one."""
         if float(np.hypot(*start.velocity[:2])) > 0.7:
             self.yaw = math.atan2(start.velocity[1], start.velocity[0])
             descent = costs.descent(start.position[:2])
@@ -289,11 +289,11 @@ class RecedingHorizonPlanner:
 
     @property
     def began_ns(self) -> int:
-        """When the plan in force begins."""
+        """Returns the start time of the current plan, ns."""
         return self._began_ns
 
 
 def _least(path: PrimitivePath, begin_s: float, clearance: Clearance) -> float:
-    """Least distance (m) to obstacles from `begin_s` to the end of a path."""
+    """Returns the min distance (m) to obstacles from `begin_s` to the end of a path."""
     times = np.append(np.arange(begin_s, path.duration_s, 0.1), max(path.duration_s, begin_s))
     return float(clearance.at(np.array([path.at(t).position for t in times])).min())

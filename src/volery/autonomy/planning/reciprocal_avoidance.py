@@ -1,9 +1,9 @@
-"""Keeping apart from others who do the same: optimal reciprocal collision avoidance.
+"""Optimal reciprocal collision avoidance between vehicles.
 
 J. van den Berg, S. Guy, M. Lin, D. Manocha, "Reciprocal n-body collision avoidance", ISRR 2009, in
-the plane. For each neighbour a half plane of velocities is allowed in which, if it takes half of
-the trouble too, both stay apart for `horizon_s`. What was heard longer ago is carried on along its
-velocity, and its place is known less well: its radius grows.
+the plane. Each neighbour allows a half plane of velocities in which, if the neighbour does the
+other half of the avoidance, both stay apart for `horizon_s`. Older positions are extrapolated by
+their velocity; the radius grows with their age.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 class Neighbour(NamedTuple):
-    """What was last heard of another vehicle, in the frame of who avoids it."""
+    """Last reported motion of another vehicle, in the frame of the avoiding vehicle."""
 
     position: Array
     """(3,) m."""
@@ -32,20 +32,20 @@ class Neighbour(NamedTuple):
 
 
 class Separation(NamedTuple):
-    """How vehicles keep apart."""
+    """Separation between vehicles."""
 
     radius_m: float = 1.5
-    """Least distance between two vehicles' centres, in plan."""
+    """Min horizontal distance between the centres of two vehicles."""
     height_m: float = 2.5
-    """Those that are so much higher or lower are not in the way."""
+    """Height difference beyond which vehicles do not conflict."""
     horizon_s: float = 4.0
-    """For so long ahead."""
+    """Time ahead for which velocities are free of conflict."""
     growth_m_s: float = 0.5
-    """How fast what is known of a silent neighbour's place gets worse."""
+    """Growth of a neighbour's radius with the age of its report."""
     forget_s: float = 5.0
-    """After so long a silence nothing is known of it."""
+    """Age of a report beyond which the neighbour is ignored."""
     step_s: float = 0.2
-    """Vehicles that are too near to each other already part within this time."""
+    """Time in which vehicles that are already too near to each other separate."""
 
 
 class HalfPlane(NamedTuple):
@@ -62,7 +62,7 @@ def half_planes(
     separation: Separation,
     now_ns: int,
 ) -> list[HalfPlane]:
-    """Constraints on the velocity (2,) in plan of a vehicle at `position` (3,) with `velocity`."""
+    """Returns constraints on the velocity (2,) m/s of a vehicle at `position` (3,) m."""
     planes = []
     for other in neighbours:
         age = (now_ns - other.time_ns) / NS_PER_S
@@ -85,7 +85,7 @@ def half_planes(
 def _half_plane(
     way: Array, own: Array, others: Array, radius: float, separation: Separation
 ) -> HalfPlane:
-    """After section 4 of the paper: `u` is the least change that leaves the velocity obstacle."""
+    """Computes a half plane by section 4 of the paper; `change` is its `u`."""
     relative = own - others
     square = float(way @ way)
     too_near = square <= radius * radius
@@ -116,7 +116,7 @@ def _half_plane(
 
 
 def violation(planes: Sequence[HalfPlane], velocities: Array) -> Array:
-    """How far (m/s) each velocity (C, 2) lies outside of what is allowed, at worst."""
+    """Returns the max violation (m/s) of the constraints by each velocity (C, 2)."""
     worst = np.zeros(len(velocities))
     for plane in planes:
         worst = np.maximum(worst, (plane.point - velocities) @ plane.normal)
@@ -124,11 +124,11 @@ def violation(planes: Sequence[HalfPlane], velocities: Array) -> Array:
 
 
 def avoiding_velocity(planes: Sequence[HalfPlane], preferred: Array, top_speed: float) -> Array:
-    """The allowed velocity (2,) nearest to the preferred one; where none is, the least bad.
+    """Returns the allowed velocity (2,) nearest to the preferred one; else the least violation.
 
-    The optimum of few constraints lies at the preferred velocity, at its projection on one of the
-    lines or the circle of `top_speed`, or where two of them cross: all are tried. Where nothing is
-    allowed, the fastest way out of each half plane is tried besides.
+    With few constraints the optimum lies at the preferred velocity, at its projection on one of the
+    lines or on the circle of `top_speed`, or at an intersection of two of them: all are tried. If
+    no velocity is allowed, the fastest one out of each half plane is tried as well.
     """
     tries = [preferred, np.zeros(2)]
     tries += [plane.point + _along(plane) * _foot(plane, preferred) for plane in planes]

@@ -1,4 +1,4 @@
-"""The area of a search: which of its cells have been looked at, and from where to look at more."""
+"""Search area: which of its cells have been observed, and the gain of viewpoints."""
 
 from __future__ import annotations
 
@@ -16,21 +16,23 @@ Grid = NDArray[np.int8]
 
 _MOST_CELLS = 4_000_000
 _BLOCKED = 50
-"""Values of an occupancy grid from here on are obstacles."""
+"""Values of an occupancy grid from which cells are obstacles."""
 
 
 class SearchArea:
-    """A polygon in the map on cells of `cell_m`."""
+    """Represents a polygon in the map by cells of `cell_m`."""
 
     def __init__(self, corners: Array, cell_m: float) -> None:
-        """`corners`: (K, 2) m. Raises PlanError for what is no area."""
+        """Creates the area of `corners` (K, 2) m. Raises PlanError if they enclose no cell."""
         if len(corners) < 3 or not np.isfinite(corners).all():
             raise PlanError("an area needs three corners or more, all of them finite")
         self.cell_m = cell_m
         self.low = np.floor(corners.min(axis=0) / cell_m) * cell_m
         shape = np.ceil((corners.max(axis=0) - self.low) / cell_m).astype(np.int64)
         if int(shape.prod()) > _MOST_CELLS:
-            raise PlanError(f"an area of {int(shape.prod())} cells; {_MOST_CELLS} are allowed")
+            raise PlanError(
+                f"an area of {int(shape.prod())} cells; at most {_MOST_CELLS} are allowed"
+            )
         self.inside = _inside(corners, self.middles(tuple(shape.tolist())))
         if not self.inside.any():
             raise PlanError("the area holds no cell")
@@ -38,44 +40,40 @@ class SearchArea:
         self.seen: Mask = np.zeros(self.inside.shape, np.bool_)
 
     def middles(self, shape: tuple[int, ...]) -> Array:
-        """Middles (nx, ny, 2) of the cells, m."""
+        """Returns the centres (nx, ny, 2) of the cells, m."""
         x = self.low[0] + (np.arange(shape[0]) + 0.5) * self.cell_m
         y = self.low[1] + (np.arange(shape[1]) + 0.5) * self.cell_m
         return np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
 
     @property
     def size_m2(self) -> float:
-        """Its area."""
+        """Returns the area, m^2."""
         return float(np.count_nonzero(self.inside)) * self.cell_m**2
 
     @property
     def seen_m2(self) -> float:
-        """How much of it has been looked at."""
+        """Returns the observed area, m^2."""
         return float(np.count_nonzero(self.seen & self.inside)) * self.cell_m**2
 
     @property
     def share(self) -> float:
-        """Share that has been looked at."""
+        """Returns the observed fraction of the area."""
         return self.seen_m2 / self.size_m2
 
     def look(
         self, place: Array, grid: Grid, grid_low: Array, grid_cell: float, view_m: float
     ) -> None:
-        """Everything within `view_m` of `place` (2+,) m that nothing known hides has been seen.
-
-        grid: (rows, columns) of an occupancy grid whose lower left corner is `grid_low`; only what
-        is known there can have been seen.
-        """
+        """Marks all cells within `view_m` of `place` (2+,) m without an obstacle between."""
         _look(
             float(place[0]), float(place[1]), grid, grid_low, grid_cell, view_m,
             self.low, self.cell_m, self.seen,
         )  # fmt: skip
 
     def gains(self, places: Array, view_m: float) -> tuple[Array, Array]:
-        """Area (K,) m^2 not yet seen within `view_m` of places (K, 2), and its worth.
+        """Returns the unobserved area (K,) m^2 within `view_m` of `places` (K, 2), and its worth.
 
-        What lies between the border and what has been seen is worth up to three times as much as
-        what lies in the open: left behind, it would have to be come back for.
+        Cells between the border and observed cells are worth up to three times as much as cells in
+        the open: the UAV would have to return for them.
         """
         new = self.inside & ~self.seen
         worth = np.where(new, 1.0 + 2.0 * _blurred(~new, round(view_m / self.cell_m)), 0.0)
@@ -85,10 +83,7 @@ class SearchArea:
 
 
 def _inside(corners: Array, places: Array) -> Mask:
-    """Whether places (..., 2) lie in a polygon.
-
-    Then a ray to the east crosses its border an odd number of times.
-    """
+    """Returns whether positions (..., 2) lie in a polygon, by ray casting to the east."""
     x, y = places[..., 0], places[..., 1]
     odd = np.zeros(x.shape, np.bool_)
     for (ax, ay), (bx, by) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
@@ -100,7 +95,7 @@ def _inside(corners: Array, places: Array) -> Mask:
 
 
 def _blurred(mask: Mask, reach: int) -> Array:
-    """Share (nx, ny) of a mask within a square of `reach` cells to each side; outside it is set."""
+    """Returns the fraction (nx, ny) of set cells within `reach` cells; cells outside are set."""
     wide = np.pad(mask, reach + 1, constant_values=True)
     total = np.cumsum(np.cumsum(wide, axis=0, dtype=np.float64), axis=1)
     width = 2 * reach + 1

@@ -1,4 +1,4 @@
-"""The surface that a vehicle flies on: parallel to the ground, at a height over it."""
+"""The surface that a vehicle flies on: parallel to the ground, at a height above it."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ Array = NDArray[np.float64]
 
 
 class Surface(NamedTuple):
-    """z = level + slope . (x, y), m."""
+    """Plane z = level + slope . (x, y), m."""
 
     level: float
     slope: Array
     """(2,)."""
 
     def height_at(self, xy: Array) -> Array:
-        """Heights over places (..., 2)."""
+        """Returns the heights (...,) m at positions (..., 2) m."""
         return np.asarray(self.level + xy @ self.slope)

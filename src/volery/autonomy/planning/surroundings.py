@@ -1,4 +1,4 @@
-"""What a vehicle sees of its surroundings: the local grid and the ground, from its sensors."""
+"""Builds the local grid and the ground plane of a vehicle's surroundings from its sensors."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ Array = NDArray[np.float64]
 
 _SHAPE = (128, 128, 32)
 _WINDOW = (96, 96, 24)
-"""Cells that are remembered, and cells that are planned in: 32 m and 24 m wide at 0.25 m."""
+"""Cells of the grid, and of the planning window: 32 m and 24 m wide at 0.25 m."""
 _BUBBLE_M = 0.9
-"""What is not known so near to the vehicle is free: it is there itself."""
+"""Radius around the vehicle in which unknown cells are free."""
 _SONAR_MEMORY_S = 0.5
 _SILENT_S = 0.5
 _JUMP_BACK_NS = NS_PER_S // 2
 
 
 class Surroundings:
-    """Takes in scans, joint angles and ranges, in the frame of the odometry."""
+    """Processes scans, joint angles and ranges, in the frame of the odometry."""
 
     def __init__(self, mounts: dict[str, Any], cell_m: float, scan_rate_hz: float) -> None:
         self.motion, self._nod = MotionHistory(), NodHistory()
@@ -42,9 +42,9 @@ class Surroundings:
         self._period_ns = round(NS_PER_S / scan_rate_hz)
         self._repeats = {name: ScanRepeats() for name in mounts}
         self._stuck: set[str] = set()
-        """LIDARs that repeat themselves."""
+        """Names of LIDARs that repeat their scans."""
         self._heard_ns: dict[str, int] = {}
-        """When the newest scan came that was none before."""
+        """Stamp of the newest new scan of each LIDAR, ns."""
         self._taken_ns: dict[str, int] = {}
         self._seen_ns: dict[str, int] = {}
         self._ground = GroundPlane()
@@ -68,33 +68,33 @@ class Surroundings:
     )
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         return {"grid": self._grid.get_state(), **save_attributes(self, self._PLAIN)}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         self._grid.set_state(state["grid"])
         restore_attributes(self, {name: state[name] for name in self._PLAIN})
 
     def on_joint(self, message: JointState) -> None:
-        """Angle of the nodding mount."""
+        """Stores the angle of the nodding mount."""
         if len(message.name) and message.name[0] == "laser_nodding" and len(message.velocity):
             angle, rate = float(message.position[0]), float(message.velocity[0])
             self._nod.add(stamp_of(message), angle, rate)
 
     def on_range(self, message: Range, now_ns: int) -> None:
-        """Range to the ground below."""
+        """Stores the range to the ground below."""
         if not math.isfinite(message.range):
             return
         self._is_sonar_stuck = self._range_repeats.are_told_by(float(message.range))
         self._range = None if self._is_sonar_stuck else (now_ns, float(message.range))
 
     def on_scan(self, name: str, scan: LaserScan, now_ns: int) -> None:
-        """A scan of LIDAR `name`."""
+        """Adds a scan of LIDAR `name`."""
         stamp = stamp_of(scan)
         heard = self._heard_ns.get(name)
         if heard is not None and heard - _JUMP_BACK_NS <= stamp <= heard:
-            return  # it has come before
+            return  # repeated message
         if self._repeats[name].are_told_by(scan):
             self._stuck.add(name)
             return
@@ -116,12 +116,12 @@ class Surroundings:
         if rays.hits.any():
             self._seen_ns[name] = stamp
         self._grid.move_to(newest.position)
-        # What is thin is seen in few of a nodding LIDAR's scans: the hits of all count.
+        # A nodding LIDAR sees thin obstacles in few of its scans: the hits of all scans count.
         self._grid.add(rays, clears=is_due)
         self._ground.add(rays.ends, now_ns, rays.hits)
 
     def problems(self, now_ns: int) -> list[str]:
-        """Why nothing can be planned, in words; none where all is well."""
+        """Returns the problems that prevent planning, as text."""
         found = []
         newest = self.motion.newest
         if newest is None or not self._is_fresh(newest.time_ns, now_ns):
@@ -131,15 +131,18 @@ class Surroundings:
                 what = "repeats itself" if name in self._stuck else "is silent"
                 found.append(f"the {name} LIDAR {what}")
         if not any(self._is_fresh(self._seen_ns.get(name), now_ns) for name in self._makers):
-            found.append("no LIDAR sees anything")
+            found.append("no LIDAR has returns")
         return found
 
     def warnings(self) -> list[str]:
-        """What is wrong but hinders nothing: without a sonar the LIDARs tell where ground is."""
+        """Returns the problems that do not prevent planning, as text.
+
+        Without a sonar, the ground comes from the LIDARs.
+        """
         return ["the sonar repeats itself"] if self._is_sonar_stuck else []
 
     def height_above_ground(self, pose: OdometrySample, now_ns: int) -> float:
-        """m, by the sonar and by what the LIDARs see of the ground."""
+        """Returns the height above ground, m, by the sonar and the LIDARs' ground returns."""
         below = None
         if self._range is not None and self._is_fresh(self._range[0], now_ns):
             below = float(pose.position[2]) - self._range[1]
@@ -147,13 +150,13 @@ class Surroundings:
         return float(pose.position[2]) - float(self._ground.height_at(pose.position[:2]))
 
     def surface(self, height_m: float) -> Surface:
-        """The surface `height_m` over the ground as it was fitted last."""
+        """Returns the surface `height_m` above the last fitted ground."""
         ground = self._ground
         level = ground.height - float(ground.slope @ ground.anchor) + height_m
         return Surface(level, ground.slope.copy())
 
     def clearance(self, place: Array) -> Clearance:
-        """Distances to obstacles around `place` (3,)."""
+        """Returns the distances to obstacles around `place` (3,) m."""
         self._grid.move_to(place)
         self._grid.clear_around(place, _BUBBLE_M)
         scores, low = self._grid.window(place, _WINDOW)

@@ -1,4 +1,4 @@
-"""Flies what the local planner plans, by velocities: it needs no pose but the plan's own."""
+"""Follows the local planner's trajectories by velocity commands."""
 
 from __future__ import annotations
 
@@ -29,28 +29,28 @@ Array = NDArray[np.float64]
 
 _PERIOD_S = 0.04
 _STALE_S = 0.5
-"""Without a pose for so long it stops."""
+"""Time without odometry after which the follower commands zero velocity."""
 _CARRIED_S = 0.1
-"""A pose is carried on along its velocity for so long at most: stamps of another clock may err."""
+"""Longest extrapolation of a pose by its velocity: stamps of another clock may be wrong."""
 _TURN_GAIN, _TURN_RAD_S = 1.8, 1.2
 _OFF_M = 2.0
-"""Farther from its plan it stops and waits for another one."""
+"""Distance from the plan beyond which the follower stops and waits for another plan."""
 _STATE = ("_pose", "_heard_ns", "_frame", "_plan", "_next", "_told", "_paused")
 
 
 class TrajectoryFollower(Node):
-    """Commands `cmd_vel` so that `planning/trajectory` is flown; tells `~/status`.
+    """Publishes `cmd_vel` to follow `planning/trajectory`; publishes `~/status`.
 
-    Velocities rather than places are commanded: places would be those of whoever flies the vehicle,
-    and without GNSS nobody knows where the map of the one lies in that of the other. At the end of
-    a plan, and without odometry, the command is to stand still. While `planning/pause`
-    (std_msgs/Bool) says so it commands nothing and forgets its plan.
+    The node commands velocities rather than positions: positions would be in the autopilot's frame,
+    and without GNSS the transform between the two frames is unknown. At the end of a plan, and
+    without odometry, the command is zero velocity. `planning/pause` (std_msgs/Bool, true) stops the
+    commands and drops the plan.
 
     Parameters
     ----------
-    odometry: topic of the pose, in whose frame plans are made.
+    odometry: topic of the pose; plans are in its frame.
     gain: m/s for each m off the plan.
-    lead_s: so much ahead is the velocity that is commanded, for the vehicle's lag.
+    lead_s: time by which the commanded velocity is ahead, to compensate for the vehicle's lag.
 
     """
 
@@ -78,11 +78,11 @@ class TrajectoryFollower(Node):
         self.create_timer(_PERIOD_S, self._on_timer)
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         return save_attributes(self, _STATE)
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         restore_attributes(self, state)
 
     def _on_odometry(self, message: Odometry) -> None:
@@ -98,7 +98,7 @@ class TrajectoryFollower(Node):
             return
         samples = samples_of(message)
         if samples is None:
-            self._tell("refused", "a plan without points, or with numbers that are not finite")
+            self._tell("refused", "a plan without points, or with values that are not finite")
             return
         self._next = samples
 

@@ -1,4 +1,4 @@
-"""Local plans as messages, and back."""
+"""Converts local plans to messages and back."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ from volery.graph.messages import (
 Array = NDArray[np.float64]
 
 _STEP_S = 0.2
-"""Between samples the velocity is taken as linear."""
+"""Time between samples; the velocity is linear between them."""
 _DURATION: type[Any] = message_type("builtin_interfaces/msg/Duration")
 _NO_TURN = Vector3(0.0, 0.0, 0.0)
 
 
 class TrajectorySamples(NamedTuple):
-    """A trajectory as samples, in one frame."""
+    """Samples of a trajectory, in one frame."""
 
     time_ns: NDArray[np.int64]
-    """(K,) growing, K > 0."""
+    """(K,) increasing, K > 0."""
     position: Array
     velocity: Array
     """(K, 3) m, m/s."""
     yaw: float
-    """Where the nose shall point, rad."""
+    """Wanted heading, rad."""
 
     def at(self, time_ns: int) -> tuple[Array, Array]:
-        """Position and velocity (3,): before the begin as there, after the end at rest there."""
+        """Returns position and velocity (3,): extrapolated before the start, at rest at the end."""
         if time_ns >= self.time_ns[-1]:
             return self.position[-1], np.zeros(3)
         row = max(bisect_right(self.time_ns, time_ns) - 1, 0)
@@ -60,7 +60,7 @@ class TrajectorySamples(NamedTuple):
 def trajectory_message(
     path: PrimitivePath, yaw: float, frame_id: str, begins_ns: int
 ) -> MultiDOFJointTrajectory:
-    """A plan as trajectory_msgs/MultiDOFJointTrajectory, stamped with its begin."""
+    """Returns a plan as trajectory_msgs/MultiDOFJointTrajectory, stamped with its start."""
     turn = Quaternion(0.0, 0.0, math.sin(0.5 * yaw), math.cos(0.5 * yaw))
     count = math.ceil(path.duration_s / _STEP_S)
     points = []
@@ -80,7 +80,7 @@ def trajectory_message(
 
 
 def samples_of(message: MultiDOFJointTrajectory) -> TrajectorySamples | None:
-    """A message's samples; None where it has none, or numbers that are not finite."""
+    """Returns a message's samples; None if it has none, or if values are not finite."""
     points = message.points
     if not points or not all(len(p.transforms) and len(p.velocities) for p in points):
         return None

@@ -1,7 +1,7 @@
-"""Where to look next: the place from which most is seen for the way there.
+"""Selects the next viewpoint: the best gain for the distance.
 
-Next-best-view by utility of gain and way, after H. Gonzalez-Banos and J.-C. Latombe, "Navigation
-strategies for exploring indoor environments", IJRR 2002.
+Next-best-view by utility of gain and distance, after H. Gonzalez-Banos and J.-C. Latombe,
+"Navigation strategies for exploring indoor environments", IJRR 2002.
 """
 
 from __future__ import annotations
@@ -19,16 +19,17 @@ Array = NDArray[np.float64]
 
 _TURN = 0.1
 _WAY_M = 80.0
-"""Prices, in discs of sight: a turn back costs a tenth, 80 m of way a whole one (modelling
-choices)."""
+"""Costs, in view discs: a reversal costs a tenth, a path of 80 m a whole disc (modelling
+choices).
+"""
 _LEAST_SHARE = 0.06
-"""Of the disc of sight must be new, else it is not worth the way."""
+"""Min fraction of the view disc that must be new."""
 _APART_M = 2.0
-"""So near to a place that is left out none is tried."""
+"""Min distance between viewpoints and excluded positions."""
 
 
 class Viewpoint(NamedTuple):
-    """A place (2,) m to look from, and the area m^2 that would be new there."""
+    """Position (2,) m of a viewpoint, and the new area m^2 that it observes."""
 
     place: Array
     gain_m2: float
@@ -41,10 +42,9 @@ def next_viewpoint(
     view_m: float,
     left_out: Sequence[Array] = (),
 ) -> Viewpoint | None:
-    """The best place to go to from `place` (2,) m; None where nothing is worth the way.
+    """Returns the best viewpoint from `place` (2,) m; None if no gain is worth the distance.
 
-    heading: of the flight, rad. left_out: places (2,) that could not be reached, or have been
-    looked from.
+    heading: of the flight, rad. left_out: positions (2,) that are unreachable or were visited.
     """
     spots = _lattice(area, 0.5 * view_m)
     for bad in left_out:
@@ -67,7 +67,7 @@ def next_viewpoint(
 
 
 def _lattice(area: SearchArea, step_m: float) -> Array:
-    """Places (K, 2) all over the area."""
+    """Returns candidate positions (K, 2) all over the area."""
     every = max(1, round(step_m / area.cell_m))
     middles = area.middles(area.inside.shape)
     rows = slice(every // 2, None, every)

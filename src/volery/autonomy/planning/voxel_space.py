@@ -1,7 +1,7 @@
-"""A map of voxels as a space to plan in: ground, and distances to what stands on it.
+"""A voxel map as a planning space: ground height, and distances to obstacles above it.
 
-Columns are measured from the ground: a place is (x, y, h) with h above the ground of its column.
-What is not known is free: whoever flies there looks first.
+A state is (x, y, h) with h above the ground of its column. Unknown space is free: the local planner
+observes it before the UAV enters it.
 """
 
 from __future__ import annotations
@@ -22,32 +22,32 @@ Floats = NDArray[np.float32]
 Integers = NDArray[np.int32]
 
 _GROUND_M = 2.0
-"""Width of the columns in which the lowest thing that was seen is the ground."""
+"""Width of the columns whose lowest occupied point is the ground."""
 _ABOVE_M = 7.0
-"""Height above ground up to which obstacles are kept."""
+"""Height above ground up to which obstacles are stored."""
 _TRUNK_FOOT_M = 0.8
-"""What is lower than this above the lowest point of its column is ground or growth."""
+"""Height above the lowest point of a column below which occupied cells are ground or growth."""
 _MOST_COLUMNS = 2_000_000
 _FAR_CELLS = 5
 
 
 class SolidVoxels(NamedTuple):
-    """What is occupied in a map, m."""
+    """Occupied cubes of a map, m."""
 
     middle: Array
-    """(K, 3)."""
+    """(K, 3): centres."""
     side: Array
-    """(K,)."""
+    """(K,): edge lengths."""
 
     @classmethod
     def of(cls, voxels: Voxels, resolution_m: float) -> SolidVoxels:
-        """The occupied cubes of a map."""
+        """Returns the occupied cubes of a map."""
         side = voxels.side[voxels.occupied].astype(np.float64) * resolution_m
         corner = voxels.corner[voxels.occupied] * resolution_m
         return cls(corner + 0.5 * side[:, None], side)
 
     def is_near(self, around: Array, margin_m: float) -> bool:
-        """Whether any of it lies within `margin_m` of the box of places (K, 2+)."""
+        """Returns whether a cube lies within `margin_m` of the box of positions (K, 2+)."""
         low, high = around[:, :2].min(axis=0) - margin_m, around[:, :2].max(axis=0) + margin_m
         return bool(((self.middle[:, :2] >= low) & (self.middle[:, :2] <= high)).all(axis=1).any())
 
@@ -58,9 +58,9 @@ class VoxelSpace:
     def __init__(
         self, solid: SolidVoxels, cell_m: float, around: Array, margin_m: float = 25.0
     ) -> None:
-        """`around`: (K, 2+) m; the space holds these places and `margin_m` around them.
+        """Covers the positions `around`, (K, 2+) m, and `margin_m` around them.
 
-        Raises PlanError where it would be too large, or nothing is known there.
+        Raises PlanError if the space would be too large, or if the map holds nothing there.
         """
         self.cell_m = cell_m
         low = around[:, :2].min(axis=0) - margin_m
@@ -70,11 +70,11 @@ class VoxelSpace:
         if int(shape.prod()) * (_GROUND_M / cell_m) ** 2 > _MOST_COLUMNS:
             raise PlanError(
                 f"start and goal span {shape[0] * _GROUND_M:g} m x {shape[1] * _GROUND_M:g} m: "
-                "too far apart to plan a way"
+                "too far apart to plan a path"
             )
         near = ((solid.middle[:, :2] >= self._low) & (solid.middle[:, :2] <= high)).all(axis=1)
         if not near.any():
-            raise PlanError("nothing is known of the map between start and goal")
+            raise PlanError("the map is empty between start and goal")
         middle, side = solid.middle[near], solid.side[near]
         lowest = middle - np.stack([0.0 * side, 0.0 * side, 0.5 * (side - side.min())], -1)
         self.ground = _ground(lowest, self._low, shape)
@@ -86,12 +86,12 @@ class VoxelSpace:
         self._distance: Floats = (np.sqrt(square) * cell_m).astype(np.float32)
 
     def box(self) -> list[tuple[float, float]]:
-        """Least and most x and y."""
+        """Returns (min, max) of x and of y, m."""
         high = self._low + np.array(self._distance.shape[:2]) * self.cell_m
         return [(float(self._low[axis]), float(high[axis])) for axis in range(2)]
 
     def ground_at(self, xy: Array) -> float:
-        """Height of the ground at a place (2,), m; the nearest one known beyond the map."""
+        """Returns the ground height (m) at a position (2,), clamped to the map."""
         at = (xy - self._low) / _GROUND_M - 0.5
         limit = np.array(self.ground.shape) - 1
         first = np.clip(np.floor(at).astype(np.int64), 0, np.maximum(limit - 1, 0))
@@ -102,7 +102,7 @@ class VoxelSpace:
         return float((1 - share[1]) * along[0] + share[1] * along[1])
 
     def is_free(self, x: float, y: float, h: float, radius_m: float) -> bool:
-        """Whether a place is so far from obstacles."""
+        """Returns whether a state is at least `radius_m` from obstacles."""
         return bool(
             _distance_at(x, y, h, self._low[0], self._low[1], self.cell_m, self._distance)
             >= radius_m
@@ -111,7 +111,7 @@ class VoxelSpace:
     def is_free_leg(
         self, ax: float, ay: float, ah: float, bx: float, by: float, bh: float, radius_m: float
     ) -> bool:
-        """Whether all places between two are so far from obstacles."""
+        """Returns whether all states between two are at least `radius_m` from obstacles."""
         return bool(
             _leg(
                 ax, ay, ah, bx, by, bh, radius_m, self._low[0], self._low[1], self.cell_m,
@@ -120,15 +120,15 @@ class VoxelSpace:
         )  # fmt: skip
 
     def is_free_between(self, a: Array, b: Array, radius_m: float) -> bool:
-        """As `is_free_leg`, of places (3,)."""
+        """Returns `is_free_leg` for states (3,)."""
         ax, ay, ah = a.tolist()
         bx, by, bh = b.tolist()
         return self.is_free_leg(ax, ay, ah, bx, by, bh, radius_m)
 
     def free_near(self, place: Array, radius_m: float, search_m: float = 3.0) -> Array | None:
-        """The nearest free place (3,) within `search_m`, at the same height; None if there is none.
+        """Returns the nearest free state (3,) within `search_m`, at the same height; else None.
 
-        Looks along rings, a cell apart.
+        It searches along rings, a cell apart.
         """
         for ring in np.arange(0.0, search_m + 1e-9, self.cell_m):
             count = max(1, math.ceil(2.0 * math.pi * ring / self.cell_m))
@@ -140,25 +140,25 @@ class VoxelSpace:
 
 
 def _ground(middle: Array, low: Array, shape: NDArray[np.int64]) -> Array:
-    """Lowest occupied point of each column, smoothed; where there is none, its neighbours'."""
+    """Returns each column's lowest occupied point, smoothed; empty columns interpolate."""
     ground = np.full(tuple(shape), np.inf)
     cells = np.floor((middle[:, :2] - low) / _GROUND_M).astype(np.int64)
     inside = ((cells >= 0) & (cells < shape)).all(axis=1)
     np.minimum.at(ground, tuple(cells[inside].T), middle[inside, 2])
     if not np.isfinite(ground).any():
-        raise PlanError("the map shows no ground")
+        raise PlanError("the map holds no ground")
     while not np.isfinite(ground).all():
         around = _neighbours(ground)
         found = np.isfinite(around)
         mean = np.where(found, around, 0.0).sum(axis=0) / np.maximum(found.sum(axis=0), 1)
         grown = np.where(np.isfinite(ground), ground, np.where(found.any(axis=0), mean, np.inf))
         ground = grown
-    # A column whose lowest point is a crown stands out; the median of nine does not.
+    # A column whose lowest point is a crown is an outlier; the median of nine removes it.
     return np.asarray(np.median(np.concatenate([ground[None], _neighbours(ground)]), axis=0))
 
 
 def _neighbours(ground: Array) -> Array:
-    """The eight neighbours (8, nx, ny) of each column; at the border the column beside it."""
+    """Returns the eight neighbours (8, nx, ny) of each column; the border is repeated."""
     wide = np.pad(ground, 1, mode="edge")
     nx, ny = ground.shape
     steps = [(a, b) for a in range(3) for b in range(3) if (a, b) != (1, 1)]
@@ -196,7 +196,7 @@ def _mark(
 def _distance_at(
     x: float, y: float, h: float, low_x: float, low_y: float, cell: float, distance: Floats
 ) -> float:
-    """Distance (m) of the cell that holds a place; 0 outside."""
+    """Returns the distance (m) of the cell that holds a state; 0 outside."""
     i, j = math.floor((x - low_x) / cell), math.floor((y - low_y) / cell)
     k = math.floor(h / cell)
     nx, ny, nz = distance.shape

@@ -21,21 +21,21 @@ _SHAPE = (8, 8, 8)
 
 
 def searched_area() -> None:
-    """Kernels that tell what of an area has been looked at."""
+    """Compiles the kernels of the search area."""
     area = SearchArea(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0]]), 1.0)
     area.look(np.zeros(3), fixed(np.zeros((2, 2), np.int8)), np.zeros(2), 1.0, 1.0)
     area.gains(np.zeros((1, 2)), 1.0)
 
 
 def ways() -> None:
-    """Kernels of the space in which ways are searched for."""
+    """Compiles the kernels of the path planning space."""
     space = VoxelSpace(SolidVoxels(np.zeros((1, 3)), np.ones(1)), 0.4, np.zeros((1, 2)), 2.0)
     space.is_free(0.0, 0.0, 1.0, 0.1)
     space.is_free_leg(0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 0.1)
 
 
 def plans() -> None:
-    """Kernels of what is planned from what is seen."""
+    """Compiles the kernels of local planning."""
     grid, here = LocalGrid(0.25, _SHAPE), np.zeros(3)
     grid.move_to(here)
     grid.add(some_rays())

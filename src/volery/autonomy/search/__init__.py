@@ -1,1 +1,1 @@
-"""What UAVs need to search together: finding a colour, placing it, sharing the air, agreeing."""
+"""Cooperative search: colour detection, positions on the ground, separation, agreement."""

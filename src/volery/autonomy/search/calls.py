@@ -1,4 +1,4 @@
-"""Claims to a find, and the calls of teammates to it."""
+"""Claims to a detection, and the calls of teammates to it."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from volery.core.clock import NS_PER_S
 from volery.graph.messages import Point, message_type, time_from_ns
 
 JOIN = "volery_interfaces/srv/JoinSearch"
-"""Type of the service by which a teammate is called."""
+"""Type of the service that calls a teammate."""
 _PERIOD_NS, _MOST = NS_PER_S, 20
-"""How often, and how many times, a teammate is called. Modelling choice."""
+"""Period and max number of calls to a teammate. Modelling choice."""
 
 
 class RescueClaim(NamedTuple):
-    """Who has found something, when and where. The least one counts: earlier, then by name."""
+    """Finder, time and position of a detection. Claims order by time, then by name."""
 
     stamp_ns: int
     finder: str
@@ -24,18 +24,18 @@ class RescueClaim(NamedTuple):
 
     @property
     def key(self) -> tuple[int, str]:
-        """What claims are told apart by, and put in order."""
+        """Returns the key that identifies and orders claims."""
         return self.stamp_ns, self.finder
 
     def request(self) -> Any:
-        """The request to come."""
+        """Returns the service request that calls a teammate."""
         return message_type(f"{JOIN}_Request")(
             time_from_ns(self.stamp_ns), self.finder, Point(*self.place)
         )
 
     @classmethod
     def from_request(cls, request: Any) -> RescueClaim:
-        """What a request says."""
+        """Returns the claim of a request."""
         stamp_ns = request.stamp.sec * NS_PER_S + request.stamp.nanosec
         place = request.place.x, request.place.y, request.place.z
         return cls(stamp_ns, request.finder, place)
@@ -43,30 +43,30 @@ class RescueClaim(NamedTuple):
 
 @dataclass
 class RescueCall:
-    """A teammate that is called. Times are ns of the node's clock."""
+    """State of the call to one teammate. Times are ns of the node's clock."""
 
     tries: int = 0
     asked_ns: int = 0
     accepted: bool = False
 
     def note(self, response: Any) -> None:
-        """Take in an answer."""
+        """Processes a response."""
         self.accepted = self.accepted or bool(response.accepted)
 
 
 @dataclass
 class RescueCalls:
-    """The calls for an own find; none for one of another UAV."""
+    """Calls for an own detection; empty for another UAV's."""
 
     to: dict[str, RescueCall] = field(default_factory=dict)
 
     @classmethod
     def of(cls, names: Iterable[str]) -> RescueCalls:
-        """New ones."""
+        """Returns new calls to UAVs."""
         return cls({name: RescueCall() for name in names})
 
     def begin_due(self, now_ns: int) -> list[tuple[str, RescueCall]]:
-        """Those to call now (again); they count as called from here on."""
+        """Returns the calls that are due, and marks them as sent."""
         due = [
             (name, call)
             for name, call in self.to.items()
@@ -77,14 +77,14 @@ class RescueCalls:
         return due
 
     def are_settled(self, now_ns: int) -> bool:
-        """Whether everybody comes, or has been given up."""
+        """Returns whether all teammates have accepted or have been given up."""
         return all(
             call.accepted or (call.tries >= _MOST and self._has_waited(call, now_ns))
             for call in self.to.values()
         )
 
     def drop(self, name: str) -> None:
-        """Call one of them no more."""
+        """Stops calling a teammate."""
         self.to.pop(name, None)
 
     def _has_waited(self, call: RescueCall, now_ns: int) -> bool:

@@ -1,4 +1,4 @@
-"""The largest patch of a colour in a picture, by thresholds of hue, saturation and value."""
+"""Finds the largest patch of a colour in an image, by thresholds of hue, saturation and value."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class ColourRange(NamedTuple):
     """Colours of the hexcone model (A. R. Smith, Color gamut transform pairs, 1978)."""
 
     first_hue_deg: float = 345.0
-    """From this hue, 0 is red and 120 green, upwards ..."""
+    """Lower end of the hue range; 0 is red, 120 green."""
     last_hue_deg: float = 15.0
-    """... to this one, through 360 where it is the smaller of both."""
+    """Upper end of the hue range; the range passes through 360 if this end is the smaller one."""
     least_saturation: float = 0.5
     """(max - min) / max of the three channels."""
     least_value: float = 0.2
@@ -32,30 +32,33 @@ class ColourRange(NamedTuple):
 
 
 class Blob(NamedTuple):
-    """A patch of pixels that hang together."""
+    """Patch of connected pixels."""
 
     pixels: int
     share: float
-    """Of the whole picture."""
+    """Fraction of the image."""
     u: float
-    """Column of its centroid, counted from the middle of the first pixel."""
+    """Column of its centroid, counted from the centre of the first pixel."""
     v: float
     """Row of its centroid."""
 
 
 def pixels_of(image: Image) -> Pixels:
-    """(height, width, 3) red, green, blue. `GraphError` for other encodings than rgb8 and bgr8."""
+    """Returns pixels (height, width, 3) red, green, blue.
+
+    Raises GraphError for encodings other than rgb8 and bgr8.
+    """
     if image.encoding not in ("rgb8", "bgr8"):
-        raise GraphError(f"the search looks at pictures in rgb8 or bgr8, not '{image.encoding}'")
+        raise GraphError(f"the search needs images in rgb8 or bgr8, not '{image.encoding}'")
     rows = np.asarray(image.data).reshape(image.height, image.step)
     pixels = rows[:, : 3 * image.width].reshape(image.height, image.width, 3)
     return pixels if image.encoding == "rgb8" else pixels[:, :, ::-1]
 
 
 def colour_mask(pixels: Pixels, colours: ColourRange, hidden: Discs = NO_DISCS) -> Mask:
-    """(height, width) where a picture (height, width, 3) has one of the colours.
+    """Returns the mask (height, width) of pixels (height, width, 3) that have one of the colours.
 
-    hidden: (K, 3) column, row and radius of discs in which nothing counts.
+    hidden: (K, 3) column, row and radius of discs that are excluded.
     """
     mask = np.empty(pixels.shape[:2], np.bool_)
     _fill_mask(np.ascontiguousarray(pixels), *colours, mask)
@@ -64,9 +67,9 @@ def colour_mask(pixels: Pixels, colours: ColourRange, hidden: Discs = NO_DISCS) 
 
 
 def largest_blob(mask: Mask) -> Blob | None:
-    """The largest patch of a mask, joined along sides and corners; None where there is nothing.
+    """Returns the largest 8-connected patch of a mask; None if the mask is empty.
 
-    Of equally large ones that whose first pixel comes first, row by row.
+    Among patches of equal size it returns the first, row by row.
     """
     pixels, sum_u, sum_v = _largest(mask)
     if pixels == 0:
@@ -99,7 +102,7 @@ def _fill_mask(
 
 @inner_kernel
 def _hue_deg(red: float, green: float, blue: float, spread: float) -> float:
-    """Hue, 0 to 360, of a colour whose largest and smallest channel differ by `spread`."""
+    """Returns the hue, 0 to 360, of a colour whose channels span `spread`."""
     if red >= green and red >= blue:
         hue = 60.0 * (green - blue) / spread
         return hue if hue >= 0.0 else hue + 360.0
@@ -121,7 +124,7 @@ def _blot_out(discs: Discs, mask: Mask) -> None:
 
 @kernel
 def _largest(mask: Mask) -> tuple[int, float, float]:
-    """Pixels of the largest patch, sums of their columns and rows."""
+    """Returns the pixel count of the largest patch, and the sums of their columns and rows."""
     rows, columns = mask.shape
     left = mask.copy()
     stack = np.empty((rows * columns, 2), np.int64)

@@ -1,4 +1,4 @@
-"""Cooperative search: a UAV that looks for a colour at random, and calls the others to it."""
+"""Cooperative search: each UAV searches for a colour at random and calls the others to it."""
 
 from __future__ import annotations
 
@@ -31,38 +31,40 @@ from volery.graph.messages import (
 Array = NDArray[np.float64]
 
 _BORDER_M = 1.0
-"""Waypoints and places keep so far inside the area: more than a UAV strays from its way."""
+"""Distance of waypoints to the border of the area: more than a UAV's tracking error."""
 _NEAR_M = 1.0
-"""So near to a waypoint it turns to the next."""
+"""Distance to a waypoint at which the next one begins."""
 _LOOKS, _LOOK_S = 5, 8.0
-"""Pictures at rest over it that make a find, and how long it tries, the way there apart."""
+"""Images from above at rest that confirm a detection, and the time for them, without the
+approach.
+"""
 _REST_M_S = 0.3
 _BLIND_S = 2.0
-"""Without a picture for so long it stops."""
+"""Time without an image after which the UAV stops."""
 _SEARCHING = frozenset({SearchPhase.SEARCH, SearchPhase.LOOK})
 """All modelling choices."""
 
 
 class CooperativeSearch(TeamFlight):
-    """Searches its area by its own camera; calls and is called by `search/join`.
+    """Searches its area by its own camera; calls teammates, and is called, by `search/join`.
 
     Parameters
     ----------
     team: names of all UAVs of the search, this one included. The order counts: each flies a layer
-        higher than the one before it.
-    area_m: [x_min, y_min, x_max, y_max] in the map; nobody leaves it, nothing beyond it is found.
-    altitude_m, layer_m: z of the lowest UAV, and how much higher each other one flies.
-    speed_m_s: on all ways.
-    apart_m: least distance, in plan, between UAVs at the object, and to it.
+        higher than the previous one.
+    area_m: [x_min, y_min, x_max, y_max] in the map; limits the flight and the detections.
+    altitude_m, layer_m: z of the lowest UAV, and the height difference between UAVs.
+    speed_m_s: horizontal speed.
+    apart_m: min horizontal distance between UAVs at the object, and to it.
     camera: its topics are `CAMERA/image_raw` and `CAMERA/camera_info`.
     mount_m, mount_rpy_deg: of the camera in the body, as in a scenario.
-    object_m: z of the middle of what is searched for.
-    hue_deg: [first, last]; saturation, value: least ones; see `search.colour_blob`.
-    share: least share of the picture.
-    gather_s: how long to wait on the ground for teammates that were never heard.
-    patience_s: after so long a silence a teammate is not waited for.
-    hold_s: how long all stay at the object.
-    search_s: how long to search in vain; 0: without an end.
+    object_m: z of the object's centre.
+    hue_deg: [first, last]; saturation, value: minimums; see `search.colour_blob`.
+    share: min fraction of the image.
+    gather_s: time to wait on the ground for teammates that have not reported yet.
+    patience_s: timeout of a teammate's reports.
+    hold_s: time that all stay at the object.
+    search_s: time limit of the search; 0: none.
     seed: of the waypoints; each UAV has a stream of its own.
 
     """
@@ -85,7 +87,7 @@ class CooperativeSearch(TeamFlight):
 
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Returns the tasks that compile its kernels."""
+        """Returns the tasks that compile the kernels of this node."""
         from volery.autonomy.search import warmup
 
         return (warmup.colours,)
@@ -98,22 +100,22 @@ class CooperativeSearch(TeamFlight):
         check_room(*self._spread)
 
         self.claim: RescueClaim | None = None
-        """What is gone by: found by this UAV or another one."""
+        """Current claim, by this UAV or another one."""
         self.calls = RescueCalls()
-        """Of an own find."""
+        """Calls for an own detection."""
         self._intrinsics: Intrinsics | None = None
         self._waypoint = 0
         self._began_ns: int | None = None
-        """When the search began."""
+        """Start of the search, ns."""
         self._image_ns = 0
         self._look_from = np.zeros(3)
         self._look_s = 0.0
         self._looks: list[Array] = []
         self._waiting_ns: int | None = None
-        """Since when everybody who comes is there."""
+        """Time since which all called teammates have arrived, ns."""
         self._finishing = False
         self._to_tell: list[str] = []
-        """Teammates that are still to be told that the search is over."""
+        """Teammates that have not been notified yet of the end of the search."""
 
         self._found = self.create_publisher(PointStamped, "~/found", 1, latched=True)
         self._come_clients = {n: self.create_client(JOIN, self._of(n, "join")) for n in self.mates}
@@ -126,7 +128,7 @@ class CooperativeSearch(TeamFlight):
         self._listen_for_intrinsics()
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         super().set_state(state)
         if self._intrinsics is None:
             self._listen_for_intrinsics()
@@ -136,10 +138,10 @@ class CooperativeSearch(TeamFlight):
         """Names of the teammates."""
         return self.settings.teammates
 
-    # --------------------------------------------------------------------------------- what it sees
+    # -------------------------------------------------------------------------------- perception
 
     def _listen_for_intrinsics(self) -> None:
-        """Until they have come once: for them a camera has to measure depth as well."""
+        """Subscribes until the first message, as a subscription makes a camera render depth too."""
 
         def on_info(info: CameraInfo) -> None:
             self._intrinsics = Intrinsics.from_message(info)
@@ -162,7 +164,7 @@ class CooperativeSearch(TeamFlight):
             self._looks.append(place)
 
     def _see(self, stamp_ns: int, place: Array) -> None:
-        """Break off, stop over it and look again: from there its height matters little."""
+        """Interrupts the search and looks again from above, where height errors matter little."""
         assert self.pose is not None
         self.claim = RescueClaim(stamp_ns, self.settings.name, _plain(place))
         low, high = np.reshape(self._inner, (2, 2))
@@ -171,10 +173,10 @@ class CooperativeSearch(TeamFlight):
         self._look_s = _LOOK_S + way / self.settings.speed_m_s
         self.enter(SearchPhase.LOOK)
 
-    # --------------------------------------------------------------------------------- what it does
+    # ----------------------------------------------------------------------------------- behaviour
 
     def act(self, pose: OdometrySample) -> None:
-        """Search, look, come, hold."""
+        """Runs the phases search, look, come and hold."""
         if self.phase in CAN_COME - {SearchPhase.READY} and self.team_in(GOING_HOME):
             self._finish()
         if self._finishing and self.phase in CAN_COME - RISING:
@@ -195,7 +197,7 @@ class CooperativeSearch(TeamFlight):
         self._to_tell = []
 
     def _search(self, pose: OdometrySample) -> None:
-        if self.claim is not None:  # called while it climbed
+        if self.claim is not None:  # called during the climb
             self.enter(SearchPhase.COME)
             return
         if self._began_ns is None:
@@ -239,7 +241,10 @@ class CooperativeSearch(TeamFlight):
         return self.in_layer(places[self.settings.rank])
 
     def _hold(self) -> None:
-        """Go home when everybody who comes has been there for a while; the finder decides it."""
+        """Ends the search once all called teammates have stayed for `hold_s`.
+
+        The finder decides; the others follow its phase.
+        """
         assert self.claim is not None
         finder = self.teammates.get(self.claim.finder)
         patience = self.settings.patience_s
@@ -254,7 +259,7 @@ class CooperativeSearch(TeamFlight):
         elif self.now_ns - self._waiting_ns > self.settings.hold_s * NS_PER_S:
             self._finish()
 
-    # ------------------------------------------------------------------------------ what they agree
+    # ----------------------------------------------------------------------------------- agreement
 
     def _call_teammates(self) -> None:
         assert self.claim is not None
@@ -266,22 +271,22 @@ class CooperativeSearch(TeamFlight):
             self.ask(self._come_clients[name], self.claim.request(), call.note)
 
     def on_call(self, request: Any, response: Any) -> Any:
-        """A teammate calls: the earlier of two finds counts, of one instant the first name's."""
+        """Handles a teammate's call: the earliest detection counts, then the first name."""
         response.message = self._why_not(RescueClaim.from_request(request))
         response.accepted = not response.message
         return response
 
     def _why_not(self, called: RescueClaim) -> str:
-        """Heed a call; or why not."""
+        """Accepts a call and returns "", or returns the reason for the refusal."""
         name = self.settings.name
         if called.finder not in self.mates:
-            return f"{called.finder or 'nobody'} is not in the team of {name}"
+            return f"{called.finder or 'the caller'} is not in the team of {name}"
         if not self.settings.area.holds(*called.place[:2]):
             return f"{name} does not leave its area"
         if self.phase not in CAN_COME or self._finishing:
-            return f"{name} takes no part any more: {self.phase}"
+            return f"{name} no longer takes part: {self.phase}"
         if self.claim is not None and self.claim.key < called.key:
-            return f"{self.claim.finder} saw something earlier"
+            return f"{self.claim.finder} has an earlier detection"
         if self.claim is None or self.claim.key != called.key:
             self.claim, self.calls = called, RescueCalls()
             if self.phase in CAN_COME - RISING - {SearchPhase.ALOFT}:
@@ -294,7 +299,7 @@ class CooperativeSearch(TeamFlight):
         return response
 
     def _finish(self) -> None:
-        """Go home, or stay on the ground, and tell the others to: once."""
+        """Flies home, or stays on the ground, and notifies the teammates once."""
         if not self._finishing:
             self._finishing, self._to_tell = True, list(self.mates)
             if self.phase is SearchPhase.READY:

@@ -1,4 +1,4 @@
-"""From a pixel of a camera to the place on a level plane that it shows, and back."""
+"""Projects pixels of a camera to positions on a level plane, and back."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ Array = NDArray[np.float64]
 Disc = tuple[float, float, float]
 
 _STEEP = 0.17
-"""A ray must point down by so much of its length, 10 degrees: flatter ones end anywhere."""
+"""Min downward component of a ray's direction, 10 degrees: flatter rays are too uncertain."""
 _NEAR_M = 0.05
 _BODY_FROM_OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
-"""Axes of a mount (x ahead, y left, z up) from optical ones (z ahead, x right, y down)."""
+"""Axes of a mount (x forward, y left, z up) from optical ones (z forward, x right, y down)."""
 
 
 @dataclass(frozen=True)
 class Intrinsics:
-    """Focal lengths and principal point, pixels; distortion is not undone."""
+    """Focal lengths and principal point, pixels; lens distortion is not corrected."""
 
     fx: float
     fy: float
@@ -35,7 +35,10 @@ class Intrinsics:
 
     @classmethod
     def from_message(cls, info: CameraInfo) -> Intrinsics:
-        """Those of a camera's `camera_info`. `GraphError` for a camera that is not calibrated."""
+        """Returns the intrinsics of a `camera_info`.
+
+        Raises GraphError if the camera is not calibrated.
+        """
         k = info.k
         if not (k[0] > 0.0 and k[4] > 0.0):
             raise GraphError("camera_info holds no focal length: the camera is not calibrated")
@@ -43,7 +46,7 @@ class Intrinsics:
 
 
 class GroundView:
-    """A camera at `mount_m` (3,) in the body, turned by `mount_rpy_deg` (3,)."""
+    """A camera at `mount_m` (3,) in the body, rotated by `mount_rpy_deg` (3,)."""
 
     def __init__(
         self, intrinsics: Intrinsics, mount_m: Sequence[float], mount_rpy_deg: Sequence[float]
@@ -54,11 +57,11 @@ class GroundView:
         self._body_from_optical: Array = turn @ _BODY_FROM_OPTICAL
 
     def place_of(self, u: float, v: float, pose: OdometrySample, plane_z: float) -> Array | None:
-        """(3,) where the ray of a pixel meets the plane at height `plane_z`, map frame.
+        """Returns the intersection (3,) of a pixel's ray with the plane at `plane_z`, map frame.
 
-        None where it points up, or down by less than 10 degrees. A thing whose seen part lies dz
-        above the plane is placed too far from the camera's foot by dz tan(angle off the vertical),
-        an error of the attitude by e turns into about e times the distance.
+        Returns None if the ray points up, or down by less than 10 degrees. An object whose visible
+        part lies dz above the plane is placed too far from the camera by dz tan(angle off the
+        vertical); an attitude error e causes an error of about e times the distance.
         """
         optical = np.array([(u - self._k.cx) / self._k.fx, (v - self._k.cy) / self._k.fy, 1.0])
         ray = rotations.rotate(pose.attitude, self._body_from_optical @ optical)
@@ -71,7 +74,10 @@ class GroundView:
     def disc_of(
         self, place: Array, radius_m: float, pose: OdometrySample
     ) -> tuple[float, float, float] | None:
-        """Column, row and radius, pixels, of a ball at `place` (3,); None behind the camera."""
+        """Returns the image disc (column, row, radius; pixels) of a ball at `place` (3,) m.
+
+        Returns None if the ball is behind the camera.
+        """
         body = rotations.rotate(rotations.conjugate(pose.attitude), place - pose.position)
         x, y, z = self._body_from_optical.T @ (body - self._mount)
         if z < _NEAR_M:
@@ -84,7 +90,7 @@ class GroundView:
 
 
 def pose_at(pose: OdometrySample, time_ns: int) -> OdometrySample:
-    """A pose carried on to another time by its velocity and turn rate."""
+    """Returns a pose extrapolated to another time by its velocity and angular velocity."""
     dt = (time_ns - pose.time_ns) * 1e-9
     turned = rotations.multiply(pose.attitude, rotations.exponential(pose.omega_body * dt))
     return OdometrySample(

@@ -1,4 +1,4 @@
-"""Whether what is searched for is in a picture, and where it is then."""
+"""Detects the searched object in an image and returns its position."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from volery.graph.messages import Image, stamp_of
 Array = NDArray[np.float64]
 
 _TEAMMATE_M = 0.7
-"""Radius of the ball in which a teammate is, which may be red itself. Modelling choice."""
+"""Radius of the ball around a teammate, which may have the colour too. Modelling choice."""
 
 
 def place_seen(
@@ -26,10 +26,10 @@ def place_seen(
     pose: OdometrySample,
     teammates: Iterable[Array],
 ) -> Array | None:
-    """(3,) the place in the map of the largest patch of the colour, inside the area.
+    """Returns the map position (3,) m of the largest patch of the colour inside the area.
 
-    pose: odometry of about the picture's time. teammates: their places (3,), where nothing counts.
-    None where the patch is too small, lies outside, or no ray to it meets the ground.
+    pose: odometry of about the image's time. teammates: their positions (3,), which are excluded.
+    Returns None if the patch is too small, lies outside, or its ray misses the ground.
     """
     pose = pose_at(pose, stamp_of(image))
     view = GroundView(intrinsics, settings.mount_m, settings.mount_rpy_deg)

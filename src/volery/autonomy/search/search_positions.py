@@ -1,4 +1,4 @@
-"""Where UAVs of a search fly: random waypoints in an area, and places around what was found."""
+"""Positions of a cooperative search: random waypoints, and positions around a detection."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ class Area(NamedTuple):
     y_max: float
 
     def holds(self, x: float, y: float) -> bool:
-        """Whether a place lies in it or on its border."""
+        """Returns whether a position lies in the area or on its border."""
         return self.x_min <= x <= self.x_max and self.y_min <= y <= self.y_max
 
     def without_border(self, width_m: float) -> Area:
-        """What is left of it inside a border. `GraphError` where nothing is."""
+        """Returns the area inside a border. Raises GraphError if it is empty."""
         inner = Area(
             self.x_min + width_m, self.y_min + width_m, self.x_max - width_m, self.y_max - width_m
         )
@@ -40,7 +40,7 @@ class Area(NamedTuple):
 
 
 def random_waypoint(area: Area, key: np.uint64, number: int) -> Array:
-    """(2,) waypoint `number` of the random stream `key`, uniform in the area."""
+    """Returns waypoint `number` (2,) m of the random stream `key`, uniform in the area."""
     across, along = (float(rng.uniform(key, 2 * number + k)) for k in range(2))
     return np.array(
         [
@@ -51,31 +51,32 @@ def random_waypoint(area: Area, key: np.uint64, number: int) -> Array:
 
 
 def places_around(place: Array, count: int, apart_m: float, area: Area) -> Array:
-    """(count, 2) places in the area, `apart_m` or more from each other and from `place` (2,).
+    """Returns positions (count, 2) in the area, at least `apart_m` from each other and `place`.
 
-    They lie on rings around it, the nearest ones first: the same for everyone who asks. Of a
-    `place` outside the area the nearest one inside counts. `GraphError` where there is no room,
-    which `check_room` tells for all places of an area at once.
+    They lie on rings around `place` (2,), the nearest ones first, and depend on the arguments only.
+    A `place` outside of the area is moved to its border. Raises GraphError if there is no room;
+    `check_room` checks this for all positions of an area.
     """
     middle = np.clip(place[:2], area[:2], area[2:])
     found: list[Array] = []
     widest = math.hypot(area.x_max - area.x_min, area.y_max - area.y_min)
     for ring in range(1, math.ceil(widest / apart_m) + 1):
-        # six places on a circle are its radius apart, and 6 k on one k times as wide a little more
+        # six points on a circle are its radius apart, 6 k on a k times wider one slightly more
         steps = min(count, 6) if ring == 1 else 6 * ring
         found += _on_ring(middle, apart_m * ring, steps, area)
         if len(found) >= count:
             return np.array(found[:count])
     raise GraphError(
-        f"search: area {list(area)} m has no room for {counted(count, 'place')} {apart_m} m apart"
+        f"search: area {list(area)} m has no room for {counted(count, 'position')} "
+        f"{apart_m} m apart"
     )
 
 
 def check_room(count: int, apart_m: float, area: Area) -> None:
-    """`GraphError` unless `places_around` finds room around every place of the area.
+    """Raises GraphError unless `places_around` finds room around every position of the area.
 
-    Around each there is a quarter circle with a radius of half the shorter side, and on it every
-    ring k but the first has 1.5 k places or more.
+    Each position has a quarter circle with a radius of half the shorter side in the area; on it
+    every ring k but the first has at least 1.5 k positions.
     """
     rings, sure = 1, 0
     while sure < count:

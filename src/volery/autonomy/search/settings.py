@@ -1,4 +1,4 @@
-"""The parameters of a cooperative search."""
+"""Parameters of a cooperative search."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from volery.graph.nodes.node import Node
 
 @dataclass(frozen=True)
 class SearchSettings:
-    """See `cooperative_search.CooperativeSearch`."""
+    """Settings; see `cooperative_search.CooperativeSearch`."""
 
     name: str
-    """Of this UAV, from the node's namespace."""
+    """Name of this UAV, from the node's namespace."""
     team: tuple[str, ...]
     area: Area
     altitude_m: float
@@ -38,27 +38,29 @@ class SearchSettings:
 
     @property
     def rank(self) -> int:
-        """Number of this UAV in its team, from 0."""
+        """Index of this UAV in its team, from 0."""
         return self.team.index(self.name)
 
     @property
     def teammates(self) -> tuple[str, ...]:
-        """All but this one."""
+        """Names of the other UAVs."""
         return tuple(name for name in self.team if name != self.name)
 
     @property
     def layer_z(self) -> float:
-        """Height in the map at which this UAV flies."""
+        """Height in the map at which this UAV flies, m."""
         return self.altitude_m + self.rank * self.layer_m
 
     @classmethod
     def declare(cls, node: Node) -> SearchSettings:
-        """Declare the parameters of a node and read them. `GraphError` for what makes no sense."""
+        """Declares and reads the parameters of a node. Raises GraphError for invalid values."""
 
         def number(name: str, default: float, least: float = -math.inf) -> float:
             value = float(node.declare_parameter(name, default).value)
             if not (math.isfinite(value) and value >= least):
-                raise GraphError(f"search: {name} must be a number from {least:g}, not {value}")
+                raise GraphError(
+                    f"search: {name} must be a number of at least {least:g}, not {value}"
+                )
             return value
 
         def numbers(name: str, default: Sequence[float]) -> tuple[float, ...]:
@@ -70,7 +72,7 @@ class SearchSettings:
         name = node.get_namespace().strip("/")
         team = tuple(node.declare_parameter("team", [name]).value)
         if name not in team or len(set(team)) != len(team):
-            raise GraphError(f"search: team must name '{name}' itself, each UAV once, not {team}")
+            raise GraphError(f"search: team must contain '{name}', and each UAV once, not {team}")
         first_hue, last_hue = numbers("hue_deg", ColourRange()[:2])
         least = number("saturation", 0.5, 0.0), number("value", 0.2, 0.0)
         return cls(

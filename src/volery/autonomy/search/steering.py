@@ -1,4 +1,4 @@
-"""Velocity commands that bring a UAV to a place and stop it there."""
+"""Computes velocity commands that bring a UAV to a position and stop it there."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ Array = NDArray[np.float64]
 _GAIN_PER_S = 0.8
 _BRAKE_M_S2 = 1.0
 _CLIMB_GAIN_PER_S, _CLIMB_M_S = 1.2, 1.0
-"""All modelling choices: gentle enough for every airframe that ships."""
+"""All modelling choices: gentle enough for every shipped airframe."""
 
 
 def towards(pose: OdometrySample, place: Array, speed_m_s: float) -> Twist:
-    """Fly to `place` (3,), the heading as it is: no faster than it can brake in time."""
+    """Returns the command that flies to `place` (3,) m at constant heading and can still brake."""
     offset = place - pose.position
     away = math.hypot(offset[0], offset[1])
     speed = min(speed_m_s, _GAIN_PER_S * away, math.sqrt(2.0 * _BRAKE_M_S2 * away))
@@ -34,6 +34,6 @@ def towards(pose: OdometrySample, place: Array, speed_m_s: float) -> Twist:
 
 
 def is_at(pose: OdometrySample, place: Array, within_m: float, still_m_s: float) -> bool:
-    """Whether a UAV is at a place and no faster than `still_m_s`."""
+    """Returns whether a UAV is within `within_m` of a position and slower than `still_m_s`."""
     away = norm(place - pose.position)
     return away <= within_m and norm(pose.velocity) <= still_m_s

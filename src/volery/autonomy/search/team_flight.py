@@ -1,4 +1,4 @@
-"""One UAV's flight in a search: its pose, what it tells its team, what it hears, how it moves.
+"""One UAV's flight in a search: its pose, its state messages, its teammates, its commands.
 
 `cooperative_search.CooperativeSearch` decides on top of it.
 """
@@ -35,23 +35,23 @@ _PHASES = frozenset(map(str, SearchPhase))
 _STILL_UP = frozenset({SearchPhase.CLIMB, SearchPhase.ALOFT})
 _PERIOD_S = 0.1
 _SETTLE_S = 1.0
-"""So long it tells that it is ready before it climbs, for others to hear and wait."""
+"""Time for which the UAV reports that it is ready before it climbs, so that others wait."""
 _REPEAT_S = 2.0
-"""A take-off or landing that has not begun is asked for again."""
+"""Period of requests for a take-off or landing that has not begun."""
 _CLIMB_S, _CLIMB_S_PER_M = 15.0, 2.0
-"""Longer than this a climb takes only if it fails."""
+"""Timeout of a climb: constant, and for each metre."""
 _FALLEN_M = 1.0
-"""Nearer than this to its place of take-off, while it should fly, it has come down."""
+"""Height over the take-off position below which a flying UAV counts as fallen."""
 _LANDED_M, _STILL_M_S = 0.3, 0.2
 _ARRIVED_M, _ARRIVED_M_S = 0.5, 0.4
 """All modelling choices."""
 
 
 class TeamFlight(Node):
-    """Takes off, keeps to its layer, lands where it took off; tells and hears `search/state`.
+    """Takes off, flies in its layer, lands where it took off; exchanges `search/state`.
 
-    Nobody leaves the column of air over its place of take-off while a teammate climbs, and nobody
-    sinks while one is under way; on the way each flies at a height of its own.
+    A UAV leaves the column over its take-off position only when no teammate climbs, and descends
+    only when no teammate is under way; in between each flies at a height of its own.
     """
 
     STATE: tuple[str, ...] = (
@@ -62,7 +62,7 @@ class TeamFlight(Node):
         "_since_ns",
         "_asked_ns",
     )
-    """Everything that changes."""
+    """Names of the attributes that a snapshot stores."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__("search", **options)
@@ -72,7 +72,7 @@ class TeamFlight(Node):
         self.teammates = {name: Teammate() for name in self.settings.teammates}
         self._home = np.zeros(3)
         self._since_ns: int | None = None
-        """When the phase began."""
+        """Start of the phase, ns."""
         self._asked_ns = -1 << 62
 
         self._legs = {
@@ -95,50 +95,51 @@ class TeamFlight(Node):
         self.create_timer(_PERIOD_S, self._on_timer)
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         return save_attributes(self, self.STATE)
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         restore_attributes(self, state)
 
     def act(self, pose: OdometrySample) -> None:
-        """Do what the phase asks for between climb and landing; in a subclass."""
+        """Runs the phases between climb and landing; a subclass overrides it."""
 
-    # ------------------------------------------------------------------------------- for subclasses
+    # -------------------------------------------------------------------------------- for
+    # subclasses
 
     @property
     def now_ns(self) -> int:
-        """Time of the node's clock."""
+        """Time of the node's clock, ns."""
         return self.get_clock().now_ns()
 
     @property
     def phase_s(self) -> float:
-        """How long the phase has lasted."""
+        """Duration of the current phase so far, s."""
         return 0.0 if self._since_ns is None else (self.now_ns - self._since_ns) * 1e-9
 
     def enter(self, phase: SearchPhase) -> None:
-        """Go on to another phase, and tell so."""
+        """Enters another phase and publishes it."""
         self.phase, self._since_ns = phase, self.now_ns
         self._tell()
 
     def in_layer(self, place: Array) -> Array:
-        """(3,) over or under `place`, at this UAV's own height."""
+        """Returns the position (3,) over or under `place`, at this UAV's own height."""
         return np.array([place[0], place[1], self.settings.layer_z])
 
     def fly_to(self, place: Array, within_m: float = _ARRIVED_M) -> bool:
-        """Command the next moment of a flight to `place` (3,); whether it hovers there."""
+        """Publishes a command towards `place` (3,) m; returns whether the UAV hovers there."""
         assert self.pose is not None
         self._command.publish(towards(self.pose, place, self.settings.speed_m_s))
         return is_at(self.pose, place, within_m, _ARRIVED_M_S)
 
     def team_in(self, phases: frozenset[SearchPhase]) -> bool:
-        """Whether a teammate that can be heard is in one of these phases."""
+        """Returns whether a teammate with recent messages is in one of these phases."""
         now, patience = self.now_ns, self.settings.patience_s
         return any(m.phase in phases and m.is_heard(now, patience) for m in self.teammates.values())
 
     def ask(self, client: Client, request: Any | None = None, then: Any = None) -> None:
-        """Call a service; `then(response)` is called with an answer, if one ever comes."""
+        """Calls a service; `then(response)` is called when the response arrives."""
 
         def on_answer(answer: Future) -> None:
             if then is not None and answer.exception() is None:
@@ -147,12 +148,12 @@ class TeamFlight(Node):
         try:
             client.call_async(request).add_done_callback(on_answer)
         except GraphError:
-            return  # nobody offers it now; who needs an answer asks again
+            return  # no server now; the caller repeats the request
 
-    # -------------------------------------------------------------------------------- what it hears
+    # -------------------------------------------------------------------------------- subscriptions
 
     def _of(self, uav: str, name: str) -> str:
-        """A teammate's name for one of the search's topics or services."""
+        """Returns the name of one of a teammate's search topics or services."""
         return f"/{uav}/search/{name}"
 
     def _on_odometry(self, message: Odometry) -> None:
@@ -162,7 +163,7 @@ class TeamFlight(Node):
         def on_state(message: Any) -> None:
             mate = self.teammates[name]
             if message.phase not in _PHASES:
-                return  # of a newer search than this one
+                return  # a phase of a newer version
             mate.phase = SearchPhase(message.phase)
             p = message.position
             mate.position, mate.heard_ns = np.array([p.x, p.y, p.z]), self.now_ns
@@ -175,7 +176,7 @@ class TeamFlight(Node):
             self._state_type(header(self.now_ns, "map"), str(self.phase), Point(*place.tolist()))
         )
 
-    # --------------------------------------------------------------------------------- what it does
+    # ------------------------------------------------------------------------------------ behaviour
 
     def _on_timer(self) -> None:
         pose = self.pose
@@ -184,7 +185,7 @@ class TeamFlight(Node):
         if self._since_ns is None:
             self._home = pose.position.copy()
             self.enter(SearchPhase.READY)
-        elif self._since_ns > self.now_ns:  # the computer's clock until the graph's was heard
+        elif self._since_ns > self.now_ns:  # wall clock, before the graph's
             self._since_ns = self.now_ns
         if self.phase in ALOFT and pose.position[2] < self._home[2] + _FALLEN_M:
             self._give_up()
@@ -231,12 +232,12 @@ class TeamFlight(Node):
             self.ask(self._land)
 
     def _give_up(self) -> None:
-        """Take no further part; come down, if it is not down already."""
+        """Leaves the search; lands if the UAV still flies."""
         self.enter(SearchPhase.DOWN)
         self.ask(self._land)
 
     def _may_ask(self) -> bool:
-        """Whether it has not asked for a flight mode lately."""
+        """Returns whether the last request is older than `_REPEAT_S`."""
         if 0 <= self.now_ns - self._asked_ns <= _REPEAT_S * NS_PER_S:
             return False
         self._asked_ns = self.now_ns

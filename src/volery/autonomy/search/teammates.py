@@ -1,4 +1,4 @@
-"""What the UAVs of a search know of each other: phases and places."""
+"""Phases and positions that the UAVs of a search share."""
 
 from __future__ import annotations
 
@@ -12,42 +12,42 @@ Array = NDArray[np.float64]
 
 
 class SearchPhase(StrEnum):
-    """Where in its search a UAV is."""
+    """Phase of a UAV in a search."""
 
     READY = "ready"
-    """On the ground; waits to hear of its team."""
+    """On the ground; waits for its team's messages."""
     CLIMB = "climb"
-    """Straight up to its layer."""
+    """Climbs vertically to its layer."""
     ALOFT = "aloft"
-    """In its layer, over its place of take-off; waits until nobody climbs any more."""
+    """In its layer, over its take-off position; waits until no teammate climbs."""
     SEARCH = "search"
     LOOK = "look"
-    """Has seen something, stops over it and looks again."""
+    """Has detected something, stops over it and looks again."""
     COME = "come"
-    """On the way to its place around what was found."""
+    """Flies to its position around the detection."""
     HOLD = "hold"
     HOME = "home"
-    """On the way to over its place of take-off."""
+    """Flies to above its take-off position."""
     OVER_HOME = "over_home"
-    """There; waits until nobody is under way any more."""
+    """Above its take-off position; waits until no teammate is under way."""
     LAND = "land"
     DONE = "done"
     """Has landed, or never flew."""
     DOWN = "down"
-    """Came down against its will, or never came up; takes no further part."""
+    """Fell or failed to take off; takes no further part."""
     LATE = "late"
-    """Came when the others were flying already; stays on the ground."""
+    """Started when the others were flying already; stays on the ground."""
 
 
 UNDER_WAY = frozenset(
     {SearchPhase.SEARCH, SearchPhase.LOOK, SearchPhase.COME, SearchPhase.HOLD, SearchPhase.HOME}
 )
-"""Between the two vertical legs: nobody climbs or sinks while a teammate is here."""
+"""Between the two vertical legs: no teammate climbs or descends meanwhile."""
 GOING_HOME = frozenset({SearchPhase.HOME, SearchPhase.OVER_HOME, SearchPhase.LAND})
 """The search is over."""
 RISING = frozenset({SearchPhase.READY, SearchPhase.CLIMB})
 ALOFT = UNDER_WAY | {SearchPhase.ALOFT, SearchPhase.OVER_HOME}
-"""Flies by the node's own velocity commands."""
+"""Flies by the node's velocity commands."""
 CAN_COME = RISING | {
     SearchPhase.ALOFT,
     SearchPhase.SEARCH,
@@ -55,20 +55,20 @@ CAN_COME = RISING | {
     SearchPhase.COME,
     SearchPhase.HOLD,
 }
-"""A call is heeded."""
+"""Accepts calls."""
 ON_THE_WAY = RISING | {SearchPhase.ALOFT, SearchPhase.LOOK, SearchPhase.COME}
-"""Will be at its place, or back in the search, some time."""
+"""Will be at its position, or back in the search."""
 
 
 @dataclass
 class Teammate:
-    """What is known of another UAV. Times are ns of the node's clock."""
+    """State of another UAV. Times are ns of the node's clock."""
 
     phase: SearchPhase | None = None
-    """None: never heard of."""
+    """None: no message yet."""
     position: Array = field(default_factory=lambda: np.zeros(3))
     heard_ns: int = 0
 
     def is_heard(self, now_ns: int, patience_s: float) -> bool:
-        """Whether it has told something lately."""
+        """Returns whether the last message is recent."""
         return self.phase is not None and 0 <= now_ns - self.heard_ns <= patience_s * 1e9

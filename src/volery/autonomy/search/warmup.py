@@ -1,4 +1,4 @@
-"""Compiles the kernels that look for colours; see `volery.autonomy.perception.warmup`."""
+"""Compiles the colour kernels; see `volery.autonomy.perception.warmup`."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ from volery.autonomy.search.colour_blob import ColourRange, colour_mask, largest
 
 
 def colours() -> None:
-    """All of them."""
+    """Compiles all kernels of the colour search."""
     largest_blob(colour_mask(fixed(np.zeros((2, 2, 3), np.uint8)), ColourRange()))

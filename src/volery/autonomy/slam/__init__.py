@@ -1,1 +1,1 @@
-"""Simultaneous localisation and mapping: an inertial filter corrected by what LIDARs see again."""
+"""Simultaneous localization and mapping: an inertial filter corrected by LIDAR scan matching."""

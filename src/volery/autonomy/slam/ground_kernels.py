@@ -1,7 +1,7 @@
-"""A map of the ground: sums of its returns in cells of 1 m, and planes through neighbouring ones.
+"""A ground map: sums of ground returns in cells of 1 m, and planes through neighbouring cells.
 
-The map rolls: an array of `GROUND_CELLS` squared of which each place belongs to the newest of
-many cells, told apart by their keys.
+The map rolls: it is an array of `GROUND_CELLS` squared. Many cells of the world share one element;
+the element belongs to the newest of them, identified by its key.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ Keys = NDArray[np.int64]
 GROUND_CELL_M = 1.0
 GROUND_CELLS = 192
 MOST = 40.0
-"""Returns of a cell after which it stays as it is."""
+"""Returns of a cell after which its sums stay constant."""
 _RIDGE = 0.3
-"""m^2: how strongly a plane's slope is drawn to the one that is expected."""
+"""m^2: weight of the expected slope in a plane fit."""
 
 
 @inner_kernel
 def key_of(i: int, j: int, k: int) -> int:
-    """A number for a cell; indices beyond 2^20 would clash."""
+    """Returns the key of a cell; indices beyond 2^20 would collide."""
     return ((i & 0x1FFFFF) << 42) | ((j & 0x1FFFFF) << 21) | (k & 0x1FFFFF)
 
 
 @inner_kernel
 def add_ground(keys: Keys, sums: Array, x: float, y: float, z: float) -> None:
-    """Take in a return."""
+    """Adds a return."""
     i, j = math.floor(x / GROUND_CELL_M), math.floor(y / GROUND_CELL_M)
     a, b, key = i % GROUND_CELLS, j % GROUND_CELLS, key_of(i, j, 0)
     cell = sums[a, b]
@@ -56,10 +56,11 @@ def add_ground(keys: Keys, sums: Array, x: float, y: float, z: float) -> None:
 def plane_at(
     keys: Keys, sums: Array, x: float, y: float, around: int, slope: Array, plane: Array
 ) -> int:
-    """Number of known cells within `around` cells of a place; fills `plane` (6,) if there are any.
+    """Fills `plane` (6,) from the cells around a position; returns the number of known cells.
 
-    The plane: height at (x, y), its two slopes, and x, y, z of the middle of the returns. Its slope
-    is drawn to `slope` (2,).
+    The plane holds the height at (x, y), its two slopes, and x, y, z of the centroid of the
+    returns. Its slope is regularized towards `slope` (2,). It is not filled if no cell within
+    `around` cells is known.
     """
     ci, cj = math.floor(x / GROUND_CELL_M), math.floor(y / GROUND_CELL_M)
     known, n = 0, 0.0
@@ -71,7 +72,8 @@ def plane_at(
             if keys[a, b] != key_of(i, j, 0):
                 continue
             cell = sums[a, b]
-            # Seldom seen cells count as others do, or a plane would be that of what lies near.
+            # Cells weigh equally, else the plane would follow the near ground, which is seen more
+            # often.
             w = 1.0 / cell[0]
             known += 1
             n += 1.0

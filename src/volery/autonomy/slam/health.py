@@ -1,4 +1,4 @@
-"""Whether the motion is followed: in words, and as a state."""
+"""Health of the tracking: a state, and problems as text."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from volery.core.saved_state import restore_attributes, save_attributes
 _SILENT_NS = NS_PER_S
 _LOST_NS = NS_PER_S
 _FEW = 6.0
-"""Uprights met again by both LIDARs below which a place is too empty to hold on to."""
+"""Uprights matched by both LIDARs below which the surroundings are too empty."""
 _UNSURE_M = 1.0
-"""Standard deviation of the place since which nobody knows where it is."""
+"""Standard deviation of the position above which tracking is lost, m."""
 
 
 class SlamHealth:
-    """Watches a tracker; `state` is starting, tracking, degraded or lost."""
+    """Monitors a tracker; `state` is starting, tracking, degraded or lost."""
 
     _STATE = ("state", "problems", "heard", "_misfit_ns", "_scarce_ns")
 
@@ -26,12 +26,12 @@ class SlamHealth:
         self.state = "starting"
         self.problems: list[str] = []
         self.heard: dict[str, int] = dict.fromkeys(names, now_ns)
-        """When sensors were last heard of, by name."""
+        """Times of the last data of each sensor, by name, ns."""
         self._misfit_ns: int | None = None
         self._scarce_ns: int | None = None
 
     def look(self, tracker: Tracker, now_ns: int, is_placed: bool) -> bool:
-        """Judge anew; whether the motion has been lost just now."""
+        """Updates state and problems; returns whether tracking has just been lost."""
         self.problems = [
             f"the {name} is silent"
             for name, heard in self.heard.items()
@@ -39,17 +39,17 @@ class SlamHealth:
         ]
         if not tracker.is_ready:
             self.state = "starting"
-            self.problems.append("waiting for half a second of standing still")
+            self.problems.append("waiting for the vehicle to stand still for 0.5 s")
             return False
         misfit = self._is_lost(tracker)
         if misfit:
-            self.problems.append("what is seen is not what was there")
+            self.problems.append("scans do not match the map")
         if tracker.is_astray:
-            self.problems.append("the IMU has left out how it moved")
+            self.problems.append("gap in the IMU data")
         if not is_placed:
-            self.problems.append("where in the map is not known")
+            self.problems.append("pose in the map unknown")
         if self._scarce_ns is not None and now_ns - self._scarce_ns > _LOST_NS:
-            self.problems.append("too few things in reach")
+            self.problems.append("too few returns in range")
         if misfit or tracker.is_astray or not is_placed:
             self.state = "lost"
         else:
@@ -71,13 +71,13 @@ class SlamHealth:
         return long or tracker.sight.is_broken or tracker.sigma_m > _UNSURE_M
 
     def begin_anew(self) -> None:
-        """The tracker has begun a new map."""
+        """Resets the misfit times after the tracker has begun a new map."""
         self._misfit_ns = self._scarce_ns = None
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         return save_attributes(self, self._STATE)
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         restore_attributes(self, state)

@@ -1,14 +1,14 @@
-"""The motion of an error-state Kalman filter between two IMU readings, and its correction.
+"""Prediction of an error-state Kalman filter between two IMU samples, and its correction.
 
 State: position (3,) m, velocity (3,) m/s, attitude (4,) x y z w, biases of gyroscope and
 accelerometer (3,) each, gravity (3,) m/s^2. Errors, in this order, 17: position, velocity, attitude
-(a small turn about the frame's axes, applied from the left), gyroscope, accelerometer, gravity's
-direction (a small turn about the frame's x and y). Equations: J. Sola, Quaternion kinematics for
-the error-state Kalman filter, 2017, section 7 (global angular errors).
+(a small rotation about the frame's axes, applied from the left), gyroscope, accelerometer,
+gravity's direction (a small rotation about the frame's x and y). Equations: J. Sola, Quaternion
+kinematics for the error-state Kalman filter, 2017, section 7 (global angular errors).
 
-Gravity is a state since the frame is that of the first map: at rest a bias of the accelerometer
-looks like a tilt, so that the frame stands a degree or two aslant. What is seen again keeps the
-attitude in the frame, and the accelerometer tells by and by where down is in it.
+Gravity is a state because the frame is that of the first map: at rest an accelerometer bias looks
+like a tilt, so the frame may be tilted by a degree or two. Scan matching fixes the attitude in the
+frame, and the accelerometer gradually shows the direction of gravity in it.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ Array = NDArray[np.float64]
 
 STATES = 17
 P, V, Q, BG, BA, G = 0, 3, 6, 10, 13, 16
-"""Where parts of the state (19,) begin."""
+"""Offsets of the parts of the state (19,)."""
 STATE_NUMBERS = 19
 
 
 @inner_kernel
 def turn_left(state: Array, x: float, y: float, z: float) -> None:
-    """Turn the attitude by a rotation vector about the world's axes."""
+    """Rotates the attitude by a rotation vector about the world's axes."""
     _product(state, x, y, z, True)
 
 
@@ -50,7 +50,7 @@ def _product(state: Array, x: float, y: float, z: float, left: bool) -> None:
 
 @inner_kernel
 def rotation_matrix(state: Array, matrix: Array) -> None:
-    """Fill `matrix` (3, 3), world from body."""
+    """Fills `matrix` (3, 3), world from body."""
     rows = matrix_rows(state[Q], state[Q + 1], state[Q + 2], state[Q + 3])
     for i in range(3):
         matrix[i, 0], matrix[i, 1], matrix[i, 2] = rows[i]
@@ -60,9 +60,10 @@ def rotation_matrix(state: Array, matrix: Array) -> None:
 def move(
     state: Array, covariance: Array, gyro: Array, accel: Array, dt: float, noise: Array
 ) -> None:
-    """Carry state (19,) and covariance (17, 17) on by `dt` s under mean readings (3,).
+    """Propagates state (19,) and covariance (17, 17) by `dt` s under mean IMU samples (3,).
 
-    `noise` (5,): densities of gyroscope, accelerometer, of their biases' walks, of gravity's.
+    `noise` (5,): densities of gyroscope, accelerometer, of their biases' random walks, of
+    gravity's.
     """
     turn = np.empty((3, 3))
     wx, wy, wz = gyro[0] - state[BG], gyro[1] - state[BG + 1], gyro[2] - state[BG + 2]
@@ -91,7 +92,7 @@ def move(
 def _move_covariance(
     covariance: Array, turn: Array, force: Array, gravity: Array, dt: float
 ) -> None:
-    """P <- F P F', rows first and then columns, in place; F differs from 1 by few blocks."""
+    """Computes P <- F P F' in place, rows first; F differs from 1 by few blocks."""
     for column in range(STATES):
         _transition(covariance[:, column], turn, force, gravity, dt)
     for row in range(STATES):
@@ -100,7 +101,7 @@ def _move_covariance(
 
 @inner_kernel
 def _transition(error: Array, turn: Array, force: Array, gravity: Array, dt: float) -> None:
-    """Errors (17,) a step later, in place: each line takes what later ones have not changed yet."""
+    """Propagates errors (17,) in place; each line uses only values not changed yet."""
     for i in range(3):
         error[i] += dt * error[3 + i]
     tx, ty, tz = error[6], error[7], error[8]
@@ -118,7 +119,7 @@ def _transition(error: Array, turn: Array, force: Array, gravity: Array, dt: flo
 
 @inner_kernel
 def add_error(state: Array, error: Array) -> None:
-    """Correct a state (19,) by errors (17,)."""
+    """Corrects a state (19,) by errors (17,)."""
     for i in range(3):
         state[P + i] += error[i]
         state[V + i] += error[3 + i]
@@ -134,7 +135,7 @@ def add_error(state: Array, error: Array) -> None:
 
 @brief_kernel
 def remember(times: NDArray[np.int64], states: Array, time_ns: int, state: Array) -> None:
-    """Let times (M,) and states (M, 19) end with a new one, without the oldest."""
+    """Shifts times (M,) and states (M, 19) by one and appends a new state."""
     last = len(times) - 1
     for k in range(last):
         times[k] = times[k + 1]
@@ -149,7 +150,10 @@ def remember(times: NDArray[np.int64], states: Array, time_ns: int, state: Array
 def observe(
     state: Array, covariance: Array, row: Array, innovation: float, variance: float
 ) -> float:
-    """Take in one number; `row` (17,) is its derivative. Returns the normalised innovation."""
+    """Applies a scalar measurement; `row` (17,) is its derivative.
+
+    Returns the normalized innovation.
+    """
     gain = np.zeros(STATES)
     for i in range(STATES):
         for k in range(STATES):
@@ -169,5 +173,5 @@ def observe(
 
 @inner_kernel
 def turned(state: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """A vector of the body along the world's axes."""
+    """Returns a vector of the body along the world's axes."""
     return rotate_vector(state[Q], state[Q + 1], state[Q + 2], state[Q + 3], x, y, z)

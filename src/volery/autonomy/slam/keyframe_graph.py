@@ -1,4 +1,4 @@
-"""The way in the map: keyframes, how they follow each other, and what places seen again correct."""
+"""The keyframe graph in the map: keyframes, odometry edges and loop closures."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ Array = NDArray[np.float64]
 _STEP_M, _STEP_RAD, _STEP_S = 2.0, 0.6, 10.0
 """Motion, or time, between keyframes."""
 _LOST_STEP_S = 2.0
-"""Time likewise while it is lost: it may hold still until it is known where in the map it is."""
+"""Time between keyframes while tracking is lost, as the vehicle may hover until relocalization."""
 _RELEVEL_NS = 25 * NS_PER_S
-"""So long the steps between keyframes follow what is learnt of where down is."""
+"""Period for which new estimates of gravity still correct earlier steps between keyframes."""
 _PER_ROOT_M = np.array([0.015, 0.015, 0.015, 0.0006])
-"""How odometry goes astray over sqrt(m): m and rad (measured on recorded flights)."""
+"""Drift of the odometry over sqrt(m): m and rad (measured on recorded flights)."""
 _APART_M = 40.0
-"""Way flown between a keyframe and one that it may be matched with."""
+"""Min distance flown between a keyframe and a loop closure candidate."""
 _NEAR_M = 12.0
 _ASTRAY = np.array([1000.0, 1000.0, 1000.0, 3.0])
-"""Standard deviations of the step over which the motion was lost."""
+"""Standard deviations of the step over which tracking was lost."""
 
 
 class KeyframePose(NamedTuple):
@@ -52,7 +52,10 @@ class KeyframePose(NamedTuple):
 
 
 class KeyframeGraph:
-    """Keyframes of one vehicle and their graph; `start` (4,) is the first one's pose in the map."""
+    """Holds the keyframes of one vehicle and their graph.
+
+    `start` (4,) is the first keyframe's pose in the map.
+    """
 
     _STATE = (
         "frames", "poses", "edges", "closures", "refused", "session", "is_placed", "correction",
@@ -65,22 +68,22 @@ class KeyframeGraph:
         self._closer = LoopCloser(matching) if has_loops else None
         self._start = np.asarray(start, np.float64)
         self._settling = np.array([0.0, 0.0, 0.0, 1.0])
-        """How the vehicle turned on its feet since it was at the start."""
+        """Rotation since the start pose, before the flight, (4,)."""
         self.frames: list[Keyframe] = []
         self.poses: list[Array] = []
-        """Of the keyframes in the map, (4,) x, y, z, yaw."""
+        """Poses of the keyframes in the map, (4,) x, y, z, yaw."""
         self.edges: list[PoseGraphEdge] = []
         self.closures = self.refused = 0
         self.session = 0
         self.is_placed = True
-        """Whether it is known where in the map the present session is."""
+        """Whether the current session's pose in the map is known."""
         self.correction = KeyframePose(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
         self.relocation = Relocalization()
         self._gathering = KeyframeBuilder()
         self._tried = -1_000
 
     def add(self, seen: SweepPoints, tracker: Tracker) -> bool:
-        """Take in a sweep; whether it has led to a new keyframe."""
+        """Adds a sweep; returns whether it has led to a new keyframe."""
         if seen.is_drawn:
             self._gathering.add(seen.points, seen.kinds)
         if not self._is_due(tracker):
@@ -96,11 +99,11 @@ class KeyframeGraph:
         return True
 
     def begin_anew(self, doubted_since_ns: int | None = None, moved: Array | None = None) -> None:
-        """The motion was lost: from now on nobody knows where in the map the odometry is.
+        """Begins a new session after tracking was lost; its pose in the map is unknown.
 
-        Keyframes since then may be of another place than they say already, and so are all those of
-        a session that has never found its place. `moved`: (2,) m in the odometry's frame, by how
-        much it seems to have been displaced.
+        Keyframes since `doubted_since_ns` may already have wrong poses, and so may all those of a
+        session that was never relocalized. `moved`: (2,) m in the odometry's frame, estimated
+        displacement.
         """
         doubted = {
             k
@@ -117,19 +120,22 @@ class KeyframeGraph:
         self._gathering = KeyframeBuilder()
 
     def pose(self, tracker: Tracker) -> tuple[Array, Array]:
-        """Present position (3,) and attitude (4,) in the map."""
+        """Returns the current position (3,) and attitude (4,) in the map."""
         at = self.correction
         position = rotations.rotate(at.attitude, tracker.state[:3]) + at.position
         return position, rotations.multiply(at.attitude, tracker.state[Q : Q + 4])
 
     def sigmas(self, tracker: Tracker) -> Array:
-        """Standard deviations (4,) of x, y, z, yaw in the map: by the way from a known place."""
+        """Returns standard deviations (4,) of x, y, z, yaw in the map, from the distance flown.
+
+        The distance counts from the last loop closure.
+        """
         if not self.is_placed:
             return _ASTRAY
         known = 0.0
         for edge in self.edges:
             if edge.is_closure:
-                # Seen again from where it began, it is as sure as then.
+                # A loop closure resets the drift to that of the older keyframe.
                 known = max(
                     known, self.frames[edge.to].travelled_m - self.frames[edge.origin].travelled_m
                 )
@@ -168,13 +174,13 @@ class KeyframeGraph:
         self._level_again(gravity)
 
     def _begin_pose(self, gravity: Array) -> Array:
-        """Of the first keyframe in the map, (4,): where it stood, by what is known of gravity."""
+        """Returns the first keyframe's pose (4,) in the map, by the current estimate of gravity."""
         attitude = self.frames[0].attitude
         turn = turn_of_heading(level_of(gravity, attitude), attitude, self._settling)
         return np.add(self._start, [0.0, 0.0, 0.0, turn])
 
     def _level_again(self, gravity: Array) -> None:
-        """Take what is now known of gravity for the last keyframes, too."""
+        """Applies the current estimate of gravity to the last keyframes."""
         first = len(self.frames) - 1
         newest = self.frames[-1]
         while (
@@ -193,7 +199,7 @@ class KeyframeGraph:
             self.edges[n] = edge._replace(measured=step)
             self.poses[edge.to] = compose(self.poses[edge.origin], step)
 
-    # ------------------------------------------------------------------------------ known places
+    # ---------------------------------------------------------------------------- loop closures
 
     def _look_for_known_places(self) -> None:
         if self._closer is None:
@@ -212,7 +218,7 @@ class KeyframeGraph:
         self.poses = optimised(self.poses, self.edges)
 
     def _find_near(self, newest: int) -> PoseGraphEdge | None:
-        """The nearest old keyframe, if it fits; at every second keyframe at most."""
+        """Matches the nearest old keyframe; at every second keyframe at most."""
         if newest - self._tried < 2 or self._closer is None:
             return None
         here = self.frames[newest]
@@ -238,7 +244,7 @@ class KeyframeGraph:
         return found.edge
 
     def _correct(self, gravity: Array) -> None:
-        """Where the odometry's frame lies, by the newest keyframe."""
+        """Updates the transform of the odometry's frame from the newest keyframe."""
         frame, pose = self.frames[-1], self.poses[-1]
         level = level_of(gravity, frame.attitude)
         turn = rotations.multiply(
@@ -247,11 +253,11 @@ class KeyframeGraph:
         self.correction = KeyframePose(pose[:3] - rotations.rotate(turn, frame.position), turn)
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         return save_attributes(self, self._STATE)
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         restore_attributes(self, state)
 
 

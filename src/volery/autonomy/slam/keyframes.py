@@ -1,4 +1,4 @@
-"""What is remembered of the way: every few metres where it was, and what stood around it."""
+"""Keyframes: every few metres a pose and the returns around it."""
 
 from __future__ import annotations
 
@@ -18,33 +18,33 @@ _MOST_POINTS = {UPRIGHT: 400, GROUND: 150}
 
 
 class Keyframe(NamedTuple):
-    """A place on the way; its axes are level, x along the vehicle's heading."""
+    """Pose and returns of a keyframe; its axes are level, x along the vehicle's heading."""
 
     time_ns: int
     position: Array
-    """(3,) in the frame of the odometry."""
+    """(3,) m, in the frame of the odometry."""
     attitude: Array
-    """(4,) likewise."""
+    """(4,) in the frame of the odometry."""
     travelled_m: float
     points: Array
     """(K, 3) m, returns around it in its axes."""
     kinds: NDArray[np.int8]
-    """(K,) what they are of."""
+    """(K,) kinds of the returns."""
     session: int
-    """Counts how often the motion was lost: within one the odometry is of one piece."""
+    """Number of tracking losses before it; within a session the odometry is continuous."""
 
 
 class Level(NamedTuple):
-    """How a keyframe's axes lie in the odometry's."""
+    """Orientation of a keyframe's axes in the odometry's."""
 
     attitude: Array
-    """(4,) level from odometry: gravity points along -z afterwards."""
+    """(4,) level from odometry: it rotates gravity to -z."""
     yaw: float
-    """Of the vehicle about the true vertical, rad."""
+    """Heading of the vehicle about the true vertical, rad."""
 
 
 def levelling(gravity: Array) -> Array:
-    """The smallest turn (4,) after which `gravity` (3,) points straight down."""
+    """Returns the smallest rotation (4,) that turns `gravity` (3,) straight down."""
     x, y, z = (-gravity / norm(gravity)).tolist()
     axis = np.array([y, -x, 0.0])
     sine = norm(axis)
@@ -54,15 +54,15 @@ def levelling(gravity: Array) -> Array:
 
 
 def level_of(gravity: Array, attitude: Array) -> Level:
-    """Level axes of a vehicle with `attitude` (4,) where gravity is `gravity` (3,)."""
+    """Returns the level axes of a vehicle with `attitude` (4,) under `gravity` (3,)."""
     turn = levelling(gravity)
     return Level(turn, float(rotations.yaw_of(rotations.multiply(turn, attitude))))
 
 
 def turn_of_heading(level: Level, attitude: Array, settling: Array) -> float:
-    """Turn of the heading, rad, while a vehicle turned by `settling` (4,), in its own axes.
+    """Returns the change of heading, rad, of a vehicle that rotated by `settling` (4,), body axes.
 
-    It ended at `attitude` (4,), whose level axes are `level`.
+    `attitude` (4,) is that at the end; its level axes are `level`.
     """
     ahead = rotations.multiply(rotations.from_rpy(0.0, 0.0, -level.yaw), level.attitude)
     before = rotations.multiply(rotations.multiply(ahead, attitude), rotations.conjugate(settling))
@@ -70,7 +70,7 @@ def turn_of_heading(level: Level, attitude: Array, settling: Array) -> float:
 
 
 def step_between(one: Keyframe, position: Array, attitude: Array, gravity: Array) -> Array:
-    """The step (4,) x, y, z, yaw from a keyframe to a pose of the odometry."""
+    """Returns the step (4,) x, y, z, yaw from a keyframe to a pose of the odometry."""
     here, there = level_of(gravity, one.attitude), level_of(gravity, attitude)
     moved = rotations.rotate(here.attitude, position - one.position)
     c, s = math.cos(here.yaw), math.sin(here.yaw)
@@ -81,14 +81,14 @@ def step_between(one: Keyframe, position: Array, attitude: Array, gravity: Array
 
 
 class KeyframeBuilder:
-    """Returns since the last keyframe, in the odometry's frame."""
+    """Collects the returns since the last keyframe, in the odometry's frame."""
 
     def __init__(self) -> None:
         self._points: list[Array] = []
         self._kinds: list[NDArray[np.int8]] = []
 
     def add(self, points: Array, kinds: NDArray[np.int8]) -> None:
-        """Remember some returns (K, 3)."""
+        """Adds returns (K, 3)."""
         useful = (kinds == UPRIGHT) | (kinds == GROUND)
         self._points.append(points[useful])
         self._kinds.append(kinds[useful])
@@ -96,7 +96,10 @@ class KeyframeBuilder:
     def keyframe(
         self, time_ns: int, state: tuple[Array, Array, Array], travelled_m: float, session: int
     ) -> Keyframe:
-        """End it at a pose: `state` is position (3,), attitude (4,) and gravity (3,)."""
+        """Returns the keyframe at a pose and begins the next one.
+
+        `state` is position (3,), attitude (4,) and gravity (3,).
+        """
         position, attitude, gravity = state
         level = level_of(gravity, attitude)
         points = np.concatenate([*self._points, np.zeros((0, 3))])
@@ -111,7 +114,7 @@ class KeyframeBuilder:
 
 
 def _spread(kinds: NDArray[np.int8], kind: int) -> NDArray[np.int64]:
-    """Rows of a kind, thinned out evenly."""
+    """Returns rows of a kind, thinned evenly."""
     rows = np.flatnonzero(kinds == kind)
     most = _MOST_POINTS[kind]
     if len(rows) <= most:

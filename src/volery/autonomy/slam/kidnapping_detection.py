@@ -1,7 +1,8 @@
-"""Whether what is seen goes on as it was: beside what was seen just before, not beside a map.
+"""Detects kidnapping: compares the newest returns with those just before, not with the map.
 
-A map says little of a displacement: much that comes into sight is new to it, too, and among many
-trunks a good part of any sweep meets something. From one instant to the next little is new.
+A comparison with the map detects displacements poorly: in flight, many returns are new to the map
+as well, and among many trunks a large part of any sweep matches something. From one instant to the
+next few returns are new.
 """
 
 from __future__ import annotations
@@ -18,22 +19,22 @@ from volery.core.clock import NS_PER_S
 Array = NDArray[np.float64]
 
 _NOW_NS, _BEFORE_NS = NS_PER_S // 4, 2 * NS_PER_S
-"""The instant that is judged, and the time before it with which it is compared."""
+"""Duration of the instant that is checked, and of the time before it that it is compared with."""
 _ENOUGH = 40
-"""Returns of things that stand, now and before, from which on their shares say something."""
+"""Min number of returns of upright objects, now and before, for a comparison."""
 _MOST, _NOTHING = 0.8, 0.15
-"""Shares that go on from which all is well, and below which it is surely elsewhere."""
+"""Continuing fraction from which all is well, and below which the vehicle was surely moved."""
 _BETTER, _ALONE = 0.25, 0.13
-"""By how much one other place must fit better than the present one, and than any third one.
+"""Margins by which one other position must fit better than the present one, and than any third one.
 
-What is seen of a slope moves along it as the vehicle tilts, and then fits at many places. In 30,000
-instants of flights through forests, dense and sparse, no other place fitted so; the share fell to
-0.20 at the least. In the dense one 84 of 90 displacements by 2.8 to 5 m and 35 of 36 by 1.5 m were
-noticed at once, in the sparse one 60 of 75 and 26 of 33, as long as enough was in reach.
+Returns from a slope move along it as the vehicle tilts, and then fit at many positions. In 30,000
+instants of flights through forests, dense and sparse, no other position fitted so; the min fraction
+was 0.20. In the dense forest 84 of 90 displacements by 2.8 to 5 m and 35 of 36 by 1.5 m were
+detected at once, in the sparse one 60 of 75 and 26 of 33, as long as enough was in range.
 """
 _PICTURE, _CELL_M = 400, 0.2
 _STEP_M, _NEAREST_M, _FARTHEST_M = 0.4, 1.1, 6.0
-"""Of the other places that are tried; nearer ones may look like the present one."""
+"""Spacing and range of the other positions; nearer ones may look like the present one."""
 
 
 def _ring() -> Array:
@@ -45,11 +46,11 @@ def _ring() -> Array:
 
 
 _STEPS = _ring()
-"""(K, 2) m to the places that are tried."""
+"""(K, 2) m: offsets of the positions that are tried."""
 
 
 class _Glance(NamedTuple):
-    """What one sweep saw of things that stand."""
+    """Upright returns of one sweep."""
 
     time_ns: int
     is_level: bool
@@ -58,29 +59,29 @@ class _Glance(NamedTuple):
 
 
 class _View(NamedTuple):
-    """What was seen in some time, in m from where the vehicle is now."""
+    """Returns of a period, in m from the vehicle's present position."""
 
     places: Array
-    """(K, 2) of the level LIDAR's returns in an instant of it."""
+    """(K, 2): returns of the level LIDAR in its newest instant."""
     picture: NDArray[np.uint8]
-    """Where any LIDAR saw something in all of it."""
+    """Occupancy by all LIDARs' returns of the whole period."""
 
 
 class KidnappingDetector:
-    """The last seconds of what stands around; `is_broken` once it was exchanged for something else.
+    """Holds the last seconds of upright returns; `is_broken` once they no longer continue.
 
-    A level LIDAR's sweeps, which see the same things again and again, are judged by what all
-    sweeps have seen.
+    Sweeps of a level LIDAR, which observes the same objects again and again, are compared with the
+    sweeps of all LIDARs.
     """
 
     def __init__(self) -> None:
         self.is_broken = False
         self.moved: Array | None = None
-        """(2,) m by which it was displaced then, in the frame of the odometry, if that is known."""
+        """(2,) m, estimated displacement in the frame of the odometry; None: unknown."""
         self._glances: deque[_Glance] = deque()
 
     def take(self, time_ns: int, places: Array, here: Array, *, is_level: bool) -> None:
-        """Go on with the places (K, 2) of a sweep's returns, seen from `here` (2,)."""
+        """Adds the positions (K, 2) of a sweep's returns, seen from `here` (2,)."""
         self._glances.append(_Glance(time_ns, is_level, places))
         while self._glances[0].time_ns <= time_ns - _NOW_NS - _BEFORE_NS:
             self._glances.popleft()
@@ -102,14 +103,14 @@ class KidnappingDetector:
 
 
 def _shares(now: _View, before: _View) -> tuple[float, float]:
-    """Of what is seen now that was seen before, and of what was seen before that is seen now."""
+    """Returns the fraction of new returns seen before, and of old returns still seen."""
     onwards = count_drawn(now.places, _CELL_M, before.picture) / len(now.places)
     back = count_drawn(before.places, _CELL_M, now.picture) / len(before.places)
     return onwards, back
 
 
 def _only_other_place(now: _View, before: _View, here: float) -> Array | None:
-    """Step (2,) m to where it fits far better than `here`, and than anywhere else."""
+    """Returns the step (2,) m to the only position that fits far better than `here`, if any."""
     shares = np.empty(len(_STEPS))
     shares_around(now.places, before.picture, before.places, now.picture, _CELL_M, _STEPS, shares)
     best = int(np.argmax(shares))

@@ -1,4 +1,4 @@
-"""Odometry whose frame is level, though the frame that the tracker's map lies in stands aslant."""
+"""Odometry in a level frame, although the frame of the tracker's map may be tilted."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ Array = NDArray[np.float64]
 
 
 class LevelOdometry:
-    """Adds up the tracker's motion, each piece turned level by what is known of gravity by then.
+    """Integrates the tracker's motion; each step is levelled by the current estimate of gravity.
 
-    So it neither jumps nor leans as gravity becomes known: whoever flies by it and by an IMU takes
-    gravity to point straight down.
+    So the odometry neither jumps nor tilts as the estimate improves: users combine it with an IMU
+    and assume that gravity points straight down.
     """
 
     _STATE = ("_was", "position")
@@ -27,10 +27,10 @@ class LevelOdometry:
     def __init__(self) -> None:
         self._was: Array | None = None
         self.position = np.zeros(3)
-        """(3,) m, where the vehicle is in it."""
+        """(3,) m, position of the vehicle in the level frame."""
 
     def follow(self, state: Array) -> tuple[Array, Array]:
-        """Position (3,) and attitude (4,) in it, for a state (19,) of the tracker."""
+        """Returns position (3,) and attitude (4,) in the level frame, for a tracker state (19,)."""
         turn = levelling(state[G : G + 3])
         if self._was is None:
             self.position = state[:3].copy()
@@ -40,9 +40,9 @@ class LevelOdometry:
         return self.position, rotations.multiply(turn, state[Q : Q + 4])
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         return save_attributes(self, self._STATE)
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         restore_attributes(self, state)

@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 @inner_kernel
 def _pivot(matrix: Array, j: int) -> int:
-    """The row from j on with the largest number in column j."""
+    """Returns the row from j on with the largest magnitude in column j."""
     found = j
     for i in range(j + 1, matrix.shape[0]):
         if abs(matrix[i, j]) > abs(matrix[found, j]):
@@ -28,9 +28,9 @@ def _swap(matrix: Array, one: int, other: int) -> None:
 
 @inner_kernel
 def eliminate(matrix: Array, right: Array) -> bool:
-    """Replace `right` (n, m) by the solution of `matrix` (n, n) X = right; False: singular.
+    """Replaces `right` (n, m) by the solution of `matrix` (n, n) X = right; False: singular.
 
-    Gauss's elimination with partial pivoting; `matrix` is used up.
+    It is Gaussian elimination with partial pivoting and overwrites `matrix`.
     """
     n, m = right.shape
     for j in range(n):
@@ -56,7 +56,7 @@ def eliminate(matrix: Array, right: Array) -> bool:
 
 @brief_kernel
 def block(matrix: Array, rows: NDArray[np.int64]) -> Array:
-    """The square part (K, K) of a matrix that lies in rows and columns `rows` (K,)."""
+    """Returns the submatrix (K, K) of rows and columns `rows` (K,)."""
     out = np.empty((len(rows), len(rows)))
     for i in range(len(rows)):
         for k in range(len(rows)):

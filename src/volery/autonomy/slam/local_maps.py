@@ -1,4 +1,4 @@
-"""What has been seen around the vehicle: uprights, and the ground."""
+"""Local maps around the vehicle: uprights and ground."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from volery.autonomy.slam.upright_kernels import CELLS, LAYERS
 
 
 class Submaps:
-    """Both as tables that kernels fill, in the frame of the odometry."""
+    """Holds both maps as tables that kernels fill, in the frame of the odometry."""
 
     def __init__(self) -> None:
         self.upright_keys = np.full((CELLS, CELLS, LAYERS), -1, np.int64)

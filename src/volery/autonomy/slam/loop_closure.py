@@ -1,4 +1,4 @@
-"""Seeing places again: sets of keyframes matched with others that were seen before."""
+"""Loop closures: matches sets of keyframes with older ones."""
 
 from __future__ import annotations
 
@@ -23,36 +23,38 @@ _ROUNDS = 8
 _BEFORE, AROUND = 2, 3
 """Keyframes before the newest one, and on both sides of the older one, that are matched."""
 _LEAST_SHARE, _LEAST_MET = 0.42, 30.0
-"""Share and number of uprights that must be met again, each counted by how well."""
+"""Min fraction and number of matched uprights, weighted by how well they fit."""
 _LEAST_SHARE_LOST, _LEAST_MET_LOST = 0.2, 80.0
 _LEAST_MARGIN_LOST = 0.05
-"""By how much its place must fit better than all others.
+"""Margin by which the found position must fit better than all others.
 
-Of 480 pairs of keyframes of flights through the forest, matched within 12 m and 0.2 rad, those that
-lay so near had margins of 0.22 in the median, nine of ten above 0.12, and nine of ten a share of
-0.21; those farther apart, which fitted somewhere all the same, had margins of 0.10 at the most, but
-shares of up to 0.39, in a thicket.
+Of 480 pairs of keyframes of flights through the forest, matched within 12 m and 0.2 rad, pairs that
+were that near had margins of 0.22 in the median, nine of ten above 0.12, and nine of ten a fraction
+of 0.21; pairs farther apart, which fitted somewhere nevertheless, had margins of 0.10 at most, but
+fractions of up to 0.39, in a thicket.
 """
 _APART_M = 1.5
-"""A place so far from the best one is another one."""
+"""Distance from the best position beyond which a position is another one."""
 _LEAST_INFORMATION = 2000.0
-"""1/m^2, of the place in the weakest direction: what three trunks tell, seen ten times each."""
+"""1/m^2, min information on the position in the weakest direction: that of three trunks, hit ten
+times each.
+"""
 _FLOOR = np.array([0.06, 0.06, 0.06, 0.004])
-"""Least standard deviation of a closure: what the map's own errors are."""
+"""Min standard deviations of a closure, for the map's own errors."""
 
 
 class LoopClosure(NamedTuple):
-    """A place seen again, and how surely."""
+    """A loop closure and its quality."""
 
     edge: PoseGraphEdge
     share: float
     met: float
     margin: float
-    """By how much it fits better than any other place that was tried."""
+    """Margin over every other position that was tried."""
 
 
 class _Trial(NamedTuple):
-    """How finely places are tried: cells of a picture, turns, and returns (all but so many)."""
+    """Resolution of a search: cell size of the occupancy image, angular step, number of returns."""
 
     cell_m: float
     step_rad: float
@@ -65,7 +67,7 @@ _NEARBY, _ANYWHERE, _ANY_HEADING = (
 
 
 class _Pair(NamedTuple):
-    """What is matched: returns (K, 3) in the axes of a keyframe, and their kinds (K,)."""
+    """Sets to match: returns (K, 3) in the axes of a keyframe, and their kinds (K,)."""
 
     query: Array
     query_kinds: NDArray[np.int8]
@@ -74,7 +76,7 @@ class _Pair(NamedTuple):
 
 
 class LoopCloser:
-    """Matches sets of keyframes; `poses` are theirs in the map, (4,) each."""
+    """Matches sets of keyframes; `poses` are their poses in the map, (4,) each."""
 
     def __init__(self, matching: ScanMatching) -> None:
         self._matching = matching
@@ -89,9 +91,9 @@ class LoopCloser:
         older: int,
         reach: tuple[float, float],
     ) -> LoopClosure | None:
-        """The newest keyframe as seen from an older one; None where they do not fit.
+        """Returns the newest keyframe relative to an older one; None if they do not fit.
 
-        `reach`: how far the newest one may be from where it seems to be, m and rad.
+        `reach`: max error of the newest one's estimated pose, m and rad.
         """
         pair = _pair(frames, poses, newest, older)
         if pair is None:
@@ -112,10 +114,10 @@ class LoopCloser:
         older: int,
         reach: tuple[float, float],
     ) -> LoopClosure | None:
-        """The newest keyframe of one that is lost as seen from an older one; maybe only a guess.
+        """Returns a hypothesis for a lost vehicle's newest keyframe relative to an older one.
 
-        `reach`: how far it may be from the older one, m, and from the heading that it seems to
-        have, rad.
+        `reach`: max distance from the older one, m, and from the estimated heading, rad. None if no
+        pose fits.
         """
         pair = _pair(frames, poses, newest, older)
         if pair is None:
@@ -137,7 +139,7 @@ class LoopCloser:
     def _searched(
         self, pair: _Pair, middle: Array, span: Array, trial: _Trial
     ) -> tuple[Array, float]:
-        """The pose (3,) x, y, yaw that fits best, and by how much better than any other place."""
+        """Returns the best pose (3,) x, y, yaw, and its margin over any other position."""
         standing = pair.query[pair.query_kinds == UPRIGHT]
         known = pair.known[pair.known_kinds == UPRIGHT]
         draw(np.ascontiguousarray(known[:, :2]), trial.cell_m, self._picture)
@@ -172,7 +174,7 @@ class LoopCloser:
         spread = np.linalg.inv(m.trust * information + 1e-3 * np.eye(4))
         sigmas = np.hypot(np.sqrt(np.maximum(np.diag(spread), 0.0)), _FLOOR)
         if told[2] < 20.0:
-            sigmas[2] = 10.0  # no ground in common: the height stays open
+            sigmas[2] = 10.0  # no common ground: the height stays open
         pose[3] = math.remainder(pose[3], math.tau)
         edge = PoseGraphEdge(rows[0], rows[1], pose.copy(), sigmas, True)
         return LoopClosure(edge, float(told[0] / max(told[1], 1.0)), float(told[0]), margin)
@@ -181,7 +183,7 @@ class LoopCloser:
 def _pair(
     frames: Sequence[Keyframe], poses: Sequence[Array], newest: int, older: int
 ) -> _Pair | None:
-    """The newest keyframes and those around an older one; None where too little is seen."""
+    """Returns the newest keyframes and those around an older one; None for too few returns."""
     query = _around(frames, poses, newest, range(newest - _BEFORE, newest + 1))
     if np.count_nonzero(query[1] == UPRIGHT) < _LEAST_MET:
         return None
@@ -190,7 +192,7 @@ def _pair(
 
 
 def _height(pair: _Pair) -> float:
-    """How much higher the newest frame flew over its ground than the older one over its own."""
+    """Returns how much higher over ground the newest keyframe was than the older one, m."""
     query = pair.query[pair.query_kinds != UPRIGHT]
     known = pair.known[pair.known_kinds != UPRIGHT]
     if not len(known) or not len(query):
@@ -201,7 +203,7 @@ def _height(pair: _Pair) -> float:
 def _around(
     frames: Sequence[Keyframe], poses: Sequence[Array], row: int, rows: range
 ) -> tuple[Array, NDArray[np.int8]]:
-    """Returns of some keyframes of one session in the axes of one of them."""
+    """Returns the returns of keyframes of one session in the axes of one of them."""
     points, kinds = [], []
     for k in rows:
         if not 0 <= k < len(frames) or frames[k].session != frames[row].session:

@@ -1,4 +1,4 @@
-"""How well a sweep fits the map, beside what is usual."""
+"""Quality of a sweep's fit to the map, relative to recent sweeps."""
 
 from __future__ import annotations
 
@@ -12,36 +12,39 @@ from volery.core.clock import NS_PER_S
 Array = NDArray[np.float64]
 
 MANY, MISFIT = 15.0, 0.25
-"""Returns from which on their share says something, and how far below the usual one is too low.
+"""Min number of returns for a check, and min matched fraction relative to the usual one.
 
-Where much comes into sight for the first time the share falls to half of the usual one, where
-nothing is as it was to a twentieth (recorded flights).
+In new surroundings the fraction falls to half of the usual one, after a kidnapping to a twentieth
+(recorded flights).
 """
 _USUAL_S = 10.0
-"""Time over which what is usual changes (modelling choices)."""
+"""Time constant of the usual fraction (modelling choices)."""
 
 
 @dataclass
 class Match:
-    """What the newest sweep of a LIDAR said."""
+    """Result of a LIDAR's newest sweep."""
 
     time_ns: int = 0
     met: float = 0.0
-    """Uprights of the map that were met again, each by how well."""
+    """Matched uprights of the map, weighted by how well they fit."""
     seen: float = 0.0
-    """Returns that should have met one."""
+    """Returns that should match an upright."""
     ground: float = 0.0
     usual: float = 0.0
-    """Share of the returns that lately met something again."""
+    """Recent average of the matched fraction."""
 
     @property
     def fits(self) -> bool:
-        """Whether about as much is met again as is usual."""
+        """Whether the matched fraction is near the usual one."""
         return self.seen < MANY or self.met >= MISFIT * self.usual * self.seen
 
 
 def judged(told: Array, before: Match | None, time_ns: int) -> Match:
-    """What a sweep said (`told`, see `matching_kernels.gather`), after the one before it."""
+    """Returns the result of a sweep, after the previous one.
+
+    `told`: see `matching_kernels.gather`.
+    """
     found = Match(time_ns, float(told[0]), float(told[1]), float(told[2]))
     if before is not None:
         found.usual = before.usual

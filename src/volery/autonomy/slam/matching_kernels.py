@@ -1,8 +1,8 @@
-"""An update of the filter by one sweep: which returns are of what, and what they say of the pose.
+"""Filter update by one sweep: classification of returns, and their information on the pose.
 
-The update is that of an iterated error-state Kalman filter in the form for many measurements
-(W. Xu and F. Zhang, FAST-LIO, RA-L 2021): with prior P, and information A and gradient g of all
-returns on position and attitude, only 6 by 6 numbers are solved for.
+The update is that of an iterated error-state Kalman filter in the form for many measurements (W. Xu
+and F. Zhang, FAST-LIO, RA-L 2021): with prior P, and information A and gradient g of all returns on
+position and attitude, only a 6 by 6 system is solved.
 """
 
 from __future__ import annotations
@@ -24,23 +24,25 @@ Kinds = NDArray[np.int8]
 
 LEFT_OUT, UPRIGHT, GROUND, NEW_GROUND = 0, 1, 2, 3
 _ON_GROUND_M = 0.25
-"""A return so near the plane of known ground is of it."""
+"""Distance to the plane of known ground within which a return is ground."""
 _OVER_GROUND_M = 0.5
-"""Nothing lower than this counts as upright: grass, feet of trees, errors of the ground's map."""
+"""Height below which no return counts as upright: grass, feet of trees, errors of the ground
+map.
+"""
 _PER_M = 0.12
-"""How much farther ground that nobody has seen may be off, per metre (modelling choice)."""
+"""Growth of the height error of unobserved ground with distance, per metre (modelling choice)."""
 _LEVEL_M = 0.3
-"""Where nothing is known of the ground, what lies so much lower than the vehicle may be it."""
+"""Without known ground, returns so much lower than the vehicle may be ground."""
 _YOUNG = 25
-"""Cells of known ground around the vehicle below which it may begin away from them."""
+"""Known ground cells around the vehicle below which ground may begin away from them."""
 _GATE_M = 0.6
 _ROBUST = 2.0
-"""Normalised distance at which a return counts half (Cauchy's weight)."""
+"""Normalized distance at which a return's weight is one half (Cauchy's weight)."""
 
 
 @inner_kernel
 def _placed(state: Array, turn: Array, point: Array) -> tuple[float, float, float]:
-    """A point (3,) of the body in the world; `turn` is the matrix of the attitude."""
+    """Returns a point (3,) of the body in the world; `turn` is the matrix of the attitude."""
     bx, by, bz = point[0], point[1], point[2]
     return (
         state[P] + turn[0, 0] * bx + turn[0, 1] * by + turn[0, 2] * bz,
@@ -60,9 +62,9 @@ def classify(
     kinds: Kinds,
     planes: Array,
 ) -> None:
-    """Say of what returns (K, 3) are; `planes` (K, 3) gets height and slopes where it is ground.
+    """Classifies returns (K, 3); `planes` (K, 3) gets height and slopes for ground returns.
 
-    `broad` (6,) is the plane of the ground around the vehicle, of `known_broad` cells.
+    `broad` (6,) is the ground plane around the vehicle, from `known_broad` cells.
     """
     turn = np.empty((3, 3))
     rotation_matrix(state, turn)
@@ -104,7 +106,7 @@ def _add_row(information: Array, gradient: Array, row: Array, weight: float, off
 
 @inner_kernel
 def _fill_row(row: Array, nx: float, ny: float, nz: float, ax: float, ay: float, az: float) -> None:
-    """How a place at (ax, ay, az) from the vehicle moves along n: with position, with attitude."""
+    """Fills the derivative along n of a point at (ax, ay, az) from the vehicle, by pose."""
     row[0], row[1], row[2] = nx, ny, nz
     row[3] = ay * nz - az * ny
     row[4] = az * nx - ax * nz
@@ -125,7 +127,7 @@ def gather(
     gradient: Array,
     told: Array,
 ) -> None:
-    """Sum up what returns say; `told` (4,): uprights met again, of how many, ground, cost."""
+    """Sums up all returns; `told` (4,): matched uprights, of how many, ground, cost."""
     turn, row, found = np.empty((3, 3)), np.empty(6), np.empty(5)
     rotation_matrix(state, turn)
     information[:] = 0.0
@@ -156,7 +158,7 @@ def gather(
         robust = 1.0 / (1.0 + square / (_ROBUST * _ROBUST))
         told[0] += robust
         told[3] += square * robust
-        # W = L L': two rows that are independent of each other.
+        # W = L L': two independent rows.
         l11 = math.sqrt(wxx)
         l21 = wxy / l11
         l22 = math.sqrt(max(wyy - l21 * l21, 0.0))
@@ -171,7 +173,7 @@ def gather(
 
 @inner_kernel
 def _place_of(i: int) -> int:
-    """Row among the 17 errors of one of the six of the pose."""
+    """Returns the row among the 17 errors of one of the six of the pose."""
     return i if i < 3 else i + 3
 
 
@@ -197,9 +199,9 @@ def update(
     information: Array,
     told: Array,
 ) -> bool:
-    """Correct state (19,) and covariance (17, 17) by classified returns; False: nothing was solved.
+    """Corrects state (19,) and covariance (17, 17) by classified returns; False: unsolvable.
 
-    `information` (6, 6) and `told` (4,) are what they said at the end; see `gather`.
+    `information` (6, 6) and `told` (4,) are those of the last round; see `gather`.
     """
     prior, error = state.copy(), np.zeros(STATES)
     gradient, right, left = np.empty(6), np.empty((6, 1)), np.empty((6, 6))
@@ -238,7 +240,7 @@ def update(
 
 @owning_kernel
 def _shrink(covariance: Array, information: Array, trust: float) -> bool:
-    """P <- P - P S' (1 + A S P S')^-1 A S P."""
+    """Computes P <- P - P S' (1 + A S P S')^-1 A S P."""
     left, right = np.empty((6, 6)), np.empty((6, STATES))
     for i in range(6):
         for k in range(6):
@@ -274,7 +276,7 @@ def insert(
     ground_keys: Keys,
     sums: Array,
 ) -> None:
-    """Draw classified returns into the maps; what stands only if `is_upright`."""
+    """Inserts classified returns into the maps; uprights only if `is_upright`."""
     turn = np.empty((3, 3))
     rotation_matrix(state, turn)
     for n in range(points.shape[0]):
@@ -292,19 +294,19 @@ def insert(
 def broad_plane(
     state: Array, keys: Keys, sums: Array, around: int, slope: Array, plane: Array
 ) -> int:
-    """`plane_at` below the vehicle, for Python."""
+    """Calls `plane_at` below the vehicle, for Python."""
     return plane_at(keys, sums, state[P], state[P + 1], around, slope, plane)
 
 
 @kernel
 def seed_ground(keys: Keys, sums: Array, x: float, y: float, z: float) -> None:
-    """`add_ground`, for Python."""
+    """Calls `add_ground`, for Python."""
     add_ground(keys, sums, x, y, z)
 
 
 @kernel
 def carry_along(states: Array, before: Array, after: Array) -> None:
-    """Correct earlier states (M, 19) rigidly, as the newest one was: from `before` to `after`."""
+    """Corrects earlier states (M, 19) rigidly, like the newest one: from `before` to `after`."""
     bx, by, bz, bw = -before[Q], -before[Q + 1], -before[Q + 2], before[Q + 3]
     ax, ay, az, aw = after[Q], after[Q + 1], after[Q + 2], after[Q + 3]
     tx, ty, tz, tw = quaternion_product(ax, ay, az, aw, bx, by, bz, bw)

@@ -1,4 +1,4 @@
-"""What the SLAM node says, as messages."""
+"""Builds the messages of the SLAM nodes."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def _pose(position: Array, attitude: Array) -> Pose:
 
 
 def _matrix(covariance: Array) -> Array:
-    """(6, 6) as messages hold it."""
+    """Returns a covariance (6, 6) flattened and read-only, as messages hold it."""
     flat = np.ascontiguousarray(covariance).reshape(36)
     flat.flags.writeable = False
     return flat
@@ -47,9 +47,10 @@ def _matrix(covariance: Array) -> Array:
 def odometry(
     time_ns: int, uav: str, state: tuple[Array, Array, Array, Array], covariance: Array
 ) -> Odometry:
-    """Position (3,), attitude (4,), velocity (3,) in `uavN/odom`, rates (3,) in the body.
+    """Returns odometry of position (3,), attitude (4,), velocity (3,) in `uavN/odom`.
 
-    `covariance` (9, 9) is of position, velocity and attitude, about the frame's axes.
+    The fourth part of `state` is the angular velocity (3,) in the body. `covariance` (9, 9) is of
+    position, velocity and attitude, about the frame's axes.
     """
     position, attitude, velocity, omega = state
     of_pose = block(covariance, _OF_POSE)
@@ -68,7 +69,10 @@ def odometry(
 
 
 def pose_in_map(time_ns: int, position: Array, attitude: Array, sigmas: Array) -> object:
-    """`sigmas` (6,): of x, y, z, m, and of turns about the map's axes, rad."""
+    """Returns a pose in the map.
+
+    `sigmas` (6,): of x, y, z, m, and of rotations about the map's axes, rad.
+    """
     return POSE(
         header(time_ns, "map"),
         PoseWithCovariance(_pose(position, attitude), _matrix(np.diag(sigmas**2))),
@@ -76,13 +80,13 @@ def pose_in_map(time_ns: int, position: Array, attitude: Array, sigmas: Array) -
 
 
 def map_from_odom(time_ns: int, uav: str, position: Array, attitude: Array) -> TFMessage:
-    """The transform `map -> uavN/odom`."""
+    """Returns the transform `map -> uavN/odom`."""
     transform = Transform(Vector3(*map(float, position)), Quaternion(*map(float, attitude)))
     return TFMessage([TransformStamped(header(time_ns, "map"), f"{uav}/odom", transform)])
 
 
 def path(time_ns: int, times_ns: Sequence[int], poses: Sequence[Array]) -> PathMessage:
-    """Keyframes' poses (4,) x, y, z, yaw in the map."""
+    """Returns the path of the keyframes' poses (4,) x, y, z, yaw in the map."""
     stamped = []
     for when, (x, y, z, yaw) in zip(times_ns, poses, strict=True):
         turn = Quaternion(0.0, 0.0, math.sin(0.5 * float(yaw)), math.cos(0.5 * float(yaw)))

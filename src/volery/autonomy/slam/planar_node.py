@@ -1,4 +1,4 @@
-"""Where a ground vehicle, or a scanner in the hand, is: from one level LIDAR, without an IMU."""
+"""Estimates the pose of a ground vehicle or hand-held scanner: one level LIDAR, no IMU."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ from volery.graph.nodes.node import Node
 Array = NDArray[np.float64]
 
 _JUMP_NS = NS_PER_S // 2
-"""A stamp so far before the newest one is a clock that was set back."""
+"""Step back in stamps from which the clock has been set back."""
 _WAITING = 4
-"""Scans that wait for the odometry of their time."""
+"""Max number of scans that wait for the odometry of their time."""
 _PATH_NS = 2_000_000
-"""Between two paths for each keyframe in them."""
+"""Time between two paths, for each keyframe in them."""
 
 
 class PlanarSlam(Node):
@@ -48,13 +48,13 @@ class PlanarSlam(Node):
 
     Parameters
     ----------
-    start: [x, y, z, yaw] of where it begins in the map, m and rad; empty: the map begins there.
-    mount: [x, y, z, roll, pitch, yaw] of the LIDAR in the body, m and rad; empty: as `/tf_static`
-        has it, else at the body's origin.
-    odometry: whether `odom` is heard where there is one.
-    reach_m: farther returns are left out.
-    nearest_m: nearer ones are.
-    loop_closures: whether places that are seen again correct the map (needs gtsam).
+    start: [x, y, z, yaw] of the start pose in the map, m and rad; empty: the map begins there.
+    mount: [x, y, z, roll, pitch, yaw] of the LIDAR in the body, m and rad; empty: as in
+        `/tf_static`, else at the body's origin.
+    odometry: whether to subscribe to `odom`.
+    reach_m: max range of returns.
+    nearest_m: min range of returns.
+    loop_closures: whether loop closures correct the map (needs gtsam).
 
     """
 
@@ -71,7 +71,7 @@ class PlanarSlam(Node):
 
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Returns the tasks that compile its kernels."""
+        """Returns the tasks that compile the kernels of this node."""
         from volery.autonomy.slam.planar import warmup
 
         return warmup.walls, warmup.told_places
@@ -126,20 +126,20 @@ class PlanarSlam(Node):
         self.create_timer(0.5, self._tell_status)
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         parts = {n: getattr(self, n).get_state() for n in ("_follower", "_way", "_odometry")}
         more = {"waiting": list(self._waiting), "joints": dict(self._joints.joints)}
         return {"parts": parts, **more, **save_attributes(self, self._PLAIN)}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         for name, part in state["parts"].items():
             getattr(self, name).set_state(part)
         self._waiting = list(state["waiting"])
         self._joints.joints = dict(state["joints"])
         restore_attributes(self, {name: state[name] for name in self._PLAIN})
 
-    # ------------------------------------------------------------------------------ what it hears
+    # ------------------------------------------------------------------------------ subscriptions
 
     def _on_joints(self, message: TFMessage) -> None:
         self._joints.add(message)
@@ -171,7 +171,7 @@ class PlanarSlam(Node):
         self._follower.set_clock(time_ns)
 
     def _take_waiting(self) -> None:
-        """Take scans in as soon as the odometry of their time is known, or late."""
+        """Processes scans as soon as the odometry of their time has arrived, or is late."""
         while self._waiting:
             newest, time_ns = self._odometry.newest_ns, stamp_of(self._waiting[0])
             awaited = newest is not None and time_ns - NS_PER_S <= newest < time_ns
@@ -197,7 +197,7 @@ class PlanarSlam(Node):
         if self._way.frames:
             self._tell_place(time_ns)
 
-    # ------------------------------------------------------------------------------ what it tells
+    # ---------------------------------------------------------------------------------- publishers
 
     def _tell_place(self, time_ns: int) -> None:
         motion = self._follower.motion
@@ -251,7 +251,7 @@ class PlanarSlam(Node):
         self._tell_path()
 
     def _tell_path(self) -> None:
-        """Where keyframes have come or moved; the longer it is the more rarely."""
+        """Publishes changed keyframes; the longer the path, the less often."""
         way, now = self._way, self.get_clock().now_ns()
         is_due = now < self._path_ns or now - self._path_ns >= len(way.frames) * _PATH_NS
         if way.changes == self._path_of or not is_due:
@@ -264,7 +264,7 @@ class PlanarSlam(Node):
         self._path.publish(messages.path(self._taken_ns or times[-1], times, poses))
 
     def _odometry_heard_ns(self) -> int | None:
-        """When the odometry was last told, by the node's clock as far as stamps follow it."""
+        """Returns the time of the last odometry, by the node's clock as far as stamps follow it."""
         newest = self._odometry.newest_ns
         if newest is None or self._taken_ns is None:
             return None

@@ -1,8 +1,8 @@
-"""Keyframes in a pose graph: how they follow each other, and where a place was seen again.
+"""Optimizes the pose graph of keyframes: odometry edges and loop closures.
 
-Tilt is known from gravity, so that a keyframe has four numbers: x, y and yaw in a gtsam graph of
-Pose2, and height beside it. Loop closures have a robust kernel (Geman and McClure's); the
-optimiser is Levenberg's and Marquardt's, with a bounded number of rounds.
+Tilt is known from gravity, so a keyframe has four values: x, y and yaw in a gtsam graph of Pose2,
+and height beside it. Loop closures have a robust kernel (Geman-McClure); the optimizer is
+Levenberg-Marquardt with a bounded number of iterations.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _ROUNDS = 12
 
 
 class PoseGraphEdge(NamedTuple):
-    """Keyframe `to` as seen from keyframe `origin`."""
+    """Pose of keyframe `to` relative to keyframe `origin`."""
 
     origin: int
     to: int
@@ -33,7 +33,7 @@ class PoseGraphEdge(NamedTuple):
 
 
 def compose(pose: Array, step: Array) -> Array:
-    """The pose (4,) x, y, z, yaw that lies `step` (4,) from `pose`."""
+    """Returns the pose (4,) x, y, z, yaw that lies `step` (4,) from `pose`."""
     c, s = math.cos(pose[3]), math.sin(pose[3])
     return np.array(
         [
@@ -46,7 +46,7 @@ def compose(pose: Array, step: Array) -> Array:
 
 
 def between(pose: Array, other: Array) -> Array:
-    """The step (4,) from `pose` to `other`."""
+    """Returns the step (4,) from `pose` to `other`."""
     c, s = math.cos(pose[3]), math.sin(pose[3])
     dx, dy = other[0] - pose[0], other[1] - pose[1]
     turn = math.remainder(other[3] - pose[3], math.tau)
@@ -54,7 +54,7 @@ def between(pose: Array, other: Array) -> Array:
 
 
 def optimised(poses: list[Array], edges: list[PoseGraphEdge]) -> list[Array]:
-    """Poses (4,) that fit the edges best; the first one stays."""
+    """Returns the poses (4,) that fit the edges best; the first one is fixed."""
     gtsam = load_gtsam()
     graph, start = gtsam.NonlinearFactorGraph(), gtsam.Values()
     heights = len(poses)
@@ -92,11 +92,11 @@ def _add(gtsam: Any, graph: Any, edge: PoseGraphEdge, heights: int) -> None:
 
 
 def load_gtsam() -> Any:
-    """The library; `NodeError` where it is not installed."""
+    """Returns the gtsam module. Raises NodeError if it is not installed."""
     try:
         import gtsam
     except ImportError as error:
         raise NodeError(
-            'loop closures need gtsam: pip install "volery[autonomy]", or loop_closures = false'
+            'loop closures need gtsam: pip install "volery[autonomy]", or set loop_closures = false'
         ) from error
     return gtsam

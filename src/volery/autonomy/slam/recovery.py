@@ -1,4 +1,4 @@
-"""What a motion of which no reading told leaves open, and how it is found out."""
+"""Recovers attitude and position after a gap in the IMU data."""
 
 from __future__ import annotations
 
@@ -17,51 +17,55 @@ from volery.core.clock import NS_PER_S
 Array = NDArray[np.float64]
 
 GAP_S = 0.05
-"""So long a reading of the IMU tells of the motion; what comes after it is not known."""
+"""Duration of motion that an IMU sample covers; the motion after it is unknown."""
 _LONGEST_STEP_S = 0.1
 _UNKNOWN_TURN, _UNKNOWN_PUSH = 0.4, 2.0
-"""Of such a motion: densities of rates and accelerations about none, rad/s and m/s^2 over root Hz.
+"""Noise densities of rates and accelerations in a gap, about zero, rad/s and m/s^2 over root Hz.
 
-A UAV that is not hit turns by 0.3 rad in half a second, and gains 1.4 m/s (modelling choices).
+A UAV without a collision rotates by 0.3 rad in half a second, and gains 1.4 m/s (modelling
+choices).
 """
 _UNSURE_RAD = 0.05
-"""Where the attitude is less sure about a level axis, ground would be taken for what stands."""
+"""Tilt uncertainty above which ground returns would be classified as upright."""
 _TRIED_RAD, _TRIED, _ATTITUDE_SHARE = 0.6, 400, 0.75
-"""Turns up to this are tried, with so many returns, of which this share must fit."""
+"""Max rotation that is tried, number of returns, and fraction of them that must fit."""
 _FOUND_RAD, _FOUND_M = 0.03, 0.15
-"""Standard deviations of what was found."""
+"""Standard deviations of the recovered pose."""
 _LEAST_M, _MOST_M, _LEAST_RAD, _MOST_RAD = 0.5, 3.0, 0.2, 0.8
-"""Places are tried within three standard deviations, within these."""
+"""Bounds of the search window of three standard deviations."""
 _PLACE_SHARE, _ELSEWHERE = 0.35, 0.75
-"""Share of the uprights that must be met, and the most that may be elsewhere, as a part of it."""
+"""Min fraction of matched uprights, and max fraction elsewhere, relative to it."""
 _LONG_NS = NS_PER_S
 _USUAL_M_S, _USUAL_EACH_NS = 2.5, NS_PER_S // 2
-"""A UAV does not fly much faster, which so often tells where up is (modelling choices)."""
+"""Typical speed of a UAV, applied as a velocity measurement at this period (modelling choices)."""
 
 
 class Recovery:
-    """Begins with a gap in the readings; until it has ended, nothing is drawn nor matched."""
+    """State of a recovery, from a gap in the IMU data to its end.
+
+    Meanwhile sweeps are neither inserted nor matched.
+    """
 
     def __init__(self, since_ns: int | None = None) -> None:
-        """`since_ns`: begin with maps that are empty, once it is known where up is."""
+        """Starts a recovery at `since_ns` with empty maps; None: tracking is intact."""
         self.since_ns = since_ns
-        """When the motion was lost; None: it is followed."""
+        """Start of the recovery, ns; None: tracking is intact."""
         self._has_maps = since_ns is None
         self.gap = 0, 0
-        """Between which times the newest unknown motion lies."""
+        """Start and end of the last gap, ns."""
         self._before = np.zeros((0, 3))
-        """Returns of the sweep before, (K, 3) m in the frame."""
+        """Returns of the previous sweep, (K, 3) m in the frame."""
         self._upright_ns = since_ns or 0
 
     @staticmethod
     def is_aslant(covariance: Array) -> bool:
-        """Whether the attitude is not known well enough to tell ground from what stands on it."""
+        """Returns whether the tilt is too uncertain to tell ground from uprights."""
         return bool(max(covariance[6, 6], covariance[7, 7]) > _UNSURE_RAD**2)
 
     def coast(
         self, state: Array, covariance: Array, span: tuple[int, int], dt: float, noise: Array
     ) -> None:
-        """Go on straight for `dt` s of a gap between two times, without a turn."""
+        """Predicts the state over `dt` s of a gap: constant velocity and attitude."""
         noise = np.array([_UNKNOWN_TURN, _UNKNOWN_PUSH, *noise[2:]])
         while dt > 0.0:
             step = min(dt, _LONGEST_STEP_S)
@@ -76,7 +80,7 @@ class Recovery:
             self._before = np.zeros((0, 3))
 
     def keep_upright(self, state: Array, covariance: Array, time_ns: int) -> None:
-        """Who believes to be aslant would gain speed, and that does not last."""
+        """Limits the velocity: a wrong tilt would appear as a lasting acceleration."""
         if self.since_ns is None or time_ns - self._upright_ns < _USUAL_EACH_NS:
             return
         self._upright_ns = time_ns
@@ -87,21 +91,21 @@ class Recovery:
                 observe(state, covariance, row, -float(state[i]), _USUAL_M_S**2)
 
     def has_failed(self, covariance: Array, now_ns: int) -> bool:
-        """Whether it is known where up is, but the place has not been found for long."""
+        """Returns whether tilt has been known, but the position not found, for too long."""
         if self.since_ns is None or self.is_aslant(covariance):
             return False
         return self._has_maps and now_ns - self.since_ns > _LONG_NS
 
     def is_in_gap(self, first_ns: int, last_ns: int) -> bool:
-        """Whether something lasted while the motion was not known."""
+        """Returns whether an interval overlaps the last gap."""
         return first_ns < self.gap[1] and last_ns > self.gap[0]
 
     def find(
         self, state: Array, covariance: Array, states: Array, maps: Submaps, points: Array
     ) -> bool:
-        """Turn and move so that returns (K, 3) of the body fit the map; whether they do.
+        """Rotates and moves the state so that returns (K, 3) of the body fit the map.
 
-        `states` (M, 19), those before, are turned and moved along.
+        Returns whether it succeeded. Earlier `states` (M, 19) move along.
         """
         if not self._has_maps:
             if not self.is_aslant(covariance):
@@ -134,7 +138,7 @@ class Recovery:
 
 
 def _find_place(state: Array, covariance: Array, maps: Submaps, body: Array) -> bool:
-    """Move and turn `state` to where uprights of the map are; whether that is one place."""
+    """Moves `state` to the best match of the uprights; returns whether it is unique."""
     spread = 3.0 * math.sqrt(float(max(covariance[0, 0], covariance[1, 1])))
     turn = 3.0 * math.sqrt(float(covariance[8, 8]))
     found = np.zeros(5)

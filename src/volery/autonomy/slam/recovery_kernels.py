@@ -1,4 +1,4 @@
-"""Finding attitude and place again after a motion that nothing told of: by trying."""
+"""Searches attitude and position after a gap in the IMU data."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ Array = NDArray[np.float64]
 _ON_GROUND_M = 0.35
 _OVER_GROUND_M = 0.6
 _FEWEST_GROUND, _FEWEST_UPRIGHTS = 60, 40
-"""Returns below which nothing can be told."""
+"""Min number of returns for a result."""
 _PER_RAD2 = 0.3
-"""How much worse a large turn must not fit than a small one."""
+"""Penalty of a rotation, per rad^2."""
 _STEP_M, _STEP_RAD = 0.25, 0.05
 _APART_M, _APART_RAD = 0.8, 0.2
-"""Places so far from the best one are others."""
+"""Distances from the best pose beyond which a pose is another one."""
 
 
 @kernel
@@ -35,11 +35,11 @@ def find_attitude(
     cells: Cells,
     reach: float,
 ) -> float:
-    """Turn the attitude in `state` (19,) so that returns (K, 3) of the body lie where the map is.
+    """Rotates the attitude in `state` (19,) so that returns (K, 3) of the body fit the map.
 
-    Turns of up to `reach` rad about each axis are tried, in steps of a sixth of it, then of a
-    third of that. Returns the share of them that lie on known ground or where something stood, of
-    those above known ground; 0: too few to tell.
+    It tries rotations of up to `reach` rad about each axis, in steps of a sixth of it, then of a
+    third of that. Returns the fraction of returns above known ground that lie on it or at an
+    upright; 0: too few returns.
     """
     step, best, share = reach / 6.0, np.zeros(3), 0.0
     for level in range(2):
@@ -83,7 +83,7 @@ def _share(
 
 @inner_kernel
 def _over_ground(keys: Keys, sums: Array, x: float, y: float, z: float) -> float:
-    """Height over the mean of a cell's ground; nan where none is known."""
+    """Returns the height over the mean ground of a cell; nan if unknown."""
     i, j = math.floor(x / GROUND_CELL_M), math.floor(y / GROUND_CELL_M)
     a, b = i % GROUND_CELLS, j % GROUND_CELLS
     if keys[a, b] != key_of(i, j, 0):
@@ -110,11 +110,11 @@ def find_place(
     reach_rad: float,
     found: Array,
 ) -> None:
-    """Move uprights among returns (K, 3), m in the frame, to where some stood.
+    """Finds the rotation and shift that move uprights among returns (K, 3) m onto known ones.
 
-    They are turned about the vertical through `middle` (3,) and moved in the plane. `found` (5,)
-    gets x, y (m), the turn (rad), the share of the uprights that meet some then, and the highest
-    such share elsewhere; all zero if there are too few.
+    The returns are in the map frame; they rotate about the vertical through `middle` (3,) and shift
+    horizontally. `found` (5,) gets x, y (m), the rotation (rad), the fraction of uprights that
+    match, and the highest such fraction elsewhere; all zero if there are too few.
     """
     found[:] = 0.0
     uprights, count = np.empty_like(points), 0

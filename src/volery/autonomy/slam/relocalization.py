@@ -1,4 +1,4 @@
-"""Finding its place in the map again: the newest keyframe of one that is lost, among all."""
+"""Relocalization: matches the newest keyframe of a lost vehicle with all older ones."""
 
 from __future__ import annotations
 
@@ -16,49 +16,50 @@ from volery.autonomy.slam.pose_graph import PoseGraphEdge, between, compose
 Array = NDArray[np.float64]
 
 _REACH_M, _TURN_RAD = 12.0, 0.2
-"""How far it may be from an old keyframe, and from the heading that the gyroscope tells; when all
-keyframes have been tried so, any heading is tried.
+"""Max distance to an old keyframe, and from the gyroscope's heading; after all keyframes have been
+tried so, any heading is tried.
 """
 _TRIES, _LEAP = 6, 3
-"""Keyframes tried at each new one; so many apart, as neighbours look alike."""
+"""Keyframes tried at each new one, and their spacing, as neighbours look alike."""
 _FRESH = 3
-"""Keyframes since it was lost from which on they are matched."""
+"""Keyframes since tracking was lost from which they are matched."""
 _SAME = np.array([0.5, 0.5, 0.5, 0.05])
 _OTHER, _HINT = 4.0 * _SAME, np.array([1.0, 1.0, 2.0, 0.1])
-"""m and rad within which guesses are of one place, beyond which they contradict each other, and
-within which they are of the place that was hinted."""
+"""m and rad: differences within which hypotheses agree, beyond which they contradict each other,
+and within which they agree with the hint.
+"""
 _SURE, _HINTED, _CLEARLY = 0.2, 0.12, 2.0
-"""What the margins of all guesses of a place must sum up to; what a hint of it adds to them; how
-much more that must be than the sum of any other place.
+"""Min sum of the margins of all hypotheses of a pose; the amount that an agreeing hint adds; min
+ratio to the sum of any other pose.
 
-One guess alone may be sure. Where few things stand any of them may be taken for any other, and the
-guesses contradict each other.
+A single hypothesis may suffice. With few uprights any of them may be mistaken for any other, and
+the hypotheses contradict each other.
 """
 
 
 class PlaceHypothesis(NamedTuple):
-    """Where a keyframe that fits would put the present session."""
+    """A hypothesis of the current session's pose in the map."""
 
     edge: PoseGraphEdge
     margin: float
     moved: Array
-    """(4,) what would move the session there."""
+    """(4,) transform of the session."""
 
 
 class Relocalization:
-    """What one that is lost has tried so far, and which keyframes nobody can be found by."""
+    """Progress of a relocalization, and the keyframes excluded from it."""
 
     def __init__(self) -> None:
         self.doubted: set[int] = set()
-        """Keyframes of which it is not sure where they are."""
+        """Keyframes with uncertain poses."""
         self._cursor = 0
         self._guesses: list[PlaceHypothesis] = []
         self._hint: Array | None = None
 
     def begin(self, doubted: set[int], hint: Array | None = None) -> None:
-        """It was lost just now, and so is where some more keyframes are.
+        """Starts a relocalization; keyframes in `doubted` are excluded from now on.
 
-        `hint`: (2,) m in the map, by how much it may have been displaced.
+        `hint`: (2,) m in the map, estimated displacement.
         """
         self.doubted |= doubted
         self._cursor = 0
@@ -68,7 +69,7 @@ class Relocalization:
     def find(
         self, closer: LoopCloser, frames: Sequence[Keyframe], poses: Sequence[Array]
     ) -> PoseGraphEdge | None:
-        """Try some keyframes of earlier sessions, in turn, the latest of them first."""
+        """Tries some keyframes of earlier sessions, newest first; returns a closure or None."""
         newest = len(frames) - 1
         session = frames[newest].session
         old = [
@@ -93,7 +94,7 @@ class Relocalization:
 def chosen(
     guesses: Sequence[PlaceHypothesis], newest: int, pose: Array, hint: Array | None = None
 ) -> PoseGraphEdge | None:
-    """The best guess of the newest keyframe, whose pose is (4,), if its place is beyond doubt.
+    """Returns the best hypothesis of the newest keyframe, at `pose` (4,), if it is certain.
 
     `hint`: see `Relocalization.begin`.
     """
@@ -117,7 +118,7 @@ def chosen(
 
 
 def _weight(guesses: Sequence[PlaceHypothesis]) -> float:
-    """The sum of margins of those guesses whose older keyframes have no returns in common."""
+    """Returns the sum of margins of the hypotheses whose older keyframes share no returns."""
     counted: list[PlaceHypothesis] = []
     for guess in sorted(guesses, key=lambda guess: -guess.margin):
         if all(abs(guess.edge.origin - other.edge.origin) > 2 * AROUND for other in counted):
@@ -126,7 +127,7 @@ def _weight(guesses: Sequence[PlaceHypothesis]) -> float:
 
 
 def _within(one: Array, other: Array, limits: Array) -> NDArray[np.bool_]:
-    """Whether poses (..., 4) differ by no more than that."""
+    """Returns whether poses (..., 4) differ by less than `limits` (4,)."""
     apart = one - other
     apart[..., 3] = np.remainder(apart[..., 3] + math.pi, math.tau) - math.pi
     return np.asarray((np.abs(apart) < limits).all(-1))

@@ -1,4 +1,4 @@
-"""Finding where a set of uprights stands among others: by trying, then by least squares."""
+"""Matches a set of uprights with others: by search, then by least squares."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 
 _FOUR = (0, 1, 2, 5)
-"""Of position and small turns, those that gravity does not tell."""
+"""Components of position and rotation that gravity does not determine."""
 
 
 @kernel
 def draw(points: Array, cell: float, picture: Picture) -> None:
-    """Mark cells at points (K, 2), and beside them, in `picture` (n, n) around the origin."""
+    """Marks the cells of points (K, 2), and their neighbours, in `picture` (n, n) at the origin."""
     n = picture.shape[0]
     picture[:] = 0
     for k in range(points.shape[0]):
@@ -50,7 +50,7 @@ def _count_at(points: Array, x: float, y: float, cell: float, picture: Picture) 
 
 @kernel
 def count_drawn(points: Array, cell: float, picture: Picture) -> int:
-    """How many of points (K, 2) lie in marked cells of a `picture` around the origin."""
+    """Returns how many of points (K, 2) lie in marked cells of a `picture` around the origin."""
     return _count_at(points, 0.0, 0.0, cell, picture)
 
 
@@ -64,10 +64,10 @@ def shares_around(
     steps: Array,
     shares: Array,
 ) -> None:
-    """Fill `shares` (K,): what meets a mark after `one` (M, 2) has moved by each of `steps` (K, 2).
+    """Fills `shares` (K,): matched fraction after `one` (M, 2) moved by each of `steps` (K, 2).
 
     It is the mean of two: of points `one` in `picture`, and of points `other` (N, 2), moved the
-    other way, in `other_picture`, in which `one` is drawn.
+    opposite direction, in `other_picture`, which shows `one`.
     """
     for k in range(steps.shape[0]):
         x, y = steps[k, 0], steps[k, 1]
@@ -87,10 +87,10 @@ def search(
     best: Array,
     shares: Array,
 ) -> float:
-    """The pose (3,) x, y, yaw of points (K, 2) in `picture` that meets most; its share of all.
+    """Finds the pose (3,) x, y, yaw of points (K, 2) in `picture` with the best score.
 
-    Tried are `middle` (3,) +- `reach` (3,), in steps of a cell and of `step_rad`; `shares` gets
-    those of all places, each at its best heading.
+    It tries `middle` (3,) +- `reach` (3,), in steps of a cell and of `step_rad`; `shares` gets the
+    scores of all positions, each at its best heading. Returns the best score, 0 to 1.
     """
     n, count = picture.shape[0], points.shape[0]
     wide, high = math.ceil(reach[0] / cell), math.ceil(reach[1] / cell)
@@ -127,7 +127,7 @@ def draw_maps(
     ground_keys: Keys,
     sums: Array,
 ) -> None:
-    """Begin maps anew with points (K, 3)."""
+    """Replaces the maps by points (K, 3)."""
     upright_keys[:] = -1
     ground_keys[:] = -1
     for k in range(points.shape[0]):
@@ -152,9 +152,10 @@ def refine(
     information: Array,
     told: Array,
 ) -> bool:
-    """Move the pose (4,) x, y, z, yaw of points (K, 3) to where they fit the maps best.
+    """Moves the pose (4,) x, y, z, yaw of points (K, 3) to the best fit with the maps.
 
-    `information` (4, 4) and `told` (4,) are those of the end. False: they leave it open.
+    `information` (4, 4) and `told` (4,) are those of the last round. Returns False if the fit is
+    singular.
     """
     state, planes = np.zeros(STATE_NUMBERS), np.zeros((points.shape[0], 3))
     now = kinds.copy()

@@ -1,4 +1,4 @@
-"""What the tracker knows of its sensors and of itself."""
+"""Parameters of the tracker: sensor noise and scan matching."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class ImuNoise:
-    """Noise of the IMU; the defaults are the ADIS16448's as RotorS and OpenUAV simulate it."""
+    """Noise of the IMU; the defaults are those of the ADIS16448 in RotorS and OpenUAV."""
 
     gyro_rad_s_sqrt_hz: float = 3.394e-4
     gyro_walk_rad_s2_sqrt_hz: float = 3.879e-5
@@ -19,25 +19,27 @@ class ImuNoise:
 
 @dataclass(frozen=True)
 class ScanMatching:
-    """How returns are compared with the map (modelling choices, tried on recorded flights)."""
+    """Comparison of returns with the map (modelling choices, tuned on recorded flights)."""
 
     reach_m: float = 30.0
-    """The data sheet of the UTM-30LX guarantees no more."""
+    """Max range, as guaranteed by the data sheet of the UTM-30LX."""
     nearest_m: float = 0.45
-    """Nearer returns are the vehicle's own, or noise."""
+    """Min range; nearer returns are from the vehicle itself, or noise."""
     rounds: int = 3
     """Gauss-Newton rounds of an update."""
     upright_sigma_m: float = 0.05
-    """Of a return about the upright that it met: range, angle, bark."""
+    """Standard deviation of a return about its upright: range, angle, bark."""
     ground_sigma_m: float = 0.05
     gravity_walk_rad_sqrt_s: float = 2e-4
-    """How the frame of the local map turns against gravity as the map grows."""
+    """Random walk of the local map's frame against gravity as the map grows."""
     trust: float = 0.05
-    """Share of the returns' information that is believed: their errors have the map's in common."""
+    """Fraction of the returns' information that is used: their errors are correlated with the
+    map's.
+    """
     insert_m: float = 0.25
     insert_rad: float = 0.07
     insert_s: float = 1.0
-    """Motion, or time, after which a scan enters the map."""
+    """Motion, or time, after which a scan is inserted into the map."""
 
 
 GRAVITY_M_S2 = 9.80665

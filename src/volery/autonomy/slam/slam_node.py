@@ -1,4 +1,4 @@
-"""Where the vehicle is and how it moves, from IMU, LIDARs and sonar alone."""
+"""Estimates pose and velocity of the vehicle from IMU, LIDARs and sonar alone."""
 
 from __future__ import annotations
 
@@ -40,19 +40,20 @@ from volery.graph.nodes.node import Node
 Array = NDArray[np.float64]
 
 _JUMP_NS = NS_PER_S // 2
-"""A stamp so far before the newest one is a clock that was set back."""
+"""Step back in stamps from which the clock has been set back."""
 _LONGEST_GAP_NS = 2 * NS_PER_S
-"""Without readings of the IMU for longer it is not known where the vehicle has gone."""
+"""Max gap in the IMU data; after a longer one the position is unknown."""
 _UNKNOWN, _DOUBTED = (3.0, 0.3), (0.5, 0.0)
-"""How far velocity (m/s) and attitude (rad) may be off after such a gap, and after what is seen did
-not fit the map."""
+"""Standard deviations of velocity (m/s) and attitude (rad) after such a gap, and after scans did
+not match the map.
+"""
 _NOTICED_NS, _SEEN_NS = round(1.5 * NS_PER_S), NS_PER_S // 2
-"""Within these a displacement is noticed by the map, and by what was seen just before."""
+"""Time in which a displacement is detected by the map, and by the returns just before."""
 _QUEUE = 500
-"""Readings that wait while the node's process does not get to them: two seconds at 200 Hz."""
+"""Queue of samples while the node's process is busy: two seconds at 200 Hz."""
 _NOISE = "[gyro, its walk, its bias, accelerometer, its walk, its bias]"
 _MOST_RAD_S, _MOST_M_S2 = 60.0, 500.0
-"""Beyond what any IMU measures."""
+"""Beyond the range of any IMU."""
 
 
 class Slam(Node):
@@ -60,15 +61,15 @@ class Slam(Node):
 
     Parameters
     ----------
-    start: [x, y, z, yaw] of where it begins in the map, m and rad; empty: the map begins there.
+    start: [x, y, z, yaw] of the start pose in the map, m and rad; empty: the map begins there.
     level_mount, nodding_mount: [x, y, z] of the LIDARs in the body, m.
-    imu_noise: densities of gyroscope and accelerometer, of their biases' walks, and turn-on biases,
-        in SI units; empty: the ADIS16448's.
-    standing_height_m: of the body over the ground where it stands.
-    odom_rate_hz, pose_rate_hz: how often they are published.
-    scan_rate_hz: sweeps taken of each LIDAR a second.
-    reach_m: farther returns are left out.
-    loop_closures: whether places that are seen again correct the map (needs gtsam).
+    imu_noise: densities of gyroscope and accelerometer, of their biases' random walks, and
+        turn-on biases, in SI units; empty: the ADIS16448's.
+    standing_height_m: height of the body over the ground when landed.
+    odom_rate_hz, pose_rate_hz: rates at which they are published.
+    scan_rate_hz: sweeps processed per second and LIDAR.
+    reach_m: max range of returns.
+    loop_closures: whether loop closures correct the map (needs gtsam).
 
     """
 
@@ -76,7 +77,7 @@ class Slam(Node):
 
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Returns the tasks that compile its kernels."""
+        """Returns the tasks that compile the kernels of this node."""
         from volery.autonomy.perception import warmup as seeing
         from volery.autonomy.slam import warmup
 
@@ -105,7 +106,7 @@ class Slam(Node):
         period = NS_PER_S / float(
             self.declare_parameter("scan_rate_hz", 20.0, min_value=0.1, max_value=1000.0).value
         )
-        self._sweep_ns = round(0.9 * period)  # a scan that comes a little early is not left out
+        self._sweep_ns = round(0.9 * period)  # tolerates a scan that arrives slightly early
         self._odom_period_ns = round(
             NS_PER_S
             / self.declare_parameter("odom_rate_hz", 50.0, min_value=0.1, max_value=1000.0).value
@@ -134,7 +135,7 @@ class Slam(Node):
         self._refused = self._resets = 0
         self._told = ""
         self._shown = (0, 0)
-        """Keyframes and closures of the path that was told last."""
+        """Numbers of keyframes and closures of the last published path."""
 
     def _open(self, pose_period_s: float) -> None:
         self._odom = self.create_publisher(Odometry, "slam/odom", 5)
@@ -155,17 +156,17 @@ class Slam(Node):
         self.create_timer(0.5, self._tell_status)
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         parts = {n: getattr(self, n).get_state() for n in ("_tracker", "_level", "_way", "_health")}
         return {"parts": parts, **save_attributes(self, self._PLAIN)}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         for name, part in state["parts"].items():
             getattr(self, name).set_state(part)
         restore_attributes(self, {name: state[name] for name in self._PLAIN})
 
-    # ------------------------------------------------------------------------------ what it hears
+    # ------------------------------------------------------------------------------ subscriptions
 
     def _on_imu(self, message: Imu) -> None:
         w, a = message.angular_velocity, message.linear_acceleration
@@ -182,14 +183,14 @@ class Slam(Node):
         for returns in seen:
             self._way.add(returns, self._tracker)
         if self._tracker.sight.is_broken:
-            self._tell_status()  # each further sweep would pull it more the wrong way
+            self._tell_status()  # each further sweep would increase the error
         self._omega = gyro - self._tracker.state[BG : BG + 3]
         if self._tracker.is_ready and time_ns - self._odom_ns >= self._odom_period_ns:
             self._odom_ns = time_ns
             self._tell_odometry(time_ns)
 
     def _set_clock(self, time_ns: int) -> None:
-        """The clock was set, or the IMU silent: it goes on from where it was, but does not know."""
+        """Resets after a clock jump or an IMU timeout: continues with unknown motion."""
         self._nod = NodHistory()
         self._taken_ns = {}
         self._odom_ns = 0
@@ -228,7 +229,7 @@ class Slam(Node):
             )
         )  # fmt: skip
 
-    # ------------------------------------------------------------------------------ what it tells
+    # ---------------------------------------------------------------------------------- publishers
 
     def _tell_odometry(self, time_ns: int) -> None:
         t = self._tracker
@@ -278,7 +279,7 @@ class Slam(Node):
     def _lose(
         self, speed_sigma: float, turn_sigma: float, wrong_since_ns: int | None = None
     ) -> None:
-        """Begin new maps; where in the old one they lie must be found out."""
+        """Begins new maps, whose pose in the old one must be found by relocalization."""
         moved = self._tracker.sight.moved
         self._tracker.begin_anew(speed_sigma, turn_sigma)
         self._health.begin_anew()

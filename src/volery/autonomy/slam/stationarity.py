@@ -1,4 +1,4 @@
-"""Standing still: how the IMU tells of it, and what its readings tell then."""
+"""Stationarity: its detection by the IMU, and the corrections that it allows."""
 
 from __future__ import annotations
 
@@ -18,35 +18,35 @@ from volery.core.clock import NS_PER_S
 Array = NDArray[np.float64]
 
 _STILL = 100
-"""Readings over which standing still is judged: 0.5 s at 200 Hz."""
+"""Number of samples that the detection uses: 0.5 s at 200 Hz."""
 _SETTLING = 2_000
-"""Readings over which a turn before it stands still is followed: 10 s at 200 Hz."""
+"""Number of samples over which a rotation before the start is tracked: 10 s at 200 Hz."""
 _STILL_GYRO, _STILL_ACCEL = 0.02, 0.25
-"""Most standard deviation of readings at rest, rad/s, m/s^2: four times the ADIS16448's."""
+"""Max standard deviation of samples at rest, rad/s, m/s^2: four times the ADIS16448's."""
 
 
 class StationaryDetector:
-    """The newest readings of the IMU, and how it turned before it first stood still."""
+    """Holds the newest IMU samples, and the rotation before the vehicle first stands still."""
 
     def __init__(self) -> None:
         self._newest: deque[tuple[Array, Array]] = deque(maxlen=_STILL)
         self._turns: deque[tuple[int, Array]] = deque(maxlen=_SETTLING)
-        """Times and rates of turn before it has begun."""
+        """Times, ns, and angular velocities before the start."""
 
     def add(self, gyro: Array, accel: Array) -> None:
-        """Take in a reading, rad/s and m/s^2, body axes."""
+        """Adds a sample, rad/s and m/s^2, body axes."""
         self._newest.append((gyro, accel))
 
     def add_turn(self, time_ns: int, gyro: Array) -> None:
-        """Take in a rate of turn for `turned_before`."""
+        """Adds an angular velocity for `turned_before`."""
         self._turns.append((time_ns, gyro))
 
     def forget(self) -> None:
-        """Judge by later readings alone."""
+        """Clears the samples."""
         self._newest.clear()
 
     def is_quiet(self) -> bool:
-        """Whether the newest readings are those of something that stands, or hovers."""
+        """Returns whether the newest samples are those of a standing or hovering vehicle."""
         if len(self._newest) < _STILL:
             return False
         gyro = np.array([reading[0] for reading in self._newest])
@@ -59,15 +59,15 @@ class StationaryDetector:
         )
 
     def mean_gyro(self) -> Array:
-        """Mean rate of turn (3,), rad/s."""
+        """Returns the mean angular velocity (3,), rad/s."""
         return np.asarray(np.mean([reading[0] for reading in self._newest], axis=0))
 
     def mean_accel(self) -> Array:
-        """Mean specific force (3,), m/s^2, which is up."""
+        """Returns the mean specific force (3,), m/s^2, which points up."""
         return np.asarray(np.mean([reading[1] for reading in self._newest], axis=0))
 
     def turned_before(self) -> Array:
-        """How it has turned since the first reading, (4,) in its own axes."""
+        """Returns the rotation since the first sample, (4,) in body axes."""
         if len(self._turns) == _SETTLING:
             return rotations.IDENTITY.copy()
         bias = np.mean([reading[0] for reading in list(self._newest)[_STILL // 2 :]], axis=0)
@@ -80,9 +80,9 @@ class StationaryDetector:
 
 
 def first_state(start: Array, up: Array, settling: Array) -> Array:
-    """State (19,) of who stands at `start` (4,) and feels the force `up` (3,).
+    """Returns the state (19,) of a vehicle at rest at `start` (4,) with specific force `up` (3,).
 
-    `settling` (4,): how it has turned, in its own axes, since its yaw was that of `start`.
+    `settling` (4,): rotation, in body axes, since the yaw was that of `start`.
     """
     roll = math.atan2(up[1], up[2])
     pitch = math.atan2(-up[0], math.hypot(up[1], up[2]))
@@ -96,7 +96,7 @@ def first_state(start: Array, up: Array, settling: Array) -> Array:
 
 
 def first_covariance(noise: ImuNoise, turn: Array) -> Array:
-    """Covariance (17, 17) of a `first_state`; `turn` (3, 3) is the matrix of its attitude."""
+    """Returns the covariance (17, 17) of a `first_state` with attitude matrix `turn` (3, 3)."""
     sigma = np.array(
         [1e-3] * 3 + [0.01] * 3 + [1e-4] * 3
         + [noise.gyro_turn_on_rad_s] * 3 + [noise.accel_turn_on_m_s2] * 3 + [2e-3] * 2
@@ -109,7 +109,7 @@ def first_covariance(noise: ImuNoise, turn: Array) -> Array:
 
 
 def hold_still(state: Array, covariance: Array, gyro: Array, noise: ImuNoise) -> None:
-    """Of who stands the velocity is zero, and the mean rate `gyro` (3,) is the bias."""
+    """Applies zero velocity, and the mean rate `gyro` (3,) as the gyroscope's bias."""
     for i in range(3):
         row = np.zeros(STATES)
         row[3 + i] = 1.0

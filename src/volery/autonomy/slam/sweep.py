@@ -1,4 +1,4 @@
-"""Sweeps of a LIDAR: their returns in the body as it is now, each beam from where it was cast."""
+"""LIDAR sweeps: motion-compensated returns in the current body frame."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Times = NDArray[np.int64]
 
 
 class Sweep(NamedTuple):
-    """One scan of a planar LIDAR, and how its mount nods."""
+    """One scan of a planar LIDAR, and the angles of its mount."""
 
     name: str
     first_ns: int
@@ -31,7 +31,7 @@ class Sweep(NamedTuple):
 
     @property
     def last_ns(self) -> int:
-        """When the last beam was cast."""
+        """Time of the last beam, ns."""
         return self.first_ns + round(self.beam_ns * (len(self.ranges) - 1))
 
     @property
@@ -40,7 +40,7 @@ class Sweep(NamedTuple):
         return self.nod != 0.0 or self.last_nod != 0.0
 
     def points(self, nearest_m: float, reach_m: float, times: Times, states: Array) -> Array:
-        """Returns (K, 3) between two distances, m in the body at the newest state; see `unskew`."""
+        """Returns points (K, 3) between two ranges, m in the newest body frame; see `unskew`."""
         points = np.empty((len(self.ranges), 3))
         count = unskew(
             self.ranges, nearest_m, reach_m, self.angle_min, self.angle_step, self.first_ns,
@@ -50,14 +50,14 @@ class Sweep(NamedTuple):
 
 
 class SweepPoints(NamedTuple):
-    """Returns of a sweep as the filter has taken them in."""
+    """Returns of a sweep after the filter update."""
 
     points: Array
     """(K, 3) m in the frame of the odometry."""
     kinds: NDArray[np.int8]
-    """(K,) what they are of; see `matching_kernels`."""
+    """(K,) kinds; see `matching_kernels`."""
     is_drawn: bool
-    """Whether it was from a new place, and what stood there entered the map."""
+    """Whether its uprights were inserted into the map."""
 
 
 @kernel
@@ -76,9 +76,9 @@ def unskew(
     states: Array,
     points: Array,
 ) -> int:
-    """Fill `points` (K, 3), m in the body at the newest of `states` (M, 19), return their number.
+    """Fills `points` (K, 3), m in the body at the newest of `states` (M, 19); returns their number.
 
-    `times` (M,) rise; a beam's pose is interpolated between the two around its time. `nod` and
+    `times` (M,) increase; a beam's pose is interpolated between the two around its time. `nod` and
     `last_nod` are the mount's angles (rad, positive down) at the first and last beam.
     """
     now = states[len(times) - 1]

@@ -1,7 +1,7 @@
-"""Following the motion of a vehicle: an inertial filter that LIDARs and sonar correct.
+"""Tracks the motion of a vehicle: an inertial filter corrected by LIDARs and sonar.
 
-Everything is in the frame of the odometry, which begins where the vehicle began and never jumps by
-what is learnt later on; the pose graph corrects it in the map.
+All poses are in the frame of the odometry, which begins at the start pose and never jumps when
+later data corrects the map; the pose graph corrects it in the map.
 """
 
 from __future__ import annotations
@@ -44,24 +44,24 @@ from volery.core.vectors import norm
 Array = NDArray[np.float64]
 
 _KEPT = 64
-"""IMU readings by whose states beams are placed: 0.3 s at 200 Hz."""
+"""Number of IMU samples whose states are stored to place beams: 0.3 s at 200 Hz."""
 _STANDING_M_S, _STANDING_NS = 0.3, 2 * NS_PER_S
-"""Who believes to be slower, or is near the ground for so long, and is quiet, stands."""
+"""Max estimated speed, or min time near the ground, of a quiet vehicle that counts as standing."""
 _SHOCK_M_S2 = 30.0
-"""Beyond this it hits something: a reading then may be as far off as it is large."""
+"""Acceleration of a collision: a sample's error may then be as large as its value."""
 _LOW_M = 0.35
-"""What the sonar says at most where the vehicle stands."""
+"""Max range of the sonar while the vehicle stands."""
 _DRAWN_M = 0.1
-"""What stands is drawn from places that are known so well."""
+"""Max standard deviation of a position from which uprights are inserted."""
 _RECENT_NS = NS_PER_S
-"""A reading of the sonar that is younger tells where the ground is."""
+"""Max age of a sonar range that gives the ground height."""
 
 
 class Tracker:
-    """The filter, its maps, and the sweeps that wait for the motion that they were made in.
+    """Holds the filter, its maps, and the sweeps that wait for the motion during them.
 
-    `start` (4,): x, y, z in m and yaw in rad where it begins. It begins after standing still for
-    half a second, from gravity.
+    `start` (4,): x, y, z in m and yaw in rad of the start pose. Tracking begins after half a second
+    at rest, from gravity.
     """
 
     _STATE = (
@@ -94,30 +94,30 @@ class Tracker:
         self._inserted: dict[str, tuple[int, Array, float]] = {}
         self._rest = StationaryDetector()
         self.settling = rotations.IDENTITY.copy()
-        """How it turned on its feet from the first reading on, (4,) in its own axes."""
+        """Rotation between the first sample and the start, (4,) in body axes."""
         self._broad = np.zeros(6)
         self._near_ground_ns: int | None = None
         self._low_since_ns: int | None = None
         self._range: tuple[int, float] | None = None
         self._standing_ns = 0
         self._is_high = False
-        """Whether the sonar says that it flies: a hover is as quiet as standing."""
+        """Whether the sonar indicates flight: a hover is as quiet as standing."""
         n = self.imu_noise
         self._noise = np.array(
             [n.gyro_rad_s_sqrt_hz, n.accel_m_s2_sqrt_hz, n.gyro_walk_rad_s2_sqrt_hz,
              n.accel_walk_m_s3_sqrt_hz, self.matching.gravity_walk_rad_sqrt_s]
         )  # fmt: skip
 
-    # ---------------------------------------------------------------------------------- readings
+    # ------------------------------------------------------------------------------------ samples
 
     @property
     def time_ns(self) -> int:
-        """Time of the state."""
+        """Time of the state, ns."""
         return 0 if self._imu is None else self._imu[0]
 
     @property
     def is_astray(self) -> bool:
-        """Whether a gap in the IMU's readings has left open where it is in its own maps."""
+        """Whether a gap in the IMU data has made the pose in the own maps uncertain."""
         return self.recovery.since_ns is not None
 
     @property
@@ -126,11 +126,11 @@ class Tracker:
 
     @property
     def sigma_m(self) -> float:
-        """Standard deviation of the place in the plane, in its worse direction of x and y."""
+        """Standard deviation of the horizontal position, in the worse of x and y, m."""
         return math.sqrt(float(max(self.covariance[0, 0], self.covariance[1, 1])))
 
     def add_imu(self, time_ns: int, gyro: Array, accel: Array) -> list[SweepPoints]:
-        """Carry the state on to a reading (rad/s, m/s^2, body axes); what sweeps were due then."""
+        """Propagates to a sample (rad/s, m/s^2, body axes); returns the sweeps due by then."""
         if self._imu is not None and time_ns <= self._imu[0]:
             self.refused += 1
             return []
@@ -151,7 +151,7 @@ class Tracker:
         return done
 
     def add_sweep(self, sweep: Sweep) -> None:
-        """Take in a sweep as soon as the motion until its end is known."""
+        """Queues a sweep until the motion up to its end is known."""
         if not self.is_ready:
             return
         self._waiting.append(sweep)
@@ -160,7 +160,7 @@ class Tracker:
             self.refused += 1
 
     def add_range(self, time_ns: int, distance: float) -> None:
-        """A reading of the sonar below, m; -inf: too near."""
+        """Adds a range of the sonar below, m; -inf: too near."""
         self._is_high = distance >= _LOW_M
         if distance < _LOW_M:
             self._near_ground_ns = time_ns
@@ -190,7 +190,7 @@ class Tracker:
         self.travelled_m += float(np.hypot(*(self.state[:2] - here[:2])))
         remember(self._times, self._states, time_ns, self.state)
 
-    # ---------------------------------------------------------------------------------- standing
+    # -------------------------------------------------------------------------------------- at rest
 
     def _try_to_begin(self, time_ns: int) -> None:
         if self._is_high or not self._rest.is_quiet():
@@ -207,13 +207,13 @@ class Tracker:
         seed_ground(self._maps.ground_keys, self._maps.sums, float(x), float(y), float(z))
 
     def _stay(self, time_ns: int) -> None:
-        """Let it have been here for all the time that states are kept."""
+        """Fills the stored states with the current one."""
         self._standing_ns = time_ns
         self._times[:] = time_ns - np.arange(_KEPT)[::-1] * 1_000_000
         self._states[:] = self.state
 
     def _keep_still(self, time_ns: int) -> None:
-        """While it stands its velocity is zero, and the gyroscope tells its bias."""
+        """Applies zero velocity and the gyroscope's bias while the vehicle stands."""
         if time_ns - self._standing_ns < NS_PER_S // 10:
             return
         self._standing_ns = time_ns
@@ -267,7 +267,7 @@ class Tracker:
         classify(points, self.state, maps.ground_keys, maps.sums, self._broad, known, kinds, planes)
 
     def _draw(self, sweep: Sweep, points: Array, kinds: NDArray[np.int8]) -> bool:
-        """Let returns enter the map; uprights only of sweeps from a new place, or after a while."""
+        """Inserts returns into the map; uprights only from a new pose, or after a while."""
         m, maps, yaw = self.matching, self._maps, float(rotations.yaw_of(self.state[Q : Q + 4]))
         last = self._inserted.get(sweep.name)
         is_new = (
@@ -276,7 +276,7 @@ class Tracker:
             or abs(math.remainder(yaw - last[2], math.tau)) > m.insert_rad
             or self.time_ns - last[0] > m.insert_s * NS_PER_S
         )
-        # Or a wrong place would become the right one.
+        # Else a wrong pose would become part of the map.
         is_new = is_new and self.match[sweep.name].fits and self.sigma_m < _DRAWN_M
         if is_new:
             self._inserted[sweep.name] = (self.time_ns, self.state[:3].copy(), yaw)
@@ -287,7 +287,7 @@ class Tracker:
         return is_new
 
     def _seed_below(self, distance: float) -> None:
-        """Where no LIDAR has seen ground below, the sonar tells of it."""
+        """Seeds the ground map from the sonar if no LIDAR has observed the ground below."""
         maps, plane = self._maps, np.zeros(6)
         slope = self._broad[1:3].copy()
         if broad_plane(self.state, maps.ground_keys, maps.sums, 2, slope, plane) > 0:
@@ -296,7 +296,7 @@ class Tracker:
         seed_ground(maps.ground_keys, maps.sums, x, y, z - distance)
 
     def set_clock(self, time_ns: int) -> None:
-        """Go on from here at another time; what waits is given up."""
+        """Continues from here at another time; drops waiting sweeps."""
         self._imu = None
         self._waiting.clear()
         self._rest.forget()
@@ -305,10 +305,10 @@ class Tracker:
         self._stay(time_ns)
 
     def begin_anew(self, speed_sigma: float, turn_sigma: float) -> None:
-        """Forget the maps, and follow the motion in new ones.
+        """Clears the maps and continues in new ones.
 
-        `speed_sigma`, m/s, and `turn_sigma`, rad about each axis, are how far velocity and attitude
-        may be off by now.
+        `speed_sigma`, m/s, and `turn_sigma`, rad about each axis, are the standard deviations of
+        velocity and attitude by now.
         """
         self._maps = Submaps()
         self._inserted, self.match, self.sight = {}, {}, KidnappingDetector()
@@ -323,9 +323,9 @@ class Tracker:
     # ------------------------------------------------------------------------------------- state
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         return save_attributes(self, self._STATE)
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         restore_attributes(self, state)

@@ -1,9 +1,9 @@
-"""A map of what stands: Gaussians of its returns, as seen from above, in cells by layers of height.
+"""A map of uprights: Gaussians of their returns, as seen from above, in cells by height layers.
 
-Trunks and walls are nearly upright: where a beam meets them, up or down, matters little, and what
-bends is told apart by layers. Cells hold number, mean (from their middle) and covariance sums of
-their returns (P. Biber and W. Strasser, The normal distributions transform, IROS 2003). As the
-map of the ground it rolls.
+Trunks and walls are nearly vertical: the height at which a beam hits them matters little, and
+layers separate leaning ones. Cells hold number, mean (from their centre) and covariance sums of
+their returns (P. Biber and W. Strasser, The normal distributions transform, IROS 2003). The map
+rolls, like the ground map.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ CELL_M = 0.5
 LAYER_M = 1.0
 CELLS, LAYERS = 192, 16
 MOST = 60.0
-"""Returns of a cell after which it stays as it is."""
+"""Returns of a cell after which its sums stay constant."""
 LEAST = 2.0
-"""Returns of a cell before it counts."""
+"""Min returns of a cell that counts."""
 
 
 @inner_kernel
 def add_upright(keys: Keys, cells: Cells, x: float, y: float, z: float) -> None:
-    """Take in a return."""
+    """Adds a return."""
     i, j, k = math.floor(x / CELL_M), math.floor(y / CELL_M), math.floor(z / LAYER_M)
     a, b, c, key = i % CELLS, j % CELLS, k % LAYERS, key_of(i, j, k)
     cell = cells[a, b, c]
@@ -53,9 +53,9 @@ def add_upright(keys: Keys, cells: Cells, x: float, y: float, z: float) -> None:
 def nearest_upright(
     keys: Keys, cells: Cells, x: float, y: float, z: float, gate: float, found: Array
 ) -> bool:
-    """Whether something stands within `gate` m; fills `found` (5,): x, y and covariance.
+    """Returns whether an upright lies within `gate` m; fills `found` (5,): x, y and covariance.
 
-    Of the layers that of the return counts, then those beside it, with 0.1 m more spread.
+    The layer of the return comes first, then its neighbours, with 0.1 m more standard deviation.
     """
     ci, cj, ck = math.floor(x / CELL_M), math.floor(y / CELL_M), math.floor(z / LAYER_M)
     beside = 1 if z / LAYER_M - ck >= 0.5 else -1

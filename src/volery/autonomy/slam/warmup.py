@@ -1,4 +1,4 @@
-"""Compiles the kernels of the SLAM in space; see `volery.autonomy.perception.warmup`."""
+"""Compiles the kernels of the 3D SLAM; see `volery.autonomy.perception.warmup`."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from volery.core.clock import NS_PER_S
 
 _PERIOD_NS = NS_PER_S // 200
 _STANDING = 100
-"""Readings of the IMU until it has stood still for half a second."""
+"""Number of IMU samples until it has stood still for half a second."""
 
 
 def motion() -> None:
-    """Kernels of the filter: it stands still, and takes in a sweep."""
+    """Compiles the kernels of the filter: standing still, and a sweep."""
     tracker = Tracker(np.zeros(4))
     readings = iter(range(0, 10 * NS_PER_S, _PERIOD_NS))
 
@@ -44,7 +44,7 @@ def motion() -> None:
 
 
 def known_places() -> None:
-    """Kernels of loop closures: a keyframe is laid onto those around an older one."""
+    """Compiles the kernels of loop closures: a keyframe is matched with older ones."""
     grid = np.stack(np.meshgrid(*2 * (np.linspace(-5.0, 5.0, 10),)), -1).reshape(-1, 2)
     points = np.column_stack([grid, np.zeros(len(grid))])
     kinds = np.where(np.arange(len(grid)) % 4, UPRIGHT, GROUND).astype(np.int8)
@@ -56,7 +56,7 @@ def known_places() -> None:
 
 
 def sight() -> None:
-    """Kernels that notice a displacement: half of what is seen is somewhere else."""
+    """Compiles the kernels that detect kidnapping: half of the returns have moved."""
     before = np.column_stack([np.linspace(-20.0, 20.0, 80), np.zeros(80)])
     now = before + np.where(np.arange(80) % 2, 3.0, 0.0)[:, None] * np.array([0.0, 1.0])
     eyes = KidnappingDetector()
@@ -65,7 +65,7 @@ def sight() -> None:
 
 
 def lost_motion() -> None:
-    """Kernels that find attitude and place again."""
+    """Compiles the kernels that recover attitude and position."""
     recovery, maps, points = Recovery(), Submaps(), np.ones((1, 3))
     state, states = np.zeros(19), np.zeros((2, 19))
     state[9] = 1.0

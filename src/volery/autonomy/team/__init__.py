@@ -1,1 +1,1 @@
-"""What UAVs of a team need to search together by radio: sectors, who takes which, what is known."""
+"""Team search by radio: sectors, their assignment, and the shared state."""

@@ -1,8 +1,8 @@
-"""Who searches which sector: the same answer for everyone who knows the same.
+"""Assigns sectors to UAVs: a deterministic function of the shared state.
 
-Each UAV decides for itself by what it has heard. Two that know different things may take the same
-sector: the one that began later gives way as soon as it hears of it. Nobody may take none that is
-left, so nothing stays unsearched.
+Each UAV decides for itself by the reports that it has received. Two UAVs with different reports may
+choose the same sector: the one that began later yields once it receives the other's report. Each
+UAV may choose any free sector, so none stays unsearched.
 """
 
 from __future__ import annotations
@@ -18,29 +18,29 @@ Mask = NDArray[np.bool_]
 
 
 class SectorClaim(NamedTuple):
-    """Who searches a sector since when, ns; of two the lesser one counts."""
+    """Start (ns) and name of a UAV that searches a sector; the smaller claim counts."""
 
     since_ns: int
     name: str
 
 
 class Worker(NamedTuple):
-    """A UAV that searches, or could."""
+    """A UAV that searches or could search."""
 
     place: Array
-    """(2,) m, map"""
+    """(2,) m, map."""
     sector: int
-    """-1: none."""
+    """Current sector; -1: none."""
     since_ns: int
     given_up: Mask
-    """(S,) sectors to which it cannot get."""
+    """(S,): sectors that it cannot reach."""
 
 
 def assign(workers: Mapping[str, Worker], searched: Mask, centres: Array) -> dict[str, int]:
-    """A sector for each worker that has none, where there is one for it.
+    """Returns a sector for each worker without one, as far as sectors are free.
 
-    searched: (S,). centres: (S, 2) m. The cheapest pair of worker and sector first; a sector costs
-    its distance, and as much again as another worker is nearer to it.
+    searched: (S,). centres: (S, 2) m. The cheapest pair of worker and sector comes first; a sector
+    costs its distance plus the distance by which another worker is nearer.
     """
     held = {worker.sector for worker in workers.values()}
     free = [s for s in range(len(searched)) if not searched[s] and s not in held]
@@ -66,7 +66,7 @@ def assign(workers: Mapping[str, Worker], searched: Mask, centres: Array) -> dic
 
 
 def must_yield(mine: SectorClaim, sector: int, others: Mapping[str, Worker]) -> bool:
-    """Whether somebody else searches my sector by an earlier claim."""
+    """Returns whether another UAV searches the same sector by an earlier claim."""
     claims = [
         SectorClaim(other.since_ns, name)
         for name, other in others.items()

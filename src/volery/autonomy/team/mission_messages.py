@@ -1,4 +1,4 @@
-"""Where to explore and where to fly, as messages."""
+"""Builds the messages of search areas and goals."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ Array = NDArray[np.float64]
 
 
 def polygon_of(area: Area | None, z: float, time_ns: int) -> PolygonStamped:
-    """The corners of an area, counter-clockwise at height `z`; none where there is no area."""
+    """Returns the corners of an area, counter-clockwise at height `z`; none without an area."""
     corners = [] if area is None else [area[:2], (area[2], area[1]), area[2:], (area[0], area[3])]
     points = [Point32(single(x), single(y), single(z)) for x, y in corners]
     return PolygonStamped(header(time_ns, "map"), Polygon(points))
 
 
 def goal_at(place: Array, time_ns: int) -> PoseStamped:
-    """A goal at `place` (3,), in whatever heading."""
+    """Returns a goal at `place` (3,) m with any heading."""
     level = Quaternion(0.0, 0.0, 0.0, 1.0)
     return PoseStamped(header(time_ns, "map"), Pose(Point(*place.tolist()), level))

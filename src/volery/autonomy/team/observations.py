@@ -1,15 +1,15 @@
-"""From single sightings to a place: rays to the ground, weighed by what each can know.
+"""Fuses single observations into positions: rays to the ground, weighted by their covariances.
 
-A ray to a thing at horizontal distance r, seen from h above its middle, meets the height of that
-middle at r = h / tan(depression). With an angular error s and an error of the ground's height q r
+A ray to an object at horizontal distance r, seen from h above its centre, meets the height of that
+centre at r = h / tan(depression). With an angular error s and an error of the ground's height q r
 (q: how far the ground may slope), its error is
 
     along the ray   sqrt(((r^2 + h^2) / h * s)^2 + (q r * r / h)^2)
     across it       r s
 
-both with that of the UAV's own place. Sightings of one thing are joined by their information
-(inverse covariances), so that rays from different sides narrow each other down: y = sum(W x),
-W = sum(P^-1), as a Kalman filter does for a state that stands still.
+both with that of the UAV's own position. Observations of one object are fused by their information
+(inverse covariances), so that rays from different sides narrow the position down: y = sum(W x), W =
+sum(P^-1), as a Kalman filter does for a constant state.
 """
 
 from __future__ import annotations
@@ -29,32 +29,34 @@ Array = NDArray[np.float64]
 _GATE = 9.21
 """99th percentile of chi squared with two degrees of freedom."""
 _NEAR_M = 2.0
-"""So near to it a sighting belongs to a track whatever the covariances say. Modelling choice."""
+"""Distance at which an observation belongs to a track whatever the covariances. Modelling
+choice.
+"""
 
 
 class PositionUncertainty(NamedTuple):
-    """What a sighting does not know."""
+    """Standard deviations of an observation."""
 
     angle_rad: float = 0.03
-    """Of the ray: pixels, attitude, time."""
+    """Angular error of the ray: pixels, attitude, time."""
     slope: float = 0.2
-    """How much the ground may rise or fall a metre of distance."""
+    """Rise or fall of the ground for each metre of distance."""
     place_m: float = 0.2
-    """Of the UAV's own place."""
+    """Error of the UAV's own position, m."""
 
 
 class Observation(NamedTuple):
-    """A thing seen once."""
+    """A single observation of an object."""
 
     time_ns: int
     place: Array
-    """(3,) m, map"""
+    """(3,) m, map."""
     covariance: Array
-    """(2, 2) of x and y, m^2"""
+    """(2, 2) of x and y, m^2."""
 
 
 def sighting_of(time_ns: int, eye: Array, place: Array, doubt: PositionUncertainty) -> Observation:
-    """The sighting of a thing whose ray from `eye` (3,) ends at `place` (3,), below the eye."""
+    """Returns the observation of an object: a ray from `eye` (3,) to `place` (3,) below it."""
     offset = place[:2] - eye[:2]
     r, h = max(float(np.hypot(*offset)), 1e-3), float(eye[2] - place[2])
     along = math.hypot((r * r + h * h) / h * doubt.angle_rad, doubt.slope * r * r / h)
@@ -67,7 +69,7 @@ def sighting_of(time_ns: int, eye: Array, place: Array, doubt: PositionUncertain
 
 @dataclass
 class Track:
-    """One thing, as all its sightings tell."""
+    """One object, fused from all its observations."""
 
     first_ns: int
     last_ns: int
@@ -76,20 +78,20 @@ class Track:
     heights: float = 0.0
     count: int = 0
     number: int = 0
-    """Of the finds of this UAV; 0: not confirmed yet."""
+    """Number of the detection of this UAV; 0: not confirmed yet."""
 
     @property
     def covariance(self) -> Array:
-        """(2, 2) of x and y, m^2."""
+        """Covariance (2, 2) of x and y, m^2."""
         return np.asarray(np.linalg.inv(self.information))
 
     @property
     def place(self) -> Array:
-        """(2,) m, map."""
+        """Position (2,) m, map."""
         return np.asarray(self.covariance @ self.weighted)
 
     def add(self, sighting: Observation) -> None:
-        """Join another sighting."""
+        """Adds an observation."""
         weight = np.linalg.inv(sighting.covariance)
         self.information = self.information + weight
         self.weighted = self.weighted + weight @ sighting.place[:2]
@@ -98,13 +100,13 @@ class Track:
         self.last_ns = sighting.time_ns
 
     def fits(self, sighting: Observation) -> bool:
-        """Whether a sighting may be of this thing."""
+        """Returns whether an observation may belong to this object."""
         off = sighting.place[:2] - self.place
         spread = np.linalg.inv(self.covariance + sighting.covariance)
         return float(off @ spread @ off) <= _GATE or float(np.hypot(*off)) <= _NEAR_M
 
     def find(self, finder: str) -> Detection:
-        """As others are told of it."""
+        """Returns the detection that other UAVs receive."""
         a, b, c, d = self.covariance.ravel().tolist()
         x, y = self.place.tolist()
         z = self.heights / self.count
@@ -113,11 +115,11 @@ class Track:
 
 @dataclass
 class Tracks:
-    """Everything that one UAV sees.
+    """All objects that one UAV observes.
 
-    sightings, within_s, spread_m: it is confirmed when seen so often, over `within_s` at least, and
-    placed to a standard deviation of `spread_m` in its worst direction. forget_s: what is not
-    confirmed and not seen again is forgotten.
+    sightings, within_s, spread_m: a track is confirmed after so many observations, over at least
+    `within_s`, with a standard deviation of at most `spread_m` in its worst direction. forget_s:
+    time after which an unconfirmed track without new observations is dropped.
     """
 
     sightings: int = 4
@@ -127,7 +129,7 @@ class Tracks:
     tracks: list[Track] = field(default_factory=list)
 
     def add(self, sighting: Observation) -> Track:
-        """Join a sighting to the thing that it fits best, or begin with a new one."""
+        """Adds an observation to the nearest track that fits, or creates a track; returns it."""
         now = sighting.time_ns
         self.tracks = [
             t for t in self.tracks if t.number or now - t.last_ns <= self.forget_s * NS_PER_S
@@ -145,7 +147,7 @@ class Tracks:
         return track
 
     def finds(self, finder: str) -> list[Detection]:
-        """All that are confirmed, by number."""
+        """Returns all confirmed detections, by number."""
         sure = sorted((t for t in self.tracks if t.number), key=lambda t: t.number)
         return [track.find(finder) for track in sure]
 

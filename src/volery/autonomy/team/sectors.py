@@ -1,4 +1,4 @@
-"""The search area as a grid of sectors, and what of a sector has been seen."""
+"""The search area as a grid of sectors, and the observed part of a sector."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ class Sectors:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Rows (along y) and columns (along x)."""
+        """Number of rows (along y) and columns (along x)."""
         a = self.area
         columns = max(round((a.x_max - a.x_min) / self.side_m), 1)
         rows = max(round((a.y_max - a.y_min) / self.side_m), 1)
         return rows, columns
 
     def __len__(self) -> int:
-        """How many there are."""
+        """Returns the number of sectors."""
         rows, columns = self.shape
         return rows * columns
 
     def of(self, number: int) -> Area:
-        """The rectangle of a sector."""
+        """Returns the rectangle of a sector."""
         rows, columns = self.shape
         row, column = divmod(number, columns)
         wide = (self.area.x_max - self.area.x_min) / columns
@@ -44,7 +44,7 @@ class Sectors:
         return Area(x, y, x + wide, y + deep)
 
     def centres(self) -> Array:
-        """(S, 2) middles, m."""
+        """Returns the centres (S, 2) of the sectors, m."""
         corners = np.array([self.of(number) for number in range(len(self))])
         middles: Array = 0.5 * (corners[:, :2] + corners[:, 2:])
         return middles
@@ -52,14 +52,14 @@ class Sectors:
 
 @dataclass
 class Coverage:
-    """Which cells of one sector have been in sight."""
+    """Marks which cells of one sector have been observed."""
 
     sector: Area
     cell_m: float
     seen: Mask = field(init=False)
-    """(rows, columns)"""
+    """(rows, columns)."""
     _middles: tuple[Array, Array] = field(init=False, repr=False, compare=False)
-    """(columns,) x and (rows,) y of the cells' middles, m."""
+    """(columns,) x and (rows,) y of the cells' centres, m."""
 
     def __post_init__(self) -> None:
         wide, deep = self._size
@@ -72,11 +72,11 @@ class Coverage:
 
     @property
     def share(self) -> float:
-        """Of the sector that has been seen."""
+        """Observed fraction of the sector."""
         return float(self.seen.mean())
 
     def look(self, place: Array, sight_m: float) -> int:
-        """See what lies within `sight_m` of `place` (2,); returns how many cells are new."""
+        """Marks cells within `sight_m` of `place` (2,) m; returns the number of new cells."""
         x, y = self._middles
         near = np.hypot(x[None, :] - place[0], y[:, None] - place[1]) <= sight_m
         new = int((near & ~self.seen).sum())
@@ -89,11 +89,11 @@ class Coverage:
 
 
 def to_bits(flags: Mask) -> NDArray[np.uint8]:
-    """Flags (S,) as they stand in a `TeamReport`."""
+    """Returns flags (S,) as the bits of a `TeamReport`."""
     return np.packbits(flags, bitorder="little")
 
 
 def from_bits(data: NDArray[np.uint8], count: int) -> Mask:
-    """The first `count` flags of a report; those that it lacks are False."""
+    """Returns the first `count` flags of a report; missing ones are False."""
     flags = np.unpackbits(np.asarray(data, np.uint8), bitorder="little")[:count].astype(np.bool_)
     return np.pad(flags, (0, count - len(flags)))

@@ -1,4 +1,4 @@
-"""The parameters of a task manager."""
+"""Parameters of a task manager."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from volery.graph.nodes.node import Node
 
 @dataclass(frozen=True)
 class TeamSettings:
-    """See `task_manager.TaskManager`."""
+    """Settings; see `task_manager.TaskManager`."""
 
     name: str
-    """Of this UAV, from the node's namespace."""
+    """Name of this UAV, from the node's namespace."""
     sectors: Sectors
     altitude_m: float
     cell_m: float
@@ -35,12 +35,12 @@ class TeamSettings:
 
     @classmethod
     def declare(cls, node: Node) -> TeamSettings:
-        """Declare the parameters of a node and read them. `GraphError` for what makes no sense."""
+        """Declares and reads the parameters of a node. Raises GraphError for invalid values."""
 
         def number(name: str, default: float, least: float, most: float = math.inf) -> float:
             value = float(node.declare_parameter(name, default).value)
             if not (math.isfinite(value) and least <= value <= most):
-                within = f"{least:g} to {most:g}" if math.isfinite(most) else f"from {least:g} on"
+                within = f"{least:g} to {most:g}" if math.isfinite(most) else f"at least {least:g}"
                 raise GraphError(f"task_manager: {name} must be {within}, not {value}")
             return value
 
@@ -52,7 +52,7 @@ class TeamSettings:
             )
         name = node.get_namespace().strip("/")
         if not name:
-            raise GraphError("task_manager: it stands beside a UAV, below its namespace")
+            raise GraphError("task_manager: no namespace; run the node in the namespace of its UAV")
         return cls(
             name=name,
             sectors=Sectors(Area(*area), number("sector_m", 40.0, 1.0)),

@@ -1,4 +1,4 @@
-"""Finding targets of a colour by the camera: where they are, and how well that is known."""
+"""Detects targets of a colour by the camera; estimates their positions and covariances."""
 
 from __future__ import annotations
 
@@ -33,38 +33,38 @@ Array = NDArray[np.float64]
 
 _TYPE = "volery_interfaces/msg/Targets"
 _MATE_S, _MATE_M = 2.0, 1.0
-"""A teammate heard so lately is within a ball of this radius. Modelling choice."""
+"""Max age of a teammate's report, s, and radius of the ball around it. Modelling choice."""
 _STALE_S = 0.5
-"""Odometry and range older than this, at the time of a picture, place nothing."""
+"""Max age of odometry and range at the time of an image."""
 
 
 class TargetDetection(Node):
-    """Looks for patches of a colour, places them on the ground, publishes `~/targets`.
+    """Detects patches of a colour, projects them to the ground, publishes `~/targets`.
 
-    Sees `CAMERA/image_raw`, its `camera_info`, odometry, and `range`, which tells how far below the
-    ground is. A target is published when it has been seen several times and is placed well enough,
-    and again with each sighting that makes it better known. Nothing counts where `radio/team` says
-    that a teammate is.
+    Subscribes to `CAMERA/image_raw`, its `camera_info`, odometry, and `range`, the distance to the
+    ground below. A target is published once it has been observed several times with a small enough
+    covariance, and with each further observation. Image regions that show a teammate, by
+    `radio/team`, are excluded.
 
     Parameters
     ----------
     camera: name of the camera.
     mount_m, mount_rpy_deg: of the camera in the body, as in a scenario.
-    odometry: topic of the pose; corrected: whether `/tf` tells where its frame lies in the map.
-    hue_deg: [first, last]; saturation, value: least ones; see `search.colour_blob`.
-    share: least share of the picture.
-    object_m: height of the targets' middle above the ground.
-    reach_m: how far away a target may be.
-    sightings, spread_m: how often it must be seen, and how well be placed (standard deviation).
+    odometry: topic of the pose; corrected: whether `/tf` holds the pose of its frame in the map.
+    hue_deg: [first, last]; saturation, value: minimums; see `search.colour_blob`.
+    share: min fraction of the image.
+    object_m: height of the targets' centre above the ground.
+    reach_m: max horizontal distance of a target.
+    sightings, spread_m: number of observations and standard deviation that confirm a target.
 
     """
 
     STATE = ("_mates", "_frame", "_pose", "_range", "_intrinsics", "_tracks")
-    """Everything that changes."""
+    """Names of the attributes that a snapshot stores."""
 
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Returns the tasks that compile its kernels."""
+        """Returns the tasks that compile the kernels of this node."""
         from volery.autonomy.search import warmup
 
         return (warmup.colours,)
@@ -91,7 +91,7 @@ class TargetDetection(Node):
         self._doubt = PositionUncertainty()
         self._frame = MapFrame()
         self._mates: dict[str, tuple[int, Array]] = {}
-        """When each was heard, ns, and where it was."""
+        """Receive time, ns, and position of each teammate's last report."""
         self._pose: OdometrySample | None = None
         self._range: tuple[int, float] | None = None
         self._intrinsics: Intrinsics | None = None
@@ -106,11 +106,11 @@ class TargetDetection(Node):
         self.create_subscription(report, "radio/team", self._on_report, 20)
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         return save_attributes(self, self.STATE)
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         restore_attributes(self, state)
 
     def _on_tf(self, message: TFMessage) -> None:
@@ -153,14 +153,14 @@ class TargetDetection(Node):
             self._tell(taken)
 
     def _teammates_in(self, view: GroundView, pose: OdometrySample) -> Array:
-        """(K, 3) discs of the picture in which teammates are, who may be of the colour."""
+        """Returns the image discs (K, 3) of teammates, which may have the colour."""
         since = pose.time_ns - round(_MATE_S * NS_PER_S)
         near = [place for heard_ns, place in self._mates.values() if heard_ns >= since]
         discs = [view.disc_of(place, _MATE_M, pose) for place in near]
         return np.array([disc for disc in discs if disc is not None]).reshape(-1, 3)
 
     def _ground_z(self, time_ns: int) -> float | None:
-        """Height in the map of the ground below; None where pose or range are not of about now."""
+        """Returns the height in the map of the ground below; None if pose or range are too old."""
         if self._pose is None or self._range is None:
             return None
         stale = _STALE_S * NS_PER_S

@@ -1,4 +1,4 @@
-"""What has been found: the finds of all UAVs, and which of them are the same thing."""
+"""The detections of all UAVs, and their grouping into targets."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ Array = NDArray[np.float64]
 
 TYPE = "volery_interfaces/msg/Target"
 _TOLD = 2
-"""Of the newest finds, and of the others, so many stand in a report. Modelling choice."""
+"""Number of newest detections, and of others, in a report. Modelling choice."""
 _LEAST_M = 0.1
-"""Standard deviation that no place is better than: maps of two UAVs differ. Modelling choice."""
+"""Smallest standard deviation of a position: maps of two UAVs differ. Modelling choice."""
 
 
 class Detection(NamedTuple):
-    """A target as one UAV knows it."""
+    """A target as one UAV observed it."""
 
     finder: str
     number: int
     stamp_ns: int
     place: tuple[float, float, float]
-    """m, map."""
+    """(3,) m, map."""
     covariance: tuple[float, float, float, float]
-    """Of x and y, m^2."""
+    """(2, 2) of x and y, row by row, m^2."""
     sightings: int
 
     @classmethod
     def from_message(cls, message: Any) -> Detection:
-        """Of a `Target`."""
+        """Returns the detection of a `Target` message."""
         p = message.position
         a, b, c, d = map(float, message.covariance)
         return cls(
@@ -48,13 +48,13 @@ class Detection(NamedTuple):
 
     @property
     def is_sound(self) -> bool:
-        """Whether its numbers can be those of a find."""
+        """Whether the values are finite and the covariance is valid."""
         a, b, c, d = self.covariance
         finite = bool(np.isfinite([*self.place, *self.covariance]).all())
         return finite and a >= 0.0 and d >= 0.0 and a * d >= b * c
 
     def message(self) -> Any:
-        """As a `Target`."""
+        """Returns the detection as a `Target` message."""
         return message_type(TYPE)(
             header(self.stamp_ns, "map"),
             self.finder,
@@ -67,16 +67,16 @@ class Detection(NamedTuple):
 
 @dataclass
 class TargetList:
-    """Finds by finder and number; the newest of each counts, in whatever order they come.
+    """Detections by finder and number; the newest of each counts, in any order of arrival.
 
-    gate_m: finds nearer to each other than this are of one thing.
+    gate_m: detections nearer to each other than this are of one target.
     """
 
     gate_m: float
     finds: dict[tuple[str, int], Detection] = field(default_factory=dict)
 
     def take(self, finds: Iterable[Detection]) -> bool:
-        """Take finds in; whether one of them told something new."""
+        """Adds detections; returns whether one of them was new."""
         changed = False
         for find in finds:
             if not find.is_sound:
@@ -87,9 +87,10 @@ class TargetList:
         return changed
 
     def to_tell(self, turn: int) -> list[Any]:
-        """Some finds as messages: the newest ones, and as many of the others as have their turn.
+        """Returns some detections as messages: the newest ones, and others in turn.
 
-        A report that held all would fill the radio's channel; after some turns all have been told.
+        A report with all of them would fill the radio's channel; after some turns all have been
+        sent.
         """
         keys = sorted(self.finds, key=lambda key: (-self.finds[key].stamp_ns, key))
         newest, others = keys[:_TOLD], sorted(keys[_TOLD:])
@@ -98,7 +99,7 @@ class TargetList:
         return [self.finds[key].message() for key in (*newest, *in_turn)]
 
     def targets(self) -> list[Detection]:
-        """One for each thing: its finds joined, weighted by their covariances."""
+        """Returns one detection for each target, fused by their covariances."""
         groups: list[list[Detection]] = []
         for key in sorted(self.finds):
             find = self.finds[key]
@@ -112,7 +113,7 @@ class TargetList:
 
 
 def _joined(group: list[Detection]) -> Detection:
-    """One find of several of the same thing, under the name of the first."""
+    """Returns one detection fused from several of the same target, with the first one's name."""
     if len(group) == 1:
         return group[0]
     information, weighted, height = np.zeros((2, 2)), np.zeros(2), 0.0

@@ -1,4 +1,4 @@
-"""What a UAV knows of its team: who was heard when, saying what."""
+"""A UAV's state of its team, from the reports that it receives."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ TYPE = "volery_interfaces/msg/TeamReport"
 
 
 class MissionPhase(StrEnum):
-    """Where in its mission a UAV is."""
+    """Phase of a UAV in its mission."""
 
     WAIT = "wait"
-    """On the ground; listens for its team."""
+    """On the ground; waits for its team's reports."""
     RISE = "rise"
     SEARCH = "search"
     IDLE = "idle"
-    """Aloft with nothing to search at the moment."""
+    """Airborne without a sector to search."""
     RETURN = "return"
     LAND = "land"
     HOLD = "hold"
-    """An operator has it wait where it is, or flies it."""
+    """Held or controlled by an operator."""
     DONE = "done"
     """Has landed."""
     DOWN = "down"
-    """Came down against its will, or never came up."""
+    """Fell, or failed to take off."""
 
 
 AT_WORK = frozenset({MissionPhase.WAIT, MissionPhase.RISE, MissionPhase.SEARCH, MissionPhase.IDLE})
@@ -47,27 +47,27 @@ ALOFT = frozenset({MissionPhase.SEARCH, MissionPhase.IDLE, MissionPhase.RETURN, 
 
 @dataclass
 class TeamMate:
-    """Another UAV by its newest report. Times are ns of the hearer's clock, but for `sent_ns`."""
+    """Another UAV by its newest report. Times are ns of the receiver's clock, except `sent_ns`."""
 
     phase: MissionPhase
     sent_ns: int
     heard_ns: int
     worker: Worker
     position: Array
-    """(3,) m, map"""
+    """(3,) m, map."""
 
 
 @dataclass
 class TeamState:
-    """The other UAVs; `sectors` is how many the area has here."""
+    """The other UAVs; `sectors` is the number of sectors in the area."""
 
     sectors: int
     mates: dict[str, TeamMate] = field(default_factory=dict)
     strangers: set[str] = field(default_factory=set)
-    """Who searches another area, or speaks of phases that are not known here."""
+    """Names of UAVs that search another area, or report unknown phases."""
 
     def hear(self, report: Any, now_ns: int) -> bool:
-        """Take a report in; False for one that is old, repeated or of another search."""
+        """Adds a report; returns False if it is old, repeated or of another search."""
         known = self.mates.get(report.name)
         sent_ns = stamp_of(report)
         if report.sectors != self.sectors or report.phase not in set(MissionPhase):
@@ -93,11 +93,11 @@ class TeamState:
         return True
 
     def heard(self, now_ns: int, patience_s: float) -> Iterator[tuple[str, TeamMate]]:
-        """Those who were heard lately, by name."""
+        """Yields the UAVs with recent reports, by name."""
         for name, mate in sorted(self.mates.items()):
             if 0 <= now_ns - mate.heard_ns <= patience_s * NS_PER_S:
                 yield name, mate
 
     def workers(self, now_ns: int, patience_s: float) -> dict[str, Worker]:
-        """Those who were heard lately and search, or will."""
+        """Returns the UAVs with recent reports that search, or will."""
         return {n: m.worker for n, m in self.heard(now_ns, patience_s) if m.phase in AT_WORK}

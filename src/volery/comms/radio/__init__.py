@@ -1,1 +1,1 @@
-"""The radio inside a run: what gets through between UAVs, and the stations on the graph."""
+"""The simulated radio of a run: the channel between UAVs, and the stations on the graph."""

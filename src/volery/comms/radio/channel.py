@@ -1,4 +1,4 @@
-"""The radio model as a `comms.link_model.Link`: one shared channel between stations at places."""
+"""The radio model, a `comms.link_model.Link`: one shared channel between stations."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from volery.scenario.radio import Radio
 
 Array = NDArray[np.float64]
 Places = Callable[[], Mapping[int, Array]]
-"""Where the stations are: address to place (3,), m, map."""
+"""Returns the stations' positions: address to (3,) m, map."""
 Looks = Callable[[Array, Array], Paths]
-"""What stands between places (P, 3) and (P, 3), m, map."""
+"""Returns the obstacles between positions (P, 3) and (P, 3), m, map."""
 
 _LOST = Delivery(lost=True)
 _MOST_TRIES = 8
 
 
 class _Sent(NamedTuple):
-    """When the frame that a station sent last has left the air."""
+    """End of the last transmission of a station."""
 
     session: int
     sequence: int
@@ -40,14 +40,14 @@ class _Sent(NamedTuple):
 
 
 class RadioChannel:
-    """Decides over frames; call it in the order of time.
+    """Decides loss and delay of frames; call it in the order of time.
 
-    seed: of the run; each pair has streams of its own, of which a frame's number takes its draws,
-    so that results do not depend on who else speaks.
+    seed: of the run. Each pair has random streams of its own, indexed by the frame's number, so
+    that results do not depend on the other stations' traffic.
     """
 
     STATE = ("_free_ns", "_sent", "_losses", "_looked_ns", "counts", "_seed")
-    """Everything that changes."""
+    """Names of the attributes that a snapshot stores."""
 
     def __init__(self, radio: Radio, seed: int, places: Places, looks: Looks) -> None:
         self._radio = radio
@@ -55,17 +55,19 @@ class RadioChannel:
         self._places = places
         self._looks = looks
         self._free_ns = 0
-        """When the channel is free again."""
+        """Time at which the channel is free again, ns."""
         self._sent: dict[int, _Sent] = {}
         self._losses: dict[tuple[int, int], float] = {}
         self._looked_ns = -1
         self.counts: Counter[str] = Counter()
-        """Frames `sent`, `received` and `faded` (once for each receiver), `crowded_out` before."""
+        """Frames `sent`, `received` and `faded` (once for each receiver), `crowded_out` by the
+        queue limit.
+        """
 
     def __call__(
         self, time_ns: int, source: int, destination: int, frame: StationFrame
     ) -> Delivery:
-        """Fate of a frame on its way to one station."""
+        """Returns loss and delay of a frame to one station."""
         before = self._sent.get(source)
         again = before is not None and before[:2] == (frame.session, frame.sequence)
         if not again and self._free_ns - time_ns > self._radio.queue_s * NS_PER_S:
@@ -73,7 +75,7 @@ class RadioChannel:
             return _LOST
         snr = self.snr_db(time_ns, source, destination)
         tries, received = self._try(source, destination, frame, snr)
-        if again and before is not None:  # one transmission reaches all that it is meant for
+        if again and before is not None:  # one transmission serves all receivers
             ends_ns = before.ends_ns
         else:
             self.counts["sent"] += 1
@@ -86,7 +88,7 @@ class RadioChannel:
         return Delivery(False, ends_ns - time_ns + round(self._radio.latency_s * NS_PER_S))
 
     def snr_db(self, time_ns: int, one: int, other: int) -> float:
-        """Signal to noise between two stations now; -inf where one of them has no place."""
+        """Returns the signal-to-noise ratio between two stations, dB; -inf without a position."""
         pair = min(one, other), max(one, other)
         stale_ns = round(self._radio.update_s * NS_PER_S)
         if self._looked_ns < 0 or time_ns - self._looked_ns >= stale_ns or pair not in self._losses:
@@ -99,21 +101,21 @@ class RadioChannel:
         return snr_db(self._radio, self._losses[pair]) - fading
 
     def reseed(self, seed: int) -> None:
-        """Draw from other streams."""
+        """Draws from other random streams."""
         self._seed = seed
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         return copy.deepcopy(save_attributes(self, self.STATE))
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         restore_attributes(self, copy.deepcopy(state))
 
     def _try(
         self, source: int, destination: int, frame: StationFrame, snr: float
     ) -> tuple[int, bool]:
-        """How often the frame is sent, and whether it is received at last."""
+        """Returns the number of transmissions, and whether the last one is received."""
         tries = 1 + (self._radio.retries if is_station(frame.destination) else 0)
         if not np.isfinite(snr):
             return tries, False
@@ -125,7 +127,7 @@ class RadioChannel:
         return tries, False
 
     def _look(self, time_ns: int) -> None:
-        """See anew what stands between all stations."""
+        """Updates the path loss between all stations."""
         places = self._places()
         pairs = list(combinations(sorted(places), 2))
         self._looked_ns, self._losses = time_ns, {}

@@ -1,8 +1,8 @@
-"""Every UAV a station, inside a run: topics go out by radio and come in from the others.
+"""The radio network of a run: each UAV is a station that relays topics to all others.
 
-What a UAV publishes on a relayed topic `/uav1/NAME` is sent to all stations, each of which
-publishes what it hears on `/uav2/radio/NAME`. Nodes cannot tell this from a station of a real radio
-network (`comms.station.tcp.radio_node`) with the same topics.
+A message on a relayed topic `/uav1/NAME` is sent to all stations, each of which publishes it on
+`/uav2/radio/NAME`. Nodes see the same topics as with a station of a real radio network
+(`comms.station.radio_node`).
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ from volery.graph.messages import Published
 from volery.scenario.radio import RelayedTopic
 
 _TICK_S = 0.5
-"""More often than stations have to tell that they are there, see `StationCore.tick`."""
+"""Less than the period at which stations must send, see `StationCore.tick`."""
 _LOST = Delivery(lost=True)
 _RULES = RouterSettings(grace_s=0.0, most_connections=FIRST_GROUND)
-"""Who comes later hears nothing of before: what is on the air is not kept for anybody."""
+"""Without a grace time: a station that joins later receives no earlier messages."""
 
 
 class Timers(Protocol):
-    """Whoever can call back at simulated times."""
+    """Schedules callbacks at simulated times."""
 
     def at(self, time_ns: int, action: Callable[[], Any]) -> None:
-        """Call `action` once, at `time_ns`."""
+        """Calls `action` once, at `time_ns`."""
 
     def every(
         self,
@@ -45,12 +45,12 @@ class Timers(Protocol):
         *,
         wanted: Callable[[], bool] | None = None,
     ) -> None:
-        """Call `callback` each period."""
+        """Calls `callback` each period, while `wanted` returns True."""
 
 
 @dataclass
 class _Member:
-    """A UAV on the network: what it says and where it hears others."""
+    """A UAV on the network: its relayed subscriptions, and publishers for the others' messages."""
 
     address: int
     said: list[Subscription] = field(default_factory=list)
@@ -58,7 +58,7 @@ class _Member:
 
 
 class RadioNetwork:
-    """The stations of a run.
+    """Runs the stations of a run.
 
     link: None for ideal ones. A message too long for a frame is dropped and counted.
     """
@@ -78,28 +78,28 @@ class RadioNetwork:
         self._exchange = LocalNetwork(_RULES, self._decide, graph.now_ns())
         self._members: dict[str, _Member] = {}
         self._silent: Counter[int] = Counter()
-        """How many faults there are of each station."""
+        """Number of active faults of each station."""
         self._due_ns: int | None = None
-        """For when the next look at what is under way is planned."""
+        """Time of the next scheduled delivery, ns."""
         self.too_long = 0
         timers.every(_TICK_S, self._advance, wanted=lambda: bool(self._members))
 
     @property
     def link(self) -> RadioChannel | None:
-        """The model; None: links are ideal."""
+        """The radio model; None: links are ideal."""
         return self._radio
 
     @property
     def statistics(self) -> Any:
-        """What the server has counted."""
+        """Statistics of the server."""
         return self._exchange.statistics
 
     def addresses(self) -> dict[str, int]:
-        """Linear ids by UAV."""
+        """Returns linear ids by UAV."""
         return {name: member.address for name, member in self._members.items()}
 
     def join(self, name: str) -> Callable[[], None]:
-        """Give a UAV a radio; returns what takes it away again."""
+        """Adds a radio to a UAV; returns the function that removes it."""
         address = free_address(name, {m.address for m in self._members.values()})
         self._exchange.join(Identity.of(address), self._graph.now_ns())
         member = self._members[name] = _Member(address)
@@ -113,27 +113,27 @@ class RadioNetwork:
         return lambda: self._leave(name)
 
     def silence(self, name: str, by: int) -> None:
-        """Let one fault more (by = 1) or less (by = -1) keep a UAV's radio from working."""
+        """Adds (by = 1) or removes (by = -1) a fault that silences a UAV's radio."""
         address = self._address_of(name)
         self._silent[address] = max(self._silent[address] + by, 0)
 
     def check(self, name: str) -> None:
-        """`CommandError` where a UAV has no radio."""
+        """Raises CommandError if a UAV has no radio."""
         self._address_of(name)
 
     def restore_all(self, name: str) -> None:
-        """Forget the faults of a UAV's radio."""
+        """Removes the faults of a UAV's radio."""
         member = self._members.get(name)
         if member is not None:
             self._silent.pop(member.address, None)
 
     def reseed(self, seed: int) -> None:
-        """Draw from other random streams."""
+        """Draws from other random streams."""
         if self._radio is not None:
             self._radio.reseed(seed)
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps; who takes part stands elsewhere."""
+        """Returns the state for a snapshot, without the list of members."""
         return {
             "exchange": self._exchange.get_state(),
             "link": None if self._radio is None else self._radio.get_state(),
@@ -143,7 +143,7 @@ class RadioNetwork:
         }
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state with the same members."""
+        """Restores a saved state with the same members."""
         self._exchange.set_state(state["exchange"])
         if self._radio is not None:
             self._radio.set_state(state["link"])
@@ -151,7 +151,7 @@ class RadioNetwork:
         self._due_ns = state["due_ns"]
         self.too_long = state["too_long"]
 
-    # ---------------------------------------------------------------------------------- inside
+    # ---------------------------------------------------------------------------------- internals
 
     def _sender(self, name: str, topic: RelayedTopic) -> Callable[[Published], None]:
         def send(published: Published) -> None:
@@ -168,7 +168,7 @@ class RadioNetwork:
         return send
 
     def _advance(self) -> None:
-        """Pass on what is due, and come again when more is."""
+        """Delivers what is due, and schedules the next delivery."""
         now_ns = self._graph.now_ns()
         for address, frame in self._exchange.advance(now_ns):
             self._hear(address, frame)

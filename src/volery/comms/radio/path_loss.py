@@ -32,7 +32,7 @@ _P833_MOST_DB = np.array([9.4, 18.0, 26.5, 29.0, 34.1])
 
 
 class Paths(NamedTuple):
-    """What stands in P lines of sight."""
+    """Obstacles along P lines of sight."""
 
     foliage_m: Array
     """(P,) length inside foliage."""
@@ -41,17 +41,17 @@ class Paths(NamedTuple):
     walls: NDArray[np.int64]
     """(P,) surfaces of solids crossed."""
     ground: NDArray[np.bool_]
-    """(P,) whether the ground is in the way."""
+    """(P,) whether the ground blocks the line of sight."""
 
     @classmethod
     def clear(cls, count: int) -> Paths:
-        """Nothing in the way."""
+        """Returns unobstructed paths."""
         none = np.zeros(count, np.int64)
         return cls(np.zeros(count), none, none.copy(), np.zeros(count, np.bool_))
 
 
 def loss_db(radio: Radio, distance_m: Array, paths: Paths) -> Array:
-    """(P,) dB lost over distances (P,) m with `paths` in the way; antennas are left out."""
+    """Returns the losses (P,) dB over distances (P,) m with `paths`, without antennas."""
     lost: Array = (
         distance_loss_db(radio, distance_m)
         + foliage_loss_db(radio, paths.foliage_m)
@@ -63,14 +63,14 @@ def loss_db(radio: Radio, distance_m: Array, paths: Paths) -> Array:
 
 
 def distance_loss_db(radio: Radio, distance_m: Array) -> Array:
-    """(P,) dB over distances (P,) m; within a metre as at one metre."""
+    """Returns the losses (P,) dB over distances (P,) m; below 1 m as at 1 m."""
     first = 20.0 * math.log10(4.0 * math.pi * radio.frequency_mhz * 1e6 / _LIGHT_M_S)
     lost: Array = first + 10.0 * radio.exponent * np.log10(np.maximum(distance_m, _REFERENCE_M))
     return lost
 
 
 def foliage_loss_db(radio: Radio, depth_m: Array) -> Array:
-    """(P,) dB in foliage of depths (P,) m."""
+    """Returns the losses (P,) dB in foliage of depths (P,) m."""
     if radio.vegetation == "none":
         return np.zeros_like(depth_m)
     if radio.vegetation == "weissberger":
@@ -81,10 +81,10 @@ def foliage_loss_db(radio: Radio, depth_m: Array) -> Array:
 
 
 def woodland(frequency_mhz: float) -> tuple[float, float]:
-    """Specific attenuation, dB/m, and most, dB, of woodland by ITU-R P.833.
+    """Returns the specific attenuation, dB/m, and the max loss, dB, of woodland by ITU-R P.833.
 
-    Between the frequencies of its table by straight lines of the logarithms, beyond them by the
-    power law through both ends.
+    It interpolates its table linearly in the logarithms, and extrapolates by the power law through
+    both ends.
     """
     return _in_table(frequency_mhz, _P833_DB_M), _in_table(frequency_mhz, _P833_MOST_DB)
 

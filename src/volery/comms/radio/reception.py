@@ -1,9 +1,9 @@
-"""Whether a frame is received: signal to noise, bit errors, packet errors, time on the air.
+"""Reception of frames: signal to noise, bit errors, packet errors, air time.
 
 Noise is thermal at 290 K in the receiver's bandwidth plus its noise figure. Bits are those of
-coherent BPSK, one for one, with a bit error rate of erfc(sqrt(Eb/N0)) / 2 (J. G. Proakis, Digital
+coherent BPSK without coding, with a bit error rate of erfc(sqrt(Eb/N0)) / 2 (J. G. Proakis, Digital
 Communications, 4th ed., eq. 5.2-11), Eb/N0 = SNR x bandwidth / bit rate; a frame is lost with any
-of its bits. What coding gains is left out.
+of its bits.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _PREAMBLE_S = 20e-6
 
 
 def snr_db(radio: Radio, loss_db: float) -> float:
-    """Signal to noise at a receiver behind a path that takes `loss_db`."""
+    """Returns the signal-to-noise ratio, dB, at a receiver behind a path loss of `loss_db`."""
     received_dbm = radio.power_dbm + 2.0 * radio.antenna_gain_dbi - loss_db
     noise_dbm = (
         _THERMAL_DBM_HZ + 10.0 * math.log10(radio.bandwidth_mhz * 1e6) + radio.noise_figure_db
@@ -30,7 +30,7 @@ def snr_db(radio: Radio, loss_db: float) -> float:
 
 
 def packet_error_rate(radio: Radio, snr: float, payload_bytes: int) -> float:
-    """Share of frames with so many bytes that is lost at a signal to noise of `snr` dB."""
+    """Returns the fraction of frames of `payload_bytes` lost at an SNR of `snr` dB."""
     energy = 10.0 ** (snr / 10.0) * radio.bandwidth_mhz / radio.bit_rate_mbit_s
     bit_error = 0.5 * math.erfc(math.sqrt(energy))
     bits = 8 * (payload_bytes + _OVERHEAD_BYTES)
@@ -38,6 +38,6 @@ def packet_error_rate(radio: Radio, snr: float, payload_bytes: int) -> float:
 
 
 def air_time_ns(radio: Radio, payload_bytes: int) -> int:
-    """For how long a frame keeps the channel."""
+    """Returns the time, ns, for which a frame occupies the channel."""
     bits = 8 * (payload_bytes + _OVERHEAD_BYTES)
     return round(1e9 * (_PREAMBLE_S + bits / (radio.bit_rate_mbit_s * 1e6)))

@@ -1,1 +1,1 @@
-"""The communication server: a router without sockets, and TCP around it."""
+"""The communication server: a router without sockets, and its TCP server."""

@@ -1,4 +1,4 @@
-"""Who may join: a HELLO against the server's rules."""
+"""Admission of stations: checks a HELLO against the server's rules."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from volery.core.plurals import counted
 
 
 def admit(hello: Hello, source: int, settings: RouterSettings) -> Refusal | None:
-    """None for a station that may join; else why it may not."""
+    """Returns None for a station that may join; else the refusal."""
     if not shows_token(hello.token, settings.token):
         return Refusal(Reason.TOKEN, 0, "the token is wrong, or there is none")
     planes = settings.planes_per_batch

@@ -1,7 +1,7 @@
-"""Which stations the server knows, and whom an address means.
+"""The directory of stations, and the receivers of an address.
 
-A server that has just started knows nobody. For a while (`grace_s`) it therefore takes every
-station for known but away, and keeps what is sent to many for those who come within that time.
+A server that has just started knows no station. For `grace_s` it therefore assumes that every
+station is known but away, and stores messages to many for stations that join within that time.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _SWEEP_NS = NS_PER_S // 4
 
 
 class Directory:
-    """Stations by address. now_ns: when the server starts."""
+    """Holds stations by address. now_ns: start time of the server."""
 
     def __init__(self, settings: RouterSettings, now_ns: int) -> None:
         self._settings = settings
@@ -32,15 +32,15 @@ class Directory:
         self._next_sweep_ns = now_ns
 
     def find(self, address: int) -> StationRecord | None:
-        """A station that is known."""
+        """Returns a known station, or None."""
         return self._stations.get(address)
 
     def stations(self) -> list[StationRecord]:
-        """All that are known."""
+        """Returns all known stations."""
         return list(self._stations.values())
 
     def add(self, address: int, now_ns: int) -> StationRecord:
-        """A station that is not known yet."""
+        """Adds a new station."""
         rules = self._settings
         rate = RateLimit(rules.rate_messages_s, rules.rate_bytes_s, rules.burst_messages, now_ns)
         station = self._stations[address] = StationRecord(
@@ -49,17 +49,17 @@ class Directory:
         return station
 
     def remove(self, address: int) -> list[StationFrame]:
-        """Know a station no more; returns what waited for it."""
+        """Removes a station; returns the messages that waited for it."""
         return self._stations.pop(address).mailbox.clear()
 
     def expects(self, now_ns: int) -> bool:
-        """Whether stations that have not been here count as known."""
+        """Returns whether stations that have never connected count as known."""
         return now_ns < self._grace_ends_ns
 
     def meant(self, frame: StationFrame) -> list[StationRecord]:
-        """Stations that a message to many is meant for, its source left out.
+        """Returns the stations that a message to many is for, without its source.
 
-        Sensing is not for those who have been away for long.
+        Sensing is not for stations that have been away for long.
         """
         lasts = frame.kind != StationFrameKind.SENSING
         return [
@@ -69,19 +69,19 @@ class Directory:
         ]
 
     def keep(self, frame: StationFrame) -> list[StationFrame]:
-        """Keep a message to many for those who come; returns what is kept no longer for it."""
+        """Stores a message to many for later stations; returns messages dropped for it."""
         self._to_many.append(frame)
         too_many = max(len(self._to_many) - self._settings.grace_messages, 0)
         return [self._to_many.popleft() for _ in range(too_many)]
 
     def kept_for(self, address: int) -> list[StationFrame]:
-        """What is kept for a station that comes now."""
+        """Returns the stored messages for a station that joins now."""
         return [frame for frame in self._to_many if self._is_meant(address, frame)]
 
     def sweep(self, now_ns: int) -> Iterator[tuple[StationFrame, Reason | None]]:
-        """What has become too old, with the reason for which it does not come.
+        """Yields expired messages with the reason of the loss.
 
-        None: a message to many that is kept for nobody any more; who was here has it.
+        None: a message to many that is no longer stored; all stations present have it.
         """
         if now_ns < self._next_sweep_ns:
             return
@@ -93,7 +93,7 @@ class Directory:
             if self._is_forgotten(station, now_ns):
                 for frame in self.remove(station.address):
                     to_it = is_station(frame.destination)
-                    never = Reason.UNKNOWN if to_it else None  # it does not count among the many
+                    never = Reason.UNKNOWN if to_it else None  # not among the many
                     yield frame, Reason.EXPIRED if station.appeared else never
             else:
                 before_ns = now_ns - round(self._settings.keep_s * NS_PER_S)

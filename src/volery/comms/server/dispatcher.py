@@ -1,7 +1,7 @@
-"""The post office of the communication server: what becomes of each message.
+"""Dispatches the messages of the communication server.
 
-Accepted once, put into the mailboxes of those it is meant for, settled when all of them have it or
-a rule has disposed of it.
+Each message is accepted once, put into the mailboxes of its receivers, and settled when all of them
+have it or a rule has dropped it.
 """
 
 from __future__ import annotations
@@ -20,37 +20,37 @@ from volery.core.clock import NS_PER_S
 from volery.core.errors import CommsError
 
 _SETTLED_AT_ONCE = 64
-"""Sequences that a station is told of at once; fewer wait for a while."""
+"""Number of settled sequences that is sent at once; fewer wait for `_SETTLED_NS`."""
 _SETTLED_NS = NS_PER_S // 5
 
 
 class Dispatcher:
-    """Knows the stations and carries their messages. now_ns: the clock at the start."""
+    """Holds the stations and dispatches their messages. now_ns: the clock at the start."""
 
     def __init__(self, settings: RouterSettings, now_ns: int, link: Link) -> None:
         self.directory = Directory(settings, now_ns)
         self.tally = Tally()
         self.woken: set[int] = set()
-        """Connections for which there is something to send."""
+        """Connections with data to send."""
         self._link = link
         self._next_settled_ns = now_ns
         self._due: list[tuple[int, int]] = []
-        """When a delayed message may go, and to whom."""
+        """Heap of due times, ns, and receivers of delayed messages."""
 
     @property
     def next_due_ns(self) -> int | None:
-        """When the next delayed message may go."""
+        """Time at which the next delayed message is due, ns; None: there is none."""
         return self._due[0][0] if self._due else None
 
     def tick(self, now_ns: int) -> None:
-        """Delayed messages, those that are too old, and what senders have not been told."""
+        """Processes delayed and expired messages, and pending SETTLED frames."""
         while self._due and self._due[0][0] <= now_ns:
             self.wake(self.directory.find(heapq.heappop(self._due)[1]))
         for frame, reason in self.directory.sweep(now_ns):
             if reason is not None:
                 self._dispose(frame, reason)
             else:
-                self._settle(frame)  # a message to many that is kept for nobody any more
+                self._settle(frame)  # a message to many that is no longer stored
         if now_ns >= self._next_settled_ns:
             self._next_settled_ns = now_ns + _SETTLED_NS
             for station in self.directory.stations():
@@ -58,7 +58,7 @@ class Dispatcher:
                     self.wake(station)
 
     def accept(self, source: StationRecord, frame: StationFrame, now_ns: int) -> None:
-        """A message from a station, which may have sent it before."""
+        """Accepts a message from a station; ignores duplicates."""
         if frame.sequence <= source.last:
             self.tally.counts["duplicates"] += 1
             return
@@ -77,12 +77,12 @@ class Dispatcher:
             self._post(each, frame, now_ns)
         if is_station(frame.destination) or not self.directory.expects(now_ns):
             self._settle(frame)
-        else:  # it stays unsettled as long as it is kept for those who come
+        else:  # it stays unsettled as long as it is stored for later stations
             for no_longer in self.directory.keep(frame):
                 self._settle(no_longer)
 
     def take_received(self, station: StationRecord, frame: StationFrame) -> None:
-        """A station tells what has come."""
+        """Processes the acknowledgements of a station."""
         try:
             for entry in decode_received(frame.payload):
                 for came in station.mailbox.received(entry):
@@ -91,12 +91,12 @@ class Dispatcher:
         except CommsError:
             self.tally.counts["unexpected"] += 1
             return
-        self.wake(station)  # there is room on its way again
+        self.wake(station)  # its window has room again
 
     def _receivers(self, frame: StationFrame, now_ns: int) -> list[StationRecord] | None:
-        """Stations that a message is meant for; None where nobody is known for whom it is.
+        """Returns the receivers of a message; None if no receiver is known.
 
-        Sensing for many may have no receiver: nobody listens.
+        Sensing for many may have no receiver.
         """
         if not is_station(frame.destination):
             meant = self.directory.meant(frame)
@@ -112,7 +112,7 @@ class Dispatcher:
         return None if station is None else [station]
 
     def expect(self, address: int, now_ns: int) -> StationRecord:
-        """A station not known before, with what was sent to many and is kept for it."""
+        """Adds a new station, with the stored messages to many."""
         station = self.directory.add(address, now_ns)
         for frame in self.directory.kept_for(address):
             source = self.directory.find(frame.source)
@@ -123,12 +123,12 @@ class Dispatcher:
         return station
 
     def forget(self, address: int) -> None:
-        """A station that will not come again: what waits for it is done with."""
+        """Removes a station for good, and settles the messages that wait for it."""
         for frame in self.directory.remove(address):
             self._settle(frame)
 
     def _post(self, station: StationRecord, frame: StationFrame, now_ns: int) -> None:
-        """Put one message into one mailbox."""
+        """Puts one message into one mailbox."""
         delivery = self._link(now_ns, frame.source, station.address, frame)
         if delivery.lost:
             self.tally.counts["lost_on_link"] += 1
@@ -148,7 +148,7 @@ class Dispatcher:
             heapq.heappush(self._due, (due_ns, station.address))
 
     def _dispose(self, frame: StationFrame, reason: Reason, at: int | None = None) -> None:
-        """Done with a message that does not come: told for commands, counted for sensing."""
+        """Drops a message: commands are refused, sensing is counted."""
         if frame.kind == StationFrameKind.COMMAND or reason is Reason.UNKNOWN:
             self.tally.refused[reason] += 1
             self._tell_refused(frame, reason, frame.destination if at is None else at)
@@ -165,7 +165,7 @@ class Dispatcher:
         if source is None or source.session != frame.session:
             return
         known = is_station(at) or reason is not Reason.UNKNOWN
-        text = _REFUSED[reason].format(at) if known else "nobody of them is here"
+        text = _REFUSED[reason].format(at) if known else "none of the addressed stations is known"
         refusal = encode_refusal(Refusal(reason, frame.sequence, text))
         source.control.append(
             encode_frame(StationFrameKind.REFUSAL, SERVER, frame.source, payload=refusal)
@@ -173,7 +173,7 @@ class Dispatcher:
         self.wake(source)
 
     def _settle(self, frame: StationFrame) -> None:
-        """One station less that has not got this message."""
+        """Settles a message for one of its receivers."""
         source = self.directory.find(frame.source)
         if source is None or source.session != frame.session:
             return
@@ -186,14 +186,14 @@ class Dispatcher:
                 self.wake(source)
 
     def wake(self, station: StationRecord | None) -> None:
-        """There is something to send to a station."""
+        """Marks a station as having data to send."""
         if station is not None and station.connection is not None:
             self.woken.add(station.connection)
 
 
 _REFUSED = {
-    Reason.UNKNOWN: "no station {} has ever been here",
+    Reason.UNKNOWN: "no station {} has connected so far",
     Reason.FULL: "too many commands wait for station {}",
     Reason.RATE: "too many messages a second (to {})",
-    Reason.EXPIRED: "station {} did not come back in time",
+    Reason.EXPIRED: "station {} did not reconnect in time",
 }

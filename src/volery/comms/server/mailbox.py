@@ -1,6 +1,6 @@
-"""What waits for one station: a lane for each source, and what is on its way.
+"""The queue of messages for one station: a lane for each source, and messages in transit.
 
-Every station has a mailbox of its own, so that traffic to one never waits for another. Sources take
+Every station has a queue of its own, so that traffic to one never delays another. Sources take
 turns; within a lane messages keep their order.
 """
 
@@ -17,32 +17,32 @@ from volery.comms.server.settings import RouterSettings
 
 
 class QueuedMessage(NamedTuple):
-    """A message in a mailbox."""
+    """A message in a queue."""
 
     frame: StationFrame
     arrived_ns: int
     due_ns: int
-    """Not to be handed over before."""
+    """Earliest time of delivery, ns."""
     number: int
     """Counts the messages of a lane."""
 
 
 class SentMessage(NamedTuple):
-    """What became of a new message."""
+    """Result of adding a message."""
 
     kept: bool
     dropped: tuple[StationFrame, ...] = ()
-    """Measurements that had to go for it."""
+    """Older measurements dropped for it."""
 
 
 class _Lane:
-    """Messages from one source, commands and sensing apart, so that either can be bounded."""
+    """Messages from one source, commands and sensing apart, so that each can be bounded."""
 
     def __init__(self) -> None:
         self.commands: deque[QueuedMessage] = deque()
         self.sensing: deque[QueuedMessage] = deque()
         self.sent: deque[QueuedMessage] = deque()
-        """On their way: the station has not yet told that they came."""
+        """In transit: sent and not yet acknowledged."""
         self.last_due_ns = 0
         self.count = 0
 
@@ -53,14 +53,14 @@ class _Lane:
         return self.commands if kind == StationFrameKind.COMMAND else self.sensing
 
     def next(self) -> deque[QueuedMessage]:
-        """The queue whose first message is the lane's first."""
+        """Returns the queue whose first message is the lane's first."""
         if not self.commands or not self.sensing:
             return self.commands or self.sensing
         earlier = self.commands[0].number < self.sensing[0].number
         return self.commands if earlier else self.sensing
 
     def acknowledged(self, upto: Received) -> Iterator[QueuedMessage]:
-        """Remove what came, up to a sequence of a session; what was sent before it came too."""
+        """Removes and yields acknowledged messages, up to a sequence of a session."""
         last = -1
         for index, waiting in enumerate(self.sent):
             frame = waiting.frame
@@ -72,7 +72,7 @@ class _Lane:
             yield self.sent.popleft()
 
     def rewind(self) -> None:
-        """What was on its way is to go again, first."""
+        """Returns messages in transit to the head of their queues."""
         while self.sent:
             waiting = self.sent.pop()
             self.of(waiting.frame.kind).appendleft(waiting)
@@ -89,11 +89,14 @@ class StationQueue:
         self._bytes = 0
 
     def __len__(self) -> int:
-        """Messages that wait or are on their way."""
+        """Returns the number of messages that wait or are in transit."""
         return sum(len(lane) for lane in self._lanes.values()) + self._on_the_way
 
     def put(self, frame: StationFrame, now_ns: int, delay_ns: int = 0) -> tuple[SentMessage, int]:
-        """Add a message; also when it may go. A full lane drops its oldest sensing, no command."""
+        """Adds a message; returns the result and its due time.
+
+        A full lane drops its oldest sensing, but no commands.
+        """
         lane = self._lanes.setdefault(frame.source, _Lane())
         queue, size = lane.of(frame.kind), len(frame.data)
         dropped: list[StationFrame] = []
@@ -111,9 +114,9 @@ class StationQueue:
         return SentMessage(True, tuple(dropped)), due_ns
 
     def take(self, now_ns: int) -> StationFrame | None:
-        """The next message, whose source then is the last to have its turn; None: nothing is due.
+        """Returns the next message, which is then in transit; None: no message is due.
 
-        It counts as on its way until `received`; at most `window` do.
+        Sources take turns. At most `window` messages are in transit until `received`.
         """
         if self._on_the_way >= self._settings.window:
             return None
@@ -136,7 +139,7 @@ class StationQueue:
         return None
 
     def received(self, upto: Received) -> list[StationFrame]:
-        """Remove and return what the station has told to have come."""
+        """Removes and returns messages that the station has acknowledged."""
         lane = self._lanes.get(upto.source)
         if lane is None:
             return []
@@ -146,7 +149,7 @@ class StationQueue:
         return came
 
     def rewind(self) -> None:
-        """The connection has ended: what was on its way is to go again."""
+        """Queues messages in transit again, after the connection has ended."""
         for source, lane in self._lanes.items():
             self._bytes += sum(len(waiting.frame.data) for waiting in lane.sent)
             lane.rewind()
@@ -155,7 +158,7 @@ class StationQueue:
         self._on_the_way = 0
 
     def expire(self, before_ns: int) -> list[StationFrame]:
-        """Remove and return what has waited since before an instant."""
+        """Removes and returns messages that arrived before a time."""
         old: list[StationFrame] = []
         for source, lane in list(self._lanes.items()):
             for queue in (lane.commands, lane.sensing):
@@ -167,7 +170,7 @@ class StationQueue:
         return old
 
     def expire_many(self) -> list[StationFrame]:
-        """Remove and return the sensing that was sent to many."""
+        """Removes and returns sensing messages to many."""
         old: list[StationFrame] = []
         for source, lane in list(self._lanes.items()):
             gone = [w.frame for w in lane.sensing if not is_station(w.frame.destination)]
@@ -180,7 +183,7 @@ class StationQueue:
         return old
 
     def clear(self) -> list[StationFrame]:
-        """Remove and return everything."""
+        """Removes and returns all messages."""
         self.rewind()
         lanes = self._lanes.values()
         everything = [w.frame for lane in lanes for q in (lane.commands, lane.sensing) for w in q]
@@ -194,6 +197,6 @@ class StationQueue:
         return len(queue) >= rules.lane_depth or self._bytes + size > rules.mailbox_bytes
 
     def _forget_empty(self, source: int, lane: _Lane) -> None:
-        """Lanes of sources that are gone for good cost nothing."""
+        """Deletes an empty lane, so that sources that have left use no memory."""
         if not lane and not lane.sent and source not in self._turns:
             del self._lanes[source]

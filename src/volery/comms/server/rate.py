@@ -1,4 +1,4 @@
-"""How much one station may send: a token bucket of messages and one of bytes."""
+"""Rate limit of one station: a token bucket of messages and one of bytes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from volery.core.clock import NS_PER_S
 class RateLimit:
     """Allows a steady rate and a burst above it.
 
-    messages_s, bytes_s: steady rates. burst: messages that may come at once, of any size.
+    messages_s, bytes_s: steady rates. burst: messages that may arrive at once, of any size.
     """
 
     def __init__(self, messages_s: float, bytes_s: float, burst: int, now_ns: int) -> None:
@@ -19,7 +19,7 @@ class RateLimit:
         self._at_ns = now_ns
 
     def allows(self, size: int, now_ns: int) -> bool:
-        """Whether a message of so many bytes may pass now; it is counted if so."""
+        """Returns whether a message of `size` bytes may pass now, and counts it if so."""
         passed_s = max(now_ns - self._at_ns, 0) / NS_PER_S
         self._at_ns = now_ns
         messages, in_bytes = (

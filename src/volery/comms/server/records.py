@@ -1,4 +1,4 @@
-"""What the server keeps of a station and of a connection."""
+"""Records of the server on stations and connections."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from volery.comms.server.rate import RateLimit
 
 @dataclass(slots=True)
 class StationRecord:
-    """A station that has been here, or is expected."""
+    """A station that has connected, or is expected."""
 
     address: int
     mailbox: StationQueue
@@ -21,18 +21,18 @@ class StationRecord:
     connection: int | None = None
     appeared: bool = False
     is_gone: bool = False
-    """Whether it has been away for so long that sensing for many is not meant for it."""
+    """Whether it has been away for so long that sensing for many is not stored for it."""
     left_ns: int = 0
-    """When its connection ended."""
+    """End of its last connection, ns."""
     session: int = 0
     last: int = 0
-    """Highest sequence that came of this session."""
+    """Highest received sequence of this session."""
     unsettled: dict[int, int] = field(default_factory=dict)
-    """Sequence of this session: how many stations have not told yet that it came."""
+    """Sequence of this session to the number of receivers that have not acknowledged it."""
     settled: list[int] = field(default_factory=list)
-    """Sequences that it has not been told of."""
+    """Settled sequences that are not sent yet."""
     control: deque[bytes] = field(default_factory=lambda: deque(maxlen=4096))
-    """Refusals for it; also while it is away."""
+    """Refusals for it, also while it is away."""
 
 
 @dataclass(slots=True)
@@ -45,6 +45,6 @@ class StationConnection:
     parser: StationFrameParser = field(default_factory=StationFrameParser)
     control: list[bytes] = field(default_factory=list)
     is_held: bool = False
-    """Whether what it has sent waits elsewhere."""
+    """Whether its data waits for the token check."""
     closing: bool = False
-    """To be ended when what is said has been sent."""
+    """Whether it ends once pending data has been sent."""

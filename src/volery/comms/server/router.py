@@ -1,6 +1,6 @@
 """The communication server without sockets and without a clock.
 
-A shell hands it connections, bytes and the time, and asks it what to send:
+Its caller passes connections, bytes and the time, and sends what it returns:
 
     router = Router(RouterSettings(), now_ns=0, boot=1)
     connection = router.connect(now_ns)
@@ -8,8 +8,8 @@ A shell hands it connections, bytes and the time, and asks it what to send:
     for each in router.take_woken():
         send(each, router.take(each, now_ns))
 
-`server` is the shell around it for TCP, `exchange` the one inside a run. The same calls with the
-same times give the same bytes. Rules and promises: docs/comms.md.
+`tcp` runs it over TCP, `comms.local_network` inside a run. The same calls with the same times give
+the same bytes. Rules and guarantees: docs/comms.md.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from volery.core.errors import CommsError
 
 
 class Router:
-    """Takes messages from stations and hands them to those they are meant for.
+    """Receives messages from stations and forwards them to their receivers.
 
     Parameters
     ----------
@@ -46,9 +46,9 @@ class Router:
     now_ns
         The clock at the start; any clock that never goes back.
     boot
-        u32 that tells this start of the server from others.
+        u32 that identifies this start of the server.
     link
-        Decides what is lost or late between two stations.
+        Decides loss and delay between two stations.
 
     """
 
@@ -64,10 +64,10 @@ class Router:
         self._directory = self._office.directory
         self._woken = self._office.woken
 
-    # ----------------------------------------------------------------------------------- the shell
+    # ---------------------------------------------------------------------------- for the caller
 
     def connect(self, now_ns: int) -> int | None:
-        """Number of a new connection; None: there are too many."""
+        """Returns the number of a new connection; None: there are too many."""
         if len(self._connections) >= self._settings.most_connections:
             self._tally.refused[Reason.FULL] += 1
             return None
@@ -76,7 +76,7 @@ class Router:
         return self._opened
 
     def receive(self, connection: int, data: bytes | memoryview, now_ns: int) -> None:
-        """Take bytes that came, in pieces of any size."""
+        """Processes received bytes, in pieces of any size."""
         known = self._connections.get(connection)
         if known is None or known.closing:
             return
@@ -88,7 +88,7 @@ class Router:
             self._refuse_connection(connection, Reason.PROTOCOL, "too many damaged frames")
 
     def disconnect(self, connection: int, now_ns: int) -> None:
-        """A connection has ended."""
+        """Processes the end of a connection."""
         ended = self._connections.pop(connection, None)
         self._woken.discard(connection)
         if ended is None:
@@ -102,31 +102,31 @@ class Router:
             station.mailbox.rewind()
 
     def forget(self, connection: int, now_ns: int) -> None:
-        """A connection has ended and its station will not come again: nothing is kept for it."""
+        """Ends a connection whose station will not return, and drops its messages."""
         known = self._connections.get(connection)
         self.disconnect(connection, now_ns)
         if known is not None and known.station is not None:
             self._office.forget(known.station.address)
 
     def tick(self, now_ns: int) -> None:
-        """What time brings: silence, age, delayed messages. Call it every 50 ms or so."""
+        """Processes timeouts and delayed messages. Call it every 50 ms or so."""
         for number, connection in list(self._connections.items()):
             self._end_silent(number, connection, now_ns)
         self._office.tick(now_ns)
 
     @property
     def next_due_ns(self) -> int | None:
-        """When the next delayed message may go."""
+        """Time at which the next delayed message is due, ns; None: there is none."""
         return self._office.next_due_ns
 
     def take_woken(self) -> list[int]:
-        """Connections for which there is something to send, since the last call."""
+        """Returns the connections with data to send, since the last call."""
         woken = sorted(self._woken)
         self._woken.clear()
         return woken
 
     def take(self, connection: int, now_ns: int, most_bytes: int = 64 << 10) -> bytes:
-        """What to send now, some frames; nothing: wait until it is woken."""
+        """Returns the bytes to send now, some frames; empty: wait for `take_woken`."""
         known = self._connections.get(connection)
         if known is None:
             return b""
@@ -148,7 +148,7 @@ class Router:
         return b"".join(frames)
 
     def hold(self, connection: int, *, is_held: bool) -> None:
-        """Notes that what a connection has sent waits before it comes to the router."""
+        """Marks whether a connection's data waits before it reaches the router."""
         known = self._connections.get(connection)
         if known is not None:
             known.is_held = is_held
@@ -159,13 +159,13 @@ class Router:
         return known is not None and known.station is not None
 
     def closing(self, connection: int) -> bool:
-        """Whether a connection is to be ended when what `take` gave has been sent."""
+        """Returns whether to close a connection once `take`'s data has been sent."""
         known = self._connections.get(connection)
         return known is None or known.closing
 
     @property
     def statistics(self) -> Statistics:
-        """What has been counted so far."""
+        """Statistics so far."""
         stations = self._directory.stations()
         present = sum(station.connection is not None for station in stations)
         waiting = sum(len(station.mailbox) for station in stations)
@@ -173,7 +173,7 @@ class Router:
         return self._tally.statistics(parsers, present, len(stations) - present, waiting)
 
     def stations(self) -> dict[int, str]:
-        """Addresses and names of the stations that are here."""
+        """Returns addresses and names of the connected stations."""
         return {s.address: s.name for s in self._directory.stations() if s.connection is not None}
 
     # ------------------------------------------------------------------------------------ frames
@@ -187,7 +187,9 @@ class Router:
             return
         connection.heard_ns = now_ns
         if frame.source != station.address or frame.session != station.session:
-            self._refuse_connection(number, Reason.PROTOCOL, "a frame in another's name")
+            self._refuse_connection(
+                number, Reason.PROTOCOL, "the frame's source is another station"
+            )
         elif frame.kind in MESSAGES:
             self._office.accept(station, frame, now_ns)
         elif frame.kind == StationFrameKind.RECEIVED:
@@ -221,7 +223,7 @@ class Router:
             station.session, station.last = frame.session, 0
             station.unsettled.clear()
             station.control.clear()
-        station.settled.clear()  # WELCOME tells it by what it leaves away
+        station.settled.clear()  # WELCOME implies them
         welcome = Welcome(self._boot, station.last, tuple(station.unsettled)[:MOST_SEQUENCES])
         connection.control.append(
             encode_frame(
@@ -231,15 +233,17 @@ class Router:
         self._woken.add(number)
 
     def _replace(self, station: StationRecord) -> None:
-        """The same station anew: the newest wins, since the old connection is most often dead."""
+        """Replaces a station's old connection, which is most often dead."""
         old = station.connection
         if old is not None:
             self._tally.counts["replaced"] += 1
-            self._refuse_connection(old, Reason.REPLACED, "this station has connected anew")
+            self._refuse_connection(
+                old, Reason.REPLACED, "this station has opened a new connection"
+            )
             self._connections[old].station = None
         station.mailbox.rewind()
 
-    # ------------------------------------------------------------------------------------ small
+    # ---------------------------------------------------------------------------------- internals
 
     def _settled_frame(self, station: StationRecord) -> bytes:
         told = station.settled[:MOST_SEQUENCES]

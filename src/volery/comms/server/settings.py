@@ -1,4 +1,4 @@
-"""The rules of the communication server as numbers; times in seconds. All are modelling choices."""
+"""Limits of the communication server; times in seconds. All are modelling choices."""
 
 from __future__ import annotations
 
@@ -10,43 +10,50 @@ from volery.core.errors import CommsError
 
 @dataclass(frozen=True)
 class RouterSettings:
-    """What the server allows and for how long it waits."""
+    """Limits and timeouts of the server."""
 
     planes_per_batch: int = PLANES_PER_BATCH
     token: str | None = None
-    """What stations must show; None: nothing."""
+    """Token that stations must send; None: no token."""
     lane_depth: int = 1024
-    """Messages of each kind that wait from one source for one station: as many as it holds."""
+    """Max waiting messages of each kind from one source for one station: a station's send
+    buffer.
+    """
     mailbox_bytes: int = 8 << 20
-    """Bytes that wait for one station."""
+    """Max waiting bytes for one station."""
     window: int = 256
-    """Messages on their way to one station that it has not yet told to have come."""
+    """Max messages in transit to one station without acknowledgement."""
     keep_s: float = 60.0
-    """For how long a message waits for its station."""
+    """Time for which a message waits for its station."""
     keep_many_s: float = 5.0
-    """For how long sensing to batches and to all waits for a station that is away; after that it is
-    as one that nobody listens to: what a fleet told a minute ago is of no use to who comes back."""
+    """Time for which sensing to batches and to all waits for a station that is away; older states
+    are of no use to a station that returns.
+    """
     forget_s: float = 600.0
-    """After which a station that is away is no longer known."""
+    """Time after which a station that is away is forgotten."""
     grace_s: float = 5.0
-    """After the start: for so long every station counts as known, since all have to come again."""
+    """Time after the start in which every station counts as known, since all have to reconnect."""
     grace_messages: int = 4096
-    """Messages to batches and to all that are kept for stations which come within that time."""
+    """Max messages to batches and to all that are stored for stations that join within that
+    time.
+    """
     hello_s: float = 2.0
-    """Within which a connection must say who it is."""
+    """Time in which a connection must send HELLO."""
     silence_s: float = 3.0
-    """After which a station that says nothing is let go; stations ping every second."""
+    """Time without data after which a station is disconnected; stations ping every second."""
     rate_messages_s: float = 2000.0
-    """Messages a second of one station, in the long run."""
+    """Steady message rate of one station."""
     burst_messages: int = 4096
-    """Messages at once; what a station sends again after a restart of the server fits."""
+    """Burst of messages; it covers the messages that a station repeats after a restart of the
+    server.
+    """
     rate_bytes_s: float = 16e6
     most_corrupt: int = 100
-    """Damaged frames after which a connection is ended."""
+    """Damaged frames after which a connection is closed."""
     most_connections: int = 256
 
     def __post_init__(self) -> None:
-        """`CommsError` for numbers that cannot be."""
+        """Raises CommsError for invalid values."""
         if not 1 <= self.planes_per_batch <= FIRST_GROUND:
             raise CommsError(f"a batch has 1 to {FIRST_GROUND} planes, not {self.planes_per_batch}")
         for name in ("lane_depth", "mailbox_bytes", "window", "burst_messages"):

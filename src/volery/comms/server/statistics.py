@@ -1,4 +1,4 @@
-"""What the communication server counts."""
+"""Counters of the communication server."""
 
 from __future__ import annotations
 
@@ -13,48 +13,48 @@ from volery.core.framing import Flaw
 
 @dataclass(frozen=True)
 class Statistics:
-    """Counts since the start; messages to many count once for each station where not said."""
+    """Counts since the start; messages to many count once for each station unless noted."""
 
     accepted: int
-    """Messages that came from stations, once each."""
+    """Messages from stations, once each."""
     delivered: int
-    """Told by the station to have come."""
+    """Messages acknowledged by their stations."""
     stored: int
-    """Kept for a station that was away."""
+    """Messages stored for a station that was away."""
     duplicates: int
-    """Sent again by a source though the server had them."""
+    """Messages that a source repeated though the server had them."""
     dropped_sensing: int
-    """Measurements that had to go for newer ones."""
+    """Measurements dropped for newer ones."""
     flooded: int
-    """Measurements above the rate that is allowed."""
+    """Measurements above the allowed rate."""
     expired: int
     """Messages that waited for too long."""
     lost_on_link: int
     """Messages that the radio model lost."""
     refused: Mapping[Reason, int]
-    """Refusals by reason, those of connections included."""
+    """Refusals by reason, including those of connections."""
     corrupt: Mapping[Flaw, int]
-    """Damaged frames by what is wrong."""
+    """Damaged frames by flaw."""
     noise_bytes: int
-    """Bytes that belonged to no frame."""
+    """Bytes outside of frames."""
     unexpected: int
-    """Whole frames that a station has no reason to send."""
+    """Valid frames that a station should not send."""
     silent: int
-    """Connections ended because nothing, or no HELLO, came."""
+    """Connections closed because no data, or no HELLO, arrived in time."""
     replaced: int
-    """Connections ended because the same station came anew."""
+    """Connections replaced by a new one of the same station."""
     connections: int
-    """Now open."""
+    """Open connections."""
     present: int
-    """Stations connected now."""
+    """Connected stations."""
     away: int
-    """Stations known and not connected."""
+    """Known stations that are not connected."""
     waiting: int
-    """Messages that wait or are on their way now."""
+    """Messages that wait or are in transit."""
 
 
 class Tally:
-    """Counts that go on; `statistics` takes a picture of them."""
+    """Counters; `statistics` returns their values."""
 
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
@@ -62,14 +62,14 @@ class Tally:
         self.corrupt: Counter[Flaw] = Counter()
 
     def add(self, parser: StationFrameParser) -> None:
-        """Keep the counts of a connection that has ended."""
+        """Adds the counts of a connection that has ended."""
         self.corrupt.update(parser.flaws)
         self.counts["noise_bytes"] += parser.noise_bytes
 
     def statistics(
         self, parsers: Sequence[StationFrameParser], present: int, away: int, waiting: int
     ) -> Statistics:
-        """The counts and how things stand. parsers: of the open connections."""
+        """Returns the statistics. parsers: of the open connections."""
         count = self.counts
         corrupt = sum((parser.flaws for parser in parsers), self.corrupt)
         noise_bytes = sum(parser.noise_bytes for parser in parsers)

@@ -5,8 +5,8 @@
     ...
     await server.stop()
 
-Everything happens in the callbacks of one asyncio loop. A station that does not read fills its own
-mailbox, and nobody waits for it.
+All code runs in the callbacks of one asyncio loop. A station that does not read fills its own queue
+and delays no other.
 """
 
 from __future__ import annotations
@@ -28,24 +28,24 @@ from volery.core.token_guesses import TokenGuesses
 PORT = 10200
 _TICK_S = 0.05
 _UNSENT_BYTES = 128 << 10
-"""In the operating system's hands and ours before a station's mailbox has to wait."""
+"""Max unsent bytes of a connection; more messages wait in the station's queue."""
 _EARLY_BYTES = 4096
-"""A HELLO fits; more need not come before the token has been checked."""
+"""Max bytes before the token check; a HELLO fits."""
 _FAREWELL_S = 1.0
-"""For how long a connection that is being ended may take to read why."""
+"""Time for which a closing connection may read its refusal, s."""
 
 
 class CommsServer:
-    """Listens for stations.
+    """Serves stations on a TCP port.
 
     Parameters
     ----------
     settings
-        The rules; its token is what stations must show.
+        The limits, and the token that stations must send.
     host, port
-        Address to listen on; port 0 takes a free one, and the attribute tells which.
+        Address to listen on; port 0 picks a free one, which the attribute then holds.
     anywhere
-        Consent to a `host` beyond loopback, which also needs a token.
+        Allows a `host` beyond loopback, which also needs a token.
 
     """
 
@@ -71,23 +71,23 @@ class CommsServer:
 
     @property
     def name(self) -> str:
-        """What it is and where."""
+        """Name and address of the server."""
         return f"communication server {self.host}:{self.port}"
 
     @property
     def statistics(self) -> Statistics:
-        """What has been counted since the start."""
+        """Statistics since the start."""
         return self.router.statistics
 
     async def start(self) -> None:
-        """Begin to listen.
+        """Starts to listen.
 
         Raises
         ------
         BridgeError
-            The address is beyond loopback without consent and token.
+            The address is beyond loopback without permission and token.
         CommsError
-            The address is taken or not this machine's.
+            The address is in use or not this machine's.
 
         """
         check_address(self.host, anywhere=self._anywhere, flag="--allow-remote and --token")
@@ -108,7 +108,7 @@ class CommsServer:
         self._tick()
 
     async def stop(self) -> None:
-        """Let everybody go."""
+        """Closes all connections."""
         if self._ticks is not None:
             self._ticks.cancel()
         if self._server is not None:
@@ -117,14 +117,14 @@ class CommsServer:
             check.cancel()
         for link in list(self._links.values()):
             link.transport.abort()
-        await asyncio.sleep(0)  # their callbacks
+        await asyncio.sleep(0)  # run their callbacks
 
     def _tick(self) -> None:
         self.router.tick(time.monotonic_ns())
         self._send_woken()
         self._ticks = self._loop.call_later(_TICK_S, self._tick)
 
-    # ------------------------------------------------------------------------- of the connections
+    # ---------------------------------------------------------------------------- for connections
 
     def _opened(self, link: _StationLink) -> None:
         number = self.router.connect(time.monotonic_ns())
@@ -149,7 +149,7 @@ class CommsServer:
             check.add_done_callback(self._checks.discard)
 
     async def _check(self, link: _StationLink, guesses: TokenGuesses) -> None:
-        """Brings what a station has sent before its token was checked to the router, in turn."""
+        """Passes a station's early data to the router, one token check at a time."""
         async with guesses.turn(link.address):
             self.router.hold(link.number, is_held=False)
             data, link.early, link.waits = link.early, b"", False
@@ -166,7 +166,7 @@ class CommsServer:
             link.proven = self.router.has_greeted(link.number)
             if link.proven:
                 self._listener.prove(link.transport)
-        if not self._sends:  # once for all that has come in this turn of the loop
+        if not self._sends:  # once for all data of this turn of the loop
             self._sends = True
             self._loop.call_soon(self._send_woken)
 
@@ -208,13 +208,13 @@ class _StationLink(asyncio.Protocol):
         self.proven = False
         """Whether the station is known to the router."""
         self.waits = False
-        """Whether what it sends waits for its token to be checked."""
+        """Whether its data waits for the token check."""
         self.early = b""
         self.address = "?"
         self._preamble = Preamble()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """As of asyncio."""
+        """Implements asyncio.Protocol."""
         assert isinstance(transport, asyncio.Transport)
         self.transport = transport
         transport.set_write_buffer_limits(_UNSENT_BYTES)
@@ -223,7 +223,7 @@ class _StationLink(asyncio.Protocol):
         self._server._opened(self)
 
     def data_received(self, data: bytes) -> None:
-        """As of asyncio."""
+        """Implements asyncio.Protocol."""
         data = self._preamble.feed(data)
         if self._preamble.refused is not None:
             self._server._end_stranger(self, self._preamble.refused)
@@ -231,14 +231,14 @@ class _StationLink(asyncio.Protocol):
             self._server._came(self, data)
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
-        """As of asyncio."""
+        """Implements asyncio.Protocol."""
         self._server._closed(self)
 
     def pause_writing(self) -> None:
-        """As of asyncio."""
+        """Implements asyncio.Protocol."""
         self.paused = True
 
     def resume_writing(self) -> None:
-        """As of asyncio."""
+        """Implements asyncio.Protocol."""
         self.paused = False
         self._server._send(self)

@@ -1,1 +1,1 @@
-"""Stations of the radio network: on the ground, beside UAVs, and as a node."""
+"""Stations of the radio network: on the ground, for UAVs, and as a node."""

@@ -1,4 +1,4 @@
-"""Addresses as people write them: `3`, `0.3`, `uav4`, `batch1`, `all`."""
+"""Parses addresses as users write them: `3`, `0.3`, `uav4`, `batch1`, `all`."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ FORMS = "a linear id such as 3, batch.plane such as 0.3, a name such as uav4, ba
 
 
 def address_of(text: str, planes_per_batch: int, names: Mapping[str, int]) -> int:
-    """Address meant by a word; names: addresses of those who have told their name.
+    """Returns the address of a word; names: addresses by the names that stations report.
 
-    `uavN` of nobody who has been heard is the station with linear id N - 1. `CommsError` where
-    nothing of the kind is meant.
+    `uavN`, if no station reports it, is the station with linear id N - 1. Raises CommsError if the
+    word is no address.
     """
     if text == "all":
         return ALL
@@ -28,4 +28,4 @@ def address_of(text: str, planes_per_batch: int, names: Mapping[str, int]) -> in
     if found := re.fullmatch(r"(uav)?(\d{1,5})", text):
         linear = int(found[2]) - bool(found[1])
         return Identity.of(linear, planes_per_batch).address(planes_per_batch)
-    raise CommsError(f"'{text}' is nobody: write {FORMS}")
+    raise CommsError(f"'{text}' is not an address: write {FORMS}")

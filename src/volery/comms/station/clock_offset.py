@@ -1,9 +1,9 @@
-"""When a message was made, by the clock of who receives it.
+"""Estimates the send time of a message by the receiver's clock.
 
-A frame tells when it was sent, by its source's clock. The two clocks need not agree, and what a
-server has kept comes late, all at once. So a message counts as new where it came about as long
-after the one before it as it was sent after that one: it tells how the clocks lie to each other,
-and from then on the age of what comes late. Before, both clocks are taken for the same.
+A frame holds its send time by its source's clock. The two clocks may differ, and messages that a
+server has stored arrive late, all at once. So a message counts as new if the gap to the previous
+one is about the same at both ends. A new message gives the offset of the clocks, which then gives
+the age of late ones. Before, both clocks are assumed to agree.
 """
 
 from __future__ import annotations
@@ -11,23 +11,26 @@ from __future__ import annotations
 from volery.core.clock import NS_PER_S
 
 _PACE = 0.5
-"""Gap of arrivals over that of sending times, or the other way round: less is a backlog that comes
-at once, or its beginning."""
+"""Min ratio of the gaps at both ends; a smaller one is a backlog that arrives at once, or its
+beginning.
+"""
 _LONGEST_KEPT_NS = 65 * NS_PER_S
-"""Older than a server keeps messages, and a little: then the clocks differ. Modelling choices."""
+"""Slightly longer than a server stores messages; an older one means that the clocks differ.
+Modelling choices.
+"""
 
 
 class ClockOffset:
-    """Of the messages of one source."""
+    """Clock offset of one source."""
 
     def __init__(self) -> None:
         self._before: tuple[int, int] | None = None
-        """When the latest message was sent, by its source, and when it came."""
+        """Send time of the latest message, by its source's clock, and its arrival."""
         self._offset_ns: int | None = None
-        """Own clock less that of the source; None: not known."""
+        """Own clock minus the source's; None: unknown."""
 
     def made_ns(self, sent_ns: int, now_ns: int) -> int:
-        """When a message that comes now was made, by the own clock; never later than now."""
+        """Returns the send time of a message that arrives now, by the own clock, at most now."""
         if self._before is not None:
             sent_gap_ns, gap_ns = sent_ns - self._before[0], now_ns - self._before[1]
             if 0 < _PACE * sent_gap_ns <= gap_ns <= sent_gap_ns / _PACE:

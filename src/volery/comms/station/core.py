@@ -1,16 +1,15 @@
-"""A station without sockets and without a clock: what it sends, resends and passes on.
+"""A station without sockets and without a clock: it sends, repeats and receives messages.
 
-A shell hands it bytes and the time, and asks what to send:
+Its caller passes bytes and the time, and sends what it returns:
 
     core = StationCore(Identity(0, 1), session=7)
     core.connected(now_ns)
     messages = core.feed(data, now_ns)
-    core.send(Kind.COMMAND, 3, b"...", now_ns)
+    core.send(StationFrameKind.COMMAND, 3, b"...", now_ns)
     write(core.take())
 
-It holds every message until the server says that it is settled, and sends again after each new
-connection what a server has not got. To its user it passes each message on once, those of a source
-in the order in which they were sent.
+It stores every message until the server settles it, and after each reconnection repeats those that
+the server lacks. It passes each received message to its user once, in the order of each source.
 """
 
 from __future__ import annotations
@@ -41,21 +40,20 @@ from volery.core.clock import NS_PER_S
 from volery.core.errors import CommsError
 
 FATAL = frozenset({Reason.IDENTITY, Reason.BATCH_SIZE, Reason.TOKEN, Reason.REPLACED})
-"""Refusals after which coming again would not help."""
+"""Refusals after which reconnecting would not help."""
 
 _PING_NS = NS_PER_S
 _SILENCE_NS = 3 * NS_PER_S
 _ACKNOWLEDGE_AT_ONCE = 64
 _REFUSALS_KEPT = 256
 _MOST_RECEIVED = 1000
-"""Entries of one RECEIVED, so that it stays below the limit of payloads."""
+"""Max entries of one RECEIVED, below the limit of payloads."""
 
 
 class StationCore:
     """One station's side of the protocol.
 
-    session: u32, another one each time that the station starts. name, token: what it tells the
-    server.
+    session: u32, a new one at each start of the station. name, token: sent to the server.
     """
 
     def __init__(
@@ -81,35 +79,35 @@ class StationCore:
         self.joined = False
         """Whether the server has welcomed this connection."""
         self.fatal: Refusal | None = None
-        """Why it is of no use to come again."""
+        """The refusal after which reconnecting is useless, or None."""
         self.boot = 0
         """Number of the server's start."""
         self.refusals: deque[Refusal] = deque(maxlen=_REFUSALS_KEPT)
-        """What the server refused, newest last; take them off as they are read."""
+        """Refusals by the server, newest last; remove them as they are read."""
         self.corrupt = 0
-        """Damaged frames on connections that have ended."""
+        """Damaged frames on ended connections."""
 
     @property
     def unsettled(self) -> int:
-        """Messages that may have to be sent again."""
+        """Number of messages that may have to be repeated."""
         return len(self._held)
 
     def is_settled(self, sequence: int) -> bool:
-        """Whether the server is done with a message: it has come, or a rule has disposed of it."""
+        """Returns whether the server has settled a message: delivered or dropped by a rule."""
         return sequence not in self._held
 
     @property
     def dropped(self) -> int:
-        """Measurements that this station itself dropped, since too many were held."""
+        """Measurements that this station dropped because its buffer was full."""
         return self._held.dropped
 
     @property
     def duplicates(self) -> int:
-        """Messages that came again and were not passed on."""
+        """Repeated messages that were not passed on."""
         return self._inbox.duplicates
 
     def connected(self, now_ns: int) -> None:
-        """A new connection: introduce ourselves."""
+        """Begins a new connection with HELLO."""
         self._parser = StationFrameParser()
         self._heard_ns = now_ns
         self.joined = False
@@ -117,7 +115,7 @@ class StationCore:
         self._say(StationFrameKind.HELLO, self._hello, now_ns)
 
     def disconnected(self) -> None:
-        """The connection has ended."""
+        """Processes the end of the connection."""
         self.corrupt += self._parser.corrupt
         self._parser = StationFrameParser()
         self.joined = False
@@ -131,19 +129,19 @@ class StationCore:
         now_ns: int,
         stamp_ns: int | None = None,
     ) -> int:
-        """Send a message as soon as there is a server; returns its sequence.
+        """Sends a message as soon as there is a server; returns its sequence.
 
         stamp_ns: the frame's time; `now_ns` unless given.
 
         Raises
         ------
         CommsError
-            The payload is too long, the kind is no message, or a command finds too many messages
-            held for that destination already. Measurements then take the place of the oldest.
+            The payload is too long, the kind is no message, or that destination's buffer is full
+            when a command is sent. Measurements replace the oldest one instead.
 
         """
         if kind not in MESSAGES:
-            raise CommsError(f"{kind.name} is no message: COMMAND and SENSING are")
+            raise CommsError(f"{kind.name} is not a message kind: use COMMAND or SENSING")
         sequence = self._sequence + 1
         data = encode_frame(
             kind,
@@ -162,7 +160,7 @@ class StationCore:
         return sequence
 
     def feed(self, data: bytes | memoryview, now_ns: int) -> list[StationFrame]:
-        """New messages in these bytes."""
+        """Returns the new messages in these bytes."""
         messages = []
         for frame in self._parser.feed(data):
             self._heard_ns = now_ns
@@ -176,7 +174,7 @@ class StationCore:
         return messages
 
     def acknowledge(self, now_ns: int) -> None:
-        """Tell the server what has come; call it some 50 ms after `feed` at the latest."""
+        """Acknowledges received messages; call it within some 50 ms after `feed`."""
         if not self.joined:
             return
         told = self._inbox.take()
@@ -186,21 +184,21 @@ class StationCore:
 
     @property
     def has_to_acknowledge(self) -> bool:
-        """Whether `acknowledge` has something to tell."""
+        """Whether received messages wait for `acknowledge`."""
         return len(self._inbox) > 0
 
     def tick(self, now_ns: int) -> None:
-        """Acknowledge, and keep the connection alive; call it every second or more often."""
+        """Acknowledges, and pings the server; call it every second or more often."""
         self.acknowledge(now_ns)
         if self.joined and now_ns - self._spoke_ns >= _PING_NS * 9 // 10:
             self._say(StationFrameKind.PING, b"", now_ns)
 
     def is_deaf(self, now_ns: int) -> bool:
-        """Whether nothing has come for so long that the server must be taken for dead."""
+        """Returns whether the server has sent nothing for so long that it must be dead."""
         return now_ns - self._heard_ns > _SILENCE_NS
 
     def take(self) -> bytes:
-        """What to send now."""
+        """Returns the bytes to send now."""
         data = b"".join(self._out)
         self._out = []
         return data

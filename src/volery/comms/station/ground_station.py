@@ -1,4 +1,4 @@
-"""A ground station without terminal and sockets: lines of people in, messages and lines out."""
+"""A ground station without terminal and sockets: command lines in, messages and text out."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ from volery.graph.messages import Point, message_type
 Send = Callable[[StationFrameKind, int, bytes], int]
 
 HELP = """\
-list                        state of each UAV; of those that tell it, mission and SLAM
-take_off WHO [ALTITUDE]     m above where it stands
-land WHO                    where it is
-hold WHO                    where it is; a mission waits until resume
-resume WHO                  go on with the mission
-return WHO                  home, and land; by its mission where it has one, else straight
-go_to WHO X Y Z [HEADING]   m in the map; degrees from its x axis to the left
-help                        this
-quit                        leave
+list                        state of each UAV, with mission and SLAM if reported
+take_off WHO [ALTITUDE]     take off; altitude in m above its position
+land WHO                    land at its position
+hold WHO                    hold its position; a mission waits until resume
+resume WHO                  continue the mission
+return WHO                  return home and land; through its mission, else straight
+go_to WHO X Y Z [HEADING]   m in the map; degrees counterclockwise from its x axis
+help                        show this help
+quit                        leave the station
 
 WHO: a linear id such as 3, batch.plane such as 0.3, a name such as uav4, batch1, or all."""
 
@@ -49,7 +49,7 @@ _USAGE = {
 }
 _SIMPLE = {"land": "land", "hold": "hold", "return": "return_home", "resume": "resume"}
 _TYPED = {"return_home": "return", "take_off_to": "take_off"}
-"""Words of people for commands of another name."""
+"""Words of the command line for commands of another name."""
 
 
 class StationRow(NamedTuple):
@@ -63,7 +63,7 @@ class StationRow(NamedTuple):
     battery: str
     age: str
     mission: str = "-"
-    """Phase and sector; `-`: it tells of none."""
+    """Phase and sector; `-`: no mission."""
     slam: str = "-"
     problem: str = ""
 
@@ -83,10 +83,10 @@ HEAD = (
 
 
 class GroundStation:
-    """Knows what UAVs tell, and turns lines into commands.
+    """Stores the states of UAVs, and turns lines into commands.
 
     send: sends a message, as `Station.send`. planes_per_batch: as of the server. is_joined: whether
-    a server is there.
+    a server is connected.
     """
 
     def __init__(
@@ -105,9 +105,9 @@ class GroundStation:
         self._asked: dict[int, str] = {}
 
     def take(self, frame: StationFrame, now_ns: int) -> str | None:
-        """Take a message; a line to be shown, where there is something to say.
+        """Processes a message; returns a line to show, or None.
 
-        now_ns: by a clock that never goes back, near the time of day that stations put on frames.
+        now_ns: by a clock that never goes back, near the wall time that stations put on frames.
         """
         try:
             named = decode_named(frame.payload)
@@ -131,7 +131,7 @@ class GroundStation:
         return f"{self._name(frame.source)}: {named.name} ({named.msgtype})"
 
     def _take_mission(self, source: int, status: Any) -> str | None:
-        """A line where phase, sector or trouble have changed."""
+        """Returns a line if phase, sector or problem have changed."""
         before, self._missions[source] = self._missions.get(source), status
         said = mission_gist(status.phase, status.sector), status.problem
         if before and said == (mission_gist(before.phase, before.sector), before.problem):
@@ -143,19 +143,19 @@ class GroundStation:
         return None if said == before else f"{self._name(source)}: SLAM {said}"
 
     def refused(self, refusal: Refusal) -> str:
-        """Line about what the server refused."""
+        """Returns a line about a refusal by the server."""
         asked = self._asked.get(refusal.sequence)
         return f"refused: {asked + ': ' if asked else ''}{refusal.text}"
 
     def rows(self, now_ns: int) -> list[StationRow]:
-        """Every UAV that has been heard, by address."""
+        """Returns a row for each UAV with a received state, by address."""
         return [
             self._row(address, state, now_ns - made_ns)
             for address, (state, made_ns) in sorted(self._states.items())
         ]
 
     def command(self, line: str) -> str:
-        """Send the command of a line; a line that says so. `CommsError` where it is none."""
+        """Sends the command of a line; returns a confirmation. Raises CommsError if invalid."""
         word, *rest = line.split()
         fields: dict[str, Any] = {}
         if word in _SIMPLE and len(rest) == 1:
@@ -169,7 +169,7 @@ class GroundStation:
         elif usage := _USAGE.get(_TYPED.get(word, word)):
             raise CommsError(f"'{line.strip()}': usage: {usage}")
         else:
-            raise CommsError(f"'{line.strip()}' is no command; help shows them")
+            raise CommsError(f"'{line.strip()}' is not a command; help lists them")
         names = {state.name: address for address, (state, _) in self._states.items()}
         address = address_of(rest[0], self._planes, names)
         request = f"{COMMANDS[name]}_Request"
@@ -182,18 +182,18 @@ class GroundStation:
         anybody = is_station(address) or any(
             is_meant(each, address, self._planes) for each in self._states
         )
-        note = "" if anybody else " (no UAV there has been heard so far)"
+        note = "" if anybody else " (no state of such a UAV received so far)"
         if self._is_joined():
             return f"sent: {said}{note}"
-        return f"queued: {said}{note}; it goes when the server is back"
+        return f"queued: {said}{note}; sent when the server is back"
 
     def open_commands(self, is_settled: Callable[[int], bool]) -> list[str]:
-        """Commands of which nobody has said that they came, or were refused, oldest first."""
+        """Returns the commands that are not settled yet, oldest first."""
         return [said for sequence, said in self._asked.items() if not is_settled(sequence)]
 
     @property
     def has_heard(self) -> bool:
-        """Whether a UAV has told its state."""
+        """Whether a UAV's state has been received."""
         return bool(self._states)
 
     def _name(self, address: int) -> str:
@@ -240,5 +240,5 @@ def _number(word: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise CommsError(f"'{word}' is no number")
+        raise CommsError(f"'{word}' is not a number")
     return value

@@ -1,7 +1,7 @@
 r"""A UAV's radio as a node: its topics over a real communication server instead of a run's radio.
 
-In flight, and wherever UAVs run in processes of their own, this takes the place of a scenario's
-`[radio]`; the other nodes stay as they are:
+For UAVs that fly, or run in processes of their own, it replaces a scenario's `[radio]`; the other
+nodes stay the same:
 
     volery node radio --via ros1 --namespace /uav1 \
         --param 'topics=["team volery_interfaces/msg/TeamReport"]' --param server=10.0.0.1:10200
@@ -26,23 +26,23 @@ from volery.graph.messages import message_type
 from volery.graph.nodes.node import Node
 
 _PERIOD_S = 0.02
-"""How often what was heard is published: messages come in another thread."""
+"""Period at which received messages are published: they arrive in another thread."""
 _HEARD_MOST = 1000
 _END_S = 2.0
 
 
 class RadioNode(Node):
-    """Sends what is published on `topics` to all stations, publishes theirs on `radio/...`.
+    """Sends messages on `topics` to all stations, publishes theirs on `radio/...`.
 
-    A server that is not there is waited for, and joined again after a break. Messages that are too
-    long, or more than a station can hold, are dropped.
+    The node waits for a server, and reconnects after an interruption. Messages that are too long,
+    or exceed a station's buffer, are dropped.
 
     Parameters
     ----------
     topics: "NAME TYPE" each, NAME below the UAV's namespace.
     server: HOST:PORT of `volery comms`.
     station: linear id; -1: that of the namespace, uavN is N - 1.
-    planes_per_batch, token: as the server wants them.
+    planes_per_batch, token: as the server requires.
 
     """
 
@@ -89,7 +89,7 @@ class RadioNode(Node):
         return self._station.joined
 
     def destroy_node(self) -> None:
-        """Leave the network."""
+        """Leaves the network."""
         super().destroy_node()
         if self._thread.is_alive():
             asyncio.run_coroutine_threadsafe(self._station.stop(), self._loop).result(_END_S)
@@ -99,18 +99,18 @@ class RadioNode(Node):
 
     def _sender(self, topic: str, msgtype: str) -> Any:
         def send(message: Any) -> None:
-            with contextlib.suppress(CommsError):  # too long: as good as lost
+            with contextlib.suppress(CommsError):  # too long: lost
                 payload = encode_named(topic, msgtype, message)
                 self._loop.call_soon_threadsafe(self._send, payload)
 
         return send
 
     def _send(self, payload: bytes) -> None:
-        with contextlib.suppress(CommsError):  # no room: as good as lost
+        with contextlib.suppress(CommsError):  # no room: lost
             self._station.send(StationFrameKind.SENSING, ALL, payload)
 
     def _take(self, frame: StationFrame) -> None:
-        """In the loop's thread: keep for the node's own; the oldest goes where there is no room."""
+        """Queues a frame for the node's thread; drops the oldest if the queue is full."""
         while True:
             with contextlib.suppress(queue.Full):
                 self._heard.put_nowait(frame)
@@ -122,7 +122,7 @@ class RadioNode(Node):
         with contextlib.suppress(queue.Empty):
             while True:
                 frame = self._heard.get_nowait()
-                with contextlib.suppress(CommsError):  # of a program that says other things
+                with contextlib.suppress(CommsError):  # other content by another program
                     named = decode_named(frame.payload)
                     publisher = self._publishers.get(named.name)
                     if publisher is not None and publisher.msgtype == named.msgtype:

@@ -1,4 +1,4 @@
-"""What has come to a station: which messages are new, and what is to be acknowledged."""
+"""The log of received messages: detects repeated ones, and collects acknowledgements."""
 
 from __future__ import annotations
 
@@ -6,25 +6,25 @@ from volery.comms.control_payloads import Received
 from volery.comms.protocol import StationFrame
 
 _SESSIONS_KEPT = 8
-"""Of each source: a source that started anew may still have messages of before on their way."""
+"""Number of sessions for each source: after a restart its older messages may still arrive."""
 
 
 class ReceiveLog:
-    """Remembers how far each source has come in each of its latest sessions."""
+    """Stores the last sequence of each source in each of its latest sessions."""
 
     def __init__(self) -> None:
         self._last: dict[int, dict[int, int]] = {}
         self._told: dict[tuple[int, int], int] = {}
         self._unacknowledged = 0
         self.duplicates = 0
-        """Messages that had come before."""
+        """Number of repeated messages."""
 
     def __len__(self) -> int:
-        """Messages since the last `take`."""
+        """Returns the number of messages since the last `take`."""
         return self._unacknowledged
 
     def is_new(self, frame: StationFrame) -> bool:
-        """Whether a message comes for the first time; it will be acknowledged in either case."""
+        """Returns whether a message is new; it is acknowledged in either case."""
         sessions = self._last.setdefault(frame.source, {})
         last = sessions.get(frame.session, 0)
         newest = max(last, frame.sequence)
@@ -38,7 +38,7 @@ class ReceiveLog:
         return new
 
     def take(self) -> list[Received]:
-        """What to acknowledge, and nothing of it again."""
+        """Returns the pending acknowledgements and clears them."""
         told = [Received(source, session, last) for (source, session), last in self._told.items()]
         self._told.clear()
         self._unacknowledged = 0

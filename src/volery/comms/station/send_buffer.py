@@ -1,4 +1,4 @@
-"""What a station holds until the server is done with it."""
+"""The messages that a station stores until the server settles them."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from volery.core.errors import CommsError
 from volery.core.plurals import counted
 
 MOST_A_DESTINATION = 1024
-"""As deep as a lane of the server, so that it takes all of them after a restart."""
+"""As deep as a lane of the server, so that the server accepts all of them after a restart."""
 MOST = 4000
-"""As many as one WELCOME can name, and as one burst may hold."""
+"""Max number that one WELCOME can list, and one burst may hold."""
 
 
 class _Message(NamedTuple):
@@ -23,24 +23,24 @@ class _Message(NamedTuple):
 
 
 class SendBuffer:
-    """Messages by sequence, oldest first."""
+    """Stores messages by sequence, oldest first."""
 
     def __init__(self) -> None:
         self._messages: dict[int, _Message] = {}
         self._of: dict[int, dict[int, StationFrameKind]] = {}
-        """By destination: kinds by sequence."""
+        """Kinds by sequence, by destination."""
         self.dropped = 0
-        """Measurements that had to go for newer ones."""
+        """Measurements dropped for newer ones."""
 
     def __len__(self) -> int:
         return len(self._messages)
 
     def __contains__(self, sequence: int) -> bool:
-        """Whether a message is held."""
+        """Returns whether a message is stored."""
         return sequence in self._messages
 
     def put(self, sequence: int, kind: StationFrameKind, destination: int, data: bytes) -> None:
-        """Hold a message. `CommsError` where there is no room, nor a measurement to give way."""
+        """Stores a message. Raises CommsError if there is no room and no measurement to drop."""
         there = self._of.setdefault(destination, {})
         if len(there) >= MOST_A_DESTINATION or len(self._messages) >= MOST:
             oldest = next(
@@ -58,23 +58,23 @@ class SendBuffer:
         self._messages[sequence] = _Message(kind, destination, data)
 
     def settle(self, sequences: Iterable[int]) -> None:
-        """Forget these."""
+        """Removes settled messages."""
         for sequence in sequences:
             self._remove(sequence)
 
     def refuse(self, sequence: int) -> None:
-        """Forget what is refused; what is for many waits for the others."""
+        """Removes a refused message; one to many stays until the other receivers have it."""
         message = self._messages.get(sequence)
         if message is not None and is_station(message.destination):
             self._remove(sequence)
 
     def reconcile(self, last: int, unsettled: Collection[int]) -> None:
-        """Forget what a server has that knows all up to `last`, but for what it says."""
+        """Removes all messages up to `last`, except the `unsettled` ones."""
         open_still = frozenset(unsettled)
         self.settle([s for s in self._messages if s <= last and s not in open_still])
 
     def after(self, last: int) -> list[bytes]:
-        """What a server has not got that has all up to `last`, oldest first."""
+        """Returns the messages after `last`, oldest first."""
         return [message.data for s, message in self._messages.items() if s > last]
 
     def _remove(self, sequence: int) -> None:

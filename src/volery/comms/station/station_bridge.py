@@ -1,11 +1,11 @@
-"""A bridge that makes every UAV of a graph a station: it tells its state and takes commands.
+"""A bridge that makes every UAV of a graph a station: it sends states and receives commands.
 
     bridges.open(StationBridge("127.0.0.1", 10200))
 
-Where a UAV has a mission (`task_manager`), that takes hold, land and return, so that it does not
-fly on against them; before a `go_to` it is put on hold.
+If a UAV has a mission (`task_manager`), hold, land and return go to the mission, which would
+otherwise continue; before a `go_to` the bridge holds it.
 
-uavN is the station with linear id N - 1; UAVs of other names take the lowest id that is free.
+uavN is the station with linear id N - 1; UAVs of other names get the lowest free id.
 """
 
 from __future__ import annotations
@@ -45,16 +45,16 @@ from volery.graph.subscription_queue import SubscriptionQueue
 _VEHICLES = "/volery/vehicles"
 _VEHICLES_TYPE = "volery_interfaces/msg/VehicleStates"
 _PERIOD_S = 0.2
-"""As often as the simulation tells of its vehicles."""
+"""Period at which the simulation publishes its vehicles."""
 _MISSION = "task_manager"
 _TOLD = ((MISSION, "mission", MISSION_TYPE), (SLAM, "slam/status", SLAM_TYPE))
-"""What else is told of a UAV that says it: name, topic below its own name, type."""
+"""Optional topics of a UAV that are sent: name, topic below its own name, type."""
 _REPEAT_S = 2.0
-"""What has not changed is told again after so long."""
+"""Period at which unchanged messages are repeated."""
 
 
 class _Told:
-    """One topic of a UAV, told to ground stations when it changes and now and then."""
+    """One topic of a UAV, sent to ground stations on change and periodically."""
 
     def __init__(self, name: str, msgtype: str, mailbox: SubscriptionQueue) -> None:
         self.mailbox = mailbox
@@ -63,7 +63,7 @@ class _Told:
         self._said_at = -math.inf
 
     def payload(self, now: float) -> bytes | None:
-        """What is to be told now, at `now` s; None: nothing."""
+        """Returns the payload to send at `now` s; None: nothing to send."""
         published = self.mailbox.take()
         if not published:
             return None
@@ -76,16 +76,16 @@ class _Told:
 
 
 def _gist(message: Any) -> object:
-    """What of a status makes people look up."""
+    """Returns the fields of a status whose change is sent at once."""
     if hasattr(message, "phase"):
         return message.phase, message.sector, message.problem
     return slam_gist(message.data)
 
 
 class StationBridge:
-    """One station for each UAV.
+    """Runs one station for each UAV.
 
-    host, port, token, planes_per_batch: of the communication server, as of `Station`.
+    host, port, token, planes_per_batch: of the communication server, as for `Station`.
     """
 
     def __init__(
@@ -107,18 +107,18 @@ class StationBridge:
 
     @property
     def name(self) -> str:
-        """What it is and where."""
+        """Name and address of the bridge."""
         return f"stations at {self._host}:{self._port}"
 
     async def start(self, gateway: Gateway) -> None:
-        """Begin to watch the fleet. A server that is not there yet is waited for."""
+        """Starts to watch the fleet; waits for a server that is not running yet."""
         self._loop = asyncio.get_running_loop()
         self._session = gateway.open(self.name)
         self._vehicles = self._session.subscribe(_VEHICLES, _VEHICLES_TYPE, wake=lambda: None)
         self._task = asyncio.create_task(self._watch(self._session))
 
     async def stop(self) -> None:
-        """Take all stations from the network."""
+        """Removes all stations from the network."""
         if self._task is not None:
             self._task.cancel()
             await asyncio.gather(self._task, return_exceptions=True)
@@ -151,7 +151,7 @@ class StationBridge:
             topic, key = f"/{uav}/{below}", (uav, name)
             if key not in self._told:
                 if session.graph.topic_type(topic) != msgtype:
-                    continue  # it has none of the kind, so far
+                    continue  # no such topic so far
                 mailbox = session.subscribe(topic, msgtype, depth=1, wake=lambda: None)
                 self._told[key] = _Told(name, msgtype, mailbox)
             payload = self._told[key].payload(self._loop.time())
@@ -184,7 +184,9 @@ class StationBridge:
             return
         srvtype = COMMANDS.get(command.name)
         if srvtype is None or command.msgtype != f"{srvtype}_Request":
-            tell(f"no command {command.name} ({command.msgtype}); there are {', '.join(COMMANDS)}")
+            tell(
+                f"unknown command {command.name} ({command.msgtype}); known: {', '.join(COMMANDS)}"
+            )
             return
 
         def answered(response: Any) -> None:
@@ -212,7 +214,7 @@ class StationBridge:
             ask()
 
     def _tell_soon(self, tell: Any, text: str) -> None:
-        """From whatever thread answers, into the loop; nobody is told once that has ended."""
+        """Passes a response from any thread to the loop, unless the loop has ended."""
         with contextlib.suppress(RuntimeError):
             self._loop.call_soon_threadsafe(tell, text)
 
@@ -224,6 +226,6 @@ class StationBridge:
 
 
 def _send(station: Station, to: int, payload: bytes) -> None:
-    """Send a measurement; where nothing can be held any more it is as good as lost by radio."""
+    """Sends a measurement; drops it if the buffer is full, like a loss by radio."""
     with contextlib.suppress(CommsError):
         station.send(StationFrameKind.SENSING, to, payload)

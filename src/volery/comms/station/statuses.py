@@ -1,4 +1,4 @@
-"""What a SLAM's status says, in words for a table."""
+"""Formats SLAM and mission statuses for a table."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import json
 
 
 def slam_gist(text: str) -> str:
-    """State of a SLAM and what is wrong, of its status (JSON); `?` where it is none."""
+    """Returns state and problems of a SLAM status (JSON); `?` if it is invalid."""
     try:
         told = json.loads(text)
         state, problems = str(told["state"]), [str(each) for each in told.get("problems", ())]
@@ -16,5 +16,5 @@ def slam_gist(text: str) -> str:
 
 
 def mission_gist(phase: str, sector: int) -> str:
-    """Phase of a mission, and its sector where it has one."""
+    """Returns the phase of a mission, and its sector if it has one."""
     return f"{phase} {sector}" if sector >= 0 else phase

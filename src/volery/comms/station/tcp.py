@@ -2,10 +2,9 @@
 
     station = Station(Identity(0, 1), on_message=take)
     await station.start()
-    station.send(Kind.COMMAND, 3, b"...")
+    station.send(StationFrameKind.COMMAND, 3, b"...")
 
-It comes again by itself where the connection breaks, every 0.2 s, and nothing that it has sent gets
-lost thereby: what is promised stands in docs/comms.md.
+It reconnects every 0.2 s after a failure without losing sent messages; guarantees: docs/comms.md.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ _ACKNOWLEDGE_S = 0.05
 
 
 def _ignore(_what: object) -> None:
-    """Nobody wants to know."""
+    """Ignores an event."""
 
 
 class Station:
@@ -41,14 +40,14 @@ class Station:
     identity
         Batch and plane, or `Identity.ground()`.
     on_message, on_refusal
-        Called in the loop with what comes, each message once, in order.
+        Called in the loop with received messages and refusals, each once, in order.
     on_joined
         Called in the loop with True when a server has welcomed it, with False when that connection
         is lost; not by `stop`.
     host, port
         Of the communication server.
     name, token, planes_per_batch
-        What the station tells the server.
+        Sent to the server.
 
     """
 
@@ -84,18 +83,18 @@ class Station:
 
     @property
     def joined(self) -> bool:
-        """Whether a server has welcomed it and the connection stands."""
+        """Whether a server has welcomed it and the connection is open."""
         return self.core.joined
 
     async def start(self, timeout_s: float | None = 5.0) -> None:
-        """Join, and from now on come again whenever the connection breaks.
+        """Joins, and reconnects whenever the connection fails.
 
-        timeout_s: None does not wait for the first time.
+        timeout_s: None returns without waiting for the server.
 
         Raises
         ------
         CommsError
-            Nobody listens there, or the server does not let this station in.
+            No server listens there, or it refuses this station.
 
         """
         self._loop = asyncio.get_running_loop()
@@ -115,7 +114,7 @@ class Station:
             raise
 
     async def stop(self) -> None:
-        """Leave. What is not settled is forgotten; see `until_settled`."""
+        """Leaves and drops unsettled messages; see `until_settled`."""
         if self._task is not None:
             self._task.cancel()
             await asyncio.gather(self._task, return_exceptions=True)
@@ -126,22 +125,22 @@ class Station:
             self._lost(self._pipe)
 
     def send(self, kind: StationFrameKind, destination: int, payload: bytes) -> int:
-        """Send a message, now or when there is a server; `CommsError` as of `StationCore.send`."""
+        """Sends a message, now or once a server is connected; raises like `StationCore.send`."""
         sequence = self.core.send(kind, destination, payload, time.monotonic_ns(), time.time_ns())
-        if not self._sends:  # once for all that is sent in this turn of the loop
+        if not self._sends:  # once for all messages of this turn of the loop
             self._sends = True
             self._loop.call_soon(self._flush)
         return sequence
 
     async def until_joined(self) -> None:
-        """Wait for the server's welcome. `CommsError` where it will never come."""
+        """Waits for the server's welcome. Raises CommsError if the server refuses for good."""
         while not self.joined:
             if self.core.fatal is not None:
                 raise CommsError(f"the server refuses this station: {self.core.fatal.text}")
             await self._next_change()
 
     async def until_settled(self) -> None:
-        """Wait until the server is done with all that was sent."""
+        """Waits until the server has settled all sent messages."""
         while self.core.unsettled:
             await self._next_change()
 
@@ -149,7 +148,7 @@ class Station:
         self._changed.clear()
         await self._changed.wait()
 
-    # ---------------------------------------------------------------------------- of the connection
+    # ------------------------------------------------------------------------------ the connection
 
     async def _keep_joined(self) -> None:
         while self.core.fatal is None:
@@ -226,25 +225,25 @@ class _Pipe(asyncio.Protocol):
         self.paused = False
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """As of asyncio."""
+        """Implements asyncio.Protocol."""
         assert isinstance(transport, asyncio.Transport)
         self.transport = transport
         tend(transport.get_extra_info("socket"))
         self._station._opened(self)
 
     def data_received(self, data: bytes) -> None:
-        """As of asyncio."""
+        """Implements asyncio.Protocol."""
         self._station._came(data)
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
-        """As of asyncio."""
+        """Implements asyncio.Protocol."""
         self._station._lost(self)
 
     def pause_writing(self) -> None:
-        """As of asyncio."""
+        """Implements asyncio.Protocol."""
         self.paused = True
 
     def resume_writing(self) -> None:
-        """As of asyncio."""
+        """Implements asyncio.Protocol."""
         self.paused = False
         self._station._flush()

@@ -1,6 +1,6 @@
-"""Pictures of the scenarios that ship, `NAME.jpg`; `volery.server.card_renderer` makes them."""
+"""Images of the shipped scenarios, `NAME.jpg`; `volery.server.card_renderer` renders them."""
 
 from pathlib import Path
 
 CARDS = Path(__file__).parent
-"""Where they lie."""
+"""Folder of the images."""

@@ -1,1 +1,1 @@
-"""Scenarios made of files that visitors of the page bring."""
+"""Scenarios made of uploaded files."""

@@ -1,4 +1,4 @@
-"""Which files are taken, and how large they may be."""
+"""Kinds of uploaded files, and their limits."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from volery.server.bounded_process import ProcessBounds
 from volery.server.replies import RefusedError
 
 BOUNDS = ProcessBounds(memory_bytes=8 << 30, cpu_s=90, wall_s=300.0)
-"""Of the process that checks one; Embree and the compiler reserve a gigabyte they do not use."""
+"""Of the checking process; Embree and the compiler reserve a gigabyte that they do not use."""
 
 
 class Kind(NamedTuple):
-    """One kind of upload. The limits hold beside those of the readers of such files."""
+    """One kind of upload. The readers of such files have limits of their own."""
 
     suffixes: tuple[str, ...]
     most_bytes: int
@@ -21,7 +21,7 @@ class Kind(NamedTuple):
 
 
 SCENARIO = "scenario"
-"""Kind of a whole scenario; the others are worlds that the server puts UAVs into."""
+"""Kind of a whole scenario; the others are worlds to which the server adds UAVs."""
 KINDS = {
     "grid_map": Kind((".csv", ".txt", ".png", ".map"), 8_000_000, "a matrix of 0 and 1"),
     "city": Kind((".geojson", ".json"), 32_000_000, "outlines of buildings as GeoJSON"),
@@ -30,18 +30,18 @@ KINDS = {
     SCENARIO: Kind((".toml",), 256_000, "a scenario"),
 }
 MOST_UPLOADS = 200
-"""Scenarios in the folder."""
+"""Max number of scenarios in the folder."""
 MAX_UAVS = 1_000
-"""In a scenario."""
+"""Max number in a scenario."""
 MOST_CELLS = 1_000_000
 MOST_TREES = 50_000
 MOST_TRIANGLES = 2_000_000
 FARTHEST_M = 5_000.0
-"""From the map's origin."""
+"""Max distance from the map's origin."""
 
 
 def kind_of_upload(name: str) -> Kind:
-    """Kind by its name. `RefusedError` tells which there are."""
+    """Returns a kind by its name. Raises RefusedError with the known kinds."""
     kind = KINDS.get(name)
     if kind is None:
         known = ", ".join(KINDS)
@@ -50,7 +50,7 @@ def kind_of_upload(name: str) -> Kind:
 
 
 def suffix_of(file_name: str, kind: Kind) -> str:
-    """Ending of a client's file name, one of those that are read; `RefusedError` otherwise."""
+    """Returns the suffix of a client's file name. Raises RefusedError if it is not supported."""
     suffix = PurePosixPath(file_name.replace("\\", "/")).suffix.lower()
     if suffix not in kind.suffixes:
         allowed = ", ".join(kind.suffixes)

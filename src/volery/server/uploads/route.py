@@ -1,4 +1,4 @@
-"""`POST ./api/uploads?kind=...&name=...`: a file becomes a scenario that can be loaded."""
+"""Route `POST ./api/uploads?kind=...&name=...`: turns a file into a scenario."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from volery.server.server_state import ServerState
 from volery.server.uploads.kinds import BOUNDS, MOST_UPLOADS, kind_of_upload, suffix_of
 
 _MOST_CHARACTERS = 30
-"""Of a scenario's name, before its number."""
+"""Max length of a scenario's name, before its number."""
 _MOST_WORDS = 600
-"""Of a message, in characters."""
+"""Max length of a message, characters."""
 
 
 async def upload(request: Request) -> Response:
-    """Take a file, check it by building its world, answer with the name of its scenario."""
+    """Stores a file, checks it by building its world, returns the name of its scenario."""
     check_operator(request)
     site: ServerState = request.app.state.site
     kind_name = request.query_params.get("kind", "")
@@ -35,13 +35,13 @@ async def upload(request: Request) -> Response:
     suffix = suffix_of(called, kind)
     folder = site.shelf.folder
     if folder is None:
-        raise RefusedError(409, "this server takes no files; start it with `volery serve`")
+        raise RefusedError(409, "this server accepts no uploads; start it with `volery serve`")
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".upload_", dir=folder) as made:
         path = Path(made) / f"{kind_name}{suffix}"
         await save_body(request, path, kind.most_bytes)
         lock: asyncio.Lock = request.app.state.upload_lock
-        async with lock:  # one after the other
+        async with lock:  # one at a time
             if len(site.shelf.added()) >= MOST_UPLOADS:
                 raise RefusedError(507, f"there are {MOST_UPLOADS} uploads already; remove some")
             name = name_for(called, site.shelf)
@@ -51,7 +51,7 @@ async def upload(request: Request) -> Response:
 
 
 def name_for(called: str, shelf: ScenarioCatalog) -> str:
-    """A free name of a scenario that reminds of the client's file name."""
+    """Returns a free scenario name similar to the client's file name."""
     stem = PurePosixPath(called.replace("\\", "/")).stem.lower()
     words = re.sub(r"[^a-z0-9]+", "_", stem).strip("_")
     base = re.sub(r"^[^a-z]*", "", words)[:_MOST_CHARACTERS].strip("_") or "upload"
@@ -61,7 +61,7 @@ def name_for(called: str, shelf: ScenarioCatalog) -> str:
 
 
 def _check(kind: str, path: Path, name: str, called: str) -> None:
-    """Build the world in a process of its own. `RefusedError` tells what is wrong with the file."""
+    """Builds the world in a separate process. Raises RefusedError with the file's problem."""
     try:
         told = run_bounded(f"{__package__}.validation", (kind, str(path), name, called), BOUNDS)
     except BoundedError as error:

@@ -1,4 +1,4 @@
-"""A scenario around a file: ground large enough for it, and two F450s that wait beside it.
+"""Builds a scenario around a file: flat ground, and two F450s beside the obstacles.
 
 text = toml_of("grid_map", Path("map.png"), "yard", "yard.png")
 """
@@ -23,44 +23,46 @@ from volery.world.inventory import read_inventory
 from volery.world.mesh_files import read_mesh
 
 _CELL_M, _BLOCK_M = 2.0, 5.0
-"""Room for an F450 (0.5 m wide) between blocks, above its usual flight."""
+"""Cell size with room for an F450 (0.5 m wide) between blocks, and height above its usual
+flight.
+"""
 _MARGIN_M = 30.0
-"""Ground beyond what stands there."""
+"""Margin of ground around the obstacles."""
 _BESIDE_M = 5.0
 _LEAST_EXTENT_M = 150.0
 _CITY_REACH_M = 2_000.0
-"""Of the part of a city that is kept, from its middle to each side."""
+"""Half the side of the part of a city that is used."""
 
 
 class _Part(NamedTuple):
-    """What a file adds to a scenario."""
+    """The part of a scenario that a file defines."""
 
     world: str
-    """TOML."""
+    """TOML of the world."""
     extent_m: float
-    """How far from the origin something stands."""
+    """Max distance of obstacles from the origin."""
     first_m: tuple[float, float]
     last_m: tuple[float, float]
-    """Where the UAVs wait."""
+    """Start positions of the UAVs."""
 
 
 def toml_of(kind: str, path: Path, name: str, called: str) -> str:
-    """TOML of a scenario `name` around the file `path`, which lies beside it.
+    """Returns the TOML of a scenario `name` around the file `path` in the same folder.
 
-    called: the file's name at home, for people. Raises `DataFileError` for a file that cannot be
-    read, or is too large for a picture in a browser.
+    called: the client's file name, for messages. Raises DataFileError for a file that cannot be
+    read, or is too large to show in a browser.
     """
     part = _MAKERS[kind](path)
     if not part.extent_m <= FARTHEST_M:
         raise DataFileError(
             f"{path} reaches {part.extent_m:.0f} m from the origin; at most {FARTHEST_M:.0f} m are "
-            "allowed: are its coordinates metres from an origin near by?"
+            "allowed: are its coordinates metres from a nearby origin?"
         )
     extent = max(_LEAST_EXTENT_M, math.ceil(part.extent_m + _MARGIN_M))
     shown = "".join(c if c.isascii() and c.isprintable() else "?" for c in called)[:80]
     return _SCENARIO.format(
         name=name,
-        description=json.dumps(f"Two F450s and what is in {shown}."),
+        description=json.dumps(f"Two F450s and the content of {shown}."),
         extent=float(extent),
         world=part.world,
         first=_numbers(part.first_m),
@@ -87,7 +89,7 @@ def _city(path: Path) -> _Part:
     features = read_features(path)
     rings = [ring for feature in features for polygon in feature.polygons for ring in polygon]
     if not rings:
-        raise DataFileError(f"{path}: there is no polygon in it")
+        raise DataFileError(f"{path}: the file holds no polygon")
     corners = np.concatenate(rings)
     longitude, latitude = ((corners.min(axis=0) + corners.max(axis=0)) / 2.0).tolist()
     frame = LocalFrame.from_degrees(latitude, longitude, 0.0)
@@ -134,7 +136,7 @@ def _forest(path: Path) -> _Part:
 
 
 def _beside(x: float, y: float = 0.0) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Two places west of what begins at x, around y."""
+    """Returns two positions west of x, around y."""
     return (x - _BESIDE_M, y - _BESIDE_M), (x - _BESIDE_M, y + _BESIDE_M)
 
 

@@ -19,9 +19,9 @@ _NAME = re.compile(r"""^[ \t]*(?:name|"name"|'name')[ \t]*=.*$""", re.MULTILINE)
 
 
 def text_of(path: Path, name: str) -> str:
-    """TOML of a scenario with another name: uploads are chosen by the names of their folders.
+    """Returns the TOML of a scenario under another name: uploads are identified by their folders.
 
-    Raises `ScenarioError` for a file that is not TOML, or has no line `name = "..."` at its top.
+    Raises ScenarioError for a file that is not TOML, or has no line `name = "..."` at its top.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -43,9 +43,9 @@ def text_of(path: Path, name: str) -> str:
 
 
 def check_contents(scenario: Scenario) -> None:
-    """Check what a stranger's scenario asks of the server, besides its world.
+    """Checks an untrusted scenario's demands on the server, except for its world.
 
-    Raises `ScenarioError` for too many UAVs, and for a node that does not ship with Volery.
+    Raises ScenarioError for too many UAVs, and for a node that Volery does not ship.
     """
     if scenario.uav_count > MAX_UAVS:
         raise ScenarioError(

@@ -1,9 +1,9 @@
-"""Makes a scenario of an uploaded file and builds its world, in a process of its own.
+"""Builds a scenario of an uploaded file and its world, in a separate process.
 
     python -m volery.server.uploads.validation grid_map FOLDER/map.png yard yard.png
 
-Files of strangers are read here, with bounds on memory and time, and without a simulation beside it
-that could suffer. Prints one JSON object: `{}` or `{"error": "one clear message"}`.
+It reads untrusted files with bounds on memory and time, apart from a running simulation. It prints
+one JSON object: `{}` or `{"error": "one clear message"}`.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from volery.server.uploads.scenario_builder import toml_of
 
 
 def check(kind: str, path: Path, name: str, called: str) -> None:
-    """Write `scenario.toml` beside `path`, and build all that stands in it.
+    """Writes `scenario.toml` beside `path`, and builds its world.
 
-    Raises `VoleryError` where the file is no such thing, or no UAV finds a place.
+    Raises VoleryError if the file is invalid, or there is no room for a UAV.
     """
     from volery.runtime.build.fleet import check_types, place
     from volery.runtime.build.worlds import build_city, build_forest, build_scene, build_terrain
@@ -48,7 +48,7 @@ def check(kind: str, path: Path, name: str, called: str) -> None:
 
 
 def main(kind: str, file: str, name: str, called: str) -> None:
-    """Check, and print what came of it."""
+    """Checks a file and prints the result."""
     bound_this_process(BOUNDS)
     told: dict[str, str] = {}
     try:

@@ -1,1 +1,1 @@
-"""SLAM in the plane from scans of one level LIDAR, and odometry where there is any."""
+"""Planar SLAM from scans of one horizontal LIDAR, with odometry if available."""

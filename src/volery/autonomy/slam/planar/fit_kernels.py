@@ -1,4 +1,4 @@
-"""A scan laid onto a map by least squares, with what the motion says as a prior."""
+"""Matches a scan to a map by least squares, with the motion estimate as a prior."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from volery.core.compiled import inner_kernel, kernel
 Array = NDArray[np.float64]
 
 _TIGHT_M = 0.12
-"""To this the gate closes."""
+"""Final width of the gate."""
 _SMALL_M, _SMALL_RAD = 1e-4, 2e-5
 
 
 @inner_kernel
 def _nearest(grid: Grid, sums: Array, corner: Array, x: float, y: float, gate: float) -> int:
-    """The cell whose returns lie nearest; -1: none within `gate`. By rings, from the middle."""
+    """Returns the cell whose returns lie nearest, searched by rings; -1: none within `gate`."""
     n = grid.shape[0]
     ci, cj = math.floor((x - corner[0]) / CELL_M), math.floor((y - corner[1]) / CELL_M)
     best, found = gate * gate, -1
@@ -82,7 +82,7 @@ def _gather(
     h: Array,
     g: Array,
 ) -> float:
-    """Normal equations of points at a pose; how many of them meet something, each by how well."""
+    """Fills the normal equations at a pose; returns the weighted number of matched points."""
     h[:], g[:] = 0.0, 0.0
     c, s = math.cos(pose[2]), math.sin(pose[2])
     scale, met = 0.5 * gate, 0.0
@@ -113,7 +113,7 @@ def _gather(
 
 @inner_kernel
 def _doubt(h: Array, g: Array, unclear: float) -> None:
-    """Take back the information along the weaker axis that rough walls alone pretend."""
+    """Removes the information along the weaker axis that comes from rough walls alone."""
     a, b, d = h[0, 0], h[0, 1], h[1, 1]
     middle, half = 0.5 * (a + d), math.hypot(0.5 * (a - d), b)
     low, high = middle - half, middle + half
@@ -156,11 +156,11 @@ def fit(
     rounds: int,
     information: Array,
 ) -> float:
-    """Move `pose` (3,) of points (K, 2) to where they fit the map best; how many meet something.
+    """Moves `pose` (3,) of points (K, 2) to the best fit; returns the weighted matched points.
 
-    expected, certainty: pose (3,) and information (3, 3) of the prior. pull: share of the points'
-    information against it. information: (3, 3), filled with what the points alone say of the pose,
-    as far as it is believed, by `trust`.
+    expected, certainty: pose (3,) and information (3, 3) of the prior. pull: factor of the points'
+    information relative to it. information: (3, 3), filled with the information of the points
+    alone, scaled by `trust`.
     """
     h, g = np.zeros((3, 3)), np.zeros(3)
     left, right = np.empty((3, 3)), np.empty((3, 1))

@@ -1,4 +1,4 @@
-"""Whether the motion is followed: in words, and as a state."""
+"""Health of the planar tracking: a state, and problems as text."""
 
 from __future__ import annotations
 
@@ -11,29 +11,29 @@ from volery.core.clock import NS_PER_S
 
 _SILENT_NS = NS_PER_S
 _UNSURE_M = 0.5
-"""Standard deviation of the place that the scans alone leave, of the last second's way."""
+"""Max standard deviation of the position by scans alone, within the last second's motion."""
 
 
 class PlanarHealth(NamedTuple):
-    """What is looked at."""
+    """Inputs of the check."""
 
     now_ns: int
     heard_ns: int
-    """When the LIDAR was last heard of."""
+    """Time of the last scan."""
     period_ns: int
     """Usual time between two scans."""
     odometry_ns: int | None
-    """When the odometry was; None: it never was."""
+    """Time of the last odometry; None: there was none."""
     has_begun: bool
     misfits: int
     is_blind: bool
     is_open: bool
-    """Whether what is seen leaves a direction open, as a corridor does."""
+    """Whether scans leave a direction unconstrained, as in a corridor."""
     is_placed: bool
 
 
 def judged(it: PlanarHealth) -> tuple[str, list[str]]:
-    """State (starting, tracking, degraded, lost) and what is wrong."""
+    """Returns the state (starting, tracking, degraded, lost) and the problems."""
     problems = []
     long = max(_SILENT_NS, 4 * it.period_ns)
     if it.now_ns - it.heard_ns > long:
@@ -41,19 +41,19 @@ def judged(it: PlanarHealth) -> tuple[str, list[str]]:
     if it.odometry_ns is not None and it.now_ns - it.odometry_ns > long:
         problems.append("the odometry is silent")
     if it.is_blind:
-        problems.append("too few things in reach")
+        problems.append("too few returns in range")
     if not it.has_begun:
         return "starting", problems
     if it.misfits:
-        problems.append("what is seen is not what was there")
+        problems.append("scans do not match the map")
     if it.is_open:
-        problems.append("what is seen leaves the way along it open")
+        problems.append("scans leave one direction unconstrained")
     if not it.is_placed:
-        problems.append("where in the map is not known")
+        problems.append("pose in the map unknown")
         return "lost", problems
     return ("degraded" if problems else "tracking"), problems
 
 
 def is_open(information: NDArray[np.float64]) -> bool:
-    """Whether a scan's information (3, 3) leaves a direction of the place open."""
+    """Returns whether a scan's information (3, 3) leaves a direction unconstrained."""
     return bool(np.linalg.eigvalsh(information[:2, :2])[0] < 1.0 / _UNSURE_M**2)

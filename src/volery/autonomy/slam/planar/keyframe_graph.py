@@ -1,4 +1,4 @@
-"""The way in the map: keyframes, how they follow each other, and what places seen again correct."""
+"""The planar keyframe graph in the map: keyframes, odometry edges and loop closures."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from volery.core.saved_state import restore_attributes, save_attributes
 Array = NDArray[np.float64]
 
 _ASTRAY = np.diag([1000.0**2, 1000.0**2, 3.0**2])
-"""Covariance of the step over which the motion was lost."""
+"""Covariance of the step over which tracking was lost."""
 _WIDEST = np.array([8.0, 8.0, 0.8])
 _NARROWEST = np.array([0.25, 0.25, 0.05])
 _ANYWHERE = np.array([6.0, 6.0, math.pi])
 _TRY_EACH = 0.9
-"""Way between two attempts."""
+"""Distance travelled between two attempts."""
 _TRIES, _LOST_TRIES = 2, 3
 _SPACED_M = 4.0
-"""Between the places that are tried at one keyframe."""
+"""Min distance between the candidates of one keyframe."""
 _AT_ONCE_M, _AT_ONCE_RAD = 0.04, 0.006
 _AT_LAST = 8
-"""Closures that say nothing new wait for so many others before all are made to fit."""
+"""Number of closures that change little after which the graph is optimized."""
 
 
 class PlanarKeyframeGraph:
-    """Keyframes and their graph; `start` (3,) is the first one's pose in the map."""
+    """Holds keyframes and their graph; `start` (3,) is the first one's pose in the map."""
 
     _STATE = (
         "frames", "poses", "edges", "session", "is_placed", "closures", "tried", "changes",
@@ -51,24 +51,24 @@ class PlanarKeyframeGraph:
         self._start = np.asarray(start, np.float64)
         self.frames: list[PlanarTrackerState] = []
         self.poses: list[Array] = []
-        """Of the keyframes in the map, (3,)."""
+        """Poses of the keyframes in the map, (3,)."""
         self.edges: list[PlanarEdge] = []
         self.session = 0
         self.is_placed = True
-        """Whether it is known where in the map the present session is."""
+        """Whether the current session's pose in the map is known."""
         self.closures = self.tried = self.changes = 0
         """`changes` counts keyframes and corrections."""
         self.covariance = np.zeros((3, 3))
-        """Of the newest keyframe in the map."""
+        """Covariance of the newest keyframe in the map, (3, 3)."""
         self._spread: list[Array] = []
-        """Covariance of each keyframe."""
+        """Covariance of each keyframe, (3, 3)."""
         self._pending: PlanarLoopClosure | None = None
         self._tried_at = -1e9
         self._cursor = 0
         self._waiting = 0
 
     def add(self, frame: PlanarTrackerState) -> bool:
-        """Take in a keyframe; whether the map has been corrected."""
+        """Adds a keyframe; returns whether the map has been corrected."""
         self._append(frame)
         if self._closer is None or frame.travelled - self._tried_at < _TRY_EACH:
             return False
@@ -83,12 +83,12 @@ class PlanarKeyframeGraph:
         return found is not None and self._weigh(found)
 
     def finish(self) -> None:
-        """Let all closures count."""
+        """Optimizes the graph with all closures."""
         if self._waiting:
             self._fit()
 
     def pose(self, own: Array) -> Array:
-        """A pose (3,) of the odometry's frame in the map."""
+        """Returns a pose (3,) of the odometry's frame in the map."""
         if not self.frames:
             return compose(self._start, own)
         return compose(self.poses[-1], between(self.frames[-1].pose, own))
@@ -109,7 +109,7 @@ class PlanarKeyframeGraph:
             step, of_step = between(self.frames[-1].pose, frame.pose), _ASTRAY
             self.session, self.is_placed, self._pending = frame.session, False, None
         row, before = len(self.frames), self.poses[-1]
-        yaw = float(step[2])  # gtsam's noise lies in the axes of the step's end
+        yaw = float(step[2])  # gtsam's noise is in the axes of the step's end
         information = np.linalg.inv(turned(of_step, -yaw))
         self.edges.append(PlanarEdge(row - 1, row, step, 0.5 * (information + information.T)))
         spread = grown(self._spread[-1], before, step, of_step)
@@ -122,17 +122,17 @@ class PlanarKeyframeGraph:
         self._spread.append(spread)
         self.covariance = spread
 
-    # ------------------------------------------------------------------------------ known places
+    # ---------------------------------------------------------------------------- loop closures
 
     def _reach(self) -> Array:
-        """How far the newest keyframe may be from where it seems to be."""
+        """Returns the max error (3,) of the newest keyframe's estimated pose."""
         sigmas = 3.0 * np.sqrt(np.diag(self.covariance))
         wide = max(float(sigmas[0]), float(sigmas[1]))
         reach = np.array([wide, wide, float(sigmas[2])])
         return np.asarray(np.clip(reach, _NARROWEST, _WIDEST))
 
     def _near(self, newest: int, reach: Array) -> Iterator[int]:
-        """Old keyframes that may be where it is, the nearest first, some way apart."""
+        """Yields old keyframes that may be nearby, nearest first, spaced apart."""
         here, apart = self.frames[newest], self._settings.closing.apart_m
         last = newest
         while last > 0 and (
@@ -155,7 +155,7 @@ class PlanarKeyframeGraph:
                 yield int(row)
 
     def _anywhere(self, newest: int) -> Iterator[int]:
-        """Lost: some of the keyframes of earlier sessions, in turn."""
+        """Yields some keyframes of earlier sessions in turn, while lost."""
         session = self.frames[newest].session
         old = [k for k, frame in enumerate(self.frames) if frame.session != session]
         fresh = sum(frame.session == session for frame in self.frames)
@@ -166,7 +166,7 @@ class PlanarKeyframeGraph:
             self._cursor += 5  # neighbours look alike
 
     def _weigh(self, found: PlanarLoopClosure) -> bool:
-        """Let a closure count, at once or once another one has agreed with it."""
+        """Accepts a closure, at once or once a second one agrees with it."""
         c, away = self._settings.closing, found.away
         far = math.hypot(away[0], away[1]) > c.far_m or abs(float(away[2])) > c.far_rad
         if not far and self.is_placed:
@@ -184,7 +184,7 @@ class PlanarKeyframeGraph:
         return True
 
     def _agree(self, one: PlanarLoopClosure, other: PlanarLoopClosure) -> bool:
-        """Whether two closures move the newest keyframes to the same place."""
+        """Returns whether two closures move the newest keyframes to the same pose."""
         c, first, second = self._settings.closing, one.edge, other.edge
         a, b = self.frames[first.to], self.frames[second.to]
         if a.session != b.session or b.travelled - a.travelled > c.again_way_m:
@@ -223,9 +223,9 @@ class PlanarKeyframeGraph:
         self.changes += 1
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         return save_attributes(self, self._STATE)
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         restore_attributes(self, state)

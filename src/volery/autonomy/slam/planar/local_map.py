@@ -1,4 +1,4 @@
-"""A map around a place, and the two ways to lay a scan onto it."""
+"""A planar submap, and the two ways to match a scan to it."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ _NOWHERE = np.array([0.0, 0.0, -1.0])
 
 
 class ScanMatch(NamedTuple):
-    """How a scan lies on a map."""
+    """A scan matched to a map."""
 
     pose: Array
-    """(3,)"""
+    """(3,) pose."""
     information: Array
-    """(3, 3) that the scan alone gives about it."""
+    """(3, 3) information of the scan alone on the pose."""
     met: float
-    """Returns that meet something, each by how well."""
+    """Matched returns, weighted by how well they fit."""
     share: float
-    """Of all returns."""
+    """Fraction of all returns."""
 
 
 class PlanarSubmap:
-    """Walls within `reach_m` of a middle.
+    """Holds walls within `reach_m` of a centre.
 
-    levels: of the search, whose widest squares are 2^(levels - 1) cells.
+    levels: of the search, whose largest squares are 2^(levels - 1) cells.
     """
 
     def __init__(self, reach_m: float, levels: int, fitting: MatchingSettings) -> None:
@@ -48,12 +48,12 @@ class PlanarSubmap:
         self._corner = np.zeros(2)
         self._fitting = fitting
         self.count = 0
-        """Cells that hold something."""
+        """Number of occupied cells."""
 
     def draw(self, points: Array, middle: Array, least: float = 1.0) -> None:
-        """Begin anew with points (K, 2) around a pose.
+        """Replaces the map by points (K, 2) around a pose.
 
-        least: returns of a cell from which on it counts in searches.
+        least: returns of a cell from which it counts in searches.
         """
         n = len(self._grid)
         self._corner = (np.floor(middle[:2] / CELL_M) - n // 2) * CELL_M
@@ -65,7 +65,7 @@ class PlanarSubmap:
         pool(self._fields)
 
     def fit(self, points: Array, start: Array, certainty: Array | None = None) -> ScanMatch:
-        """Lay points (K, 2) on it from a pose (3,), held to that by `certainty` (3, 3)."""
+        """Fits points (K, 2) to the map from a pose (3,), weighted by its `certainty` (3, 3)."""
         f = self._fitting
         pose, information = start.copy(), np.zeros((3, 3))
         held = 1e-3 * np.eye(3) if certainty is None else certainty
@@ -88,11 +88,11 @@ class PlanarSubmap:
         least: float = 0.0,
         shut: Array | None = None,
     ) -> tuple[Array, float]:
-        """The pose of points (K, 2) within `middle` (3,) +- `reach` (3,) that scores best.
+        """Returns the pose of points (K, 2) within `middle` (3,) +- `reach` (3,) that scores best.
 
-        slope: (3,) of the score, lost for each unit squared away from the middle. shut: a place
-        and a radius where nothing is looked for. The score is the share of returns that meet
-        something, 0 where none is above `least`.
+        slope: (3,) reduction of the score for each unit squared away from the centre. shut: a
+        position and a radius that are excluded. The score is the fraction of matched returns, 0 if
+        none is above `least`.
         """
         best = middle.copy()
         far = float(np.sqrt((points * points).sum(axis=1)).max()) if len(points) else 1.0

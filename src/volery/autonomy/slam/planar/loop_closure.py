@@ -1,4 +1,4 @@
-"""Places seen again: the way just travelled laid onto what older keyframes around it saw."""
+"""Loop closures in the plane: matches the newest keyframes with older ones around them."""
 
 from __future__ import annotations
 
@@ -21,30 +21,33 @@ Array = NDArray[np.float64]
 _LEVELS = 6
 _MOST_FRAMES, _MOST_QUERIES = 24, 12
 _THIN, _FINE = 160, 600
-"""Returns that are searched with, and that are fitted."""
+"""Number of returns for the search, and for the fit."""
 _ALIKE, _OTHER_M = 0.93, 0.7
-"""A second place this far off that scores so nearly as well makes both doubtful."""
+"""A second position at this distance that scores nearly as well makes both ambiguous."""
 _ANY_RAD = 3.0
-"""A window so wide is that of who is lost: it lies about the older keyframe."""
+"""Window from which tracking counts as lost: it is centred on the older keyframe."""
 _LEAST_INFORMATION = 400.0
-"""1/m^2 of the place in the weaker direction: less tells only the stronger one."""
+"""1/m^2 of the position in the weaker direction: below it only the stronger one is constrained."""
 _MARGIN = np.array([0.3, 0.3, 0.1])
-"""What a fit may add to the window of the search."""
+"""Amount by which a fit may exceed the window of the search."""
 _FLOOR = np.diag([0.02**2, 0.02**2, 0.004**2])
-"""Least covariance of a closure."""
+"""Min covariance of a closure."""
 
 
 class PlanarLoopClosure(NamedTuple):
-    """A place seen again, how well, and how far it moves the newest keyframe."""
+    """A loop closure, its fit, and how far it moves the newest keyframe."""
 
     edge: PlanarEdge
     fit: ScanMatch
     away: Array
-    """(3,) from where the newest keyframe seemed to be, in the axes of the older one."""
+    """(3,) from the newest keyframe's estimated pose, in the axes of the older one."""
 
 
 class PlanarLoopCloser:
-    """Lays the newest keyframes onto old ones; `poses` are those of all in the map, (3,) each."""
+    """Matches the newest keyframes with old ones.
+
+    `poses` are those of all keyframes in the map, (3,) each.
+    """
 
     def __init__(self, settings: PlanarSettings) -> None:
         self._settings = settings
@@ -59,9 +62,9 @@ class PlanarLoopCloser:
         older: int,
         reach: Array,
     ) -> PlanarLoopClosure | None:
-        """The newest keyframe as seen from an older one; None where they do not fit.
+        """Returns the newest keyframe relative to an older one; None if they do not fit.
 
-        reach: (3,) how far the newest one may be from where it seems to be, m and rad.
+        reach: (3,) max error of the newest one's estimated pose, m and rad.
         """
         known = self._around(frames, poses, newest, older)
         query = self._query(frames, newest)
@@ -86,7 +89,7 @@ class PlanarLoopCloser:
         return PlanarLoopClosure(edge, found, away)
 
     def _found(self, query: Array, guess: Array, reach: Array) -> Array | None:
-        """Where it lies best in the window; None where nothing fits, or two places do."""
+        """Returns the best pose in the window; None if no pose fits, or two do."""
         thin = np.ascontiguousarray(query[:: max(len(query) // _THIN, 1)])
         slope = np.zeros(3) if reach[2] >= _ANY_RAD else 0.04 / reach**2
         least = 0.45
@@ -102,7 +105,7 @@ class PlanarLoopCloser:
         return pose
 
     def _is_along(self, query: Array, pose: Array, other: Array) -> bool:
-        """Whether two places are the same but for the direction that the walls leave open."""
+        """Returns whether two poses differ only along the direction that the walls leave open."""
         found = self._map.fit(query, pose)
         values, axes = np.linalg.eigh(found.information[:2, :2])
         if values[0] > _LEAST_INFORMATION:
@@ -119,11 +122,11 @@ class PlanarLoopCloser:
         if found.share < wanted or found.met < c.least_met or values[1] < _LEAST_INFORMATION:
             return False
         if weak and reach[0] > 3.0:
-            return False  # any corridor would do
+            return False  # any corridor would match
         return bool((np.abs(away) <= reach + _MARGIN).all())
 
     def _information(self, told: Array, yaw: float) -> Array:
-        """What a closure says, in the axes of its measurement."""
+        """Returns a closure's information, in the axes of its measurement."""
         c, s = math.cos(yaw), math.sin(yaw)
         axes = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
         own = axes @ told @ axes.T
@@ -132,7 +135,7 @@ class PlanarLoopCloser:
     def _around(
         self, frames: Sequence[PlanarTrackerState], poses: Sequence[Array], newest: int, older: int
     ) -> list[int]:
-        """Old keyframes of the older one's surroundings, the nearest ones."""
+        """Returns the nearest old keyframes around the older one."""
         c, here = self._settings.closing, frames[newest]
         away = {
             k: float(np.hypot(*(poses[k] - poses[older])[:2]))
@@ -147,7 +150,7 @@ class PlanarLoopCloser:
         return near[:_MOST_FRAMES]
 
     def _query(self, frames: Sequence[PlanarTrackerState], newest: int) -> Array:
-        """What the way just travelled saw (K, 2), in the axes of the newest keyframe."""
+        """Returns the last keyframes' returns (K, 2), in the axes of the newest keyframe."""
         here, parts = frames[newest], []
         for k in range(newest, max(newest - _MOST_QUERIES, -1), -1):
             way = here.travelled - frames[k].travelled

@@ -1,6 +1,6 @@
-"""A map of walls around a place: cells with what their returns look like, and how near they are.
+"""A map of walls: cells with the shape of their returns, and a field of proximity to them.
 
-Cells of `CELL_M` that hold returns are numbered; the grid knows the numbers. A cell knows the mean
+Cells of `CELL_M` that hold returns are numbered; the grid holds the numbers. A cell holds the mean
 of its returns and, from those around it, whether they lie along a line.
 """
 
@@ -19,18 +19,19 @@ Field = NDArray[np.uint8]
 
 CELL_M = 0.1
 COUNT, MX, MY, CXX, CXY, CYY = range(6)
-"""What sums hold: number, mean and sums of squares about it."""
+"""Columns of sums: number, mean and sums of squares about it."""
 RX, RY, NX, NY, THICK, KIND = range(6)
-"""What shapes hold: a point of the line, its normal, its variance across; or of a heap."""
+"""Columns of shapes: a point, the line's normal, its variance across, and the kind."""
 LINE, HEAP, FEW = 1.0, 0.0, -1.0
-"""Of few returns nobody knows what they are of. Far along a wall single beams end always at the
-same places about the scanner: taken for things they would hold it where it is."""
+"""Kinds; FEW: too few returns to classify. Far along a wall single beams always end at the same
+positions relative to the scanner: taken for objects they would hold it in place.
+"""
 FULL = 100
-"""Of the field: on a wall."""
+"""Value of the field on a wall."""
 _LEAST = 5.0
-"""Returns that a line needs."""
+"""Min number of returns of a line."""
 _STRAIGHT, _VERY_STRAIGHT = 0.12, 0.04
-"""Variance across over that along, of a line in a window of three cells, and of five."""
+"""Max variance across over that along, of a line in a window of three cells, and of five."""
 _ALONG_M = 0.05
 _BLUR_M = 0.1
 
@@ -71,7 +72,7 @@ def _window(grid: Grid, sums: Array, i: int, j: int, reach: int, total: Array) -
 
 @inner_kernel
 def _shape(total: Array, shape: Array, straight: float) -> bool:
-    """Describe the returns of a window; whether they lie along a line."""
+    """Describes the returns of a window; returns whether they lie along a line."""
     n = total[COUNT]
     a, b, d = total[CXX] / n, total[CXY] / n, total[CYY] / n
     middle, half = 0.5 * (a + d), math.hypot(0.5 * (a - d), b)
@@ -87,7 +88,10 @@ def _shape(total: Array, shape: Array, straight: float) -> bool:
 
 @kernel
 def build(points: Array, corner: Array, grid: Grid, cells: Grid, sums: Array, shapes: Array) -> int:
-    """Fill a map with points (K, 2); `corner` (2,) m is that of the grid. The number of cells."""
+    """Fills a map with points (K, 2); returns the number of cells.
+
+    `corner` (2,) m is that of the grid.
+    """
     n, count, most = grid.shape[0], 0, sums.shape[0]
     grid[:] = -1
     for k in range(points.shape[0]):
@@ -123,7 +127,7 @@ def build(points: Array, corner: Array, grid: Grid, cells: Grid, sums: Array, sh
 
 @kernel
 def blur(cells: Grid, sums: Array, count: int, corner: Array, least: float, field: Field) -> None:
-    """How near things are, in cells of the grid: `FULL` at a wall, falling as a normal density.
+    """Fills `field` with the proximity to walls: `FULL` at a wall, falling as a normal density.
 
     Cells with fewer than `least` returns do not count.
     """
@@ -142,7 +146,7 @@ def blur(cells: Grid, sums: Array, count: int, corner: Array, least: float, fiel
 
 @kernel
 def pool(fields: Field) -> None:
-    """Fill `fields` (L, n, n) from the first: at level h the most of 2^h x 2^h cells from there."""
+    """Fills `fields` (L, n, n) from the first: level h holds maxima of 2^h x 2^h cells."""
     levels, n = fields.shape[0], fields.shape[1]
     for h in range(1, levels):
         step = 1 << (h - 1)

@@ -1,8 +1,8 @@
-"""How the vehicle moves between two scans: by its odometry, or going on as it went.
+"""Predicts the motion between two scans: by odometry, or at constant velocity.
 
-A Kalman filter of pose and velocity. Without odometry the velocity along the body's axes changes
-by white accelerations; what no scan tells, such as the way along a plain corridor, goes on with
-the last velocity, and its covariance grows with the third power of the time.
+A Kalman filter of pose and velocity. Without odometry the velocity along the body's axes changes by
+white accelerations. In directions that scans leave open, such as along a plain corridor, the motion
+continues at the last velocity, and its covariance grows with the third power of the time.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from volery.autonomy.slam.planar.settings import MotionSettings
 Array = NDArray[np.float64]
 
 _LEAST_M, _LEAST_RAD = 1e-3, 3e-4
-"""So well at most the next pose is foretold."""
+"""Min standard deviations of a prediction."""
 _FIRST_M_S, _FIRST_RAD_S = 1.0, 1.0
 _LONGEST_S = 3.0
-"""Nobody goes on as he went for longer: then the velocity is not known."""
+"""Max duration of a constant-velocity prediction; after it the velocity is unknown."""
 
 
 class PlanarMotion:
-    """Pose (3,), velocity (3,) in the body's axes, and their covariance (6, 6)."""
+    """Holds pose (3,), velocity (3,) in the body's axes, and their covariance (6, 6)."""
 
     def __init__(self, settings: MotionSettings) -> None:
         self._settings = settings
@@ -34,13 +34,13 @@ class PlanarMotion:
         self.covariance = np.diag([0.0] * 3 + [_FIRST_M_S**2] * 2 + [_FIRST_RAD_S**2])
 
     def forget_velocity(self) -> None:
-        """Nothing is known of how fast it moves."""
+        """Resets the velocity to unknown."""
         self.velocity = np.zeros(3)
         self.covariance[:3, 3:] = self.covariance[3:, :3] = 0.0
         self.covariance[3:, 3:] = np.diag([_FIRST_M_S**2] * 2 + [_FIRST_RAD_S**2])
 
     def move(self, dt: float, step: Array | None) -> Array:
-        """Foretell the pose after `dt` s; `step` (3,) is the odometry's, None: there is none.
+        """Predicts the pose after `dt` s; `step` (3,) is the odometry's, None: no odometry.
 
         Returns the covariance (3, 3) that the step adds, in the axes of the body before it.
         """
@@ -95,7 +95,7 @@ class PlanarMotion:
         return np.asarray(added)
 
     def _lever(self, step: Array) -> Array:
-        """How an error of the yaw moves the place."""
+        """Returns the derivative (3, 3) of the moved pose by the pose."""
         c, s = math.cos(self.pose[2]), math.sin(self.pose[2])
         lever = np.eye(3)
         lever[0, 2] = -(s * step[0] + c * step[1])
@@ -104,12 +104,12 @@ class PlanarMotion:
 
     @property
     def certainty(self) -> Array:
-        """Information (3, 3) about the pose."""
+        """Information (3, 3) on the pose."""
         least = np.diag([_LEAST_M**2, _LEAST_M**2, _LEAST_RAD**2])
         return np.asarray(np.linalg.inv(self.covariance[:3, :3] + least))
 
     def correct(self, pose: Array, information: Array) -> None:
-        """Take the pose (3,) that scan and motion together make likeliest.
+        """Sets the pose (3,) that scan and motion together make most likely.
 
         information: (3, 3) of the scan alone.
         """

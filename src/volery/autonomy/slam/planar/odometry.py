@@ -1,4 +1,4 @@
-"""Poses of a wheel odometry by time."""
+"""Buffers poses of a wheel odometry by time."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ _KEPT = 512
 _JUMP_BACK_NS = NS_PER_S // 2
 _LATE_NS, _GAP_NS = NS_PER_S // 4, 5 * NS_PER_S
 _MOST_M_S, _MOST_RAD_S = 20.0, 20.0
-"""Faster steps are odometry that was set anew."""
+"""Speeds above which a step is a reset of the odometry."""
 
 
 class WheelOdometry:
-    """What was told lately; poses that are not finite, late or repeated are left out."""
+    """Holds recent poses; ignores poses that are not finite, late or repeated."""
 
     def __init__(self) -> None:
         self._times: list[int] = []
@@ -33,20 +33,20 @@ class WheelOdometry:
 
     @property
     def newest_ns(self) -> int | None:
-        """Time of the newest pose."""
+        """Time of the newest pose, ns; None: no pose."""
         return self._times[-1] if self._times else None
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         return {"times": list(self._times), "poses": list(self._poses), "refused": self.refused}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         self._times, self._poses = list(state["times"]), list(state["poses"])
         self.refused = state["refused"]
 
     def add(self, message: Odometry) -> None:
-        """Remember a pose."""
+        """Adds a pose."""
         p, q = message.pose.pose.position, message.pose.pose.orientation
         numbers = np.array([p.x, p.y, q.x, q.y, q.z, q.w])
         time_ns = stamp_of(message)
@@ -63,7 +63,7 @@ class WheelOdometry:
         del self._times[:-_KEPT], self._poses[:-_KEPT]
 
     def at(self, time_ns: int) -> Array | None:
-        """The pose (3,) at a time, between those around it; None where it is not known."""
+        """Returns the pose (3,) at a time, interpolated; None if it is unknown."""
         row = bisect_right(self._times, time_ns) - 1
         if row < 0:
             return None
@@ -78,7 +78,7 @@ class WheelOdometry:
 
 
 def step_between(one: Array | None, other: Array | None, dt: float) -> Array | None:
-    """The step (3,) between two poses `dt` s apart; None where it is not known or cannot be."""
+    """Returns the step (3,) between two poses `dt` s apart; None if unknown or implausible."""
     if one is None or other is None:
         return None
     step = between(one, other)

@@ -1,4 +1,4 @@
-"""Keyframes in the plane as a graph of poses, which gtsam makes fit."""
+"""Optimizes the planar pose graph of keyframes by gtsam."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ _ROUNDS = 20
 _BEND = 3.0
 """Standard deviations at which a closure begins to lose weight (Cauchy's kernel)."""
 _MOST_SIGMAS = 7.0
-"""A closure that lies farther off afterwards was none."""
+"""Max deviation of a closure after the optimization, in standard deviations; else it is removed."""
 
 
 class PlanarEdge(NamedTuple):
-    """Keyframe `to` as seen from keyframe `origin`."""
+    """Pose of keyframe `to` relative to keyframe `origin`."""
 
     origin: int
     to: int
     measured: Array
     """(3,) x, y, yaw along the axes of `origin`."""
     information: Array
-    """(3, 3)"""
+    """(3, 3)."""
     is_closure: bool = False
 
 
 def optimised(poses: list[Array], edges: list[PlanarEdge]) -> tuple[list[Array], list[PlanarEdge]]:
-    """Poses (3,) that fit the edges best, the first one stays; and the edges without false ones."""
+    """Returns the optimized poses (3,), first one fixed, and the edges without outliers."""
     found = _solved(poses, edges)
     kept = [edge for edge in edges if not edge.is_closure or _misfit(found, edge) <= _MOST_SIGMAS]
     if len(kept) < len(edges):
@@ -42,7 +42,7 @@ def optimised(poses: list[Array], edges: list[PlanarEdge]) -> tuple[list[Array],
 
 
 def _misfit(poses: list[Array], edge: PlanarEdge) -> float:
-    """How far, in standard deviations, an edge is from what it measured."""
+    """Returns the deviation of an edge from its measurement, in standard deviations."""
     seen = between(poses[edge.origin], poses[edge.to])
     away = between(edge.measured, seen)
     return math.sqrt(max(float(away @ edge.information @ away), 0.0))

@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 
 def compose(pose: Array, step: Array) -> Array:
-    """The pose that lies `step` from `pose`, along its axes."""
+    """Returns the pose `step` from `pose`, along its axes."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
     return np.array(
         [
@@ -23,7 +23,7 @@ def compose(pose: Array, step: Array) -> Array:
 
 
 def between(pose: Array, other: Array) -> Array:
-    """The step from `pose` to `other`."""
+    """Returns the step from `pose` to `other`."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
     dx, dy = other[0] - pose[0], other[1] - pose[1]
     turn = math.remainder(other[2] - pose[2], math.tau)
@@ -31,14 +31,14 @@ def between(pose: Array, other: Array) -> Array:
 
 
 def placed(points: Array, pose: Array) -> Array:
-    """Points (K, 2) of a body at `pose`, in the frame of the pose."""
+    """Returns points (K, 2) of a body at `pose` in the frame of the pose."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
     moved: Array = points @ np.array([[c, s], [-s, c]]) + pose[:2]
     return moved
 
 
 def turned(covariance: Array, yaw: float) -> Array:
-    """A covariance (3, 3) of x, y, yaw in axes that are turned by -yaw."""
+    """Returns a covariance (3, 3) of x, y, yaw in axes rotated by -yaw."""
     c, s = math.cos(yaw), math.sin(yaw)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     result: Array = turn @ covariance @ turn.T
@@ -46,7 +46,7 @@ def turned(covariance: Array, yaw: float) -> Array:
 
 
 def grown(covariance: Array, pose: Array, step: Array, of_step: Array) -> Array:
-    """Covariance (3, 3) of `compose(pose, step)`, in the frame of the pose.
+    """Returns the covariance (3, 3) of `compose(pose, step)`, in the frame of the pose.
 
     `covariance` is that of the pose, `of_step` that of the step in the pose's axes.
     """

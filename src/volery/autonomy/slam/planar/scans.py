@@ -1,4 +1,4 @@
-"""From a laser scan to returns in the plane of the body."""
+"""Converts laser scans to returns in the plane of the body."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ Array = NDArray[np.float64]
 
 
 def returns(scan: LaserScan, mount: Mount, velocity: Array, kept: ReturnSettings) -> Array:
-    """Returns (K, 2) m in the body as it is at the first beam.
+    """Returns the returns (K, 2) m in the body at the time of the first beam.
 
-    velocity: (3,) of the body in its own axes, m/s and rad/s, by which each beam is placed.
+    velocity: (3,) of the body in its own axes, m/s and rad/s, which places each beam.
     """
     ranges = np.asarray(scan.ranges, np.float64)
     nearest = max(kept.nearest_m, float(scan.range_min))
@@ -45,7 +45,7 @@ def returns(scan: LaserScan, mount: Mount, velocity: Array, kept: ReturnSettings
 
 
 def thinned(points: Array, apart: float, most: int) -> Array:
-    """At most so many of points (K, 2) in the order of the beams, no two neighbours too near."""
+    """Returns at most `most` of points (K, 2), in beam order, at least `apart` m apart."""
     kept = np.zeros(len(points), np.bool_)
     _thin(points, apart, kept)
     chosen = points[kept]

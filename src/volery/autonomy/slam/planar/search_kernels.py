@@ -1,8 +1,8 @@
-"""Where a scan lies in a map: the best of all poses in a window, found by branch and bound.
+"""Finds the best pose of a scan in a window of a map, by branch and bound.
 
 The correlative matching of E. Olson (Real-time correlative scan matching, ICRA 2009), searched as
 by W. Hess et al. (Real-time loop closure in 2D LIDAR SLAM, ICRA 2016): a square of 2^h x 2^h cells
-cannot score more than the most that each return finds in it.
+cannot score more than the maximum that each return finds in it.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ Array = NDArray[np.float64]
 Cells = NDArray[np.int32]
 
 _MOST_NODES = 400_000
-"""Squares that are looked at, so that the time is bounded."""
+"""Max number of squares, which bounds the time."""
 
 
 @inner_kernel
 def _score(field: Field, cells: Cells, i: int, j: int) -> float:
-    """Mean over points at cells (K, 2), moved by (i, j), as a share."""
+    """Returns the mean over points at cells (K, 2), shifted by (i, j), as a fraction."""
     n, total = field.shape[0], 0
     for k in range(cells.shape[0]):
         a, b = cells[k, 0] + i, cells[k, 1] + j
-        # A square that only begins outside may reach in.
+        # A square that only begins outside may extend inside.
         if -64 < a < n and -64 < b < n:
             total += field[max(a, 0), max(b, 0)]
     return float(total / (FULL * max(cells.shape[0], 1)))
@@ -50,7 +50,7 @@ def _put(node: Array, score: float, level: int, turn: int, i: int, j: int) -> No
 
 @inner_kernel
 def _split(fields: Field, cells: Cells, stack: Array, held: int, found: float) -> int:
-    """Put the four parts of the square at `held` there, the best last; the new number held."""
+    """Replaces the square at `held` by its four parts, best last; returns the new stack size."""
     level, turn = int(stack[held, 1]) - 1, int(stack[held, 2])
     i, j, begin = int(stack[held, 3]), int(stack[held, 4]), held
     half = 1 << level
@@ -71,7 +71,7 @@ def _split(fields: Field, cells: Cells, stack: Array, held: int, found: float) -
 
 @inner_kernel
 def _begin(fields: Field, cells: Cells, top: int, wide: int, high: int, first: Array) -> None:
-    """Squares of the highest level that cover the window, (N, 5) as the stack holds them."""
+    """Fills `first` (N, 5) with the squares of the highest level that cover the window."""
     side, row = 1 << top, 0
     for turn in range(cells.shape[0]):
         for i in range(-wide, wide + 1, side):
@@ -93,11 +93,11 @@ def search(
     shut: Array,
     best: Array,
 ) -> float:
-    """The pose (3,) of points (K, 2) that scores best within `middle` (3,) +- `reach` (3,).
+    """Finds the pose (3,) of points (K, 2) that scores best in `middle` (3,) +- `reach` (3,).
 
-    slope: (3,) lost of the score for each unit squared away from `middle`. least: lower scores
-    are not looked for. shut: (3,) a place x, y around which, to a radius, nothing is looked for.
-    Returns the score, 0 where nothing was found; `best` is filled otherwise.
+    slope: (3,) reduction of the score for each unit squared away from `middle`. least: lower scores
+    are ignored. shut: (3,) position x, y and a radius that are excluded. Returns the score, 0 if
+    none was found; else `best` is filled.
     """
     turns = math.ceil(reach[2] / step_rad)
     wide, high = math.ceil(reach[0] / CELL_M), math.ceil(reach[1] / CELL_M)

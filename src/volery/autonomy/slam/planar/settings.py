@@ -1,4 +1,4 @@
-"""What the planar SLAM knows of its sensors and of itself (modelling choices, tried on logs)."""
+"""Parameters of the planar SLAM (modelling choices, tuned on logs)."""
 
 from __future__ import annotations
 
@@ -7,46 +7,52 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class ReturnSettings:
-    """Which returns of a scan count."""
+    """Selection of a scan's returns."""
 
     nearest_m: float = 0.05
     reach_m: float = 30.0
     apart_m: float = 0.04
-    """Neighbouring returns nearer to each other than this say the same."""
+    """Neighbouring returns nearer to each other than this are redundant."""
     most: int = 360
-    """Returns of a scan that are matched."""
+    """Max number of returns of a scan that are matched."""
     most_kept: int = 720
-    """Returns of a keyframe."""
+    """Max number of returns of a keyframe."""
 
 
 @dataclass(frozen=True)
 class MatchingSettings:
-    """How returns are compared with a map."""
+    """Comparison of returns with a map."""
 
     sigma_m: float = 0.03
-    """Of a return about the wall that it met: range, angle, plaster."""
+    """Standard deviation of a return about its wall: range, angle, plaster."""
     gate_m: float = 0.4
-    """A return farther than this from everything, at first, has met something new."""
+    """Initial max distance of a match; a return farther from all cells is new."""
     rounds: int = 12
     trust: float = 0.05
-    """Share of the returns' information that is believed: their errors have the map's in common."""
+    """Fraction of the returns' information that is used: their errors are correlated with the
+    map's.
+    """
     pull: float = 0.3
-    """The same against the motion, while a scan is laid onto the map: a few returns of a corner
-    must be able to hold it against a guess."""
+    """The same fraction relative to the motion, while a scan is matched: a few returns of a corner
+    must outweigh a prediction.
+    """
     unclear: float = 0.01
-    """Information along the weaker axis, as a share of that along the stronger one, that rough
-    walls alone pretend: so much of it is not believed."""
+    """Information along the weaker axis, as a fraction of that along the stronger one, that rough
+    walls alone produce: it is subtracted.
+    """
 
 
 @dataclass(frozen=True)
 class MotionSettings:
-    """How it may move."""
+    """Motion model."""
 
     accel_m2_s3: float = 0.3
-    """Density of white acceleration of who has no odometry."""
+    """Density of the white acceleration without odometry."""
     turn_rad2_s3: float = 1.0
     odometry_m: float = 0.002
-    """Standard deviation of a step of the odometry at rest, m and rad, and its shares."""
+    """Standard deviation of an odometry step at rest, m and rad, and its fractions of the
+    motion.
+    """
     odometry_rad: float = 0.002
     odometry_per_m: float = 0.1
     odometry_rad_per_m: float = 0.08
@@ -55,46 +61,46 @@ class MotionSettings:
 
 @dataclass(frozen=True)
 class KeyframeSettings:
-    """Which scans become keyframes, and which of them the local map is made of."""
+    """Selection of keyframes, and of those in the local map."""
 
     step_m: float = 0.5
     step_rad: float = 0.35
     step_share: float = 0.75
-    """So much less of a scan meets the map than just after the last keyframe."""
+    """Matched fraction, relative to that after the last keyframe, below which a keyframe is due."""
     least_m: float = 0.1
     least_rad: float = 0.1
     local_way: float = 10.0
-    """Way, m, that the local map reaches back; a turn by 1 rad counts as 0.3 m."""
+    """Distance, m, that the local map covers; a rotation by 1 rad counts as 0.3 m."""
     local_most: int = 60
 
 
 @dataclass(frozen=True)
 class LoopClosureSettings:
-    """When a place counts as seen again."""
+    """Acceptance of loop closures."""
 
     apart_m: float = 10.0
-    """Way between a keyframe and one that it may be matched with."""
+    """Min distance travelled between a keyframe and a loop closure candidate."""
     around_m: float = 8.0
-    """Old keyframes so near to each other are matched together."""
+    """Radius within which old keyframes are matched together."""
     query_m: float = 4.0
-    """So much of the way just travelled is matched with them."""
+    """Distance travelled whose keyframes are matched with them."""
     share: float = 0.85
-    """Of the returns, as a share of how many usually do, that must meet something."""
+    """Min matched fraction, relative to the usual one."""
     least_share: float = 0.42
     most_share: float = 0.62
     least_met: float = 40.0
     far_m: float = 0.5
     far_rad: float = 0.06
-    """A closure that moves it farther must be confirmed by a second one."""
+    """A closure that moves the keyframe farther needs confirmation by a second one."""
     again_m: float = 0.15
     again_rad: float = 0.03
-    """How well two closures must agree, and over how much way at most."""
+    """Max difference of two closures, and max distance travelled between them."""
     again_way_m: float = 8.0
 
 
 @dataclass(frozen=True)
 class PlanarSettings:
-    """All of them."""
+    """All parameters."""
 
     returns: ReturnSettings = ReturnSettings()
     fitting: MatchingSettings = MatchingSettings()

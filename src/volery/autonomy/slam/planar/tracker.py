@@ -1,7 +1,7 @@
-"""Following a level scanner: each scan is laid onto a map of the last keyframes.
+"""Tracks a level scanner: matches each scan with a map of the last keyframes.
 
-Everything is in the frame of the odometry, which begins where the log begins and never jumps by
-what is learnt later on.
+All poses are in the frame of the odometry, which begins at the start of the log and never jumps
+when later data corrects the map.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ Array = NDArray[np.float64]
 
 _LEVELS = 4
 _TURN_M = 0.3
-"""What a turn by 1 rad counts as way."""
+"""Distance that a rotation by 1 rad counts as."""
 _FEW = 12
-"""Returns below which a scan says nothing."""
+"""Returns below which a scan is ignored."""
 _POOR, _LOST_SHARE = 0.9, 0.5
-"""Share of the usual share of returns below which a fit is doubted, or not believed."""
+"""Fractions of the usual matched fraction below which a fit is doubtful, or rejected."""
 _USUAL_S = 5.0
 _LOST_SCANS, _LOST_NS = 4, NS_PER_S
 _ROUGHLY = np.diag([0.7**2, 0.7**2, 0.3**2])
-"""Covariance of a way over which scans did not fit, but odometry went on."""
+"""Covariance of a motion over which scans did not fit, but odometry continued."""
 _WIDEST = np.array([1.6, 1.6, 0.9])
 _FLOOR = np.diag([0.008**2, 0.008**2, 0.0015**2])
-"""Least covariance of a step between keyframes: what map and scanner have in common."""
+"""Min covariance of a step between keyframes: the common errors of map and scanner."""
 
 
 class PlanarTrackerState(NamedTuple):
-    """A keyframe as the follower leaves it."""
+    """A keyframe of the tracker."""
 
     time_ns: int
     pose: Array
@@ -49,19 +49,19 @@ class PlanarTrackerState(NamedTuple):
     points: Array
     """(K, 2) m in its own axes."""
     step: Array
-    """(3,) from the keyframe before."""
+    """(3,) from the previous keyframe."""
     covariance: Array
-    """(3, 3) of the step, in the axes of the keyframe before."""
+    """(3, 3) of the step, in the axes of the previous keyframe."""
     travelled: float
-    """Way until here; turns count, see `_TURN_M`."""
+    """Distance so far; rotations count, see `_TURN_M`."""
     usual: float
-    """Share of the returns that lately met something again."""
+    """Recent average of the matched fraction."""
     session: int
-    """Counts how often the motion was lost."""
+    """Number of tracking losses."""
 
 
 class PlanarTracker:
-    """Motion, local map and the newest keyframe."""
+    """Holds motion, local map and the newest keyframe."""
 
     def __init__(self, settings: PlanarSettings) -> None:
         self.settings = settings
@@ -71,16 +71,16 @@ class PlanarTracker:
         self.share = self.usual = 0.0
         self.session = 0
         self.misfits = 0
-        """Scans that have not fitted, one after the other."""
+        """Number of consecutive scans that did not fit."""
         self.is_blind = self.is_open = False
-        """Whether too few things are in reach, or what is seen leaves a direction open."""
+        """Whether too few returns are in range, or scans leave a direction unconstrained."""
         self._misfit_ns = 0
         self._has_odometry = False
         self._map = PlanarSubmap(settings.returns.reach_m + 4.0, _LEVELS, settings.fitting)
         self._local: deque[PlanarTrackerState] = deque()
         self._last: PlanarTrackerState | None = None
         self._since = np.zeros((3, 3))
-        """Covariance of the pose as seen from the newest keyframe, in that one's axes."""
+        """Covariance of the pose relative to the newest keyframe, in that one's axes."""
         self._fresh_share = 0.0
 
     _STATE = (
@@ -89,33 +89,33 @@ class PlanarTracker:
     )  # fmt: skip
 
     def get_state(self) -> dict[str, Any]:
-        """What a snapshot keeps."""
+        """Returns the state for a snapshot."""
         motion = save_attributes(self.motion, ("pose", "velocity", "covariance"))
         return {"motion": motion, "local": tuple(self._local), **save_attributes(self, self._STATE)}
 
     def set_state(self, state: dict[str, Any]) -> None:
-        """Go back to a kept state."""
+        """Restores a saved state."""
         restore_attributes(self.motion, state["motion"])
         self._local = deque(state["local"])
         restore_attributes(self, {name: state[name] for name in self._STATE})
         self._redraw()
 
     def set_clock(self, time_ns: int) -> None:
-        """Go on from here at another time, at any speed."""
+        """Continues from here at another time, with unknown velocity."""
         self.time_ns = time_ns
         self.motion.forget_velocity()
 
     @property
     def is_lost(self) -> bool:
-        """Whether scans have not fitted for so long that nothing is known of the motion."""
+        """Whether scans have not fitted for so long that the motion is unknown."""
         if self.misfits < _LOST_SCANS or self.time_ns is None:
             return False
         return self.time_ns - self._misfit_ns >= _LOST_NS
 
     def begin_anew(self) -> bool:
-        """What is seen is not what was there: begin a new map with the next scan.
+        """Begins a new map with the next scan, as scans no longer fit.
 
-        Whether the way so far goes on, by odometry, if only roughly.
+        Returns whether the session continues, by odometry, though roughly.
         """
         self._local.clear()
         self.misfits, self.usual = 0, 0.0
@@ -128,9 +128,9 @@ class PlanarTracker:
         return False
 
     def follow(self, time_ns: int, returns: Array, step: Array | None) -> PlanarTrackerState | None:
-        """Take in the returns (K, 2) of a scan; the keyframe that it has become, if it has.
+        """Processes the returns (K, 2) of a scan; returns the new keyframe, if one was due.
 
-        step: (3,) since the scan before, by the odometry.
+        step: (3,) since the previous scan, by the odometry.
         """
         r = self.settings.returns
         dt = 0.0 if self.time_ns is None else (time_ns - self.time_ns) / NS_PER_S
@@ -145,7 +145,7 @@ class PlanarTracker:
             found = self._match(points)
             self._judge(time_ns, dt, found)
             if self.misfits == 1 and step is None:
-                self.motion.forget_velocity()  # it would only lead farther away
+                self.motion.forget_velocity()  # it would only increase the error
             if self.misfits == 0:
                 self.is_open = is_open(found.information)
                 self.motion.correct(found.pose, found.information)
@@ -156,7 +156,7 @@ class PlanarTracker:
     # ---------------------------------------------------------------------------------- matching
 
     def _match(self, points: Array) -> ScanMatch:
-        """By least squares from where it should be; where that fits poorly, by search."""
+        """Matches by least squares from the prediction; if that fits poorly, after a search."""
         motion = self.motion
         found = self._map.fit(points, motion.pose, motion.certainty)
         if found.share >= _POOR * self.usual and not self._is_surprising(found):
@@ -174,7 +174,7 @@ class PlanarTracker:
         return other if other.share > found.share + 0.03 else found
 
     def _is_surprising(self, found: ScanMatch) -> bool:
-        """Whether the scan lies farther from where it should be than three sigma."""
+        """Returns whether the scan deviates from the prediction by more than four sigma."""
         away = found.pose - self.motion.pose
         away[2] = math.remainder(float(away[2]), math.tau)
         return float(away @ self.motion.certainty @ away) > 16.0

@@ -1,4 +1,4 @@
-"""Compiles the kernels of the SLAM in the plane; see `volery.autonomy.perception.warmup`."""
+"""Compiles the kernels of the planar SLAM; see `volery.autonomy.perception.warmup`."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ _LEVELS = 2
 
 
 def walls() -> None:
-    """Kernels that lay a scan onto a map."""
+    """Compiles the kernels that match a scan with a map."""
     points = np.zeros((0, 2))
-    for per_beam_s in (0.0, 0.001):  # beams that were cast at once, or one after the other
+    for per_beam_s in (0.0, 0.001):  # beams at once, or one after the other
         scan = a_scan()
         scan.time_increment = per_beam_s
         points = thinned(returns(scan, LEVEL, np.zeros(3), ReturnSettings()), 0.04, 20)
@@ -29,6 +29,6 @@ def walls() -> None:
 
 
 def told_places() -> None:
-    """The kernel that picks what a message tells of the covariance."""
+    """Compiles the kernel that selects the covariance of a message."""
     nowhere = np.zeros(3), rotations.IDENTITY, np.zeros(3), np.zeros(3)
     messages.odometry(0, "uav1", nowhere, np.zeros((9, 9)))
