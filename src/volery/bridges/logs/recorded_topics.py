@@ -1,4 +1,4 @@
-"""Which topics a log gets: those of patterns; without patterns all, and no picture twice."""
+"""Selects the topics of a log by patterns; without patterns all, each image once."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ _SECOND_FORMS = (
     ("/depth/compressedDepth", "{base}/depth"),
     ("/points", "{base}/depth"),
 )
-"""Ends of a camera's topics that are left out where another one has the same picture.
+"""Topics of a camera that are skipped if another topic has the same image.
 
-Of colours the compressed form stays, of depth the lossless one; points are made of the depth.
+Colour images stay compressed, depth images lossless; points are skipped for the depth image.
 """
 
 
