@@ -244,7 +244,7 @@ def test_a_service_of_one_client_for_another(bench, client):
     ("response", "words"),
     [
         ({"result": False, "values": "cannot"}, "cannot"),
-        ({"result": True, "values": {"success": 5}}, "answered wrongly"),
+        ({"result": True, "values": {"success": 5}}, "sent a wrong response"),
         (None, "has left"),
     ],
 )

@@ -247,7 +247,7 @@ class BagLog(LogWriter):
 
         super().__init__(path)
         if compression == "zstd":
-            raise RecordingError(f"{path}: a .bag is compressed with lz4 or not at all")
+            raise RecordingError(f"{path}: a .bag supports lz4 or no compression")
         writer = bag_writer(path, compressed=compression == "lz4")
         self._file = DiskFile(path)
         writer.path = cast("Path", _Opened(self._file))

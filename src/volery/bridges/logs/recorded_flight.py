@@ -99,7 +99,7 @@ def read_flight(path: Path) -> RecordedFlight:
     for place, command in enumerate(commands):
         if command.number != place:
             raise RecordingError(
-                f"{path}: command {place} of the flight is missing, so that the flight cannot be replayed: "
+                f"{path}: command {place} is missing, so that the flight cannot be replayed: "
                 "the log is damaged, or its recording started after very many commands"
             )
     return RecordedFlight(path, origin, commands, last[-1].time_ns if last else 0)

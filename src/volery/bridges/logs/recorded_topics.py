@@ -22,21 +22,21 @@ Colour images stay compressed, depth images lossless; points are skipped for the
 def recorded_topics(
     graph: Graph, topics: Iterable[str] = (), exclude: Iterable[str] = ()
 ) -> Callable[[str], bool]:
-    """Returns whether a topic is recorded, by its name.
+    """Returns a function that tests by its name whether a topic is recorded.
 
     Parameters
     ----------
     graph
-        Of which topics exist: a raw picture is left out only where a compressed one is published.
+        Graph of the topics: a raw image is skipped only if a compressed one is published.
     topics
-        Patterns of `topic_patterns`. Without any: all topics, each picture in one form.
+        Patterns of `topic_patterns`. Without any: all topics, each image in one form.
     exclude
-        Patterns of topics that are left out in either case.
+        Patterns of topics that are never recorded.
 
     Raises
     ------
     GraphError
-        For what is no pattern.
+        A pattern is invalid.
 
     """
     chosen = tuple(topics)

@@ -43,7 +43,7 @@ class LogTopic:
 
     topic: str
     msgtype: str
-    """ROS 2 style name, `sensor_msgs/msg/LaserScan`."""
+    """Name in ROS 2 style, `sensor_msgs/msg/LaserScan`."""
     definition: str
     encoding: str
     """`cdr` or `ros1`."""

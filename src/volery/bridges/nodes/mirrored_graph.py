@@ -85,7 +85,7 @@ class MirroredGraph(Graph):
         self._barrier = barrier, begin
 
     def hand_out(self) -> bool:
-        """Calls back for all received messages, in the order of arrival; returns whether there were any.
+        """Delivers all received messages in the order of arrival; returns whether there were any.
 
         Messages that arrive meanwhile wait for the next call. Raises `GraphError` if a reliable
         subscription has lost messages: this process is too slow for it.

@@ -80,7 +80,7 @@ class Ros2Client:
         return self._participant.where
 
     def host_node(self, name: str, parameters: Parameters, post: Callable[[Any], Any]) -> None:
-        """Becomes the ROS 2 node of this name, with its parameters, which are set through `post`."""
+        """Becomes the ROS 2 node of this name; its parameters are set through `post`."""
         check_name(name)
 
         def set_value(node: str, parameter: str, value: Any, done: Callable[[str], None]) -> None:

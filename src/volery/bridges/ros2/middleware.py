@@ -112,7 +112,7 @@ class Participant(Protocol):
         """Creates a publisher."""
 
     def reader(self, spec: TopicSpec, take: TakeMessage) -> Handle:
-        """Subscribe; what this participant itself publishes does not come."""
+        """Creates a subscription, which does not receive this participant's own messages."""
 
     def server(self, spec: ServiceSpec, take: TakeRequest) -> Handle:
         """Creates a service."""

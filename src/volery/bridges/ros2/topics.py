@@ -119,7 +119,7 @@ class Ros2Topics:
         """Warns of publishers with incompatible types."""
         for publisher in remote:
             if publisher.msgtype != topic.msgtype:
-                text = f"carries {topic.msgtype}; a publisher of {publisher.msgtype} is not heard"
+                text = f"carries {topic.msgtype}; a publisher of {publisher.msgtype} is ignored"
                 self._complaints.tell(topic.name, text)
             elif publisher.type_hash not in (None, message_hash(topic.msgtype)):
                 text = f"a publisher has another definition of {topic.msgtype}"

@@ -50,7 +50,7 @@ def request_struct(msgtype: str) -> type[Any]:
 
 
 def _complete(struct: type[Any]) -> type[Any]:
-    """Creates the type's description, which the package does with the first topic, without a lock."""
+    """Creates the type's description now; the package creates it later, without a lock."""
     struct.__idl__.fill_type_data()
     return struct
 

@@ -1,4 +1,4 @@
-"""Publishers, subscriptions, and the two halves of services over zenoh, compatible with rmw_zenoh."""
+"""Publishers, subscriptions and services over zenoh, compatible with rmw_zenoh."""
 
 from __future__ import annotations
 

@@ -127,7 +127,7 @@ def read_token(token: str) -> ZenohEndpoint | None:
 
 
 def _read_qos(words: str) -> Profile:
-    """Returns the quality of service of a token, in which defaults may be missing: `::,10:,:,:,,`."""
+    """Returns the profile in a token's text, in which defaults may be missing: `::,10:,:,:,,`."""
     reliability, durability, history, *_ = [*words.split(":"), "", "", ""]
     depth = history.partition(",")[2]
     return Profile(
