@@ -166,7 +166,7 @@ def test_the_services_are_told_without_rosbridge_too():
         (("topic", "pub", "/x", "no_msgs/Such"), "no_msgs/msg/Such"),
         (("topic", "pub", "/x", "std_msgs/String", "{data: 3}"), "data must be"),
         (("topic", "pub", "/x", "std_msgs/String", "{data"), "is not YAML"),
-        (("service", "call", "/nope"), "nobody offers"),
+        (("service", "call", "/nope"), "has no server"),
         (("service", "call", "/uav1/go_to", "{position: {x: bad}}"), "position.x must be"),
         (("node", "nonsense"), "module:Class"),
         (("node", "no_such_module:Node"), "cannot be imported"),

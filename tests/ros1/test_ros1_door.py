@@ -457,7 +457,7 @@ def test_no_master_is_a_clear_refusal(tmp_path):
     )
     said = tool(sys.executable, "-c", program)
     assert "no ROS master answers at http://127.0.0.1:9" in said
-    assert "'nonsense' is no address of a ROS master" in said
+    assert "'nonsense' is not the address of a ROS master" in said
     assert "allow that with" in said
 
 

@@ -367,7 +367,12 @@ def test_the_endpoints_words_are_kept_and_nonsense_is_survived(here, meet):
     until(lambda: seen)
     assert seen[0].message.angular.z == 5.0
     text = "\n".join(connector.notes)
-    for words in ("Unknown message class", "not subscribed", "no JSON", "geometry_msgs/msg/Twist"):
+    for words in (
+        "Unknown message class",
+        "not subscribed",
+        "invalid JSON",
+        "geometry_msgs/msg/Twist",
+    ):
         assert words in text
 
 

@@ -86,9 +86,9 @@ def test_a_scanner_may_turn_clockwise(tmp_path):
         ("1200000 0 0 0 1000 2000", "line 5: 6 columns where the layout needs 7"),
         ("1200000 0 0 0 1000 2000 far", "line 5: a column has no number"),
         ("1000001 0 0 0 1000 2000 3000", "line 5: at 1.000001 s, not after the line before"),
-        ("nan 0 0 0 1000 2000 3000", "line 5: nan s is no time"),
-        ("-5 0 0 0 1000 2000 3000", "line 5: -5e-06 s is no time"),
-        ("9e99 0 0 0 1000 2000 3000", "line 5: 9e[+]93 s is no time"),
+        ("nan 0 0 0 1000 2000 3000", "line 5: nan s is out of range"),
+        ("-5 0 0 0 1000 2000 3000", "line 5: -5e-06 s is out of range"),
+        ("9e99 0 0 0 1000 2000 3000", "line 5: 9e[+]93 s is out of range"),
         ("\x00\xff", "line 5: 1 column where"),
     ],
 )

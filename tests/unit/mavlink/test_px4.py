@@ -104,7 +104,7 @@ def test_who_speaks_no_mavlink_gives_way_and_who_comes_after_a_px4_is_ended(open
             assert bridge.connected == ("uav1",)
     told = [text for text in caplog.messages if "does not send MAVLink" in text]
     assert told == ["uav1: the connected client does not send MAVLink; connect a PX4"]
-    assert "uav1: its PX4 is connected already; another connection is ended" in caplog.messages
+    assert "uav1: its PX4 is connected already; another connection is closed" in caplog.messages
 
 
 def test_several_vehicles_share_one_clock(opened):

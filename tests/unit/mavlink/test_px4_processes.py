@@ -136,7 +136,7 @@ def test_what_is_no_px4_is_told(tmp_path):
 @pytest.mark.parametrize(("first", "count"), [(0, 0), (-1, 1), (250, 10)])
 def test_numbers_beyond_mavlinks_ids_are_refused(tmp_path, first, count):
     make_px4(tmp_path, FAILS)
-    with pytest.raises(BridgeError, match="0 to 253 can be"):
+    with pytest.raises(BridgeError, match="0 to 253 are allowed"):
         Px4Instances(find_px4(tmp_path), count, first=first)
 
 

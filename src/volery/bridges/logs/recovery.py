@@ -54,7 +54,7 @@ def recover(path: str | Path, out: str | Path | None = None) -> Recovery:
         first = next(records, None)
         if first is None:
             problem = f" ({walk.problem})" if walk.problem else ""
-            raise RecordingError(f"{path}: has no readable message{problem}; nothing is written")
+            raise RecordingError(f"{path}: holds no readable message{problem}; nothing is written")
         count, end_ns = _write(kind, itertools.chain([first], records), out)
     return Recovery(out, count, end_ns, walk.problem)
 

@@ -111,7 +111,7 @@ class ArdupilotBridge:
             self._seats.append(seat)
             await self._listen(seat, self._port + PORT_STEP * k)
         self._absence = ConnectionNotice(
-            "ArduAutopilot", self._missing, self._how_to_start, self._notice_s
+            "ArduPilot", self._missing, self._how_to_start, self._notice_s
         )
 
     async def stop(self) -> None:
