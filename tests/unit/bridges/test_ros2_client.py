@@ -184,7 +184,7 @@ def test_a_link_says_what_is_not_there(link, monkeypatch):
         link.advertise("/x", "no_pkg/msg/Nothing")
     with pytest.raises(GraphError, match="does not allow"):
         link.advertise("/1x", STRING)
-    with pytest.raises(GraphError, match="takes"):
+    with pytest.raises(GraphError, match="needs"):
         call_and_wait(link, "/ours", String("x"), 10.0)
     with pytest.raises(GraphError, match="not advertised"):
         link.publish("/never", String("x"))

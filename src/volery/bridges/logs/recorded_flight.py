@@ -47,7 +47,7 @@ class RecordedScenario:
             return cls(name, int(plain["seed"]), version, dict(content))
         except (ValueError, TypeError, KeyError, RecursionError, OverflowError):
             reason = (
-                f"the log's message on {ORIGIN_TOPIC} is not a scenario: JSON with name, seed, "
+                f"the log's message on {ORIGIN_TOPIC} holds no scenario: JSON with name, seed, "
             )
             raise RecordingError(f"{reason}version and content is needed") from None
 
