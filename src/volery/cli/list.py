@@ -15,7 +15,7 @@ def show_scenarios() -> None:
         scenario = load_scenario(name)
         count = str(scenario.uav_count)
         rows.append((name, count, f"{scenario.duration_s:g} s", library.describe(name)))
-    print_table(("scenario", "UAVs", "duration", "description"), rows, right=(1, 2))
+    print_table(("scenario", "UAVs", "duration", "what it is"), rows, right=(1, 2))
 
 
 def show_nodes() -> None:

@@ -138,7 +138,7 @@ def test_version() -> None:
 
 def test_list() -> None:
     lines = runner.invoke(app, ["list"]).stdout.splitlines()
-    assert lines[0].split() == ["scenario", "UAVs", "duration", "description"]
+    assert lines[0].split() == ["scenario", "UAVs", "duration", "what", "it", "is"]
     for name in library.names():
         assert any(line.startswith(f"{name} ") and library.describe(name) in line for line in lines)
 
