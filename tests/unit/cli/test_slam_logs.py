@@ -241,7 +241,7 @@ def test_a_clock_set_back_in_the_middle_costs_no_scan(text, carried, tmp_path):
         (
             "1 2 3\n",
             ("--layout", "layout.toml", "--initial-pose", "1,2"),
-            "--initial-pose: 4 numbers",
+            "--initial-pose: expects 4 numbers",
         ),
         (
             "1 2 3\n",
