@@ -188,7 +188,7 @@ def test_a_map_that_is_too_large_costs_nothing_else(most, text, tmp_path, monkey
         assert told["cell_m"] is None
         assert sorted(path.name for path in out.iterdir()) == ["path.tum", "summary.json"]
     else:
-        assert f"they are {told['cell_m']:g} m wide" in result.output
+        assert f"cells are {told['cell_m']:g} m wide" in result.output
         assert told["cell_m"] in (0.1, 0.2, 0.4)
         assert grid_of(out)[2] == told["cell_m"]
 
