@@ -264,7 +264,7 @@ def _tell(out: Path, told: dict[str, Any]) -> None:
         f"{counted(told['sessions'], 'session')}, {counted(told['refused'], 'message')} refused"
     )
     topics = [topic for topic in told["topics"].values() if topic != "/tf_static"]
-    typer.echo(f"input      {told['uav']}: {', '.join(topics)}")
+    typer.echo(f"input     {told['uav']}: {', '.join(topics)}")
     states = ", ".join(f"{name} {_lasting(s)}" for name, s in told["states_s"].items())
     typer.echo(f"state     {states or 'none'}")
     for problem, seconds in told["problems_s"].items():

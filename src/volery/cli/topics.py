@@ -27,7 +27,7 @@ def list_topics(via: str, *, types: bool) -> None:
         found = topic_types(link)
         if not found:
             where = getattr(link, "where", via)
-            typer.echo(f"nobody was heard there: {where}", err=True)
+            typer.echo(f"no topics found: {where}", err=True)
     for topic, msgtype in found.items():
         if "/_" not in topic:
             typer.echo(f"{topic} [{msgtype}]" if types else topic)

@@ -163,7 +163,7 @@ def test_a_list_leaves_out_hidden_topics_and_says_who_was_asked(monkeypatch, cap
     Found.topics = {}
     list_topics("ros2://7", types=False)
     told = capsys.readouterr()
-    assert (told.out, told.err) == ("", f"nobody was heard there: {Found.where}\n")
+    assert (told.out, told.err) == ("", f"no topics found: {Found.where}\n")
 
 
 def test_a_link_finds_topics_and_services(simulated, link):
