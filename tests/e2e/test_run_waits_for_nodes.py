@@ -119,11 +119,11 @@ def test_what_does_not_come_is_named():
     words = ["run", "hover", "--wait-for", "a,/uav1/b", "--wait-timeout", "0.1"]
     result = CliRunner().invoke(app, [*words, "--bridge", f"rosbridge={free_port()}"])
     assert result.exit_code == 2
-    assert "waits for a, /uav1/b, at most 0.1 s" in result.output
+    assert "waiting for a, /uav1/b, at most 0.1 s" in result.output
     assert "a, /uav1/b not connected within 0.1 s; connected: none" in result.output
 
 
 def test_a_start_that_nothing_can_resume_is_refused():
     result = CliRunner().invoke(app, ["run", "hover", "--start-paused"])
     assert result.exit_code == 2
-    assert "nothing can let this run go on" in result.output
+    assert "nothing can resume this run" in result.output

@@ -165,15 +165,15 @@ def test_the_services_are_told_without_rosbridge_too():
         (("topic", "echo", "/nope"), "no topic '/nope'"),
         (("topic", "pub", "/x", "no_msgs/Such"), "no_msgs/msg/Such"),
         (("topic", "pub", "/x", "std_msgs/String", "{data: 3}"), "data must be"),
-        (("topic", "pub", "/x", "std_msgs/String", "{data"), "no YAML"),
-        (("service", "call", "/nope"), "nobody offers"),
+        (("topic", "pub", "/x", "std_msgs/String", "{data"), "is not YAML"),
+        (("service", "call", "/nope"), "has no server"),
         (("service", "call", "/uav1/go_to", "{position: {x: bad}}"), "position.x must be"),
         (("node", "nonsense"), "module:Class"),
         (("node", "no_such_module:Node"), "cannot be imported"),
-        (("topic", "list", "--via", "pigeon://post"), "no way into a graph"),
-        (("topic", "list", "--via", "rosbridge://127.0.0.1:1"), "nobody speaks rosbridge"),
-        (("topic", "list", "--via", "ros-tcp://127.0.0.1:1"), "nobody speaks ROS-TCP"),
-        (("topic", "list", "--via", "ros-tcp://127.0.0.1:x"), "no way into a graph"),
+        (("topic", "list", "--via", "pigeon://post"), "is not a graph connection"),
+        (("topic", "list", "--via", "rosbridge://127.0.0.1:1"), "no rosbridge server"),
+        (("topic", "list", "--via", "ros-tcp://127.0.0.1:1"), "no ROS-TCP server"),
+        (("topic", "list", "--via", "ros-tcp://127.0.0.1:x"), "is not a graph connection"),
         (("topic", "--via", "pigeon://post", "list"), "'pigeon://post' is no way"),
         (("service", "--via", "a://b", "call", "/x", "--via", "c://d"), "'c://d' is no way"),
     ],
@@ -384,7 +384,7 @@ def test_a_client_unloads_the_world_and_loads_one_again():
         assert len(answer(client, "/get_available_worlds").worlds) > 3
         assert UNLOADING in answer(client, "/get_simulator_features").features.features
         assert answer(client, "/load_world", world_resource=world("atlantis")).result.result == 2
-        with pytest.raises(GraphError, match="nobody offers"):
+        with pytest.raises(GraphError, match="has no server"):
             answer(client, "/get_entities")
         assert answer(client, "/load_world", world_resource=world("hover")).result.result == 1
         come_back(PLAYING)

@@ -213,7 +213,7 @@ def test_a_scenario_that_ends_stays_and_one_that_cannot_be_leads_back(server):
 
 def test_ctrl_c_ends_it(server):
     assert server.end() == 0
-    assert server.lines[-1] == "the server has ended"
+    assert server.lines[-1] == "the server has stopped"
     assert not [line for line in server.lines if "Traceback" in line or "ERROR" in line]
 
 

@@ -24,7 +24,7 @@ with volery.Simulation(volery.load_scenario("longleaf")) as simulation:
 @pytest.mark.timeout(600)
 def test_page_is_in_what_is_published(tmp_path):
     if not (ROOT / PAGE).is_file():
-        pytest.skip("the page is not built: make web")
+        pytest.skip("the page is not built: run `make web`")
     subprocess.run(
         [sys.executable, "-m", "build", "--outdir", str(tmp_path), str(ROOT)],
         check=True,

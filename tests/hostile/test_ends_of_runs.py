@@ -324,6 +324,6 @@ def test_a_run_on_a_full_disk_ends_with_one_line(tmp_path, suffix):
     out, err = process.communicate(timeout=HANG_S)
     assert process.returncode == 2
     assert len(err.splitlines()) == 1
-    assert f"error: {log}: cannot write the log: File too large; its first" in err
+    assert f"error: {log}: cannot write the log: File too large; the first" in err
     assert "The log could not be written: flew" in out
     assert summarize(log).messages > 10

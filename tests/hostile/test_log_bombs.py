@@ -322,7 +322,7 @@ def test_recordings_are_limited_in_number_and_bytes(tmp_path, monkeypatch):
     monkeypatch.setattr(recordings_quota, "MAX_TOTAL_BYTES", 10_000)
     assert recordings_quota.room_left(tmp_path) == 8_000
     monkeypatch.setattr(recordings_quota, "MAX_TOTAL_BYTES", 2_000)
-    with pytest.raises(RecordingError, match="the most that are kept"):
+    with pytest.raises(RecordingError, match="the maximum; remove some"):
         recordings_quota.room_left(tmp_path)
     monkeypatch.setattr(recordings_quota, "MAX_RECORDINGS", 2)
     with pytest.raises(RecordingError, match="there are 2 recordings already"):

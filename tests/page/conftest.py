@@ -34,7 +34,7 @@ def chromium():
     if browser_path() is None:
         pytest.skip("there is no Chromium: apt-get install chromium")
     if not (STATIC / "index.html").is_file():
-        pytest.skip("the page is not built: make web")
+        pytest.skip("the page is not built: run `make web`")
     with open_browser(*COMPOSED_PLAINLY) as opened:
         yield opened
 

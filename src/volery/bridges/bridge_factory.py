@@ -1,8 +1,8 @@
-"""Bridges by name, as the command line takes them: `rosbridge`, `ros-tcp=127.0.0.1:10001`.
+"""Makes bridges by the names of the command line: `rosbridge`, `ros-tcp=127.0.0.1:10001`.
 
     bridges.open(make_bridge("mavlink=14550", BridgeOptions(allow_remote=True)))
 
-Entry points of the group `volery.bridges` hold the names: those that ship, and those that other
+The names are entry points of the group `volery.bridges`: those that ship, and those that other
 installed packages add.
 """
 
@@ -71,7 +71,7 @@ def _kind_of(name: str, registry: EntryPoints) -> BridgeKind:
 def _unknown(name: str, names: list[str]) -> str:
     if not names:
         return (
-            f"no bridge '{name}': the installed packages name no bridges at all; install Volery "
+            f"no bridge '{name}': the installed packages register no bridges; install Volery "
             "again (from its source folder: pip install -e .)"
         )
     near = difflib.get_close_matches(name, names, n=1)
@@ -86,7 +86,7 @@ def _parse(address: str, port: int, text: str) -> Address:
         if colon:
             host = before.strip("[]")
         if not after.isdecimal() or not 0 <= int(after) <= 65535:
-            raise BridgeError(f"'{text}': an address is PORT or HOST:PORT, port 0 to 65535")
+            raise BridgeError(f"'{text}': use PORT or HOST:PORT, port 0 to 65535")
         port = int(after)
     return Address(host, port)
 
@@ -98,5 +98,5 @@ def _parse_line(address: str, baud: int, text: str) -> Address:
     elif after.isdecimal():
         baud = int(after)
     if not path or (colon and not after.isdecimal()):
-        raise BridgeError(f"'{text}': a serial line is PATH or PATH:BAUD")
+        raise BridgeError(f"'{text}': use PATH or PATH:BAUD for a serial line")
     return Address(path, baud)

@@ -1,12 +1,11 @@
-"""Bridges: servers and clients that carry the graph to other programs, on one asyncio thread.
+"""Bridges: servers and clients that connect the graph to other programs, on one asyncio thread.
 
     with BridgeHost(simulation.gateway) as bridges:
         bridges.open(RosTcpEndpoint(port=10000))
         simulation.run(speed=1.0)
 
-Everything a bridge does runs in the thread of `BridgeHost`; what it needs of the simulation it asks
-of the
-`Gateway`. A bridge that fails ends alone.
+All code of a bridge runs in the thread of `BridgeHost` and accesses the simulation through the
+`Gateway`. A bridge that fails does not affect the others.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ _LONGEST_START_S = 30.0
 
 
 class BridgeHost:
-    """The thread in which bridges work. Use it as a context manager, or call `close`."""
+    """The thread in which bridges run. Use it as a context manager, or call `close`."""
 
     def __init__(self, gateway: Gateway) -> None:
         self._gateway = gateway
@@ -43,7 +42,7 @@ class BridgeHost:
         return tuple(bridge.name for bridge in self._bridges)
 
     def open(self, bridge: Bridge) -> None:
-        """Start a bridge; `BridgeError` where that is not possible."""
+        """Starts a bridge. Raises `BridgeError` if that fails."""
         if self._closed:
             raise BridgeError("the bridges are closed")
         try:
@@ -54,11 +53,11 @@ class BridgeHost:
         self._bridges.append(bridge)
 
     def call(self, work: Coroutine[Any, Any, T], timeout_s: float | None = None) -> T:
-        """Run a coroutine in the bridges' thread and wait for its result."""
+        """Runs a coroutine in the bridges' thread and waits for its result."""
         return self._thread.call(work, timeout_s)
 
     def close(self) -> None:
-        """Stop all bridges and the thread; a second time nothing happens."""
+        """Stops all bridges and the thread; further calls do nothing."""
         if self._closed:
             return
         self._closed = True
@@ -66,7 +65,7 @@ class BridgeHost:
             try:
                 self.call(bridge.stop(), _LONGEST_START_S)
             except Exception:
-                _log.exception("%s did not close in good order", bridge.name)
+                _log.exception("%s did not close cleanly", bridge.name)
         self._thread.end()
 
     def __enter__(self) -> BridgeHost:
@@ -77,12 +76,12 @@ class BridgeHost:
 
 
 def wake_of(loop: asyncio.AbstractEventLoop, callback: Callable[[], object]) -> Callable[[], None]:
-    """A `graph.session.Wake` that has `callback` called in `loop`, also while that is closing."""
+    """Returns a `graph.session.Wake` that runs `callback` in `loop`, if the loop is still open."""
 
     def wake() -> None:
         try:
             loop.call_soon_threadsafe(callback)
-        except RuntimeError:  # the loop has ended: nobody is left to be told
+        except RuntimeError:  # the loop has ended
             return
 
     return wake

@@ -1,8 +1,8 @@
-"""Bounds of what a WebSocket client sends beside whole messages: control frames, fragments.
+"""Limits what a WebSocket client sends besides whole messages: control frames and fragments.
 
-Servers stop reading from a client for each message until it is taken. They do not for pings, which
-they answer also where the client reads no answers, nor for fragments, which they collect one by
-one. A client that floods a server with them would take its memory and its time.
+Servers stop reading from a client after each message until the message is processed. They do not
+stop for pings, which they answer even if the client does not read, nor for fragments, which they
+collect. A client that floods a server with them would use up its memory and its time.
 """
 
 from __future__ import annotations
@@ -11,17 +11,17 @@ import asyncio
 from typing import Any
 
 MAX_FRAGMENTS = 4096
-"""Of one message. Browsers send none below some kilobytes (modelling choice)."""
+"""Fragments of one message. Browsers send none below some kilobytes (modelling choice)."""
 FRAMES_PER_S = 500.0
-"""Pings, pongs and fragments of a client, on average (modelling choice)."""
+"""Mean rate of a client's pings, pongs and fragments (modelling choice)."""
 MAX_FRAMES_AHEAD = 1000
-"""Those that it may send in advance."""
+"""Frames that a client may send ahead of that rate."""
 
 _UNREAD, _FAST = "unread answers", "too many frames"
 
 
 class FrameLimits:
-    """The bounds of one connection. All methods belong to the thread of its loop."""
+    """Limits one connection. All methods belong to the thread of its loop."""
 
     def __init__(self, transport: HeldTransport, loop: asyncio.AbstractEventLoop) -> None:
         self._transport = transport
@@ -31,25 +31,25 @@ class FrameLimits:
         self._counted_s = loop.time()
 
     def control_frame(self) -> None:
-        """Counts a ping or pong; reads no more for a while where they come too fast."""
+        """Counts a ping or pong; pauses reading if they come too fast."""
         self._count_frame()
 
     def unread_answer(self) -> None:
-        """Reads no more until `answers_read`: a ping was answered, and earlier answers wait."""
+        """Pauses reading until `answers_read`, because earlier answers are still unsent."""
         self._transport.hold(_UNREAD)
 
     def answers_read(self) -> None:
-        """The client has read what waited."""
+        """Resumes reading after the client has read the answers."""
         self._transport.release(_UNREAD)
 
     def fragment(self) -> bool:
-        """Counts a fragment; returns whether the message may go on."""
+        """Counts a fragment; returns whether the message may continue."""
         self._num_fragments += 1
         self._count_frame()
         return self._num_fragments <= MAX_FRAGMENTS
 
     def message(self) -> None:
-        """A message begins."""
+        """Starts a new message."""
         self._num_fragments = 0
 
     def _count_frame(self) -> None:
@@ -64,7 +64,7 @@ class FrameLimits:
 
 
 class HeldTransport:
-    """A transport that is read from while neither its protocol nor any other reason holds it."""
+    """A transport that is read while neither its protocol nor any other reason pauses it."""
 
     def __init__(self, transport: asyncio.Transport) -> None:
         self._transport = transport
@@ -75,21 +75,21 @@ class HeldTransport:
         return getattr(self._transport, name)
 
     def pause_reading(self) -> None:
-        """As of asyncio, for the protocol."""
+        """Implements asyncio's method for the protocol."""
         self.hold("protocol")
 
     def resume_reading(self) -> None:
-        """As of asyncio, for the protocol."""
+        """Implements asyncio's method for the protocol."""
         self.release("protocol")
 
     def hold(self, reason: str) -> None:
-        """Reads no more until `reason` and all others are released."""
+        """Pauses reading until `reason` and all others are released."""
         if not self._reasons:
             self._transport.pause_reading()
         self._reasons.add(reason)
 
     def release(self, reason: str) -> None:
-        """Reads on if nothing else holds it; does nothing where `reason` does not."""
+        """Removes `reason`, if present, and resumes reading without further reasons."""
         if reason in self._reasons:
             self._reasons.discard(reason)
             if not self._reasons:
@@ -103,7 +103,7 @@ class HeldTransport:
         self._timers[reason] = loop.call_later(wait_s, self.release, reason)
 
     def end(self) -> None:
-        """Forgets what waits: the connection is lost."""
+        """Cancels all timers after the connection is lost."""
         for timer in self._timers.values():
             timer.cancel()
         self._timers.clear()

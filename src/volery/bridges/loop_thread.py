@@ -1,4 +1,4 @@
-"""An asyncio loop in a thread of its own, for whatever serves clients beside the engine."""
+"""Runs an asyncio loop in its own thread, for servers beside the engine."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 
 _SWITCH_INTERVAL_S = 0.0005
-"""Python's own 5 ms would be the latency of every answer while the engine computes."""
+"""Python's default of 5 ms would be the latency of every answer while the engine computes."""
 
 
 class LoopThread:
@@ -23,20 +23,23 @@ class LoopThread:
 
     @property
     def running(self) -> bool:
-        """Whether it has been started and not ended."""
+        """Whether the thread runs."""
         return self._thread.is_alive()
 
     def start(self) -> None:
-        """Begin to run."""
+        """Starts the thread."""
         sys.setswitchinterval(min(sys.getswitchinterval(), _SWITCH_INTERVAL_S))
         self._thread.start()
 
     def call(self, work: Coroutine[Any, Any, T], timeout_s: float | None = None) -> T:
-        """Run a coroutine in the loop and wait for its result. `TimeoutError` after `timeout_s`."""
+        """Runs a coroutine in the loop and waits for its result.
+
+        Raises `TimeoutError` after `timeout_s`.
+        """
         return asyncio.run_coroutine_threadsafe(work, self._loop).result(timeout_s)
 
     def end(self) -> None:
-        """Cancel what still runs and give everything back; a second time nothing happens."""
+        """Cancels running coroutines and closes the loop; further calls do nothing."""
         if self.running:
             self._loop.call_soon_threadsafe(self._loop.stop)
             self._thread.join()

@@ -1,7 +1,7 @@
-"""Whose web pages may reach a server on this machine.
+"""Checks the origin of web pages that connect to a server on this machine.
 
-A web page of a stranger, open in a browser on this machine, reaches loopback too. Browsers tell
-whose page it is in the header `Origin`; programs tell none.
+A web page of another site, open in a browser on this machine, can connect to loopback too. Browsers
+send the page's site in the header `Origin`; other programs send none.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from volery.core.network_access import LOOPBACK
 
 
 class Origins:
-    """Lets pages in from localhost, from the address that is connected to, and from a list.
+    """Accepts pages from localhost, from the server's own address, and from a list.
 
     Parameters
     ----------
     listed
         Further origins, such as `https://studio.example.org`.
     token_needed
-        Whether clients must show a token besides.
+        Whether clients also need a token.
 
     """
 
@@ -30,25 +30,28 @@ class Origins:
         self._token_needed = token_needed
 
     def let_in(self, origin: str | None, host: str) -> bool:
-        """Whether pages of `origin` may come; host: what the client calls this server."""
+        """Returns whether pages of `origin` may connect.
+
+        Host: the client's name for this server.
+        """
         if origin is None or origin in self._listed:
             return True
         page = name_of(origin.partition("//")[2])
-        if page is None:  # "null": a file, or a page that hides where it is from
+        if page is None:  # "null": a file, or a page that hides its origin
             return False
         if page in LOOPBACK:
             return True
-        # A name may be made to point here by whoever owns it, so only an address proves the page
-        # to be from where it connects to; where a token is asked for, a name will do.
+        # The owner of a name may point it here, so only an address proves that the page is from the
+        # server it connects to; if a token is required, a name is enough.
         return page == name_of(host) and (is_address(page) or self._token_needed)
 
     def lists(self, host: str) -> bool:
-        """Whether a listed origin is of this host, such as `studio.example.org:8443`."""
+        """Returns whether a listed origin has this host, such as `studio.example.org:8443`."""
         return any(origin.partition("//")[2] == host for origin in self._listed)
 
 
 def name_of(host: str) -> str | None:
-    """`example.org` of `example.org:8080`, `::1` of `[::1]:8080`; None where it is no host."""
+    """Returns `example.org` for `example.org:8080`, `::1` for `[::1]:8080`; None for no host."""
     try:
         return urlsplit(f"//{host}").hostname
     except ValueError:
@@ -56,7 +59,7 @@ def name_of(host: str) -> str | None:
 
 
 def is_address(host: str) -> bool:
-    """Whether a host is a number, not a name."""
+    """Returns whether a host is an IP address, not a name."""
     try:
         ipaddress.ip_address(host)
     except ValueError:

@@ -1,7 +1,7 @@
-"""A program's part in a graph that a server elsewhere offers, over a connection that is kept.
+"""Connects a program to the graph of a remote server and keeps the connection.
 
-It has the methods and the meaning of `graph.session.Session`. When the connection breaks it comes
-back by itself, and announces, subscribes to and offers everything again.
+A remote client has the methods of `graph.session.Session`. If the connection breaks, the client
+reconnects and repeats its advertisements, subscriptions and services.
 """
 
 from __future__ import annotations
@@ -27,46 +27,46 @@ _ANSWER_TIMEOUT_S = 5.0
 
 
 class RemoteServices(Protocol):
-    """Services that a client calls and offers, also when there is no connection."""
+    """Services that a client calls and offers, also without a connection."""
 
     def call(self, service: str, request: Any | None, reply: ServiceReply) -> None:
-        """Call a service; without a request the server is asked for its type first."""
+        """Calls a service; without a request the server is first asked for its type."""
 
     def offer(self, service: str, srvtype: str, handler: Handler) -> None:
-        """Offer a service. `GraphError` for an unknown type, or if it is offered already."""
+        """Creates a service. Raises `GraphError` for an unknown type or an existing service."""
 
     def withdraw(self, service: str, who: str) -> None:
-        """Offer a service no more; its open requests fail. `GraphError` if it was not offered."""
+        """Destroys a service; its open requests fail. Raises `GraphError` if it does not exist."""
 
 
 class RemoteClient(ABC):
-    """One program's part in a remote graph. All methods may be called by any thread.
+    """Connects one program to a remote graph. Any thread may call the methods.
 
-    It has an asyncio loop in a thread of its own; wakes, replies and requests come from there.
+    The client runs an asyncio loop in its own thread, which calls wakes, replies and handlers.
 
-    A subclass says `_PROTOCOL` and `_SERVER`, sets `_topics` and `_services` before it calls
-    `_start`, the last step of its `__init__`, and has the abstract methods. Of these
-    `_keep_connected`, in the loop, calls `_joined` when a connection stands and everything has
-    been asked for, `_lose` when it is gone, and keeps in `_why` what made it fail.
+    A subclass defines `_PROTOCOL` and `_SERVER`, sets `_topics` and `_services` before it calls
+    `_start`, the last step of its `__init__`, and implements the abstract methods. In the loop,
+    `_keep_connected` calls `_joined` after the server has received all requests, calls `_lose`
+    when the connection breaks, and stores the reason of a failure in `_why`.
 
     Parameters
     ----------
     name
-        Who it is, for people.
+        Name of the client, for messages.
     where
-        Address of the server, for people.
+        Address of the server, for messages.
 
     """
 
     _PROTOCOL: ClassVar[str]
-    """Its name, as people write it; in small letters it ends the thread's name."""
+    """Name of the protocol; in lower case part of the thread's name."""
     _SERVER: ClassVar[str]
-    """What people call a server of the protocol."""
+    """Name of the protocol's server, for messages."""
 
     _topics: RemoteTopics
-    """What is published and received, told to the server with every connection anew."""
+    """Publications and subscriptions, repeated on every connection."""
     _services: RemoteServices
-    """What is called and offered, likewise."""
+    """Calls and services, likewise."""
 
     def __init__(self, name: str, where: str) -> None:
         self.name = name
@@ -79,7 +79,7 @@ class RemoteClient(ABC):
         self._closed = False
 
     def _start(self, connect_timeout_s: float) -> None:
-        """Begin to connect. `BridgeError` where nobody answers in time; 0: do not wait."""
+        """Starts to connect. Raises `BridgeError` if no server answers in time; 0: do not wait."""
         self._main = self._loop.create_task(self._keep_connected())
         name = f"{self.name}-{self._PROTOCOL.lower()}"
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
@@ -95,32 +95,32 @@ class RemoteClient(ABC):
 
     @property
     def connected(self) -> bool:
-        """Whether the server is there at the moment."""
+        """Whether the server is connected."""
         return self._connected.is_set()
 
     @property
     def connections(self) -> int:
-        """How often it has been connected."""
+        """Number of connections so far."""
         return self._connections
 
     def wait_until_connected(self, timeout_s: float) -> None:
-        """Wait for the server. `BridgeError` where it does not answer in time."""
+        """Waits for the server. Raises `BridgeError` if it does not answer in time."""
         if not self._connected.wait(timeout_s):
-            raise UnreachableError(f"nobody speaks {self._PROTOCOL} at {self._where}: {self._why}")
+            raise UnreachableError(f"no {self._PROTOCOL} server at {self._where}: {self._why}")
 
     # ------------------------------------------------------------------------------------ topics
 
     def advertise(self, topic: str, msgtype: str, *, latched: bool = False) -> None:
-        """Announce that messages will be published on `topic`. `GraphError` for a wrong type."""
+        """Advertises `topic`. Raises `GraphError` for a wrong type."""
         self._check_open()
         self._topics.advertise(topic, msgtype, latched)
 
     def unadvertise(self, topic: str) -> None:
-        """Publish on `topic` no more. `GraphError` if it did not."""
+        """Ends the publication of `topic`. Raises `GraphError` if there was none."""
         self._topics.unadvertise(topic, self.name)
 
     def published_type(self, topic: str) -> str | None:
-        """Type that was announced for `topic`; None if it was not."""
+        """Returns the advertised type of `topic`; None if it is not advertised."""
         return self._topics.published_type(topic)
 
     def publish(self, topic: str, message: Any) -> None:
@@ -140,7 +140,10 @@ class RemoteClient(ABC):
         reliable: bool = False,
         wake: Wake,
     ) -> SubscriptionQueue:
-        """As `Link.subscribe`; without a type the client asks the server for it."""
+        """Subscribes like `GraphConnection.subscribe`.
+
+        Without a type the client asks the server for it.
+        """
         self._check_open()
         if msgtype is None:
             msgtype = self._type_of(topic)
@@ -149,18 +152,18 @@ class RemoteClient(ABC):
         return self._topics.subscribe(topic, msgtype, depth, reliable, wake)
 
     def unsubscribe(self, mailbox: SubscriptionQueue) -> None:
-        """Receive no more; what waits can still be taken."""
+        """Ends a subscription; queued messages remain available."""
         self._topics.unsubscribe(mailbox)
 
     @abstractmethod
     def _type_of(self, topic: str) -> str | None:
-        """Ask the server for the type of a topic; None or empty where there is no such topic."""
+        """Asks the server for the type of a topic; None or empty if there is no such topic."""
 
     def _ask(self, ask: Callable[[Future[T]], object], silence: str) -> T:
-        """Have the server asked by `ask`, and wait for what that gets as an answer.
+        """Sends a request with `ask` and waits for the answer.
 
-        `GraphError` with `silence` as its text where no answer comes, and in the client's own
-        thread, which would wait for itself.
+        Raises `GraphError` with the text `silence` if no answer arrives, and also in the client's
+        own thread, which would wait for itself.
         """
         if threading.current_thread() is self._thread:
             raise GraphError(
@@ -176,7 +179,7 @@ class RemoteClient(ABC):
     # ---------------------------------------------------------------------------------- services
 
     def call(self, service: str, request: Any | None, reply: ServiceReply) -> None:
-        """Call a service; `reply` gets the response or a `GraphError` in the client's thread.
+        """Calls a service; `reply` receives the response or a `GraphError` in the client's thread.
 
         Calls that are open when the connection breaks fail.
         """
@@ -184,18 +187,18 @@ class RemoteClient(ABC):
         self._services.call(service, request, reply)
 
     def offer(self, service: str, srvtype: str, handler: Handler) -> None:
-        """Offer a service; `handler(request, reply)` is called in the client's thread."""
+        """Creates a service; `handler(request, reply)` is called in the client's thread."""
         self._check_open()
         self._services.offer(service, srvtype, handler)
 
     def withdraw(self, service: str) -> None:
-        """Offer a service no more. `GraphError` if it was not offered."""
+        """Destroys a service. Raises `GraphError` if it does not exist."""
         self._services.withdraw(service, self.name)
 
     # --------------------------------------------------------------------------------------- end
 
     def close(self) -> None:
-        """Leave; a second time nothing happens."""
+        """Disconnects; further calls do nothing."""
         if self._closed:
             return
         self._closed = True
@@ -205,7 +208,7 @@ class RemoteClient(ABC):
 
     def _check_open(self) -> None:
         if self._closed:
-            raise GraphError(f"{self.name} has left")
+            raise GraphError(f"{self.name} is closed")
 
     # ------------------------------------------------------------------------------- its thread
 
@@ -216,27 +219,27 @@ class RemoteClient(ABC):
         except asyncio.CancelledError:
             pass
         finally:
-            self._lose(f"{self.name} has left")
+            self._lose(f"{self.name} is closed")
             self._loop.close()
 
     @abstractmethod
     async def _keep_connected(self) -> None:
-        """Connect, and again whenever the connection breaks, until `_leave` ends it."""
+        """Connects, and reconnects after each break, until `_leave` ends it."""
 
     def _joined(self) -> None:
-        """A connection stands, and everything has been asked for."""
+        """Marks the client as connected, after the server has received all requests."""
         self._connections += 1
         self._connected.set()
 
     def _lose(self, why: str) -> None:
-        """The connection is gone, or there will be none any more."""
+        """Marks the client as disconnected."""
         self._connected.clear()
         self._drop(why)
 
     @abstractmethod
     def _drop(self, why: str) -> None:
-        """Drop what waits to be sent; who waits for an answer is told why none will come."""
+        """Drops queued messages and fails open requests with the reason."""
 
     def _leave(self) -> None:
-        """Bring `_keep_connected` to an end, after `close`."""
+        """Ends `_keep_connected`, after `close`."""
         self._main.cancel()

@@ -1,4 +1,4 @@
-"""What a client of a remote graph publishes and receives there, whatever the protocol."""
+"""Publications and subscriptions of a remote client, independent of the protocol."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ from volery.graph.subscription_queue import SubscriptionQueue, SubscriptionQueue
 
 @dataclass
 class Subscription:
-    """A topic that is received, once for all its mailboxes."""
+    """A topic's subscription, shared by all its queues."""
 
     msgtype: str
     mailboxes: list[SubscriptionQueue] = field(default_factory=list)
     depth: int = 1
-    """The most that a mailbox has asked for."""
+    """Largest depth of its queues."""
     reliable: bool = False
-    """Whether a mailbox has asked for it."""
+    """Whether a queue has requested reliable delivery."""
 
 
 class RemoteTopics(ABC):
-    """What was announced and subscribed to, also when there is no connection.
+    """Holds advertisements and subscriptions, also without a connection.
 
-    A subclass has the words of its protocol: the `_tell_...` tell the server of a change, with the
-    lock held, and do nothing without a connection; `_send` sends a message.
+    A subclass implements the protocol: the `_tell_...` methods send a change to the server, with
+    the lock held, and do nothing without a connection; `_send` sends a message.
 
     Parameters
     ----------
     lock
-        Held by whoever changes what the client wants of the server.
+        Held during changes of advertisements and subscriptions.
     check_type
-        Raises `GraphError` for a message type that the graph does not know.
+        Raises `GraphError` for an unknown message type.
 
     """
 
@@ -48,7 +48,7 @@ class RemoteTopics(ABC):
         self._subscriptions: dict[str, Subscription] = {}
 
     def repeat_topics(self) -> None:
-        """Announce and subscribe everything, on a connection that is new; with the lock held."""
+        """Repeats all advertisements and subscriptions on a new connection; needs the lock."""
         for topic, (msgtype, latched) in self._announced.items():
             self._tell_advertised(topic, msgtype, latched)
         for topic, subscription in self._subscriptions.items():
@@ -57,7 +57,7 @@ class RemoteTopics(ABC):
     # ------------------------------------------------------------------------------ publications
 
     def advertise(self, topic: str, msgtype: str, latched: bool) -> None:
-        """Announce a topic. `GraphError` for an unknown type."""
+        """Advertises a topic. Raises `GraphError` for an unknown type."""
         self._check_type(msgtype)
         with self._lock:
             if self._announced.get(topic) != (msgtype, latched):
@@ -65,19 +65,19 @@ class RemoteTopics(ABC):
                 self._tell_advertised(topic, msgtype, latched)
 
     def unadvertise(self, topic: str, who: str) -> None:
-        """Take an announcement back. `GraphError` where there was none."""
+        """Ends an advertisement. Raises `GraphError` if there was none."""
         with self._lock:
             if self._announced.pop(topic, None) is None:
                 raise GraphError(f"{who} does not publish '{topic}'")
             self._tell_unadvertised(topic)
 
     def published_type(self, topic: str) -> str | None:
-        """Announced type of a topic."""
+        """Returns the advertised type of a topic."""
         found = self._announced.get(topic)
         return None if found is None else found[0]
 
     def publish(self, topic: str, message: Any, who: str) -> None:
-        """Send a message of the announced type; without a connection it is dropped."""
+        """Sends a message of the advertised type; drops it without a connection."""
         msgtype = self.published_type(topic)
         if msgtype is None:
             raise GraphError(f"{who} has not advertised '{topic}'")
@@ -88,7 +88,7 @@ class RemoteTopics(ABC):
 
     @property
     def announced(self) -> tuple[str, ...]:
-        """Names of the announced topics."""
+        """Names of the advertised topics."""
         with self._lock:
             return tuple(self._announced)
 
@@ -97,7 +97,7 @@ class RemoteTopics(ABC):
     def subscribe(
         self, topic: str, msgtype: str, depth: int, reliable: bool, wake: Wake
     ) -> SubscriptionQueue:
-        """Begin to receive a topic. `GraphError` for an unknown type, or a second one."""
+        """Subscribes to a topic. Raises `GraphError` for an unknown or a second type."""
         self._check_type(msgtype)
         check_depth(depth)
         mailbox = SubscriptionQueue(topic, depth, wake, reliable=reliable)
@@ -112,7 +112,7 @@ class RemoteTopics(ABC):
         return mailbox
 
     def unsubscribe(self, mailbox: SubscriptionQueue) -> None:
-        """Receive no more; the server is told with the topic's last mailbox."""
+        """Ends a queue's subscription; the last one of a topic also ends that of the server."""
         with self._lock:
             found = self._subscriptions.get(mailbox.topic)
             if found is None or mailbox not in found.mailboxes:
@@ -124,14 +124,14 @@ class RemoteTopics(ABC):
 
     @property
     def mailboxes(self) -> tuple[SubscriptionQueueInfo, ...]:
-        """How the subscriptions fare."""
+        """State of the subscriptions."""
         with self._lock:
             return tuple(m.info for s in self._subscriptions.values() for m in s.mailboxes)
 
     def _deliver(self, topic: str, decode: Callable[[str], Any]) -> None:
-        """Hand a message that has come to who wants it; `decode` makes it, of a type.
+        """Passes a received message to its queues; `decode` decodes it for a type.
 
-        Not called where nobody wants it; the `GraphError` that it raises is the caller's.
+        Does not call `decode` without queues; its `GraphError` passes to the caller.
         """
         with self._lock:
             found = self._subscriptions.get(topic)
@@ -147,20 +147,20 @@ class RemoteTopics(ABC):
 
     @abstractmethod
     def _send(self, topic: str, message: Any, msgtype: str) -> None:
-        """Send a message of this type; without a connection count it as dropped."""
+        """Sends a message of this type; without a connection counts it as dropped."""
 
     @abstractmethod
     def _tell_advertised(self, topic: str, msgtype: str, latched: bool) -> None:
-        """Tell that messages of a type will come."""
+        """Sends an advertisement."""
 
     @abstractmethod
     def _tell_unadvertised(self, topic: str) -> None:
-        """Tell that no more messages will come."""
+        """Sends the end of an advertisement."""
 
     @abstractmethod
     def _tell_subscribed(self, topic: str, subscription: Subscription) -> None:
-        """Ask for messages, as many as the subscription says now; it may have been asked before."""
+        """Subscribes with the subscription's current options; may repeat an earlier request."""
 
     @abstractmethod
     def _tell_unsubscribed(self, topic: str) -> None:
-        """Ask for no more messages."""
+        """Unsubscribes."""

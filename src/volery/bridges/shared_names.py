@@ -1,20 +1,20 @@
-"""Which names a simulation and a ROS graph beside it share, and in which direction."""
+"""Selects the names that a simulation shares with a ROS graph, and their direction."""
 
 from __future__ import annotations
 
 import fnmatch
 
 COMMANDS = ("*/cmd_vel", "*/trajectory", "*/goal_pose")
-"""Topics taken from outside also where the graph has publishers of its own."""
+"""Topics received from the ROS graph even if the simulation publishes them."""
 
 _NOT_SHARED = frozenset({"/rosout", "/rosout_agg"})
 
 
 class SharedNames:
-    """Patterns of names, as `fnmatch` has them.
+    """Selects names by patterns of `fnmatch`.
 
-    patterns: of topics and services that are shared at all. commands: of topics that others may
-    publish beside publishers of the graph.
+    patterns: of shared topics and services. commands: of topics that other publishers may publish
+    besides those of the simulation.
     """
 
     def __init__(self, patterns: tuple[str, ...], commands: tuple[str, ...] = COMMANDS) -> None:
@@ -22,11 +22,11 @@ class SharedNames:
         self._commands = commands
 
     def has(self, name: str) -> bool:
-        """Whether a topic or service is shared at all."""
+        """Returns whether a topic or service is shared."""
         return name not in _NOT_SHARED and any(fnmatch.fnmatch(name, p) for p in self._patterns)
 
     def takes(self, topic: str, publishers: int, subscribers: int) -> bool:
-        """Whether messages of a topic are taken from outside."""
+        """Returns whether messages of a topic are received from the ROS graph."""
         if not subscribers:
             return False
         return not publishers or any(fnmatch.fnmatch(topic, p) for p in self._commands)

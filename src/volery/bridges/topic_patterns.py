@@ -1,7 +1,7 @@
-"""Choosing topics by patterns, as for file names.
+"""Selects topics by patterns like those of file names.
 
-`*` stands for any characters within one part of a name, `?` for one of them, `**` for any number of
-parts: `/uav*/laser/**` matches `/uav1/laser/horizontal/scan`, `/**` matches all.
+`*` matches any characters within one part of a name, `?` one character, `**` any number of parts:
+`/uav*/laser/**` matches `/uav1/laser/horizontal/scan`, `/**` matches all.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ _ALLOWED = re.compile(r"/(?:[\w*?]+(?:/[\w*?]+)*)?")
 _TOKENS = re.compile(r"/\*\*(?=/|$)|\*\*|\*|\?|[^*?/]+|/")
 
 Pattern = list[str]
-"""Tokens: wildcards, and what stands between them."""
+"""Tokens: wildcards, and the text between them."""
 
 
 def topic_filter(topics: Iterable[str], exclude: Iterable[str] = ()) -> Callable[[str], bool]:
-    """Whether a topic matches one of `topics` and none of `exclude`.
+    """Returns a function that tests whether a topic matches one of `topics` and none of `exclude`.
 
-    The answer for each topic is worked out once. `GraphError` for what is no pattern.
+    The result for each topic is computed once. Raises `GraphError` for an invalid pattern.
     """
     wanted, unwanted = _compiled(topics), _compiled(exclude)
     answers: dict[str, bool] = {}
@@ -40,9 +40,10 @@ def topic_filter(topics: Iterable[str], exclude: Iterable[str] = ()) -> Callable
 
 
 def renamer(names: Mapping[str, str]) -> Callable[[str], str]:
-    """New names of topics: `{"/scan": "/uav1/scan"}`, or whole branches `{"/uav1/**": "/uav2/**"}`.
+    """Returns a function that renames topics, `{"/scan": "/uav1/scan"}`, or whole branches.
 
-    The longest branch counts. `GraphError` for a branch that is renamed to none.
+    A branch is given as `{"/uav1/**": "/uav2/**"}`. The longest branch counts. Raises `GraphError`
+    for a branch without a new branch.
     """
     exact: dict[str, str] = {}
     branches: dict[str, str] = {}
@@ -74,7 +75,7 @@ def _compiled(patterns: Iterable[str]) -> list[Pattern]:
             raise GraphError(f"a pattern has at most {MAX_PATTERN_CHARACTERS} characters")
         if _ALLOWED.fullmatch(pattern) is None:
             raise GraphError(
-                f"'{pattern}' is no pattern for topics: it begins with / and is made of letters, "
+                f"'{pattern}' is not a topic pattern: use a leading / and letters, "
                 "digits, _ and the wildcards * ? **"
             )
         compiled.append(_TOKENS.findall(pattern))
@@ -82,7 +83,7 @@ def _compiled(patterns: Iterable[str]) -> list[Pattern]:
 
 
 def _match(pattern: Pattern, name: str) -> bool:
-    """Whether a pattern matches; no pattern takes longer than its length times that of the name."""
+    """Returns whether a pattern matches; the cost is at most its length times that of the name."""
     ends = {0}
     for token in pattern:
         ends = _ends_of(token, name, ends)
@@ -92,10 +93,10 @@ def _match(pattern: Pattern, name: str) -> bool:
 
 
 def _ends_of(token: str, name: str, starts: set[int]) -> set[int]:
-    """Where a token may end in `name` that begins at one of `starts`."""
+    """Returns where a token that begins at one of `starts` may end in `name`."""
     if token == "**":
         return set(range(min(starts), len(name) + 1))
-    if token == "/**":  # also nothing at all: /a/**/b matches /a/b
+    if token == "/**":  # matches nothing too: /a/**/b matches /a/b
         first = min((start for start in starts if name.startswith("/", start)), default=len(name))
         return starts | set(range(first + 1, len(name) + 1))
     if token == "?":

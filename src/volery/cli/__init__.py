@@ -1,1 +1,1 @@
-"""The command `volery`. Heavy imports stand inside the commands, so that `--help` is quick."""
+"""The command `volery`. Heavy imports are inside the commands, so that `--help` is quick."""

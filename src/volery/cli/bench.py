@@ -1,4 +1,4 @@
-"""`volery bench`: measure, show, keep."""
+"""`volery bench`: runs benchmarks, prints and saves their results."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from volery.core.errors import VoleryError
 def measure_and_show(
     name: str, *, as_json: bool, out: Path | None, markdown: Path | None, quick: bool = False
 ) -> None:
-    """Measure one bench, or all of them each in a process of its own."""
+    """Measures one bench, or all of them, each in its own process."""
     for path in (out, markdown):
         if path is not None and not path.parent.is_dir():
-            raise VoleryError(f"{path}: there is no folder {path.parent}")
+            raise VoleryError(f"{path}: folder {path.parent} does not exist")
     with _progress_told():
         if name == "all" and quick:
             raise VoleryError("--quick is for one bench: forest_search, load or hostile")
@@ -47,7 +47,7 @@ def measure_and_show(
 
 @contextmanager
 def _progress_told() -> Iterator[None]:
-    """Let long benches say on standard error what they do."""
+    """Makes long benches report their progress on standard error."""
     log, handler = logging.getLogger("volery.bench"), logging.StreamHandler()
     log.setLevel(logging.INFO)
     log.addHandler(handler)
@@ -58,7 +58,7 @@ def _progress_told() -> Iterator[None]:
 
 
 def _in_own_process(name: str) -> Result:
-    """A bench unspoilt by what the others left in memory."""
+    """Runs a bench in a new process, so that the memory of other benches does not affect it."""
     command = [sys.executable, "-P", "-m", "volery.cli.app", "bench", name, "--json"]
     done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False)
     if done.returncode:

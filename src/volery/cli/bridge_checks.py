@@ -1,4 +1,4 @@
-"""Which bridges go together, and which options need which bridge: told before anything is built."""
+"""Checks before a build which bridges exclude each other and which options need which bridge."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ if TYPE_CHECKING:
     from volery.scenario.schema import Scenario
 
 BUILT_IN = ("mavlink", "mavlink-tcp", "mavlink-serial")
-"""Bridges to the autopilots that Volery has for the UAVs."""
+"""Bridges to Volery's built-in autopilot."""
 
 _OUTSIDE = ("px4", "px4-serial", "ardupilot")
-"""Bridges whose autopilots fly the UAVs."""
+"""Bridges to external autopilots, which control the UAVs."""
 _EVERY = ("px4", "ardupilot")
-"""Those of them that take all UAVs."""
+"""External autopilots that control all UAVs of a run."""
 
 _ROS2 = ("ros2", "ros2-zenoh")
 
@@ -25,11 +25,14 @@ _WITHOUT_TOKEN = (
     *("ros-tcp", "ros-tcp-2", "ros1", "ros2", "ros2-zenoh", "sensor-link", "px4", "ardupilot"),
     *_BY_SIGNING,
 )
-"""Bridges that programs connect to, whose protocols carry no token."""
+"""Bridges that accept connections and whose protocols carry no token."""
 
 
 def check_bridges(options: RunOptions) -> None:
-    """`BridgeError` for bridges that would fight over UAVs, and options that nothing would heed."""
+    """Checks the bridges of a run's options.
+
+    Raises `BridgeError` for bridges that exclude each other and for options without their bridge.
+    """
     names = _names(options)
     _check_autopilots(names)
     if options.mavlink_key is not None and not set(names) & set(BUILT_IN):
@@ -56,7 +59,7 @@ def check_bridges(options: RunOptions) -> None:
 
 
 def token_gaps(options: RunOptions) -> list[str]:
-    """Returns what a user who sets a token must know of bridges that cannot ask for it."""
+    """Returns a warning for each bridge whose protocol cannot ask for the token."""
     if options.token is None:
         return []
     return [
@@ -80,7 +83,7 @@ def _remedy(name: str) -> str:
 
 
 def check_autopilots(scenario: Scenario, options: RunOptions) -> None:
-    """`BridgeError` where a scenario brings autopilots for UAVs that bridges bring others for."""
+    """Raises `BridgeError` if both the scenario and a bridge give a UAV an autopilot."""
     from volery.mavlink.scenario_setup import NODE
     from volery.scenario.node_names import is_same_node
 

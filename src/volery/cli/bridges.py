@@ -1,4 +1,4 @@
-"""Opens the bridges that `volery run` was asked for."""
+"""Opens the bridges of a run's `RunOptions`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from volery.scenario.schema import Scenario
 
 _LONGEST_START_S = 60.0
-"""Wall time in which PX4s must have connected."""
+"""Wall time within which all PX4 instances must connect."""
 _LOOK_S = 0.05
 
 
@@ -29,7 +29,7 @@ def fit_out(scenario: Scenario, options: RunOptions) -> Scenario:
     if options.px4_dir is not None:
         from volery.mavlink.hil.px4_processes import find_px4
 
-        find_px4(options.px4_dir)  # a wrong folder is told before anything is built
+        find_px4(options.px4_dir)  # reports a wrong folder before anything is built
     check_autopilots(scenario, options)
     names = {text.partition("=")[0] for text in options.bridges}
     if names & set(BUILT_IN):
@@ -49,7 +49,7 @@ def fit_out(scenario: Scenario, options: RunOptions) -> Scenario:
 
 @contextmanager
 def open_bridges(simulation: Any, options: RunOptions) -> Iterator[None]:
-    """Hold the bridges of `options` open, and say where they are; none where none was asked for."""
+    """Opens the bridges of `options`, prints their addresses and closes them on exit."""
     if not options.bridges:
         yield
         return
@@ -85,7 +85,7 @@ def _bridge_options(options: RunOptions) -> BridgeOptions:
 
 @contextmanager
 def _px4_instances(simulation: Any, bridges: list[Bridge], options: RunOptions) -> Iterator[None]:
-    """Run a PX4 for each UAV where that was asked for, and wait until all are connected."""
+    """Runs a PX4 for each UAV if `options` has a PX4 folder; waits until all are connected."""
     if options.px4_dir is None:
         yield
         return
@@ -106,10 +106,10 @@ def _px4_instances(simulation: Any, bridges: list[Bridge], options: RunOptions) 
 
 
 def _missing(simulation: Any, bridge: Px4Bridge, instances: Px4Instances) -> str:
-    """Which PX4s have not connected, where to, and what they said last."""
+    """Returns an error text with the missing PX4s, their addresses and last output."""
     return "\n".join(
         f"{uav}: PX4 {number} has not connected to {bridge.address(number)} within "
-        f"{_LONGEST_START_S:g} s; it said last:{instances.words_of(number) or ' nothing'}"
+        f"{_LONGEST_START_S:g} s; last output:{instances.words_of(number) or ' nothing'}"
         for number, uav in enumerate(simulation.uav_names)
         if uav not in bridge.connected
     )

@@ -1,4 +1,4 @@
-"""`volery run --replay-commands`: which flight is repeated, and with which scenario."""
+"""`volery run --replay-commands`: the log to replay, and its scenario."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ if TYPE_CHECKING:
 
 
 def recorded_flight(options: RunOptions) -> RecordedFlight | None:
-    """The flight to be repeated; None where none was asked for.
+    """Returns the flight to replay; None without `--replay-commands`.
 
-    Raises `RecordingError` where the log holds none, `ScenarioError` for options that would make it
-    another one.
+    Raises `RecordingError` if the log holds no flight, `ScenarioError` for options that would
+    change the flight.
     """
     if options.replay_commands is None:
         return None
     given = {"--uavs": options.uavs, "--seconds": options.seconds, "--seed": options.seed}
     for flag, value in given.items():
         if value is not None:
-            raise ScenarioError(f"{flag}: a repeated flight has that of its log")
+            raise ScenarioError(f"{flag}: a command replay uses that of its log")
     from volery.bridges.logs.recorded_flight import read_flight
 
     return read_flight(options.replay_commands)
 
 
 def recorded_scenario(flight: RecordedFlight, options: RunOptions) -> Scenario:
-    """The scenario of the flight; says where it may not come out the same.
+    """Returns the scenario of the recorded flight; warns if another version of Volery recorded it.
 
-    Its files and nodes are those of the file that the command line names. By a mere name it reads
-    only beside the log and starts shipped nodes only.
+    If the command line names a scenario file, its data files and nodes are used. Otherwise only
+    files in the log's folder are read and only shipped nodes start.
 
-    Raises `ScenarioError` where the log is of another one than was named.
+    Raises `ScenarioError` if the log belongs to another scenario than the named one.
     """
     from volery import __version__, load_scenario
     from volery.runtime.replay.scenario_record import scenario_of

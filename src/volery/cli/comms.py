@@ -1,4 +1,4 @@
-"""`volery comms`: the communication server, until Ctrl-C."""
+"""`volery comms`: runs the communication server until Ctrl-C."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _TOLD_S = 10.0
 
 
 def serve_stations(host: str, port: int, settings: RouterSettings, *, anywhere: bool) -> None:
-    """Serve stations and say every ten seconds, if something changed, how it goes.
+    """Serves stations; prints a summary every ten seconds if something changed.
 
-    SIGINT, SIGTERM and SIGHUP end it, also where a shell that put it into the background ignores
-    SIGINT; the second of its kind at once.
+    SIGINT, SIGTERM and SIGHUP end the server, even if a shell started it in the background with
+    SIGINT ignored. A second signal of the same kind ends it at once.
     """
     asyncio.run(_serve(CommsServer(settings, host, port, anywhere=anywhere)))
 
@@ -52,7 +52,7 @@ async def _serve(server: CommsServer) -> None:
 
 
 def summary(counted: Statistics) -> str:
-    """The counts that matter, in one line."""
+    """Returns the main counts in one line."""
     refused = sum(counted.refused.values())
     lost = counted.dropped_sensing + counted.flooded + counted.expired + counted.lost_on_link
     return (

@@ -1,4 +1,4 @@
-"""Where `volery node`, `volery topic` and `volery service` find their graph."""
+"""Connects `volery node`, `volery topic` and `volery service` to a graph."""
 
 from __future__ import annotations
 
@@ -22,12 +22,13 @@ WAYS = "rosbridge://HOST:PORT, ros-tcp://HOST:PORT, ros1, ros2, ros2-zenoh or rc
 ROS2_WAYS = ("ros2", "ros2-zenoh", "rclpy")
 _ROS_TCP_PORT = 10000
 PATIENCE_S = 30.0
-"""So long nodes in processes of their own wait for their graph; a world takes a while to build."""
+"""Wall time for which a node in its own process waits for its graph; a world may take long to
+build."""
 _AGAIN_S = 0.2
 
 
 def open_link(via: str, name: str) -> GraphConnection:
-    """Join the graph at `via` under a name. `BridgeError` where nobody answers there."""
+    """Joins the graph at `via` under a node name. Raises `BridgeError` if no server answers."""
     scheme, _, rest = via.partition("://")
     if scheme in ("rosbridge", "ws", "wss"):
         from volery.bridges.rosbridge.client import RosbridgeClient
@@ -53,7 +54,7 @@ def open_link(via: str, name: str) -> GraphConnection:
 
 
 def await_link(via: str, name: str, patience_s: float = PATIENCE_S) -> GraphConnection:
-    """As `open_link`, for programs that may be started before the graph: waits, and says so."""
+    """Joins like `open_link`, but waits up to `patience_s` for a graph that starts later."""
     until = time.monotonic() + patience_s
     told = False
     while True:
@@ -64,12 +65,12 @@ def await_link(via: str, name: str, patience_s: float = PATIENCE_S) -> GraphConn
                 raise
             if not told:
                 told = True
-                typer.echo(f"{error}; waits {patience_s:.0f} s for it", err=True)
+                typer.echo(f"{error}; waiting up to {patience_s:.0f} s", err=True)
             time.sleep(_AGAIN_S)
 
 
 def join_late(late: DeferredConnection, host: NodeHost) -> GraphConnection:
-    """Join the graph of nodes that are there already; their timers count from then on."""
+    """Joins the graph of nodes that run already; their timers start after the connection."""
     before_ns = host.now_ns()
     link = late.join()
     host.postpone(host.now_ns() - before_ns)
@@ -77,9 +78,9 @@ def join_late(late: DeferredConnection, host: NodeHost) -> GraphConnection:
 
 
 class ConnectionOptions:
-    """Says when a link's connection breaks, and when it is back; ask it again and again.
+    """Prints when the connection breaks and when it is back, at each call.
 
-    For `NodeHost.spin` it is an end that never comes.
+    Serves as the end condition of `NodeHost.spin`; the condition never holds.
     """
 
     def __init__(self, link: GraphConnection, via: str) -> None:
@@ -88,17 +89,21 @@ class ConnectionOptions:
         self._was = True
 
     def __call__(self) -> bool:
-        """Say what has changed."""
+        """Prints a change of the connection's state."""
         connected = getattr(self._link, "connected", True)
         if connected != self._was:
             self._was = connected
-            what = "is there again" if connected else "is gone; waiting for it"
+            what = "is connected again" if connected else "is disconnected; waiting for it"
             typer.echo(f"the graph at {self._via} {what}", err=True)
         return False
 
 
 def _ros2_terms(via: str) -> Ros2Environment:
-    """Of `ros2://DOMAIN?interface=NAME`, `ros2-zenoh://HOST:PORT?domain=DOMAIN`, `rclpy://DOMAIN`."""
+    """Parses the environment of a ROS 2 connection.
+
+    Known forms: `ros2://DOMAIN?interface=NAME`, `ros2-zenoh://HOST:PORT?domain=DOMAIN`,
+    `rclpy://DOMAIN`.
+    """
     from volery.bridges.ros2.environment import Ros2Environment
 
     parts = urlsplit(via)
@@ -109,8 +114,8 @@ def _ros2_terms(via: str) -> Ros2Environment:
     interfaces = tuple(asked.pop("interface", ())) if kind == "ros2" else ()
     if asked:
         known = {"ros2": "interface", "ros2-zenoh": "domain"}.get(kind)
-        hint = f"{kind} knows {known}" if known else f"{kind} has no options"
-        raise BridgeError(f"'{via}': there is no option '{next(iter(asked))}'; {hint}")
+        hint = f"{kind} supports {known}" if known else f"{kind} has no options"
+        raise BridgeError(f"'{via}': unknown option '{next(iter(asked))}'; {hint}")
     if parts.path.strip("/") not in ("", kind) or parts.fragment:
         raise _no_way(via)
     if domain and not domain.isdecimal():
@@ -122,7 +127,7 @@ def _ros2_terms(via: str) -> Ros2Environment:
 
 
 def _address(via: str, port: int) -> tuple[str, int]:
-    """Host and port of a way into a graph. `BridgeError` for what is none."""
+    """Returns host and port of a graph's address. Raises `BridgeError` if `via` is invalid."""
     try:
         parts = urlsplit(via)
         host, given = parts.hostname, parts.port
@@ -134,11 +139,11 @@ def _address(via: str, port: int) -> tuple[str, int]:
 
 
 def _no_way(via: str) -> BridgeError:
-    return BridgeError(f"'{via}' is no way into a graph; use {WAYS}")
+    return BridgeError(f"'{via}' is not a graph connection; use {WAYS}")
 
 
 def _own_name(name: str) -> str:
-    """A node name of its own: a ROS 1 master ends the older of two nodes of one name."""
+    """Returns a unique node name: a ROS 1 master ends the older of two nodes with one name."""
     import os
 
     return f"{name}_{os.getpid()}"

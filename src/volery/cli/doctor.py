@@ -1,4 +1,4 @@
-"""`volery doctor`: is this machine fit to fly? Each line is ok or says how to mend it."""
+"""`volery doctor`: checks whether this machine can run flights; each problem comes with its fix."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _CORES = 2
 
 
 class UnfitError(Exception):
-    """A check failed; the text says how to mend it."""
+    """Reports a failed check; its text says how to fix the problem."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """One line: `examine` returns what it found, or raises UnfitError with the remedy."""
+    """Describes one check: `examine` returns what it found, or raises `UnfitError` with the fix."""
 
     name: str
     examine: Callable[[], str]
@@ -33,7 +33,7 @@ class Check:
 
 
 def examine() -> bool:
-    """Run all checks, print a line each; whether everything essential is fit."""
+    """Runs all checks, prints one line each; returns whether all essential checks passed."""
     fit = True
     for check in CHECKS:
         try:
@@ -83,11 +83,11 @@ def _kernels() -> str:
     folder = compiled.cache_dir()
     if tempfile.gettempdir() in str(folder) and "volery-kernels" in str(folder):
         raise UnfitError(
-            f"compiled kernels go to {folder} and are lost with it: make ~/.cache writable or "
-            "set VOLERY_CACHE_DIR to a folder that is"
+            f"compiled kernels are in the temporary folder {folder}: make ~/.cache writable or "
+            "set VOLERY_CACHE_DIR to a writable folder"
         )
     count = sum(1 for _ in folder.rglob("*.nbc"))
-    state = counted(count, "compiled kernel") if count else "empty, the first flight compiles"
+    state = counted(count, "compiled kernel") if count else "empty, the first run compiles"
     return f"{folder} ({state})"
 
 
@@ -150,7 +150,7 @@ def _cores() -> str:
 
     cores = usable_cores()
     if cores < _CORES:
-        raise UnfitError(f"{cores} usable; flights run, but fleets want {_CORES} or more")
+        raise UnfitError(f"{cores} usable; flights run, but large fleets need {_CORES} or more")
     return f"{cores} usable"
 
 
@@ -159,14 +159,14 @@ def _memory() -> str:
 
     gib = memory_bytes() / 2**30
     if gib < _MEMORY_GIB:
-        raise UnfitError(f"{gib:.1f} GiB; forests want {_MEMORY_GIB:g} GiB: fly a smaller one")
+        raise UnfitError(f"{gib:.1f} GiB; forests need {_MEMORY_GIB:g} GiB: use a smaller one")
     return f"{gib:.1f} GiB"
 
 
 def _disk() -> str:
     gib = shutil.disk_usage(Path.cwd()).free / 2**30
     if gib < _DISK_GIB:
-        raise UnfitError(f"{gib:.2f} GiB free here; logs want {_DISK_GIB:g} GiB: make room")
+        raise UnfitError(f"{gib:.2f} GiB free here; logs need {_DISK_GIB:g} GiB: free some space")
     return f"{gib:.1f} GiB free here"
 
 

@@ -1,4 +1,4 @@
-"""What a command does with an error: one line on stderr and an exit code, never a traceback."""
+"""Reports a command's error as one line on stderr with an exit code; no traceback by default."""
 
 from __future__ import annotations
 
@@ -25,26 +25,26 @@ _shows_traceback: ContextVar[bool] = ContextVar("volery_shows_traceback", defaul
 
 
 class _Words(logging.Formatter):
-    """A level as `complain` and `warn` have it."""
+    """Formats a log record's level like `complain` and `warn`."""
 
     def format(self, record: logging.LogRecord) -> str:
-        """`warning: ...`, with the traceback where there is one."""
+        """Returns `warning: ...`, with the traceback if the record has one."""
         return f"{record.levelname.lower()}: {super().format(record)}"
 
 
 def word_logs() -> None:
-    """Have what the package logs look like what its commands say."""
+    """Formats records of the package's loggers like messages of its commands."""
     if logging.lastResort is not None:
         logging.lastResort.setFormatter(_Words())
 
 
 def complain(text: str) -> None:
-    """Say `error: ...` on stderr."""
+    """Prints `error: ...` on stderr."""
     typer.echo(f"error: {text}", err=True)
 
 
 def complain_of(error: BaseException, text: str = "") -> None:
-    """Say what went wrong, and where in the user's code; with `--traceback` all frames."""
+    """Prints an error and its location in the user's code; with `--traceback` all frames."""
     complain(text or str(error))
     if _shows_traceback.get():
         typer.echo("".join(traceback.format_exception(error)).rstrip(), err=True)
@@ -54,19 +54,19 @@ def complain_of(error: BaseException, text: str = "") -> None:
 
 
 def warn(text: str) -> None:
-    """Say `warning: ...` on stderr, of what does not end a command."""
+    """Prints `warning: ...` on stderr for a problem that does not end the command."""
     typer.echo(f"warning: {text}", err=True)
 
 
 def _was_interrupted(error: BaseException | None) -> bool:
-    """Whether Ctrl-C is behind an error: libraries that are being imported make others of it."""
+    """Returns whether Ctrl-C caused an error: libraries turn it into other errors while loading."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
     return error is not None
 
 
 def _check_numbers(options: Mapping[str, object]) -> None:
-    """`VoleryError` for an option whose number is not finite, or of no size that means anything."""
+    """Raises `VoleryError` for an option whose number is not finite or out of range."""
     for name, value in options.items():
         if isinstance(value, float) and value and not _SMALLEST <= abs(value) <= _LARGEST:
             flag = name.replace("_", "-")
@@ -76,7 +76,7 @@ def _check_numbers(options: Mapping[str, object]) -> None:
 
 
 def guarded(command: Callable[P, None]) -> Callable[P, None]:
-    """Turn a user's mistakes, Ctrl-C, SIGTERM and SIGHUP into a line and an exit code."""
+    """Turns a user's errors, Ctrl-C, SIGTERM and SIGHUP into a line on stderr and an exit code."""
 
     @functools.wraps(command)
     def run(*arguments: P.args, **options: P.kwargs) -> None:

@@ -1,4 +1,4 @@
-"""One flight of the command line: run it, then write what was asked for, also when stopped."""
+"""Runs a flight of the command line; then writes log, report and digest, even if it was stopped."""
 
 from __future__ import annotations
 
@@ -31,23 +31,23 @@ _CONTACTS_SHOWN = 10
 
 @dataclass(frozen=True)
 class RunOptions:
-    """What the command line asked for."""
+    """Holds the command line's options of a run."""
 
     scenario: str
     uavs: int | None = None
     seconds: float | None = None
     seed: int | None = None
     nodes: bool = True
-    """Whether the scenario's nodes run inside; else they run elsewhere, or not at all."""
+    """Whether the scenario's nodes run in this process; else elsewhere, or not at all."""
     trust: bool = False
-    """Whether nodes that lie beside the scenario's file run."""
+    """Whether nodes from the scenario's folder may run."""
     speed: float | None = None
     threads: int | None = None
     record: Path | None = None
     topics: tuple[str, ...] = ()
-    """Patterns of what is recorded; none: all topics, and no picture twice."""
+    """Patterns of recorded topics; empty: all topics, each image once."""
     exclude: tuple[str, ...] = ()
-    """Patterns of what is not."""
+    """Patterns of topics that are not recorded."""
     report: Path | None = None
     digest: bool = False
     overwrite: bool = False
@@ -56,37 +56,38 @@ class RunOptions:
     allow_remote: bool = False
     token: str | None = None
     domain_id: int | None = None
-    """Of ROS 2; None: that of ROS_DOMAIN_ID."""
+    """ROS 2 domain; None: ROS_DOMAIN_ID."""
     interfaces: tuple[str, ...] = ()
-    """Of the network, for ROS 2; none: this machine alone."""
+    """Network interfaces of ROS 2 over DDS; empty: loopback."""
     changes: Changes | None = None
-    """To the scenario, by the client that loaded it."""
+    """Changes to the scenario by the client that loaded it."""
     page: str | None = None
-    """`HOST:PORT`, `PORT` or, for the usual place, nothing; None: no page."""
+    """Page address, `HOST:PORT` or `PORT`; empty: the default address; None: no page."""
     exit_at_end: bool = False
     """Whether a run with a page ends with its scenario."""
     replay_commands: Path | None = None
     px4_dir: Path | None = None
-    """Of PX4's sources: instances are run beside the flight; None: by somebody else, or none."""
+    """Folder of PX4's sources, whose instances run with the flight; None: PX4 runs elsewhere or not
+    at all."""
     autopilot_timeout_s: float = 10.0
-    """Wall time that an autopilot in lock step may be silent ..."""
+    """Wall time after which a silent autopilot in lock step times out."""
     drop_on_timeout: bool = False
-    """... and whether it is then waited for no more; else the run ends."""
+    """Whether the run continues after an autopilot's timeout; else the run ends."""
     start_paused: bool = False
     wait_for: tuple[str, ...] = ()
-    """Names of nodes and clients outside that must be there before the first step ..."""
+    """Names of external nodes and clients that must connect before the first step."""
     wait_timeout_s: float = DEFAULT_TIMEOUT_S
-    """... within so much wall time."""
+    """Wall time within which they must connect."""
     mavlink_key: Path | None = None
-    """File with the text that signs MAVLink."""
+    """File with the text from which the key that signs MAVLink is made."""
 
 
 class _StoppedError(Exception):
-    """A signal has come; raised between two steps."""
+    """Signals between two steps that the process received a stop signal."""
 
 
 class CommandLineFlight:
-    """One flight with its log, report and digest."""
+    """Runs one flight with its log, report and digest."""
 
     def __init__(
         self,
@@ -120,7 +121,10 @@ class CommandLineFlight:
             self._recorded = simulation.graph.subscribe_all(self._log.write, matches)
 
     def fly(self) -> int:
-        """Run to the end, to a signal or to an error; then write what is left to write."""
+        """Runs to the end, a signal or an error; returns the exit code.
+
+        Then writes the remaining files.
+        """
         code = 0
         problem = ""
         start = time.perf_counter()
@@ -150,7 +154,7 @@ class CommandLineFlight:
         return code
 
     def _await_clients(self) -> None:
-        """Do what is to be done before the first step."""
+        """Waits for clients and applies `--start-paused` before the first step."""
         options, simulation = self._options, self._simulation
         names, timeout_s = options.wait_for, options.wait_timeout_s
         if not wait_for_clients(simulation, names, timeout_s, lambda: self._interrupts.pressed):
@@ -161,7 +165,7 @@ class CommandLineFlight:
             )
 
     def _stay(self) -> None:
-        """Keep the page open until Ctrl-C; what is flown past the end leaves no files."""
+        """Keeps the page open until Ctrl-C; steps after the scenario's end are not recorded."""
         simulation = self._simulation
         if simulation.quitting:
             return
@@ -248,7 +252,7 @@ class CommandLineFlight:
             )
 
     def _reason(self, problem: str) -> str:
-        """Why a flight that nobody stopped is over before its time."""
+        """Returns why a flight ended early without a signal or an error."""
         scenario = self._simulation.scenario
         early = self._simulation.time_s < scenario.duration_s
         return "; all are down" if early and not problem and self._all_down() else ""

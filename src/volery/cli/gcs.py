@@ -1,4 +1,4 @@
-"""`volery gcs`: a ground station at the terminal, or fed with lines by another program."""
+"""`volery gcs`: runs a ground station at the terminal, or with lines from another program."""
 
 from __future__ import annotations
 
@@ -23,25 +23,25 @@ from volery.comms.station.tcp import Station
 from volery.core.errors import CommsError
 
 _LEAVE_S = 2.0
-"""For how long commands may still be on their way when the last line has been read."""
+"""Wall time for commands in transit after the last input line."""
 _FIRST_S, _OTHERS_S = 2.0, 0.3
-"""For how long a script waits for the first state of a UAV, then for those of others."""
+"""Wall times for which a script waits for the first state of a UAV, then for those of others."""
 
 
 def parse_server(text: str) -> tuple[str, int]:
-    """Host and port of HOST[:PORT]. `CommsError` for anything else."""
+    """Parses HOST[:PORT]. Raises `CommsError` for other texts."""
     host, colon, port = text.rpartition(":")
     if not colon or host.endswith(":"):
         return text, PORT  # a name, or an IPv6 address
     if not host or not port.isdigit() or not 0 < int(port) < 65536:
-        raise CommsError(f"'{text}' is no server: write HOST:PORT")
+        raise CommsError(f"'{text}' is not a server address; use HOST:PORT")
     return host.strip("[]"), int(port)
 
 
 def command_station(
     server: str, number: int, token: str | None, planes_per_batch: int, log: Path | None
 ) -> None:
-    """Join a server, show what comes, and send what is asked for, line by line."""
+    """Joins a server, prints received messages and sends the commands of the input lines."""
     host, port = parse_server(server)
     with contextlib.ExitStack() as stack:
         file = None if log is None else stack.enter_context(log.open("a", encoding="utf-8"))
@@ -62,7 +62,10 @@ def command_station(
 
 
 class _Desk:
-    """Where lines come from and go to. log: a file for them, with the time."""
+    """Reads input lines and prints messages.
+
+    log: file to which all lines are appended, with UTC times.
+    """
 
     ground: GroundStation
 
@@ -74,7 +77,10 @@ class _Desk:
         self._lines: asyncio.Queue[str | None] = asyncio.Queue()
 
     async def work(self, station: Station) -> None:
-        """Until the last line, or `quit`; `CommsError` where the server sends this station away."""
+        """Works until the last line or `quit`.
+
+        Raises `CommsError` if the server rejects this station.
+        """
         await station.start()
         self._say(f"joined as ground station, address {station.core.address}; help shows commands")
         self._has_joined = True
@@ -91,11 +97,11 @@ class _Desk:
                 with contextlib.suppress(TimeoutError, asyncio.TimeoutError):
                     await asyncio.wait_for(station.until_settled(), _LEAVE_S)
             if still_open := self.ground.open_commands(station.core.is_settled):
-                self._say(f"warning: nobody has said that it came: {', '.join(still_open)}")
+                self._say(f"warning: no acknowledgement of: {', '.join(still_open)}")
         finally:
             await station.stop()
         if station.core.fatal is not None:
-            raise CommsError(f"the server sends this station away: {station.core.fatal.text}")
+            raise CommsError(f"the server rejects this station: {station.core.fatal.text}")
 
     async def _wait_for_states(self) -> None:
         ends = time.monotonic() + _FIRST_S
@@ -113,7 +119,7 @@ class _Desk:
         elif word == "list":
             print_table(HEAD, self.ground.rows(self._now_ns()), right=(4, 5, 6))
             if not self.ground.has_heard:
-                typer.echo("no UAV has been heard so far")
+                typer.echo("no message of a UAV received so far")
             sys.stdout.flush()
         else:
             try:
@@ -122,12 +128,12 @@ class _Desk:
                 self._say(f"error: {error}")
 
     def on_message(self, frame: StationFrame) -> None:
-        """What a station tells."""
+        """Prints a received message."""
         if line := self.ground.take(frame, self._now_ns()):
             self._say(line)
 
     def on_refusal(self, refusal: Refusal) -> None:
-        """What the server refuses; that it does not let this station in ends the command."""
+        """Prints a refusal of the server; ends the command if the server rejects this station."""
         if refusal.sequence or refusal.reason not in FATAL:
             self._say(self.ground.refused(refusal))
         else:
@@ -135,14 +141,14 @@ class _Desk:
             self._lines.put_nowait(None)
 
     def on_joined(self, joined: bool) -> None:
-        """The server is there again, or gone."""
+        """Prints that the server connected or disconnected."""
         if joined and self._has_joined:
             self._say("the server is back")
         elif not joined and not self._is_sent_away:
             self._say("the connection to the server is lost; trying again")
 
     def _now_ns(self) -> int:
-        """A clock that never goes back, set by the time of day at the start."""
+        """Returns a clock that never goes back, set by the time of day at the start."""
         return self._clock_ns + time.monotonic_ns()
 
     def _say(self, line: str) -> None:
@@ -155,7 +161,7 @@ class _Desk:
 
 
 def _read_into(queue: asyncio.Queue[str | None], loop: asyncio.AbstractEventLoop) -> None:
-    """Lines of standard input as they come, then None; read in a thread, which may block."""
+    """Queues lines of standard input, then None; reads them in a thread, because reads block."""
 
     def read() -> None:
         with contextlib.suppress(RuntimeError):  # the loop has ended

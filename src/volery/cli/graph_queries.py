@@ -1,4 +1,4 @@
-"""Questions to a graph that command-line tools wait for."""
+"""Queries a graph on behalf of command-line tools; each call waits for the response."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ TIMEOUT_S = 10.0
 
 
 def ask_rosapi(link: GraphConnection, question: str, **fields: Any) -> Any:
-    """Ask a `/rosapi` service, `question` being its type: `TopicType`."""
+    """Calls a `/rosapi` service; `question` is its type, such as `TopicType`."""
     request = message_type(f"rosapi_msgs/srv/{question}_Request")(**fields)
     return call_and_wait(link, "/rosapi/" + _snake(question), request, TIMEOUT_S)
 
 
 def topic_types(link: GraphConnection) -> dict[str, str]:
-    """Topics of the graph and their types, by name."""
+    """Returns the topics of the graph and their types, by name."""
     if isinstance(link, TellsTopics):
         return dict(sorted(link.topic_types().items()))
     answer = ask_rosapi(link, "Topics")
@@ -26,7 +26,7 @@ def topic_types(link: GraphConnection) -> dict[str, str]:
 
 
 def type_of_topic(link: GraphConnection, topic: str) -> str:
-    """Type of a topic. `BridgeError` where there is no such topic."""
+    """Returns the type of a topic. Raises `BridgeError` if there is no such topic."""
     if isinstance(link, TellsTopics):
         found = link.topic_types().get(topic, "")
     else:
@@ -37,20 +37,20 @@ def type_of_topic(link: GraphConnection, topic: str) -> str:
 
 
 def service_names(link: GraphConnection) -> list[str]:
-    """Services of the graph, sorted."""
+    """Returns the services of the graph, sorted."""
     if isinstance(link, TellsServices):
         return sorted(link.service_types())
     return sorted(ask_rosapi(link, "Services").services)
 
 
 def type_of_service(link: GraphConnection, service: str) -> str:
-    """Type of a service. `BridgeError` where nobody offers it."""
+    """Returns the type of a service. Raises `BridgeError` if the service has no server."""
     if isinstance(link, TellsServices):
         found = link.service_types().get(service, "")
     else:
         found = ask_rosapi(link, "ServiceType", service=service).type
     if not found:
-        raise BridgeError(f"nobody offers service '{service}'; see `volery service list`")
+        raise BridgeError(f"service '{service}' has no server; see `volery service list`")
     return found
 
 

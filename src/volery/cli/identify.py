@@ -1,4 +1,4 @@
-"""`volery identify`: from an airframe to the data file of its identified plant."""
+"""`volery identify`: writes the data file of an airframe's identified plant."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from volery.core.errors import VoleryError
 
 
 def identify_and_write(airframe: str, out: Path, order: int) -> None:
-    """Fly, fit, write and show how good the fit is."""
+    """Flies, fits, writes the file and prints the fit's errors."""
     from volery.control.identification import identify, to_toml
     from volery.vehicle.airframe import load_airframe
 
     if not out.parent.is_dir():
-        raise VoleryError(f"{out}: there is no folder {out.parent}")
+        raise VoleryError(f"{out}: folder {out.parent} does not exist")
     model = identify(load_airframe(airframe), 1 if order == 1 else 2)
     out.write_text(to_toml(model), encoding="utf-8")
     errors = model.fit_error.model_dump() if model.fit_error else {}

@@ -1,4 +1,4 @@
-"""`volery interfaces`: message types as packages for ROS's own tools."""
+"""`volery interfaces`: writes message types as packages for ROS tools."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from volery.graph.codecs.interface_packages import (
 
 
 def write_and_tell(folder: Path, names: list[str], *, overwrite: bool, ros1: bool) -> None:
-    """Write packages into a folder of a workspace, and say what they need."""
+    """Writes packages into a folder of a workspace and prints what they need."""
     if not folder.is_dir():
-        raise VoleryError(f"{folder}: there is no such folder; `mkdir -p {folder}` makes it")
+        raise VoleryError(f"{folder}: no such folder; create it with `mkdir -p {folder}`")
     wanted = list(dict.fromkeys(names)) or [OWN]
     for name in wanted:
         typer.echo(write_package(name, folder, overwrite=overwrite, ros1=ros1))

@@ -1,8 +1,8 @@
-"""Ctrl-C, SIGTERM and SIGHUP: at once before a flight, between two steps in flight.
+"""Handles Ctrl-C, SIGTERM and SIGHUP: at once before a flight, between two steps during a flight.
 
-All three end a command in the same way: a terminal's Ctrl-C, the stop of a container or a service,
-a terminal that is closed. The second one ends it without further files; after that SIGTERM and
-SIGHUP do what they do to any process.
+All three signals end a command in the same way: a terminal's Ctrl-C, the stop of a container or
+service, a terminal that closes. The second signal ends the command without further files. After
+that, SIGTERM and SIGHUP have the system's default effect.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ _CAUSES = {
     signal.SIGHUP: "by SIGHUP: its terminal has closed",
 }
 _FATAL = 128
-"""What shells add to the number of the signal that ended a process."""
+"""Offset that shells add to the number of the signal that ended a process."""
 
 
 class StopSignals:
-    """Context in which the three signals call `on_signal`; SIGHUP only where it is not ignored.
+    """Context in which the three signals call `on_signal`; SIGHUP only if it is not ignored.
 
-    Does nothing outside of the main thread, which alone can take signals.
+    Does nothing outside the main thread, because only the main thread can handle signals.
     """
 
     first: ClassVar[signal.Signals | None] = None
-    """The signal that came first to the present command."""
+    """First signal that the current command received."""
 
     def __init__(
         self,
@@ -48,7 +48,7 @@ class StopSignals:
         self._before: dict[signal.Signals, Any] = {}
 
     def __enter__(self) -> StopSignals:
-        """Take the signals over."""
+        """Installs the handlers."""
         if threading.current_thread() is threading.main_thread():
             for number in self._signals:
                 if number is signal.SIGHUP and signal.getsignal(number) is signal.SIG_IGN:
@@ -57,13 +57,13 @@ class StopSignals:
         return self
 
     def __exit__(self, *_exception: object) -> None:
-        """Give the signals back."""
+        """Restores the previous handlers."""
         for number, handler in self._before.items():
             if signal.getsignal(number) == self._take:
                 signal.signal(number, handler)
 
     def leave_to_the_system(self) -> None:
-        """Have the next SIGTERM or SIGHUP end the process whatever it does."""
+        """Restores the default action of SIGTERM and SIGHUP: the next one ends the process."""
         for number in self._before:
             if number is not signal.SIGINT:
                 signal.signal(number, signal.SIG_DFL)
@@ -76,22 +76,22 @@ class StopSignals:
 
 
 def stopped_how() -> str:
-    """Returns how the process was stopped, for people: `with Ctrl-C`."""
+    """Returns how the process was stopped, as text for messages: `with Ctrl-C`."""
     return _CAUSES[StopSignals.first or signal.SIGINT]
 
 
 def stopped_code() -> int:
-    """Returns the exit code after a signal: 130, 143 or 129, as shells have it."""
+    """Returns the exit code after a signal: 130, 143 or 129, as in shells."""
     return _FATAL + (StopSignals.first or signal.SIGINT)
 
 
 def stop_at_once(_number: int, _frame: FrameType | None) -> None:
-    """End a command that has nothing to write: raises `KeyboardInterrupt`."""
+    """Raises `KeyboardInterrupt`, to end a command that has nothing to write."""
     raise KeyboardInterrupt
 
 
 class Interrupts:
-    """Context in which the signals are handled; `pressed` says whether one has come."""
+    """Context that handles the signals; `pressed` is true after the first one."""
 
     def __init__(self) -> None:
         self.pressed = False
@@ -102,16 +102,16 @@ class Interrupts:
         self._hook: Any = None
 
     def __enter__(self) -> Interrupts:
-        """Take the signals over; they raise KeyboardInterrupt until `be_gentle`."""
+        """Installs handlers that raise KeyboardInterrupt until `be_gentle`."""
         self._signals.__enter__()
         self._hook, sys.unraisablehook = sys.unraisablehook, self._on_unraisable
         return self
 
     def __exit__(self, *_exception: object) -> None:
-        """Give the signals back.
+        """Restores the previous handlers.
 
-        After a KeyboardInterrupt the hook stays: the process ends, and what the interrupt left half
-        made may live for as long.
+        After a KeyboardInterrupt the hook stays: the process ends, and half-made objects may live
+        as long.
         """
         self._forget_retry()
         self._signals.__exit__()
@@ -119,10 +119,10 @@ class Interrupts:
             sys.unraisablehook = self._hook
 
     def be_gentle(self) -> None:
-        """Let the first signal from here on only set `pressed`; KeyboardInterrupt if one was lost.
+        """Makes the next signal only set `pressed`.
 
-        One is lost where it comes in a callback of the garbage collector, which can pass no
-        exception on.
+        Raises KeyboardInterrupt if an earlier signal was lost. A signal is lost if it arrives in a
+        callback of the garbage collector, which cannot raise.
         """
         self._forget_retry()
         if self.pressed:
@@ -151,13 +151,13 @@ class Interrupts:
             self._retry = None
 
     def _on_unraisable(self, unraisable: Any) -> None:
-        """Say nothing of lost interrupts, and of objects that one left half made."""
+        """Ignores lost interrupts and errors of objects that an interrupt left half made."""
         if not (self._raised or issubclass(unraisable.exc_type, KeyboardInterrupt)):
             self._hook(unraisable)
 
 
 def _is_compiling(frame: FrameType | None) -> bool:
-    """Whether the compiler's own code runs: its callbacks lose exceptions, and it fails on them."""
+    """Returns whether the compiler runs: its callbacks lose exceptions or fail on them."""
     while frame is not None:
         if frame.f_globals.get("__name__", "").startswith(_COMPILER):
             return True
@@ -166,7 +166,7 @@ def _is_compiling(frame: FrameType | None) -> bool:
 
 
 def _write_nowhere() -> None:
-    """A terminal that has closed takes no words; what would be said must not end what is left."""
+    """Redirects output to the null device: writing to a closed terminal would fail."""
     nowhere = os.open(os.devnull, os.O_RDWR)
     for descriptor in (1, 2):
         if _is_device(descriptor):
@@ -175,7 +175,7 @@ def _write_nowhere() -> None:
 
 
 def _is_device(descriptor: int) -> bool:
-    """Whether words go to a terminal; one that has closed no longer calls itself one."""
+    """Returns whether output goes to a device; a closed terminal does not report itself as one."""
     try:
         return stat.S_ISCHR(os.fstat(descriptor).st_mode)
     except OSError:

@@ -1,4 +1,4 @@
-"""What keys do to a flight: pause, single steps, speed."""
+"""Maps keys to commands for a flight: pause, single steps, speed."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ SLOWEST, FASTEST = 2.0**-10, 2.0**16
 
 
 def steer(simulation: Any, key: str, real_time_factor: float) -> None:
-    """Do what `key` means; other keys mean nothing.
+    """Executes the command of `key`; ignores other keys.
 
-    real_time_factor: what the run has reached; the first - starts from it at full speed.
+    real_time_factor: the measured factor of the run, from which the first - starts at full speed.
     """
     if key == " ":
         (simulation.resume if simulation.paused else simulation.pause)()
@@ -28,6 +28,6 @@ def steer(simulation: Any, key: str, real_time_factor: float) -> None:
 
 
 def _power_of_two(factor: float) -> float:
-    """The nearest one."""
+    """Returns the nearest power of two within the limits."""
     factor = min(max(factor, SLOWEST), FASTEST)
     return 2.0 ** round(math.log2(factor))

@@ -1,4 +1,4 @@
-"""Keys pressed at a terminal, read without waiting for Enter."""
+"""Reads keys pressed at a terminal without waiting for Enter."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from typing import Any
 
 _ESCAPE = "\x1b"
 _LOCAL_FLAGS, _CONTROL = 3, 6
-"""Places in the list that termios calls the attributes of a terminal."""
+"""Indices in the list of terminal attributes of termios."""
 
 
 class Keys:
-    """Context in which single keys can be read; none come where stdin is no terminal.
+    """Context in which single keys can be read; there are none if stdin is no terminal.
 
-    Ctrl-C and Ctrl-Z keep their meaning. In the background the terminal is left alone: who changes
-    it from there is stopped.
+    Ctrl-C and Ctrl-Z work as usual. In the background the terminal is left unchanged, because the
+    system stops background processes that change it.
     """
 
     def __init__(self) -> None:
@@ -26,7 +26,7 @@ class Keys:
         self._before: list[Any] = []
 
     def __enter__(self) -> Keys:
-        """Remember how the terminal is set."""
+        """Saves the terminal's settings."""
         stdin = sys.stdin
         if stdin is not None and not stdin.closed and stdin.isatty():
             self._terminal = stdin.fileno()
@@ -34,13 +34,16 @@ class Keys:
         return self
 
     def __exit__(self, *_exception: object) -> None:
-        """Set the terminal as it was."""
+        """Restores the terminal's settings."""
         if self._terminal >= 0 and self._in_foreground():
-            with contextlib.suppress(termios.error):  # it was hung up
+            with contextlib.suppress(termios.error):  # hung up
                 termios.tcsetattr(self._terminal, termios.TCSADRAIN, self._before)
 
     def pressed(self) -> str:
-        """The keys since the last call, one character each; cursor keys and the like left out."""
+        """Returns the keys since the last call, one character each.
+
+        Leaves out cursor keys and other escape sequences.
+        """
         if self._terminal < 0 or not self._in_foreground():
             return ""
         try:
@@ -51,11 +54,11 @@ class Keys:
         except (OSError, termios.error):
             data = b""
         if not data:
-            self._terminal = -1  # it was hung up
+            self._terminal = -1  # hung up
         return data.decode(errors="ignore").partition(_ESCAPE)[0]
 
     def _read_single_keys(self) -> None:
-        """Take lines and echo off; again where a shell that had the terminal put them back."""
+        """Turns line buffering and echo off, again if a shell has turned them on meanwhile."""
         mode: list[Any] = termios.tcgetattr(self._terminal)
         taken_off = termios.ICANON | termios.ECHO
         if mode[_LOCAL_FLAGS] & taken_off:

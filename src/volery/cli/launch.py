@@ -1,4 +1,4 @@
-"""`volery launch`: the nodes of a profile together in a process of their own."""
+"""`volery launch`: runs the nodes of a profile together in one process."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ def launch_profile(
     lock_step_s: float | None,
     trust: bool = False,
 ) -> None:
-    """Run the nodes of a profile until Ctrl-C, or until one fails; None leaves it to the profile.
+    """Runs the nodes of a profile until Ctrl-C or until one fails; None: as in the profile.
 
-    trust: whether modules beside it may run without a question. `BridgeError` where it names no
-    nodes, `ScenarioError` for nodes that may not run.
+    trust: whether modules in the profile's folder may run without a question. Raises `BridgeError`
+    if the profile names no nodes, `ScenarioError` for nodes that may not run.
     """
     from volery.bridges.nodes.deferred_connection import DeferredConnection
     from volery.bridges.nodes.host import NodeHost
@@ -40,7 +40,7 @@ def launch_profile(
 
     profile = load_profile(path)
     if not profile.launch:
-        raise BridgeError(f"{path}: there is no [[launch]] in it; `volery node` starts one node")
+        raise BridgeError(f"{path}: has no [[launch]]; `volery node` starts one node")
     nodes = [entry.node for entry in profile.launch]
     access = ScenarioAccess(path.parent, is_trusted=trust)
     if not trust:
@@ -68,9 +68,9 @@ def launch_profile(
 def start_profile(
     profile: Profile, host: NodeHost, access: ScenarioAccess | None = None
 ) -> list[Node]:
-    """Start the nodes of a profile on a host, in its order.
+    """Starts the nodes of a profile on a host, in the profile's order.
 
-    access: which modules they may be; None: as of a scenario that a program makes.
+    access: which modules may run; None: the access of a scenario made by a program.
     """
     from volery.bridges.nodes.profile import absolute_names
     from volery.runtime.build.node_loading import start_node

@@ -1,4 +1,4 @@
-"""`volery list`: the scenarios that ship, and the nodes that installed packages register."""
+"""`volery list`: prints the shipped scenarios and the nodes that installed packages register."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from volery.cli.tables import print_table
 
 
 def show_scenarios() -> None:
-    """Print names, fleet sizes, durations and descriptions."""
+    """Prints names, fleet sizes, durations and descriptions."""
     from volery.scenario import library
     from volery.scenario.load import load_scenario
 
@@ -19,7 +19,7 @@ def show_scenarios() -> None:
 
 
 def show_nodes() -> None:
-    """Print the registered names of nodes and their classes."""
+    """Prints the registered names of nodes and their classes."""
     from volery.scenario.node_names import registered_nodes
 
     print_table(("node", "class"), list(registered_nodes().items()))

@@ -15,9 +15,9 @@ _FORMATS = {"mcap": "MCAP", "bag": "ROS 1 bag"}
 
 
 def show_log(path: Path) -> bool:
-    """Print what is in a log; False, after one line on stderr, where it is damaged.
+    """Prints the contents of a log; returns False, after one line on stderr, if the log is damaged.
 
-    Raises `RecordingError` where it is no log.
+    Raises `RecordingError` if the file is no log.
     """
     from volery.bridges.logs.reader import summarize
 
@@ -38,7 +38,7 @@ def show_log(path: Path) -> bool:
 
 
 def recover_log(path: Path, out: Path | None) -> None:
-    """Write the readable part of a log as a whole file and say what was saved."""
+    """Writes the readable part of a log as a valid log and prints its size."""
     from volery.bridges.logs.reader import summarize
     from volery.bridges.logs.recovery import recover
 
@@ -55,7 +55,7 @@ def recover_log(path: Path, out: Path | None) -> None:
 
 
 def convert_log(path: Path, out: Path, layout: Path, *, overwrite: bool) -> None:
-    """Write a plain text log of scans as a log of messages and say what was in it."""
+    """Converts a text log of scans to a log of messages and prints the counts."""
     from volery.bridges.logs.log_writer import check_target, open_log
     from volery.bridges.logs.text_layout import TextLayout
     from volery.bridges.logs.text_scans import TextScans

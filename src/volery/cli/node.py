@@ -1,4 +1,4 @@
-"""`volery node`: one node as a process of its own, on a simulation's graph or a real vehicle's."""
+"""`volery node`: runs a node in its own process, on the graph of a simulation or a real vehicle."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class NodeOptions:
-    """What the command line asked for; None leaves it to the profile."""
+    """Holds the command line's options; None: as in the profile."""
 
     node: str
     via: str | None
@@ -37,7 +37,7 @@ class NodeOptions:
 
 
 def run_node(options: NodeOptions) -> None:
-    """Run a node until Ctrl-C, or until it fails."""
+    """Runs a node until Ctrl-C or until it fails."""
     from pydantic import ValidationError
 
     from volery.bridges.nodes.deferred_connection import DeferredConnection
@@ -58,7 +58,7 @@ def run_node(options: NodeOptions) -> None:
         entry = NodeEntry(node=options.node, parameters=parameters)
     except ValidationError:
         raise BridgeError(
-            f"'{options.node}' is no node: give a name of `volery list --nodes`, or module:Class"
+            f"'{options.node}' is not a node; use a name of `volery list --nodes`, or module:Class"
         ) from None
     name = options.node.rpartition(":")[2]
     via = options.via or profile.via or os.environ.get("VOLERY_VIA") or DEFAULT_VIA
@@ -75,7 +75,7 @@ def run_node(options: NodeOptions) -> None:
         context = host.context(absolute_names(profile.remap, namespace))
         node = start_node(entry, context, namespace, "volery node", access)
         try:
-            # before the graph, or a clock in lock step, waits for it
+            # before the graph, or a clock in lock step, waits for the node
             compile_all(node.warmup_tasks())
             link = join_late(late, host)
             if options.lock_step_s is not None:
@@ -89,7 +89,7 @@ def run_node(options: NodeOptions) -> None:
 
 
 def _check_namespace(link: GraphConnection, namespace: str) -> None:
-    """Warn where the graph has no topic of the node's UAV, if the graph lists its topics."""
+    """Warns if the graph lists its topics and has none of the node's UAV."""
     uav = namespace.strip("/")
     try:
         topics = topic_types(link)
@@ -102,17 +102,17 @@ def _check_namespace(link: GraphConnection, namespace: str) -> None:
 
 
 def _folder_of(name: str, profile: Path | None) -> Path:
-    """A folder beside the profile, or in the working folder."""
+    """Returns a folder relative to the profile, else relative to the working folder."""
     beside = Path(name) if profile is None else profile.parent / name
     return beside if beside.is_dir() else Path(name)
 
 
 def _parameters(words: Sequence[str]) -> dict[str, Any]:
-    """`NAME:=VALUE` or `NAME=VALUE`, the value as YAML."""
+    """Parses `NAME:=VALUE` or `NAME=VALUE`, the value as YAML."""
     found: dict[str, Any] = {}
     for word in words:
         name, equals, value = word.partition("=")
         if not equals:
-            raise BridgeError(f"--param: NAME=VALUE, not '{word}'")
+            raise BridgeError(f"--param: expects NAME=VALUE, not '{word}'")
         found[name.rstrip(":")] = from_yaml(value)
     return found

@@ -1,4 +1,4 @@
-"""Shows what nodes log at the terminal, as rclpy does: `[INFO] [12.500000000] [uav1.node]: ..`."""
+"""Prints nodes' logs at the terminal, as rclpy does: `[INFO] [12.500000000] [uav1.node]: ..`."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ class _Terminal(logging.Handler):
     """Writes a line to stderr."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        """As of `logging.Handler`."""
+        """Implements `logging.Handler`."""
         level = _LEVELS.get(record.levelno, record.levelname)
         time, node = getattr(record, "node_time", ""), getattr(record, "node", record.name)
         typer.echo(f"[{level}] [{time}] [{node}]: {record.getMessage()}", err=True)
 
 
 def show_node_logs() -> None:
-    """Show them from now on; the nodes' own levels decide which."""
+    """Shows the logs from now on; the nodes' own levels filter them."""
     logger = logging.getLogger(PYTHON_LOGGER)
     if not any(isinstance(handler, _Terminal) for handler in logger.handlers):
         logger.addHandler(_Terminal())

@@ -1,4 +1,4 @@
-"""Options shared by several commands, and one whose value is optional."""
+"""Options shared by several commands, and a command with an optional option value."""
 
 from __future__ import annotations
 
@@ -120,8 +120,8 @@ GroupSizeOption = Annotated[
 
 
 class PageCommand(TyperCommand):
-    """A command that takes `--page` as well as `--page=HOST:PORT`; typer knows only the latter."""
+    """Accepts `--page` as well as `--page=HOST:PORT`; typer supports only the latter."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """As of typer, for the words of the command line."""
+        """Implements typer's method for the arguments of the command line."""
         return super().parse_args(ctx, ["--page=" if word == "--page" else word for word in args])

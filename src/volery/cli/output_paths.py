@@ -1,4 +1,4 @@
-"""What a flight is to write: refused before the flight where it cannot be, not after it."""
+"""Checks before a flight that its output files can be written."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from volery.core.errors import RecordingError, VoleryError, reason_of
 
 
 def check_record(path: Path, *, overwrite: bool) -> None:
-    """Refuse a log that could not be begun."""
+    """Raises `RecordingError` or `VoleryError` if a log cannot be created."""
     from volery.bridges.logs.log_writer import check_target
 
     check_target(path, overwrite=True)
@@ -19,7 +19,7 @@ def check_record(path: Path, *, overwrite: bool) -> None:
 
 
 def check_report(folder: Path) -> None:
-    """Refuse a folder in which no report could be written."""
+    """Raises `VoleryError` if no report can be written into a folder."""
     from volery.report.page import check_folder
 
     _check_parent(folder, "the report")
@@ -27,9 +27,12 @@ def check_report(folder: Path) -> None:
 
 
 def check_folder(folder: Path, what: str) -> None:
-    """Refuse a folder in which `what` could not be written, or made where it would be."""
+    """Raises `VoleryError` if `what` cannot be written into a folder.
+
+    The same holds if the folder is missing and cannot be created.
+    """
     if folder.exists() and not folder.is_dir():
-        raise VoleryError(f"{folder} is no folder")
+        raise VoleryError(f"{folder} is not a folder")
     place = folder.absolute()
     while not place.exists():
         place = place.parent
@@ -41,18 +44,18 @@ def check_folder(folder: Path, what: str) -> None:
 
 
 def _check_parent(path: Path, what: str) -> None:
-    """Refuse a path in a missing folder, unless that alone is missing: more is a slip of the pen.
+    """Raises `VoleryError` if a path's parent is missing, unless only the last folder is missing.
 
-    Nothing is made directly below the root, where a mistyped first folder would land.
+    A folder is never created directly below the root, where a mistyped first folder would end up.
     """
     parent = path.absolute().parent
     above = parent.parent
     if parent.is_dir():
         return
-    problem = f"there is no folder {parent}"
+    problem = f"folder {parent} does not exist"
     if parent.exists():
-        problem = f"{parent} is no folder"
+        problem = f"{parent} is not a folder"
     elif above.is_dir() and above != above.parent:
         return
-    hint = "" if parent.exists() else f"; `mkdir -p {parent}` makes it"
+    hint = "" if parent.exists() else f"; create it with `mkdir -p {parent}`"
     raise VoleryError(f"{path}: cannot create {what}: {problem}{hint}")

@@ -1,4 +1,4 @@
-"""The page's server beside the runs of a command."""
+"""Serves the page during the runs of a command."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ AT_THE_USUAL_PLACE = ""
 
 
 class Page:
-    """The page of a command's runs; without a server nothing happens."""
+    """Represents the page of a command's runs; without a server its methods do nothing."""
 
     def __init__(self, server: PageServer | None = None) -> None:
         self._server = server
 
     def building(self, scenario: Scenario, message: str = "") -> None:
-        """Tell that a scenario is being built."""
+        """Reports that a scenario is being built."""
         if self._server is not None:
             self._server.building(scenario.name, scenario.description, message)
 
     def showing(self, world: Any, message: str = "") -> AbstractContextManager[None]:
-        """Let clients into a simulation or idle while the context lasts."""
+        """Gives clients access to a simulation or an idle server while the context lasts."""
         if self._server is None:
             return nullcontext()
         world.use_low_latency()
@@ -46,7 +46,7 @@ class Page:
 
 @contextmanager
 def page_of(options: RunOptions) -> Iterator[Page]:
-    """The page that `--page` asks for, if it does."""
+    """Serves the page if `--page` is given."""
     if options.page is None:
         yield Page()
         return
@@ -56,15 +56,15 @@ def page_of(options: RunOptions) -> Iterator[Page]:
 
 @contextmanager
 def serving(settings: PageSettings, shelf: ScenarioCatalog | None = None) -> Iterator[Page]:
-    """Serve the page, with cards of what is on the shelf, and say where."""
+    """Serves the page, with cards of the catalog's scenarios, and prints its address."""
     from volery.server.page import is_built
     from volery.server.page_server import PageServer
 
     with PageServer(settings, shelf) as server:
-        needed = "  (it asks for the token)" if settings.tokens.needed else ""
+        needed = "  (needs the token)" if settings.tokens.needed else ""
         typer.echo(f"page    {server.url}{needed}", err=True)
         if not is_built():
-            warn("the page is not built: make web builds it; the rest of the address works")
+            warn("the page is not built: run `make web`; the other addresses work")
         yield Page(server)
 
 

@@ -1,4 +1,4 @@
-"""`volery play`: a recorded log behind bridges, with a clock that can be put anywhere."""
+"""`volery play`: plays a recorded log over bridges, with a clock that can seek."""
 
 from __future__ import annotations
 
@@ -16,23 +16,22 @@ from volery.cli.keys import Keys
 from volery.core.plurals import counted
 
 _BRIDGES = ("rosbridge",)
-"""Opened where no bridge is named: a log is played for somebody."""
+"""Bridges that open by default."""
 _LEAP_S = 5.0
 _LEAPS = {",": -_LEAP_S, "/": _LEAP_S}
 
 
 class _StoppedError(Exception):
-    """Ctrl-C was pressed."""
+    """Signals between two steps that Ctrl-C was pressed."""
 
 
 def play(
     log: Path, options: RunOptions, *, scenario: Path | None, loop: bool, paused: bool
 ) -> None:
-    """Play a log until Ctrl-C, or until a client wants it to quit.
+    """Plays a log until Ctrl-C, or until a client quits.
 
-    scenario: the user's own file of what was flown; without it files lie beside the log.
-
-    Raises `RecordingError` where there is no log, or nothing in it.
+    scenario: the user's scenario file of the flight; without it, data files are read from the log's
+    folder. Raises `RecordingError` if there is no log or the log is empty.
     """
     from volery.runtime.replay.log_player import LogPlayer
     from volery.scenario.load import load_scenario

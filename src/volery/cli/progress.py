@@ -1,4 +1,4 @@
-"""Progress of a flight: a bar on a terminal, a few plain lines elsewhere."""
+"""Shows the progress of a flight: a bar on a terminal, a few plain lines elsewhere."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _PLAIN_PERIOD_S = 10.0
 
 
 class FlightProgress:
-    """Shows simulated time and real-time factor while a flight runs."""
+    """Shows simulated time and real-time factor during a flight."""
 
     def __init__(self, name: str, duration_s: float) -> None:
         self._name = name
@@ -23,7 +23,7 @@ class FlightProgress:
         self._paused = False
 
     def __enter__(self) -> FlightProgress:
-        """Begin, with the building of the world."""
+        """Starts the display with the building of the world."""
         if sys.stdout.isatty():
             from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 
@@ -44,14 +44,14 @@ class FlightProgress:
         return self
 
     def __exit__(self, *_exception: object) -> None:
-        """Take the bar away."""
+        """Removes the bar."""
         self._stop()
 
     def update(self, time_s: float, real_time_factor: float, *, paused: bool = False) -> None:
-        """Show how far the flight is."""
+        """Shows the simulated time."""
         state = f"{time_s:.1f} of {self._duration_s:g} s  {real_time_factor:.1f} x real time"
         if paused:
-            state = f"paused at {time_s:.3f} of {self._duration_s:g} s: space goes on, . steps"
+            state = f"paused at {time_s:.3f} of {self._duration_s:g} s: space resumes, . steps"
         changed, self._paused = paused != self._paused, paused
         if self._bar is not None:
             self._bar.update(self._task, completed=time_s, state=state)
@@ -60,13 +60,13 @@ class FlightProgress:
             typer.echo(f"{self._name}: {state}")
 
     def note(self, text: str) -> None:
-        """Say what is done after the flight; an empty text ends it."""
+        """Shows what is done after the flight; an empty text removes the note."""
         if sys.stdout.isatty():
             sys.stdout.write(f"\r\x1b[2K{text}")
             sys.stdout.flush()
 
     def finish(self, time_s: float) -> None:
-        """The flight is over: what follows is printed below."""
+        """Ends the display; later output is printed below the bar."""
         if self._bar is not None:
             self._bar.update(self._task, completed=time_s)
         self._stop()

@@ -1,4 +1,4 @@
-"""`volery px4`: PX4s for a simulation that runs elsewhere, until Ctrl-C."""
+"""`volery px4`: runs PX4s for a simulation elsewhere until Ctrl-C."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ def run_px4(
     speed: float | None,
     airframe: str | None = None,
 ) -> None:
-    """Run instances until a signal ends them; `BridgeError` where one cannot start or ends.
+    """Runs instances until a signal; raises `BridgeError` if an instance cannot start or exits.
 
-    airframe: name or file of the one that all of them fly; None: PX4's own Iris.
+    airframe: name or file of the airframe of all instances; None: PX4's Iris.
     """
     ended = threading.Event()
 
@@ -65,7 +65,10 @@ def run_px4(
 
 
 def parameters_for(airframe: Airframe) -> Mapping[str, float]:
-    """Returns PX4's parameters that fit an airframe; BridgeError where PX4 cannot fly it."""
+    """Returns PX4's parameters for an airframe.
+
+    Raises `BridgeError` if PX4 cannot fly the airframe.
+    """
     import numpy as np
 
     from volery.vehicle.airframe import hover_thrusts

@@ -1,4 +1,4 @@
-"""Says before a recording how much room its pictures take."""
+"""Warns before a recording of the disk space that images take."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ _MOST_NAMED = 3
 
 
 def warn_of_size(rates: Mapping[str, float], matches: Callable[[str], bool]) -> None:
-    """Warn of pictures that fill a disk.
+    """Warns of images that fill a disk.
 
-    rates: bytes a second of simulated time, by topic. matches: whether a topic is recorded.
+    rates: bytes per simulated second, by topic. matches: whether a topic is recorded.
     """
     recorded = {topic: rate * 60e-6 for topic, rate in rates.items() if matches(topic)}
     total = sum(recorded.values())
@@ -22,6 +22,6 @@ def warn_of_size(rates: Mapping[str, float], matches: Callable[[str], bool]) -> 
     largest = sorted(recorded, key=lambda topic: -recorded[topic])[:_MOST_NAMED]
     named = ", ".join(f"{topic} {recorded[topic]:.0f}" for topic in largest)
     warn(
-        f"the log grows by about {total:.0f} MB per minute of the flight, by pictures alone "
+        f"the log grows by about {total:.0f} MB per minute of the flight, from images alone "
         f"({named}); --exclude '{largest[0]}' leaves one out, --topics chooses"
     )

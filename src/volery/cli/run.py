@@ -1,4 +1,4 @@
-"""`volery run`: what was asked for, checked; then build and fly."""
+"""`volery run`: checks the options, builds the scenario and flies it."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ __all__ = ["RunOptions", "fly", "parse_speed"]
 
 _THREADS = 2
 _GLANCE_S = 0.2
-"""How often a run without a world looks for Ctrl-C."""
+"""Wall time between two checks for Ctrl-C in a run without a world, s."""
 _FAREWELL_S = 0.1
-"""Time for the last answer to reach its client."""
+"""Wall time for the last response to arrive at its client, s."""
 
 
 def parse_speed(text: str) -> float | None:
-    """Factor of real time; None for `max`. ScenarioError for anything else."""
+    """Returns the real-time factor; None for `max`. Raises ScenarioError for other texts."""
     if text == "max":
         return None
     try:
@@ -51,7 +51,7 @@ def parse_speed(text: str) -> float | None:
 
 
 def fly(options: RunOptions) -> int:
-    """Fly a scenario as the options say, then those that clients load; return the exit code."""
+    """Flies a scenario with the options, then those that clients load; returns the exit code."""
     check_bridges(options)
     for gap in token_gaps(options):
         warn(gap)
@@ -74,7 +74,7 @@ def fly(options: RunOptions) -> int:
 
 
 def _build_and_fly(options: RunOptions, interrupts: Interrupts, page: Page) -> tuple[int, _Change]:
-    """Exit code, and what a client wants instead."""
+    """Builds and flies a scenario; returns the exit code and a client's request for another one."""
     from volery import Simulation
 
     flight = recorded_flight(options)
@@ -104,12 +104,15 @@ def _build_and_fly(options: RunOptions, interrupts: Interrupts, page: Page) -> t
 
 
 def _wait_for_world(options: RunOptions, interrupts: Interrupts, page: Page) -> tuple[int, _Change]:
-    """Keep the bridges open with no world behind them; exit code, and what a client wants then."""
+    """Runs the bridges without a world.
+
+    Returns the exit code and a client's request for a scenario.
+    """
     from volery.runtime.idle_server import IdleServer
 
     change = _Change(options)
     idle = IdleServer(change.ask)
-    typer.echo("no world is loaded; /load_world brings one, Ctrl-C ends", err=True)
+    typer.echo("no world is loaded; load one with /load_world; Ctrl-C exits", err=True)
     with open_bridges(idle, options), page.showing(idle):
         while not (change.asked or idle.quitting or interrupts.pressed):
             idle.wait(_GLANCE_S)
@@ -134,7 +137,7 @@ def _scenario_of(options: RunOptions) -> Scenario:
 
 
 def _loading(options: RunOptions, request: WorldRequest) -> RunOptions:
-    """The options for the flight that a client asks for."""
+    """Returns the options of the flight that a client requests."""
     wanted = request.changes
     if wanted.speed is not None:
         options = replace(options, speed=wanted.speed or None)
@@ -144,17 +147,20 @@ def _loading(options: RunOptions, request: WorldRequest) -> RunOptions:
 
 
 class _Change:
-    """Another scenario that a client of the graph wants to see flown, with the same options."""
+    """Holds a client's request for another scenario, to be flown with the same options."""
 
     def __init__(self, options: RunOptions) -> None:
         self._options = options
         self.asked = False
         self.wanted: WorldRequest | None = None
-        """None: no world at all."""
+        """None: no world."""
         self.quit: Callable[[], None] = _nothing
 
     def ask(self, request: WorldRequest | LogRequest | None) -> None:
-        """End the present flight for another one; `CommandError` where it must not end."""
+        """Ends the current flight for another one.
+
+        Raises `CommandError` if the flight must not end.
+        """
         options = self._options
         for flag, given in (("--record", options.record), ("--report", options.report)):
             if given is not None:
@@ -162,9 +168,9 @@ class _Change:
         if options.digest:
             raise CommandError("this run prints the digest of one flight (--digest)")
         if options.replay_commands is not None:
-            raise CommandError("this run repeats one flight (--replay-commands)")
+            raise CommandError("this run replays one flight (--replay-commands)")
         if isinstance(request, LogRequest):
-            raise CommandError("this run flies; `volery serve` and `volery play` play logs")
+            raise CommandError("this run simulates; `volery serve` and `volery play` play logs")
         if request is not None:
             _scenario_of(_loading(options, request))
         self.asked, self.wanted = True, request
@@ -172,4 +178,4 @@ class _Change:
 
 
 def _nothing() -> None:
-    """Nothing can be asked for before the simulation is there."""
+    """Does nothing: there is no simulation yet."""

@@ -1,4 +1,4 @@
-"""`volery serve`: the page, and one world after the other behind it, until Ctrl-C."""
+"""`volery serve`: serves the page and one world after another until Ctrl-C."""
 
 from __future__ import annotations
 
@@ -36,26 +36,26 @@ _THREADS = 2
 _GLANCE_S = 0.02
 """Wall seconds between looks at clients of a paused world, and at Ctrl-C without a world."""
 _FAREWELL_S = 0.1
-"""Time for the last answer to reach its client."""
+"""Wall time for the last response to arrive at its client, s."""
 
 
 @dataclass(frozen=True)
 class ServeOptions:
-    """What the command line asked for."""
+    """Holds the command line's options."""
 
     first: RunOptions
-    """The scenario to begin with, and what holds for all of them."""
+    """First scenario, and the options of all runs."""
     page: PageSettings
 
 
 class _StoppedError(Exception):
-    """Ctrl-C was pressed; raised between two steps."""
+    """Signals between two steps that Ctrl-C was pressed."""
 
 
 def serve(options: ServeOptions) -> None:
-    """Serve until Ctrl-C, or until a client lets the simulator quit.
+    """Serves until Ctrl-C, or until a client quits the simulator.
 
-    Raises `VoleryError` where the first scenario cannot be built or the server cannot listen.
+    Raises `VoleryError` if the first scenario cannot be built or the server cannot listen.
     """
     from volery.scenario.catalog import ScenarioCatalog
 
@@ -69,23 +69,26 @@ def serve(options: ServeOptions) -> None:
         host = _Host(options, page, interrupts, _Wish(first, options.first.speed, shelf))
         while host.goes_on:
             host.go_on()
-    typer.echo("the server has ended", err=True)
+    typer.echo("the server has stopped", err=True)
 
 
 class _Wish:
-    """What is to be flown next: the first scenario, then what clients ask for."""
+    """Holds what runs next: the first scenario, then what clients request."""
 
     def __init__(self, scenario: Scenario, speed: float | None, shelf: ScenarioCatalog) -> None:
         self.shelf = shelf
-        """What may be flown."""
+        """Scenarios that may run."""
         self.speed = speed
-        """Factor of real time to begin with; None: as fast as possible."""
+        """Initial real-time factor; None: as fast as possible."""
         self.asked = True
         self._wanted: Scenario | Path | None = scenario
         self.quit: Callable[[], None] = _nothing
 
     def ask(self, request: WorldRequest | LogRequest | None) -> None:
-        """End the present flight for another one; `VoleryError` where that cannot be."""
+        """Ends the current flight for another one.
+
+        Raises `VoleryError` if the request cannot be met.
+        """
         if request is None:
             self.want(None)
         elif isinstance(request, LogRequest):
@@ -97,17 +100,17 @@ class _Wish:
         self.quit()
 
     def want(self, what: Scenario | Path | None) -> None:
-        """Have this flown next, or this log played; None: no world at all."""
+        """Sets the scenario to fly or the log to play next; None: no world."""
         self.asked, self._wanted = True, what
 
     def take(self) -> Scenario | Path | None:
-        """What to do now; what is asked for from here on comes after it."""
+        """Returns the current request; later requests come after it."""
         self.asked, self.quit = False, _nothing
         return self._wanted
 
 
 class _Host:
-    """Builds worlds and flies them, one at a time."""
+    """Builds worlds and runs them, one at a time."""
 
     def __init__(
         self, options: ServeOptions, page: Page, interrupts: Interrupts, wish: _Wish
@@ -117,18 +120,18 @@ class _Host:
         self._interrupts = interrupts
         self._wish = wish
         self._present: Scenario | None = None
-        """What was built last."""
+        """World that was built last."""
         self._problem = ""
-        """What went wrong last, for the page."""
+        """Last problem, for the page."""
         self._quits = False
 
     @property
     def goes_on(self) -> bool:
-        """Whether there is more to do."""
+        """Returns whether the server goes on."""
         return not (self._quits or self._interrupts.pressed)
 
     def go_on(self) -> None:
-        """Do what is wished for until something else is; after a failure go back."""
+        """Runs the request until another one arrives; after a failure returns to the last world."""
         wanted = self._wish.take()
         if wanted is None:
             self._wait()
@@ -138,7 +141,7 @@ class _Host:
                 self._play(wanted)
             else:
                 self._fly(wanted)
-        except Exception as error:  # a mistake of ours in one world must not end the others
+        except Exception as error:  # an error of ours in one world must not end the others
             if self._present is None:
                 raise
             what = str(error) if isinstance(error, VoleryError) else _unexpected(error)
@@ -147,7 +150,7 @@ class _Host:
             self._wish.want(None if self._present is wanted else self._present)
 
     def _fly(self, scenario: Scenario) -> None:
-        """Build a world and stay with it."""
+        """Builds a world and runs it."""
         from volery import Simulation
 
         first, page = self._options.first, self._page
@@ -170,7 +173,7 @@ class _Host:
             self._quits = simulation.quitting and not self._wish.asked
 
     def _play(self, log: Path) -> None:
-        """Open a log and stay with it."""
+        """Opens a log and plays it."""
         from volery.runtime.replay.log_player import LogPlayer
 
         with LogPlayer(
@@ -178,7 +181,7 @@ class _Host:
         ) as player:
             if player.scenario is not None:
                 self._page.building(player.scenario, self._problem)
-            _ = player.geometry  # made here: the server only reads it
+            _ = player.geometry  # computed here: the server only reads it
             self._wish.quit = player.quit
             self._interrupts.be_gentle()
             first, page = self._options.first, self._page
@@ -192,12 +195,12 @@ class _Host:
             self._quits = player.quitting and not self._wish.asked
 
     def _return(self) -> None:
-        """Fly again what was flown before a log."""
+        """Requests the scenario that ran before a log."""
         self._wish.want(self._present)
         self._wish.quit()
 
     def _stay(self, simulation: Any) -> None:
-        """Fly; at the end hold still there, until a reset or something else is asked for."""
+        """Runs the scenario; at its end stays paused until a reset or another request."""
         speed = self._wish.speed
         try:
             while not simulation.quitting:
@@ -213,7 +216,7 @@ class _Host:
             raise _StoppedError
 
     def _wait(self) -> None:
-        """Keep the bridges open with no world behind them."""
+        """Runs the bridges without a world."""
         from volery.runtime.idle_server import IdleServer
 
         idle = IdleServer(self._wish.ask, self._wish.shelf)
@@ -239,10 +242,10 @@ def _first_scenario(options: RunOptions) -> Scenario:
 
 
 def _unexpected(error: Exception) -> str:
-    """A sentence for what should not happen; where it did is logged."""
+    """Returns a sentence for an unexpected error and logs its traceback."""
     _log.error("a world ended with an error", exc_info=error)
     return f"internal error: {type(error).__name__}: {error}"
 
 
 def _nothing() -> None:
-    """Nothing can be ended before it has begun."""
+    """Does nothing: no flight has begun."""

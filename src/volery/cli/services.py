@@ -1,4 +1,4 @@
-"""`volery service list|type|call`: a graph's services from a terminal."""
+"""`volery service list|type|call`: queries a graph's services from a terminal."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ _RESULT = "simulation_interfaces/msg/Result"
 
 
 def list_services(via: str, *, types: bool) -> None:
-    """Print the services, one a line."""
+    """Prints the services, one per line."""
     with closing(open_link(via, "volery_service_list")) as link:
         for service in service_names(link):
             typer.echo(f"{service} [{type_of_service(link, service)}]" if types else service)
 
 
 def show_type(via: str, service: str) -> None:
-    """Print a service's type."""
+    """Prints a service's type."""
     with closing(open_link(via, "volery_service_type")) as link:
         typer.echo(type_of_service(link, service))
 
 
 def call(via: str, service: str, values: str | None, *, timeout_s: float) -> None:
-    """Call a service with a request typed as YAML and print the response as YAML.
+    """Calls a service with a request typed as YAML and prints the response as YAML.
 
-    Raises `BridgeError` where the response says that the request is refused.
+    Raises `BridgeError` if the response says that the request is refused.
     """
     with closing(open_link(via, "volery_service_call")) as link:
         srvtype = type_of_service(link, service)
@@ -41,13 +41,13 @@ def call(via: str, service: str, values: str | None, *, timeout_s: float) -> Non
     typer.echo(to_yaml(response, whole=True) or "(an empty response)")
     reason = refusal_of(response)
     if reason is not None:
-        raise BridgeError(f"{service} refuses: {reason or 'no reason is given'}")
+        raise BridgeError(f"{service} refuses: {reason or 'no reason given'}")
 
 
 def refusal_of(response: Any) -> str | None:
-    """Return why a response refuses its request; None: it does not.
+    """Returns why a response refuses its request; None if it does not.
 
-    Known are `success` with `message` (std_srvs and Volery's services) and the `Result` of
+    Recognizes `success` with `message` (std_srvs and Volery's services) and the `Result` of
     simulation_interfaces.
     """
     if getattr(response, "success", True) is False:

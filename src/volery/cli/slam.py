@@ -1,4 +1,4 @@
-"""`volery slam`: the SLAM over a log, its map and path as files."""
+"""`volery slam`: runs the SLAM over a log and writes its map and path as files."""
 
 from __future__ import annotations
 
@@ -25,16 +25,17 @@ if TYPE_CHECKING:
 _MAPS = ("map.png", "map.pgm", "map.yaml")
 _NAMES = (*_MAPS, "path.tum", "summary.json")
 _PLAIN_PERIOD_S = 10.0
-"""Between lines of progress where nobody watches a terminal."""
+"""Time between lines of progress if stderr is no terminal."""
 _WAYS_TIMES, _WAYS_APART_M = 5.0, 5.0
-"""Ways by odometry and by scans that differ by so many times and metres are not of one flight."""
+"""Paths by odometry and by scans that differ by more than this factor and distance are
+inconsistent."""
 _DEGRADED = 0.1
-"""Share of the log's time from which on an IMU that was not used is worth a word."""
+"""Fraction of the log's time with poor tracking above which an unused IMU is suggested."""
 
 
 @dataclass(frozen=True)
 class SlamArguments:
-    """The options as they were typed."""
+    """Holds the options as they were typed."""
 
     log: Path
     out: Path
@@ -55,7 +56,7 @@ class SlamArguments:
 
 
 def map_log(asked: SlamArguments) -> None:
-    """Run the SLAM over a log, write what came of it and say so."""
+    """Runs the SLAM over a log, writes its results and prints a summary."""
     from volery.bridges.logs.text_layout import TextLayout
     from volery.runtime.replay.slam.offline_slam import SlamOptions
     from volery.runtime.replay.slam.sources import open_source
@@ -81,10 +82,10 @@ def map_log(asked: SlamArguments) -> None:
     others = other_uavs(source.topics, run.channels.uav)
     typer.echo(f"mapping {asked.log}{_beginning(run.start, start)}", err=True)
     if others and asked.uav is None and asked.scan is None:
-        warn(f"{run.channels.uav} is mapped; the log has {', '.join(others)}, too: --uav")
+        warn(f"mapping {run.channels.uav}; the log also has {', '.join(others)}: select with --uav")
     try:
         outcome = run.run(_Progress().tell)
-    finally:  # what is wrong with the log is often why nothing came of it
+    finally:  # a problem of the log often explains why the SLAM failed
         for problem in filter(None, (source.problem, *source.doubts)):
             warn(f"{asked.log}: {problem}")
     cell_m = _write(asked, outcome)
@@ -94,7 +95,7 @@ def map_log(asked: SlamArguments) -> None:
 
 
 def _run(source: LogSource | TextSource, options: SlamOptions) -> OfflineSlam:
-    """Ready to begin; where the log lacks something it is told whether it is whole."""
+    """Returns the SLAM, ready to start; errors say whether the log is damaged."""
     from volery.runtime.replay.slam.offline_slam import OfflineSlam
 
     try:
@@ -106,29 +107,29 @@ def _run(source: LogSource | TextSource, options: SlamOptions) -> OfflineSlam:
 
 
 def _beginning(start: Pose | None, asked: Pose | None) -> str:
-    """Where it begins, if the log has told it."""
+    """Returns the initial pose as text if the log defines one."""
     if start is None or asked is not None:
         return ""
     x, y, z, yaw = _in_degrees(start)
     return (
-        f" from {x:g}, {y:g}, {z:g} m, {yaw:g} degrees, as it tells; --initial-pose says otherwise"
+        f" from {x:g}, {y:g}, {z:g} m, {yaw:g} degrees, from the log; --initial-pose overrides it"
     )
 
 
 def _in_degrees(start: Pose | None) -> tuple[float, float, float, float]:
-    """x, y, z, m, and yaw, degrees, for people; the map's origin where nothing tells it."""
+    """Returns x, y, z, m, and yaw, degrees, for messages; the map's origin if unknown."""
     x, y, z, yaw = start or (0.0, 0.0, 0.0, 0.0)
     return round(x, 2), round(y, 2), round(z, 2), round(math.degrees(yaw), 1)
 
 
 class _Progress:
-    """Tells how far it is, now and then where that goes into a file."""
+    """Prints the progress, at long intervals if stderr is no terminal."""
 
     def __init__(self) -> None:
         self._told = time.monotonic()
 
     def tell(self, scans: int, seconds: float) -> None:
-        """What has been read so far."""
+        """Prints how much has been read."""
         now = time.monotonic()
         if sys.stderr.isatty() or now - self._told >= _PLAIN_PERIOD_S:
             self._told = now
@@ -136,7 +137,7 @@ class _Progress:
 
 
 def _advise(outcome: SlamResult, topics: dict[str, str]) -> None:
-    """Say that an IMU might help that the log has and that was not used."""
+    """Suggests the log's IMU if it was not used and tracking was poor."""
     from volery.runtime.replay.slam.topic_selection import IMU
 
     total = sum(outcome.states.values())
@@ -144,20 +145,20 @@ def _advise(outcome: SlamResult, topics: dict[str, str]) -> None:
     imus = sorted(topic for topic, kind in topics.items() if kind == IMU)
     if imus and not outcome.channels.has_imu and poor > _DEGRADED * total:
         warn(
-            f"degraded or lost for {poor / total:.0%} of the time, in the plane; of a vehicle that "
-            f"leans or flies the log's IMU ({', '.join(imus)}) may tell more: --imu"
+            f"degraded or lost for {poor / total:.0%} of the time, in the plane; if the vehicle "
+            f"leans or flies, the log's IMU ({', '.join(imus)}) may help: --imu"
         )
 
 
 def _compare_ways(outcome: SlamResult) -> None:
-    """Say that odometry and scans tell of ways that cannot both be right."""
+    """Warns if the path lengths by odometry and by scans contradict each other."""
     wheels, seen = outcome.wheels_m, outcome.trajectory.length_m
     if wheels is None or abs(wheels - seen) < _WAYS_APART_M:
         return
     if max(wheels, seen) > _WAYS_TIMES * min(wheels, seen):
         warn(
-            f"by its odometry it went {wheels:.1f} m over ground, by what the scans saw "
-            f"{seen:.1f} m: are the units right? --no-odometry leaves it out"
+            f"the path is {wheels:.1f} m long by odometry, by scans "
+            f"{seen:.1f} m: check the units, or use --no-odometry"
         )
 
 
@@ -169,7 +170,7 @@ def _check_folder(out: Path, *, overwrite: bool) -> None:
 
 
 def _numbers(text: str | None, count: int, option: str) -> Any:
-    """Numbers of an option, parted by commas or blanks."""
+    """Parses the numbers of an option, separated by commas or blanks."""
     if text is None:
         return None
     try:
@@ -177,12 +178,12 @@ def _numbers(text: str | None, count: int, option: str) -> Any:
     except ValueError:
         found = ()
     if len(found) != count or not all(map(math.isfinite, found)):
-        raise VoleryError(f"{option}: {count} numbers, such as '{','.join(['0'] * count)}'")
+        raise VoleryError(f"{option}: expects {count} numbers, such as '{','.join(['0'] * count)}'")
     return found
 
 
 def _write(asked: SlamArguments, outcome: SlamResult) -> float | None:
-    """The path, and the map if there can be one: the width of its cells, m."""
+    """Writes the path, and the map if there is one; returns the width of its cells, m."""
     from volery.runtime.replay.slam.trajectory import write_tum
 
     asked.out.mkdir(parents=True, exist_ok=True)
@@ -206,7 +207,7 @@ def _write_map(asked: SlamArguments, outcome: SlamResult) -> float:
         rows, columns = grid.odds.shape
         warn(
             f"the map is {columns * grid.cell_m:.0f} m x {rows * grid.cell_m:.0f} m, too large for "
-            f"cells of {asked.resolution:g} m: they are {grid.cell_m:g} m wide"
+            f"cells of {asked.resolution:g} m: cells are {grid.cell_m:g} m wide"
         )
     values = grid.occupancy()
     write_grid(asked.out / "map", values, grid.origin, grid.cell_m)
@@ -256,16 +257,16 @@ def _tell(out: Path, told: dict[str, Any]) -> None:
     share = told["cpu_share"]
     typer.echo(
         f"{counted(told['scans'], 'scan')} over {told['lasted_s']:.1f} s, "
-        f"{told['way_m']:.1f} m over ground ({'with' if told['mode'] == 'imu' else 'without'} IMU)"
+        f"{told['way_m']:.1f} m path length ({'with' if told['mode'] == 'imu' else 'without'} IMU)"
     )
     typer.echo(
         f"{counted(told['keyframes'], 'keyframe')}, {counted(told['closures'], 'closure')}, "
         f"{counted(told['sessions'], 'session')}, {counted(told['refused'], 'message')} refused"
     )
     topics = [topic for topic in told["topics"].values() if topic != "/tf_static"]
-    typer.echo(f"heard     {told['uav']}: {', '.join(topics)}")
+    typer.echo(f"input     {told['uav']}: {', '.join(topics)}")
     states = ", ".join(f"{name} {_lasting(s)}" for name, s in told["states_s"].items())
-    typer.echo(f"state     {states or 'none told'}")
+    typer.echo(f"state     {states or 'none'}")
     for problem, seconds in told["problems_s"].items():
         typer.echo(f"problem   {problem}: {_lasting(seconds)}")
     if share is not None:
@@ -276,5 +277,5 @@ def _tell(out: Path, told: dict[str, Any]) -> None:
 
 
 def _lasting(seconds: float) -> str:
-    """Tenths of what is short, too."""
+    """Formats a duration, with tenths below 10 s."""
     return f"{seconds:.1f} s" if seconds < 10.0 else f"{seconds:.0f} s"

@@ -1,15 +1,15 @@
-"""The command `volery` from its very first moment: Ctrl-C ends it in a line also while it loads."""
+"""Entry point of the command `volery`: handles Ctrl-C even while modules load."""
 
 from __future__ import annotations
 
 import sys
 
 _INTERRUPTED = 130
-"""128 + SIGINT; as `volery.cli.interrupt` has it, which is not loaded yet."""
+"""128 + SIGINT, as in `volery.cli.interrupt`, which is not loaded yet."""
 
 
 def main() -> None:
-    """Load the command line and run it."""
+    """Loads the command line and runs it."""
     try:
         from volery.cli.app import main as run
     except KeyboardInterrupt:

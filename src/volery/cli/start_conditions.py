@@ -1,4 +1,4 @@
-"""Before the first step: waits for nodes and clients outside, holds the clock."""
+"""Waits for external nodes and clients and pauses the clock before the first step."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ def wait_for_clients(
     timeout_s: float,
     is_stopped: Callable[[], bool],
 ) -> bool:
-    """Wait until all `names` are connected; False where `is_stopped()` before that.
+    """Waits until all `names` are connected; returns False if `is_stopped()` before that.
 
-    A name is that of a node outside, `/uav1/watcher` or `watcher`, of a lock-step partner, or of a
-    client as the page lists it; one word of it is enough: `rosbridge`. `CommandError` names those
-    that do not come within `timeout_s` of wall time.
+    A name is that of an external node, `/uav1/watcher` or `watcher`, of a lock-step partner, or of
+    a client as the page lists it; one word of a name is enough: `rosbridge`. Raises `CommandError`
+    with the missing names after `timeout_s` of wall time.
     """
     if not names:
         return True
     until = time.monotonic() + timeout_s
     missing = _missing(simulation, names)
     if missing:
-        typer.echo(f"waits for {', '.join(missing)}, at most {timeout_s:g} s", err=True)
+        typer.echo(f"waiting for {', '.join(missing)}, at most {timeout_s:g} s", err=True)
     while missing:
         if is_stopped():
             return False
@@ -52,16 +52,19 @@ def wait_for_clients(
 
 
 def start_paused(simulation: Any, *, can_be_resumed: bool) -> None:
-    """Hold the clock before the first step. `CommandError` where nothing could let it go on."""
+    """Pauses the clock before the first step.
+
+    Raises `CommandError` if no client could resume the run.
+    """
     if not (can_be_resumed or sys.stdin.isatty()):
         raise CommandError(
-            "--start-paused: nothing can let this run go on; open the page (--page) or a bridge "
+            "--start-paused: nothing can resume this run; open the page (--page) or a bridge "
             "(--bridge rosbridge), or start it at a terminal"
         )
     simulation.pause()
     typer.echo(
         "paused before the first step: space at this terminal, Play on the page or "
-        "/set_simulation_state lets it go on",
+        "/set_simulation_state resumes the run",
         err=True,
     )
 

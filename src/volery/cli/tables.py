@@ -1,4 +1,4 @@
-"""Tables for people on a terminal, plain columns for everybody else."""
+"""Prints tables for users on a terminal, plain columns for programs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import typer
 def print_table(
     head: Sequence[str], rows: Sequence[Sequence[str]], *, right: Collection[int] = ()
 ) -> None:
-    """Print rows below their head; columns whose numbers are in `right` are flush right."""
+    """Prints rows below their head; columns whose numbers are in `right` are right-aligned."""
     if sys.stdout.isatty():
         from rich import box
         from rich.console import Console

@@ -1,4 +1,4 @@
-"""`volery topic list|type|echo|hz|bw|pub`: a graph's topics from a terminal."""
+"""`volery topic list|type|echo|hz|bw|pub`: inspects a graph's topics from a terminal."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ _DEPTH = 1000
 
 
 def list_topics(via: str, *, types: bool) -> None:
-    """Print the topics, one a line, without those that ROS 2 hides: a part begins with _."""
+    """Prints the topics, one per line, without those that ROS 2 hides: a part begins with _."""
     with closing(open_link(via, "volery_topic_list")) as link:
         found = topic_types(link)
         if not found:
             where = getattr(link, "where", via)
-            typer.echo(f"nobody was heard there: {where}", err=True)
+            typer.echo(f"no topics found: {where}", err=True)
     for topic, msgtype in found.items():
         if "/_" not in topic:
             typer.echo(f"{topic} [{msgtype}]" if types else topic)
 
 
 def show_type(via: str, topic: str) -> None:
-    """Print a topic's type."""
+    """Prints a topic's type."""
     with closing(open_link(via, "volery_topic_type")) as link:
         typer.echo(type_of_topic(link, topic))
 
 
 def echo(via: str, topic: str, *, count: int | None, whole: bool) -> None:
-    """Print messages as YAML, each followed by a line of dashes."""
+    """Prints messages as YAML, each followed by a line of dashes."""
     left = math.inf if count is None else count
     for published in _messages(via, topic, "volery_topic_echo"):
         if published is None:
@@ -63,19 +63,19 @@ class Window:
     """Whether a message has arrived since `take_line`."""
 
     def add(self, time_s: float, size: int) -> None:
-        """Note a message; the oldest is forgotten where there are too many."""
+        """Adds a message; removes the oldest beyond `most`."""
         self.times.append(time_s)
         self.sizes.append(size)
         del self.times[: -self.most], self.sizes[: -self.most]
         self.is_fresh = True
 
     def take_line(self, line: Callable[[Window], str]) -> str:
-        """Return `line(self)`; where nothing has arrived since the last time, say that instead."""
+        """Returns `line(self)`, or that no message has arrived since the last call."""
         fresh, self.is_fresh = self.is_fresh, False
         return line(self) if fresh else "no new messages"
 
     def rate_line(self) -> str:
-        """Rate and periods, as `rostopic hz` has them."""
+        """Returns rate and periods in the format of `rostopic hz`."""
         periods = [b - a for a, b in zip(self.times, self.times[1:], strict=False)]
         if not periods:
             return "no new messages"
@@ -87,7 +87,7 @@ class Window:
         )
 
     def bandwidth_line(self) -> str:
-        """Bytes a second and sizes, as `rostopic bw` has them."""
+        """Returns bandwidth and sizes in the format of `rostopic bw`."""
         if len(self.times) < 2:
             return "no new messages"
         span = self.times[-1] - self.times[0]
@@ -100,7 +100,7 @@ class Window:
 
 
 def measure(via: str, topic: str, *, window: int, line: Callable[[Window], str]) -> None:
-    """Print a line about a topic's arrivals each second."""
+    """Prints a line about a topic's arrivals each second."""
     seen = Window(window)
     told = time.monotonic()
     sizes = line is Window.bandwidth_line
@@ -116,9 +116,9 @@ def measure(via: str, topic: str, *, window: int, line: Callable[[Window], str])
 def publish(
     via: str, topic: str, msgtype: str, values: str, *, rate_hz: float, times: int | None
 ) -> None:
-    """Publish a message typed as YAML, `times` times or until Ctrl-C."""
+    """Publishes a message typed as YAML, `times` times or until Ctrl-C."""
     if not (math.isfinite(rate_hz) and rate_hz > 0.0):
-        raise BridgeError(f"--rate: a positive number, not {rate_hz}")
+        raise BridgeError(f"--rate: expects a positive number, not {rate_hz}")
     name = msgtype if "/msg/" in msgtype else msgtype.replace("/", "/msg/", 1)
     message = read_message(values, name)
     with closing(open_link(via, "volery_topic_pub")) as link:
@@ -139,7 +139,7 @@ def _repeat(
 
 
 def _messages(via: str, topic: str, name: str) -> Iterator[Published | None]:
-    """Messages of a topic without an end, and None at least five times a second."""
+    """Yields the messages of a topic without end, and None at least five times a second."""
     with closing(open_link(via, name)) as link:
         come, told = threading.Event(), ConnectionOptions(link, via)
         mailbox = link.subscribe(topic, type_of_topic(link, topic), depth=_DEPTH, wake=come.set)

@@ -1,8 +1,8 @@
-"""Asks once whether code that lies beside a scenario or a launch profile may run.
+"""Asks once whether node code from the folder of a scenario or launch profile may run.
 
-A node is a module, and importing it runs its code with all rights of the user. Shipped and
-installed nodes start without a question; those beside the file only with `--trust`, or with a yes
-at a terminal, which is remembered for this file and these modules.
+A node is a module, and importing a module runs its code with all rights of the user. Shipped and
+installed nodes start without a question. Nodes from the file's folder start only with `--trust` or
+after a yes at a terminal, which is saved for this file and these modules.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from volery.scenario.node_names import node_module
 
 
 def with_trust(options: RunOptions) -> RunOptions:
-    """The options, `trust` set where the nodes beside the scenario may run.
+    """Returns the options, with `trust` set if the nodes from the scenario's folder may run.
 
-    Raises `ScenarioError` where there are such nodes and they may not.
+    Raises `ScenarioError` if there are such nodes and they may not run.
     """
     if options.trust or not options.nodes or options.scenario in library.names():
         return options
@@ -42,9 +42,9 @@ def with_trust(options: RunOptions) -> RunOptions:
 
 
 def may_run_local_nodes(file: Path, nodes: Iterable[str], access: ScenarioAccess) -> bool:
-    """Whether a file names nodes that lie beside it, and its user trusts them.
+    """Returns whether a file names nodes from its own folder and the user trusts them.
 
-    Asks at a terminal where that is not known. Raises `ScenarioError` where they may not run.
+    Asks at a terminal if no answer is saved. Raises `ScenarioError` if they may not run.
     """
     from volery.runtime.build.node_loading import is_local
 
@@ -67,12 +67,12 @@ def may_run_local_nodes(file: Path, nodes: Iterable[str], access: ScenarioAccess
 
 
 def at_terminal() -> bool:
-    """Whether a user can be asked."""
+    """Returns whether a user can be asked."""
     return sys.stdin.isatty() and sys.stderr.isatty()
 
 
 def trust_file() -> Path:
-    """Where answers are kept: below XDG_STATE_HOME, or ~/.local/state."""
+    """Returns the file of saved answers: below XDG_STATE_HOME, or ~/.local/state."""
     base = os.environ.get("XDG_STATE_HOME")
     root = Path(base) if base else Path.home() / ".local" / "state"
     return root / "volery" / "trusted.json"
@@ -92,7 +92,7 @@ def _read() -> dict[str, Any]:
 
 
 def _remember(file: Path, modules: Iterable[str]) -> None:
-    """Keep an answer; where that cannot be, it is asked for again."""
+    """Saves an answer; if that fails, the user is asked again next time."""
     known = _read()
     known[str(file.resolve())] = sorted(_trusted(file) | set(modules))
     target = trust_file()

@@ -1,4 +1,4 @@
-"""Messages as YAML, as ROS users read and type them."""
+"""Converts messages to and from YAML, in the form of the ROS tools."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _LONGEST_LIST = 128
 
 
 def to_yaml(message: Any, *, whole: bool = False) -> str:
-    """A message as YAML; long lists of numbers are cut unless `whole`."""
+    """Returns a message as YAML; cuts long lists of numbers unless `whole`."""
     from volery.cli.yaml_writer import Numbers, write_yaml
     from volery.graph.codecs.json_codec import JsonCodec
 
@@ -22,14 +22,14 @@ def to_yaml(message: Any, *, whole: bool = False) -> str:
 
 
 def read_message(text: str, msgtype: str) -> Any:
-    """The message that a user typed as YAML; what is missing is 0. `GraphError` for a wrong one."""
+    """Returns the message of a YAML text; missing fields are 0. Raises `GraphError` if invalid."""
     from volery.graph.codecs.json_decoding import decode_plain
 
     return decode_plain(from_yaml(text) or {}, msgtype)
 
 
 def from_yaml(text: str) -> Any:
-    """Plain form of what a user typed. `GraphError` where it is no YAML."""
+    """Returns the plain values of a YAML text. Raises `GraphError` if the text is no YAML."""
     from ruamel.yaml import YAML
     from ruamel.yaml.error import YAMLError
 
@@ -37,4 +37,4 @@ def from_yaml(text: str) -> Any:
         return YAML(typ="safe", pure=True).load(io.StringIO(text))
     except YAMLError as error:
         reason = " ".join(str(error).split())
-        raise GraphError(f"'{text}' is no YAML: {reason}") from None
+        raise GraphError(f"'{text}' is not YAML: {reason}") from None

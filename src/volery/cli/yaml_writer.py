@@ -1,4 +1,4 @@
-"""Writes plain values as YAML, as `ros2 topic echo` does, but a list of numbers in one line."""
+"""Writes plain values as YAML, as `ros2 topic echo` does, but lists of numbers in one line."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _EXPONENT_WITHOUT_POINT = re.compile(r"(?<![.\d])(\d+)e")
 
 
 class Numbers:
-    """An array of numbers, shape (n,), of which the first `most` are shown."""
+    """Array of numbers, shape (n,); its text shows the first `most`."""
 
     def __init__(self, values: NDArray[Any], most: int) -> None:
         text = ", ".join(map(repr, values[:most].tolist()))

@@ -1,7 +1,7 @@
-"""MAVLink: an autopilot for every UAV that ground stations understand, and real ones in lock step.
+"""MAVLink: a built-in autopilot for every UAV, and real autopilots in lock step.
 
-The autopilot (`autopilot.Autopilot`) takes frames and flight states with their simulated time and
-gives frames and commands to its UAV: it knows neither sockets nor graphs. `node.Autopilot` runs it
-inside the simulation, `udp_bridge`, `tcp_bridge` and `serial_bridge` carry its
-frames.
+The built-in autopilot (`autopilot.Autopilot`) receives frames and flight states with their
+simulated time and returns frames and commands to its UAV; it uses neither sockets nor graphs.
+`node.AutopilotNode` runs it inside the simulation; `udp_bridge`, `tcp_bridge` and `serial_bridge`
+carry its frames.
 """

@@ -1,4 +1,4 @@
-"""The bridges of this package; `pyproject.toml` gives them their names."""
+"""Defines the bridges of this package; `pyproject.toml` gives them their names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The dialect `common` of MAVLink 2, as pymavlink packs and unpacks it."""
+"""Packs and unpacks the dialect `common` of MAVLink 2 with pymavlink."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from volery.core.errors import BridgeError
 from volery.core.extras import missing_package
 
 AUTOPILOT = 1
-"""MAV_COMP_ID_AUTOPILOT1."""
+"""Component id MAV_COMP_ID_AUTOPILOT1."""
 
 
 @cache
 def dialect() -> Any:
-    """The module of pymavlink with messages and enumerations. `BridgeError` where it is missing."""
+    """Returns pymavlink's module of messages and enumerations. Raises `BridgeError` if missing."""
     try:
         from pymavlink.dialects.v20 import common
     except ImportError:
@@ -30,7 +30,7 @@ _MAGIC = 0xFD
 
 
 def check_of(data: bytes) -> int:
-    """MAVLink's checksum, CRC-16/MCRF4XX, as pymavlink has it computed."""
+    """Returns MAVLink's checksum, CRC-16/MCRF4XX, as pymavlink computes it."""
     return _crc()(data)
 
 
@@ -44,11 +44,11 @@ def _crc() -> Callable[[bytes], int]:
 
 
 NEWER = {300: 217, 435: 134, 436: 193}
-"""CRC_EXTRA of messages of `common` that pymavlink's `common` does not have, by their ids."""
+"""CRC_EXTRA of messages of `common` that pymavlink's `common` lacks, by message id."""
 
 
 def crc_extra_of(number: int) -> int:
-    """What goes into the checksum of a message that is sent."""
+    """Returns the CRC_EXTRA that enters the checksum of a sent message."""
     if number in NEWER:
         return NEWER[number]
     extra: int = dialect().mavlink_map[number].crc_extra
@@ -58,8 +58,8 @@ def crc_extra_of(number: int) -> int:
 class Codec:
     """Packs messages of one vehicle.
 
-    Frames are those of pymavlink's own `pack`, in a third of its time: ten vehicles with all their
-    streams send 5,000 a second.
+    Frames are equal to those of pymavlink's `pack` and take a third of its time: ten vehicles with
+    all their streams send 5,000 a second.
     """
 
     def __init__(self, system: int, component: int = AUTOPILOT) -> None:
@@ -67,7 +67,10 @@ class Codec:
         self._source = (system, component)
 
     def pack(self, message: Any, sequence: int) -> bytes:
-        """A frame with a sequence number from 0 to 255; packs its fields once for all links."""
+        """Returns a frame with a sequence number from 0 to 255.
+
+        The fields are packed once for all links.
+        """
         if "char" in message.fieldtypes:
             self._mav.seq = sequence
             packed: bytes = message.pack(self._mav)
@@ -75,11 +78,11 @@ class Codec:
         payload = message.__dict__.get("on_wire")
         if payload is None:
             payload = message.on_wire = _payload_of(message)
-        number = type(message).id  # some have a field of that name
+        number = type(message).id  # some messages have a field of that name
         return self._framed(number, payload, sequence, message.crc_extra)
 
     def frame(self, number: int, payload: bytes, sequence: int) -> bytes:
-        """A frame of a message's packed fields."""
+        """Returns a frame of a message's packed fields."""
         payload = payload.rstrip(b"\0") or b"\0"
         return self._framed(number, payload, sequence, crc_extra_of(number))
 
@@ -92,7 +95,7 @@ class Codec:
 
 
 def _payload_of(message: Any) -> bytes:
-    """Fields of a message of numbers, without the zeros at the end."""
+    """Returns the fields of a message of numbers, without trailing zeros."""
     fields: Iterable[Any] = map(message.__dict__.get, message.ordered_fieldnames)
     if any(length > 1 for length in message.lengths):
         spread: list[Any] = []
@@ -104,13 +107,13 @@ def _payload_of(message: Any) -> bytes:
 
 
 class Parser:
-    """Unpacks the messages of whole frames."""
+    """Unpacks messages from whole frames."""
 
     def __init__(self) -> None:
         self._mav = dialect().MAVLink(None, 0, 0)
 
     def decode(self, frame: bytes) -> Any | None:
-        """The message of a frame; None where its payload does not fit."""
+        """Returns the message of a frame; None if its payload does not fit."""
         try:
             return self._mav.decode(bytearray(frame))
         except (dialect().MAVError, struct.error, UnicodeError):

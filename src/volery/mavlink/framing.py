@@ -1,8 +1,8 @@
-"""Cuts a stream of bytes into MAVLink frames; the stream may begin anywhere and hold noise.
+"""Cuts a stream of bytes into MAVLink frames; the stream may begin anywhere and contain noise.
 
-A frame counts where its start, its length, its message's id and its checksum agree; else the search
-goes on with the next byte, so that nothing that is whole gets lost behind noise. Both generations
-of frames are known; signatures are not looked at here.
+A frame is valid if its start, length, message id and checksum agree. Otherwise the search continues
+with the next byte, so that noise does not hide a whole frame. MAVLink 1 and 2 are supported;
+signatures are not checked here.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from volery.mavlink.codec import NEWER, check_of, crc_extra_of, dialect
 _SECOND, _FIRST = 0xFD, 0xFE
 """Start of a frame of MAVLink 2 and 1."""
 SIGNED = 1
-"""The only flag of a frame that may be set: others say that it cannot be understood."""
+"""The only supported flag of a frame; frames with other flags cannot be parsed."""
 _SIGNATURE = 13
 
 
 class MavlinkFrame(NamedTuple):
-    """One frame: its bytes, and what routing needs."""
+    """One frame: its bytes, and the ids that routing needs."""
 
     data: bytes
     message: int
@@ -29,14 +29,14 @@ class MavlinkFrame(NamedTuple):
 
 
 class Framer:
-    """Feed it bytes, get frames."""
+    """Converts bytes to frames."""
 
     def __init__(self) -> None:
         self._rest = b""
         self._known = dialect().mavlink_map
 
     def feed(self, data: bytes) -> list[MavlinkFrame]:
-        """Frames that `data` completes; an unfinished one waits for the rest."""
+        """Returns the frames that `data` completes; an unfinished one waits for the next call."""
         data, frames, at = self._rest + data, [], 0
         while at < len(data):
             start = _start_in(data, at)
@@ -57,15 +57,15 @@ class Framer:
         return frames
 
     def datagram(self, data: bytes) -> list[MavlinkFrame]:
-        """Frames of a datagram, in which they are whole or broken."""
+        """Returns the frames of a datagram; the datagram contains no partial frames."""
         frames = self.feed(data)
-        while self._rest:  # what looked like a beginning was none
+        while self._rest:  # the assumed start of a frame was none
             self._rest, rest = b"", self._rest[1:]
             frames += self.feed(rest)
         return frames
 
     def _frame(self, data: bytes) -> MavlinkFrame | None:
-        """The frame of these bytes; None where they are none."""
+        """Returns the frame of these bytes; None if they are no frame."""
         if data[0] == _FIRST:
             system, component, number = data[3], data[4], data[5]
             end = 6 + data[1]
@@ -83,7 +83,7 @@ class Framer:
 
 
 def lengths_of(data: bytes) -> Iterator[int]:
-    """Bytes of each of the frames of MAVLink 2 that `data` is made of."""
+    """Yields the length in bytes of each of the MAVLink 2 frames in `data`."""
     at = 0
     while at < len(data):
         length = 12 + data[at + 1] + (_SIGNATURE if data[at + 2] & SIGNED else 0)
@@ -92,14 +92,14 @@ def lengths_of(data: bytes) -> Iterator[int]:
 
 
 def _start_in(data: bytes, at: int) -> int:
-    """Where the next frame may start."""
+    """Returns the index at which the next frame may start."""
     second, first = data.find(_SECOND, at), data.find(_FIRST, at)
     found = [place for place in (second, first) if place >= 0]
     return min(found, default=len(data))
 
 
 def _length_at(data: bytes, start: int) -> int | None:
-    """Bytes of the frame that starts here; None where that is not known yet."""
+    """Returns the length in bytes of the frame that starts here; None if not known yet."""
     if len(data) - start < 3:
         return None
     if data[start] == _FIRST:
@@ -108,5 +108,5 @@ def _length_at(data: bytes, start: int) -> int | None:
 
 
 def _may_grow(data: bytes, start: int) -> bool:
-    """Whether what is there of a frame can still become one."""
+    """Returns whether the received part can still become a frame."""
     return not (data[start] == _SECOND and len(data) - start > 2 and data[start + 2] & ~SIGNED)

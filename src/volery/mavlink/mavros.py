@@ -1,6 +1,6 @@
-"""MAVROS's topics and services for one autopilot, so that offboard programs run unchanged.
+"""Offers MAVROS's topics and services for one autopilot, so that offboard programs run unchanged.
 
-Names, types and frames are MAVROS's: ENU and FLU, places from the autopilot's local origin.
+Names, types and frames are MAVROS's: ENU and FLU, positions from the autopilot's local origin.
 """
 
 from __future__ import annotations
@@ -47,15 +47,16 @@ _TARGET, _ATTITUDE = "mavros_msgs/msg/PositionTarget", "mavros_msgs/msg/Attitude
 _BOOL, _MODE = "mavros_msgs/srv/CommandBool", "mavros_msgs/srv/SetMode"
 _TOL, _LONG = "mavros_msgs/srv/CommandTOL", "mavros_msgs/srv/CommandLong"
 _SLOW_NS, _FAST_NS = 1_000_000_000, 30_000_000
-"""The state comes with each heartbeat, the place at about PX4's rate of LOCAL_POSITION_NED."""
+"""Periods of the state, sent with each heartbeat, and of the pose, at about the rate of PX4's
+LOCAL_POSITION_NED."""
 _SOURCE: Source = (-1, 1, 240)
-"""System and component of MAVROS itself; the link is none of the bridges'."""
+"""System and component of MAVROS itself; the link belongs to no bridge."""
 _log = logging.getLogger(__name__)
 _NOTHING = (math.nan, math.nan, math.nan)
 
 
 class Mavros:
-    """The topics below `prefix` of the autopilot `autopilot`, on the graph of `node`."""
+    """Topics below `prefix` of the autopilot `autopilot`, on the graph of `node`."""
 
     def __init__(self, node: Node, autopilot: Autopilot, prefix: str) -> None:
         self._autopilot = autopilot
@@ -91,7 +92,7 @@ class Mavros:
     # --------------------------------------------------------------------------------------- out
 
     def tell(self) -> None:
-        """Publish what is due."""
+        """Publishes what is due."""
         autopilot, memory = self._autopilot, self._autopilot.memory
         state = (memory.armed, memory.mode)
         if self._is_due("slow", _SLOW_NS) or state != self._last_state:
@@ -190,7 +191,7 @@ class Mavros:
             try:
                 setpoint = read(message)
             except CommandError:
-                return  # a setpoint that is none has nobody to tell
+                return  # an invalid setpoint has no response
             offboard.take(self._autopilot, _SOURCE, setpoint)
 
         return take
@@ -208,7 +209,7 @@ class Mavros:
     def _raw(self, message: Any) -> OffboardSetpoint:
         mask = int(message.type_mask)
         if message.coordinate_frame not in (1, 8) or mask & 512:
-            raise CommandError("no such setpoints")
+            raise CommandError("unsupported setpoint")
         place = self._in_map(message.position) if message.coordinate_frame == 1 else _NOTHING
         push = message.acceleration_or_force
         return _checked(
@@ -243,7 +244,7 @@ class Mavros:
         return response
 
     def _refuse(self, what: str) -> None:
-        """Tell why something is not done, for which the responses have no room."""
+        """Reports why a request is refused; the responses have no field for the reason."""
         _log.warning("%s: %s", self._prefix, what)
         self._autopilot.say(2, what)
 

@@ -1,13 +1,12 @@
-"""The autopilot as a node of the simulation: in lock step with its UAV, so that flights repeat.
+"""Runs the autopilot as a node of the simulation: in lock step with its UAV, so that runs repeat.
 
     [[types.iris.nodes]]
     node = "mavlink_autopilot"
     parameters = { px4 = { MIS_TAKEOFF_ALT = 5.0 } }
 
-Frames come on `mavlink/in` and go out on `mavlink/out`; `udp_bridge`, `tcp_bridge` and
-`serial_bridge` carry them. Beside them stand MAVROS's topics and services below `mavros/`, those of
-system 1 below
-`/mavros/` too.
+The node subscribes to frames on `mavlink/in` and publishes frames on `mavlink/out`; `udp_bridge`,
+`tcp_bridge` and `serial_bridge` carry them. It also has MAVROS's topics and services below
+`mavros/`, and for system 1 below `/mavros/` too.
 """
 
 from __future__ import annotations
@@ -30,16 +29,16 @@ from volery.mavlink.mavros import Mavros
 PACKETS = "volery_interfaces/msg/MavlinkPackets"
 _STATE = "volery_interfaces/msg/FlightState"
 _PACES: WeakKeyDictionary[Any, TransferPace] = WeakKeyDictionary()
-"""Of the vehicles of each graph, which share it."""
+"""Transfer pace of the vehicles of each graph, which share it."""
 MOST_SYSTEMS = 250
-"""Ids above are ground stations' by custom."""
+"""Largest system id of a vehicle; ids above are ground stations' by convention."""
 
 
 class AutopilotNode(Node):
-    """A PX4-like autopilot.
+    """Runs a PX4-like autopilot.
 
-    Parameters: `system_id` (0: that of uavN is N; of other names the highest that is free), `px4`:
-    values of its own parameters by name, see docs/mavlink.md.
+    Parameters: `system_id` (0: N for uavN; for other names the highest free id), `px4`: values of
+    the autopilot's parameters by name, see docs/mavlink.md.
     """
 
     def __init__(self, **options: Any) -> None:
@@ -48,7 +47,7 @@ class AutopilotNode(Node):
         given = self.declare_parameter("px4", {}).value
         self.system_id = wanted or self._own_number() or self._free_number()
         if not 1 <= self.system_id <= MOST_SYSTEMS:
-            raise NodeError(f"system_id {self.system_id}: 1 to {MOST_SYSTEMS} is allowed")
+            raise NodeError(f"system_id {self.system_id}: must be 1 to {MOST_SYSTEMS}")
         self.declare_parameter("mavlink_id", self.system_id)
         build = build_of(self)
         self.core = core.Autopilot(self.system_id, GraphVehicle(self), build, given)
@@ -65,11 +64,14 @@ class AutopilotNode(Node):
         self.create_subscription(Temperature, "pressure/temperature", self._take_temperature, 1)
 
     def get_state(self) -> AutopilotState:
-        """Everything that changes; links are the bridges', who goes back keeps those there are."""
+        """Returns the whole state.
+
+        Links belong to the bridges, so a restore keeps the current ones.
+        """
         return self.core.memory
 
     def set_state(self, state: AutopilotState) -> None:
-        """Go on from a kept state, with the links of now."""
+        """Restores a saved state, with the current links."""
         links = self.core.memory.links
         self.core.memory = state
         self.core.log.end()
@@ -78,7 +80,7 @@ class AutopilotNode(Node):
             streams.begin(link, state.now_ns)
 
     def destroy_node(self) -> None:
-        """As of nodes; the flight logs go, too."""
+        """Destroys the node and closes the flight logs."""
         super().destroy_node()
         self.core.log.close()
 
@@ -109,7 +111,7 @@ class AutopilotNode(Node):
         self.core.memory.air_temperature = float(temperature.temperature)
 
     def _flush(self) -> None:
-        """Hand out what was sent, in one message a link."""
+        """Publishes the pending frames, one message per link."""
         frames: dict[int, list[bytes]] = {}
         for link, data in self.core.take_sent():
             frames.setdefault(link, []).append(data)
@@ -118,12 +120,12 @@ class AutopilotNode(Node):
             self._out.publish(self._packets(link=link, profile=0, closed=False, data=joined))
 
     def _own_number(self) -> int:
-        """N of uavN; 0 of other names."""
+        """Returns N for uavN; 0 for other names."""
         found = re.fullmatch(r"/uav([1-9]\d{0,2})", self.get_namespace())
         return int(found[1]) if found and int(found[1]) <= MOST_SYSTEMS else 0
 
     def _free_number(self) -> int:
-        """The highest id that no other autopilot of the graph has."""
+        """Returns the highest id that no other autopilot of the graph has."""
         parameters = self._context.graph.parameters
         taken = {
             parameters.get(node, name).value

@@ -1,4 +1,4 @@
-"""Gives the UAVs of a scenario autopilots, or what those outside need."""
+"""Adds autopilots to the UAVs of a scenario, or the sensors that external autopilots need."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _CALIBRATED_IMU = "iim42653"
 
 
 def with_autopilots(scenario: Scenario) -> Scenario:
-    """The scenario with an autopilot beside each UAV whose type has none.
+    """Returns the scenario with an autopilot for each UAV whose type has none.
 
-    It is part of what is flown then: logs tell of it, and repeated flights have it too.
-    `BridgeError` where pymavlink is not installed.
+    The autopilots are then part of the scenario: logs contain them, and replayed flights have them
+    too. Raises `BridgeError` if pymavlink is not installed.
     """
     dialect()
     data: dict[str, Any] = scenario.model_dump(exclude_unset=True)
@@ -31,11 +31,13 @@ def with_autopilots(scenario: Scenario) -> Scenario:
 
 
 def with_px4(scenario: Scenario) -> Scenario:
-    """The scenario for real PX4s: every type has the sensors that they need, none starts by itself.
+    """Returns the scenario for real PX4s: all types have the sensors that PX4 needs.
 
-    An IMU at 250 Hz, so that each step has a reading; magnetometer, barometer and GNSS where a type
-    has none. Where the scenario chooses no model of an IMU it is a calibrated one: beyond a bias of
-    0.3 m/s^2 PX4 does not arm.
+    No UAV takes off by itself.
+
+    Adds an IMU at 250 Hz, so that each step has a sample, and magnetometer, barometer and GNSS if a
+    type has none. If the scenario chooses no IMU model, the model is a calibrated one: PX4 does not
+    arm with a bias above 0.3 m/s^2.
     """
     dialect()
     others = ("magnetometer", "barometer", "gnss")
@@ -43,10 +45,10 @@ def with_px4(scenario: Scenario) -> Scenario:
 
 
 def with_ardupilot(scenario: Scenario) -> Scenario:
-    """The scenario for real ArduPilots: IMU and true state at 800 Hz; none starts by itself.
+    """Returns the scenario for real ArduPilots: IMU and true state at 800 Hz; no UAV takes off.
 
-    Physics steps that do not fit are made as long as the time between two states. ArduPilot makes
-    all further sensors of its own from the true state.
+    If the physics step does not fit, it becomes the period of the states. ArduPilot computes all
+    other sensors from the true state.
     """
     dialect()
     if scenario.physics.rate_hz % STATE_HZ:
@@ -63,9 +65,9 @@ def _with_sensors(
     others: Sequence[str],
     models: Mapping[str, str] | None = None,
 ) -> Scenario:
-    """Every type with these sensors; the UAVs wait on the ground.
+    """Returns the scenario in which every type has these sensors; the UAVs wait on the ground.
 
-    rates: of some sensors, by kind. models: of those whose model the scenario does not choose.
+    rates: sensor rates, Hz, by kind. models: for sensors whose model the scenario does not choose.
     """
     data: dict[str, Any] = scenario.model_dump(exclude_unset=True)
     for name, uav_type in scenario.types.items():
@@ -83,5 +85,5 @@ def _with_sensors(
 
 
 def _parsed_like(scenario: Scenario, data: dict[str, Any]) -> Scenario:
-    """The scenario of `data`, with the access of `scenario`."""
+    """Returns the scenario of `data`, with the access of `scenario`."""
     return parse_scenario(data, where=scenario.name, access=scenario.access)

@@ -174,7 +174,7 @@ def test_best_effort_publishers_are_heard_too(world, other):
 
 def test_foreign_types_and_other_definitions_are_warned_of(world, other, caplog):
     wrong, _ = other.speak("/uav1/cmd_vel", STRING)
-    until(lambda: "publisher of std_msgs/msg/String is not heard" in caplog.text)
+    until(lambda: "publisher of std_msgs/msg/String is ignored" in caplog.text)
     wrong.close()
     topics = world.bridge._shared.topics
     fake = next(p for p in other.participant.publishers() if p.topic == "/chatter")
@@ -237,7 +237,7 @@ def _confined():
 
 def test_interfaces_that_there_are_not_are_told():
     with pytest.raises(
-        BridgeError, match="there is no network interface 'no_such_interface'; there are "
+        BridgeError, match="unknown network interface 'no_such_interface'; known are "
     ):
         join_ros2(Ros2Environment(domain_id=DOMAIN + 3, interfaces=("no_such_interface",)))
 
@@ -460,7 +460,7 @@ def test_everything_is_given_back():
 
 def test_what_is_not_understood_is_named_by_the_vendor_of_its_dds():
     rest = bytes(14)
-    assert "as rmw_fastrtps does" in why_foreign("clientid", b"\x01\x0f" + rest)
+    assert "uses rmw_fastrtps" in why_foreign("clientid", b"\x01\x0f" + rest)
     assert "fastrtps" not in why_foreign("clientid", b"\x01\x10" + rest)
     assert "RTI Connext DDS and lacks 'serviceid=" in why_foreign("serviceid", b"\x01\x01" + rest)
     assert "a DDS of vendor 01.77" in why_foreign("clientid", b"\x01\x77" + rest)

@@ -168,7 +168,7 @@ def test_nothing_leaves_the_machine_unless_interfaces_are_named():
     assert 'name="eth0"' in there
     assert 'address="192.168.1.7"' in there
     assert "127.0.0.1" not in there
-    with pytest.raises(BridgeError, match="no network interface"):
+    with pytest.raises(BridgeError, match="is not a network interface"):
         environment.join_ros2(environment.Ros2Environment("dds", 7, ('"/><x',)))
 
 

@@ -169,7 +169,7 @@ def test_it_connects_again_and_registers_again(here, there):
     until(lambda: topics(there)["/uav1/status"].publishers == 1)
     here.publish(out, String("again"))
     until(lambda: seen)
-    assert any("has left" in note for note in connector.notes)
+    assert any("has disconnected" in note for note in connector.notes)
 
 
 def test_it_may_start_before_the_endpoint(here, there):
@@ -193,7 +193,7 @@ def test_connections_are_reported(here, there):
     target = f"ROS-TCP to 127.0.0.1:{port}"
     assert len(reports) == 1
     assert reports[0].startswith(f"{target}: cannot connect: ")
-    assert reports[0].endswith("; it connects when an endpoint is there")
+    assert reports[0].endswith("; retrying until an endpoint answers")
     endpoint = RosTcpEndpoint(port=port, generation="ros2")
     there.bridges.open(endpoint)
     until(lambda: len(reports) == 2)
@@ -337,7 +337,7 @@ def test_types_that_the_endpoint_does_not_know_are_named_once(here, meet):
         endpoint.sock.sendall(frame("__error", json.dumps({"text": text}).encode()))
     until(lambda: len(reports) == 2)
     assert reports[1].endswith(
-        ": the endpoint does not know octomap_msgs/Octomap, which /maps/one, /maps/two need: not "
+        ": the endpoint lacks octomap_msgs/Octomap, which /maps/one, /maps/two need: not "
         "shared; install the package octomap_msgs where the endpoint runs"
     )
     assert {m.topic for m in here.gateway.sessions()[0].mailboxes} == {"/out"}
@@ -367,7 +367,12 @@ def test_the_endpoints_words_are_kept_and_nonsense_is_survived(here, meet):
     until(lambda: seen)
     assert seen[0].message.angular.z == 5.0
     text = "\n".join(connector.notes)
-    for words in ("Unknown message class", "not subscribed", "no JSON", "geometry_msgs/msg/Twist"):
+    for words in (
+        "Unknown message class",
+        "not subscribed",
+        "invalid JSON",
+        "geometry_msgs/msg/Twist",
+    ):
         assert words in text
 
 

@@ -209,7 +209,7 @@ def test_a_service_of_the_simulation(bench, client):
     assert (answer["result"], answer["id"]) == (False, 7)
     assert "data must be true or false" in answer["values"]
     client.send("call_service", service="/nobody", args=[])
-    assert "nobody offers" in client.read()[0]["values"]
+    assert "has no server" in client.read()[0]["values"]
     client.send("call_service", service="/arm", args=[1, 2, 3])
     assert "3 arguments for 1" in client.read()[0]["values"]
 
@@ -244,7 +244,7 @@ def test_a_service_of_one_client_for_another(bench, client):
     ("response", "words"),
     [
         ({"result": False, "values": "cannot"}, "cannot"),
-        ({"result": True, "values": {"success": 5}}, "answered wrongly"),
+        ({"result": True, "values": {"success": 5}}, "sent a wrong response"),
         (None, "has left"),
     ],
 )

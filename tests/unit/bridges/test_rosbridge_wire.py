@@ -191,7 +191,7 @@ def test_fragments_are_bounded():
     one = {"op": "fragment", "id": "a", "data": "x", "num": 0, "total": 2}
     for k in range(MOST_OPEN):
         assembly.add(one | {"id": k}, 0.0)
-    with pytest.raises(BridgeError, match="under way"):
+    with pytest.raises(BridgeError, match="are incomplete"):
         assembly.add(one, 0.0)
     assert assembly.add(one, 31.0) is None  # the others have been given up
     assert assembly.waiting == 1

@@ -84,11 +84,11 @@ def test_a_scanner_may_turn_clockwise(tmp_path):
     ("line", "problem"),
     [
         ("1200000 0 0 0 1000 2000", "line 5: 6 columns where the layout needs 7"),
-        ("1200000 0 0 0 1000 2000 far", "line 5: a column holds no number"),
+        ("1200000 0 0 0 1000 2000 far", "line 5: a column has no number"),
         ("1000001 0 0 0 1000 2000 3000", "line 5: at 1.000001 s, not after the line before"),
-        ("nan 0 0 0 1000 2000 3000", "line 5: nan s is no time"),
-        ("-5 0 0 0 1000 2000 3000", "line 5: -5e-06 s is no time"),
-        ("9e99 0 0 0 1000 2000 3000", "line 5: 9e[+]93 s is no time"),
+        ("nan 0 0 0 1000 2000 3000", "line 5: nan s is out of range"),
+        ("-5 0 0 0 1000 2000 3000", "line 5: -5e-06 s is out of range"),
+        ("9e99 0 0 0 1000 2000 3000", "line 5: 9e[+]93 s is out of range"),
         ("\x00\xff", "line 5: 1 column where"),
     ],
 )
@@ -101,7 +101,7 @@ def test_lines_that_cannot_be_read_are_left_out_and_told(tmp_path, line, problem
 
 @pytest.mark.parametrize("text", ["", "# nothing\n", "one two three\n", "1 2 3\n"])
 def test_a_file_without_scans_is_refused(tmp_path, text):
-    with pytest.raises(RecordingError, match="holds no scan of this layout"):
+    with pytest.raises(RecordingError, match="has no scan of this layout"):
         list(walk(tmp_path, text))
 
 
@@ -207,7 +207,7 @@ def test_odometry_that_is_no_number_is_not_told(tmp_path):
 )
 def test_a_text_is_no_number_of_a_layout(table, key, value):
     changed = {**LAYOUT, table: {**LAYOUT.get(table, {}), key: value}}
-    with pytest.raises(ValueError, match="numbers stand here"):
+    with pytest.raises(ValueError, match="must be a number"):
         TextLayout.model_validate(changed)
 
 

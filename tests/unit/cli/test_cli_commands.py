@@ -268,7 +268,7 @@ def test_bench_mistakes(tmp_path: Path) -> None:
     assert ", ".join(registry.BENCHES) + ", or all" in result.stderr
     result = runner.invoke(app, ["bench", "lidar", "--out", str(tmp_path / "no" / "x.json")])
     assert result.exit_code == 2
-    assert "there is no folder" in result.stderr
+    assert "does not exist" in result.stderr
     for content in ("{}", "[1]", '"x"', "no json"):
         path = tmp_path / "bad.json"
         path.write_text(content)

@@ -87,10 +87,19 @@ def test_ros1_log(invoke: Invoke, tmp_path: Path) -> None:
         (("run", "hover", "--speed", "nan"), "--speed"),
         (("run", "hover", "--record", "log.txt"), r"log.txt.*\.mcap.*\.bag"),
         (("run", "hover", "--record", "exists.mcap"), "exists already.*--overwrite"),
-        (("run", "hover", "--record", "a/b/x.mcap"), "a/b/x.mcap: cannot.*no folder .*a/b.*mkdir"),
-        (("run", "hover", "--record", "/nosuchroot/x.mcap"), "no folder /nosuchroot; `mkdir -p"),
-        (("run", "hover", "--report", "a/b/report"), "a/b/report: cannot.*no folder .*a/b.*mkdir"),
-        (("run", "hover", "--report", "/nosuchroot/x"), "no folder /nosuchroot"),
+        (
+            ("run", "hover", "--record", "a/b/x.mcap"),
+            "a/b/x.mcap: cannot.*folder .*a/b does not exist.*mkdir",
+        ),
+        (
+            ("run", "hover", "--record", "/nosuchroot/x.mcap"),
+            "folder /nosuchroot does not exist; create it with `mkdir -p",
+        ),
+        (
+            ("run", "hover", "--report", "a/b/report"),
+            "a/b/report: cannot.*folder .*a/b does not exist.*mkdir",
+        ),
+        (("run", "hover", "--report", "/nosuchroot/x"), "folder /nosuchroot does not exist"),
         (("run", "hover", "--report", "exists.mcap"), "exists.mcap: cannot write the report"),
         (("run", "hover", "--record", "exists.mcap/x.bag"), "exists.mcap/x.bag: cannot create"),
     ],

@@ -18,7 +18,7 @@ def test_nodes_wait_for_their_graph_and_say_so(monkeypatch, capsys) -> None:
     monkeypatch.setattr(connections, "open_link", open_link)
     monkeypatch.setattr(connections, "_AGAIN_S", 0.0)
     assert connections.await_link("x://y", "node") == "link"
-    assert capsys.readouterr().err == "nobody at x://y; waits 30 s for it\n"
+    assert capsys.readouterr().err == "nobody at x://y; waiting up to 30 s\n"
     tries.clear()
     with pytest.raises(UnreachableError):
         connections.await_link("x://y", "node", patience_s=0.0)
@@ -26,7 +26,7 @@ def test_nodes_wait_for_their_graph_and_say_so(monkeypatch, capsys) -> None:
 
 
 def test_what_never_comes_is_not_waited_for(capsys) -> None:
-    with pytest.raises(BridgeError, match="no way into a graph"):
+    with pytest.raises(BridgeError, match="is not a graph connection"):
         connections.await_link("pigeon://post", "node")
     assert capsys.readouterr().err == ""
 
@@ -41,7 +41,8 @@ def test_a_graph_that_goes_and_comes_is_told_once_each(capsys) -> None:
         line.connected = connected
         assert told() is False
     assert capsys.readouterr().err == (
-        "the graph at x://y is gone; waiting for it\nthe graph at x://y is there again\n"
+        "the graph at x://y is disconnected; waiting for it\n"
+        "the graph at x://y is connected again\n"
     )
     assert connections.ConnectionOptions(object(), "ros2")() is False  # of which no server tells
     assert capsys.readouterr().err == ""

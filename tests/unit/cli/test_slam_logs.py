@@ -74,7 +74,7 @@ def test_a_text_log_becomes_map_path_and_summary(mapped, carried):
     assert told["refused"] == 1
     assert told["way_m"] == pytest.approx(16.0, abs=0.3)
     assert "mapping " in said
-    assert "m over ground (without IMU)" in said
+    assert "m path length (without IMU)" in said
     assert f"1 line left out; line {len(carried.time_s) + 1}: " in said
     assert "warning: " in said
     assert said.count("warning: ") == 1
@@ -171,7 +171,7 @@ def test_a_folder_that_cannot_be_written_to_is_told_before_the_work(text, monkey
     assert "error: /proc/nowhere/out: cannot write the map there: " in result.output
     result = slam(text / "scans.txt", *layout, "--out", text / "scans.txt")
     assert result.exit_code == 2
-    assert "is no folder" in result.output
+    assert "is not a folder" in result.output
 
 
 @pytest.mark.parametrize("most", [40_000, 40])
@@ -188,7 +188,7 @@ def test_a_map_that_is_too_large_costs_nothing_else(most, text, tmp_path, monkey
         assert told["cell_m"] is None
         assert sorted(path.name for path in out.iterdir()) == ["path.tum", "summary.json"]
     else:
-        assert f"they are {told['cell_m']:g} m wide" in result.output
+        assert f"cells are {told['cell_m']:g} m wide" in result.output
         assert told["cell_m"] in (0.1, 0.2, 0.4)
         assert grid_of(out)[2] == told["cell_m"]
 
@@ -212,7 +212,7 @@ def test_an_imu_that_was_not_used_is_advised_where_the_plane_does_not_do(capsys)
     _advise(outcome, topics)
     told = capsys.readouterr().err
     assert told.startswith("warning: degraded or lost for 33% of the time, in the plane")
-    assert "(/uav1/imu) may tell more: --imu" in told
+    assert "(/uav1/imu) may help: --imu" in told
     outcome.states.update(tracking=60.0)
     _advise(outcome, topics)
     assert capsys.readouterr().err == ""
@@ -233,7 +233,7 @@ def test_a_clock_set_back_in_the_middle_costs_no_scan(text, carried, tmp_path):
 @pytest.mark.parametrize(
     ("content", "arguments", "told"),
     [
-        ("", ("--layout", "layout.toml"), "holds no scan of this layout"),
+        ("", ("--layout", "layout.toml"), "has no scan of this layout"),
         ("", (), "the file is empty"),
         ("1 2 3\n", (), "a scanner's text log needs --layout"),
         ("1 2 3\n", ("--layout", "layout.toml"), "3 columns where the layout needs"),
@@ -241,7 +241,7 @@ def test_a_clock_set_back_in_the_middle_costs_no_scan(text, carried, tmp_path):
         (
             "1 2 3\n",
             ("--layout", "layout.toml", "--initial-pose", "1,2"),
-            "--initial-pose: 4 numbers",
+            "--initial-pose: expects 4 numbers",
         ),
         (
             "1 2 3\n",
@@ -267,7 +267,7 @@ def test_what_cannot_be_mapped_is_told_in_a_line(content, arguments, told, text,
 @pytest.mark.parametrize(
     ("line", "instead", "told"),
     [
-        ("[odometry]", "[odometry]\nunit_m = 1.0", "warning: by its odometry it went 16"),
+        ("[odometry]", "[odometry]\nunit_m = 1.0", "warning: the path is 16"),
         ("beams = 241", "beams = 200", "41 columns unused: a line has 245, the layout's last"),
         (
             "[ranges]",

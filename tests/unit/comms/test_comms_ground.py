@@ -271,7 +271,7 @@ def test_gcs_says_that_the_server_is_gone_and_back_and_what_did_not_come() -> No
         gcs.tell("land uav2")
         gcs.says("queued: land to uav2")
         gcs.tell("quit")
-        gcs.says("warning: nobody has said that it came: hold to uav1, land to uav2")
+        gcs.says("warning: no acknowledgement of: hold to uav1, land to uav2")
         assert gcs.process.wait(60.0) == 0
 
 

@@ -146,7 +146,10 @@ def test_who_is_silent_ends_the_run_or_is_given_up(opened, caplog):
     meet(simulation, bridge, 1)
     with caplog.at_level(logging.WARNING, logger="volery.mavlink"):
         simulation.run(0.5)
-    assert "uav1: its autopilot has been silent for 0.3 s; it is not waited for" in caplog.messages
+    assert (
+        "uav1: its autopilot has been silent for 0.3 s; the simulation goes on without it"
+        in caplog.messages
+    )
     assert bridge.connected == ()
 
 
@@ -185,8 +188,8 @@ def test_noise_and_a_second_one_are_told_of_and_passed_over(opened, caplog):
         simulation.run(0.2)
     finish(autopilot)
     assert caplog.messages == [
-        "uav1: what speaks to its port is no ArduPilot",
-        "uav1: its ArduPilot is there already; another one is not heard",
+        "uav1: a sender to its port is not an ArduPilot",
+        "uav1: its ArduPilot is connected already; another one is ignored",
     ]
 
 
@@ -258,7 +261,7 @@ def test_motors_follow_the_arms():
 
 
 def test_arms_that_arducopter_does_not_fly():
-    with pytest.raises(BridgeError, match="the other way"):
+    with pytest.raises(BridgeError, match="turn opposite"):
         motors_of(
             [rotor._replace(direction={"cw": "ccw", "ccw": "cw"}[rotor.direction]) for rotor in X]
         )

@@ -45,8 +45,8 @@ def test_missing_px4s_are_told_of_once_while_time_goes_on(opened, caplog):
     port = free_port()
     simulation = opened(with_px4(irises(2)), Px4Bridge(port=port, notice_s=SOON_S))
     assert heard(caplog, simulation) == [
-        f"no PX4 yet for uav1 (127.0.0.1:{port}), uav2 (127.0.0.1:{port + 1}): they stand still "
-        "until one comes; PX4's instances connect to ports 4560 and following"
+        f"no PX4 yet for uav1 (127.0.0.1:{port}), uav2 (127.0.0.1:{port + 1}): they stay on the "
+        "ground until one connects; PX4's instances connect to ports 4560 and following"
     ]
     assert simulation.time_s == pytest.approx(3.0 * SOON_S)
 
@@ -59,7 +59,7 @@ def test_only_those_are_told_of_that_are_missing(opened, caplog):
         while not bridge.connected and time.monotonic() < end:
             time.sleep(0.01)
         (told,) = heard(caplog, simulation, 6.0 * SOON_S)
-    assert f"uav2 (127.0.0.1:{bridge._port + 1}): it stands still" in told
+    assert f"uav2 (127.0.0.1:{bridge._port + 1}): it stays on the ground" in told
     assert "uav1" not in told
 
 
@@ -81,7 +81,9 @@ def test_missing_ardupilots_are_told_of(opened, caplog):
     port = free_port(socket.SOCK_DGRAM)
     simulation = opened(with_ardupilot(irises()), ArdupilotBridge(port=port, notice_s=SOON_S))
     (told,) = heard(caplog, simulation)
-    assert told.startswith(f"no ArduPilot yet for uav1 (UDP 127.0.0.1:{port}): it stands still")
+    assert told.startswith(
+        f"no ArduPilot yet for uav1 (UDP 127.0.0.1:{port}): it stays on the ground"
+    )
     assert "start with: arducopter --model JSON" in told
 
 
@@ -89,7 +91,7 @@ def test_a_silent_serial_line_is_told_of(opened, caplog):
     terminal = Terminal()
     simulation = opened(with_px4(irises()), Px4SerialBridge(terminal.path, notice_s=SOON_S))
     (told,) = heard(caplog, simulation)
-    assert told.startswith(f"no PX4 yet for uav1 ({terminal.path} at 921600 baud): it stands")
+    assert told.startswith(f"no PX4 yet for uav1 ({terminal.path} at 921600 baud): it stays")
     assert "SYS_HITL = 1" in told
 
 
@@ -97,4 +99,4 @@ def test_of_many_three_are_named():
     places = {f"uav{k}": f"127.0.0.1:{4559 + k}" for k in range(1, 51)}
     told = notice("PX4", places, "start them")
     assert told.startswith("no PX4 yet for uav1 (127.0.0.1:4560), uav2 ")
-    assert "uav3 (127.0.0.1:4562) and 47 more: they stand still" in told
+    assert "uav3 (127.0.0.1:4562) and 47 more: they stay on the ground" in told

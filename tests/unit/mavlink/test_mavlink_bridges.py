@@ -168,7 +168,7 @@ def test_names_of_the_command_line():
         with open_bridges(simulation, options):
             simulation.run(0.1)
         with (
-            pytest.raises(BridgeError, match="no serial line"),
+            pytest.raises(BridgeError, match="is not a serial line"),
             open_bridges(
                 simulation, RunOptions("flat", bridges=("mavlink-serial=/dev/null:57600",))
             ),

@@ -92,7 +92,7 @@ def test_who_speaks_no_mavlink_gives_way_and_who_comes_after_a_px4_is_ended(open
         meet(simulation, bridge, 1)
         stranger.sendall(b"hello, is this the way to the aviary?" * 5)
         end = time.monotonic() + 60.0
-        while "does not speak" not in caplog.text and time.monotonic() < end:
+        while "does not send MAVLink" not in caplog.text and time.monotonic() < end:
             time.sleep(0.01)
         with socket.create_connection(address) as px4:
             assert is_ended(stranger)
@@ -102,9 +102,9 @@ def test_who_speaks_no_mavlink_gives_way_and_who_comes_after_a_px4_is_ended(open
             with socket.create_connection(address) as second:
                 assert is_ended(second)
             assert bridge.connected == ("uav1",)
-    told = [text for text in caplog.messages if "does not speak MAVLink" in text]
-    assert told == ["uav1: what is connected does not speak MAVLink: no PX4?"]
-    assert "uav1: its PX4 is connected already; another connection is ended" in caplog.messages
+    told = [text for text in caplog.messages if "does not send MAVLink" in text]
+    assert told == ["uav1: the connected client does not send MAVLink; connect a PX4"]
+    assert "uav1: its PX4 is connected already; another connection is closed" in caplog.messages
 
 
 def test_several_vehicles_share_one_clock(opened):
@@ -143,7 +143,7 @@ def test_a_silent_one_is_given_up_where_that_is_wanted_and_may_come_back(opened,
     with caplog.at_level(logging.WARNING, logger="volery.mavlink"):
         simulation.run(1.0)
     assert simulation.time_s == pytest.approx(1.0)
-    told = "uav1: its autopilot has been silent for 0.5 s; it is not waited for"
+    told = "uav1: its autopilot has been silent for 0.5 s; the simulation goes on without it"
     assert told in caplog.messages
     again = StandIn(bridge._port, 50)
     meet(simulation, bridge, 1)
@@ -166,7 +166,7 @@ def test_time_goes_on_without_one_that_is_disarmed_and_says_nothing(opened, capl
         raise autopilot.fault
     assert len(autopilot.sensors) == 200
     told = {text for text in caplog.messages if "silent" in text}
-    assert told == {"uav1: its autopilot is disarmed and silent; it is not waited for"}
+    assert told == {"uav1: its autopilot is disarmed and silent; the simulation goes on without it"}
 
 
 def test_one_that_is_disarmed_and_never_answers_again_ends_the_run(opened):
@@ -242,9 +242,9 @@ def test_one_on_a_serial_line_flies_the_uav_that_is_left():
 def test_a_serial_line_that_is_too_slow_is_told():
     simulation = Simulation(scenario(), threads=1)
     with simulation, BridgeHost(simulation.gateway) as bridges:
-        with pytest.raises(BridgeError, match="57600 baud is too slow for HIL; 230400 or more"):
+        with pytest.raises(BridgeError, match="57600 baud is too slow for HIL; use 230400 or more"):
             bridges.open(Px4SerialBridge("/dev/null", 57600))
-        with pytest.raises(BridgeError, match="/dev/null is no serial line"):
+        with pytest.raises(BridgeError, match="/dev/null is not a serial line"):
             bridges.open(Px4SerialBridge("/dev/null"))
 
 
@@ -318,8 +318,8 @@ def test_what_cannot_be_said_is_told_of_and_the_run_goes_on(opened, monkeypatch,
     simulation.run(0.1)
     assert simulation.time_s == pytest.approx(0.1)
     autopilot.close()
-    told = [text for text in caplog.messages if "cannot be told" in text]
-    assert told == ["uav1: its autopilot cannot be told what is sensed: infinity is no integer"]
+    told = [text for text in caplog.messages if "cannot send sensor values" in text]
+    assert told == ["uav1: cannot send sensor values to its autopilot: infinity is no integer"]
 
 
 def test_who_was_let_go_is_not_obeyed(opened):

@@ -111,19 +111,21 @@ def test_one_that_ends_by_itself_is_told(tmp_path):
     with Px4Instances(find_px4(tmp_path), 1, first=NUMBER) as instances:
         assert instances.wait(60.0)
     assert instances.failure == (
-        "PX4 187 ended with code 3; it said:\n  PX4 server already running for instance 187"
+        "PX4 187 ended with code 3; last output:\n  PX4 server already running for instance 187"
     )
 
 
 def test_what_is_no_px4_is_told(tmp_path):
-    with pytest.raises(BridgeError, match="no such folder; --px4-dir takes that of PX4-Autopilot"):
+    with pytest.raises(
+        BridgeError, match="no such folder; --px4-dir needs the folder of PX4-Autopilot"
+    ):
         find_px4(tmp_path / "nowhere")
     with pytest.raises(BridgeError, match="px4 is missing; build it there with `make"):
         find_px4(tmp_path)
     build = make_px4(tmp_path, FAILS)
     assert find_px4(build).binary == build / "bin/px4"
     (build / "bin/px4").chmod(0o644)
-    with pytest.raises(BridgeError, match="is no program that may be run"):
+    with pytest.raises(BridgeError, match="is not executable"):
         find_px4(tmp_path)
     (build / "bin/px4").chmod(0o755)
     (build / "etc/init.d-posix/airframes/10016_none_iris").unlink()
@@ -134,7 +136,7 @@ def test_what_is_no_px4_is_told(tmp_path):
 @pytest.mark.parametrize(("first", "count"), [(0, 0), (-1, 1), (250, 10)])
 def test_numbers_beyond_mavlinks_ids_are_refused(tmp_path, first, count):
     make_px4(tmp_path, FAILS)
-    with pytest.raises(BridgeError, match="0 to 253 can be"):
+    with pytest.raises(BridgeError, match="0 to 253 are allowed"):
         Px4Instances(find_px4(tmp_path), count, first=first)
 
 
@@ -158,4 +160,4 @@ def test_one_that_never_connects_is_told_with_its_last_words(tmp_path, monkeypat
         pass
     said = str(error.value)
     assert said.startswith("uav1: PX4 0 has not connected to 127.0.0.1:")
-    assert "within 1 s; it said last:\n  INFO [init] waiting for something" in said
+    assert "within 1 s; last output:\n  INFO [init] waiting for something" in said

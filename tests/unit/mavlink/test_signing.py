@@ -86,7 +86,7 @@ def test_what_pymavlink_signs_is_accepted_once():
 @pytest.mark.parametrize(
     ("mav", "why"),
     [
-        (station(None), "it does not sign"),
+        (station(None), "it sends unsigned frames"),
         (station(bytes(32)), "its signature does not match the key"),
         (station(stamp=STAMP - 6_100_000), "its clock is more than a minute behind"),
     ],
@@ -96,7 +96,7 @@ def test_strangers_are_refused_and_told_of_once(mav, why, caplog):
     signing = ours()
     for _ in range(3):
         assert not signing.accepts(frame_of(mav))
-    assert caplog.messages == [f"MAVLink: system 255, component 190 is not heard: {why}"]
+    assert caplog.messages == [f"MAVLink: system 255, component 190 is ignored: {why}"]
 
 
 def test_a_changed_frame_is_refused():

@@ -182,7 +182,7 @@ def test_what_is_kept_has_a_bound(tmp_path, flying, monkeypatch):
     flying.process_commands()
     flying.run(0.01)
     log.close()
-    with pytest.raises(RecordingError, match="command 0 of the flight is missing"):
+    with pytest.raises(RecordingError, match="command 0 is missing"):
         read_flight(tmp_path / "x.mcap")
 
 

@@ -124,7 +124,7 @@ def test_a_log_gives_the_way_that_its_own_slam_told(tells, flown, tmp_path):
     flown.write(tmp_path / "flight.mcap", tells=tells)
     result = slam(tmp_path / "flight.mcap", tmp_path / "out", "--initial-pose", "0,0,0,0")
     assert result.exit_code == 0, result.output
-    assert "as it tells" not in result.output
+    assert "--initial-pose overrides it" not in result.output
     path = np.loadtxt(tmp_path / "out" / "path.tum")
     own = np.stack([np.interp(path[:, 0], flown.own[:, 0], flown.own[:, k]) for k in (1, 2, 3)], 1)
     assert len(path) > 200
@@ -154,7 +154,7 @@ def test_it_begins_where_a_log_of_volerys_tells(more, begins, flown, tmp_path):
     flown.write(tmp_path / "flight.mcap", tells="scenario", **more)
     result = slam(tmp_path / "flight.mcap", tmp_path / "out")
     assert result.exit_code == 0, result.output
-    assert ("as it tells; --initial-pose says otherwise" in result.output) == any(begins)
+    assert ("from the log; --initial-pose overrides it" in result.output) == any(begins)
     told = json.loads((tmp_path / "out" / "summary.json").read_text())["start"]
     np.testing.assert_allclose(told, begins, atol=0.02)
     path = np.loadtxt(tmp_path / "out" / "path.tum")[:, 1:4]
@@ -194,8 +194,8 @@ def test_of_several_uavs_it_says_which_one_it_maps(flown, tmp_path):
     flown.write(tmp_path / "flight.mcap", tells="moving", others=("uav2", "uav3"))
     result = slam(tmp_path / "flight.mcap", tmp_path / "out")
     assert result.exit_code == 0, result.output
-    assert "warning: uav1 is mapped; the log has uav2, uav3, too: --uav" in result.output
-    assert "heard     uav1: /uav1/laser/horizontal/scan, /uav1/imu, /uav1/laser/n" in result.output
+    assert "warning: mapping uav1; the log also has uav2, uav3: select with --uav" in result.output
+    assert "input     uav1: /uav1/laser/horizontal/scan, /uav1/imu, /uav1/laser/n" in result.output
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["uav"] == "uav1"
     assert re.search(r"state     (starting 0\.\d s, )?tracking \d\.\d s", result.output)
     assert "1 session, " in result.output

@@ -87,7 +87,7 @@ def test_recording(simulate, flat_data, tmp_path):
 def test_recording_of_some_topics(simulate, flat_data, tmp_path):
     simulation = simulate(flat_data, recordings=tmp_path)
     start = "/volery/start_recording"
-    refused(ask(simulation, start, path="a.mcap", topics=["odom"]), "is no pattern")
+    refused(ask(simulation, start, path="a.mcap", topics=["odom"]), "is not a topic pattern")
     chosen = {"topics": ["/uav1/**", "/clock"], "exclude": ["/**/ground_truth/**"]}
     assert ask(simulation, start, path="a.mcap", **chosen).success
     simulation.run(0.2)

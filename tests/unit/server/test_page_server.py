@@ -280,7 +280,5 @@ def test_without_the_pages_build_nothing_breaks(monkeypatch, tmp_path, capsys):
         assert ask(server, "/icon.svg").status == 200
     said = capsys.readouterr().err.splitlines()
     assert said[0].startswith("page    http://127.0.0.1:")
-    assert said[1] == (
-        "warning: the page is not built: make web builds it; the rest of the address works"
-    )
+    assert said[1] == ("warning: the page is not built: run `make web`; the other addresses work")
     assert len(said) == 2

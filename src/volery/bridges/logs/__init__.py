@@ -1,1 +1,1 @@
-"""Logs of a run: written, read, mended, recorded by pattern, replayed."""
+"""Writes, reads, recovers, records and replays logs of a run."""

@@ -1,4 +1,4 @@
-"""The chunks of a ROS 1 bag (wiki.ros.org/Bags/Format/2.0)."""
+"""Reads the chunks of a ROS 1 bag (wiki.ros.org/Bags/Format/2.0)."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from volery.core.clock import NS_PER_S
 
 _LENGTH = struct.Struct("<I")
 _STAMP_BYTES = 12
-"""Seconds, nanoseconds, offset."""
+"""Bytes of an index entry: seconds, nanoseconds, offset."""
 
 
 class BagChunks(ChunkedLog):
-    """Chunks by the index records that follow each."""
+    """Indexes chunks by the index records that follow each."""
 
     format = "bag"
 
@@ -55,7 +55,10 @@ class BagChunks(ChunkedLog):
             self._cut = CUT_OFF
 
     def _take(self, fields: dict[bytes, bytes], span: Span, body: int) -> None:
-        """Take one record outside of chunks, its data from `body` on; `ValueError`: damaged."""
+        """Handles a record outside of chunks, its data from `body` on.
+
+        Raises `ValueError` if damaged.
+        """
         kind = fields.get(b"op")
         length = span.position + span.length - body
         if kind == bag_format.CHUNK:
@@ -69,7 +72,10 @@ class BagChunks(ChunkedLog):
             self._learn(bag_format.number(fields, b"conn"), fields, self._read(body, length))
 
     def _index(self, fields: dict[bytes, bytes], body: int, length: int) -> None:
-        """The times of one channel in the present chunk; a damaged one has the chunk be read."""
+        """Reads the times of one channel in the current chunk.
+
+        Without a valid index the chunk is read.
+        """
         known = sum(len(stamps) for stamps in self._stamps)
         stamps = None
         if not length % _STAMP_BYTES and length // _STAMP_BYTES <= MAX_CHUNK_MESSAGES - known:
@@ -99,7 +105,10 @@ class BagChunks(ChunkedLog):
         self._stamps.clear()
 
     def _record(self, position: int) -> tuple[dict[bytes, bytes], int, int] | None:
-        """Header fields, begin and end of the data of a record; None where it is not whole."""
+        """Returns header fields, start and end of the data of a record.
+
+        None if it is incomplete.
+        """
         start = self._read(position, 4)
         if len(start) < 4:
             return None
@@ -123,7 +132,7 @@ class BagChunks(ChunkedLog):
 
 
 def _indexed(span: Span, counts: dict[int, int], stamps: list[NDArray[np.int64]]) -> Chunk:
-    """A chunk by its index records: rows of seconds, nanoseconds, offset."""
+    """Returns a chunk from its index records: rows of seconds, nanoseconds, offset."""
     found = np.concatenate(stamps)
     found = found[np.argsort(found[:, 2])]
     return Chunk.of_times(span, counts, found[:, 0] * NS_PER_S + found[:, 1])

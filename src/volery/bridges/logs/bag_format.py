@@ -1,4 +1,4 @@
-"""Records of ROS 1 bags (wiki.ros.org/Bags/Format/2.0) from bytes. Damaged: `ValueError`."""
+"""Parses records of ROS 1 bags (wiki.ros.org/Bags/Format/2.0). Raises `ValueError` if damaged."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ _TIME = struct.Struct("<II")
 
 
 class BagIndex:
-    """Finds out whether a bag's index is there and has a record of every chunk."""
+    """Checks whether a bag has an index with a record of every chunk."""
 
     def __init__(self) -> None:
         self._is_begun = False
         self._missing = 0
 
     def pass_record(self, fields: dict[bytes, bytes]) -> None:
-        """Takes the header fields of the next record of the file."""
+        """Reads the header fields of the next record of the file."""
         kind = fields.get(b"op")
         if kind == HEADER:
             self._is_begun = any(fields.get(b"index_pos", b""))
@@ -38,12 +38,12 @@ class BagIndex:
 
     @property
     def is_whole(self) -> bool:
-        """Whether all of it has been passed."""
+        """Whether the whole index has been read."""
         return self._is_begun and self._missing <= 0
 
 
 def bag_fields(data: bytes) -> dict[bytes, bytes]:
-    """The fields of a record's header."""
+    """Returns the fields of a record's header."""
     fields: dict[bytes, bytes] = {}
     position = 0
     while position + 4 <= len(data):
@@ -55,7 +55,7 @@ def bag_fields(data: bytes) -> dict[bytes, bytes]:
 
 
 def number(fields: dict[bytes, bytes], name: bytes) -> int:
-    """A field of four bytes."""
+    """Returns a field of four bytes."""
     value = fields.get(name, b"")
     if len(value) != _LENGTH.size:
         raise ValueError(f"a record lacks its field '{name.decode()}'")
@@ -63,7 +63,7 @@ def number(fields: dict[bytes, bytes], name: bytes) -> int:
 
 
 def time_ns(fields: dict[bytes, bytes], name: bytes = b"time") -> int:
-    """A field with a time."""
+    """Returns a field with a time, ns."""
     value = fields.get(name, b"")
     if len(value) != _TIME.size:
         raise ValueError(f"a record lacks its field '{name.decode()}'")
@@ -72,14 +72,14 @@ def time_ns(fields: dict[bytes, bytes], name: bytes = b"time") -> int:
 
 
 def checked_time_ns(at_ns: int) -> int:
-    """The same time. `ValueError` where ROS 2 cannot tell it."""
+    """Returns the same time. Raises `ValueError` if ROS 2 cannot represent it."""
     if at_ns > MAX_TIME_NS:
-        raise ValueError(f"a message of {at_ns} ns, later than ROS 2 can tell")
+        raise ValueError(f"a message of {at_ns} ns, later than ROS 2 can represent")
     return at_ns
 
 
 def unpack_chunk(fields: dict[bytes, bytes], data: bytes | memoryview) -> bytes:
-    """The records in a chunk, by its header's fields and its data."""
+    """Returns the records in a chunk from its header's fields and its data."""
     compression = fields.get(b"compression", b"").decode()
     return unpack(compression, data, number(fields, b"size"))
 
@@ -87,7 +87,7 @@ def unpack_chunk(fields: dict[bytes, bytes], data: bytes | memoryview) -> bytes:
 def chunk_content(
     chunk: bytes, connect: Callable[[int, dict[bytes, bytes], bytes], None]
 ) -> Content:
-    """The messages among records one behind the other; `connect` gets connections."""
+    """Returns the messages among consecutive records; calls `connect` for connections."""
     heads = []
     position = 0
     while position < len(chunk):
@@ -105,16 +105,16 @@ def chunk_content(
 
 
 def inner_record(data: bytes, position: int) -> tuple[dict[bytes, bytes], int, int]:
-    """Header fields of a record in memory, begin and end of its data."""
+    """Returns header fields of a record in memory, start and end of its data."""
     body = _end_of(data, position)
     return bag_fields(data[position + 4 : body]), body + 4, _end_of(data, body)
 
 
 def _end_of(data: bytes, position: int) -> int:
-    """End of the bytes whose length stands at a position."""
+    """Returns the end of the bytes whose length is at a position."""
     if position + 4 > len(data):
-        raise ValueError("a record is not whole")
+        raise ValueError("a record is incomplete")
     end = position + 4 + int(_LENGTH.unpack_from(data, position)[0])
     if end > len(data):
-        raise ValueError("a record is not whole")
+        raise ValueError("a record is incomplete")
     return end

@@ -22,10 +22,10 @@ def bag_writer(path: Path, *, compressed: bool = True) -> Writer:
 
 
 def _roslz4_frame(data: bytes) -> bytes:
-    """Compresses a chunk for roslz4, which reads only these frames.
+    """Compresses a chunk for roslz4, which reads only this kind of frames.
 
-    Source: `lz4s.c` of ros_comm 1.15: it refuses linked blocks, a content size and checksums of
-    blocks, and takes the last eight bytes for an end mark and a checksum of the content.
+    Source: `lz4s.c` of ros_comm 1.15: roslz4 refuses linked blocks, a content size and checksums of
+    blocks, and reads the last eight bytes as an end mark and a checksum of the content.
     """
     frame = compress(data, 0, block_linked=False, store_size=False, content_checksum=True)
     return cast("bytes", frame)

@@ -1,8 +1,7 @@
-"""How much a log may cost its reader: bounds on what a file says and on what it unpacks to.
+"""Limits the cost of reading a log: what a file announces and what it unpacks to.
 
-A log is often a stranger's. Some bytes of it can unpack to gigabytes, and a few megabytes of
-records can describe millions of topics. Every reader stops at these bounds; real logs stay far
-below.
+Logs may be untrusted. A few bytes can unpack to gigabytes, and a few megabytes of records can
+describe millions of topics. Every reader stops at these limits; real logs stay far below.
 """
 
 from __future__ import annotations
@@ -12,32 +11,33 @@ from pathlib import Path
 from volery.core.errors import RecordingError
 
 MAX_CHUNK_BYTES = 256 << 20
-"""Of one chunk, packed or unpacked, or a message outside of chunks. Recorders write 1 to 100 MB."""
+"""Largest chunk, packed or unpacked, or message outside of chunks. Recorders write 1 to 100 MB."""
 MAX_CHUNK_MESSAGES = 1_000_000
 MAX_CHUNKS = 500_000
-"""Of one file."""
+"""Largest number of chunks of one file."""
 MAX_RECORDS = 5_000_000
-"""Of one file, outside of its chunks: chunks, and their indexes by topic."""
+"""Largest number of records of one file outside of its chunks: chunks, and their indexes by topic.
+"""
 MAX_HEAD_BYTES = 1 << 20
-"""Of the fields in front of a bag's record."""
+"""Largest head of a bag's record."""
 MAX_TIME_NS = (1 << 31) * 1_000_000_000 - 1
-"""Seconds of ROS 2 are 32 bits with a sign: to 2038."""
+"""Latest time of a message: seconds of ROS 2 are signed and have 32 bits, to 2038."""
 MAX_TOPICS = 20_000
-"""Of one file, and as many schemas."""
+"""Largest number of topics of one file, and of schemas."""
 MAX_DEFINITION_BYTES = 1 << 20
-"""Of one message definition with all that it nests."""
+"""Largest message definition with all nested types."""
 MAX_DEFINITIONS_BYTES = 64 << 20
-"""Of all definitions of one file together."""
+"""Largest sum of all definitions of one file."""
 MAX_NESTED_TYPES = 512
-"""Of one message definition."""
+"""Largest number of types that one message definition nests."""
 MAX_INDEX_BYTES = 64 << 20
-"""Of the index at a file's end: topics, and where the chunks are."""
+"""Largest index at a file's end: topics, and the positions of the chunks."""
 KEPT_BYTES = 256 << 20
-"""Of unpacked chunks that a player keeps in memory; of at least one, however large."""
+"""Unpacked chunks that a player caches; at least one, however large."""
 
 _FREE_BYTES = 1 << 30
 _MAX_RATIO = 256
-"""lz4 packs at most 255 to 1, so that every honest lz4 log passes, whatever is in it."""
+"""lz4 packs at most 255 to 1, so that every valid lz4 log passes."""
 
 
 class UnpackingBudget:
@@ -49,17 +49,17 @@ class UnpackingBudget:
         self._spent = 0
 
     def spend(self, count: int) -> None:
-        """Count so many bytes. `RecordingError` where there are more than in any log."""
+        """Counts unpacked bytes. Raises `RecordingError` if there are too many."""
         self._spent += count
         if self._spent > self._most:
             raise RecordingError(
                 f"{self._path}: unpacks to more than {self._most / 1e9:.1f} GB, more than any log "
-                "of its size does; it is not read any further"
+                "of its size does; the rest is not read"
             )
 
 
 class TopicBudget:
-    """Counts the topics and definitions that one file describes."""
+    """Counts the topics and definitions of one file."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -67,7 +67,7 @@ class TopicBudget:
         self._bytes = 0
 
     def spend(self, definition_bytes: int) -> None:
-        """Count a topic or a schema. `RecordingError` where there are more than any log has."""
+        """Counts a topic or a schema. Raises `RecordingError` if there are too many."""
         self._count += 1
         self._bytes += definition_bytes
         if self._count > 2 * MAX_TOPICS or self._bytes > MAX_DEFINITIONS_BYTES:

@@ -1,7 +1,7 @@
-"""Any place of a log at once: where its chunks are, when they are of, and what is in each.
+"""Random access to a log: the positions, times and contents of its chunks.
 
-The index is built by hopping over the file from record to record, so that a log that was cut off is
-as good as a whole one; what is compressed is read only where nothing else tells what it holds.
+The index is built by skipping through the file from record to record, so that a truncated log works
+as well as a whole one. Compressed data is read only if no index describes its contents.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from volery.bridges.logs.records import LogRecord, LogTopic
 from volery.core.errors import RecordingError
 
 _CHUNKS_KEPT = 8
-"""Decompressed ones, in memory; fewer where they are large."""
+"""Largest number of decompressed chunks in the cache; fewer if they are large."""
 
 
 class Span(NamedTuple):
-    """A piece of the file that is read at once: position and length."""
+    """A part of the file that is read at once: position and length."""
 
     position: int
     length: int
@@ -42,33 +42,33 @@ class Span(NamedTuple):
 
 @dataclass(frozen=True)
 class Chunk:
-    """Messages that are stored together: from when to when, and how many of each channel."""
+    """Messages that are stored together: their times, and the number of messages by channel."""
 
     span: Span
     start_ns: int
     end_ns: int
     counts: Mapping[int, int]
     falls_ns: int
-    """By how much a message is at most earlier than one before it in the chunk."""
+    """Largest time by which a message is earlier than one before it in the chunk."""
 
     @classmethod
     def of_times(cls, span: Span, counts: Mapping[int, int], times_ns: NDArray[np.int64]) -> Chunk:
-        """A chunk with messages at `times_ns` (N,), N > 0, in their order."""
+        """Returns a chunk with messages at `times_ns` (N,), N > 0, in their order."""
         falls = np.maximum.accumulate(times_ns) - times_ns
         first, last = int(times_ns.min()), int(times_ns.max())
         return cls(span, first, last, counts, int(falls.max()))
 
 
 class Unindexed(NamedTuple):
-    """A chunk of which the file's index does not tell what is in it."""
+    """A chunk whose contents the file's index does not describe."""
 
     span: Span
 
 
 class ChunkedLog(ABC):
-    """The chunks of one file; a damaged one is empty, and `problem` tells of it.
+    """Reads the chunks of one file; a damaged chunk is empty, and `problem` describes the damage.
 
-    Raises `RecordingError` where the file describes or unpacks to more than any log does.
+    Raises `RecordingError` if the file describes or unpacks to more than the limits.
     """
 
     format = ""
@@ -76,7 +76,7 @@ class ChunkedLog(ABC):
     def __init__(self, path: Path) -> None:
         self.path = path
         self.topics: dict[int, LogTopic] = {}
-        """By channel."""
+        """Topics by channel."""
         self._cut = ""
         """What is missing at the file's end."""
         self._damage = DamageCount()
@@ -94,36 +94,38 @@ class ChunkedLog(ABC):
         except BaseException:
             self.close()
             raise
-        self._unpacking = None  # from here on what is played decides, a chunk at a time
+        self._unpacking = (
+            None  # from here on playback determines what is unpacked, a chunk at a time
+        )
 
     @property
     def problem(self) -> str:
-        """What is wrong with the file, as far as it was read; empty for a whole one."""
+        """Problems of the file, as far as it was read; empty for a whole one."""
         return "; ".join(part for part in (self._cut, self._damage.describe()) if part)
 
     @property
     def damaged(self) -> int:
-        """Chunks and records that were left out so far."""
+        """Number of chunks and records skipped so far."""
         return self._damage.count
 
     def counts(self) -> Counter[int]:
-        """Messages of each channel."""
+        """Returns the number of messages of each channel."""
         total: Counter[int] = Counter()
         for chunk in self.chunks:
             total.update(chunk.counts)
         return total
 
     def content(self, chunk: Chunk) -> Content:
-        """What a chunk holds."""
+        """Returns the content of a chunk."""
         return self._content(chunk.span)
 
     def record(self, content: Content, head: Head) -> LogRecord:
-        """One message of it."""
+        """Returns one message of a chunk's content."""
         data = content.data[head.begin : head.end]
         return LogRecord(self.topics[head.channel], head.time_ns, data, head.sequence)
 
     def close(self) -> None:
-        """Close the file."""
+        """Closes the file."""
         self._file.close()
         self._kept.clear()
 
@@ -131,17 +133,20 @@ class ChunkedLog(ABC):
 
     @abstractmethod
     def _scan(self) -> None:
-        """Put all chunks into `_found`, in the order of the file; learn what stands outside."""
+        """Stores all chunks in `_found`, in the order of the file.
+
+        Reads the records outside of chunks.
+        """
 
     @abstractmethod
     def _parse(self, data: bytes) -> Content:
-        """The messages of a span, `ValueError` for damaged bytes; learns its channels."""
+        """Returns the messages of a span and reads its channels. Raises `ValueError` if damaged."""
 
     def _read(self, position: int, length: int) -> bytes:
         return os.pread(self._file.fileno(), length, position)
 
     def _count_record(self) -> None:
-        """Count a record outside of chunks. `RecordingError` where there are too many."""
+        """Counts a record outside of chunks. Raises `RecordingError` if there are too many."""
         self._records += 1
         if self._records > MAX_RECORDS or len(self._found) > MAX_CHUNKS:
             raise RecordingError(
@@ -177,7 +182,7 @@ class ChunkedLog(ABC):
         return len(self._kept) > _CHUNKS_KEPT or kept > KEPT_BYTES
 
     def _told(self, found: Chunk | Unindexed) -> Chunk:
-        """The chunk with its times and counts, read where the index does not tell them."""
+        """Returns the chunk with its times and counts, which are read if the index lacks them."""
         if isinstance(found, Chunk):
             return found
         heads = self._content(found.span).heads
@@ -189,7 +194,7 @@ class ChunkedLog(ABC):
         return Chunk.of_times(found.span, counts, times)
 
     def _learn_channels(self) -> None:
-        """Read the chunks that tell of channels which nothing outside of them does."""
+        """Reads the chunks with channels that no record outside of them describes."""
         for chunk in self.chunks:
             if not chunk.counts.keys() <= self.topics.keys():
                 self._content(chunk.span)
@@ -202,7 +207,7 @@ class ChunkedLog(ABC):
 
 
 def open_chunks(path: Path) -> ChunkedLog:
-    """The chunks of a log. `RecordingError` where there is no such file, or it is no log."""
+    """Opens the chunks of a log. Raises `RecordingError` if the file is missing or no log."""
     from volery.bridges.logs.bag_chunks import BagChunks
     from volery.bridges.logs.mcap_chunks import McapChunks
     from volery.bridges.logs.records import log_format

@@ -1,4 +1,4 @@
-"""What a chunk of a log holds, and the count of those that are damaged."""
+"""The content of a log's chunk, and the count of damaged chunks."""
 
 from __future__ import annotations
 
@@ -18,35 +18,35 @@ class Head(NamedTuple):
 
 @dataclass(frozen=True)
 class Content:
-    """What a chunk holds, in the order of the log."""
+    """Messages of a chunk, in the order of the log."""
 
     heads: tuple[Head, ...] = ()
     data: bytes = b""
 
     @property
     def memory_bytes(self) -> int:
-        """About what it takes to keep it."""
+        """Approximate memory of the content."""
         return len(self.data) + _HEAD_BYTES * len(self.heads)
 
 
 _HEAD_BYTES = 250
-"""Of a `Head` and its numbers."""
+"""Memory of a `Head` and its numbers."""
 
 
 @dataclass
 class DamageCount:
-    """Counts damaged chunks and records, and remembers the first."""
+    """Counts damaged chunks and records; stores the first problem."""
 
     count: int = 0
     first: str = ""
 
     def add(self, position: int, error: Exception) -> None:
-        """Count one that begins at a byte of the file."""
+        """Counts a damaged part that starts at a byte of the file."""
         self.count += 1
         self.first = self.first or f"at byte {position}: {error}"
 
     def describe(self) -> str:
-        """Returns a phrase for people; empty where nothing is damaged."""
+        """Returns a phrase for messages; empty without damage."""
         if not self.count:
             return ""
         if self.count == 1:

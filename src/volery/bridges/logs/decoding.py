@@ -1,4 +1,4 @@
-"""Messages of the graph from the records of a log, whichever ROS wrote it."""
+"""Decodes messages from the records of a log, from ROS 1 or ROS 2."""
 
 from __future__ import annotations
 
@@ -28,13 +28,16 @@ class Decoded(NamedTuple):
 
 
 class LogDecoder:
-    """Decodes records. Types that nobody knows are learned from the definitions in the log."""
+    """Decodes records; learns unknown types from the definitions in the log."""
 
     def __init__(self) -> None:
         self._types: dict[LogTopic, str | GraphError] = {}
 
     def type_of(self, topic: LogTopic) -> str:
-        """Type of a topic's messages, learned where nobody knows it. `GraphError` as `decode`."""
+        """Returns the type of a topic's messages; learns unknown types.
+
+        Raises `GraphError` as `decode`.
+        """
         found = self._types.get(topic)
         if found is None:
             found = self._types[topic] = _type_of(topic)
@@ -43,12 +46,12 @@ class LogDecoder:
         return found
 
     def decode(self, record: LogRecord) -> Decoded:
-        """Message of a record; its arrays are read-only.
+        """Returns the message of a record; its arrays are read-only.
 
         Raises
         ------
         GraphError
-            The type is unknown or not the one of that name here, or the bytes do not fit it.
+            The type is unknown or differs from the local one, or the bytes do not fit it.
 
         """
         found = self.type_of(record.topic)
@@ -58,7 +61,7 @@ class LogDecoder:
 
 
 def _type_of(topic: LogTopic) -> str | GraphError:
-    """Type of a topic's messages, known by now; or why they cannot be read."""
+    """Returns the type of a topic's messages, or the error that prevents decoding."""
     try:
         if topic.encoding not in ("ros1", "cdr"):
             raise GraphError(f"messages encoded as '{topic.encoding}' cannot be read")
@@ -69,7 +72,7 @@ def _type_of(topic: LogTopic) -> str | GraphError:
             ours = ros1_codec().md5(name)
             if ours != topic.digest:
                 raise GraphError(
-                    f"the log has another {name} than is known here: md5 {topic.digest}, not {ours}"
+                    f"the log's {name} differs from the local one: md5 {topic.digest}, not {ours}"
                 )
     except GraphError as error:
         return error
@@ -77,7 +80,7 @@ def _type_of(topic: LogTopic) -> str | GraphError:
 
 
 def _learn(name: str, topic: LogTopic) -> None:
-    """Register a type, and what it nests, from the log's text."""
+    """Registers a type, and the types that it nests, from the log's text."""
     if topic.schema_encoding not in _DEFINITION_FORMS or not topic.definition.strip():
         raise GraphError(f"type {name} is not known, and the log does not define it")
     if len(topic.definition) > MAX_DEFINITION_BYTES:

@@ -1,8 +1,8 @@
-"""A file that grows by whole pieces: either a piece is on the disk, or nothing of it is.
+"""A file that grows by whole pieces: a piece is on the disk completely or not at all.
 
-Log writers put a chunk together with many small writes. They are gathered in memory and committed
-at once; where the disk is full the file is cut back to the last whole piece, so that what remains
-is readable.
+Log writers assemble a chunk from many small writes. They are buffered in memory and committed at
+once. If the disk is full, the file is truncated to the last whole piece, so that the rest stays
+readable.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from volery.core.errors import RecordingError
 
 
 class DiskFile:
-    """Binary output file with `commit`; offers the few stream methods that log writers call.
+    """Binary output file with `commit`; implements the few stream methods that log writers call.
 
-    It is locked until it is closed: `RecordingError` where another process has the lock.
+    The file is locked until it is closed. Raises `RecordingError` if another process has the lock.
     """
 
     def __init__(self, path: Path) -> None:
@@ -35,35 +35,35 @@ class DiskFile:
 
     @property
     def pending(self) -> int:
-        """Bytes written and not yet committed."""
+        """Number of bytes written and not yet committed."""
         return len(self._buffer)
 
     def write(self, data: bytes | bytearray | memoryview) -> int:
-        """Gather `data`."""
+        """Buffers `data`."""
         self._buffer += data
         return len(data)
 
     def tell(self) -> int:
-        """Position of the next byte."""
+        """Returns the position of the next byte."""
         return self._committed + len(self._buffer)
 
     def seek(self, position: int) -> int:
-        """Go back to rewrite the file's start; only once, as the last thing before closing."""
+        """Goes back to rewrite the file's start; only once, as the last step before closing."""
         self.commit()
         self._committed = position
         self._rewrites_start = True
         return position
 
     def flush(self) -> None:
-        """Do nothing: `commit` decides what reaches the disk."""
+        """Does nothing: `commit` writes to the disk."""
 
     def commit(self) -> None:
-        """Hand everything gathered to the disk.
+        """Writes all buffered bytes to the disk.
 
         Raises
         ------
         RecordingError
-            The disk does not take it; the file then ends with the last whole piece.
+            Writing failed; the file then ends with the last whole piece.
 
         """
         if not self._buffer:
@@ -77,20 +77,20 @@ class DiskFile:
             if not self._rewrites_start:
                 os.ftruncate(self._descriptor, self._committed)
             raise RecordingError(
-                f"{self.path}: cannot write the log: {error.strerror}; its first "
-                f"{self._committed / 1e6:.1f} MB are kept"
+                f"{self.path}: cannot write the log: {error.strerror}; the first "
+                f"{self._committed / 1e6:.1f} MB are saved"
             ) from None
         self._committed += done
 
     def close(self) -> None:
-        """Commit and close."""
+        """Commits and closes."""
         try:
             self.commit()
         finally:
             self.discard()
 
     def discard(self) -> None:
-        """Close without what was not committed."""
+        """Closes without uncommitted bytes."""
         self._buffer.clear()
         if self._descriptor >= 0:
             os.close(self._descriptor)

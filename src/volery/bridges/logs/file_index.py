@@ -1,6 +1,7 @@
-"""The index at a log's end: topics, counts and times, without reading what lies before it.
+"""Reads the index at a log's end: topics, counts and times, without reading the messages.
 
-A whole file ends with one. Where it is missing, damaged or too large, a reader walks over the file.
+A whole file ends with an index. If the index is missing, damaged or too large, the reader scans the
+file.
 """
 
 from __future__ import annotations
@@ -31,23 +32,26 @@ Counts = dict[tuple[str, str], int]
 """Messages by topic and type."""
 
 _FOOTER_BYTES = 29
-"""Of an MCAP's last record: its head, two positions and a checksum."""
+"""Size of an MCAP's last record: its head, two positions and a checksum."""
 _PAIR = struct.Struct("<II")
 
 
 def mcap_index(path: Path, counts: Counts) -> tuple[int, int] | None:
-    """First and last time of an MCAP's messages, and their counts; None without a good index."""
+    """Returns first and last time of an MCAP's messages and fills `counts`.
+
+    None without an index.
+    """
     with path.open("rb") as file:
         try:
             return _mcap_statistics(file, path, counts)
         except RecordingError:
             raise
-        except Exception:  # whatever the records' reader makes of damaged bytes
+        except Exception:  # any error of the records' reader on damaged bytes
             return None
 
 
 def bag_index(path: Path, counts: Counts) -> tuple[int, int] | None:
-    """The same of a bag."""
+    """Returns first and last time of a bag's messages and fills `counts`; None without an index."""
     with path.open("rb") as file:
         try:
             return _bag_statistics(file, path, counts)
@@ -136,7 +140,7 @@ def _bag_statistics(file: BinaryIO, path: Path, counts: Counts) -> tuple[int, in
             pairs = data[begin : position - (position - begin) % _PAIR.size]
             for connection, messages in _PAIR.iter_unpack(pairs):
                 if connection not in topics:
-                    raise ValueError("a chunk's index names a connection that there is not")
+                    raise ValueError("a chunk's index names an unknown connection")
                 counts[topics[connection]] += messages
     if not index.is_whole:
         return None

@@ -1,7 +1,7 @@
-"""Advisory locks on logs: one run writes a log at a time, and no other command reads it as a ruin.
+"""Advisory locks on logs: one run writes a log at a time, and no other command reads it meanwhile.
 
-A lock is on the file itself and ends with the process that holds it, however that ends. Where the
-file system knows no locks there is none.
+A lock is on the file itself and ends with the process that has it. File systems without locks are
+supported, without protection.
 """
 
 from __future__ import annotations
@@ -18,13 +18,16 @@ _BEING_WRITTEN = "is being written by another process; end that first"
 
 
 def lock_for_writing(descriptor: int, path: Path) -> None:
-    """Lock an open file until it is closed. `RecordingError` where another process uses it."""
+    """Locks an open file until it is closed. Raises `RecordingError` if another process uses it."""
     _lock(descriptor, path, fcntl.LOCK_EX, "is being written or recovered by another process")
 
 
 @contextlib.contextmanager
 def locked_for_reading(path: Path) -> Iterator[None]:
-    """Keep writers away meanwhile. `RecordingError` where one is there already, or no file."""
+    """Keeps writers away.
+
+    Raises `RecordingError` if the file is being written or cannot be opened.
+    """
     descriptor = _open(path)
     try:
         _lock(descriptor, path, fcntl.LOCK_SH, _BEING_WRITTEN)
@@ -35,9 +38,9 @@ def locked_for_reading(path: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def locked_for_replacing(path: Path) -> Iterator[None]:
-    """Keep others away from a file that is replaced; nothing where it cannot be opened.
+    """Locks a file that is replaced, if it can be opened.
 
-    Raises `RecordingError` where another process uses it.
+    Raises `RecordingError` if another process uses it.
     """
     try:
         descriptor = _open(path)

@@ -1,8 +1,8 @@
-"""Logs of a run: MCAP with ROS 2 messages (Foxglove opens it) and ROS 1 .bag.
+"""Writes logs of a run: MCAP with ROS 2 messages (for Foxglove) and ROS 1 .bag.
 
-Both are written in chunks of about a megabyte, closed at least every two seconds of wall time and
-handed to the disk whole: a killed run loses what came after its last chunk, no more. The tail of
-such a file (its index) is missing; `volery.bridges.logs.recovery` writes it.
+Both formats are written in chunks of about a megabyte, closed at least every two seconds of wall
+time and written to the disk as a whole: a killed run loses only the messages after its last chunk.
+The tail of such a file (its index) is missing; `volery.bridges.logs.recovery` writes it.
 
     log = open_log("flight.mcap")
     graph.subscribe_all(log.write)
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from volery.graph.messages import Published
 
 CHUNK_WALL_S = 2.0
-"""A chunk is closed by the first message that finds it this old, however small it is."""
+"""Age at which the next message closes a chunk, however small the chunk is."""
 LIBRARY = "volery"
 
 Compression = Literal["lz4", "zstd", "none"]
@@ -38,23 +38,23 @@ Compression = Literal["lz4", "zstd", "none"]
 def open_log(
     path: str | Path, *, overwrite: bool = False, compression: Compression = "lz4"
 ) -> LogWriter:
-    """Begin a log; the suffix decides the format.
+    """Creates a log; the suffix selects the format.
 
     Parameters
     ----------
     path
-        `.mcap` for ROS 2 CDR in MCAP, `.bag` for ROS 1. Missing folders are made.
+        `.mcap` for ROS 2 CDR in MCAP, `.bag` for ROS 1. Missing folders are created.
     overwrite
-        Replace a file of that name; otherwise one is refused. One that another process is writing
+        Replace an existing file, which is refused otherwise. A file that another process writes
         is never replaced.
     compression
-        `zstd` is smaller and slower than `lz4`; a .bag knows `lz4` and `none`.
+        `zstd` is smaller and slower than `lz4`; a .bag supports `lz4` and `none`.
 
     Raises
     ------
     RecordingError
-        The suffix is unknown, the file exists or is being written, or it cannot be created; then
-        nothing is left of it.
+            The suffix is unknown, the file exists or is being written, or it cannot be created; no
+            partial file remains.
 
     """
     path = Path(path)
@@ -69,22 +69,25 @@ def open_log(
 
 
 def _begin(kind: type[McapLog] | type[BagLog], path: Path, compression: Compression) -> LogWriter:
-    """A new log; where its first bytes cannot be written the file is removed again."""
+    """Creates a new log; removes the file again if its first bytes cannot be written."""
     try:
         return kind(path, compression)
     except FileExistsError:
-        raise  # of another process, made meanwhile
+        raise  # of another process, created meanwhile
     except (OSError, RecordingError):
         path.unlink(missing_ok=True)
         raise
 
 
 def check_target(path: Path, *, overwrite: bool = False) -> type[McapLog] | type[BagLog]:
-    """Returns the kind of log that `open_log` begins; `RecordingError` where it refuses to."""
+    """Returns the kind of log that `open_log` creates.
+
+    Raises `RecordingError` if it would refuse to.
+    """
     kinds: dict[str, type[McapLog] | type[BagLog]] = {".mcap": McapLog, ".bag": BagLog}
     kind = kinds.get(path.suffix.lower())
     if kind is None:
-        raise RecordingError(f"{path}: a log is named .mcap (ROS 2) or .bag (ROS 1)")
+        raise RecordingError(f"{path}: the name of a log must end in .mcap (ROS 2) or .bag (ROS 1)")
     if path.is_dir():
         raise RecordingError(f"{path}: cannot create the log: it is a folder")
     if path.exists() and not overwrite:
@@ -94,11 +97,11 @@ def check_target(path: Path, *, overwrite: bool = False) -> type[McapLog] | type
 
 
 class LogWriter(ABC):
-    """A log being written. After the first RecordingError every further `write` repeats it."""
+    """Writes a log. After the first RecordingError every further `write` repeats it."""
 
     path: Path
     messages: int
-    """Number of messages that can be read in the file: those of its whole chunks."""
+    """Number of readable messages in the file: those of its whole chunks."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -111,11 +114,11 @@ class LogWriter(ABC):
 
     @property
     def size_bytes(self) -> int:
-        """Of the file, what is gathered for it included."""
+        """Size of the file, including buffered bytes."""
         return self._file.tell()
 
     def write(self, published: Published) -> None:
-        """Add a message, at its simulated time of publication."""
+        """Adds a message, at its simulated time of publication."""
         if self._failure is not None:
             raise self._failure
         self._add(published)
@@ -126,14 +129,14 @@ class LogWriter(ABC):
             self.flush()
 
     def flush(self) -> None:
-        """Close the chunk in progress and hand it to the disk."""
+        """Closes the current chunk and writes it to the disk."""
         if self._failure is not None:
             raise self._failure
         self._end_chunk()
         self._commit()
 
     def close(self) -> None:
-        """Write the rest and the index. Does nothing more after a failure or a second time."""
+        """Writes the rest and the index; does nothing after a failure or a second time."""
         if self._closed:
             return
         self._closed = True
@@ -146,7 +149,7 @@ class LogWriter(ABC):
             self._file.discard()
 
     def abort(self) -> None:
-        """Close the file as a killed run would leave it: whole chunks, no index."""
+        """Closes the file as a killed run would leave it: whole chunks, no index."""
         self._closed = True
         self._file.discard()
 
@@ -156,11 +159,11 @@ class LogWriter(ABC):
         except RecordingError as error:
             self._failure = error
             raise
-        self.messages = self._taken  # a chunk is handed over as soon as it is whole
+        self.messages = self._taken  # chunks are committed as soon as they are complete
         self._chunk_since = time.monotonic()
 
     def _commit_start(self) -> None:
-        """Hand the first bytes to the disk; where it does not take them the file is closed."""
+        """Writes the first bytes to the disk; closes the file if that fails."""
         try:
             self._file.commit()
         except RecordingError:
@@ -178,7 +181,7 @@ class LogWriter(ABC):
 
 
 class McapLog(LogWriter):
-    """MCAP: profile `ros2`, CDR messages, `ros2msg` schemas with every nested definition."""
+    """Writes MCAP: profile `ros2`, CDR messages, `ros2msg` schemas with every nested definition."""
 
     def __init__(self, path: Path, compression: Compression = "lz4") -> None:
         from mcap.writer import CompressionType, Writer
@@ -226,7 +229,7 @@ class McapLog(LogWriter):
 
 
 class _Opened:
-    """In the place of a path, for a writer that opens its file by itself."""
+    """Replaces a path for a writer that opens its file by itself."""
 
     def __init__(self, file: DiskFile) -> None:
         self._file = file
@@ -237,14 +240,14 @@ class _Opened:
 
 
 class BagLog(LogWriter):
-    """ROS 1 bag, format 2.0."""
+    """Writes a ROS 1 bag, format 2.0."""
 
     def __init__(self, path: Path, compression: Compression = "lz4") -> None:
         from volery.graph.codecs.ros1 import ros1_codec
 
         super().__init__(path)
         if compression == "zstd":
-            raise RecordingError(f"{path}: a .bag is compressed with lz4 or not at all")
+            raise RecordingError(f"{path}: a .bag supports lz4 or no compression")
         writer = bag_writer(path, compressed=compression == "lz4")
         self._file = DiskFile(path)
         writer.path = cast("Path", _Opened(self._file))
@@ -279,7 +282,7 @@ class BagLog(LogWriter):
 
     def _commit(self) -> None:
         super()._commit()
-        # Of a written chunk only the number of messages a topic is still needed.
+        # A written chunk needs only its number of messages by topic.
         for chunk in self._writer.chunks[-2:-1]:
             counts: Any = {key: range(len(index)) for key, index in chunk.connections.items()}
             chunk.connections = counts

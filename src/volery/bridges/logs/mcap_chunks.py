@@ -1,4 +1,4 @@
-"""The chunks of an MCAP file (mcap.dev/spec, version 0)."""
+"""Reads the chunks of an MCAP file (mcap.dev/spec, version 0)."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ _HEAD = mcap_format.HEAD
 _INDEX = struct.Struct("<HL")
 _ENTRIES = np.dtype([("time", "<u8"), ("offset", "<u8")])
 _LOOSE_BYTES = 1 << 20
-"""Messages outside of chunks are taken together up to so many bytes."""
+"""Limit of bytes up to which messages outside of chunks are grouped."""
 
 
 class McapChunks(ChunkedLog):
-    """Chunks by their message indexes; messages outside of chunks in runs."""
+    """Indexes chunks by their message indexes; groups messages outside of chunks."""
 
     format = "mcap"
 
@@ -58,7 +58,7 @@ class McapChunks(ChunkedLog):
         self._end_chunk()
 
     def _take(self, opcode: int, span: Span) -> None:
-        """Take one record outside of chunks. `ValueError` where it is damaged."""
+        """Handles a record outside of chunks. Raises `ValueError` if it is damaged."""
         if opcode == Opcode.MESSAGE_INDEX and self._chunk is not None:
             self._index(span)
         elif opcode == Opcode.MESSAGE:
@@ -76,7 +76,10 @@ class McapChunks(ChunkedLog):
             self._learn(opcode, self._read(begin, most))
 
     def _index(self, span: Span) -> None:
-        """The times of one channel in the present chunk; a damaged one has the chunk be read."""
+        """Reads the times of one channel in the current chunk.
+
+        Without a valid index the chunk is read.
+        """
         count = (span.length - _HEAD.size - _INDEX.size) // _ENTRIES.itemsize
         known = sum(len(entries) for entries in self._entries.values())
         data = b""
@@ -89,7 +92,7 @@ class McapChunks(ChunkedLog):
         entries = np.frombuffer(data[_INDEX.size :], _ENTRIES)
         if len(entries) and entries["time"].max() > MAX_TIME_NS:
             self._forget_index()
-            raise ValueError("the index of a chunk has a time later than ROS can tell")
+            raise ValueError("the index of a chunk has a time later than ROS can represent")
         if len(entries):
             self._entries[channel] = entries
 
@@ -127,7 +130,7 @@ class McapChunks(ChunkedLog):
 
 
 def _indexed(span: Span, entries: Mapping[int, NDArray[Any]]) -> Chunk:
-    """A chunk by its message indexes."""
+    """Returns a chunk from its message indexes."""
     counts = {channel: len(found) for channel, found in entries.items()}
     found = np.concatenate(list(entries.values()))
     times = found["time"][np.argsort(found["offset"])].astype(np.int64)

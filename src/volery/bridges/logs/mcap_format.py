@@ -1,4 +1,4 @@
-"""Records of MCAP (mcap.dev/spec, version 0) from bytes. Damaged: `ValueError`."""
+"""Parses records of MCAP (mcap.dev/spec, version 0). Raises `ValueError` if damaged."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from volery.bridges.logs.content import Content, Head
 from volery.bridges.logs.unpacking import unpack
 
 HEAD = struct.Struct("<BQ")
-"""Opcode and length, in front of every record."""
+"""Opcode and length at the start of every record."""
 DEFINITIONS = (Opcode.SCHEMA, Opcode.CHANNEL)
 READ = (Opcode.CHUNK, Opcode.MESSAGE, *DEFINITIONS)
-"""Records that hold messages, or tell what they are."""
+"""Records with messages or their definitions."""
 _MESSAGE = struct.Struct("<HIQ")
 """Channel, sequence, log time; the publish time follows."""
 _MESSAGE_BYTES = 22
@@ -29,33 +29,33 @@ _LENGTH = struct.Struct("<Q")
 
 
 def unpack_chunk(chunk: memoryview) -> bytes:
-    """The records in the body of a chunk."""
+    """Returns the records in the body of a chunk."""
     if len(chunk) < _CHUNK.size:
-        raise ValueError("the chunk's head is not whole")
+        raise ValueError("the chunk's head is incomplete")
     _, _, size, crc, name_bytes = _CHUNK.unpack_from(chunk)
     begin = _CHUNK.size + name_bytes
     if begin + _LENGTH.size > len(chunk):
-        raise ValueError("the chunk's head is not whole")
+        raise ValueError("the chunk's head is incomplete")
     compression = bytes(chunk[_CHUNK.size : begin]).decode()
     (packed_bytes,) = _LENGTH.unpack_from(chunk, begin)
     data = unpack(compression, chunk[begin + _LENGTH.size :][:packed_bytes], size)
     if crc and zlib.crc32(data) != crc:
-        raise ValueError("the chunk's checksum is another one")
+        raise ValueError("the chunk's checksum does not match")
     return data
 
 
 def chunk_content(data: bytes, learn: Callable[[int, bytes], None]) -> Content:
-    """The messages among records one behind the other; `learn` gets schemas and channels."""
+    """Returns the messages among consecutive records; calls `learn` for schemas and channels."""
     heads = []
     position, size = 0, len(data)
     while position < size:
         if position + HEAD.size > size:
-            raise ValueError("a record is not whole")
+            raise ValueError("a record is incomplete")
         opcode, length = HEAD.unpack_from(data, position)
         body = position + HEAD.size
         position = body + length
         if position > size:
-            raise ValueError("a record is not whole")
+            raise ValueError("a record is incomplete")
         if opcode == Opcode.MESSAGE:
             heads.append(message_head(data, body, position))
             if len(heads) > MAX_CHUNK_MESSAGES:
@@ -66,17 +66,17 @@ def chunk_content(data: bytes, learn: Callable[[int, bytes], None]) -> Content:
 
 
 def message_head(data: bytes, begin: int, end: int) -> Head:
-    """The message whose record stands from `begin` to `end`."""
+    """Returns the message whose record spans `begin` to `end`."""
     if end - begin < _MESSAGE_BYTES:
-        raise ValueError("a message is not whole")
+        raise ValueError("a message is incomplete")
     channel, sequence, time_ns = _MESSAGE.unpack_from(data, begin)
     if time_ns > MAX_TIME_NS:
-        raise ValueError(f"a message of {time_ns} ns, later than ROS can tell")
+        raise ValueError(f"a message of {time_ns} ns, later than ROS can represent")
     return Head(channel, time_ns, begin + _MESSAGE_BYTES, end, sequence)
 
 
 def definition(opcode: int, data: bytes) -> Schema | Channel:
-    """The schema or channel in a record."""
+    """Returns the schema or channel in a record."""
     if len(data) > MAX_DEFINITION_BYTES:
         raise ValueError(
             f"a message definition of {len(data)} bytes; at most {MAX_DEFINITION_BYTES} are read"
@@ -85,7 +85,7 @@ def definition(opcode: int, data: bytes) -> Schema | Channel:
     try:
         found: Schema | Channel
         found = Schema.read(stream) if opcode == Opcode.SCHEMA else Channel.read(stream)
-    except Exception as error:  # whatever the reader makes of damaged bytes
-        reason = str(error) or "it is not whole"
+    except Exception as error:  # any error of the reader on damaged bytes
+        reason = str(error) or "it is incomplete"
         raise ValueError(f"a schema or channel is damaged: {reason}") from None
     return found

@@ -1,7 +1,7 @@
-"""A log on a graph, at any of its times: forward as asked for, or somewhere else at once.
+"""Plays a log on a graph, forward or from any of its times.
 
-Only what somebody listens to is decoded. Who begins to listen, and everybody after a jump, gets the
-last message before the present time, so that what is shown is what was the case then.
+Only topics with subscribers are decoded. New subscribers, and all subscribers after a seek, receive
+the last message before the current time, so that they have the state of that time.
 """
 
 from __future__ import annotations
@@ -19,15 +19,16 @@ from volery.core.errors import GraphError, RecordingError
 from volery.graph.graph import Graph, Publisher
 
 LATCHED = ("/tf_static", "/map", "/weather", "/volery/scenario", "/robot_description")
-"""Topics whose last message awaits those who subscribe later."""
+"""Topics whose last message is sent to later subscribers."""
 LEFT_OUT = ("/clock", "/volery/player/**")
-"""A graph on which a log is played has these of its own."""
+"""Topics that the playing graph publishes itself."""
 HAPPENINGS = ("/events", "/volery/log", "/rosout", "/**/events")
-"""Their last message is no state that still holds."""
+"""Topics of events, whose last message is not a state that still holds."""
 
 _TF = "tf2_msgs/msg/TFMessage"
 _TF_NS = 250_000_000
-"""Of transforms, each message tells some: what was told for so long holds (modelling choice)."""
+"""Each transform message has only some transforms: those of this last period hold (modelling
+choice)."""
 
 
 class PlayedTopic(NamedTuple):
@@ -39,9 +40,9 @@ class PlayedTopic(NamedTuple):
 
 
 class Playback:
-    """The log at `path` on a graph; belongs to the thread of that graph.
+    """Plays the log at `path` on a graph; belongs to the thread of that graph.
 
-    Raises `RecordingError` where there is no log, or no message in it.
+    Raises `RecordingError` if there is no log, or no message in it.
     """
 
     def __init__(self, path: Path) -> None:
@@ -53,9 +54,9 @@ class Playback:
             raise RecordingError(f"{path}: holds no readable message{why}")
         self.start_ns, self.end_ns = self._line.start_ns, self._line.end_ns
         self.position_ns = self.start_ns
-        """Where on the log's line of time it is; see `timeline`."""
+        """Position on the log's time line; see `timeline`."""
         self.now_ns = self.start_ns
-        """What the log's own clock tells there; while a message is published, its time."""
+        """Time of the log's own clock there; during a publication, the message's time."""
         self.refused: dict[str, str] = {}
         """Topics that cannot be played, and why not."""
         self._place = Place(0, 0)
@@ -67,7 +68,7 @@ class Playback:
         self._graph: Graph
 
     def open(self, graph: Graph) -> None:
-        """Announce the log's topics on a graph whose time is `now_ns`."""
+        """Advertises the log's topics on a graph whose time is `now_ns`."""
         self._graph = graph
         is_played = topic_filter(("/**",), LEFT_OUT)
         for channel, topic in self.log.topics.items():
@@ -83,7 +84,7 @@ class Playback:
 
     @cached_property
     def topics(self) -> tuple[PlayedTopic, ...]:
-        """All topics of the log, by name; to count their messages takes long in a long log."""
+        """Returns all topics of the log, by name; counting messages is slow for a long log."""
         counts = self.log.counts()
         found = self.log.topics.items()
         return tuple(
@@ -92,11 +93,14 @@ class Playback:
 
     @property
     def problem(self) -> str:
-        """What is wrong with the file; empty for a whole one."""
+        """Problems of the file; empty for a whole one."""
         return self.log.problem
 
     def advance(self, until_ns: int) -> bool:
-        """Publish what was told up to `until_ns`, or some of it; whether that is all."""
+        """Publishes messages up to `until_ns`, or some of them.
+
+        Returns whether all were published.
+        """
         until_ns = min(until_ns, self.end_ns)
         shown, self._place, over = self._line.take(self._place, until_ns, self._wanted())
         self._publish(shown)
@@ -106,7 +110,7 @@ class Playback:
         return over
 
     def seek(self, time_ns: int) -> None:
-        """Go to a time, to the nearest end from beyond; and show what was the case then."""
+        """Seeks to a time within the log and publishes the state of that time."""
         self.position_ns = min(max(time_ns, self.start_ns), self.end_ns)
         if self.position_ns == self.start_ns:
             self._place = Place(0, 0)
@@ -116,7 +120,7 @@ class Playback:
         self._set_clock()
 
     def show_to_newcomers(self) -> None:
-        """Give those who have begun to listen what they would have heard last."""
+        """Sends new subscribers the last messages before the current time."""
         listeners = {topic.name: topic.subscribers for topic in self._graph.topics()}
         before, self._listeners = self._listeners, listeners
         fresh = {name for name, count in listeners.items() if count > before.get(name, 0)}
@@ -126,7 +130,7 @@ class Playback:
             self._set_clock()
 
     def close(self) -> None:
-        """Close the file."""
+        """Closes the file."""
         self.log.close()
 
     # ------------------------------------------------------------------------------------ inside
@@ -135,7 +139,7 @@ class Playback:
         return {c for c, publisher in self._publishers.items() if publisher.wanted}
 
     def _show(self, channels: Set[int]) -> None:
-        """Publish what `channels` told last before the present place."""
+        """Publishes the last messages of `channels` before the current position."""
         states = {c for c in channels if not self._happens(self._publishers[c].topic)}
         moving = {c for c in states if self._is_transform(c)}
         shown = self._line.last_before(self._place, states - moving)
@@ -150,7 +154,7 @@ class Playback:
         return publisher.msgtype == _TF and not publisher.latched
 
     def _publish(self, shown: Iterable[Shown]) -> None:
-        """Publish messages, each at the time that the log gives it."""
+        """Publishes messages, each at its time in the log."""
         for _, channel, record in shown:
             self.now_ns = record.time_ns
             try:

@@ -1,4 +1,4 @@
-"""What is in a log: topics, types, counts, times; also of a file that a killed run left."""
+"""Summarizes a log: topics, types, counts, times; also for a truncated file."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ class LogSummary:
 
 
 def summarize(path: str | Path) -> LogSummary:
-    """Look into a log, through its index or, where that is missing, chunk by chunk.
+    """Summarizes a log, from its index or, without one, chunk by chunk.
 
     Raises
     ------
     RecordingError
-        The file cannot be read, is no log, or describes or unpacks to more than any log does.
+        The file cannot be read, is no log, or exceeds the limits of a log.
 
     """
     path = Path(path)

@@ -1,4 +1,4 @@
-"""The flight in a log: which scenario was flown, and every command that came from outside."""
+"""The flight in a log: its scenario, and every command of external clients."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ _ORIGIN_TYPE = "std_msgs/msg/String"
 
 @dataclass(frozen=True)
 class RecordedScenario:
-    """What was flown: a scenario's name and content, as plain data, its seed, Volery's version.
+    """A flight's scenario: name and content as plain data, seed, Volery's version.
 
-    A log says nothing of where the scenario's files lie: older logs have a `folder`, which is not
-    believed, for a log may be another person's.
+    A log does not contain the folder of the scenario's files: the `folder` of older logs is
+    ignored, because a log may be untrusted.
     """
 
     name: str
@@ -34,24 +34,26 @@ class RecordedScenario:
     content: dict[str, Any]
 
     def to_json(self) -> str:
-        """As it stands in a log."""
+        """Returns the JSON text of a log."""
         fields = {"name": self.name, "seed": self.seed, "version": self.version, "folder": None}
-        return json.dumps({**fields, "content": self.content}, default=str)  # of dates
+        return json.dumps({**fields, "content": self.content}, default=str)  # dates
 
     @classmethod
     def from_json(cls, text: str) -> RecordedScenario:
-        """Read it. `RecordingError` for what is none."""
+        """Parses the JSON text of a log. Raises `RecordingError` if it is invalid."""
         try:
             plain = json.loads(text)
             name, version, content = str(plain["name"]), str(plain["version"]), plain["content"]
             return cls(name, int(plain["seed"]), version, dict(content))
         except (ValueError, TypeError, KeyError, RecursionError, OverflowError):
-            reason = f"what the log tells on {ORIGIN_TOPIC} is no scenario: JSON with name, seed, "
+            reason = (
+                f"the log's message on {ORIGIN_TOPIC} holds no scenario: JSON with name, seed, "
+            )
             raise RecordingError(f"{reason}version and content is needed") from None
 
 
 class RecordedCommand(NamedTuple):
-    """A recorded command and its moment; see `engine.command_queue`."""
+    """A recorded command and its time; see `engine.command_queue`."""
 
     number: int
     step: int
@@ -61,7 +63,7 @@ class RecordedCommand(NamedTuple):
 
 @dataclass(frozen=True)
 class RecordedFlight:
-    """All that is needed to repeat a flight."""
+    """All data that a replay of a flight needs."""
 
     path: Path
     origin: RecordedScenario
@@ -71,9 +73,9 @@ class RecordedFlight:
 
 
 def origin_of(log: ChunkedLog) -> RecordedScenario | None:
-    """The scenario of a log's flight; None where it does not tell.
+    """Returns the scenario of a log's flight; None if the log has none.
 
-    `RecordingError` where what it tells is none.
+    Raises `RecordingError` if the scenario is invalid.
     """
     for record in _records_of(log, ORIGIN_TOPIC):
         if record.topic.msgtype == _ORIGIN_TYPE:
@@ -82,12 +84,12 @@ def origin_of(log: ChunkedLog) -> RecordedScenario | None:
 
 
 def read_flight(path: Path) -> RecordedFlight:
-    """Read the flight in a log. `RecordingError` where it is none that can be repeated."""
+    """Reads the flight in a log. Raises `RecordingError` if it cannot be replayed."""
     log = open_chunks(path)
     try:
         origin = origin_of(log)
         if origin is None:
-            raise RecordingError(f"{path}: tells of no scenario ({ORIGIN_TOPIC}) to be repeated")
+            raise RecordingError(f"{path}: has no scenario ({ORIGIN_TOPIC}) to replay")
         commands = _commands_of(log)
         last = log.content(log.chunks[-1]).heads
     except GraphError as error:
@@ -97,8 +99,8 @@ def read_flight(path: Path) -> RecordedFlight:
     for place, command in enumerate(commands):
         if command.number != place:
             raise RecordingError(
-                f"{path}: command {place} of the flight is missing, so that it cannot be repeated: "
-                "the log is damaged, or was begun when very many had been given"
+                f"{path}: command {place} is missing, so that the flight cannot be replayed: "
+                "the log is damaged, or its recording started after very many commands"
             )
     return RecordedFlight(path, origin, commands, last[-1].time_ns if last else 0)
 
@@ -108,13 +110,13 @@ def _commands_of(log: ChunkedLog) -> tuple[RecordedCommand, ...]:
     commands: list[RecordedCommand] = []
     topics = {topic.topic for topic in log.topics.values()}
     waiting: Any = None
-    """The record whose content is the next message."""
+    """Record whose content is the next message."""
     for record in _records_of(log, command_records.TOPIC, following=True):
         if waiting is not None:
             if record.topic.topic == waiting.name:
                 content = decoder.decode(record).message
                 commands.append(_command(waiting, content))
-            else:  # it was taken back before it was delivered, or the log ends
+            else:  # withdrawn before its delivery, or the log ends
                 commands.append(_command(waiting, None))
             waiting = None
         if record.topic.topic != command_records.TOPIC:
@@ -132,7 +134,7 @@ def _commands_of(log: ChunkedLog) -> tuple[RecordedCommand, ...]:
             commands.append(_command(message, content))
     if waiting is not None:
         commands.append(_command(waiting, None))
-    # What was on its way when a log was begun is in it twice: as it came, and as an earlier one.
+    # Commands in transit at the start of a log are in it twice: as new and as earlier commands.
     once = {command.number: command for command in reversed(commands)}
     return tuple(once[number] for number in sorted(once))
 
@@ -144,9 +146,9 @@ def _command(message: Any, content: Any) -> RecordedCommand:
 
 
 def _records_of(log: ChunkedLog, topic: str, *, following: bool = False) -> Iterator[LogRecord]:
-    """Messages of a topic, and with `following` also the one after each, if its topic is known.
+    """Yields messages of a topic, with `following` also the one after each, if its topic is known.
 
-    `RecordingError` where the chunks that are said to hold them unpack to more than any log does.
+    Raises `RecordingError` if their chunks unpack to more than the limits.
     """
     budget = UnpackingBudget(log.path, log.size)
     channels = {channel for channel, found in log.topics.items() if found.topic == topic}

@@ -1,4 +1,4 @@
-"""Which topics a log gets: those of patterns; without patterns all, and no picture twice."""
+"""Selects the topics of a log by patterns; without patterns all, each image once."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ _SECOND_FORMS = (
     ("/depth/compressedDepth", "{base}/depth"),
     ("/points", "{base}/depth"),
 )
-"""Ends of a camera's topics that are left out where another one has the same picture.
+"""Topics of a camera that are skipped if another topic has the same image.
 
-Of colours the compressed form stays, of depth the lossless one; points are made of the depth.
+Colour images stay compressed, depth images lossless; points are skipped for the depth image.
 """
 
 
 def recorded_topics(
     graph: Graph, topics: Iterable[str] = (), exclude: Iterable[str] = ()
 ) -> Callable[[str], bool]:
-    """Returns whether a topic is recorded, by its name.
+    """Returns a function that tests by its name whether a topic is recorded.
 
     Parameters
     ----------
     graph
-        Of which topics exist: a raw picture is left out only where a compressed one is published.
+        Graph of the topics: a raw image is skipped only if a compressed one is published.
     topics
-        Patterns of `topic_patterns`. Without any: all topics, each picture in one form.
+        Patterns of `topic_patterns`. Without any: all topics, each image in one form.
     exclude
-        Patterns of topics that are left out in either case.
+        Patterns of topics that are never recorded.
 
     Raises
     ------
     GraphError
-        For what is no pattern.
+        A pattern is invalid.
 
     """
     chosen = tuple(topics)

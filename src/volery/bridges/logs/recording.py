@@ -1,12 +1,12 @@
-"""Recording what goes over the graph, by patterns of topics, begun and ended while it runs.
+"""Records topics of the graph by patterns, started and stopped during a run.
 
     recorder = Recorder(graph, open_log("scans.mcap"), topics=("/uav*/laser/**",))
     gateway.post(recorder.start).result()
     ...
     gateway.post(recorder.stop).result()
 
-Latched messages that were published before come first, with the time of the start. A log that
-cannot be written any further ends its recording, never the simulation.
+Latched messages published before come first, with the time of the start. A log that cannot be
+written any further ends its recording, never the simulation.
 """
 
 from __future__ import annotations
@@ -23,27 +23,27 @@ from volery.graph.messages import Published
 
 @dataclass(frozen=True)
 class RecordingInfo:
-    """How a recording fares."""
+    """State of a recording."""
 
     path: str
     running: bool
     messages: int
-    """Messages taken; after a failure the log says how many can be read."""
+    """Messages received; after a failure the log has the number of readable ones."""
     failure: str
     """Why it ended by itself; empty if it did not."""
 
 
 class Recorder:
-    """One recording. Methods belong to the simulation's thread; others use `Gateway.post`.
+    """Records a graph. Methods belong to the simulation's thread; others use `Gateway.post`.
 
     Parameters
     ----------
     graph
-        What is recorded.
+        Graph to record.
     log
-        Where to; `stop` closes it.
+        Log to write; `stop` closes it.
     topics, exclude
-        See `recorded_topics`. `GraphError` for what is no pattern.
+        See `recorded_topics`. Raises `GraphError` for an invalid pattern.
 
     """
 
@@ -64,21 +64,21 @@ class Recorder:
 
     @property
     def info(self) -> RecordingInfo:
-        """Counts so far; any thread may ask."""
+        """Returns the counts so far; any thread may call it."""
         failure = "" if self._failure is None else str(self._failure)
         running = self._subscription is not None
         return RecordingInfo(str(self._log.path), running, self._messages, failure)
 
     def start(self) -> None:
-        """Begin. `RecordingError` for a recorder that was started before."""
+        """Starts recording. Raises `RecordingError` for a recorder that was started before."""
         if self._ended or self._subscription is not None:
             raise RecordingError(f"{self._log.path}: this recording was started before")
         self._subscription = self._graph.subscribe_all(self._take, self._matches)
 
     def stop(self) -> None:
-        """Write the rest and close the log; a second time nothing happens.
+        """Writes the rest and closes the log; further calls do nothing.
 
-        RecordingError where the log could not be written, then or earlier.
+        Raises `RecordingError` if the log could not be written, then or earlier.
         """
         if self._ended:
             return

@@ -1,7 +1,7 @@
-"""Walks through the records of a log, whole or cut off, without needing its index.
+"""Reads the records of a log, whole or truncated, without its index.
 
-A killed run leaves a file without its tail. Its chunks stand one behind the other, each with its
-length, so they can be read until the file ends in the middle of one.
+A killed run leaves a file without its tail. Its chunks are consecutive, each with its length, so
+they can be read until the file ends within one.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ CUT_OFF = "cut off: the index at its end is missing"
 
 
 def cut_at(position: int) -> str:
-    """What is wrong with a file that ends within the record at a byte."""
+    """Returns the problem of a file that ends within the record at a byte."""
     return f"cut off in the middle of a chunk, which begins at byte {position}"
 
 
@@ -43,7 +43,7 @@ class LogTopic:
 
     topic: str
     msgtype: str
-    """ROS 2 style name, `sensor_msgs/msg/LaserScan`."""
+    """Name in ROS 2 style, `sensor_msgs/msg/LaserScan`."""
     definition: str
     encoding: str
     """`cdr` or `ros1`."""
@@ -53,7 +53,7 @@ class LogTopic:
 
     @classmethod
     def of_mcap(cls, channel: Channel, schema: Schema | None) -> LogTopic:
-        """Topic of an MCAP channel."""
+        """Returns the topic of an MCAP channel."""
         return cls(
             channel.topic,
             schema.name if schema else "",
@@ -64,9 +64,9 @@ class LogTopic:
 
     @classmethod
     def of_bag(cls, head: dict[bytes, bytes], data: bytes) -> LogTopic:
-        """Topic of a bag's connection: fields and data of its record.
+        """Returns the topic of a bag's connection from fields and data of its record.
 
-        Raises `ValueError` where it is no such record.
+        Raises `ValueError` if the record is invalid.
         """
         details = bag_fields(data)
         try:
@@ -93,9 +93,9 @@ class LogRecord(NamedTuple):
 
 @dataclass
 class LogWalk:
-    """Iterate over it for the messages; afterwards `problem` says what was wrong, if anything.
+    """Iterates over the messages of a log; afterwards `problem` describes any damage.
 
-    Iterating raises `RecordingError` where the file describes or unpacks to more than any log does.
+    Iterating raises `RecordingError` if the file describes or unpacks to more than the limits.
     """
 
     path: Path
@@ -106,7 +106,7 @@ class LogWalk:
 
     @property
     def damaged_chunks(self) -> int:
-        """Chunks and records that were left out so far."""
+        """Number of chunks and records skipped so far."""
         return self.damage.count
 
     def __iter__(self) -> Iterator[LogRecord]:
@@ -203,7 +203,7 @@ _WALKS = {"mcap": LogWalk._mcap, "bag": LogWalk._bag}
 
 
 def log_format(path: Path) -> str:
-    """`mcap` or `bag`, by the file's first bytes.
+    """Returns `mcap` or `bag`, by the file's first bytes.
 
     Raises
     ------
@@ -228,17 +228,17 @@ def log_format(path: Path) -> str:
 
 
 def _body(file: BinaryIO, length: int) -> bytes:
-    """The next bytes of a file. `ValueError` where they are more than any record has."""
+    """Returns the next bytes of a file. Raises `ValueError` beyond the largest record."""
     if length > MAX_CHUNK_BYTES:
         raise ValueError(f"a record of {length} bytes; at most {MAX_CHUNK_BYTES} are read")
     return file.read(length)
 
 
 def _bag_record(file: BinaryIO, size: int) -> tuple[dict[bytes, bytes], bytes] | None:
-    """Header fields and data of the next record; None at the end or where it is not whole.
+    """Returns header fields and data of the next record; None at the end or if it is incomplete.
 
-    size: bytes of the whole file. A read of more would claim memory for all that a length says.
-    What is too large is passed over, and comes empty.
+    size: bytes of the whole file. A longer read would allocate memory for any announced length. Too
+    large records are skipped and returned empty.
     """
     parts = []
     for most in (MAX_HEAD_BYTES, MAX_CHUNK_BYTES):

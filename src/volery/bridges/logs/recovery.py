@@ -1,4 +1,4 @@
-"""Writes a log that a killed run left as a whole file with an index."""
+"""Copies a truncated log to a whole file with an index."""
 
 from __future__ import annotations
 
@@ -19,28 +19,28 @@ from volery.core.errors import RecordingError
 
 @dataclass(frozen=True)
 class Recovery:
-    """What was saved, and where to."""
+    """Result of a recovery."""
 
     path: Path
     messages: int
     end_ns: int
     problem: str
-    """What was wrong with the original; empty if nothing was."""
+    """Problem of the original; empty if there was none."""
 
 
 def recovered_name(path: Path) -> Path:
-    """Where `recover` writes by default: `flight.mcap` becomes `flight.recovered.mcap`."""
+    """Returns the default output of `recover`: `flight.mcap` becomes `flight.recovered.mcap`."""
     return path.with_name(f"{path.stem}.recovered{path.suffix}")
 
 
 def recover(path: str | Path, out: str | Path | None = None) -> Recovery:
-    """Copy every readable message into a new log of the same format.
+    """Copies every readable message into a new log of the same format.
 
     Raises
     ------
     RecordingError
-        The file is no log, holds no readable message or is being written, or the new one exists
-        already or cannot be written; then nothing is left of it.
+            The file is no log, holds no readable message or is being written, or the new one exists
+            already or cannot be written; no partial file remains.
 
     """
     path = Path(path)
@@ -60,7 +60,7 @@ def recover(path: str | Path, out: str | Path | None = None) -> Recovery:
 
 
 def _write(kind: str, records: Iterable[LogRecord], out: Path) -> tuple[int, int]:
-    """Write a whole log under another name first, so that `out` is whole or not there."""
+    """Writes a log under another name first, so that `out` is complete or does not exist."""
     made = out.with_name(f".{out.stem}.part{out.suffix}")
     try:
         with locked_for_replacing(made):
@@ -72,7 +72,7 @@ def _write(kind: str, records: Iterable[LogRecord], out: Path) -> tuple[int, int
             made.unlink(missing_ok=True)
     except OSError as error:
         raise RecordingError(
-            f"{out}: cannot write the log: {error.strerror}; nothing of it is left"
+            f"{out}: cannot write the log: {error.strerror}; no partial file remains"
         ) from None
     return found
 

@@ -1,12 +1,12 @@
-"""Playing a log into a graph, in simulated time.
+"""Replays a log into a graph, in simulated time.
 
     replay = Replay("flight.mcap", topics=("/uav1/**",), remap={"/uav1/**": "/ghost/**"})
     replay.start(graph, timers, now_ns)
 
-Every message is published when it is due: at the present time plus its distance from the log's
-first message. The log is read as it is needed, a chunk at a time. Messages are in the order of the
-log; one with an earlier time than the one before it comes with that one. The headers' stamps stay
-as they were recorded.
+Every message is published when it is due: at the start time plus its distance from the log's first
+message. The log is read as needed, a chunk at a time. Messages are in the order of the log; one
+with an earlier time than its predecessor is published with that one. The headers' stamps are
+unchanged.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _SHORTEST_LAP_NS = 1_000_000
 
 @dataclass(frozen=True)
 class ReplayInfo:
-    """How a replay fares."""
+    """State of a replay."""
 
     path: str
     running: bool
@@ -44,50 +44,50 @@ class ReplayInfo:
     skipped: int
     """Messages that could not be published."""
     laps: int
-    """How often the log was played to its end."""
+    """Number of times the log was played to its end."""
     problem: str
-    """What was wrong with the file, as far as it was read: cut off, damaged chunks."""
+    """Problems of the file, as far as it was read: cut off, damaged chunks."""
     refused: Mapping[str, str]
-    """Topics of which messages were skipped, each with the first reason."""
+    """Topics with skipped messages, each with the first reason."""
 
 
 class _Place(NamedTuple):
-    """Where a replay is: when its lap began, and the number of the log's next record."""
+    """Position of a replay: start of its lap, and the number of the log's next record."""
 
     lap_ns: int
     record: int
 
 
 class Replay:
-    """One replay. Methods but `info` belong to the simulation's thread; others use `Gateway.post`.
+    """Replays a log. Methods except `info` belong to the simulation's thread; see `Gateway.post`.
 
     Parameters
     ----------
     path
-        A .mcap or .bag file, whole or cut off.
+        A .mcap or .bag file, whole or truncated.
     topics, exclude
-        Patterns of topics (as in the log) that are played, and of those of them that are not; see
-        `topic_patterns`. A graph has a clock of its own, so `/clock` is left out by default.
+            Patterns of played topics (names of the log), and of exceptions; see `topic_patterns`. A
+            graph has its own clock, so `/clock` is excluded by default.
     remap
         New names of topics, or of whole branches: `{"/uav1/**": "/uav2/**"}`.
     rate
-        Seconds of the log a simulated second.
+        Seconds of the log per simulated second.
     offset_s
         Simulated seconds between the start and the log's first message.
     begin_s
-        Seconds of the log that are left out at its beginning; of them what is latched comes at
-        once.
+            Seconds of the log skipped at its beginning; latched messages of this time are published
+            at once.
     loop
-        Begin again at the end.
+        Restart at the end.
     latched
-        Patterns of topics whose last message awaits those who subscribe later.
+        Patterns of topics whose last message is sent to later subscribers.
 
     Raises
     ------
     RecordingError
         There is no such file, it is no log, or a number is out of range.
     GraphError
-        A pattern or a new name is none.
+        A pattern or a new name is invalid.
 
     """
 
@@ -124,7 +124,7 @@ class Replay:
 
     @property
     def info(self) -> ReplayInfo:
-        """Counts so far; any thread may ask."""
+        """Returns the counts so far; any thread may call it."""
         return ReplayInfo(
             str(self._stream.path),
             self._running,
@@ -136,9 +136,9 @@ class Replay:
         )
 
     def start(self, graph: Graph, timers: Deferred, now_ns: Callable[[], int]) -> None:
-        """Begin at the present time, which `now_ns` tells. `RecordingError` the second time.
+        """Starts at the current time of `now_ns`. Raises `RecordingError` the second time.
 
-        timers: the engine, or whoever else calls back at times of the same clock.
+        timers: the engine, or another source of callbacks at times of the same clock.
         """
         if self._started:
             raise RecordingError(f"{self._stream.path}: this replay was started before")
@@ -147,7 +147,7 @@ class Replay:
         self._go_on(_Place(now_ns() + self._offset_ns, 0))
 
     def stop(self) -> None:
-        """Publish no more; what was latched is forgotten. A second time nothing happens."""
+        """Stops publishing and clears latched messages; further calls do nothing."""
         self._started = self._stopped = True
         self._running = False
         self._stream.close()
@@ -155,10 +155,10 @@ class Replay:
             publisher.cancel()
         self._publishers.clear()
 
-    # A restored snapshot brings back an earlier deadline: its place says where to read on.
+    # A restored snapshot brings back an earlier deadline: its position selects the next record.
 
     def _go_on(self, place: _Place) -> None:
-        """Publish what is due from `place` on, then wait for the next."""
+        """Publishes what is due from `place` on, then waits for the next message."""
         self._stream.seek(place.record)
         while (record := self._stream.peek()) is not None:
             due_ns = self._due_ns(place.lap_ns, record)
@@ -179,7 +179,7 @@ class Replay:
             self._go_on(place)
 
     def _due_ns(self, lap_ns: int, record: LogRecord) -> int | None:
-        """Simulated time at which a record is to be published; None for never."""
+        """Returns the simulated time at which a record is published; None for never."""
         after_ns = record.time_ns - self._stream.first_ns - self._begin_ns
         if after_ns < 0:
             comes = not self._begin_ns or self._is_latched(record.topic.topic)
@@ -210,7 +210,7 @@ class Replay:
             self._running = False
             self._stream.close()
             return
-        # The gap between two laps is the mean one between two messages.
+        # The gap between two laps is the mean gap between two messages.
         gap_ns = span_ns / (self._stream.selected - 1) if self._stream.selected > 1 else 0.0
         lap_ns = max(round((span_ns + gap_ns) / self._rate), _SHORTEST_LAP_NS)
         next_lap = place.lap_ns + lap_ns

@@ -1,4 +1,4 @@
-"""What stands where in a plain text log of a scanner: a small TOML file.
+"""Column layout of a scanner's plain text log: a small TOML file.
 
     [ranges]
     first_column = 24
@@ -7,7 +7,7 @@
     angle_max_deg = 120.0
     range_max_m = 5.6
 
-Columns are numbered from 0. Everything else has a default.
+Columns are numbered from 0. All other keys have defaults.
 """
 
 from __future__ import annotations
@@ -23,29 +23,29 @@ Turn = Annotated[float, Field(ge=-360.0, le=360.0)]
 
 
 class _Table(Data):
-    """Whose numbers are numbers: neither texts in quotation marks nor true or false."""
+    """A table whose numbers must be numbers: neither texts nor true or false."""
 
     @field_validator("*", mode="before")
     @classmethod
     def _no_text_for_a_number(cls, value: Any) -> Any:
         found = value if isinstance(value, list | tuple) else [value]
         if any(isinstance(one, str | bool) for one in found):
-            raise ValueError("numbers stand here, without quotation marks")
+            raise ValueError("must be a number, without quotation marks")
         return value
 
 
 class TimeColumn(_Table):
-    """When a scan was taken."""
+    """Time of a scan."""
 
     column: Column = 0
     unit_s: Positive = 1e-6
-    """Microseconds, unless stated otherwise."""
+    """Unit of the time; microseconds by default."""
 
 
 class RangeColumns(_Table):
-    """The beams of one scan, from `angle_min_deg` to `angle_max_deg`, counter-clockwise from above.
+    """Beams of one scan, from `angle_min_deg` to `angle_max_deg`, counter-clockwise from above.
 
-    Where the minimum is the greater angle, the scanner turns clockwise.
+    If the minimum is the greater angle, the scanner turns clockwise.
     """
 
     first_column: Column
@@ -56,9 +56,9 @@ class RangeColumns(_Table):
     range_min_m: NonNegative = 0.02
     unit_m: Positive = 1e-3
     no_echo: tuple[float, ...] = (0.0,)
-    """Numbers in the file that say: nothing was met."""
+    """Values in the file that mean: no return."""
     sweep_s: NonNegative = 0.0
-    """From the first beam to the last one; the scan's time is that of the first."""
+    """Time from the first beam to the last one; the scan's time is that of the first."""
 
     @model_validator(mode="after")
     def _sweeps_some_way(self) -> Self:
@@ -70,7 +70,7 @@ class RangeColumns(_Table):
 
 
 class OdometryColumns(_Table):
-    """A pose in the plane beside each scan: columns of x, y and yaw."""
+    """Pose in the plane with each scan: columns of x, y and yaw."""
 
     columns: tuple[Column, Column, Column]
     unit_m: Positive = 1e-3
@@ -78,45 +78,48 @@ class OdometryColumns(_Table):
 
 
 class WheelColumns(_Table):
-    """Two wheels' counters beside each scan, which make a pose in the plane."""
+    """Counters of two wheels with each scan, which yield a pose in the plane."""
 
     columns: tuple[Column, Column]
     """Left, right."""
     unit_m: Positive
-    """Way of a wheel's rim in one unit of its counter."""
+    """Distance of a wheel's rim per unit of its counter."""
     apart_m: Positive
-    """Between the wheels."""
+    """Distance between the wheels."""
 
 
 class PositionColumns(_Table):
-    """Of the scanner in the body, FLU."""
+    """Pose of the scanner in the body, FLU."""
 
     position_m: Vector3 = (0.0, 0.0, 0.0)
     rpy_deg: Vector3 = (0.0, 0.0, 0.0)
 
 
 class TextLayout(Data):
-    """A log with one scan a line, its numbers parted by blanks, commas or semicolons."""
+    """Layout of a log with one scan per line.
+
+    Numbers are separated by blanks, commas or semicolons.
+    """
 
     ranges: RangeColumns
     time: TimeColumn = TimeColumn()
     odometry: OdometryColumns | None = None
     wheels: WheelColumns | None = None
-    """In the place of `odometry`."""
+    """Alternative to `odometry`."""
     mount: PositionColumns = PositionColumns()
     uav: Name = "uav1"
     topic: Topic = "laser/horizontal/scan"
-    """Of the scans, below the UAV's name."""
+    """Topic of the scans, below the UAV's name."""
 
     @model_validator(mode="after")
     def _has_one_odometry(self) -> Self:
         if self.odometry is not None and self.wheels is not None:
-            raise ValueError("either odometry or wheels can be given")
+            raise ValueError("give either odometry or wheels, not both")
         return self
 
     @property
     def columns(self) -> int:
-        """How many columns a line must have."""
+        """Number of columns that a line must have."""
         last = [self.time.column, self.ranges.first_column + self.ranges.beams - 1]
         moving = self.odometry or self.wheels
         return 1 + max(last + list(moving.columns if moving else ()))

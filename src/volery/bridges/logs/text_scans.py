@@ -1,4 +1,4 @@
-"""Plain text logs of scanners, one scan a line, as messages."""
+"""Converts plain text logs of scanners, one scan per line, to messages."""
 
 from __future__ import annotations
 
@@ -37,22 +37,23 @@ _APART = re.compile(r"[\s,;]+")
 _COMMENTS = ("#", "%", "//")
 _LONGEST_LINE = 10_000_000
 _LATEST_S = 4.0e9
-"""Stamps of messages end there: 32 bits of seconds."""
+"""Latest stamp of messages: 32 bits of seconds."""
 _FEW = 0.01
-"""Share of the beams that meets something where units are wrong, or a scanner sees nothing."""
+"""Fraction of beams with a return below which units are wrong, or the scanner has no target in
+range."""
 _JUMP_NS = NS_PER_S // 2
-"""A time so far before that of the line before is a clock that was set; less is disorder."""
+"""Step back of the time from which on the clock was set; smaller steps are disorder."""
 
 
 @dataclass
 class TextScans:
-    """A plain text log, to be walked through once.
+    """A plain text log, to be iterated once.
 
-    Iterating gives the `Published` messages of each line in turn: `/tf_static` with the mounting
-    first, odometry where the log has it, the scan. A line that cannot be read is left out and
-    counted in `left_out`, `problem` tells of the first one. Where the clock was set back the times
-    go back, too; `clock_set` counts that. Raises `RecordingError` where the file cannot be read, or
-    holds no scan of this layout.
+    Iterating yields the `Published` messages of each line in turn: `/tf_static` with the mounting
+    first, odometry if the log has it, the scan. An unreadable line is skipped and counted in
+    `left_out`; `problem` describes the first one. If the clock was set back, the times go back,
+    too; `clock_set` counts these steps. Raises `RecordingError` if the file cannot be read, or has
+    no scan of this layout.
     """
 
     path: Path
@@ -63,19 +64,19 @@ class TextScans:
     problem: str = ""
     _most_columns: int = field(default=0, repr=False)
     _met: int = field(default=0, repr=False)
-    """Beams that have met something in the scanner's reach."""
+    """Beams with a return within the scanner's range."""
     _unit_ns: Decimal = field(init=False, repr=False)
-    """Of the times."""
+    """Unit of the times, ns."""
     _newest_ns: int = field(default=-1, repr=False)
     _counters: tuple[float, float] | None = field(default=None, repr=False)
     _pose: tuple[float, float, float] = field(default=(0.0, 0.0, 0.0), repr=False)
-    """By the wheels: x, y in m, yaw in rad."""
+    """Pose from the wheels: x, y in m, yaw in rad."""
 
     def __post_init__(self) -> None:
         self._unit_ns = Decimal(repr(self.layout.time.unit_s)) * NS_PER_S
 
     def __iter__(self) -> Iterator[Published]:
-        """Messages in the order of the lines."""
+        """Yields messages in the order of the lines."""
         try:
             with self.path.open(encoding="utf-8", errors="replace") as lines:
                 number = 0
@@ -87,11 +88,11 @@ class TextScans:
             raise RecordingError(f"{self.path}: cannot be read: {error.strerror}") from None
         if not self.scans:
             reason = self.problem or "it is empty"
-            raise RecordingError(f"{self.path}: holds no scan of this layout ({reason})")
+            raise RecordingError(f"{self.path}: has no scan of this layout ({reason})")
 
     @property
     def doubts(self) -> list[str]:
-        """What may be wrong with the layout, a line each, once the log has been walked through."""
+        """Possible problems of the layout, a line each, after the log has been read."""
         it, doubts = self.layout.ranges, []
         unused = self._most_columns - self.layout.columns
         if unused > 0:
@@ -108,7 +109,7 @@ class TextScans:
         return doubts
 
     def write_to(self, log: LogWriter) -> None:
-        """Put all messages into a log."""
+        """Writes all messages to a log."""
         for published in self:
             log.write(published)
 
@@ -142,24 +143,27 @@ class TextScans:
         try:
             row = np.array(words[: self.layout.columns], dtype=np.float64)
         except ValueError:
-            raise ValueError("a column holds no number") from None
+            raise ValueError("a column has no number") from None
         return row
 
     def _time_ns(self, word: str) -> int:
-        """Exactly what the word says: a double of seconds would be off by 200 ns by now."""
+        """Returns the exact time of the text: a double of seconds would be off by 200 ns by now."""
         time_s = float(word) * self.layout.time.unit_s
         if not 0.0 <= time_s < _LATEST_S:  # which NaN is not
-            raise ValueError(f"{time_s:g} s is no time that a message can bear")
+            raise ValueError(f"{time_s:g} s is out of range for a message's time")
         try:
             time_ns = int((Decimal(word) * self._unit_ns).to_integral_value())
         except ArithmeticError:
-            raise ValueError(f"{word[:40]} is no time that can be told exactly") from None
+            raise ValueError(f"{word[:40]} is not an exact time") from None
         if self._newest_ns - _JUMP_NS <= time_ns <= self._newest_ns:
             raise ValueError(f"at {time_s:.6f} s, not after the line before it")
         return time_ns
 
     def _pose_of(self, row: NDArray[np.float64]) -> tuple[float, float, float] | None:
-        """Of the body, by the odometry's columns or the wheels; None: the line tells of neither."""
+        """Returns the body's pose from the odometry's columns or the wheels.
+
+        None if the line has neither.
+        """
         odometry, wheels = self.layout.odometry, self.layout.wheels
         if odometry is not None:
             x, y, turn = (float(number) for number in row[list(odometry.columns)])
@@ -179,7 +183,7 @@ class TextScans:
 def _rolled(
     pose: tuple[float, float, float], left: float, right: float, apart: float
 ) -> tuple[float, float, float]:
-    """The pose after its wheels have rolled so far, m, along an arc."""
+    """Returns the pose after its wheels have rolled these distances, m, along an arc."""
     x, y, yaw = pose
     way, turn = 0.5 * (left + right), (right - left) / apart
     along = yaw + 0.5 * turn
@@ -191,7 +195,7 @@ def _published(topic: str, time_ns: int, message: Any) -> Published:
 
 
 def _scan(layout: TextLayout, time_ns: int, row: NDArray[np.float64]) -> LaserScan:
-    """REP 117: inf met nothing, -inf met something too near, NaN is no measurement."""
+    """Converts a row to a LaserScan by REP 117: inf no return, -inf too near, NaN unmeasured."""
     it = layout.ranges
     told = row[it.first_column : it.first_column + it.beams]
     ranges = told * it.unit_m
@@ -235,5 +239,5 @@ def _transform(mount: PositionColumns) -> Transform:
 
 
 def _frame(layout: TextLayout) -> str:
-    """As the simulation names it: `uav1/laser_horizontal`."""
+    """Returns the frame's name as in the simulation: `uav1/laser_horizontal`."""
     return f"{layout.uav}/{layout.topic.removesuffix('/scan').replace('/', '_')}"

@@ -1,8 +1,8 @@
-"""A log as one line of time, also where its own time went back.
+"""Orders a log on one time line, even if its own time went back.
 
-A flight that was reset, or taken back to a kept state, tells some times twice. On the line what
-came after such a jump follows what came before: its times are shifted by as much as the clock went
-back. A log without jumps keeps its own times.
+A flight that was reset, or restored from a snapshot, has some times twice. On the time line the
+messages after such a step follow those before it: their times are shifted by the step. A log
+without steps keeps its own times.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ _JUMP_NS = NS_PER_S // 10
 """Messages may be out of order by less (modelling choice): publishers have their own clocks."""
 _FOREVER_NS = 1 << 62
 _MAX_FRUITLESS = 64
-"""Chunks that are read for messages that their index promises and that are not in them."""
+"""Chunks read in search of messages that their index announces and that are not in them."""
 
 
 class _Piece(NamedTuple):
-    """Messages `first` to before `last` of a chunk (None: to its end), where on the line."""
+    """Messages `first` to before `last` of a chunk (None: its end), and their times on the line."""
 
     chunk: Chunk
     first: int
@@ -33,18 +33,18 @@ class _Piece(NamedTuple):
     shift_ns: int
     start_ns: int
     end_ns: int
-    """Latest time on the line up to here, which never falls."""
+    """Latest time on the line up to here, which never decreases."""
 
 
 class Place(NamedTuple):
-    """Of a message on the line: piece, and message in it."""
+    """Position of a message on the line: piece, and message in it."""
 
     piece: int
     message: int
 
 
 class Shown(NamedTuple):
-    """A message, where it stands on the line, and the number of its channel."""
+    """A message, its time on the line, and the number of its channel."""
 
     time_ns: int
     channel: int
@@ -52,7 +52,7 @@ class Shown(NamedTuple):
 
 
 class Passage(NamedTuple):
-    """Some messages, the place behind them, and whether no more are to come there."""
+    """Some messages, the position after them, and whether they were the last ones there."""
 
     shown: list[Shown]
     place: Place
@@ -60,7 +60,7 @@ class Passage(NamedTuple):
 
 
 class Timeline:
-    """The messages of a log, one after the other or from any time on."""
+    """Returns the messages of a log in order, or from any time on."""
 
     def __init__(self, log: ChunkedLog) -> None:
         self.log = log
@@ -75,13 +75,13 @@ class Timeline:
         return any(piece.shift_ns for piece in self._pieces)
 
     def shift_ns(self, place: Place) -> int:
-        """How far the line is ahead of the log's own time, before a place."""
+        """Returns the offset of the line to the log's own time, before a position."""
         number = min(place.piece, len(self._pieces) - 1)
         at_its_start = number == place.piece and place.message <= self._pieces[number].first
         return self._pieces[max(number - at_its_start, 0)].shift_ns
 
     def after(self, time_ns: int) -> Place:
-        """Place of the first message that is later than `time_ns`."""
+        """Returns the position of the first message that is later than `time_ns`."""
         number = bisect_left(self._ends, time_ns + 1)
         place = Place(number, 0)
         for _ in range(_MAX_FRUITLESS):
@@ -92,9 +92,9 @@ class Timeline:
         return place
 
     def take(self, place: Place, until_ns: int, channels: Set[int]) -> Passage:
-        """Messages of `channels` from a place on, up to `until_ns`, at most those of one chunk.
+        """Returns messages of `channels` from a position on, up to `until_ns`, at most one chunk.
 
-        No more than one chunk is read, also where an index promises messages that are not in it.
+        At most one chunk is read, even if an index announces messages that are not in it.
         """
         shown: list[Shown] = []
         number, message = place
@@ -117,7 +117,7 @@ class Timeline:
         return Passage(shown, Place(number, 0), over=number == len(self._pieces))
 
     def last_before(self, place: Place, channels: Set[int]) -> list[Shown]:
-        """The last message of each channel before a place, in the order of the log."""
+        """Returns the last message of each channel before a position, in the order of the log."""
         missing = set(channels)
         found: list[Shown] = []
         fruitless = 0
@@ -136,7 +136,7 @@ class Timeline:
         return found[::-1]
 
     def since(self, place: Place, time_ns: int, channels: Set[int]) -> list[Shown]:
-        """All messages of `channels` before a place and after `time_ns`, in their order."""
+        """Returns all messages of `channels` before a position and after `time_ns`, in order."""
         found: list[Shown] = []
         fruitless = 0
         for piece, content, heads in self._backwards(place):
@@ -155,7 +155,10 @@ class Timeline:
     def _backwards(
         self, place: Place
     ) -> Iterator[tuple[_Piece, Callable[[], Content], Callable[[], tuple[Head, ...]]]]:
-        """Pieces before a place, the last one first, each with what gives its messages."""
+        """Yields the pieces before a position, the last one first.
+
+        Each piece comes with functions for its content and heads.
+        """
         for number in range(min(place.piece, len(self._pieces) - 1), -1, -1):
             piece = self._pieces[number]
             content = partial(self.log.content, piece.chunk)
@@ -170,7 +173,7 @@ def _heads(content: Callable[[], Content], first: int, last: int | None) -> tupl
 
 
 def _pieces_of(log: ChunkedLog) -> list[_Piece]:
-    """The pieces of the line; chunks in which the clock went back are looked through."""
+    """Returns the pieces of the line; scans chunks in which the clock went back."""
     pieces: list[_Piece] = []
     shift_ns, front_ns = 0, -_FOREVER_NS
     for chunk in log.chunks:
@@ -187,7 +190,7 @@ def _pieces_of(log: ChunkedLog) -> list[_Piece]:
 def _cut(
     log: ChunkedLog, chunk: Chunk, shift_ns: int, front_ns: int
 ) -> tuple[list[_Piece], int, int]:
-    """Pieces of a chunk between jumps; shift and latest time behind them."""
+    """Returns the pieces of a chunk between steps; shift and latest time after them."""
     pieces = []
     first, low_ns = 0, _FOREVER_NS
     for k, head in enumerate(log.content(chunk).heads):

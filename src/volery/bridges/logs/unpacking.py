@@ -1,8 +1,8 @@
-"""Unpacks the chunks of logs, and stops where one unpacks to more than a chunk may hold.
+"""Unpacks the chunks of logs, up to the largest size of a chunk.
 
     data = unpack("lz4", packed, size)
 
-Each decompressor is asked for a bounded number of bytes, so that a bomb costs no more than a chunk.
+Each decompressor has a limit of bytes, so that a decompression bomb costs no more than a chunk.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ from volery.bridges.logs.budgets import MAX_CHUNK_BYTES
 _PIECE_BYTES = 1 << 20
 
 Decompress = Callable[[memoryview, int], bytes]
-"""Unpacks bytes to at most so many; what is beyond is left."""
+"""Unpacks at most a number of bytes; ignores the rest."""
 
 
 def unpack(compression: str, packed: bytes | memoryview, size: int) -> bytes:
-    """The bytes of a chunk, `size` of them.
+    """Returns the `size` bytes of a chunk.
 
     Parameters
     ----------
     compression
-        `lz4`, `zstd`, `bz2`; `none` or nothing for bytes as they are.
+        `lz4`, `zstd`, `bz2`; `none` or empty for uncompressed bytes.
     packed
-        What the file holds.
+        Bytes in the file.
     size
-        Bytes that the file says it unpacks to.
+        Announced size of the unpacked bytes.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def _lz4(packed: memoryview, most: int) -> bytes:
 
 
 def _stepwise(decompressor: bz2.BZ2Decompressor, packed: memoryview, most: int) -> bytes:
-    """Unpack one frame; pieces are joined once, so that memory holds what came and no more."""
+    """Unpacks one frame; pieces are joined once, so that memory holds only the output."""
     data = decompressor.decompress(packed, most)
     if len(data) < most and not decompressor.eof:
         pieces = [data]

@@ -1,1 +1,1 @@
-"""Nodes of this project in processes of their own."""
+"""Runs Volery's nodes in their own processes."""

@@ -1,11 +1,12 @@
-"""A link for nodes that are started before their graph is there.
+"""A connection for nodes that start before their graph.
 
-So a node's own complaints, as of its parameters, come at once and not after a wait for the graph.
+The errors of a node itself, such as wrong parameters, are then reported without a wait for the
+graph.
 
     link = DeferredConnection("watcher", lambda: await_link(via, "watcher"))
     host = NodeHost(link)
-    node = Watcher(context=host.context())      # what is wrong with it is told here
-    link.join()                                 # here the graph is waited for
+    node = Watcher(context=host.context())   # raises the node's own errors
+    link.join()         # waits for the graph
 """
 
 from __future__ import annotations
@@ -26,13 +27,13 @@ from volery.graph.subscription_queue import SubscriptionQueue, Wake
 Action = Callable[[GraphConnection], None]
 
 _MOST_PUBLISHED = 1000
-"""The newest so many messages are kept until the graph is there (modelling choice)."""
+"""Number of newest messages stored until the graph is connected (modelling choice)."""
 
 
 class DeferredConnection:
-    """A `GraphConnection` that announces and publishes at `join` what came before it.
+    """A `GraphConnection` that repeats earlier advertisements and messages at `join`.
 
-    open_link: joins the graph. Who calls a service before `join` has it joined then.
+    open_link: joins the graph. A service call before `join` joins the graph.
     """
 
     def __init__(self, name: str, open_link: Callable[[], GraphConnection]) -> None:
@@ -44,7 +45,7 @@ class DeferredConnection:
         self._lock = threading.RLock()
 
     def join(self) -> GraphConnection:
-        """Join the graph, unless that is done; the link to it."""
+        """Joins the graph, if not done yet; returns the connection."""
         if self._link is None:
             link = self._open_link()
             with self._lock:
@@ -56,11 +57,11 @@ class DeferredConnection:
         return self._link
 
     def advertise(self, topic: str, msgtype: str, *, latched: bool = False) -> None:
-        """As of `GraphConnection`."""
+        """Implements `GraphConnection.advertise`."""
         self._announce(lambda link: link.advertise(topic, msgtype, latched=latched))
 
     def publish(self, topic: str, message: Any) -> None:
-        """As of `GraphConnection`."""
+        """Implements `GraphConnection.publish`."""
         with self._lock:
             if self._link is None:
                 self._published.append(lambda link: link.publish(topic, message))
@@ -68,7 +69,7 @@ class DeferredConnection:
         self._link.publish(topic, message)
 
     def unadvertise(self, topic: str) -> None:
-        """As of `GraphConnection`."""
+        """Implements `GraphConnection.unadvertise`."""
         self._announce(lambda link: link.unadvertise(topic))
 
     def subscribe(
@@ -80,7 +81,10 @@ class DeferredConnection:
         reliable: bool = False,
         wake: Wake,
     ) -> SubscriptionQueue:
-        """As `GraphConnection.subscribe`; the mailbox is empty until there is a graph."""
+        """Implements `GraphConnection.subscribe`.
+
+        The queue is empty until the graph is connected.
+        """
         mailbox = _LateMailbox(topic, depth, wake, reliable=reliable)
 
         def fill(link: GraphConnection) -> None:
@@ -90,7 +94,7 @@ class DeferredConnection:
         return mailbox
 
     def unsubscribe(self, mailbox: SubscriptionQueue) -> None:
-        """As of `GraphConnection`."""
+        """Implements `GraphConnection.unsubscribe`."""
 
         def empty(link: GraphConnection) -> None:
             if isinstance(mailbox, _LateMailbox) and mailbox.real is not None:
@@ -99,15 +103,15 @@ class DeferredConnection:
         self._announce(empty)
 
     def call(self, service: str, request: Any | None, reply: ServiceReply) -> None:
-        """As of `GraphConnection`."""
+        """Implements `GraphConnection.call`."""
         self.join().call(service, request, reply)
 
     def offer(self, service: str, srvtype: str, handler: Handler) -> None:
-        """As of `GraphConnection`."""
+        """Implements `GraphConnection.offer`."""
         self._announce(lambda link: link.offer(service, srvtype, handler))
 
     def host_node(self, name: str, parameters: Parameters, post: Callable[[Any], Any]) -> None:
-        """As of `HostsNodes`, where the link to the graph is one."""
+        """Implements `HostsNodes.host_node`, if the connection to the graph does."""
 
         def host(link: GraphConnection) -> None:
             if isinstance(link, HostsNodes):
@@ -116,7 +120,7 @@ class DeferredConnection:
         self._announce(host)
 
     def close(self) -> None:
-        """As of `GraphConnection`; without a graph nothing happens."""
+        """Implements `GraphConnection.close`; does nothing without a graph."""
         if self._link is not None:
             self._link.close()
 
@@ -129,15 +133,15 @@ class DeferredConnection:
 
 
 class _LateMailbox(SubscriptionQueue):
-    """Stands for one that a link to the graph fills."""
+    """Forwards to the queue of the connection to the graph."""
 
     real: SubscriptionQueue | None = None
 
     @property
     def failure(self) -> str | None:
-        """As of `SubscriptionQueue`."""
+        """Implements `SubscriptionQueue.failure`."""
         return None if self.real is None else self.real.failure
 
     def take_numbered(self, most: int | None = None) -> list[tuple[int, Published]]:
-        """As of `SubscriptionQueue`."""
+        """Implements `SubscriptionQueue.take_numbered`."""
         return [] if self.real is None else self.real.take_numbered(most)

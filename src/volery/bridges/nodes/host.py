@@ -1,11 +1,11 @@
-"""Runs nodes in a process of their own, on a link to the graph of a simulation or a real vehicle.
+"""Runs nodes in their own process, connected to the graph of a simulation or a real vehicle.
 
     host = NodeHost(link, clock="auto")
     node = GapFollowing(context=host.context(), namespace="/uav1")
     host.spin()
 
-The node cannot tell: its clock is the graph's `/clock` where there is one, else the computer's, and
-its timers go by that clock.
+The node is the same as inside the simulation: its clock is the graph's `/clock` if there is one,
+else the computer's, and its timers use that clock.
 """
 
 from __future__ import annotations
@@ -33,26 +33,26 @@ from volery.graph.qos import QoSProfile
 ClockKind = Literal["auto", "simulated", "wall"]
 _LONGEST_WAIT_S = 0.2
 _CLOCKS_KEPT = 1000
-"""A node that is busy for a while still lets its timers ring at each tick."""
+"""Number of queued clock messages, so that a busy node still gets its timers at each tick."""
 
 
 @dataclass(order=True)
 class _Alarm:
-    """Something that is due at a time, and again each period where that is not 0."""
+    """A timer that is due at a time, and then each period if the period is not 0."""
 
     due_ns: int
     number: int
     period_ns: int = field(compare=False)
     action: Callable[[], Any] = field(compare=False)
     callback: Callable[[], Any] | None = field(default=None, compare=False)
-    """What `every` was given."""
+    """Callback given to `every`."""
 
 
 class NodeHost:
-    """One thread's worth of nodes. All methods but `stop` belong to the thread that spins.
+    """Runs nodes in one thread. All methods except `stop` belong to the thread that spins.
 
-    clock: `simulated` follows `/clock`, and nothing is due before its first message; `wall` is the
-    computer's clock (ns since 1970); `auto` is `wall` until a `/clock` is heard.
+    clock: `simulated` follows `/clock`, and no timer is due before its first message; `wall` is the
+    computer's clock (ns since 1970); `auto` is `wall` until the first `/clock` message.
     """
 
     def __init__(self, link: GraphConnection, *, clock: ClockKind = "auto") -> None:
@@ -71,11 +71,11 @@ class NodeHost:
             )
 
     def context(self, remap: Mapping[str, str] | None = None) -> Context:
-        """What a node stands on; `remap` gives topics and services other names."""
+        """Returns a node's context; `remap` renames topics and services."""
         return Context(self.graph, self, self.now_ns, remap=dict(remap or {}))
 
     def now_ns(self) -> int:
-        """Simulated time, or the computer's."""
+        """Returns the simulated time, or the computer's, ns."""
         if self._simulated_ns is not None:
             return self._simulated_ns
         return 0 if self._kind == "simulated" else time.time_ns()
@@ -89,9 +89,9 @@ class NodeHost:
         *,
         wanted: Callable[[], bool] | None = None,
     ) -> None:
-        """Call `callback` each period; after a standstill once, not for each one missed.
+        """Calls `callback` each period, if `wanted()`.
 
-        Not where `wanted()` is false.
+        After a pause once, not for each missed period.
         """
 
         def ring() -> None:
@@ -103,16 +103,16 @@ class NodeHost:
         self._set(alarm)
 
     def forget(self, callback: Callable[[], None]) -> None:
-        """Call `callback`, which `every` was given, no more."""
+        """Removes a `callback` given to `every`."""
         self._alarms = [alarm for alarm in self._alarms if alarm.callback != callback]
         heapq.heapify(self._alarms)
 
     def at(self, time_ns: int, action: Callable[[], Any]) -> None:
-        """Call `action` once, at `time_ns` or as soon as possible."""
+        """Calls `action` once, at `time_ns` or as soon as possible."""
         self._set(_Alarm(time_ns, next(self._numbers), 0, action))
 
     def postpone(self, by_ns: int) -> None:
-        """Have all that is due come so much later."""
+        """Delays all timers."""
         for alarm in self._alarms:
             alarm.due_ns += by_ns
 
@@ -126,7 +126,7 @@ class NodeHost:
     def _set_clock(self, stamp: Time) -> None:
         before_ns, now_ns = self.now_ns(), stamp.sec * NS_PER_S + stamp.nanosec
         if self._simulated_ns is None or now_ns < before_ns:
-            # Another clock from here on, or a simulation that was reset: what was left stays left.
+            # The clock changed, or the simulation was reset: remaining times stay the same.
             for alarm in self._alarms:
                 alarm.due_ns += now_ns - before_ns
         self._simulated_ns = now_ns
@@ -143,11 +143,11 @@ class NodeHost:
     # --------------------------------------------------------------------------------- lock step
 
     def join_lock_step(self, name: str, period_s: float, timeout_s: float = 10.0) -> None:
-        """Have the simulation wait for the nodes each `period_s`; before `spin`.
+        """Makes the simulation wait for the nodes each `period_s`; call it before `spin`.
 
-        At each meeting, what the simulation published until then has been handed out and due timers
-        have rung before it goes on: with its physics step as the period the nodes answer as they
-        do inside. `GraphError` where it does not want to wait.
+        At each exchange, all messages that the simulation has published are delivered and due
+        timers are called before the simulation goes on: with its physics step as the period the
+        nodes respond as they do inside. Raises `GraphError` if the simulation refuses.
         """
         go, done = (f"/volery/lock_step/{name}/{word}" for word in ("go", "done"))
         self._link.advertise(done, "rosgraph_msgs/msg/Clock")
@@ -157,7 +157,7 @@ class NodeHost:
             self._link.publish(done, published.message)
 
         if self._clock is not None:
-            self._clock.cancel()  # the meetings tell the time
+            self._clock.cancel()  # the exchanges set the time
         self.graph.subscribe(go, meet, Clock)
         self.graph.hold_back(go, lambda published: self._set_clock(published.message.clock))
         srvtype = "volery_interfaces/srv/JoinLockStep"
@@ -176,7 +176,7 @@ class NodeHost:
         self._set_clock(answer.now)
 
     def _begin_periods(self) -> None:
-        """Let timers begin now: the wall time since they were made is none of the simulation's."""
+        """Restarts the timers: wall time since their creation is not simulated time."""
         if self._simulated_ns is None:
             now_ns = self.now_ns()
             for alarm in self._alarms:
@@ -184,19 +184,19 @@ class NodeHost:
             heapq.heapify(self._alarms)
 
     def announce(self, node: str) -> None:
-        """Say that the node of this full name is ready, for `volery run --wait-for`."""
+        """Announces that the node of this full name is ready, for `volery run --wait-for`."""
         self._link.advertise(presence_topic(node), PRESENCE_TYPE)
 
     # --------------------------------------------------------------------------------------- run
 
     def spin(self, until: Callable[[], bool] | None = None) -> None:
-        """Serve the nodes until `stop`, or until `until()` is true; errors of nodes end it."""
+        """Serves the nodes until `stop`, or until `until()` is true; errors of nodes end it."""
         with reported_failures(self.graph):
             while not self._stopped and not (until is not None and until()):
                 self.spin_once(_LONGEST_WAIT_S)
 
     def spin_once(self, timeout_s: float) -> None:
-        """Wait for something to do, at most `timeout_s`, and do it."""
+        """Waits for work, at most `timeout_s`, and does it."""
         self._woken.wait(self._pause_s(timeout_s))
         self._woken.clear()
         while self.graph.hand_out():
@@ -205,7 +205,7 @@ class NodeHost:
             self._ring_due()
 
     def stop(self) -> None:
-        """End `spin` soon; from any thread."""
+        """Ends `spin` soon; any thread may call it."""
         self._stopped = True
         self._woken.set()
 

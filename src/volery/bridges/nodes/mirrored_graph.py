@@ -1,4 +1,4 @@
-"""A graph of a node's own process: every name in it stands for the same name elsewhere."""
+"""The graph of a node's own process, which mirrors a remote graph."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _CALL_TIMEOUT_S = 10.0
 
 
 class MirroredGraph(Graph):
-    """Publications go out through a link, what others publish comes in through it.
+    """Publishes through a connection and receives remote messages through it.
 
-    Callbacks run in the thread that calls `hand_out`; `wake`, called by the link's thread, says
-    that there is something to do.
+    Callbacks run in the thread that calls `hand_out`; the connection's thread calls `wake` when
+    there is work.
     """
 
     def __init__(
@@ -36,7 +36,7 @@ class MirroredGraph(Graph):
         self._barrier: tuple[str, Callable[[Published], None]] | None = None
 
     def enter(self, node: str) -> None:
-        """Note a node here and, where the link can tell it, there."""
+        """Registers a node here and, if the connection supports it, remotely."""
         super().enter(node)
         if isinstance(self._link, HostsNodes):
             self._link.host_node(node, self.parameters, self.post)
@@ -46,7 +46,7 @@ class MirroredGraph(Graph):
     def advertise(
         self, topic: str, msgtype: str | type[Any], *, latched: bool = False
     ) -> Publisher:
-        """Announce a publisher here and there."""
+        """Advertises a topic here and remotely."""
         name = msgtype if isinstance(msgtype, str) else type_name(msgtype)
         self._link.advertise(topic, name, latched=latched)
         return _RemotePublisher(super().advertise(topic, name, latched=latched), self._link)
@@ -59,9 +59,9 @@ class MirroredGraph(Graph):
         *,
         qos: QoSProfile = DEFAULT_QOS,
     ) -> Subscription:
-        """Call `callback` with each message that comes through the link.
+        """Calls `callback` with each message of the connection.
 
-        The first subscriber of a topic decides how messages wait.
+        The first subscriber of a topic determines the queue's options.
         """
         name = type_name(msgtype) if isinstance(msgtype, type) else msgtype
         if topic not in self._mailboxes:
@@ -73,22 +73,22 @@ class MirroredGraph(Graph):
         return _RemoteSubscription(readers, callback, lambda: self._leave(topic))
 
     def _leave(self, topic: str) -> None:
-        """End a subscription over there that nobody reads here."""
+        """Ends a remote subscription without local subscribers."""
         if topic in self._mailboxes and not self._readers[topic]:
             self._link.unsubscribe(self._mailboxes.pop(topic))
 
     def hold_back(self, barrier: str, begin: Callable[[Published], None]) -> None:
-        """Hand messages out only when one on `barrier` has come after them.
+        """Delivers messages only after a later message on `barrier`.
 
-        `begin` is called with that one before those that it frees.
+        `begin` is called with that message before the messages that it releases.
         """
         self._barrier = barrier, begin
 
     def hand_out(self) -> bool:
-        """Call back for everything that has come, in the order of arrival; whether there was any.
+        """Delivers all received messages in the order of arrival; returns whether there were any.
 
-        What comes meanwhile waits for the next call. `GraphError` where a reliable subscription
-        has lost messages: this process is too slow for it.
+        Messages that arrive meanwhile wait for the next call. Raises `GraphError` if a reliable
+        subscription has lost messages: this process is too slow for it.
         """
         for mailbox in self._mailboxes.values():
             if mailbox.failure is not None:
@@ -108,7 +108,7 @@ class MirroredGraph(Graph):
         return bool(come or posted)
 
     def _freed(self) -> Iterator[tuple[str, Published]]:
-        """Messages to be handed out now, in order."""
+        """Returns messages to deliver now, in order."""
         if self._barrier is None:
             freed, self._held = self._held, []
             yield from freed
@@ -121,13 +121,13 @@ class MirroredGraph(Graph):
             yield from freed
 
     def show_to_all(self, sender: Publisher, message: Any) -> None:
-        """Publish a message."""
+        """Publishes a message."""
         sender.publish(message)
 
     # ---------------------------------------------------------------------------------- services
 
     def offer(self, service: str, srvtype: str, handler: Callable[[Any], Any]) -> None:
-        """Offer a service over there; its handler runs here, in `hand_out`."""
+        """Creates a remote service; its handler runs here, in `hand_out`."""
 
         def ask(request: Any, reply: ServiceReply) -> None:
             self.post(lambda: _answer(handler, request, reply))
@@ -135,19 +135,19 @@ class MirroredGraph(Graph):
         self._link.offer(service, srvtype, ask)
 
     def offer_async(self, service: str, srvtype: str, ask: AsyncHandler) -> None:
-        """Like `offer`, for answers that come later."""
+        """Creates a service like `offer`, for answers that come later."""
         self._link.offer(service, srvtype, lambda q, reply: self.post(lambda: ask(q, reply)))
 
     def has_service(self, service: str) -> bool:  # noqa: ARG002
-        """Whether to try: only a call tells whether somebody over there answers."""
+        """Returns True: only a call shows whether a remote server exists."""
         return True
 
     def call(self, service: str, request: Any | None = None) -> Any:
-        """Call and wait for the response; `GraphError` where none comes in time."""
+        """Calls a service and waits for the response. Raises `GraphError` after a timeout."""
         return call_and_wait(self._link, service, request, _CALL_TIMEOUT_S)
 
     def call_async(self, service: str, request: Any | None, reply: ServiceReply) -> None:
-        """Call; the answer comes from the link's thread."""
+        """Calls a service; the answer comes from the connection's thread."""
         self._link.call(service, request, reply)
 
     def _keep(self, action: Callable[[], Any]) -> None:
@@ -165,13 +165,13 @@ class _RemoteSubscription(Subscription):
         self._leave = leave
 
     def cancel(self) -> None:
-        """Stop receiving; the last one ends the stream."""
+        """Stops receiving; the last subscription ends the remote one."""
         super().cancel()
         self._leave()
 
 
 class _RemotePublisher(Publisher):
-    """Publishes through the link; whether anybody listens over there is not known."""
+    """Publishes through the connection; remote subscribers are unknown."""
 
     def __init__(self, local: Publisher, link: GraphConnection) -> None:
         self._local = local
@@ -190,23 +190,23 @@ class _RemotePublisher(Publisher):
 
     @property
     def wanted(self) -> bool:
-        """True: somebody may listen."""
+        """True, because remote subscribers are unknown."""
         return True
 
     @property
     def subscriptions(self) -> int:
-        """1: somebody may listen."""
+        """Always 1, because remote subscribers are unknown."""
         return 1
 
     def publish(self, message: Any) -> None:
-        """Send a message."""
+        """Sends a message."""
         name = getattr(message, "__msgtype__", None)
         if name != self.msgtype:
             raise GraphError(f"topic '{self.topic}' carries {self.msgtype}, not {name}")
         self._link.publish(self.topic, message)
 
     def cancel(self) -> None:
-        """Publish no more, here and there."""
+        """Ends the publication, here and remotely."""
         self._local.cancel()
         self._link.unadvertise(self.topic)
 
@@ -218,6 +218,6 @@ def _number(entry: tuple[int, str, Published]) -> int:
 def _answer(handler: Callable[[Any], Any], request: Any, reply: ServiceReply) -> None:
     try:
         reply.answer(handler(request))
-    except Exception as error:  # the caller's business too
+    except Exception as error:  # an error for the caller, too
         reply.fail(GraphError(f"{type(error).__name__}: {error}"))
         raise

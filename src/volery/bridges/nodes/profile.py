@@ -1,7 +1,7 @@
-"""Launch profiles: the same node in simulation, on the ground and in flight.
+"""Launch profiles: run the same node in simulation, on the ground and in flight.
 
-A profile is a TOML file that says where a node runs and what its topics are called there. It never
-changes what the node does.
+A profile is a TOML file that defines where a node runs and how its topics are named there. A
+profile never changes what the node does.
 
     name = "flight_test"
     via = "ros1"
@@ -15,7 +15,7 @@ changes what the node does.
     [parameters]
     height_m = 3.0
 
-One that names nodes launches all of them in one process (`volery launch`):
+A profile with nodes launches all of them in one process (`volery launch`):
 
     [[launch]]
     node = "task_manager"
@@ -42,37 +42,37 @@ class Launched(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     node: Annotated[str, Field(pattern=NODE_PATTERN)]
-    """A registered name, such as `slam`, or `module:Class`."""
+    """Registered name, such as `slam`, or `module:Class`."""
     parameters: dict[str, Any] = {}
 
 
 class Profile(BaseModel):
-    """How nodes are launched."""
+    """Options of launched nodes."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str = "default"
     via: str | None = None
-    """Way into the graph, as `volery node --via` takes it."""
+    """Graph connection, as in `volery node --via`."""
     namespace: Namespace = ""
     clock: Literal["auto", "simulated", "wall"] = "auto"
     remap: dict[Name, Name] = {}
-    """The node's names, relative ones below its namespace, to those of the graph."""
+    """Maps the node's names, relative ones below its namespace, to those of the graph."""
     parameters: dict[str, Any] = {}
-    """Of the node that `volery node` starts."""
+    """Parameters of the node that `volery node` starts."""
     launch: tuple[Launched, ...] = ()
-    """What `volery launch` starts."""
+    """Nodes that `volery launch` starts."""
     message_packages: tuple[str, ...] = ()
-    """Folders of ROS packages with message definitions, beside the profile."""
+    """Folders of ROS packages with message definitions, relative to the profile."""
 
 
 def load_profile(path: Path) -> Profile:
-    """Read a profile. Raises `DataFileError` naming file, key and what is allowed."""
+    """Reads a profile. Raises `DataFileError` with file, key and allowed values."""
     return load_data_file(path, Profile)
 
 
 def absolute_names(remap: dict[str, str], namespace: str) -> dict[str, str]:
-    """`remap` with relative names made absolute, as `graph.nodes.node.Context` takes it."""
+    """Returns `remap` with absolute names, for `graph.nodes.node.Context`."""
 
     def resolve(name: str) -> str:
         return name if name.startswith("/") else f"{namespace}/{name}"

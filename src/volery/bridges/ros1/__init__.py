@@ -1,1 +1,1 @@
-"""Native ROS 1 through rospy: the whole graph, or one node, in a real roscore."""
+"""Native ROS 1 through rospy: connects the whole graph, or one node, to a real roscore."""

@@ -1,12 +1,12 @@
-"""The bridge to native ROS 1: the simulation joins a real roscore through rospy.
+"""The bridge to native ROS 1: joins a real roscore through rospy.
 
     with BridgeHost(simulation.gateway) as bridges:
         bridges.open(Ros1Bridge())
         simulation.run(speed=1.0)
 
-Topics that the graph publishes appear in ROS 1 under the same names; those that it listens to are
-taken from ROS 1; its services can be called from there, and ROS 1 services named to the bridge from
-the graph. Without rospy the bridge does not open and says what to install.
+Topics that the graph publishes appear in ROS 1 under the same names; topics that it subscribes to
+are received from ROS 1. ROS 1 nodes can call its services, and the graph can call ROS 1 services
+that are named to the bridge. Without rospy the bridge does not open and reports what to install.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from volery.graph.session import Gateway
 
 _SURVEY_S = 0.25
 _MASTER_EACH = 4
-"""Surveys between two looks at the master."""
+"""Surveys between two queries to the master."""
 _USE_SIM_TIME = "/use_sim_time"
 
 _log = logging.getLogger(__name__)
@@ -41,14 +41,14 @@ class Ros1Bridge:
     node_name
         Name of the node.
     topics
-        Patterns of the names of topics and services that are shared, as `fnmatch` has them.
+        Patterns of the names of shared topics and services, as in `fnmatch`.
     commands
-        Patterns of topics that ROS 1 may publish beside publishers of the graph.
+        Patterns of topics that ROS 1 may publish besides publishers of the graph.
     remote_services
         ROS 1 services that the graph can call, and their types (`std_srvs/srv/Trigger`).
     use_sim_time
-        Whether to set that parameter while the bridge is open, so that nodes that start meanwhile
-        follow the simulation's `/clock`. Its earlier value comes back afterwards.
+        Whether to set this parameter while the bridge is open, so that nodes started meanwhile
+        follow the simulation's `/clock`. The previous value is restored afterwards.
 
     """
 
@@ -78,15 +78,15 @@ class Ros1Bridge:
 
     @property
     def dropped(self) -> dict[str, int]:
-        """Messages that slow ROS 1 subscribers have missed, by topic, where there are any."""
+        """Number of messages that slow ROS 1 subscribers missed, by topic, without zeros."""
         return {} if self._bridge is None else self._bridge.dropped
 
     async def start(self, gateway: Gateway) -> None:
-        """Join the ROS 1 graph. `BridgeError` without rospy or a master."""
+        """Joins the ROS 1 graph. Raises `BridgeError` without rospy or a master."""
         await asyncio.get_running_loop().run_in_executor(None, self._begin, gateway)
 
     async def stop(self) -> None:
-        """Take everything back; the node remains, without topics, until the process ends."""
+        """Unregisters all topics and services; the node remains until the process ends."""
         await asyncio.get_running_loop().run_in_executor(None, self._end)
 
     def _begin(self, gateway: Gateway) -> None:
@@ -112,12 +112,12 @@ class Ros1Bridge:
             self._bridge = None
 
     def _watch(self) -> None:
-        """Share what appears, take back what goes, register again with a new master."""
+        """Updates the shared names, and registers again with a new master."""
         bridge, count, away = self._bridge, 0, False
         while bridge is not None and not self._stopping.wait(_SURVEY_S) and bridge.node.alive:
             count += 1
             if not threading.main_thread().is_alive():
-                bridge.close()  # else rospy's threads would keep the process from ending
+                bridge.close()  # else rospy's threads would keep the process alive
                 return
             try:
                 if count % _MASTER_EACH == 0:
@@ -133,7 +133,7 @@ class Ros1Bridge:
                 if not away:
                     _log.warning("ROS master %s: %s", bridge.node.master.uri, error)
                 away = True
-            except Exception as error:  # a topic that breaks must not end the bridge
+            except Exception as error:  # an error of one topic must not end the bridge
                 _log.warning("%s: %s: %s", self.name, type(error).__name__, error)
         if bridge is not None and not bridge.node.alive:
             _log.error("%s was ended by another node of its name", self.name)
@@ -152,7 +152,7 @@ class Ros1Bridge:
             self._bridge.node.master.ask("setParam", _USE_SIM_TIME, True)
 
     def _restore_sim_time(self) -> None:
-        """Nodes that start later would wait for a clock that is gone."""
+        """Restores the parameter: later nodes would wait for a missing clock."""
         if self._bridge is None or not self._use_sim_time:
             return
         master = self._bridge.node.master

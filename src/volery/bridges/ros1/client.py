@@ -1,4 +1,4 @@
-"""A program's part in a ROS 1 graph, with the methods of `graph.session.Session`.
+"""Connects a program to a ROS 1 graph, with the methods of `graph.session.Session`.
 
 Its methods:
 
@@ -32,9 +32,9 @@ _log = logging.getLogger(__name__)
 
 
 class Ros1Client:
-    """One ROS 1 node as a `graph.connection.Link`; wakes and requests come in threads of rospy's.
+    """One ROS 1 node as a `GraphConnection`; wakes and requests come from rospy's threads.
 
-    Parameters are those of `ros1_node.join_ros1`, which tells what `BridgeError` it raises.
+    Parameters and `BridgeError` are those of `ros1.node.join_ros1`.
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class Ros1Client:
     # ------------------------------------------------------------------------------------ topics
 
     def advertise(self, topic: str, msgtype: str, *, latched: bool = False) -> None:
-        """Announce that messages will be published on `topic`. `GraphError` for a wrong type."""
+        """Advertises `topic`. Raises `GraphError` for a wrong type."""
         with self._lock:
             self._check_open()
             old = self._publishers.get(topic)
@@ -72,7 +72,7 @@ class Ros1Client:
             )
 
     def unadvertise(self, topic: str) -> None:
-        """Publish on `topic` no more. `GraphError` if it was not announced."""
+        """Ends the publication of `topic`. Raises `GraphError` if there was none."""
         with self._lock:
             publisher = self._publishers.pop(topic, None)
         if publisher is None:
@@ -80,12 +80,12 @@ class Ros1Client:
         publisher.handle.unregister()
 
     def published_type(self, topic: str) -> str | None:
-        """Type that was announced for `topic`; None if none was."""
+        """Returns the advertised type of `topic`; None if it is not advertised."""
         publisher = self._publishers.get(topic)
         return None if publisher is None else publisher.msgtype
 
     def publish(self, topic: str, message: Any) -> None:
-        """Publish a message of the announced type; nothing is done while nobody subscribes."""
+        """Publishes a message of the advertised type; does nothing without subscribers."""
         publisher = self._publishers.get(topic)
         if publisher is None:
             raise GraphError(f"{self.name} has not advertised '{topic}'")
@@ -102,7 +102,10 @@ class Ros1Client:
         reliable: bool = False,
         wake: Wake,
     ) -> SubscriptionQueue:
-        """As `Link.subscribe`; a message's time is that of its arrival, by the computer's clock."""
+        """Subscribes as `GraphConnection.subscribe`.
+
+        Messages get the wall time of their arrival.
+        """
         check_depth(depth)
         found = msgtype or self._node.topic_type(topic)
         if found is None:
@@ -116,7 +119,7 @@ class Ros1Client:
         return mailbox
 
     def unsubscribe(self, mailbox: SubscriptionQueue) -> None:
-        """Receive no more; what waits can still be taken."""
+        """Ends a subscription; queued messages remain available."""
         with self._lock:
             subscriber = self._mailboxes.pop(mailbox, None)
         if subscriber is not None:
@@ -136,7 +139,7 @@ class Ros1Client:
     # ---------------------------------------------------------------------------------- services
 
     def call(self, service: str, request: Any | None, reply: ServiceReply) -> None:
-        """Call a service; `reply` gets the response or a `GraphError`, in another thread."""
+        """Calls a service; `reply` receives the response or a `GraphError`, in another thread."""
 
         def ask() -> None:
             try:
@@ -144,17 +147,17 @@ class Ros1Client:
                 wanted = f"{srvtype}_Request"
                 question = message_type(wanted)() if request is None else request
                 if type_name(type(question)) != wanted:
-                    raise GraphError(f"service '{service}' takes {wanted}")
+                    raise GraphError(f"service '{service}' needs {wanted}")
                 reply.answer(self._node.call(service, srvtype, question))
             except GraphError as error:
                 reply.fail(error)
-            except Exception as error:  # whoever asked must hear of it
+            except Exception as error:  # report any error to the caller
                 reply.fail(GraphError(f"service '{service}': {type(error).__name__}: {error}"))
 
         threading.Thread(target=ask, name=f"volery-ros1 {service}", daemon=True).start()
 
     def offer(self, service: str, srvtype: str, handler: Handler) -> None:
-        """Offer a service; `handler(request, reply)` is called in a thread of the request's own."""
+        """Creates a service; `handler(request, reply)` is called in the request's own thread."""
 
         def handle(request: Any) -> Any:
             come: Future[Any] = Future()
@@ -167,21 +170,21 @@ class Ros1Client:
         with self._lock:
             self._check_open()
             if service in self._offers:
-                raise GraphError(f"{self.name} offers service '{service}' already")
+                raise GraphError(f"{self.name} has a service '{service}' already")
             self._offers[service] = self._node.service(service, srvtype, handle)
 
     def withdraw(self, service: str) -> None:
-        """Offer a service no more. `GraphError` if it was not offered."""
+        """Destroys a service. Raises `GraphError` if it does not exist."""
         with self._lock:
             offered = self._offers.pop(service, None)
         if offered is None:
-            raise GraphError(f"{self.name} does not offer service '{service}'")
+            raise GraphError(f"{self.name} has no service '{service}'")
         offered.shutdown()
 
     # --------------------------------------------------------------------------------------- end
 
     def close(self) -> None:
-        """Take back everything; the node itself ends with the process."""
+        """Unregisters all topics and services; the node itself ends with the process."""
         self._closed.set()
         with self._lock:
             topics, mailboxes = tuple(self._publishers), tuple(self._mailboxes)
@@ -195,7 +198,7 @@ class Ros1Client:
 
     @property
     def info(self) -> SessionInfo:
-        """What the client does at present."""
+        """Returns the current state of the client."""
         with self._lock:
             return SessionInfo(
                 self.name,
@@ -206,19 +209,19 @@ class Ros1Client:
 
     def _check_open(self) -> None:
         if self._closed.is_set():
-            raise GraphError(f"{self.name} has left")
+            raise GraphError(f"{self.name} is closed")
         if not self._node.alive:
             raise GraphError(f"{self.name} was ended by another node of its name")
 
     def _watch(self) -> None:
-        """Register again with a master that began anew."""
+        """Registers again with a restarted master."""
         while not self._closed.wait(_MASTER_EACH_S) and self._node.alive:
             if not threading.main_thread().is_alive():
-                self.close()  # else rospy's threads would keep the process from ending
+                self.close()  # else rospy's threads would keep the process alive
                 return
             try:
                 self._node.register_again()
-            except (OSError, BridgeError):  # it is away
+            except (OSError, BridgeError):  # the master is away
                 continue
 
 
@@ -235,7 +238,7 @@ class _Publisher:
         self._sequence = 0
 
     def publish(self, message: Any) -> None:
-        """Send a message; what is latched also to those to come."""
+        """Sends a message; a latched one also to later subscribers."""
         if not (self.latched or self.handle.get_num_connections()):
             return
         with self._lock:

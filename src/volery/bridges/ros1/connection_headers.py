@@ -1,8 +1,8 @@
-"""Accepts TCPROS connections and passes each on once its connection header has arrived.
+"""Accepts TCPROS connections and passes each on after its connection header has arrived.
 
 rospy reads the header in the thread that accepts, without a limit of time or size: one silent
-connection keeps all later subscribers out. Here headers arrive in the sockets' own buffers, so
-that no thread waits for a particular client.
+connection blocks all later subscribers. Here headers arrive in the sockets' own buffers, so that no
+thread waits for a particular client.
 
 Source: wiki.ros.org/ROS/Connection%20Header (length of 4 bytes, little endian, then the fields).
 """
@@ -20,15 +20,15 @@ from typing import Any
 from volery.core.listener import Listener
 
 HEADER_S = 5.0
-"""Within which a header must have arrived (modelling choice)."""
+"""Time within which a header must arrive (modelling choice)."""
 MAX_HEADER_BYTES = 64 << 10
-"""Subscribers send the message definition in it: some kilobytes."""
+"""Largest header: subscribers send the message definition in it, some kilobytes."""
 _LENGTH = struct.Struct("<I")
 _FULL_PAUSE_S = 0.05
-"""Between two tries to accept while there is no room."""
+"""Pause between two attempts to accept while there is no room."""
 
 Take = Callable[[socket.socket, Any], object]
-"""Takes a connection, whose header can be read without waiting, and the client's address."""
+"""Handles a connection, whose header can be read without waiting, and the client's address."""
 
 
 class HeaderServer:
@@ -47,7 +47,7 @@ class HeaderServer:
         self._is_stopping = False
 
     def run(self) -> None:
-        """Accepts until `stop`; then closes the listener and the connections that wait."""
+        """Accepts until `stop`; then closes the listener and the waiting connections."""
         with selectors.DefaultSelector() as selector:
             selector.register(self._wake_up, selectors.EVENT_READ)
             selector.register(self._listener, selectors.EVENT_READ)
@@ -91,13 +91,13 @@ class HeaderServer:
         selector.register(connection, selectors.EVENT_READ)
 
     def _look(self, connection: socket.socket, selector: selectors.BaseSelector) -> None:
-        """Passes a connection on if its header has arrived, or drops it where none can come."""
+        """Passes a connection on if its header has arrived; drops it if none can arrive."""
         waiting = self._waiting[connection]
         try:
             have = connection.recv(waiting.wanted, socket.MSG_PEEK | socket.MSG_DONTWAIT)
         except OSError:
             have = b""
-        if len(have) < waiting.wanted:  # the client has left
+        if len(have) < waiting.wanted:  # the client has disconnected
             self._drop(connection, selector)
         elif waiting.wanted == _LENGTH.size:
             (length,) = _LENGTH.unpack(have)
@@ -129,7 +129,7 @@ class HeaderServer:
 
 
 class _Waiting:
-    """A connection whose header is on its way: at first its length, then all of it."""
+    """A connection whose header is incomplete: first its length, then the whole header."""
 
     def __init__(self, address: Any, deadline_s: float) -> None:
         self.address = address
@@ -138,5 +138,5 @@ class _Waiting:
 
 
 def _wake_at(connection: socket.socket, num_bytes: int) -> None:
-    """Has the selector report the connection once so many bytes have arrived, or it has ended."""
+    """Makes the selector report the connection once after so many bytes, or after its end."""
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVLOWAT, num_bytes)

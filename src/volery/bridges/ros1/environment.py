@@ -22,12 +22,12 @@ _lock = threading.Lock()
 
 
 def load_rospy() -> Any:
-    """The module `rospy`, imported on first use.
+    """Returns the module `rospy`, imported on first use.
 
     Raises
     ------
     BridgeError
-        It is not installed, or this Python cannot load it.
+        rospy is not installed, or this Python cannot load it.
 
     """
     with _lock:
@@ -35,7 +35,7 @@ def load_rospy() -> Any:
 
 
 def rospy_is_installed() -> bool:
-    """Whether `load_rospy` has something to load."""
+    """Returns whether `load_rospy` can find rospy."""
     return importlib.util.find_spec("rospy") is not None or bool(_folders())
 
 
@@ -43,7 +43,7 @@ def rospy_is_installed() -> bool:
 def _load() -> Any:
     withdraw_ros_imports()  # rospy imports ROS 1's own messages
     added = [] if importlib.util.find_spec("rospy") else _folders()
-    # At the end, and only for now: whatever this environment has itself must win, numpy above all.
+    # At the end, and only for now: packages of this environment must win, numpy above all.
     sys.path.extend(added)
     logger_class, before = logging.getLoggerClass(), set(sys.modules)
     try:
@@ -57,15 +57,15 @@ def _load() -> Any:
     else:
         return rospy
     finally:
-        logging.setLoggerClass(logger_class)  # rospy's own is meant for its nodes alone
+        logging.setLoggerClass(logger_class)  # rospy's own class is meant for its nodes alone
         for folder in added:
             sys.path.remove(folder)
-        # rospy keeps what it has imported; files of nodes shall find Volery's messages
+        # rospy keeps its imports; node files must find Volery's messages
         forget_message_packages(set(sys.modules) - before)
 
 
 def _folders() -> list[str]:
-    """Folders outside of this environment that hold rospy and what it imports."""
+    """Returns folders outside of this environment with rospy and its imports."""
     distribution = os.environ.get("ROS_DISTRO", "noetic")
     sourced = Path("/opt/ros") / distribution / "lib/python3/dist-packages"
     for folder in (sourced, _DEBIAN):

@@ -1,4 +1,4 @@
-"""What a simulation and a ROS 1 graph share: topics both ways, services both ways."""
+"""Shares topics and services between a simulation and a ROS 1 graph, in both directions."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _log = logging.getLogger(__name__)
 
 
 class GraphSync:
-    """What the bridge shares at present; `survey` brings it up to date, in one thread at a time."""
+    """Holds the shared names; `survey` updates them, in one thread at a time."""
 
     def __init__(self, node: Ros1Node, session: Session, sharing: SharedNames) -> None:
         self.node = node
@@ -39,7 +39,7 @@ class GraphSync:
         self._refused: set[str] = set()
 
     def survey(self) -> None:
-        """Share what has appeared since, take back what has gone."""
+        """Shares new topics and services, and removes old ones."""
         topics = {t.name: t for t in self._session.graph.topics() if self._sharing.has(t.name)}
         wanted = {name: (self._publishers(t), self._subscribers(t)) for name, t in topics.items()}
         for name, (publishers, subscribers) in wanted.items():
@@ -49,12 +49,12 @@ class GraphSync:
 
     @property
     def dropped(self) -> dict[str, int]:
-        """What slow subscribers have missed, by topic."""
+        """Number of messages that slow subscribers missed, by topic."""
         counts = {name: outlet.dropped for name, outlet in tuple(self._outlets.items())}
         return {name: count for name, count in counts.items() if count}
 
     def close(self) -> None:
-        """Take everything back."""
+        """Unregisters all topics and services."""
         for inlet in self._inlets.values():
             inlet.unregister()
         for service in self._services.values():
@@ -67,11 +67,11 @@ class GraphSync:
     # ------------------------------------------------------------------------------------ topics
 
     def _publishers(self, topic: TopicInfo) -> int:
-        """How many others publish a topic in the graph."""
+        """Returns the number of other publishers of a topic in the graph."""
         return topic.publishers - (self._session.published_type(topic.name) is not None)
 
     def _subscribers(self, topic: TopicInfo) -> int:
-        """How many others subscribe to it."""
+        """Returns the number of other subscribers of a topic in the graph."""
         outlet = self._outlets.get(topic.name)
         return topic.subscribers - (outlet is not None and outlet.holds)
 
@@ -104,13 +104,13 @@ class GraphSync:
         def receive(data: bytes, sender: str, latched: bool) -> None:
             nonlocal keeps
             if sender == self.node.name:
-                return  # what the graph itself publishes
+                return  # the graph's own messages
             try:
                 message = decode(data, msgtype)
                 outlet = self._outlets.get(name)
                 if outlet is not None:
                     outlet.leave_out(message)
-                keeps = keeps or latched  # one publisher stands for all of them here
+                keeps = keeps or latched  # one publisher represents all of them here
                 self._session.advertise(name, msgtype, latched=keeps)
                 self._session.publish(name, message)
             except GraphError as error:
@@ -119,7 +119,7 @@ class GraphSync:
         return receive
 
     def _speaks(self, topic: TopicInfo) -> bool:
-        """Whether ROS 1 has a form of the topic's type."""
+        """Returns whether ROS 1 has a form of the topic's type."""
         if topic.name in self._refused:
             return False
         try:
@@ -131,7 +131,7 @@ class GraphSync:
         return True
 
     def _refuse(self, name: str, error: Exception) -> None:
-        """Say once what cannot be shared."""
+        """Logs once why a name cannot be shared."""
         if name not in self._refused:
             self._refused.add(name)
             _log.warning("ROS 1: %s: %s", name, error)
@@ -139,7 +139,10 @@ class GraphSync:
     # ---------------------------------------------------------------------------------- services
 
     def offer_remote(self, services: Mapping[str, str]) -> None:
-        """Offer ROS 1 services in the graph. `GraphError` for a wrong type or a taken name."""
+        """Creates services of the graph for ROS 1 services.
+
+        Raises `GraphError` for a wrong type or a taken name.
+        """
         for name, srvtype in services.items():
             self._session.offer(name, srvtype, self._caller(name, srvtype))
             self._remote.add(name)
@@ -151,7 +154,7 @@ class GraphSync:
                     reply.answer(self.node.call(name, srvtype, request))
                 except GraphError as error:
                     reply.fail(error)
-                except Exception as error:  # whoever asked must hear of it
+                except Exception as error:  # report any error to the caller
                     reply.fail(GraphError(f"service '{name}': {error}"))
 
             threading.Thread(target=ask, name=f"volery-ros1 {name}", daemon=True).start()

@@ -1,8 +1,8 @@
-"""Gives rosgraph the addresses of this machine without `netifaces`.
+"""Provides the addresses of this machine to rosgraph without `netifaces`.
 
 Debian's `python3-rosgraph` imports that package when a node with `ROS_HOSTNAME=localhost` connects
-to another one, but neither depends on it nor survives without it; a build for Debian's Python is of
-no use to another version.
+to another one, but neither depends on it nor works without it; a build for Debian's Python does not
+work with another version.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ _ADDRESS = slice(20, 24)
 
 
 def provide_local_addresses() -> None:
-    """Makes rosgraph work where `netifaces` cannot be imported; call it once rospy is loaded.
+    """Makes rosgraph work if `netifaces` cannot be imported; call it after rospy is loaded.
 
-    An importable `netifaces` stays loaded, also when its folder leaves `sys.path` later.
+    An importable `netifaces` stays loaded, even if its folder leaves `sys.path` later.
     """
     try:
         importlib.import_module("netifaces")
@@ -40,7 +40,7 @@ def ipv4_addresses() -> list[str]:
             request = struct.pack(f"{_REQUEST_BYTES}s", name.encode()[: _NAME_BYTES - 1])
             try:
                 answer = fcntl.ioctl(probe.fileno(), _SIOCGIFADDR, request)
-            except OSError:  # it has none
+            except OSError:  # no address
                 continue
             found.append(socket.inet_ntoa(answer[_ADDRESS]))
     return found

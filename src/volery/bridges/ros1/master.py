@@ -1,4 +1,4 @@
-"""Questions to a ROS 1 master, each with a time-out."""
+"""Queries a ROS 1 master, with a timeout."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class _Transport(xmlrpc.client.Transport):
 
 
 class Ros1Master:
-    """The master at `uri`, asked in the name of one node. Safe to use from several threads."""
+    """The master at `uri`, queried in the name of one node. Safe to use from several threads."""
 
     def __init__(self, uri: str, node_name: str) -> None:
         parts = urlsplit(uri)
@@ -29,33 +29,36 @@ class Ros1Master:
         except ValueError:
             known = None
         if not known:
-            raise BridgeError(f"'{uri}' is no address of a ROS master, such as http://HOST:11311")
+            raise BridgeError(f"'{uri}' is not the address of a ROS master; use http://HOST:11311")
         self.uri = uri
         self.host = str(parts.hostname)
         self._node_name = node_name
 
     def ask(self, method: str, *arguments: Any) -> Any:
-        """Value that the master's `method` returns.
+        """Returns the value of the master's `method`.
 
         Raises
         ------
         OSError
             The master does not answer.
         BridgeError
-            It answers that it cannot.
+            The master reports an error.
 
         """
         with xmlrpc.client.ServerProxy(self.uri, transport=_Transport()) as proxy:
             try:
                 code, text, value = getattr(proxy, method)(self._node_name, *arguments)
             except (xmlrpc.client.Error, http.client.HTTPException, ValueError, TypeError) as error:
-                raise BridgeError(f"{self.uri} is no ROS master: {error}") from None
+                raise BridgeError(f"{self.uri} is not a ROS master: {error}") from None
         if code != 1:
             raise BridgeError(f"ROS master: {method}: {text}")
         return value
 
     def knows_service(self, service: str) -> bool:
-        """Whether somebody offers a service. `OSError` where the master does not answer."""
+        """Returns whether a service has a server.
+
+        Raises `OSError` if the master does not answer.
+        """
         try:
             return bool(self.ask("lookupService", service))
         except BridgeError:

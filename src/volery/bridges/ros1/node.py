@@ -1,4 +1,4 @@
-"""The process as a node of a ROS 1 graph, through rospy, which allows one node a process."""
+"""The process as a node of a ROS 1 graph, through rospy, which allows one node per process."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from volery.graph.codecs.ros1 import ros1_codec, ros2_name
 DEFAULT_MASTER = "http://127.0.0.1:11311"
 _BULKY = {"Image", "CompressedImage", "PointCloud2", "OccupancyGrid", "Octomap"}
 _QUEUES = (10, 500)
-"""How many messages may wait for one slow reader: bulky ones, others."""
+"""Messages that may wait for one slow reader: large ones, others."""
 _RECEIVE_BYTES = 1 << 20
 _HEADER_TIMEOUT_S = 3.0
 
@@ -31,11 +31,11 @@ _lock = threading.Lock()
 _nodes: list[Ros1Node] = []
 
 Receive = Callable[[bytes, str, bool], None]
-"""Takes a message's bytes, the name of the node that sent it, and whether that one latches it."""
+"""Handles a message's bytes, the name of the sender's node, and whether the sender latches it."""
 
 
 class Ros1Node:
-    """The node. All methods may be called by any thread; those that ask the master may block."""
+    """The node. Any thread may call the methods; those that query the master may block."""
 
     def __init__(self, rospy: Any, name: str, master: Ros1Master) -> None:
         self.name = name
@@ -45,13 +45,13 @@ class Ros1Node:
 
     @property
     def alive(self) -> bool:
-        """Whether it takes part; a second node of the same name ends the first."""
+        """Whether the node is active; a second node of the same name ends the first."""
         return not self._rospy.is_shutdown()
 
     # ------------------------------------------------------------------------------------ topics
 
     def publisher(self, topic: str, msgtype: str, *, latched: bool = False) -> Any:
-        """A `rospy.Publisher` of raw messages. `GraphError` for an unknown type."""
+        """Returns a `rospy.Publisher` of raw messages. Raises `GraphError` for an unknown type."""
         made = raw_message_class(msgtype)
         depth = _QUEUES[0] if made.__name__ in _BULKY else _QUEUES[1]
         found: list[Any] = []
@@ -65,9 +65,10 @@ class Ros1Node:
     def outlet(
         self, topic: str, msgtype: str, on_change: Callable[[], None], *, latched: bool
     ) -> Any:
-        """A `rospy.Publisher` to whose connections somebody else writes. `GraphError`: the type.
+        """Returns a `rospy.Publisher` to whose connections the caller writes.
 
-        on_change: called when subscribers have come or gone. latched: what they are told.
+        on_change: called when subscribers have come or gone. latched: reported to subscribers.
+        Raises `GraphError` for an unknown type.
         """
         publisher = self._rospy.Publisher(
             topic,
@@ -80,7 +81,7 @@ class Ros1Node:
         return publisher
 
     def subscriber(self, topic: str, msgtype: str, receive: Receive) -> Any:
-        """A `rospy.Subscriber`; `receive` is called in a thread of its own."""
+        """Returns a `rospy.Subscriber`; `receive` is called in a thread of its own."""
 
         def call_back(raw: Any) -> None:
             header = raw._connection_header
@@ -92,14 +93,14 @@ class Ros1Node:
         )
 
     def topic_type(self, topic: str) -> str | None:
-        """ROS 2 name of the type that the master knows for a topic; None if it knows none."""
+        """Returns the ROS 2 name of the master's type of a topic; None if unknown."""
         found = dict(self._ask_master("getTopicTypes")).get(topic)
         return None if found is None or found == "*" else ros2_name(found)
 
     # ---------------------------------------------------------------------------------- services
 
     def service(self, service: str, srvtype: str, handle: Callable[[Any], Any]) -> Any:
-        """Offer a service: a `rospy.Service`, which ends with `shutdown()`.
+        """Creates a service: returns a `rospy.Service`, which ends with `shutdown()`.
 
         `handle(request)` returns the response, in a thread of its own; its `GraphError` becomes the
         caller's error.
@@ -117,7 +118,10 @@ class Ros1Node:
         return self._rospy.Service(service, made, answer)
 
     def call(self, service: str, srvtype: str, request: Any) -> Any:
-        """Call a service of another node and wait for its response. `GraphError` without one."""
+        """Calls a service of another node and waits for its response.
+
+        Raises `GraphError` without one.
+        """
         codec = ros1_codec()
         made = raw_service_class(srvtype)
         raw = made._request_class(codec.encode(request, f"{srvtype}_Request"))
@@ -128,7 +132,10 @@ class Ros1Node:
         return codec.decode(response.data, f"{srvtype}_Response")
 
     def service_type(self, service: str) -> str:
-        """ROS 2 name of the type of another node's service. `GraphError` if nobody offers it."""
+        """Returns the ROS 2 name of the type of another node's service.
+
+        Raises `GraphError` if the service has no server.
+        """
         network = self._rospy.core.rosgraph.network
         try:
             address = self.master.ask("lookupService", service).removeprefix("rosrpc://")
@@ -140,40 +147,43 @@ class Ros1Node:
                 header = network.read_ros_handshake_header(connection, buffer, 4096)
             return ros2_name(header["type"], "srv")
         except BridgeError:
-            raise GraphError(f"nobody offers service '{service}'") from None
+            raise GraphError(f"service '{service}' has no server") from None
         except (OSError, ValueError, KeyError, network.ROSHandshakeException) as error:
             raise GraphError(f"service '{service}': {error}") from None
 
     # ------------------------------------------------------------------------------------ master
 
     def _ask_master(self, method: str, *arguments: Any) -> Any:
-        """`GraphError` where the master does not answer."""
+        """Queries the master. Raises `GraphError` if it does not answer."""
         try:
             return self.master.ask(method, *arguments)
         except (OSError, BridgeError) as error:
             raise GraphError(f"ROS master: {error}") from None
 
     def register_again(self) -> bool:
-        """Register all that there is if the master has forgotten; whether it had. `OSError`."""
+        """Registers everything again if the master has lost it; returns whether it had.
+
+        May raise `OSError`.
+        """
         return self._registrar.register_again()
 
 
 def join_ros1(
     name: str, *, master_uri: str | None = None, host: str | None = None, anywhere: bool = False
 ) -> Ros1Node:
-    """The process's node, made on the first call; it ends with the process.
+    """Returns the process's node, created on the first call; it ends with the process.
 
     Parameters
     ----------
     name
         Name of the node, without a slash.
     master_uri
-        Where the master is; without one `ROS_MASTER_URI` tells, or it is on this machine.
+        Address of the master; default: `ROS_MASTER_URI`, else this machine.
     host
-        Address of this machine for other nodes; without one `ROS_HOSTNAME` or `ROS_IP` tells, or it
-        is 127.0.0.1. rospy listens on all addresses where this one is not loopback's.
+            Address of this machine for other nodes; default: `ROS_HOSTNAME` or `ROS_IP`, else
+            127.0.0.1. rospy listens on all addresses unless this one is loopback's.
     anywhere
-        Whether other machines may reach this node.
+        Whether other machines may connect to this node.
 
     Raises
     ------
@@ -188,10 +198,10 @@ def join_ros1(
         if _nodes:
             node = _nodes[0]
             if (node.name, node.master.uri) != (f"/{name}", uri) or not node.alive:
-                state = "is" if node.alive else "was, until another node took its name,"
+                state = "is" if node.alive else "was (until another node took its name)"
                 raise BridgeError(
                     f"this process {state} ROS 1 node {node.name} at {node.master.uri}, and rospy "
-                    "allows one a process: start another process"
+                    "allows one node per process: start another process"
                 )
             return node
         _set_address(host, anywhere=anywhere)
@@ -203,7 +213,7 @@ def join_ros1(
 
 
 def _check_master(master: Ros1Master) -> None:
-    """Left alone, rospy would wait for a master without end."""
+    """Checks for a master, because rospy would wait for one without end."""
     try:
         master.ask("getPid")
     except OSError as error:
@@ -213,7 +223,7 @@ def _check_master(master: Ros1Master) -> None:
 
 
 def _set_address(host: str | None, *, anywhere: bool) -> None:
-    """Tell rospy, which knows nothing but the environment, how others reach this machine."""
+    """Sets this machine's address for rospy, which reads only the environment."""
     given = host or os.environ.get("ROS_HOSTNAME") or os.environ.get("ROS_IP") or "127.0.0.1"
     check_address(given, anywhere=anywhere, flag="anywhere=True or --allow-remote")
     if host is not None or not (os.environ.get("ROS_HOSTNAME") or os.environ.get("ROS_IP")):
@@ -222,7 +232,7 @@ def _set_address(host: str | None, *, anywhere: bool) -> None:
 
 
 def _warn_of_loopback(master: Ros1Master) -> None:
-    """Say that nodes of a master elsewhere cannot reach this one."""
+    """Warns if nodes of a remote master cannot connect to this one."""
     own = os.environ.get("ROS_HOSTNAME") or os.environ.get("ROS_IP") or ""
     if not (own == "localhost" or own.startswith("127.")):
         return
@@ -257,21 +267,21 @@ def _begin(rospy: Any, name: str, uri: str) -> None:
 
 
 def _hurry(publishers: list[Any]) -> None:
-    """Switch Nagle's algorithm off, which rospy does only for subscribers that ask for it."""
+    """Disables Nagle's algorithm, as rospy does only for subscribers that ask for it."""
     for publisher in publishers:
         for connection in publisher.impl.connections if publisher.impl else ():
             try:
                 with socket.socket(fileno=os.dup(connection.fileno())) as same:
                     same.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            except (OSError, TypeError):  # it is closing
+            except (OSError, TypeError):  # closing
                 continue
 
 
 def _listener(rospy: Any, on_change: Callable[[], None]) -> Any:
-    """A listener of rospy's kind."""
+    """Returns a listener of rospy's class."""
 
     class Listener(rospy.SubscribeListener):  # type: ignore[misc]
-        """Passes on."""
+        """Forwards to `on_change`."""
 
         def peer_subscribe(self, *_: Any) -> None:
             on_change()

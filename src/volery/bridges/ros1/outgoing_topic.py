@@ -1,4 +1,4 @@
-"""Topics of the graph on their way to ROS 1 subscribers."""
+"""Sends topics of the graph to ROS 1 subscribers."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from volery.graph.session import Session
 from volery.graph.subscription_queue import SubscriptionQueue
 
 _DEPTH = 1000
-"""One tick may publish once for each UAV, as it does on `/tf`."""
+"""Queue depth: one tick may publish once for each UAV, as on `/tf`."""
 _OWN_KEPT = 1000
 
 _log = logging.getLogger(__name__)
 
 
 class Ros1OutgoingTopic:
-    """One topic: its messages are taken and turned into bytes only while somebody subscribes.
+    """One topic; its messages are received and encoded only while it has subscribers.
 
-    `serve` runs in the pump's thread; all else may be called by any.
+    `serve` runs in the writer's thread; any thread may call the other methods.
     """
 
     def __init__(
@@ -55,33 +55,36 @@ class Ros1OutgoingTopic:
 
     @property
     def is_current(self) -> bool:
-        """Whether it listens to the graph just while somebody subscribes."""
+        """Whether the subscription to the graph matches the presence of ROS 1 subscribers."""
         return bool(self._publisher.get_num_connections()) == self.holds
 
     @property
     def holds(self) -> bool:
-        """Whether it listens to the graph."""
+        """Whether it subscribes to the graph."""
         return self._mailbox is not None
 
     @property
     def dropped(self) -> int:
-        """Messages that subscribers have missed because they were slow."""
+        """Number of messages that slow subscribers missed."""
         return self._dropped + sum(reader.dropped for reader in tuple(self._readers.values()))
 
     def leave_out(self, message: Any) -> None:
-        """Do not send a message that came from ROS 1 itself."""
+        """Skips a message that came from ROS 1 itself."""
         if self._mailbox is not None:
             self._own[id(message)] = message
             if len(self._own) > _OWN_KEPT:
                 self._own.popitem(last=False)
 
     def serve(self) -> None:
-        """Send what waits; begin or end to listen to the graph as subscribers come and go."""
+        """Sends queued messages.
+
+        Subscribes to or unsubscribes from the graph with the subscribers.
+        """
         newcomers = self._meet()
         if not self._readers:
             self._let_go()
             return
-        if self._mailbox is None:  # a new mailbox holds what was latched, for all of them
+        if self._mailbox is None:  # a new queue has the latched messages, for all readers
             self._mailbox = self._session.subscribe(
                 self.topic, self.msgtype, depth=_DEPTH, wake=self.wake
             )
@@ -97,14 +100,14 @@ class Ros1OutgoingTopic:
                 self._send(published, self._readers.values())
 
     def close(self) -> None:
-        """Publish no more, once the pump has ended."""
+        """Ends the publication, after the writer thread has ended."""
         self._let_go()
         self._publisher.unregister()
         for reader in self._readers.values():
             reader.close()
 
     def _meet(self) -> list[Reader]:
-        """Bring the readers up to date with rospy's connections; those that are new."""
+        """Matches the readers with rospy's connections; returns the new ones."""
         connections = self._publisher.impl.connections  # rospy replaces the list at each change
         if connections is self._connections:
             return []
@@ -118,14 +121,14 @@ class Ros1OutgoingTopic:
             if connection not in self._readers:
                 try:
                     reader = self._pump.reader(connection)
-                except (OSError, TypeError):  # it has closed already
+                except (OSError, TypeError):  # closed already
                     continue
                 self._readers[connection] = reader
                 newcomers.append(reader)
         return newcomers
 
     def _kept(self) -> list[Published]:
-        """What latched publishers of the graph have sent last."""
+        """Returns the last messages of latched publishers of the graph."""
         glance = self._session.subscribe(self.topic, self.msgtype, depth=_DEPTH, wake=_nothing)
         self._session.unsubscribe(glance)
         return glance.take()
@@ -150,4 +153,4 @@ class Ros1OutgoingTopic:
 
 
 def _nothing() -> None:
-    """Nobody needs to be woken."""
+    """Does nothing, because no reader needs a wake-up."""

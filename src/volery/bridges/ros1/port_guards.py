@@ -1,8 +1,8 @@
-"""Bounds what strangers can cost at the ports that rospy opens: TCPROS and XML-RPC.
+"""Limits the cost of clients at the ports that rospy opens: TCPROS and XML-RPC.
 
-rospy waits for headers without end in the thread that accepts connections, takes bodies of any
+rospy waits for headers without end in the thread that accepts connections, reads bodies of any
 size, has a thread for each XML-RPC connection, and ends its server when file descriptors run out.
-Its classes are replaced by subclasses of them, before a node begins.
+Subclasses replace its classes before a node starts.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from volery.bridges.ros1.web_pages import is_of_a_page
 from volery.core.listener import open_listener
 
 MAX_CALL_BYTES = 256 << 10
-"""Of one XML-RPC request. The largest of ROS, publisherUpdate, names 50 bytes a publisher."""
+"""Largest XML-RPC request. The largest of ROS, publisherUpdate, has 50 bytes per publisher."""
 CALL_S = 20.0
-"""How long an XML-RPC connection may be silent; clients of ROS connect again by themselves."""
+"""Timeout of silent XML-RPC connections; clients of ROS reconnect by themselves."""
 MAX_CALLERS = 128
-"""XML-RPC connections, each with a thread; the oldest gives way."""
+"""Largest number of XML-RPC connections, each with a thread; beyond, the oldest is closed."""
 MAX_MESSAGE_BYTES = 64 << 20
-"""Of one message or service request that a ROS 1 node sends."""
+"""Largest message or service request that a ROS 1 node sends."""
 
 
 def guard_ports() -> None:
-    """Has servers that rospy opens from now on keep to the limits; a second call does nothing."""
+    """Applies the limits to servers that rospy opens from now on; a second call does nothing."""
     tcpros: Any = importlib.import_module("rospy.impl.tcpros_base")
     xmlrpc: Any = importlib.import_module("rosgraph.xmlrpc")
     if getattr(tcpros.TCPServer, "is_guarded", False):
@@ -43,7 +43,7 @@ def guard_ports() -> None:
 
 def _tcpros_server(base: Any, network: Any) -> Any:
     class Server(base):  # type: ignore[misc]
-        """rospy's own, which hands a connection on when its header is there."""
+        """rospy's server, which passes a connection on after its header has arrived."""
 
         is_guarded = True
         port: int
@@ -70,7 +70,7 @@ def _bounded_receive(tcpros: Any) -> Any:
     receive = tcpros.recv_buff
 
     def bounded(connection: socket.socket, buffer: Any, buffer_bytes: int) -> int:
-        """Reads into the buffer as rospy does, of one message at most MAX_MESSAGE_BYTES."""
+        """Reads into the buffer like rospy, at most MAX_MESSAGE_BYTES of one message."""
         if buffer.tell() > MAX_MESSAGE_BYTES:
             raise tcpros.TransportTerminated(f"sends more than {MAX_MESSAGE_BYTES >> 20} MiB")
         return int(receive(connection, buffer, buffer_bytes))
@@ -80,12 +80,12 @@ def _bounded_receive(tcpros: Any) -> Any:
 
 def _call_handler(base: Any) -> Any:
     class Handler(base):  # type: ignore[misc]
-        """rospy's own, for short calls of programs."""
+        """rospy's handler, for short calls of programs."""
 
         timeout = CALL_S
 
         def do_POST(self) -> None:  # noqa: N802
-            """As of `http.server`."""
+            """Implements the method of `http.server`."""
             refusal = _refusal(self.headers)
             if refusal is None:
                 super().do_POST()
@@ -97,22 +97,22 @@ def _call_handler(base: Any) -> Any:
 
 
 def _refusal(headers: Any) -> tuple[HTTPStatus, str] | None:
-    """Returns status and reason where an XML-RPC request is not read; None: it is."""
+    """Returns status and reason of a refused XML-RPC request; None if it is accepted."""
     if is_of_a_page(headers):
-        return HTTPStatus.FORBIDDEN, "programs alone may call this"
+        return HTTPStatus.FORBIDDEN, "only programs may call this"
     length = headers.get("Content-Length", "")
     if not (length.isascii() and length.isdecimal()):
         return HTTPStatus.LENGTH_REQUIRED, "the length of the body is missing"
     if len(length) > len(str(MAX_CALL_BYTES)) or int(length) > MAX_CALL_BYTES:
         return HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"at most {MAX_CALL_BYTES} bytes"
     if headers.get("Content-Encoding", "identity") != "identity":
-        return HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "packed bodies are not taken"
+        return HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "compressed bodies are not supported"
     return None
 
 
 def _call_server(base: Any) -> Any:
     class Server(base):  # type: ignore[misc]
-        """rospy's own, with a limit of connections."""
+        """rospy's server, with a limit of connections."""
 
         socket: socket.socket
         server_address: Any
@@ -125,13 +125,13 @@ def _call_server(base: Any) -> Any:
             self.server_address = self.socket.getsockname()
 
         def server_activate(self) -> None:
-            """Does nothing: it listens already."""
+            """Does nothing: the server listens already."""
 
         def register_multicall_functions(self) -> None:
             """Does nothing: one request is one call."""
 
         def get_request(self) -> Any:
-            """The next connection; `OSError`: there is none at present."""
+            """Returns the next connection. Raises `OSError` if there is none now."""
             connection, address = self.socket.accept()
             connection.setblocking(True)
             return connection, address

@@ -1,8 +1,8 @@
-"""Message and service classes for rospy that carry ready bytes.
+"""Message and service classes for rospy that carry encoded bytes.
 
-rospy asks a class for its name, md5 sum and definition, and to write itself. These classes know the
-first three from the graph's types and write bytes that were made elsewhere, so that types without
-an installed ROS 1 package work too, and nothing is packed field by field.
+rospy asks a class for its name, md5 sum and definition, and serializes its instances. These classes
+take the first three from the graph's types and write bytes that were encoded elsewhere, so that
+types without an installed ROS 1 package work too, and no field is packed by itself.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from volery.graph.codecs.ros1 import ros1_codec, ros1_name
 
 @cache
 def raw_message_class(msgtype: str) -> Any:
-    """Class of a type such as `nav_msgs/msg/Odometry`, or of a service's part.
+    """Returns the class of a type such as `nav_msgs/msg/Odometry`, or of a service's part.
 
-    Its instances have `data`, the ROS 1 bytes. `GraphError` for an unknown type.
+    Its instances have `data`, the ROS 1 bytes. Raises `GraphError` for an unknown type.
     """
     codec = ros1_codec()
     return type(
@@ -32,7 +32,7 @@ def raw_message_class(msgtype: str) -> Any:
             "_type": ros1_name(msgtype),
             "_md5sum": codec.md5(msgtype),
             "_full_text": codec.definition_text(msgtype),
-            "_has_header": False,  # the bytes hold their sequence number already
+            "_has_header": False,  # the bytes have their sequence number already
             "_slot_types": ["uint8[]"],
         },
     )
@@ -40,7 +40,10 @@ def raw_message_class(msgtype: str) -> Any:
 
 @cache
 def raw_service_class(srvtype: str) -> Any:
-    """Class of a service such as `std_srvs/srv/SetBool`. `GraphError` for an unknown type."""
+    """Returns the class of a service such as `std_srvs/srv/SetBool`.
+
+    Raises `GraphError` for an unknown type.
+    """
     return type(
         ros1_name(srvtype).rpartition("/")[2],
         (),

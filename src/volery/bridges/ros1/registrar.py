@@ -1,7 +1,7 @@
-"""Registers what a node has with the ROS 1 master, also with one that went away and came back.
+"""Registers a node's topics and services with the ROS 1 master, also after a restart of the master.
 
-rospy's own registrar tries without end while no master answers, holding locks that publishing and
-leaving need, and never looks whether a master that began anew still knows the node.
+rospy's own registrar retries without end while no master answers, holding locks that publishing and
+closing need, and never checks whether a restarted master still has the node.
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ _METHODS = {"pub": "Publisher", "sub": "Subscriber", "srv": "Service"}
 
 
 class Ros1Registrar:
-    """Takes the place of rospy's registrar once that has registered the node itself."""
+    """Replaces rospy's registrar after that has registered the node itself."""
 
     def __init__(self, rospy: Any, master: Ros1Master, node_name: str) -> None:
         self._registration = rospy.impl.registration
         self._master = master
-        # rospy registers this service when the node begins, and nothing does so later: a master
-        # that knows it knows all, while new topics may come to a new master at any time.
+        # rospy registers this service when the node starts, and nothing does so later: a master
+        # that has it has everything, while new topics may be registered with a new master at any
+        # time.
         self._sign = f"{node_name}/get_loggers"
         self._uri = rospy.get_node_uri()
         self._missed = threading.Event()
@@ -35,7 +36,7 @@ class Ros1Registrar:
         listeners.listeners[:] = [self._listener()]
 
     def register_again(self) -> bool:
-        """Register everything if the master has forgotten or missed it; whether it had.
+        """Registers everything that the master lacks; returns whether it lacked anything.
 
         Raises
         ------
@@ -58,7 +59,7 @@ class Ros1Registrar:
         return True
 
     def added(self, name: str, what: str, kind: str) -> None:
-        """Register a topic of a type, or a service at an address."""
+        """Registers a topic of a type, or a service at an address."""
         try:
             answer = self._master.ask(f"register{_METHODS[kind]}", name, what, self._uri)
         except (OSError, BridgeError):
@@ -68,7 +69,7 @@ class Ros1Registrar:
             self._connector.publisher_update(name, answer)
 
     def removed(self, name: str, what: str, kind: str) -> None:
-        """Take a registration back; a master that is away forgets by itself."""
+        """Removes a registration; a restarted master has none."""
         try:
             self._master.ask(
                 f"unregister{_METHODS[kind]}", name, what if kind == "srv" else self._uri
@@ -80,7 +81,7 @@ class Ros1Registrar:
         registrar = self
 
         class Listener(self._registration.RegistrationListener):  # type: ignore[misc,name-defined]
-            """Passes on."""
+            """Forwards to the registrar."""
 
             def reg_added(self, name: str, what: str, kind: str) -> None:
                 registrar.added(name, what, kind)

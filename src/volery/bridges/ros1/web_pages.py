@@ -1,8 +1,8 @@
-"""Recognises what web pages send to the XML-RPC port that rospy opens.
+"""Detects requests of web pages to the XML-RPC port that rospy opens.
 
-A page of a stranger may post to any port of its reader's machine, as long as the content type is
-one of those that forms have. XML-RPC demands `text/xml`. Browsers name the page's origin in each
-POST; programs name none.
+A page of any site may post to any port of its user's machine, as long as the content type is one of
+those of forms. XML-RPC demands `text/xml`. Browsers name the page's origin in each POST; programs
+name none.
 
 Sources: Fetch Standard, "CORS-safelisted request-header"; XML-RPC Specification, "Header
 requirements"; RFC 6454 section 7.

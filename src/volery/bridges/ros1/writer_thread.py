@@ -1,7 +1,7 @@
-"""The thread that writes to ROS 1 subscribers, each of which may be slow or stand still.
+"""The thread that writes to ROS 1 subscribers, any of which may be slow or stalled.
 
-rospy has a thread and an unlimited wait for each of them; here one thread writes what their sockets
-take at once, and keeps a bounded rest for each.
+rospy has a thread and an unlimited queue for each subscriber; here one thread writes what their
+sockets accept at once, and queues a bounded rest for each.
 """
 
 from __future__ import annotations
@@ -19,29 +19,29 @@ from typing import Any, Protocol
 
 _MOST_MESSAGES = 1000
 _MOST_BYTES = 16 << 20
-"""What may wait for one subscriber; beyond, the oldest goes."""
+"""Limits of what may wait for one subscriber; beyond, the oldest message is dropped."""
 _LENGTH = struct.Struct("<I")
 
 _log = logging.getLogger(__name__)
 
 
 class Served(Protocol):
-    """What a pump serves."""
+    """Object that the writer thread serves."""
 
     topic: str
 
     def serve(self) -> None:
-        """Send what there is to send; called in the pump's thread."""
+        """Sends pending messages; called in the writer's thread."""
 
 
 class Reader:
-    """One ROS 1 subscriber of one topic, for the pump's thread alone."""
+    """One ROS 1 subscriber of one topic, for the writer's thread alone."""
 
     def __init__(self, connection: Any, selector: selectors.BaseSelector) -> None:
         self.dropped = 0
         self._connection = connection
         self._selector = selector
-        # The duplicate stays valid, and ours, when rospy closes the connection meanwhile.
+        # The duplicate stays valid, and ours, if rospy closes the connection meanwhile.
         self._socket = socket.socket(fileno=os.dup(connection.fileno()))
         self._socket.setblocking(False)
         if self._socket.family in (socket.AF_INET, socket.AF_INET6):
@@ -50,7 +50,7 @@ class Reader:
         self._waiting_bytes = 0
 
     def send(self, data: bytes) -> None:
-        """Send one message, now or as soon as the subscriber takes it."""
+        """Sends one message, now or as soon as the subscriber accepts it."""
         length = _LENGTH.pack(len(data))
         if self._waiting:
             self._keep(memoryview(length + data))
@@ -72,7 +72,7 @@ class Reader:
         self._selector.register(self._socket, selectors.EVENT_WRITE, self)
 
     def flush(self) -> None:
-        """Send on what waits."""
+        """Sends pending bytes."""
         while self._waiting:
             first = self._waiting[0]
             try:
@@ -90,8 +90,10 @@ class Reader:
         self._selector.unregister(self._socket)
 
     def close(self) -> None:
-        """Send no more; nothing happens a second time."""
-        if self._waiting and self._selector.get_map() is not None:  # None once the pump has ended
+        """Stops sending; further calls do nothing."""
+        if (
+            self._waiting and self._selector.get_map() is not None
+        ):  # None after the writer thread has ended
             self._selector.unregister(self._socket)
         self._waiting.clear()
         self._socket.close()
@@ -99,7 +101,7 @@ class Reader:
     def _keep(self, rest: memoryview) -> None:
         self._waiting.append(rest)
         self._waiting_bytes += len(rest)
-        # The first one is on its way in part; the last one is the newest.
+        # The first message is partly sent; the last one is the newest.
         while len(self._waiting) > 2 and (
             len(self._waiting) > _MOST_MESSAGES or self._waiting_bytes > _MOST_BYTES
         ):
@@ -108,7 +110,10 @@ class Reader:
             self.dropped += 1
 
     def _give_up(self) -> None:
-        """The subscriber has gone; rospy strikes it off and tells the topic so."""
+        """Closes the connection of a subscriber that has gone.
+
+        Rospy removes it and notifies the topic.
+        """
         self.close()
         self._connection.close()
 
@@ -121,7 +126,7 @@ class Ros1WriterThread:
         self._ready: deque[Served] = deque()
         self._bell = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._poll = select.epoll()
-        # Edge-triggered: each ring is told of once, without a read, which would let go of the GIL.
+        # Edge-triggered: each ring is reported once, without a read, which would release the GIL.
         self._poll.register(self._bell, select.EPOLLIN | select.EPOLLET)
         self._poll.register(self._selector.fileno(), select.EPOLLIN)
         self._lock = threading.Lock()
@@ -130,11 +135,11 @@ class Ros1WriterThread:
         self._thread.start()
 
     def reader(self, connection: Any) -> Reader:
-        """What writes to a connection of rospy's; for use in `serve`."""
+        """Returns a writer to a connection of rospy's; for use in `serve`."""
         return Reader(connection, self._selector)
 
     def waker(self, served: Served) -> Callable[[], None]:
-        """A function that has something served, to be called by any thread."""
+        """Returns a function that makes the thread serve an object; any thread may call it."""
 
         def wake() -> None:
             self._ready.append(served)
@@ -143,7 +148,7 @@ class Ros1WriterThread:
         return wake
 
     def close(self) -> None:
-        """End the thread; what waits is not sent."""
+        """Ends the thread; pending messages are not sent."""
         self._closing = True
         self._ring()
         self._thread.join()
@@ -170,5 +175,5 @@ class Ros1WriterThread:
     def _serve(self, served: Served) -> None:
         try:
             served.serve()
-        except Exception as error:  # one topic's trouble must not end the others
+        except Exception as error:  # an error of one topic must not end the others
             _log.warning("ROS 1 topic %s: %s: %s", served.topic, type(error).__name__, error)

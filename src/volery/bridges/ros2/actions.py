@@ -1,4 +1,4 @@
-"""Actions of the graph for ROS 2 clients: three services and two topics each, as rcl_action has it.
+"""Action servers for ROS 2 clients: three services and two topics each, as in rcl_action.
 
 https://design.ros2.org/articles/actions.html
 """
@@ -24,10 +24,10 @@ from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Session
 
 MOST_GOALS = 1000
-"""Goals of an action that are remembered, with their results; the oldest ended one goes first."""
+"""Stored goals of an action, with their results; beyond, the oldest finished one is removed."""
 
 _CANCELING = 3
-"""Of action_msgs/msg/GoalStatus, as are those of `GoalStatus`."""
+"""Values of action_msgs/msg/GoalStatus, as in `GoalStatus`."""
 _UNKNOWN = 0
 _REJECTED, _UNKNOWN_GOAL, _TERMINATED = 1, 2, 3
 """Return codes of action_msgs/srv/CancelGoal."""
@@ -49,12 +49,12 @@ class _Asked:
 
     @property
     def ended(self) -> bool:
-        """Whether its result is there."""
+        """Whether its result is available."""
         return self.result is not None
 
 
 class ActionServer:
-    """One action. What it does happens in the simulation's thread."""
+    """One action. All methods run in the simulation's thread."""
 
     def __init__(
         self,
@@ -87,7 +87,7 @@ class ActionServer:
             self._handles.append(participant.server(spec, serve))
 
     def close(self) -> None:
-        """Offer it no more; goals on their way are cancelled."""
+        """Destroys the action server; open goals are cancelled."""
         for asked in tuple(self._asked.values()):
             if asked.goal is not None and not asked.ended:
                 self._graph.post(asked.goal.cancel)
@@ -209,7 +209,7 @@ class ActionServer:
 
 
 class ActionServers:
-    """All actions of a graph; `survey` brings them up to date."""
+    """All actions of a graph; `survey` updates them."""
 
     def __init__(
         self, participant: Participant, session: Session, node: NodeName, worker: Ros2WriterThread
@@ -220,7 +220,7 @@ class ActionServers:
         self._complaints = WarningFilter()
 
     def survey(self) -> None:
-        """Offer what has appeared since, take back what has gone."""
+        """Creates servers of new actions and destroys those of removed ones."""
         types = self._session.graph.actions.types()
         for name in [name for name in self._servers if name not in types]:
             self._servers.pop(name).close()
@@ -233,7 +233,7 @@ class ActionServers:
         self._servers[name] = ActionServer(*self._parts, (name, action_type))
 
     def close(self) -> None:
-        """Take everything back."""
+        """Destroys all action servers."""
         for server in self._servers.values():
             server.close()
 

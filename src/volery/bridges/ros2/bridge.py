@@ -4,9 +4,9 @@
         bridges.open(Ros2Bridge())
         simulation.run(speed=1.0)
 
-Topics that the graph publishes appear in ROS 2 under the same names; those that it listens to are
-taken from ROS 2; its services, actions and parameters can be used from there, and ROS 2 services
-named to the bridge from the graph. No ROS 2 needs to be installed.
+Topics that the graph publishes appear in ROS 2 under the same names; topics that it subscribes to
+are received from ROS 2. ROS 2 nodes can use its services, actions and parameters, and the graph can
+call ROS 2 services that are named to the bridge. ROS 2 need not be installed.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ from volery.graph.session import Gateway, Session
 
 _SURVEY_S = 0.25
 _BREATH_S = 0.02
-"""Between two surveys, however many others come and go."""
+"""Shortest time between two surveys, however often others appear and leave."""
 NODE = "/volery"
 _SET = "rosapi_msgs/srv/SetParam"
 
 _taken: set[tuple[str, int, str]] = set()
-"""Middlewares, domains and node names of the open bridges of this process: two of one would take
+"""Middlewares, domains and node names of the open bridges of this process: two of one would receive
 every command twice."""
 _places = threading.Lock()
 
@@ -47,20 +47,20 @@ _log = logging.getLogger(__name__)
 
 
 class Ros2Bridge:
-    """The whole simulation in a ROS 2 graph; a `graph.bridge_kind.Bridge`.
+    """Connects the whole simulation to a ROS 2 graph; a `graph.bridge_kind.Bridge`.
 
     Parameters
     ----------
     terms
         Middleware, domain and interfaces.
     node_name
-        Full name of the node that stands for the simulation.
+        Full name of the node of the simulation.
     topics
-        Patterns of the names of topics and services that are shared, as `fnmatch` has them.
+        Patterns of the names of shared topics and services, as in `fnmatch`.
     commands
-        Patterns of topics that ROS 2 may publish beside publishers of the graph.
+        Patterns of topics that ROS 2 may publish besides publishers of the graph.
     reliable
-        Patterns of topics that are published reliably though they carry what sensors stream.
+        Patterns of sensor topics that are published reliably.
     remote_services
         ROS 2 services that the graph can call, and their types (`std_srvs/srv/Trigger`).
 
@@ -90,15 +90,15 @@ class Ros2Bridge:
 
     @property
     def dropped(self) -> dict[str, int]:
-        """Messages that came too fast to be sent, by topic, where there are any."""
+        """Number of messages that were not sent in time, by topic, without zeros."""
         return {} if self._shared is None else self._shared.topics.dropped
 
     async def start(self, gateway: Gateway) -> None:
-        """Join the ROS 2 graph. `BridgeError` where that is not possible."""
+        """Joins the ROS 2 graph. Raises `BridgeError` if that fails."""
         await asyncio.get_running_loop().run_in_executor(None, self._begin, gateway)
 
     async def stop(self) -> None:
-        """Leave it with everything."""
+        """Leaves the ROS 2 graph."""
         await asyncio.get_running_loop().run_in_executor(None, self._end)
 
     def _begin(self, gateway: Gateway) -> None:
@@ -140,12 +140,12 @@ class Ros2Bridge:
             self._place = None
 
     def _watch(self) -> None:
-        """Share what appears, take back what goes, here and there."""
+        """Updates the shared names in both directions."""
         shared, breath = self._shared, threading.Event()
         while shared is not None and not self._stopping:
             try:
                 shared.survey()
-            except Exception as error:  # a topic that breaks must not end the bridge
+            except Exception as error:  # an error of one topic must not end the bridge
                 _log.warning("%s: %s: %s", self.name, type(error).__name__, error)
             breath.wait(_BREATH_S)
             self._news.wait(_SURVEY_S)
@@ -153,7 +153,7 @@ class Ros2Bridge:
 
 
 class _Shared:
-    """All that the bridge shares."""
+    """Everything that the bridge shares."""
 
     def __init__(
         self,
@@ -168,7 +168,7 @@ class _Shared:
         self._worker = Ros2WriterThread()
         self._clerk = Ros2WriterThread(
             "volery-ros2-services"
-        )  # answers may wait for who asked to be found
+        )  # answers may wait for the discovery of the caller
         participant.add_node(node)
         self.topics = Ros2Topics(participant, session, sharing, reliable, node, self._worker)
         self.services = Ros2Services(participant, session, sharing, node, self._clerk)
@@ -179,7 +179,7 @@ class _Shared:
         )
 
     def survey(self) -> None:
-        """Bring everything up to date."""
+        """Updates all shared names."""
         self.topics.survey()
         self.services.survey()
         self._actions.survey()
@@ -187,13 +187,13 @@ class _Shared:
         self._participant.announce()
 
     def _set(self, node: str, name: str, value: Any, done: Callable[[str], None]) -> None:
-        """Set a parameter as clients of all bridges do, so that recorded flights repeat it."""
+        """Sets a parameter as clients of all bridges do, so that recorded flights repeat it."""
         request = message_type(f"{_SET}_Request")(f"{node}:{name}", json.dumps(value))
         reply = ServiceReply(lambda response: done(response.reason), lambda error: done(str(error)))
         self._session.call("/rosapi/set_param", request, reply)
 
     def close(self) -> None:
-        """Take everything back."""
+        """Removes all shared names."""
         self._worker.close()
         self._clerk.close()
         self.topics.close()

@@ -1,6 +1,6 @@
-"""A program's part in a ROS 2 graph, with the methods of `graph.session.Session`.
+"""Connects a program to a ROS 2 graph, with the methods of `graph.session.Session`.
 
-    link = Ros2Client(Ros2Terms(domain_id=7), "/uav1/gap_following")
+    link = Ros2Client(Ros2Environment(domain_id=7), "/uav1/gap_following")
     mailbox = link.subscribe("/uav1/laser/horizontal/scan", wake=woken.set)
 
 A node that runs on it (`volery node ... --via ros2`) is a ROS 2 node of its own name, with its
@@ -41,17 +41,17 @@ from volery.graph.session import Handler, SessionInfo
 from volery.graph.subscription_queue import SubscriptionQueue, Wake
 
 _FIRST_LOOK_S = 1.0
-"""How long others may take to be found, after joining."""
+"""Time for the discovery of others after joining."""
 _LONGEST_LOOK_S = 3.0
 _LATCHED_DEPTH = 1
 _PUBLISHED_DEPTH = 100
 
 
 class Ros2Client:
-    """One participant in a ROS 2 graph as a `graph.connection.Link`.
+    """One participant in a ROS 2 graph as a `GraphConnection`.
 
-    name: of the ROS 2 node that it is until a node of ours says what it is called.
-    `BridgeError` where the graph cannot be joined.
+    name: of the ROS 2 node until a node of Volery sets its own name. Raises `BridgeError` if the
+    graph cannot be joined.
     """
 
     def __init__(self, terms: Ros2Environment | None = None, name: str = "/volery_node") -> None:
@@ -76,11 +76,11 @@ class Ros2Client:
 
     @property
     def where(self) -> str:
-        """Middleware and domain, for people."""
+        """Middleware and domain, for messages."""
         return self._participant.where
 
     def host_node(self, name: str, parameters: Parameters, post: Callable[[Any], Any]) -> None:
-        """Be the ROS 2 node of this name, with its parameters, which are set through `post`."""
+        """Becomes the ROS 2 node of this name; its parameters are set through `post`."""
         check_name(name)
 
         def set_value(node: str, parameter: str, value: Any, done: Callable[[str], None]) -> None:
@@ -111,12 +111,12 @@ class Ros2Client:
     # ------------------------------------------------------------------------------------ topics
 
     def topic_types(self) -> dict[str, str]:
-        """Topics that others publish or subscribe to, and their types."""
+        """Returns topics that others publish or subscribe to, and their types."""
         self._look_around()
         return dict(self._participant.topic_types())
 
     def advertise(self, topic: str, msgtype: str, *, latched: bool = False) -> None:
-        """Announce that messages will be published on `topic`. `GraphError` for a wrong type."""
+        """Advertises `topic`. Raises `GraphError` for a wrong type."""
         check_name(topic)
         _known(msgtype)
         depth = _LATCHED_DEPTH if latched else _PUBLISHED_DEPTH
@@ -132,7 +132,7 @@ class Ros2Client:
         self._participant.announce()
 
     def unadvertise(self, topic: str) -> None:
-        """Publish on `topic` no more. `GraphError` if it was not announced."""
+        """Ends the publication of `topic`. Raises `GraphError` if there was none."""
         with self._lock:
             publisher = self._publishers.pop(topic, None)
         if publisher is None:
@@ -141,12 +141,12 @@ class Ros2Client:
         self._participant.announce()
 
     def published_type(self, topic: str) -> str | None:
-        """Type that was announced for `topic`; None if none was."""
+        """Returns the advertised type of `topic`; None if it is not advertised."""
         publisher = self._publishers.get(topic)
         return None if publisher is None else publisher.msgtype
 
     def publish(self, topic: str, message: Any) -> None:
-        """Publish a message of the announced type."""
+        """Publishes a message of the advertised type."""
         publisher = self._publishers.get(topic)
         if publisher is None:
             raise GraphError(f"{self.name} has not advertised '{topic}'")
@@ -164,9 +164,9 @@ class Ros2Client:
         reliable: bool = False,
         wake: Wake,
     ) -> SubscriptionQueue:
-        """As `Link.subscribe`; a message's time is that of its arrival, by the computer's clock.
+        """Subscribes as `GraphConnection.subscribe`; messages get the wall time of their arrival.
 
-        The middleware delivers reliably where all publishers do; `reliable` is of the mailbox only.
+        The middleware delivers reliably if all publishers do; `reliable` applies to the queue only.
         """
         check_depth(depth)
         check_name(topic)
@@ -180,7 +180,7 @@ class Ros2Client:
         return mailbox
 
     def unsubscribe(self, mailbox: SubscriptionQueue) -> None:
-        """Receive no more; what waits can still be taken."""
+        """Ends a subscription; queued messages remain available."""
         self._subscriptions.close(mailbox)
         self._participant.announce()
 
@@ -197,12 +197,12 @@ class Ros2Client:
     # ---------------------------------------------------------------------------------- services
 
     def service_types(self) -> dict[str, str]:
-        """Services that others offer, and their types."""
+        """Returns services of others, and their types."""
         self._look_around()
         return dict(self._participant.service_types())
 
     def call(self, service: str, request: Any | None, reply: ServiceReply) -> None:
-        """Call a service; `reply` gets the response or a `GraphError`, in another thread."""
+        """Calls a service; `reply` receives the response or a `GraphError`, in another thread."""
 
         def ask() -> None:
             try:
@@ -210,7 +210,7 @@ class Ros2Client:
                 wanted = f"{spec.srvtype}_Request"
                 question = zero_message(wanted) if request is None else request
                 if type_name(type(question)) != wanted:
-                    raise GraphError(f"service '{service}' takes {wanted}")
+                    raise GraphError(f"service '{service}' needs {wanted}")
                 ask_server(caller, spec, question, reply)
             except GraphError as error:
                 reply.fail(error)
@@ -218,7 +218,10 @@ class Ros2Client:
         threading.Thread(target=ask, name=f"volery-ros2 {service}", daemon=True).start()
 
     def _caller(self, service: str) -> tuple[ServiceSpec, Caller]:
-        """A client of a service that is there. `GraphError` where nobody offers it in time."""
+        """Returns a client of an existing service.
+
+        Raises `GraphError` if it has no server in time.
+        """
         with self._lock:
             known = self._callers.get(service)
         if known is not None:
@@ -226,7 +229,7 @@ class Ros2Client:
         check_name(service)
         types = self._participant.service_types
         if not wait_for(lambda: service in types(), _LONGEST_LOOK_S):
-            raise GraphError(f"nobody offers service '{service}'")
+            raise GraphError(f"service '{service}' has no server")
         srvtype = types()[service]
         _known(f"{srvtype}_Request")
         with self._lock:
@@ -237,31 +240,31 @@ class Ros2Client:
             return self._callers[service]
 
     def offer(self, service: str, srvtype: str, handler: Handler) -> None:
-        """Offer a service; `handler(request, reply)` is called in a thread of the link's."""
+        """Creates a service; `handler(request, reply)` is called in a thread of the connection."""
         check_name(service)
         _known(f"{srvtype}_Request")
         with self._lock:
             self._check_open()
             if service in self._servers:
-                raise GraphError(f"{self.name} offers service '{service}' already")
+                raise GraphError(f"{self.name} has a service '{service}' already")
             take = answerer(self._worker, srvtype, handler, self._complaints)
             spec = ServiceSpec(self._node, service, srvtype)
             self._servers[service] = self._participant.server(spec, take)
         self._participant.announce()
 
     def withdraw(self, service: str) -> None:
-        """Offer a service no more. `GraphError` if it was not offered."""
+        """Destroys a service. Raises `GraphError` if it does not exist."""
         with self._lock:
             server = self._servers.pop(service, None)
         if server is None:
-            raise GraphError(f"{self.name} does not offer service '{service}'")
+            raise GraphError(f"{self.name} has no service '{service}'")
         server.close()
         self._participant.announce()
 
     # --------------------------------------------------------------------------------------- end
 
     def close(self) -> None:
-        """Leave the graph with everything; a second time nothing happens."""
+        """Leaves the graph; further calls do nothing."""
         with self._lock:
             if self._closed:
                 return
@@ -279,7 +282,7 @@ class Ros2Client:
 
     @property
     def info(self) -> SessionInfo:
-        """What the client does at present."""
+        """Returns the current state of the client."""
         with self._lock:
             return SessionInfo(
                 self.name,
@@ -290,10 +293,10 @@ class Ros2Client:
 
     def _check_open(self) -> None:
         if self._closed:
-            raise GraphError(f"{self.name} has left")
+            raise GraphError(f"{self.name} is closed")
 
     def _look_around(self) -> None:
-        """Give others time to be found, when it is too early for a list of them."""
+        """Waits for the discovery of others, if the client joined just now."""
         time.sleep(max(self._joined + _FIRST_LOOK_S - time.monotonic(), 0.0))
 
 

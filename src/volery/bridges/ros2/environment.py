@@ -1,4 +1,4 @@
-"""Joins a ROS 2 graph: which middleware, which domain, what must be installed."""
+"""Joins a ROS 2 graph with a middleware, a domain and its requirements."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from volery.graph.nodes.imports import withdraw_ros_imports
 Kind = Literal["dds", "zenoh", "rclpy"]
 
 MOST_DOMAIN = 232
-"""Beyond, the ports of DDS do not fit into 16 bits (RTPS 2.5, 9.6.2.3)."""
+"""Largest domain: beyond, the ports of DDS do not fit into 16 bits (RTPS 2.5, 9.6.2.3)."""
 
 _PACKAGES = {"dds": "cyclonedds", "zenoh": "zenoh", "rclpy": "rclpy"}
 _MISSING = {
@@ -27,20 +27,20 @@ _MISSING = {
 
 
 class Ros2Environment(NamedTuple):
-    """Where to find the ROS 2 graph."""
+    """Connection of a ROS 2 graph."""
 
     middleware: Kind = "dds"
-    """`rclpy`: whatever the sourced ROS 2 uses; for nodes, not for the bridge."""
+    """`rclpy`: the middleware of the sourced ROS 2; for nodes, not for the bridge."""
     domain_id: int | None = None
-    """None: that of the variable ROS_DOMAIN_ID."""
+    """None: the variable ROS_DOMAIN_ID."""
     interfaces: tuple[str, ...] = ()
-    """Of the network, for DDS, by name or address; none: this machine alone."""
+    """Network interfaces for DDS, by name or address; empty: this machine alone."""
     router: str = ""
-    """HOST:PORT of zenoh's router; empty: this machine's, at its usual port."""
+    """HOST:PORT of zenoh's router; empty: this machine's, at its default port."""
 
 
 def join_ros2(terms: Ros2Environment) -> Participant:
-    """Take part in a ROS 2 graph. `BridgeError` tells what is missing."""
+    """Joins a ROS 2 graph. Raises `BridgeError` with what is missing."""
     withdraw_ros_imports()
     package = _PACKAGES[terms.middleware]
     if importlib.util.find_spec(package) is None:
@@ -58,17 +58,17 @@ def join_ros2(terms: Ros2Environment) -> Participant:
 
 
 def _sourced(domain_id: int) -> Participant:
-    """Take part with the ROS 2 that is sourced. `BridgeError` where it does not work."""
+    """Joins with the sourced ROS 2. Raises `BridgeError` if it does not work."""
     try:
         from volery.bridges.ros2.rcl.participant import RclParticipant
 
         return RclParticipant(domain_id)
-    except (ImportError, RuntimeError) as error:  # of another Python, or an rmw that is not there
+    except (ImportError, RuntimeError) as error:  # of another Python, or a missing rmw
         raise BridgeError(f"rclpy does not start: {error}") from None
 
 
 def domain_of(given: int | None) -> int:
-    """The domain that is asked for, or that of ROS_DOMAIN_ID. `BridgeError` for what is none."""
+    """Returns the given domain, or ROS_DOMAIN_ID. Raises `BridgeError` for an invalid one."""
     text = os.environ.get("ROS_DOMAIN_ID", "") or "0" if given is None else str(given)
     if not text.isdecimal() or int(text) > MOST_DOMAIN:
         source = "ROS_DOMAIN_ID" if given is None else "domain id"
@@ -79,5 +79,5 @@ def domain_of(given: int | None) -> int:
 def _checked(interfaces: Sequence[str]) -> tuple[str, ...]:
     for name in interfaces:
         if not name or any(letter in name for letter in "<>&\"' "):
-            raise BridgeError(f"'{name}' is no network interface")
+            raise BridgeError(f"'{name}' is not a network interface")
     return tuple(interfaces)

@@ -1,8 +1,8 @@
-"""What the bridge and nodes need of a middleware: the endpoints of one ROS 2 participant.
+"""Interface of a middleware for the bridge and nodes: the endpoints of one ROS 2 participant.
 
-A participant is one process's part in the graph and may hold several nodes. Bytes that cross this
-line are CDR with its header, of plain messages: what a middleware adds to requests stays behind it.
-All methods may be called by any thread; what comes in is told in threads of the participant's.
+A participant belongs to one process and may hold several nodes. Bytes that cross this interface are
+CDR with its header, of plain messages, without the middleware's additions to requests. Any thread
+may call the methods; callbacks run in threads of the participant.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ DEFAULT_DEPTH = 10
 
 
 class Profile(NamedTuple):
-    """Quality of service of a publisher or subscription, as far as the field varies it."""
+    """Quality of service of a publisher or subscription, as far as it varies in practice."""
 
     reliable: bool = True
     latched: bool = False
@@ -44,31 +44,31 @@ class ServiceSpec(NamedTuple):
 
 
 class RemotePublisher(NamedTuple):
-    """A publisher of somebody else."""
+    """A publisher of another participant."""
 
     topic: str
     msgtype: str
     profile: Profile
     type_hash: str | None = None
-    """None where it does not tell."""
+    """None if unknown."""
 
 
 class Handle(Protocol):
-    """Something that takes part in the graph until it is closed."""
+    """An endpoint that is active until it is closed."""
 
     def close(self) -> None:
-        """Leave; a second time nothing happens."""
+        """Closes the endpoint; further calls do nothing."""
 
 
 class Writer(Handle, Protocol):
     """A publisher."""
 
     def write(self, cdr: bytes) -> None:
-        """Send one message; never waits for a subscriber."""
+        """Sends one message, as CDR; never waits for a subscriber."""
 
     @property
     def matched(self) -> bool:
-        """Whether anybody subscribes."""
+        """Whether the topic has subscribers."""
 
 
 Answer = Callable[[bytes], None]
@@ -82,55 +82,55 @@ class Caller(Handle, Protocol):
 
     @property
     def ready(self) -> bool:
-        """Whether a server is there."""
+        """Whether the service has a server."""
 
     @property
     def problem(self) -> str:
-        """Why nobody answers though a server is there; empty where that is not known."""
+        """Why a connected server does not answer; empty if unknown."""
 
     def call(self, request: bytes, on_response: TakeMessage, on_loss: Callable[[], None]) -> None:
-        """Send a request; one of the two is called once, the second if the server has left."""
+        """Sends a request; calls one of the two once, `on_loss` if the server has left."""
 
 
 class Participant(Protocol):
-    """One process's part in a ROS 2 graph."""
+    """One process's participant in a ROS 2 graph."""
 
     @property
     def where(self) -> str:
-        """Middleware and domain, for people."""
+        """Middleware and domain, for messages."""
 
     def add_node(self, node: NodeName) -> None:
-        """Have a node appear."""
+        """Adds a node."""
 
     def remove_node(self, node: NodeName) -> None:
-        """Have a node disappear; its endpoints are closed by whoever made them."""
+        """Removes a node; its endpoints are closed by their owners."""
 
     def announce(self) -> None:
-        """Tell others of nodes and endpoints that came and went, where that is not told at once."""
+        """Publishes changes of nodes and endpoints, if the middleware does not do so at once."""
 
     def writer(self, spec: TopicSpec) -> Writer:
-        """Publish."""
+        """Creates a publisher."""
 
     def reader(self, spec: TopicSpec, take: TakeMessage) -> Handle:
-        """Subscribe; what this participant itself publishes does not come."""
+        """Creates a subscription, which does not receive this participant's own messages."""
 
     def server(self, spec: ServiceSpec, take: TakeRequest) -> Handle:
-        """Offer a service."""
+        """Creates a service."""
 
     def caller(self, spec: ServiceSpec) -> Caller:
-        """Become a client of a service."""
+        """Creates a client of a service."""
 
     def publishers(self) -> list[RemotePublisher]:
-        """Publishers of others."""
+        """Returns publishers of others."""
 
     def topic_types(self) -> Mapping[str, str]:
-        """Topics that others publish or subscribe to, and their types."""
+        """Returns topics that others publish or subscribe to, and their types."""
 
     def service_types(self) -> Mapping[str, str]:
-        """Services that others offer, and their types."""
+        """Returns services of others, and their types."""
 
     def when_changed(self, tell: Callable[[], None]) -> None:
-        """Have `tell` called when others come or go."""
+        """Calls `tell` when others appear or leave."""
 
     def close(self) -> None:
-        """Leave the graph with everything."""
+        """Leaves the graph."""

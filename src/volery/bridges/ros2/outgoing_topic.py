@@ -1,4 +1,4 @@
-"""Topics of the graph on their way to ROS 2."""
+"""Sends topics of the graph to ROS 2."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from volery.graph.session import Session
 from volery.graph.subscription_queue import SubscriptionQueue
 
 _DEPTH = 1000
-"""One tick may publish once for each UAV, as it does on `/tf`."""
+"""Queue depth: one tick may publish once for each UAV, as on `/tf`."""
 _OWN_KEPT = 1000
 
 _log = logging.getLogger(__name__)
 
 
 class Ros2OutgoingTopic:
-    """One topic: its messages are taken and turned into bytes only while somebody subscribes.
+    """One topic; its messages are received and encoded only while it has subscribers.
 
-    What is latched is always taken: ROS 2's publishers keep it for those who come later. `serve`
-    runs in the worker's thread; all else may be called by any.
+    Latched topics are always received: ROS 2's publishers store them for late subscribers. `serve`
+    runs in the writer's thread; any thread may call the other methods.
     """
 
     def __init__(
@@ -40,25 +40,25 @@ class Ros2OutgoingTopic:
 
     @property
     def holds(self) -> bool:
-        """Whether it listens to the graph."""
+        """Whether it subscribes to the graph."""
         return self._mailbox is not None
 
     @property
     def dropped(self) -> int:
-        """Messages that were not sent because they came too fast."""
+        """Number of messages that were not sent in time."""
         return 0 if self._mailbox is None else self._mailbox.info.dropped
 
     @property
     def wanted(self) -> bool:
-        """Whether it should listen to the graph."""
+        """Whether it should subscribe to the graph."""
         return self.spec.profile.latched or self._writer.matched
 
     def wake(self) -> None:
-        """Have it served."""
+        """Schedules `serve`."""
         self._worker.post(self.serve)
 
     def adapt(self) -> None:
-        """Begin or end to listen to the graph, as subscribers come and go."""
+        """Subscribes to or unsubscribes from the graph with the subscribers."""
         if self.wanted != self.holds:
             self._worker.post(self._adapt)
 
@@ -73,22 +73,22 @@ class Ros2OutgoingTopic:
             )
 
     def leave_out(self, message: Any) -> None:
-        """Do not send a message that came from ROS 2 itself."""
+        """Skips a message that came from ROS 2 itself."""
         if self._mailbox is not None:
             self._own[id(message)] = message
             if len(self._own) > _OWN_KEPT:
                 self._own.popitem(last=False)
 
     def serve(self) -> None:
-        """Send what waits."""
-        if self._mailbox is None:  # it listens no more, or is closed
+        """Sends queued messages."""
+        if self._mailbox is None:  # unsubscribed, or closed
             return
         for published in self._mailbox.take():
             if not self._own or self._own.pop(id(published.message), None) is None:
                 self._send(published)
 
     def close(self) -> None:
-        """Publish no more; in the worker's thread or after its end."""
+        """Ends the publication; in the writer's thread or after its end."""
         self._closed = True
         self._let_go()
         self._writer.close()

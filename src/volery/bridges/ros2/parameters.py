@@ -1,6 +1,6 @@
-"""Parameters of nodes as ROS 2 asks for them: six services for each node, and their events.
+"""Parameters of nodes for ROS 2: six services for each node, and their events.
 
-How a value is set is up to whoever owns the parameters: see `SetValue`.
+The owner of the parameters determines how a value is set: see `SetValue`.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from volery.graph.parameters import Parameters
 from volery.graph.service_reply import ServiceReply
 
 _SIM_TIME = "use_sim_time"
-"""Every ROS 2 node has it; here it is true and nobody's to change."""
+"""Parameter of every ROS 2 node; here it is true and read-only."""
 _ALWAYS_SIM_TIME = f"parameter '{_SIM_TIME}' is read-only: nodes here follow /clock"
 _EVENTS = "/parameter_events"
 _EVENT_TYPE = "rcl_interfaces/msg/ParameterEvent"
@@ -40,14 +40,14 @@ _SERVICES = (
 
 
 SetValue = Callable[[str, str, Any, Callable[[str], None]], None]
-"""(node, parameter, value, done): sets a value and says why not, or an empty text, some time."""
+"""(node, parameter, value, done): sets a value; calls `done` later, with a reason on failure."""
 
 
 class ParameterServices:
-    """The parameters of all nodes of a graph; `survey` brings the nodes up to date.
+    """The parameters of all nodes of a graph; `survey` updates the nodes.
 
-    owner: the node that stands for the whole process, which need not have any of its own.
-    now_ns: what stamps the events.
+    owner: the node of the whole process, which may have no parameters. now_ns: stamps of the
+    events.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class ParameterServices:
         self._events = participant.writer(spec)
 
     def survey(self) -> None:
-        """Have nodes appear that have parameters, and those disappear that have ended."""
+        """Adds new nodes with parameters, and removes nodes that have ended."""
         wanted = {self._owner, *map(NodeName.of, self._declared.nodes())}
         for node in [node for node in self._nodes if node not in wanted]:
             self._leave(node)
@@ -84,7 +84,7 @@ class ParameterServices:
         self._nodes[node] = [self._serve(node, base) for base in _SERVICES]
 
     def close(self) -> None:
-        """Take everything back."""
+        """Removes all nodes."""
         for node in tuple(self._nodes):
             self._leave(node)
         self._events.close()
@@ -113,7 +113,7 @@ class ParameterServices:
         )
         return self._participant.server(ServiceSpec(node, f"{node.full}/{word}", srvtype), take)
 
-    # ------------------------------------------------------------------------------------ asking
+    # ------------------------------------------------------------------------------------ reading
 
     def _names(self, node: NodeName) -> list[str]:
         return sorted(
@@ -121,7 +121,7 @@ class ParameterServices:
         )
 
     def _value(self, node: NodeName, name: str) -> Any:
-        """Value of a parameter; None where there is none of that name."""
+        """Returns the value of a parameter; None if there is no such parameter."""
         try:
             return self._declared.get(node.full, name).value
         except GraphError:
@@ -165,7 +165,7 @@ class ParameterServices:
         self._set_each(node, request.parameters, lambda found: reply.answer(response(found)))
 
     def _set_all(self, node: NodeName, request: Any, reply: ServiceReply) -> None:
-        """All or none: refused before anything is set where one is read-only or unknown."""
+        """Sets all parameters or none: refused if one is read-only or unknown."""
         response = message_type("rcl_interfaces/srv/SetParametersAtomically_Response")
         bad = [p.name for p in request.parameters if self._refuses(node, p)]
         if bad:
@@ -187,7 +187,7 @@ class ParameterServices:
     def _set_each(
         self, node: NodeName, wanted: list[Any], done: Callable[[list[Any]], None]
     ) -> None:
-        """Set one after the other; `done` gets the results."""
+        """Sets parameters one after the other; `done` receives the results."""
         results: list[Any] = []
 
         def go_on() -> None:
@@ -211,7 +211,7 @@ class ParameterServices:
         go_on()
 
     def _is_clock(self, node: NodeName, name: str) -> bool:
-        """Whether it is the parameter that every node has without declaring it."""
+        """Returns whether it is the parameter that every node has without declaring it."""
         return name == _SIM_TIME and (node.full, name) not in self._declared.names()
 
     def _tell_event(self, node: NodeName, parameter: Any) -> None:
@@ -226,7 +226,10 @@ def _result(reason: str) -> Any:
 
 
 def _is_below(name: str, prefixes: list[str], depth: int) -> bool:
-    """Whether a name lies below one of the prefixes, at most so many dots deep; 0: any depth."""
+    """Returns whether a name is below one of the prefixes, at most `depth` dots deep.
+
+    0: any depth.
+    """
     for prefix in prefixes or [""]:
         start = f"{prefix}." if prefix else ""
         rest = name[len(start) :]

@@ -1,7 +1,7 @@
-"""Quality of service of what the simulation publishes, as the field has it.
+"""Quality of service of the simulation's topics, as usual in ROS 2.
 
-A publisher that offers less than a subscription asks for is not heard, so everything is reliable
-but what sensors stream, which ROS 2 drivers publish best effort (rclcpp's `SensorDataQoS`).
+A subscription does not match a publisher that offers less than it requests, so all topics are
+reliable but sensor streams, which ROS 2 drivers publish best effort (rclcpp's `SensorDataQoS`).
 """
 
 from __future__ import annotations
@@ -9,11 +9,11 @@ from __future__ import annotations
 from volery.bridges.ros2.middleware import Profile
 
 SENSOR_DATA = Profile(reliable=False, depth=5)
-"""rmw_qos_profile_sensor_data."""
+"""Profile rmw_qos_profile_sensor_data."""
 SERVICES = Profile()
-"""rmw_qos_profile_services_default."""
+"""Profile rmw_qos_profile_services_default."""
 COMMANDS = Profile(depth=100)
-"""Of what comes in: bursts of several UAVs' commands between two looks."""
+"""Profile of received topics: bursts of several UAVs' commands between two surveys."""
 
 _STREAMS = frozenset(
     {
@@ -31,8 +31,8 @@ _STREAMS = frozenset(
         "Temperature",
     }
 )
-"""Of sensor_msgs. Joint states and batteries are states, not measurements that replace each other
-within milliseconds: their publishers are reliable."""
+"""Types of sensor_msgs. Joint states and batteries are states, not measurements that replace each
+other within milliseconds: their publishers are reliable."""
 _NAMED = {
     "/tf": Profile(depth=100),  # tf2_ros::DynamicBroadcasterQoS
     "/clock": Profile(depth=1),  # subscribers: rclcpp::ClockQoS, best effort, depth 1
@@ -41,7 +41,7 @@ _NAMED = {
 
 
 def profile_of(topic: str, msgtype: str, *, latched: bool) -> Profile:
-    """How the simulation publishes a topic."""
+    """Returns the simulation's profile of a topic."""
     if latched:
         return Profile(latched=True, depth=1)  # as maps and tf2_ros::StaticBroadcasterQoS
     named = _NAMED.get(topic)
@@ -52,7 +52,7 @@ def profile_of(topic: str, msgtype: str, *, latched: bool) -> Profile:
 
 
 def common_profile(offers: list[Profile]) -> Profile:
-    """The most that a subscription can ask of all publishers on its topic."""
+    """Returns the most that a subscription can request from all publishers on its topic."""
     if not offers:
         return COMMANDS
     return COMMANDS._replace(

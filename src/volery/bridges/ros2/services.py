@@ -1,4 +1,4 @@
-"""Services that a simulation and a ROS 2 graph share, both ways."""
+"""Shares services between a simulation and a ROS 2 graph, in both directions."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Session
 
 _LONGEST_WAIT_S = 10.0
-"""For a server to appear, which DDS may take seconds to find."""
+"""Time for a server to appear, which DDS may take seconds to discover."""
 _PAUSE_S = 0.005
 
 
 class Ros2Services:
-    """What is shared at present; `survey` brings it up to date, in one thread at a time."""
+    """Holds the shared services; `survey` updates them, in one thread at a time."""
 
     def __init__(
         self,
@@ -44,7 +44,7 @@ class Ros2Services:
         self._complaints = WarningFilter()
 
     def survey(self) -> None:
-        """Offer in ROS 2 what has appeared since, take back what has gone."""
+        """Creates ROS 2 servers of new services and destroys those of removed ones."""
         offered = {
             name: srvtype
             for name, srvtype in self._session.graph.services().items()
@@ -63,7 +63,10 @@ class Ros2Services:
         self._servers[name] = self._participant.server(spec, take)
 
     def take_remote(self, services: Mapping[str, str]) -> None:
-        """Offer ROS 2 services in the graph. `GraphError` for a wrong type or a taken name."""
+        """Creates services of the graph for ROS 2 services.
+
+        Raises `GraphError` for a wrong type or a taken name.
+        """
         for name, srvtype in services.items():
             check_name(name)
             spec = ServiceSpec(self._node, name, srvtype)
@@ -72,7 +75,7 @@ class Ros2Services:
             self._callers[name] = caller
 
     def close(self) -> None:
-        """Take everything back."""
+        """Destroys all shared services."""
         for server in self._servers.values():
             server.close()
         for caller in self._callers.values():
@@ -83,7 +86,7 @@ class Ros2Services:
 
 
 def _is_of_ros2(name: str) -> bool:
-    """Whether ROS 2 has no way of its own to ask the same."""
+    """Returns whether ROS 2 has no equivalent of its own."""
     return not name.startswith("/rosapi/")
 
 
@@ -93,10 +96,10 @@ def answerer(
     ask: Callable[[Any, ServiceReply], None],
     complaints: WarningFilter,
 ) -> Callable[[bytes, Answer], None]:
-    """A `TakeRequest` that reads requests for `ask` and writes its responses.
+    """Returns a `TakeRequest` that decodes requests for `ask` and encodes its responses.
 
-    ROS 2 has no word for a failure: it is told in the response where that has room for a reason,
-    else nothing is answered and a warning logged.
+    ROS 2 has no failure of services: the response reports it if it has a field for a reason, else
+    there is no answer and a warning is logged.
     """
     response_type = f"{srvtype}_Response"
 
@@ -121,7 +124,7 @@ def answerer(
 
 
 def _refusal(response_type: str, reason: str) -> Any | None:
-    """A response that says no and why; None where the type has no room for that."""
+    """Returns a response with a refusal and its reason; None if the type has no field for it."""
     response = zero_message(response_type)
     names = {field.name for field in fields(response)}
     if {"success", "message"} <= names and response.success is False:
@@ -135,7 +138,7 @@ def _refusal(response_type: str, reason: str) -> Any | None:
 
 
 def ask_server(caller: Caller, spec: ServiceSpec, request: Any, reply: ServiceReply) -> None:
-    """Ask a ROS 2 server, waiting for it to be found; `reply` gets its response or an error."""
+    """Calls a ROS 2 server after its discovery; `reply` receives its response or an error."""
 
     def respond(data: bytes) -> None:
         try:
@@ -152,7 +155,7 @@ def ask_server(caller: Caller, spec: ServiceSpec, request: Any, reply: ServiceRe
             raise GraphError(
                 f"service '{spec.service}': {caller.problem}"
                 if caller.problem
-                else f"nobody offers ROS 2 service '{spec.service}'"
+                else f"ROS 2 service '{spec.service}' has no server"
             )
         caller.call(encode_cdr(request, f"{spec.srvtype}_Request"), respond, lose)
     except GraphError as error:
@@ -160,7 +163,7 @@ def ask_server(caller: Caller, spec: ServiceSpec, request: Any, reply: ServiceRe
 
 
 def _forwarder(caller: Caller, spec: ServiceSpec) -> Callable[[Any, ServiceReply], None]:
-    """A handler of a service of the graph that passes requests on to a ROS 2 server."""
+    """Returns a handler of a service of the graph that forwards requests to a ROS 2 server."""
 
     def handle(request: Any, reply: ServiceReply) -> None:
         name = f"volery-ros2 {spec.service}"
@@ -171,7 +174,7 @@ def _forwarder(caller: Caller, spec: ServiceSpec) -> Callable[[Any, ServiceReply
 
 
 def wait_for(what: Callable[[], bool], timeout_s: float) -> bool:
-    """Wait until something is true, which others bring about; whether it came to be."""
+    """Waits until a condition is true; returns whether it became true."""
     pause = threading.Event()
     for _ in range(max(int(timeout_s / _PAUSE_S), 1)):
         if what():

@@ -1,4 +1,4 @@
-"""The subscriptions of a program in a ROS 2 graph, which ask for what their publishers offer."""
+"""Subscriptions of a program in a ROS 2 graph, adapted to their publishers' profiles."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from volery.graph.subscription_queue import SubscriptionQueue, SubscriptionQueue
 
 
 class Subscriptions:
-    """Mailboxes and where their messages come from. Safe to use from several threads."""
+    """Queues and their ROS 2 subscriptions. Safe to use from several threads."""
 
     def __init__(self, participant: Participant, node: NodeName) -> None:
         self._participant = participant
@@ -28,12 +28,12 @@ class Subscriptions:
 
     @property
     def infos(self) -> tuple[SubscriptionQueueInfo, ...]:
-        """How they fare."""
+        """State of the subscriptions."""
         with self._lock:
             return tuple(mailbox.info for mailbox in self._inlets)
 
     def open(self, mailbox: SubscriptionQueue, msgtype: str, depth: int) -> None:
-        """Begin to fill a mailbox."""
+        """Subscribes for a queue."""
         receive = self._receiver(mailbox, msgtype)
         with self._lock:
             inlet = _Inlet(mailbox.topic, msgtype, max(depth, DEFAULT_DEPTH), receive)
@@ -41,28 +41,28 @@ class Subscriptions:
             self._subscribe(inlet)
 
     def close(self, mailbox: SubscriptionQueue) -> None:
-        """Fill it no more; nothing happens a second time."""
+        """Ends a queue's subscription; further calls do nothing."""
         with self._lock:
             inlet = self._inlets.pop(mailbox, None)
             if inlet is not None and inlet.handle is not None:
                 inlet.handle.close()
 
     def close_all(self) -> None:
-        """Fill none any more."""
+        """Ends all subscriptions."""
         with self._lock:
             self._closed = True
             for mailbox in tuple(self._inlets):
                 self.close(mailbox)
 
     def adapt(self) -> None:
-        """Others came or went: ask for what publishers offer now."""
+        """Adapts to the current publishers' profiles."""
         with self._lock:
             if not self._closed:
                 for inlet in self._inlets.values():
                     self._subscribe(inlet)
 
     def move(self, node: NodeName) -> None:
-        """Belong to another node from now on."""
+        """Moves all subscriptions to another node."""
         with self._lock:
             self._node = node
             for inlet in self._inlets.values():
@@ -81,7 +81,7 @@ class Subscriptions:
         return receive
 
     def _subscribe(self, inlet: _Inlet) -> None:
-        """Subscribe so that all present publishers of a topic are heard, if that is new."""
+        """Subscribes so that all current publishers of a topic match, if that is a change."""
         offers = [
             p.profile
             for p in self._participant.publishers()
@@ -102,7 +102,7 @@ class Subscriptions:
 
 
 class _Inlet:
-    """A subscription, and what it asks for at present."""
+    """A subscription and its current profile."""
 
     def __init__(
         self, topic: str, msgtype: str, depth: int, receive: Callable[[bytes], None]

@@ -1,4 +1,4 @@
-"""Topics that a simulation and a ROS 2 graph share, both ways."""
+"""Shares topics between a simulation and a ROS 2 graph, in both directions."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from volery.graph.session import Session
 
 
 class Ros2Topics:
-    """What is shared at present; `survey` brings it up to date, in one thread at a time."""
+    """Holds the shared topics; `survey` updates them, in one thread at a time."""
 
     def __init__(
         self,
@@ -43,12 +43,12 @@ class Ros2Topics:
 
     @property
     def dropped(self) -> dict[str, int]:
-        """Messages that came too fast to be sent, by topic, where there are any."""
+        """Number of messages that were not sent in time, by topic, without zeros."""
         counts = {name: outlet.dropped for name, outlet in tuple(self._outlets.items())}
         return {name: count for name, count in counts.items() if count}
 
     def survey(self) -> None:
-        """Share what has appeared since, take back what has gone."""
+        """Shares new topics and removes old ones."""
         remote: dict[str, list[RemotePublisher]] = {}
         for publisher in self._participant.publishers():
             remote.setdefault(publisher.topic, []).append(publisher)
@@ -64,14 +64,14 @@ class Ros2Topics:
         self._update_inlet(topic, others, remote)
 
     def close(self) -> None:
-        """Take everything back; after the worker's end."""
+        """Removes all topics; after the writer's end."""
         for _, inlet in self._inlets.values():
             inlet.close()
         for outlet in self._outlets.values():
             outlet.close()
 
     def _publishers(self, topic: TopicInfo) -> int:
-        """How many others publish a topic in the graph."""
+        """Returns the number of other publishers of a topic in the graph."""
         return topic.publishers - (self._session.published_type(topic.name) is not None)
 
     def _update_outlet(self, topic: TopicInfo, publishers: int) -> None:
@@ -116,10 +116,10 @@ class Ros2Topics:
         self._inlets[name] = profile, self._participant.reader(spec, self._receive(topic, profile))
 
     def _look_at(self, topic: TopicInfo, remote: list[RemotePublisher]) -> None:
-        """Say which publishers will not be understood."""
+        """Warns of publishers with incompatible types."""
         for publisher in remote:
             if publisher.msgtype != topic.msgtype:
-                text = f"carries {topic.msgtype}; a publisher of {publisher.msgtype} is not heard"
+                text = f"carries {topic.msgtype}; a publisher of {publisher.msgtype} is ignored"
                 self._complaints.tell(topic.name, text)
             elif publisher.type_hash not in (None, message_hash(topic.msgtype)):
                 text = f"a publisher has another definition of {topic.msgtype}"

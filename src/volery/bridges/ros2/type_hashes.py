@@ -1,4 +1,4 @@
-"""Type hashes of ROS 2 (REP-2011, RIHS01): what tells two peers that they mean the same type.
+"""Type hashes of ROS 2 (REP-2011, RIHS01), which identify equal types of two peers.
 
 A hash is the SHA-256 of the type's description as JSON, with the descriptions of all types in it,
 in the form of `rosidl_generator_type_description`.
@@ -16,7 +16,7 @@ from rosbags.interfaces import Nodetype
 from volery.graph.messages import typestore
 
 UNKNOWN = "RIHS01_" + "0" * 64
-"""Of a type that has none."""
+"""Hash of a type without one."""
 
 # type_description_interfaces/msg/FieldType
 _TYPE_IDS = {
@@ -30,7 +30,7 @@ _TYPE_IDS = {
     "uint64": 9,
     "float32": 10,
     "float64": 11,
-    "char": 3,  # ROS 2 takes its char for an uint8
+    "char": 3,  # ROS 2 maps its char to uint8
     "bool": 15,
     "byte": 16,
     "octet": 16,
@@ -40,7 +40,7 @@ _TYPE_IDS = {
 _NESTED = 1
 _BOUNDED_STRING = 21
 _ARRAY, _BOUNDED_SEQUENCE, _SEQUENCE = 48, 96, 144
-"""Added to the number of an element's type."""
+"""Offsets to the number of an element's type."""
 _MEMBER = "structure_needs_at_least_one_member"
 
 _Fields = list[tuple[str, Any]]
@@ -48,13 +48,13 @@ _Fields = list[tuple[str, Any]]
 
 @cache
 def message_hash(msgtype: str) -> str:
-    """`RIHS01_...` of a message type; `KeyError` if it is unknown."""
+    """Returns `RIHS01_...` of a message type. Raises `KeyError` if it is unknown."""
     return _hash(msgtype, {})
 
 
 @cache
 def service_hash(srvtype: str) -> str:
-    """`RIHS01_...` of a service type, which is made of request, response and event.
+    """Returns `RIHS01_...` of a service type, which consists of request, response and event.
 
     srvtype: `std_srvs/srv/Trigger`, or a service of an action, `pkg/action/Name_SendGoal`.
     """
@@ -79,13 +79,13 @@ def _name(msgtype: str) -> Any:
 
 
 def _hash(msgtype: str, made: dict[str, _Fields]) -> str:
-    """made: fields of types that no store has."""
+    """Returns the hash of a type; made: fields of types that no store has."""
     described: dict[str, Any] = {}
 
     def describe(name: str) -> None:
         if name in described:
             return
-        described[name] = None  # types do not contain themselves; this one is under way
+        described[name] = None  # types do not contain themselves; this one is in progress
         fields = made.get(name) or typestore().fielddefs[name][1]
         if not fields:
             fields = [(_MEMBER, (Nodetype.BASE, ("uint8", 0)))]
@@ -104,7 +104,7 @@ def _hash(msgtype: str, made: dict[str, _Fields]) -> str:
 
 
 def _field(name: str, described: Any) -> dict[str, Any]:
-    """A field as `rosidl` describes it, of one as `rosbags` does."""
+    """Returns a field in the form of `rosidl` from that of `rosbags`."""
     kind, detail = described
     added, capacity = 0, 0
     if kind == Nodetype.ARRAY:

@@ -1,4 +1,4 @@
-"""What is wrong, told once."""
+"""Logs each warning once."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ from volery.core.errors import GraphError
 
 _log = logging.getLogger(__name__)
 _MOST = 10_000
-"""Things that are remembered as told; beyond, nothing more is told."""
+"""Number of stored warnings; beyond, none is logged."""
 
 
 class WarningFilter:
-    """Warnings of names that something is wrong with."""
+    """Warnings by name."""
 
     def __init__(self) -> None:
         self._told: set[tuple[str, str]] = set()
         self._refused: set[str] = set()
 
     def tried(self, name: str, action: Callable[[], object]) -> None:
-        """Do something for a name; where that fails, say why and never try again."""
+        """Runs an action for a name; if it fails, logs the reason and never tries again."""
         if name in self._refused:
             return
         try:
             action()
-        except Exception as error:  # one name's trouble must not end the others
+        except Exception as error:  # an error of one name must not end the others
             self._refused.add(name)
             told = str(error) if isinstance(error, GraphError) else repr(error)
             self.tell(name, f"is not shared: {told}")
 
     def tell(self, name: str, text: str) -> None:
-        """Warn of something, the first time."""
+        """Logs a warning, the first time."""
         if (name, text) not in self._told and len(self._told) < _MOST:
             self._told.add((name, text))
             _log.warning("ROS 2: %s: %s", name, text)

@@ -13,7 +13,7 @@ Job = Callable[[], object]
 
 
 class Ros2WriterThread:
-    """Does what it is given, one after the other."""
+    """Runs jobs one after the other."""
 
     def __init__(self, name: str = "volery-ros2") -> None:
         self._jobs: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
@@ -21,11 +21,11 @@ class Ros2WriterThread:
         self._thread.start()
 
     def post(self, job: Job) -> None:
-        """Have something done soon; from any thread, which does not wait."""
+        """Adds a job; any thread may call it without waiting."""
         self._jobs.put(job)
 
     def close(self) -> None:
-        """Do what was given so far, then end."""
+        """Runs the jobs so far, then ends."""
         self._jobs.put(None)
         self._thread.join()
 
@@ -33,5 +33,5 @@ class Ros2WriterThread:
         while (job := self._jobs.get()) is not None:
             try:
                 job()
-            except Exception as error:  # one topic's trouble must not end the others
+            except Exception as error:  # an error of one topic must not end the others
                 _log.warning("ROS 2: %s: %s", type(error).__name__, error)

@@ -1,1 +1,1 @@
-"""ROS-TCP: what Unity's ROS-TCP-Connector and ROS-TCP-Endpoint speak, from both sides."""
+"""ROS-TCP: the protocol of Unity's ROS-TCP-Connector and ROS-TCP-Endpoint, both sides."""

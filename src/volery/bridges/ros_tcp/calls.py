@@ -1,9 +1,9 @@
-"""Calls of services of the graph that come over a ROS-TCP connection, either end of it.
+"""Calls services of the graph for either end of a ROS-TCP connection.
 
-A call that fails is answered with a `__response` of zero bytes: the protocol knows no failure, and
-both Unity's Connector and Unity's endpoint would wait for ever. Zero bytes make the deserializer
-throw into the code that awaits the response (read in `ROSConnection.cs`, `MessageDeserializer.cs`
-and `tcp_sender.py`, v0.7.0; a response type without fields arrives as if nothing had failed).
+A failed call is answered with a `__response` of zero bytes: the protocol has no failure, and both
+Unity's Connector and Unity's endpoint would wait for ever. Zero bytes make the deserializer throw
+in the code that awaits the response (see `ROSConnection.cs`, `MessageDeserializer.cs` and
+`tcp_sender.py`, v0.7.0; a response type without fields arrives as if nothing had failed).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ MOST_CALLS = 1000
 
 
 class Calls:
-    """Calls services for one peer; `complain` is told, by any thread, which ones failed."""
+    """Calls services for one peer; calls `complain`, in any thread, with each failure."""
 
     def __init__(
         self, session: Session, outbox: RosTcpOutbox, complain: Callable[[str], None]
@@ -35,9 +35,9 @@ class Calls:
         self._open: set[ServiceReply] = set()
 
     def call(self, number: int, frame: RosTcpFrame, expected: str | None = None) -> None:
-        """Call the service that `frame` names, with its payload, as the peer's request `number`.
+        """Calls the service that `frame` names, with its payload, as the peer's request `number`.
 
-        expected: type that the peer takes the service for.
+        expected: the service's type according to the peer.
         """
         name = frame.destination
         payloads = self._outbox.payloads
@@ -69,14 +69,14 @@ class Calls:
         self._session.call(absolute(name), request, reply)
 
     def respond(self, number: int, name: str, body: ros_tcp.Bytes) -> None:
-        """Answer request `number`; `name` must not be empty, or the peer sees a keepalive."""
+        """Answers request `number`; `name` must not be empty, or the peer would see a keepalive."""
         header = ros_tcp.command("response", nul=self._outbox.ends_in_nul, srv_id=number)
         self._outbox.put(header + ros_tcp.frame(name, body))
 
     def _type(self, service: str, expected: str | None) -> str:
         offered = self._session.graph.services().get(service)
         if offered is None:
-            raise GraphError("nobody offers it")
+            raise GraphError("it has no server")
         if expected is not None and expected != offered:
             raise GraphError(f"its type is {offered}, not {expected}")
         return offered

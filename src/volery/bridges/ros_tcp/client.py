@@ -1,12 +1,12 @@
-"""A program's part in a graph that a ROS-TCP endpoint offers: ours, or Unity's ROS-TCP-Endpoint.
+"""Connects a program to the graph of a ROS-TCP endpoint: Volery's, or Unity's ROS-TCP-Endpoint.
 
     client = RosTcpClient("127.0.0.1", 10000, name="planner")
     mailbox = client.subscribe("/uav1/odom", "nav_msgs/msg/Odometry", wake=wake)
     client.advertise("/uav1/cmd_vel", "geometry_msgs/msg/Twist")
     client.publish("/uav1/cmd_vel", Twist(...))
 
-It has the methods and the meaning of `graph.session.Session`. It keeps its connection: when that
-breaks it comes back by itself, and announces, subscribes to and offers everything again.
+The client has the methods of `graph.session.Session`. If the connection breaks, the client
+reconnects and repeats its advertisements, subscriptions and services.
 """
 
 from __future__ import annotations
@@ -34,27 +34,27 @@ MOST_COMPLAINTS = 100
 
 
 class RosTcpClient(RemoteClient):
-    """One program's part in a remote graph. All methods may be called by any thread.
+    """Connects one program to a remote graph. Any thread may call the methods.
 
-    `close` sends what waits before it leaves.
+    `close` sends queued messages before it disconnects.
 
     Parameters
     ----------
     host, port
-        Where the endpoint listens.
+        Address of the endpoint.
     name
-        Who it is, for people.
+        Name of the client, for messages.
     generation
-        Of ROS, of an endpoint that sends no handshake, as those before 0.7; others tell theirs.
+        Generation of ROS of an endpoint without a handshake, as before 0.7.
     connect_timeout_s
-        How long to try at first; 0: do not wait, keep trying in the background.
+        Timeout of the first connection; 0: do not wait, connect in the background.
     handshake_s
-        After so long an endpoint counts as one that sends no handshake.
+        Time after which an endpoint counts as one without a handshake.
 
     Raises
     ------
     BridgeError
-        Nobody answers there in time, or somebody who does not speak ROS-TCP.
+        No server answers in time, or the server is not a ROS-TCP endpoint.
 
     """
 
@@ -91,28 +91,31 @@ class RosTcpClient(RemoteClient):
 
     @property
     def problem(self) -> tuple[str, ...]:
-        """The newest complaints of the endpoint, and those about it."""
+        """Newest error reports of the endpoint, and errors of the connection."""
         return tuple(self._complaints)
 
     @property
     def dropped(self) -> int:
-        """Publications that found no connection, or too slow a one."""
+        """Number of publications without a connection, or over too slow a connection."""
         return self._line.dropped
 
     @property
     def info(self) -> SessionInfo:
-        """What the client does at present."""
+        """Current state of the client."""
         with self._line.lock:
             publishes, mailboxes = self._topics.announced, self._topics.mailboxes
         return SessionInfo(self.name, publishes, mailboxes, self._services.offered)
 
     def topic_types(self) -> dict[str, str]:
-        """Topics of the graph and their types, by name. `GraphError` where no answer comes."""
+        """Returns topics of the graph and their types, by name.
+
+        Raises `GraphError` without an answer.
+        """
         return self._ask(
             lambda found: self._topics.ask_list(
                 ServiceReply(found.set_result, found.set_exception)
             ),
-            f"the endpoint at {self._where} tells no topics",
+            f"the endpoint at {self._where} does not list its topics",
         )
 
     def _type_of(self, topic: str) -> str | None:
@@ -136,7 +139,7 @@ class RosTcpClient(RemoteClient):
             before = self._connections
             try:
                 await self._serve(await dial(*self._address))
-            except (OSError, TimeoutError, UnicodeError) as error:  # or no such name can be
+            except (OSError, TimeoutError, UnicodeError) as error:  # or no such name exists
                 self._why = reason_of(error)
             self._lose(f"the connection to {self._where} is broken")
             if self._closed:
@@ -146,7 +149,7 @@ class RosTcpClient(RemoteClient):
             pause_s = min(2.0 * pause_s, LONGEST_PAUSE_S)
 
     async def _serve(self, sock: socket.socket) -> None:
-        """Take part until the connection ends."""
+        """Runs the protocol until the connection ends."""
         ended: asyncio.Future[None] = self._loop.create_future()
         reasons: list[str] = []
 
@@ -173,11 +176,11 @@ class RosTcpClient(RemoteClient):
             self._line.keep_alive()
             await self._attend(pipe, ended)
         finally:
-            pipe.close(f"{self.name} has left")
+            pipe.close(f"{self.name} is closed")
         self._why = reasons[0]
 
     async def _attend(self, pipe: RosTcpConnection, ended: asyncio.Future[None]) -> None:
-        """Show that we live, until the connection ends."""
+        """Sends keepalives until the connection ends."""
         latest_s = self._loop.time() + self._handshake_s
         while not ended.done():
             await asyncio.wait([ended], timeout=min(KEEPALIVE_S / 2.0, self._handshake_s))
@@ -188,7 +191,7 @@ class RosTcpClient(RemoteClient):
                 self._line.keep_alive()
 
     def _begin(self, generation: Generation, features: frozenset[str]) -> None:
-        """The endpoint can be spoken to: ask for everything."""
+        """Repeats all requests after the endpoint's generation is known."""
         with self._line.lock:
             self._line.begin(generation, features)
             self._topics.repeat_topics()
@@ -203,7 +206,7 @@ class RosTcpClient(RemoteClient):
     # ------------------------------------------------------------------------------------- input
 
     def _take(self, frame: RosTcpFrame) -> None:
-        """Do what a frame asks for. `BridgeError` for a handshake that cannot be understood."""
+        """Handles a frame. Raises `BridgeError` for an invalid handshake."""
         body, self._body = self._body, None
         if frame.destination == "__handshake":
             fields = ros_tcp.read_fields(frame.payload)

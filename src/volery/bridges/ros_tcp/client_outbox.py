@@ -1,6 +1,6 @@
-"""What a client has for the endpoint that it is connected to: commands first, then messages.
+"""Outgoing queue of a client: commands first, then messages.
 
-It outlives connections; between two of them nothing is kept.
+The queue outlives connections; it is empty between two of them.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ _BATCH_PARTS = 128
 
 
 class ClientOutbox:
-    """The way out, for any thread; `wake` tells that there is something to `gather`."""
+    """Queues frames, for any thread; calls `wake` when there is something to `gather`."""
 
     def __init__(self, wake: Wake) -> None:
         self.lock = threading.RLock()
-        """Held by whoever changes what the client wants of the endpoint."""
+        """Held during changes of the client's requests to the endpoint."""
         self.payloads: Payloads = payloads_of("ros1")
-        """How messages become bytes on this connection."""
+        """Encoding of messages on this connection."""
         self.features: frozenset[str] = frozenset()
-        """What the endpoint understands beyond the protocol."""
+        """Extensions of the protocol that the endpoint supports."""
         self.open = False
-        """Whether the endpoint's generation is known, so that it can be spoken to."""
+        """Whether the endpoint's generation is known, so that frames can be sent."""
         self.dropped = 0
-        """Messages that found no connection, or too slow a one."""
+        """Number of messages without a connection, or over too slow a connection."""
         self._wake = wake
         self._woken = False
         self._nul = False
@@ -45,15 +45,15 @@ class ClientOutbox:
         self._message_bytes = 0
 
     def begin(self, generation: Generation, features: frozenset[str]) -> None:
-        """The endpoint speaks this generation of ROS."""
+        """Starts a connection with an endpoint of this generation of ROS."""
         with self.lock:
             self.payloads = payloads_of(generation)
             self.features = features
-            self._nul = generation == "ros2"  # that endpoint cuts off the last byte
+            self._nul = generation == "ros2"  # this endpoint cuts off the last byte
             self.open = True
 
     def lose(self) -> None:
-        """The connection is gone, and what waited for it."""
+        """Ends the connection and drops its queue."""
         with self.lock:
             self.open = False
             self.dropped += len(self._messages)
@@ -62,22 +62,22 @@ class ClientOutbox:
             self._message_bytes = self._command_bytes = 0
 
     def keep_alive(self) -> None:
-        """Show that the client lives."""
+        """Sends a keepalive."""
         self._put(ros_tcp.KEEPALIVE)
 
     def command(self, name: str, body: tuple[str, Bytes] | None = None, **fields: Any) -> None:
-        """Send a command, if the endpoint can be spoken to.
+        """Sends a command, if the connection is ready.
 
         body: destination and payload of the frame that belongs to it.
         """
         with self.lock:
             if self.open:
                 frame = ros_tcp.command(name, nul=self._nul, **fields)
-                # in one write: what came between them would be taken for the body
+                # in one write: a frame between them would count as the body
                 self._put(frame if body is None else frame + ros_tcp.frame(*body))
 
     def message(self, topic: str, payload: Bytes) -> None:
-        """Send a message; of what the network is too slow for, the oldest are dropped."""
+        """Sends a message; over too slow a network the oldest ones are dropped."""
         frame = ros_tcp.frame(topic, payload)
         with self.lock:
             self._messages.append(frame)
@@ -89,11 +89,11 @@ class ClientOutbox:
 
     @property
     def crowded(self) -> bool:
-        """Whether so many commands wait that nothing should be done to cause more."""
+        """Whether so many commands wait that no more should be caused."""
         return self._command_bytes > _MOST_COMMAND_BYTES
 
     def gather(self) -> list[Bytes]:
-        """Whole frames to send next, a bounded number; none if nothing waits."""
+        """Returns whole frames to send next, a bounded number; none if nothing waits."""
         self._woken = False
         parts: list[Bytes] = []
         size = 0

@@ -1,7 +1,7 @@
 """Services that one client of a ROS-TCP endpoint calls and offers.
 
-The protocol knows no failure: an endpoint says `__error`, and ours then responds with zero bytes.
-What an `__error` says of a service is told to whoever called it.
+The protocol has no failure: an endpoint sends `__error`, and Volery's then responds with zero
+bytes. The caller of a service receives the text of an `__error` about it.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Handler
 
 FIRST_REQUEST = 101
-"""As Unity's Connector counts."""
+"""First request number, as in Unity's Connector."""
 _OF_SERVICE = re.compile(r"[Ss]ervice (?:destination )?'([^']+)'(?:: )?(.*)", re.DOTALL)
-"""What endpoints say of a service: ours, and Unity's."""
+"""Form of error texts about a service: Volery's, and Unity's."""
 _TYPE_OF = "/rosapi/service_type"
 
 
@@ -36,7 +36,7 @@ class _Call:
     srvtype: str
     reply: ServiceReply
     why: str = ""
-    """What the endpoint said of the service meanwhile."""
+    """Endpoint's error about the service meanwhile."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class _Offer:
 
 
 class ClientServices:
-    """Open calls, and services on offer, also when there is no connection."""
+    """Open calls and offered services, also without a connection."""
 
     def __init__(self, line: ClientOutbox) -> None:
         self._line = line
@@ -58,14 +58,14 @@ class ClientServices:
         self._connection = 0
 
     def repeat(self) -> None:
-        """Offer everything, on a connection that is new."""
+        """Registers all services on a new connection."""
         self._connection += 1
         self._registered.clear()
         for service, offer in self._offers.items():
             self._announce(service, offer.srvtype)
 
     def lose(self, why: str) -> None:
-        """The connection is gone: open calls fail."""
+        """Fails all open calls after the loss of the connection."""
         with self._line.lock:
             calls, self._calls = self._calls, {}
         for call in calls.values():
@@ -74,7 +74,7 @@ class ClientServices:
     # ------------------------------------------------------------------------------------- calls
 
     def call(self, service: str, request: Any | None, reply: ServiceReply) -> None:
-        """Call a service; without a request rosapi is asked for its type first."""
+        """Calls a service; without a request rosapi is first asked for its type."""
         if request is not None:
             name: str = request.__msgtype__
             self._call(service, name.removesuffix("_Request"), request, reply)
@@ -83,7 +83,7 @@ class ClientServices:
         def ask(answer: Any) -> None:
             try:
                 if not answer.type:
-                    raise GraphError(f"nobody offers service '{service}'")
+                    raise GraphError(f"service '{service}' has no server")
                 srvtype = ros2_name(answer.type, "srv")
                 self._call(service, srvtype, zero_message(f"{srvtype}_Request"), reply)
             except GraphError as error:
@@ -115,12 +115,12 @@ class ClientServices:
             self._calls.pop(number, None)
 
     def take_response(self, number: int, frame: RosTcpFrame) -> None:
-        """Answer a call. `BridgeError` where nobody made it."""
+        """Completes a call. Raises `BridgeError` for an unknown call."""
         with self._line.lock:
             call = self._calls.pop(number, None)
         if call is None:
             raise BridgeError(f"a response to request {number}, which is not open")
-        failure = GraphError(f"service '{call.service}': {call.why or 'it gave no response'}")
+        failure = GraphError(f"service '{call.service}': {call.why or 'it sent no response'}")
         if not frame.payload and call.why:
             call.reply.fail(failure)
             return
@@ -132,9 +132,9 @@ class ClientServices:
         call.reply.answer(response)
 
     def hear_error(self, text: str) -> None:
-        """Tell callers what the endpoint says of their service.
+        """Passes the endpoint's error about a service to its callers.
 
-        An endpoint that tells why in this way, and not with an empty response, will not respond.
+        An endpoint that reports a reason in this way, without an empty response, will not respond.
         """
         found = _OF_SERVICE.search(text)
         if found is None:
@@ -150,36 +150,36 @@ class ClientServices:
     # ------------------------------------------------------------------------------------ offers
 
     def offer(self, service: str, srvtype: str, handler: Handler) -> None:
-        """Offer a service. `GraphError` for an unknown type, or if it is offered already."""
+        """Creates a service. Raises `GraphError` for an unknown type or an existing service."""
         known(f"{srvtype}_Request")
         with self._line.lock:
             if service in self._offers:
-                raise GraphError(f"service '{service}' is offered already")
+                raise GraphError(f"service '{service}' exists already")
             self._offers[service] = _Offer(srvtype, handler)
             self._announce(service, srvtype)
 
     def withdraw(self, service: str, who: str) -> None:
-        """Offer a service no more; its open requests fail."""
+        """Destroys a service; its open requests fail."""
         with self._line.lock:
             offer = self._offers.pop(service, None)
             if offer is None:
-                raise GraphError(f"{who} does not offer service '{service}'")
+                raise GraphError(f"{who} has no service '{service}'")
             if ros_tcp.REMOVE in self._line.features:
                 self._line.command("remove_unity_service", topic=service)
         for reply in tuple(offer.pending):
-            reply.fail(GraphError(f"service '{service}': {who} has left"))
+            reply.fail(GraphError(f"service '{service}': {who} is closed"))
 
     @property
     def offered(self) -> tuple[str, ...]:
-        """Names of the services on offer."""
+        """Names of the offered services."""
         return tuple(self._offers)
 
     def take_request(self, number: int, frame: RosTcpFrame) -> None:
-        """Have a request handled; a handler's mistake is the caller's answer."""
+        """Passes a request to its handler; the caller receives the handler's error."""
         offer = self._offers.get(absolute(frame.destination))
         name, connection = frame.destination, self._connection
         if offer is None:
-            self._respond(connection, number, name, error=f"'{name}' is not offered here")
+            self._respond(connection, number, name, error=f"'{name}' does not exist here")
             return
 
         def answer(message: Any) -> None:
@@ -211,7 +211,7 @@ class ClientServices:
         if error is not None and ros_tcp.RESPONSE_ERROR in self._line.features:
             fields["error"] = error
         with self._line.lock:
-            if connection == self._connection:  # numbers mean nothing on another one
+            if connection == self._connection:  # numbers are invalid on another one
                 self._line.command("response", (name, body), **fields)
 
     def _announce(self, service: str, srvtype: str) -> None:

@@ -1,4 +1,4 @@
-"""Topics of one client of a ROS-TCP endpoint: what it publishes and what it receives."""
+"""Publications and subscriptions of one client of a ROS-TCP endpoint."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from volery.graph.codecs.ros1_names import ros2_name
 from volery.graph.service_reply import ServiceReply
 
 QUEUE_SIZE = 100
-"""Messages of a topic that the endpoint lets wait for whom it passes them on to."""
+"""Messages of a topic that the endpoint queues for its subscribers."""
 
 
 class ClientTopics(RemoteTopics):
-    """What was announced and subscribed to, also when there is no connection.
+    """Advertisements and subscriptions, also without a connection.
 
-    Endpoints that cannot be told so keep an announcement that was taken back, and go on to send
-    what was unsubscribed, which is passed over.
+    Endpoints without removal keep ended advertisements, and continue to send unsubscribed topics,
+    whose messages are ignored.
     """
 
     def __init__(self, line: ClientOutbox) -> None:
@@ -30,14 +30,14 @@ class ClientTopics(RemoteTopics):
         self._listings: list[ServiceReply] = []
 
     def lose(self, why: str) -> None:
-        """The connection is gone: nobody answers any more what was asked."""
+        """Fails open requests after the loss of the connection."""
         with self._line.lock:
             listings, self._listings = self._listings, []
         for reply in listings:
             reply.fail(GraphError(why))
 
     def take(self, frame: RosTcpFrame) -> None:
-        """Hand a message to who wants it. `GraphError` where it is none."""
+        """Passes a message to its queues. Raises `GraphError` if it is invalid."""
         self._deliver(
             frame.destination,
             lambda msgtype: self._line.payloads.decode(frame.payload, msgtype),
@@ -46,7 +46,7 @@ class ClientTopics(RemoteTopics):
     # ------------------------------------------------------------------------------------- lists
 
     def ask_list(self, reply: ServiceReply) -> None:
-        """Ask for topics and their types; the reply gets a dictionary by name."""
+        """Requests topics and their types; the reply receives a dictionary by name."""
         with self._line.lock:
             if self._line.open:
                 self._listings.append(reply)
@@ -55,12 +55,12 @@ class ClientTopics(RemoteTopics):
         reply.fail(GraphError("there is no connection"))
 
     def take_list(self, fields: dict[str, Any]) -> None:
-        """Answer everybody who asked. `BridgeError` where the list is none."""
+        """Answers all requests for the list. Raises `BridgeError` if the list is invalid."""
         try:
             pairs = zip(fields["topics"], fields["types"], strict=True)
             found = {str(topic): ros2_name(msgtype) for topic, msgtype in sorted(pairs)}
         except (KeyError, TypeError, ValueError, GraphError) as error:
-            self.lose(f"the endpoint's list of topics makes no sense: {error}")
+            self.lose(f"the endpoint's list of topics is invalid: {error}")
             raise BridgeError(f"topic_list: {error}") from None
         with self._line.lock:
             listings, self._listings = self._listings, []

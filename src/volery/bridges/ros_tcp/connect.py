@@ -9,14 +9,14 @@ KEEPALIVE_S = 1.0
 """Seconds without a frame after which Unity's Connector sends a keepalive."""
 FIRST_PAUSE_S = 0.2
 LONGEST_PAUSE_S = 5.0
-"""Pauses between two attempts double up to this."""
+"""Largest pause between two attempts; pauses double up to it."""
 _CONNECT_S = 5.0
 _UNANSWERED_MS = 15_000
-"""So long may sent bytes stay unread before the endpoint counts as gone."""
+"""Time for which sent bytes may stay unacknowledged before the endpoint counts as gone, ms."""
 
 
 async def dial(host: str, port: int) -> socket.socket:
-    """A connected socket; `OSError` or `TimeoutError` if nobody answers."""
+    """Returns a connected socket. Raises `OSError` or `TimeoutError` if no server answers."""
     loop = asyncio.get_running_loop()
     (family, *_, address), *_ = await loop.getaddrinfo(host, port, type=socket.SOCK_STREAM)
     sock = socket.socket(family, socket.SOCK_STREAM)

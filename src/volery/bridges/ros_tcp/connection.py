@@ -1,7 +1,7 @@
-"""A connected socket between a frame parser and an outbox, in one event loop.
+"""Connects a socket, a frame parser and an outbox in one event loop.
 
-Bytes are received where they stay and sent from where they are: asyncio's own transports would copy
-each message twice.
+Bytes are received into and sent from their final memory: asyncio's own transports would copy each
+message twice.
 """
 
 from __future__ import annotations
@@ -18,57 +18,57 @@ from volery.core.network_access import tend
 from volery.core.preamble import Preamble
 
 _BATCHES_A_TURN = 16
-"""After so many others have their turn."""
+"""Batches after which others have their turn."""
 _FRAMES_A_TURN = 32
-"""Who sends more at once is read from in small bites, so that a flood delays nobody else."""
+"""Frames beyond which a peer is read in small parts, so that a flood does not delay others."""
 _BITE_BYTES = 2048
 _LARGEST_BITE_BYTES = 256 << 10
-"""One read copies as long as the peer refills the socket: of 16 MB it took a tenth of a second."""
+"""Limit of one read, which copies as long as the peer refills the socket: a read of 16 MB took a
+tenth of a second."""
 _PREAMBLE_BYTES = 16
 _FAREWELL_S = 1.0
 
 
 class Outgoing(Protocol):
-    """Frames that wait to be sent."""
+    """Frames to send."""
 
     @property
     def crowded(self) -> bool:
-        """Whether so much waits that nothing should be done to cause more."""
+        """Whether so many bytes wait that no more should be caused."""
 
     def gather(self) -> list[Bytes]:
-        """Parts of whole frames to send next, a bounded number; none if nothing waits."""
+        """Returns parts of whole frames to send next, a bounded number; none if nothing waits."""
 
 
 class ServerEnd(NamedTuple):
-    """What a server wants to know of the first bytes of a client."""
+    """A server's checks of the first bytes of a client."""
 
     preamble: Preamble
     prove: Callable[[], None]
-    """Called when a valid frame has come."""
+    """Called when a valid frame has arrived."""
     note_stranger: Callable[[str], None]
-    """Called with the protocol of a client that speaks another one."""
+    """Called with the protocol of a client that uses another one."""
 
 
 class Throttle(Protocol):
-    """Tells when to read on from a peer that costs too much; `graph.read_budget.Reading`."""
+    """Limits reading from a peer that costs too much; `graph.read_budget.Reading`."""
 
     def begin(self) -> None:
-        """Decoding begins."""
+        """Starts the measurement of decoding."""
 
     def end(self, frames: int, size: int) -> float:
-        """Decoding is over. Returns what it has cost, in s."""
+        """Ends the measurement of decoding. Returns its cost, s."""
 
     def pause_s(self) -> float:
-        """Returns for how long not to read; 0: read on."""
+        """Returns the time for which not to read, s; 0: read on."""
 
 
 class RosTcpConnection:
-    """Reads frames, hands them to `take`, and sends what the outbox gathers.
+    """Reads frames, passes them to `take`, and sends what the outbox gathers.
 
-    broken: told why nothing that follows can be read; what it puts into the outbox is still sent.
-    closed: told once why the connection has ended.
-    server_end: what a server checks of a new client; None: we are the client.
-    throttle: None where the peer may send as much as it likes.
+    broken: called with the reason why the rest cannot be read; frames that it puts into the outbox
+    are still sent. closed: called once with the reason of the end. server_end: a server's checks of
+    a new client; None for a client. throttle: None for an unlimited peer.
     """
 
     def __init__(
@@ -99,25 +99,25 @@ class RosTcpConnection:
         self._ending = False
         self._open = True
         self.last_received_s = self.last_sent_s = self._loop.time()
-        """Instants of the loop's clock."""
+        """Times of the loop's clock."""
         sock.setblocking(False)
         tend(sock)
         self._loop.add_reader(sock, self._readable)
 
     def flush(self) -> None:
-        """Send what waits as far as the peer takes it."""
+        """Sends queued frames as far as the peer accepts them."""
         if self._open and not self._blocked:
             self._write()
 
     def finish(self) -> None:
-        """Hear no more, send what waits, then close."""
+        """Stops reading, sends queued frames, then closes."""
         if self._open and not self._ending:
             self._ending = True
-            self._loop.call_later(_FAREWELL_S, self.close, "it broke the protocol")
+            self._loop.call_later(_FAREWELL_S, self.close, "it violated the protocol")
             self.flush()
 
     def close(self, reason: str) -> None:
-        """End the connection now; a second time nothing happens."""
+        """Ends the connection now; further calls do nothing."""
         if not self._open:
             return
         self._open = False
@@ -140,10 +140,10 @@ class RosTcpConnection:
             self.close(str(error.strerror))
             return
         if not count:
-            self.close("it has left")
+            self.close("it has disconnected")
             return
         self.last_received_s = self._loop.time()
-        if self._ending:  # what is not read would make the system withdraw our last words
+        if self._ending:  # unread bytes would make the system discard our last frames
             return
         if self._is_stranger(space[:count]):
             return
@@ -161,9 +161,9 @@ class RosTcpConnection:
             self._loop.remove_reader(self._sock)
 
     def _is_stranger(self, data: memoryview) -> bool:
-        """Ends a connection that speaks another protocol; whether it did.
+        """Ends a connection with another protocol; returns whether it did.
 
-        Nothing need be held back: no frame is whole before its first bytes tell.
+        Nothing need be held back: no frame is whole before its first bytes show the protocol.
         """
         if self._unproven is None:
             return False
@@ -172,7 +172,7 @@ class RosTcpConnection:
         if preamble.refused is None:
             return False
         self._unproven.note_stranger(preamble.refused)
-        self.close(f"it speaks {preamble.refused}")
+        self.close(f"it uses {preamble.refused}")
         return True
 
     def _prove(self, has_frames: bool) -> None:
@@ -193,7 +193,7 @@ class RosTcpConnection:
             self._throttle.end(len(frames), size)
 
     def _must_pause(self) -> bool:
-        """Whether not to read on: the peer does not read our answers, or costs too much."""
+        """Returns whether to pause reading: the peer does not read answers, or costs too much."""
         pause_s = 0.0 if self._throttle is None else self._throttle.pause_s()
         if pause_s and self._paused is None:
             self._paused = self._loop.call_later(pause_s, self._pause_over)
@@ -227,7 +227,7 @@ class RosTcpConnection:
             self._loop.add_reader(self._sock, self._readable)
 
     def _idle(self) -> None:
-        """All is sent."""
+        """Handles the empty queue."""
         self._block(False)
         if self._ending:
             with contextlib.suppress(OSError):
@@ -241,7 +241,7 @@ class RosTcpConnection:
         self._blocked = blocked
 
     def _forget(self, sent: int) -> None:
-        """Drop what was sent from the front."""
+        """Removes sent bytes from the front."""
         parts = self._unsent
         gone = 0
         while gone < len(parts) and sent >= len(parts[gone]):

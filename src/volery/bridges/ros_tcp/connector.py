@@ -2,8 +2,8 @@
 
     bridges.open(RosTcpConnector("127.0.0.1", 10000))
 
-It need not be there yet: the bridge connects when it can, and again when the connection is lost. It
-reports both, and what the endpoint complains of.
+The endpoint need not exist yet: the bridge connects when it can, and reconnects after a loss. The
+bridge reports both, and the endpoint's error messages.
 """
 
 from __future__ import annotations
@@ -30,30 +30,29 @@ from volery.graph.subscription_queue import Wake
 _REFRESH_S = 0.5
 _NOTES = 100
 _MOST_REPORTS = 100
-"""Different notes that are reported; an endpoint that complains without end fills no terminal."""
+"""Number of different reports; repeated errors of an endpoint do not fill a terminal."""
 _FIRST_ATTEMPT_S = 1.0
-"""So long does `start` wait for the outcome of the first attempt."""
+"""Time for which `start` waits for the outcome of the first attempt."""
 _SPOKEN = {"ros1": "ROS 1", "ros2": "ROS 2"}
 
 _log = logging.getLogger(__name__)
 
 
 class RosTcpConnector:
-    """A bridge that is a client of somebody else's endpoint.
+    """A bridge that is a client of an external endpoint.
 
     Parameters
     ----------
     host, port
-        Where the endpoint listens.
+        Address of the endpoint.
     publish, subscribe, services
-        Patterns of what takes part; see `Selection`.
+        Patterns of shared names; see `Selection`.
     depth
-        Messages of one topic that wait while the endpoint does not keep up; the newest are kept.
+        Queue depth of each topic for a slow endpoint; the oldest messages are dropped.
     handshake_s
-        Endpoints before 0.7 send no handshake: after so long this one counts as one of ROS 1.
-    report
-        Called in the bridges' thread with a line for people, whenever a connection begins or ends
-        and for each new complaint; without it they are logged.
+        Time without a handshake after which the endpoint counts as ROS 1, before 0.7.
+        Called in the bridges' thread with a line of text, whenever a connection starts or ends
+        and for each new error; without it they are logged.
 
     """
 
@@ -86,7 +85,7 @@ class RosTcpConnector:
 
     @property
     def name(self) -> str:
-        """What it is, where to, and how that goes."""
+        """Name, address and state of the bridge."""
         return f"{self._target} ({self.state})"
 
     @property
@@ -104,11 +103,11 @@ class RosTcpConnector:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the endpoint said, and why connections ended: the newest hundred lines."""
+        """Messages of the endpoint, and reasons of ended connections: the newest hundred lines."""
         return tuple(self._notes)
 
     async def start(self, gateway: Gateway) -> None:
-        """Begin to connect; returns when the outcome is known, after a second at the latest."""
+        """Starts to connect; returns when the outcome is known, after a second at the latest."""
         self._task = asyncio.get_running_loop().create_task(self._stay_connected(gateway))
         try:
             async with asyncio.timeout(_FIRST_ATTEMPT_S):
@@ -117,7 +116,7 @@ class RosTcpConnector:
             return
 
     async def stop(self) -> None:
-        """Disconnect."""
+        """Disconnects."""
         if self._task is not None:
             self._task.cancel()
             await asyncio.gather(self._task, return_exceptions=True)
@@ -130,7 +129,7 @@ class RosTcpConnector:
                 sock = await dial(*self._address)
             except (OSError, TimeoutError) as error:
                 why = os.strerror(error.errno) if error.errno else str(error) or "no answer"
-                self._note(f"cannot connect: {why}; it connects when an endpoint is there")
+                self._note(f"cannot connect: {why}; retrying until an endpoint answers")
                 self._is_known.set()
             else:
                 began_s = asyncio.get_running_loop().time()
@@ -141,7 +140,7 @@ class RosTcpConnector:
             pause_s = min(2.0 * pause_s, LONGEST_PAUSE_S)
 
     async def _serve(self, gateway: Gateway, sock: socket.socket) -> bool:
-        """Play Unity's part until the connection ends; whether it ever began in earnest."""
+        """Acts as a Unity client until the connection ends; returns whether the protocol began."""
         host, port = self._address
         note = self._note
         open_session = partial(
@@ -169,14 +168,14 @@ class RosTcpConnector:
         return connection.session.generation is not None
 
     def _begun(self, generation: Generation) -> None:
-        """The endpoint has said what it speaks, or is taken for one that does not say it."""
+        """Reports the connection after the handshake, or after the time for it."""
         again = " again" if self._was_lost else ""
         self._report(f"{self._target}: connected{again}, messages of {_SPOKEN[generation]}")
         self._reported.clear()
         self._is_known.set()
 
     def _note(self, text: str) -> None:
-        """Keep a line, and report it the first time in a connection or between two."""
+        """Stores a line, and reports it once per connection."""
         if not self._notes or self._notes[-1] != text:
             self._notes.append(text)
         if text not in self._reported and len(self._reported) < _MOST_REPORTS:
@@ -208,7 +207,7 @@ class _Connection:
             raise
 
     async def attend(self, handshake_s: float) -> None:
-        """Register what is new and show that we live, until the connection ends."""
+        """Registers new names and sends keepalives, until the connection ends."""
         latest_s = self._loop.time() + handshake_s
         self.pipe.flush()
         while not self.ended.done():
@@ -217,7 +216,7 @@ class _Connection:
             if self.session.generation is not None:
                 self.session.refresh()
             elif now_s >= latest_s:
-                self._note("no handshake: taken for an endpoint of ROS 1 before version 0.7")
+                self._note("no handshake: assuming an endpoint of ROS 1 before version 0.7")
                 self.session.begin("ros1")
             if now_s >= self.pipe.last_sent_s + KEEPALIVE_S and not self.session.outbox.crowded:
                 self.session.outbox.put(ros_tcp.KEEPALIVE)

@@ -1,9 +1,9 @@
-"""A ROS-TCP endpoint: the server that Unity's ROS-TCP-Connector connects to.
+"""A ROS-TCP endpoint: the server for Unity's ROS-TCP-Connector.
 
-    bridges.open(RosTcpEndpoint(port=10000))                      # messages of ROS 1
+    bridges.open(RosTcpEndpoint(port=10000))       # messages of ROS 1
     bridges.open(RosTcpEndpoint(port=10001, generation="ros2"))
 
-Any number of clients, each with a session of its own in the graph.
+It serves any number of clients, each with its own session in the graph.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from volery.graph.session import Gateway
 from volery.graph.subscription_queue import Wake
 
 SILENCE_S = 15.0
-"""Fifteen keepalives of Unity's Connector."""
+"""Time of fifteen keepalives of Unity's Connector."""
 _CHECKS_A_SILENCE = 4
 _RETRY_S = 0.1
 
@@ -43,19 +43,19 @@ class RosTcpEndpoint:
     Parameters
     ----------
     host, port
-        Where to listen; port 0 takes a free one, and `port` tells which.
+        Listening address; port 0 takes a free port, see `port`.
     generation
-        What payloads are: "ros1" or "ros2". The handshake tells the clients.
+        Encoding of payloads: "ros1" or "ros2". The handshake tells the clients.
     anywhere
-        Consent to a `host` beyond loopback: the protocol carries no password.
+        Allows a `host` beyond loopback: the protocol carries no password.
     most_payload_bytes
-        A client that announces a longer payload is let go.
+        A client that announces a longer payload is disconnected.
     depth
-        Messages of one topic that wait for a client who does not keep up; the newest are kept.
+        Queue depth of each topic for a slow client; the oldest messages are dropped.
     silence_s
-        A client that has ever sent a keepalive, and then nothing for so long, counts as gone.
+        Timeout of a client that has ever sent a keepalive.
     most_clients
-        Clients at once.
+        Largest number of clients.
 
     """
 
@@ -86,14 +86,14 @@ class RosTcpEndpoint:
 
     @property
     def name(self) -> str:
-        """What it is and where."""
+        """Name and address of the bridge."""
         return f"ROS-TCP {self._host}:{self.port} ({self._generation})"
 
     async def start(self, gateway: Gateway) -> None:
-        """Listen. `BridgeError` where the port is in use or the host is not ours."""
+        """Starts listening. Raises `BridgeError` if the port is in use or the host is not local."""
         loop = asyncio.get_running_loop()
         if self._generation == "ros1":
-            ros1_codec()  # which takes a while to load: not when the first client comes
+            ros1_codec()  # slow to load: not when the first client connects
         greeting = ros_tcp.handshake(self._generation, FEATURES)
         self._listener = _listen(self._host, self.port, greeting)
         self.port = self._listener.getsockname()[1]
@@ -103,7 +103,7 @@ class RosTcpEndpoint:
         ]
 
     async def stop(self) -> None:
-        """Let all clients go."""
+        """Disconnects all clients."""
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -133,14 +133,14 @@ class RosTcpEndpoint:
                 _Client(sock, parser, open_session, self._clients, listener)
 
     async def _watch(self) -> None:
-        """Let those go who fell silent."""
+        """Disconnects silent clients."""
         loop = asyncio.get_running_loop()
         while True:
             await asyncio.sleep(self._silence_s / _CHECKS_A_SILENCE)
             latest = loop.time() - self._silence_s
             for client in tuple(self._clients):
                 if client.pipe.parser.keepalives and client.pipe.last_received_s < latest:
-                    client.pipe.close("it fell silent")
+                    client.pipe.close("it timed out")
 
 
 class _Client:

@@ -1,4 +1,4 @@
-"""Messages of one topic on their way from a peer into the graph: a bounded queue."""
+"""Bounded queue for one topic's messages from a peer to the graph."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class IncomingQueue:
         self.dropped = 0
 
     def put(self, message: Any) -> None:
-        """Publish a message, or let it wait in the place of the oldest one."""
+        """Publishes a message, or queues it in the place of the oldest one."""
         with self._lock:
             if self._under_way >= self._depth:
                 self.dropped += len(self._waiting) == self._depth
@@ -34,7 +34,7 @@ class IncomingQueue:
 
     def _publish(self, message: Any) -> None:
         self._session.publish(self.topic, message)
-        self._session.post(self._arrived)  # posts are done in order: the message is there by then
+        self._session.post(self._arrived)  # posts run in order: the message is published by then
 
     def _arrived(self) -> None:
         with self._lock:

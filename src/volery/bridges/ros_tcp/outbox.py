@@ -1,6 +1,6 @@
-"""What waits to be sent to one peer: commands first, then messages in the order of arrival.
+"""Outgoing queue for one peer: commands first, then messages in the order of arrival.
 
-Messages stay in their bounded mailboxes until the socket takes them, so that a peer who does not
+Messages stay in their bounded queues until the socket accepts them, so that a peer that does not
 read loses messages and costs no memory.
 """
 
@@ -22,7 +22,7 @@ from volery.graph.subscription_queue import SubscriptionQueue, Wake
 
 _BATCH_BYTES = 64 << 10
 _BATCH_PARTS = 128
-"""At most so many parts a system call; Linux takes 1024."""
+"""Parts per system call; Linux accepts 1024."""
 _MOST_WAITING_BYTES = 1 << 20
 
 
@@ -33,7 +33,7 @@ class _Stream:
         self.destination = destination
         self.mailbox: SubscriptionQueue | None = None
         self.queued = False
-        """Whether its turn is planned."""
+        """Whether its turn is scheduled."""
 
     @property
     def next_number(self) -> int | None:
@@ -42,9 +42,9 @@ class _Stream:
 
 
 class RosTcpOutbox:
-    """Frames for one peer. `put` and mailboxes may be filled by any thread.
+    """Frames for one peer. Any thread may call `put` and fill the queues.
 
-    wake: called, by any thread, when there is something to gather after there was nothing.
+    wake: called, in any thread, when there is something to gather after there was nothing.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class RosTcpOutbox:
     ) -> None:
         self._session = session
         self.payloads = payloads
-        """How messages become bytes; an endpoint's handshake may change it."""
+        """Encoding of messages; an endpoint's handshake may change it."""
         self.ends_in_nul = False
         """Whether the peer expects its commands to end in a NUL."""
         self._wake = wake
@@ -69,7 +69,7 @@ class RosTcpOutbox:
         self._woken = False
 
     def put(self, frame: bytes) -> None:
-        """Add a command, with its body if it has one; it goes before all messages."""
+        """Adds a command, with its body if it has one, before all messages."""
         with self._lock:
             self._commands.append(frame)
             self._command_bytes += len(frame)
@@ -77,7 +77,7 @@ class RosTcpOutbox:
 
     @property
     def crowded(self) -> bool:
-        """Whether so many commands wait that nothing should be done to cause more."""
+        """Whether so many commands wait that no more should be caused."""
         return self._command_bytes > _MOST_WAITING_BYTES
 
     def stream(
@@ -89,10 +89,10 @@ class RosTcpOutbox:
         *,
         reliable: bool = False,
     ) -> None:
-        """Send messages of `topic` as frames to `destination` from now on.
+        """Sends messages of `topic` as frames to `destination` from now on.
 
-        A second time it begins anew: latched messages come again, as ROS-TCP-Endpoint does it.
-        `GraphError` for a wrong name or type.
+        A second call restarts the stream: latched messages are sent again, as by ROS-TCP-Endpoint.
+        Raises `GraphError` for a wrong name or type.
         """
         stream = _Stream(destination)
 
@@ -105,10 +105,10 @@ class RosTcpOutbox:
         self.end_stream(destination)
         stream.mailbox = mailbox
         self._streams[destination] = stream
-        stir()  # what was latched came before the mailbox was known
+        stir()  # latched messages arrived before the queue was known
 
     def end_stream(self, destination: str) -> bool:
-        """Send no more of it; whether it was sent."""
+        """Ends a stream; returns whether there was one."""
         stream = self._streams.pop(destination, None)
         if stream is None or stream.mailbox is None:
             return False
@@ -118,11 +118,11 @@ class RosTcpOutbox:
 
     @property
     def streams(self) -> int:
-        """How many topics are sent."""
+        """Number of streams."""
         return len(self._streams)
 
     def gather(self) -> list[Bytes]:
-        """Parts of whole frames to send next, a bounded number; none if nothing waits."""
+        """Returns parts of whole frames to send next, a bounded number; none if nothing waits."""
         self._woken = False
         parts: list[Bytes] = []
         size = 0
@@ -133,7 +133,7 @@ class RosTcpOutbox:
                 size += len(frame)
                 continue
             stream = self._next_stream()
-            if stream is None and self._commands:  # a topic that ended has been told of
+            if stream is None and self._commands:  # notices of an ended topic
                 continue
             if stream is None:
                 break
@@ -149,7 +149,7 @@ class RosTcpOutbox:
             return frame
 
     def _next_stream(self) -> _Stream | None:
-        """The topic whose next message came before those of all others."""
+        """Returns the topic with the oldest next message."""
         while self._ready:
             self._plan(self._ready.popleft())
         while self._turns:
@@ -157,11 +157,11 @@ class RosTcpOutbox:
             stream.queued = False
             if stream.next_number == number:
                 return stream
-            self._plan(stream)  # its oldest messages had to go
+            self._plan(stream)  # its oldest messages were dropped
         return None
 
     def _plan(self, stream: _Stream) -> None:
-        """Give a topic its turn, or end it where it has lost what it must not."""
+        """Schedules a topic, or ends it if it has lost messages of a reliable subscription."""
         if stream.mailbox is not None and stream.mailbox.failure is not None:
             failure = stream.mailbox.failure
             self.end_stream(stream.destination)
@@ -173,7 +173,7 @@ class RosTcpOutbox:
             heapq.heappush(self._turns, (number, next(self._numbers), stream))
 
     def _add_message(self, stream: _Stream, parts: list[Bytes]) -> int:
-        """Add a topic's next message; returns its bytes."""
+        """Adds a topic's next message; returns its bytes."""
         taken = [] if stream.mailbox is None else stream.mailbox.take(1)
         self._plan(stream)
         if not taken:

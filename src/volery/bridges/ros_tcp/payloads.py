@@ -1,4 +1,4 @@
-"""What ROS-TCP frames carry: messages of ROS 1 or ROS 2, and names as Unity spells them."""
+"""Encodes messages of ROS 1 or ROS 2 in ROS-TCP frames, with names in Unity's spelling."""
 
 from __future__ import annotations
 
@@ -18,113 +18,131 @@ _CDR_HEADER_BYTES = 4
 
 
 class Payloads(Protocol):
-    """How messages become bytes and come back."""
+    """Encodes and decodes messages."""
 
     def published(self, published: Published) -> list[Bytes]:
-        """Bytes of a message of the graph, in parts; `GraphError` as `encode`."""
+        """Returns the bytes of a message of the graph, in parts.
+
+        Raises `GraphError` as `encode`.
+        """
 
     def encode(self, message: Any, msgtype: str) -> bytes:
-        """Bytes of a message; `GraphError` where it cannot be said in this generation."""
+        """Returns the bytes of a message.
+
+        Raises `GraphError` if this generation cannot encode it.
+        """
 
     def decode(self, data: Bytes, msgtype: str) -> Any:
-        """The message; `GraphError` where the bytes are none."""
+        """Returns the message. Raises `GraphError` for invalid bytes."""
 
     def learn(self, msgtype: str) -> None:
-        """Prepare for a type, some milliseconds, that its first message need not wait."""
+        """Prepares for a type, some milliseconds, so that its first message need not wait."""
 
     def short(self, msgtype: str) -> str:
-        """Name of a type as Unity writes it: `std_msgs/String`, `std_srvs/SetBool`."""
+        """Returns Unity's name of a type: `std_msgs/String`, `std_srvs/SetBool`."""
 
 
 class Ros1Payloads:
     """Plain ROS 1 serialization.
 
-    limited: messages come from clients, and may become no more objects than `object_count` allows.
+    limited: messages are from clients, and their number of objects is limited by `object_count`.
     """
 
     def __init__(self, *, limited: bool = False) -> None:
         self._limited = limited
 
     def published(self, published: Published) -> list[Bytes]:
-        """Bytes of a message of the graph, in parts; `GraphError` as `encode`."""
+        """Returns the bytes of a message of the graph, in parts.
+
+        Raises `GraphError` as `encode`.
+        """
         return parts_of(published, self.encode) or [published.ros1]
 
     def encode(self, message: Any, msgtype: str) -> bytes:
-        """Bytes of a message; `GraphError` where it does not fit its type."""
+        """Returns the bytes of a message. Raises `GraphError` if it does not fit its type."""
         return ros1_codec().encode(message, msgtype)
 
     def decode(self, data: Bytes, msgtype: str) -> Any:
-        """The message; `GraphError` where the bytes are none."""
+        """Returns the message. Raises `GraphError` for invalid bytes."""
         if self._limited:
             check_objects(data, msgtype, ROS1)
         return ros1_codec().decode(data, msgtype)
 
     def learn(self, msgtype: str) -> None:
-        """Prepare for a type, some milliseconds, that its first message need not wait."""
+        """Prepares for a type, some milliseconds, so that its first message need not wait."""
         ros1_codec().learn(msgtype)
 
     def short(self, msgtype: str) -> str:
-        """Name of a type as Unity writes it."""
+        """Returns Unity's name of a type."""
         return ros1_name(msgtype)
 
 
 class Ros2Payloads:
-    """CDR with its header of four bytes; `limited` as of `Ros1Payloads`."""
+    """CDR with its header of four bytes; `limited` as in `Ros1Payloads`."""
 
     def __init__(self, *, limited: bool = False) -> None:
         self._limited = limited
 
     def published(self, published: Published) -> list[Bytes]:
-        """Bytes of a message of the graph, in parts; `GraphError` as `encode`."""
+        """Returns the bytes of a message of the graph, in parts.
+
+        Raises `GraphError` as `encode`.
+        """
         try:
             return parts_of(published, self.encode) or [published.cdr]
         except (*CODING_ERRORS, AssertionError) as error:
             raise GraphError(f"the message does not fit {published.msgtype}: {error}") from None
 
     def encode(self, message: Any, msgtype: str) -> bytes:
-        """Bytes of a message; `GraphError` where it does not fit its type."""
+        """Returns the bytes of a message. Raises `GraphError` if it does not fit its type."""
         return encode_cdr(message, msgtype)
 
     def decode(self, data: Bytes, msgtype: str) -> Any:
-        """The message; `GraphError` where the bytes are none."""
+        """Returns the message. Raises `GraphError` for invalid bytes."""
         if len(data) == _CDR_HEADER_BYTES and not _has_fields(msgtype):
-            data = bytes(data) + b"\0"  # Unity leaves out the byte that stands for nothing
+            data = bytes(data) + b"\0"  # Unity leaves out the byte of an empty message
         if self._limited:
             check_objects(data, msgtype, CDR)
         return decode_cdr(data, msgtype)
 
     def learn(self, msgtype: str) -> None:
-        """Prepare for a type, some milliseconds, that its first message need not wait."""
+        """Prepares for a type, some milliseconds, so that its first message need not wait."""
         typestore().get_msgdef(msgtype)
 
     def short(self, msgtype: str) -> str:
-        """Name of a type as Unity writes it."""
+        """Returns Unity's name of a type."""
         package, _, plain = msgtype.split("/")
         return f"{package}/{plain}"
 
 
 def payloads_of(generation: Generation, *, limited: bool = False) -> Payloads:
-    """The payloads of a generation of ROS; `BridgeError` if there is none of that name.
+    """Returns the payloads of a generation of ROS. Raises `BridgeError` for an unknown name.
 
-    limited: messages come from clients, and are refused where decoding would take too long.
+    limited: messages are from clients, and are refused if decoding would take too long.
     """
     if generation not in _KINDS:
-        raise BridgeError(f"generation is 'ros1' or 'ros2', not '{generation}'")
+        raise BridgeError(f"generation must be 'ros1' or 'ros2', not '{generation}'")
     return _KINDS[generation](limited=limited)
 
 
 def topic_type(name: str) -> str:
-    """`std_msgs/msg/String` of Unity's `std_msgs/String`. `GraphError` if there is none such."""
+    """Returns `std_msgs/msg/String` for Unity's `std_msgs/String`.
+
+    Raises `GraphError` if unknown.
+    """
     return _known(ros2_name(name, "msg"), "")
 
 
 def service_type(name: str) -> str:
-    """`std_srvs/srv/SetBool` of Unity's `std_srvs/SetBool`. `GraphError` if there is none such."""
+    """Returns `std_srvs/srv/SetBool` for Unity's `std_srvs/SetBool`.
+
+    Raises `GraphError` if unknown.
+    """
     return _known(ros2_name(name, "srv"), "_Request")
 
 
 def absolute(name: str) -> str:
-    """A name as the graph knows it: Unity projects write `cmd_vel` and mean `/cmd_vel`."""
+    """Returns a name in the graph: `cmd_vel` in Unity projects means `/cmd_vel`."""
     return name if name.startswith("/") else f"/{name}"
 
 

@@ -1,8 +1,7 @@
-"""What one client of our ROS-TCP endpoint says, and what it is answered; without a socket.
+"""Protocol of one client of Volery's ROS-TCP endpoint, without a socket.
 
-Whatever a client does wrong is told to it with `__error` and harms nobody else.
-A service that fails, or that nobody offers, is answered with `__error`, and with the empty response
-that `calls` explains.
+The client receives each of its errors as `__error`; other clients are not affected. A service that
+fails, or that has no server, is answered with `__error`, and with the empty response of `calls`.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ MOST_DEPTH = 1000
 MOST_REGISTRATIONS = 10_000
 """Topics and services of one client."""
 _FIRST_REQUEST = 1001
-"""As ROS-TCP-Endpoint counts."""
+"""First request number, as in ROS-TCP-Endpoint."""
 
 FEATURES = (ros_tcp.QUEUE_SIZE, ros_tcp.REMOVE, ros_tcp.RESPONSE_ERROR)
 
@@ -42,7 +41,7 @@ Body = Callable[[RosTcpFrame], None]
 
 
 class EndpointSession:
-    """One client's part in the graph. `take` and `close` belong to the bridge's thread."""
+    """One client's session of the graph. `take` and `close` belong to the bridge's thread."""
 
     def __init__(
         self,
@@ -78,11 +77,11 @@ class EndpointSession:
 
     @property
     def reading(self) -> Reading:
-        """What the client is charged for, and when to read on from it."""
+        """Account of reading from the client, which limits its rate."""
         return self._session.reading
 
     def take(self, frame: RosTcpFrame) -> None:
-        """Do what a frame asks for."""
+        """Handles a frame."""
         body, self._body = self._body, None
         try:
             if frame.destination.startswith("__"):
@@ -97,11 +96,11 @@ class EndpointSession:
             self.complain(f"{frame.destination[:200]}: {error}")
 
     def complain(self, text: str) -> None:
-        """Tell the client that something is wrong; by any thread."""
+        """Sends an error to the client; any thread may call it."""
         self.outbox.put(ros_tcp.command("error", text=text))
 
     def close(self) -> None:
-        """Take everything back that the client registered."""
+        """Releases everything that the client registered."""
         self._session.close()
 
     # ------------------------------------------------------------------------------------ topics
@@ -151,7 +150,7 @@ class EndpointSession:
         names, types = [t.name for t in topics], [self._payloads.short(t.msgtype) for t in topics]
         self.outbox.put(ros_tcp.command("topic_list", topics=names, types=types))
 
-    # ---------------------------------------------------------- services that the client calls
+    # ------------------------------------------------------------ services that the client calls
 
     def _ros_service(self, fields: Fields) -> None:
         name, srvtype = _name_in(fields), service_type(text_field(fields, "message_name"))
@@ -170,12 +169,12 @@ class EndpointSession:
         self._calls.call(number, frame, self._called.get(frame.destination))
 
     def _lack_body(self, what: str, number: int) -> None:
-        """Unity's queues may drop a body behind its header."""
+        """Handles a missing body, which Unity's queues may drop behind its header."""
         self.complain(f"__{what} {number} came without its body")
         if what == "request":
             self._calls.respond(number, "/", b"")
 
-    # ---------------------------------------------------------- services that the client offers
+    # ----------------------------------------------------------- services that the client offers
 
     def _unity_service(self, fields: Fields) -> None:
         name, srvtype = _name_in(fields), service_type(text_field(fields, "message_name"))
@@ -200,7 +199,7 @@ class EndpointSession:
     def _remove_unity_service(self, fields: Fields) -> None:
         name = text_field(fields, "topic")
         if name not in self._offered:
-            raise BridgeError(f"service '{name}' was not offered")
+            raise BridgeError(f"service '{name}' does not exist")
         self._offered.discard(name)
         self._session.withdraw(absolute(name))
 
@@ -209,7 +208,7 @@ class EndpointSession:
         self._body = ("response", number, lambda frame: self._answer(number, frame, error))
 
     def _answer(self, number: int, frame: RosTcpFrame, error: Any) -> None:
-        """Hand the client's response to whoever called its service."""
+        """Passes the client's response to the caller of its service."""
         reply, srvtype = self._requests.pop(number)
         if error is not None:
             reply.fail(GraphError(str(error)))
@@ -217,7 +216,7 @@ class EndpointSession:
         try:
             response = self._payloads.decode(frame.payload, f"{srvtype}_Response")
         except GraphError as broken:
-            reply.fail(GraphError(f"the service's answer is broken: {broken}"))
+            reply.fail(GraphError(f"the service's response is invalid: {broken}"))
             raise
         reply.answer(response)
 
@@ -227,21 +226,21 @@ class EndpointSession:
 
 
 def _depth(fields: Fields, default: int) -> int:
-    """Messages that may wait, by the client's `queue_size`; in ROS a queue of 0 loses nothing."""
+    """Returns the depth of a client's `queue_size`; in ROS a queue of 0 loses nothing."""
     depth = number_field({"queue_size": default, **fields}, "queue_size")
     return min(max(depth, 1), MOST_DEPTH) if depth else MOST_DEPTH
 
 
 def _name_in(fields: Fields) -> str:
-    """Name of the topic or service to register."""
+    """Returns the name of the topic or service to register."""
     name = text_field(fields, "topic")
     if name.startswith("__"):
-        raise BridgeError(f"'{name[:200]}' would be taken for a command")
+        raise BridgeError(f"'{name[:200]}' is reserved for commands")
     return name
 
 
 class _Requests:
-    """Requests that the client has not answered yet; added to by the simulation's thread."""
+    """Requests that the client has not answered yet; the simulation's thread adds to them."""
 
     def __init__(self) -> None:
         self._open: dict[int, tuple[ServiceReply, str]] = {}

@@ -1,8 +1,8 @@
-"""The part that Unity plays in a ROS-TCP connection, played by the simulation; without a socket.
+"""Unity's side of a ROS-TCP connection, run by the simulation; without a socket.
 
-It registers itself as publisher of the graph's topics, as subscriber of those by which it is
-commanded, and as server of the graph's services. What is received is never sent back: a topic goes
-one way. `__remove_*` is never sent, since Unity's endpoint closes the connection on it.
+The session registers as publisher of the graph's topics, as subscriber of command topics, and as
+server of the graph's services. Received messages are never sent back: a topic has one direction.
+`__remove_*` is never sent, since Unity's endpoint closes the connection on it.
 """
 
 from __future__ import annotations
@@ -24,30 +24,30 @@ from volery.graph.session import Gateway
 from volery.graph.subscription_queue import Wake
 
 _REFUSED = re.compile(r"Not registered to publish topic '([^']+)'")
-"""What endpoints say to each message whose type they do not know."""
+"""Endpoints' error for each message of an unknown type."""
 _UNKNOWN = re.compile(r"Unknown (?:message|service) class '([^']+)'")
-"""What they say to the registration of a type of which they have no package."""
+"""Endpoints' error for the registration of a type without an installed package."""
 _MOST_NAMED = 5
 _NOTES = ("__error", "__warn", "__log")
 
 
 @dataclass(frozen=True)
 class Selection:
-    """What takes part, as patterns in which `*` stands for anything, slashes too."""
+    """Shared names, as patterns in which `*` matches anything, slashes too."""
 
     publish: tuple[str, ...] = ("*",)
-    """Topics with publishers here that the other side shall get."""
+    """Topics with publishers here that are sent to the endpoint."""
     subscribe: tuple[str, ...] = ("/uav*/cmd_vel", "/uav*/trajectory", "/uav*/goal_pose")
-    """Topics with subscribers here that the other side may publish; these are not sent."""
+    """Topics with subscribers here that the endpoint may publish; these are not sent."""
     services: tuple[str, ...] = ("*",)
-    """Services here that the other side may call."""
+    """Services here that the endpoint may call."""
 
     def receives(self, topic: TopicInfo) -> bool:
-        """Whether a topic comes from the other side."""
+        """Returns whether a topic is received from the endpoint."""
         return topic.subscribers > 0 and _matches(topic.name, self.subscribe)
 
     def sends(self, topic: TopicInfo) -> bool:
-        """Whether a topic goes to the other side."""
+        """Returns whether a topic is sent to the endpoint."""
         return (
             topic.publishers > 0
             and not _matches(topic.name, self.subscribe)
@@ -56,10 +56,10 @@ class Selection:
 
 
 class UnitySession:
-    """One connection to an endpoint. All but the wake belongs to the bridge's thread.
+    """One connection to an endpoint. All methods but the wake belong to the bridge's thread.
 
-    note: called, by any thread, with what the other side complains of and with what is not sent.
-    begun: called once it is known which messages the endpoint speaks.
+    note: called, in any thread, with the endpoint's errors and with what is not sent. begun: called
+    once the endpoint's generation is known.
     """
 
     def __init__(
@@ -83,25 +83,25 @@ class UnitySession:
         self._sent: set[str] = set()
         self._served: dict[str, str] = {}
         self._registered: dict[str, list[str]] = {}
-        """Topics and services by their types, as the endpoint spells those."""
+        """Topics and services by their types, in the endpoint's spelling."""
         self._unknown: set[str] = set()
-        """Types that the endpoint does not know."""
+        """Types that the endpoint lacks."""
         self._request: int | None = None
         self.generation: Generation | None = None
-        """What the endpoint speaks; None before its handshake."""
+        """Generation of the endpoint; None before its handshake."""
         self.outbox.put(ros_tcp.KEEPALIVE)
 
     def begin(self, generation: Generation) -> None:
-        """Register everything, now that the generation is known."""
+        """Registers everything, once the generation is known."""
         self.generation = generation
         self.outbox.payloads = payloads_of(generation)
-        self.outbox.ends_in_nul = generation == "ros2"  # that endpoint cuts off the last byte
+        self.outbox.ends_in_nul = generation == "ros2"  # this endpoint cuts off the last byte
         if self._begun is not None:
             self._begun(generation)
         self.refresh()
 
     def refresh(self) -> None:
-        """Register topics and services that are new."""
+        """Registers new topics and services."""
         if self.generation is None:
             return
         for topic, register in self._new_topics():
@@ -115,7 +115,7 @@ class UnitySession:
                 self._register("unity_service", name, srvtype)
 
     def _new_topics(self) -> list[tuple[TopicInfo, Callable[[TopicInfo], None]]]:
-        """Topics not registered yet, and what does that.
+        """Returns unregistered topics and their registration functions.
 
         All their types are learnt before the first one is registered: it is sent from then on, and
         its messages should not wait.
@@ -136,7 +136,7 @@ class UnitySession:
         return new
 
     def take(self, frame: RosTcpFrame) -> None:
-        """Do what a frame asks for. `BridgeError` for a handshake that cannot be understood."""
+        """Handles a frame. Raises `BridgeError` for an invalid handshake."""
         number, self._request = self._request, None
         if frame.destination == "__handshake":
             if self.generation is None:
@@ -148,7 +148,7 @@ class UnitySession:
             elif frame.destination in _NOTES:
                 self._hear(str(ros_tcp.read_fields(frame.payload).get("text", "")))
             elif frame.destination.startswith("__"):
-                return  # an answer that was not asked for
+                return  # an answer to no request
             elif number is not None:
                 self._calls.call(number, frame)
             else:
@@ -157,22 +157,22 @@ class UnitySession:
             self._note(f"{frame.destination[:200]}: {error}")
 
     def close(self) -> None:
-        """Leave the graph."""
+        """Leaves the graph."""
         self._session.close()
 
     def _hear(self, text: str) -> None:
-        """Keep what the endpoint says, and send no more of what it cannot take."""
+        """Stores the endpoint's message, and stops sending what the endpoint refuses."""
         unknown, refused = _UNKNOWN.search(text), _REFUSED.search(text)
         if unknown is not None and unknown[1] in self._registered:
             self._leave_out(unknown[1])
         elif refused is not None and refused[1] in self._sent:
             if self.outbox.end_stream(refused[1]):
-                self._note(f"'{refused[1]}' is not sent any more: {text[:200]}")
+                self._note(f"'{refused[1]}' is no longer sent: {text[:200]}")
         else:
             self._note(text[:1000])
 
     def _leave_out(self, msgtype: str) -> None:
-        """Send nothing of a type that the endpoint does not know, and say what that concerns."""
+        """Stops sending a type that the endpoint lacks, and reports its topics and services."""
         if msgtype in self._unknown:
             return
         self._unknown.add(msgtype)
@@ -182,7 +182,7 @@ class UnitySession:
         more = len(names) - _MOST_NAMED
         listed = ", ".join(names[:_MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
         self._note(
-            f"the endpoint does not know {msgtype}, which {listed} need: not shared; install "
+            f"the endpoint lacks {msgtype}, which {listed} need: not shared; install "
             f"the package {msgtype.partition('/')[0]} where the endpoint runs"
         )
 
@@ -207,10 +207,10 @@ class UnitySession:
             self.outbox.stream(topic.name, topic.name, topic.msgtype, self._depth)
 
     def _register(self, command: str, name: str, msgtype: str, **fields: str | int) -> bool:
-        """Tell the endpoint of a topic or service; false where it is known not to have the type."""
+        """Registers a topic or service; returns False if the endpoint is known to lack the type."""
         short = self._short(msgtype)
         if short in self._unknown:
-            self._note(f"'{name}' is not shared: the endpoint does not know {short}")
+            self._note(f"'{name}' is not shared: the endpoint lacks {short}")
             return False
         self._registered.setdefault(short, []).append(name)
         self._command(command, topic=name, message_name=short, **fields)

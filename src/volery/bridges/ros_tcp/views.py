@@ -1,8 +1,8 @@
-"""Images, clouds and grids as bytes, without a copy of what is large in them.
+"""Returns images, clouds and grids as bytes, without a copy of their large field.
 
 Serialization copies a message at least once, which for megabytes takes longer than the socket. In
-both generations of ROS a message whose last field, but for a bool perhaps, is a sequence of bytes
-consists of a small front, a count, those bytes as they are, and the bool.
+both generations of ROS a message whose last field, except for a bool perhaps, is a sequence of
+bytes consists of a small front, a count, those bytes unchanged, and the bool.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.messages import Published, typestore
 
 LARGE_BYTES = 16 << 10
-"""Below this a copy costs less than taking a message apart."""
+"""Size below which a copy costs less than splitting a message."""
 
 _COUNT = Struct("<I")
 _ELEMENTS = {"uint8": np.dtype(np.uint8), "int8": np.dtype(np.int8)}
 
 
 def parts_of(published: Published, encode: Callable[[Any, str], bytes]) -> list[Bytes] | None:
-    """Parts of a message's bytes; None where there is nothing large in it to be left in place.
+    """Returns the parts of a message's bytes; None if it has no large field.
 
-    encode: gives the bytes of a whole message, in either generation.
+    encode: returns the bytes of a whole message, in either generation.
     """
     plan = _plan(published.msgtype)
     if plan is None:
@@ -58,7 +58,7 @@ def _can_stay(large: Any, element: np.dtype[Any]) -> bool:
 
 @cache
 def _plan(msgtype: str) -> tuple[str, np.dtype[Any], int] | None:
-    """Large field, type of its elements, bytes behind it; None if the type is not such a one."""
+    """Returns the large field, type of its elements, bytes after it; None for other types."""
     fields = typestore().fielddefs[msgtype][1]
     tail_bytes = 0
     if len(fields) > 1 and fields[-1][1] == (Nodetype.BASE, ("bool", 0)):

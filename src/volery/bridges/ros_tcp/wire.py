@@ -2,9 +2,9 @@
 
 A frame is `u32le length | destination, UTF-8 | u32le length | payload`, without magic or checksum.
 The destination is a topic, a service, or a command `__name` whose payload is JSON. Eight zero
-bytes, an empty frame, only say that the sender lives.
+bytes, an empty frame, are a keepalive.
 
-ROS 2 versions of the Connector end destinations and JSON in a NUL that the lengths count.
+ROS 2 versions of the Connector end destinations and JSON in a NUL that the lengths include.
 
 Source: ROS-TCP-Connector and ROS-TCP-Endpoint v0.7.0, `ROSConnection.cs`, `SysCommand.cs`,
 `client.py`, `tcp_sender.py`.
@@ -28,9 +28,9 @@ KEEPALIVE = bytes(8)
 QUEUE_SIZE = "queue_size"
 """Feature: `__subscribe` may have a `queue_size`, the number of messages that may wait."""
 REMOVE = "remove"
-"""Feature: `__remove_subscriber` and its like are understood."""
+"""Feature: `__remove_subscriber` and similar commands are supported."""
 RESPONSE_ERROR = "response_error"
-"""Feature: `__response` may have an `error`, the reason why a service failed."""
+"""Feature: `__response` may have an `error`, the reason of a service's failure."""
 MOST_PAYLOAD_BYTES = 64 << 20
 MOST_DESTINATION_BYTES = 4096
 MOST_JSON_BYTES = 1 << 20
@@ -39,11 +39,11 @@ _VERSION = "v0.7.0"
 _LENGTH = Struct("<I")
 _SCRATCH_BYTES = 64 << 10
 _APART_BYTES = 16 << 10
-"""A longer payload that has not come whole is received where it stays, without a copy."""
+"""Size above which an incomplete payload is received into its own memory, without a copy."""
 
 
 class RosTcpFrame(NamedTuple):
-    """One frame; the payload may be kept, nobody writes to it any more."""
+    """One frame; the payload may be stored, because it is not written any more."""
 
     destination: str
     payload: Bytes
@@ -52,8 +52,8 @@ class RosTcpFrame(NamedTuple):
 class RosTcpFrameParser:
     """Cuts a stream of bytes into frames.
 
-    Bytes are written where `space` says, `written` tells how many came. Work is linear in them, and
-    memory is what really came, whatever length a frame claims.
+    The caller writes bytes to `space` and reports their number to `written`. The work is linear in
+    them, and memory is what really arrived, whatever length a frame claims.
     """
 
     def __init__(
@@ -74,18 +74,18 @@ class RosTcpFrameParser:
         self._apart: memoryview | None = None
         self._filled = 0
         self.keepalives = 0
-        """How many have come."""
+        """Number of keepalives."""
 
     def space(self) -> memoryview:
-        """Where the next bytes belong; never empty."""
+        """Returns where to write the next bytes; never empty."""
         if self._apart is not None:
             return self._apart[self._filled :]
         return self._scratch[self._end :]
 
     def written(self, count: int) -> list[RosTcpFrame]:
-        """Frames that are whole now that `count` more bytes are there.
+        """Returns the frames that are complete after `count` more bytes.
 
-        `BridgeError` for a frame over the limits: what follows it means nothing.
+        Raises `BridgeError` for a frame over the limits: the rest cannot be parsed.
         """
         frames: list[RosTcpFrame] = []
         if self._apart is not None:
@@ -102,7 +102,7 @@ class RosTcpFrameParser:
         return frames
 
     def feed(self, data: Bytes) -> list[RosTcpFrame]:
-        """Frames that are whole with `data`; `BridgeError` as for `written`."""
+        """Returns the frames that are complete with `data`. Raises `BridgeError` as `written`."""
         frames: list[RosTcpFrame] = []
         rest = memoryview(data)
         while rest:
@@ -114,11 +114,11 @@ class RosTcpFrameParser:
         return frames
 
     def end(self) -> None:
-        """Forgets a frame that is not whole: no more bytes come. Its memory is free at once."""
+        """Drops an incomplete frame and frees its memory at once: no more bytes will arrive."""
         self._apart = None
 
     def _advance(self, frames: list[RosTcpFrame]) -> bool:
-        """Read the next part of a frame; False where bytes are missing."""
+        """Reads the next part of a frame; returns False if bytes are missing."""
         if self._destination_bytes is None:
             self._destination_bytes = self._length("destination", self._most_destination)
             return self._destination_bytes is not None
@@ -157,7 +157,7 @@ class RosTcpFrameParser:
         return part
 
     def _begin_apart(self, length: int) -> None:
-        # memory of numpy's is not touched, hence not used, before bytes come
+        # numpy does not touch, hence not use, memory before bytes arrive
         self._apart = np.empty(length, np.uint8).data
         self._filled = self._end - self._start
         self._apart[: self._filled] = self._scratch[self._start : self._end]
@@ -172,7 +172,7 @@ class RosTcpFrameParser:
         self._destination_bytes = self._destination = self._payload_bytes = None
 
     def _compact(self) -> None:
-        """Move what is left to the front; that is less than a small payload."""
+        """Moves the rest to the front; it is less than a small payload."""
         left = self._end - self._start
         if self._start and left:
             self._scratch[:left] = bytes(self._scratch[self._start : self._end])
@@ -180,28 +180,28 @@ class RosTcpFrameParser:
 
 
 def head(destination: str, payload_bytes: int) -> bytes:
-    """All of a frame before its payload."""
+    """Returns all of a frame before its payload."""
     name = destination.encode()
     return b"".join((_LENGTH.pack(len(name)), name, _LENGTH.pack(payload_bytes)))
 
 
 def frame(destination: str, payload: Bytes) -> bytes:
-    """A whole frame."""
+    """Returns a whole frame."""
     return head(destination, len(payload)) + payload
 
 
 def command(name: str, *, nul: bool = False, **fields: Any) -> bytes:
-    """Frame of the command `__name`.
+    """Returns the frame of the command `__name`.
 
-    nul: end the JSON in a NUL; a ROS 2 endpoint cuts the last byte off unseen.
+    nul: end the JSON in a NUL; a ROS 2 endpoint cuts off the last byte.
     """
     return frame(f"__{name}", json.dumps(fields).encode() + b"\0" * nul)
 
 
 def handshake(generation: Generation, features: Sequence[str] = ()) -> bytes:
-    """First frame of an endpoint, with what it understands beyond the protocol.
+    """Returns the first frame of an endpoint, with its extensions of the protocol.
 
-    Unity's Connector reads of the metadata the fields that it knows.
+    Unity's Connector ignores unknown fields of the metadata.
     """
     fields: dict[str, Any] = {"protocol": generation.upper()}
     if features:
@@ -210,7 +210,7 @@ def handshake(generation: Generation, features: Sequence[str] = ()) -> bytes:
 
 
 def read_handshake(fields: dict[str, Any]) -> Generation:
-    """Generation of ROS that an endpoint speaks; `BridgeError` if it does not say."""
+    """Returns an endpoint's generation of ROS. Raises `BridgeError` if it is missing."""
     try:
         metadata = json.loads(fields["metadata"])
         protocol = str(metadata["protocol"]).lower()
@@ -224,7 +224,7 @@ def read_handshake(fields: dict[str, Any]) -> Generation:
 
 
 def read_features(fields: dict[str, Any]) -> frozenset[str]:
-    """What an endpoint understands beyond the protocol, by the fields of its handshake."""
+    """Returns an endpoint's extensions of the protocol, from the fields of its handshake."""
     try:
         features = json.loads(fields["metadata"])["features"]
     except (KeyError, TypeError, ValueError):
@@ -235,29 +235,29 @@ def read_features(fields: dict[str, Any]) -> frozenset[str]:
 
 
 def read_fields(payload: Bytes) -> dict[str, Any]:
-    """Fields of a command; `BridgeError` where they are no JSON object."""
+    """Returns the fields of a command. Raises `BridgeError` if they are no JSON object."""
     if len(payload) > MOST_JSON_BYTES:
         raise BridgeError(f"{len(payload)} bytes of JSON, over {MOST_JSON_BYTES}")
     try:
         fields = json.loads(str(payload, "utf-8").rstrip("\0") or "{}")
     except (ValueError, RecursionError) as error:
-        raise BridgeError(f"no JSON: {error}") from None
+        raise BridgeError(f"invalid JSON: {error}") from None
     if not isinstance(fields, dict):
         raise BridgeError("no JSON object")
     return fields
 
 
 def text_field(fields: dict[str, Any], name: str) -> str:
-    """A text that must be there and not be empty; else `BridgeError`."""
+    """Returns a required text, not empty. Raises `BridgeError` otherwise."""
     value = fields.get(name)
     if not isinstance(value, str) or not value:
-        raise BridgeError(f"'{name}' is missing or no text")
+        raise BridgeError(f"'{name}' is missing or not text")
     return value
 
 
 def number_field(fields: dict[str, Any], name: str) -> int:
-    """A whole number that must be there; else `BridgeError`."""
+    """Returns a required whole number. Raises `BridgeError` otherwise."""
     value = fields.get(name)
     if not isinstance(value, int) or isinstance(value, bool):
-        raise BridgeError(f"'{name}' is missing or no whole number")
+        raise BridgeError(f"'{name}' is missing or not a whole number")
     return value

@@ -1,4 +1,4 @@
-"""What a client may do, where not every client may do everything."""
+"""Restricts what a client may do."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from volery.bridges.rosbridge.wire import Operation
 
 
 class AccessPolicy(Protocol):
-    """Stands before the operations of one client, those of the connection itself excepted."""
+    """Checks the operations of one client, except for those of the connection itself."""
 
     def check(self, operation: Operation) -> bool:
-        """Whether the client may do that; `BridgeError` with the reason where it shall be told.
+        """Returns whether the client may execute an operation; raises `BridgeError` with a reason.
 
-        A gate may put right what a client says of itself.
+        The policy may correct what a client states about itself.
         """
 
 
 def refusal(operation: Operation, reason: str) -> Operation | None:
-    """What a client is answered whose call or goal is refused; None: a status must tell it."""
+    """Returns the response to a refused call or goal; None: a status must report the refusal."""
     if operation["op"] == "call_service":
         answer = {"op": "service_response", "service": operation.get("service")}
     elif operation["op"] == "send_action_goal":

@@ -1,7 +1,7 @@
-"""Actions of one rosbridge client: goals it sends, and actions it offers.
+"""Actions of one rosbridge client: goals it sends, and actions it serves.
 
-Goals, feedback and results travel through `graph.actions` as messages of types that the graph
-knows, so a client may send goals to the simulation, to other clients, and they to it.
+Goals, feedback and results pass through `graph.actions` as messages of known types, so that clients
+and the simulation can send goals to each other.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ from volery.graph.codecs.zero import zero_message
 from volery.graph.session import Session
 
 MOST_GOALS = 1000
-"""Open goals of one client, and open goals for it."""
+"""Open goals sent by one client, and open goals sent to it."""
 
 _UNKNOWN = 0
-"""action_msgs/msg/GoalStatus of a goal that never began."""
+"""Value of action_msgs/msg/GoalStatus for a goal that never started."""
 
 
 @dataclass
@@ -42,17 +42,17 @@ class _Asked:
     """A goal that the client has sent."""
 
     action: str
-    """As the client calls it."""
+    """Name used by the client."""
     action_type: str
     tell: Callable[[str, dict[str, Any]], None]
     feedback: bool
     goal: Goal | None = None
-    """Known once the simulation's thread has begun with it."""
+    """Known once the simulation's thread has started it."""
 
 
 @dataclass(frozen=True)
 class _Acting:
-    """A goal that the client has been given."""
+    """A goal that the client has received."""
 
     action: str
     action_type: str
@@ -60,7 +60,7 @@ class _Acting:
 
 
 class RosbridgeActions:
-    """The actions of one client. Its methods belong to the client's thread."""
+    """The actions of one client. All methods belong to the client's thread."""
 
     def __init__(self, session: Session, forms: MessageEncoder, send: Send, post: Post) -> None:
         self._session = session
@@ -74,10 +74,10 @@ class RosbridgeActions:
         self._numbers = itertools.count(1)
         self._closed = False
 
-    # ------------------------------------------------------------------------------------ asking
+    # ------------------------------------------------------------------------------- sent goals
 
     def send_goal(self, operation: Operation) -> None:
-        """Pass a goal of the client's on."""
+        """Forwards a goal of the client."""
         action, key = read_text(operation, "action"), read_id(operation)
         size = int(read_number(operation, "fragment_size", 0, 0, 1e9)) or None
         compression = read_choice(operation, "compression", ("none", "png", "cbor"))
@@ -100,7 +100,7 @@ class RosbridgeActions:
         name = absolute(action)
         action_type = self._graph.actions.types().get(name)
         if action_type is None:
-            raise BridgeError(f"nobody offers action '{name}'")
+            raise BridgeError(f"action '{name}' has no server")
         given = operation.get("action_type")
         if isinstance(given, str) and given and ros2_name(given, "action") != action_type:
             raise BridgeError(f"action '{name}' is a {action_type}, not {given}")
@@ -111,7 +111,7 @@ class RosbridgeActions:
         return action_type
 
     def _begin(self, key: Id, asked: _Asked, request: Any) -> None:
-        """Send the goal, in the simulation's thread."""
+        """Sends the goal, in the simulation's thread."""
 
         def on_feedback(message: Any) -> None:
             if asked.feedback:
@@ -124,7 +124,7 @@ class RosbridgeActions:
         self._session.tell("goal", name, asked.action_type, request)
         try:
             asked.goal = self._graph.actions.send(name, request, on_feedback, on_result)
-        except Exception as error:  # whoever takes goals may break; this client shall know
+        except Exception as error:  # report any error of the action's server to this client
             text = str(error)
             self._post(lambda: self._tell_failure(key, asked, text))
 
@@ -135,7 +135,7 @@ class RosbridgeActions:
     def _tell_result(self, key: Id, asked: _Asked, status: GoalStatus, result: Any) -> None:
         self._asked.pop(key, None)
         plain = {} if result is None else self._forms.plain(result, f"{asked.action_type}_Result")
-        # rosbridge means by "result" that there is one; how it went is the status
+        # in rosbridge "result" means that there is a result; its outcome is the status
         asked.tell("action_result", {"values": plain, "status": int(status), "result": True})
 
     def _tell_failure(self, key: Id, asked: _Asked, text: str) -> None:
@@ -143,17 +143,17 @@ class RosbridgeActions:
         asked.tell("action_result", {"values": text, "status": _UNKNOWN, "result": False})
 
     def cancel_goal(self, operation: Operation) -> None:
-        """Ask that a goal be given up."""
+        """Requests the cancellation of a goal."""
         asked = self._asked.get(read_id(operation))
         if asked is None:
             raise BridgeError("cancel_action_goal: no open goal has this 'id'")
         self._session.tell("cancel", absolute(asked.action), asked.action_type)
         self._session.post(lambda: _cancel(asked))
 
-    # ------------------------------------------------------------------------------------ acting
+    # --------------------------------------------------------------------------- received goals
 
     def advertise(self, operation: Operation) -> None:
-        """Offer an action of the client's."""
+        """Creates an action server of the client."""
         action = read_text(operation, "action")
         action_type = ros2_name(read_text(operation, "type"), "action")
         name = absolute(action)
@@ -165,7 +165,7 @@ class RosbridgeActions:
         self._offers[name] = (action, action_type)
 
     def unadvertise(self, operation: Operation) -> None:
-        """Offer an action no more; its open goals are aborted."""
+        """Destroys an action server; its open goals are aborted."""
         name = absolute(read_text(operation, "action"))
         if self._offers.pop(name, None) is None:
             raise BridgeError(f"unadvertise_action: '{name}' is not offered by this client")
@@ -174,7 +174,7 @@ class RosbridgeActions:
             _abort(self._acting.pop(number))
 
     def _take(self, action: str, action_type: str, goal: Goal) -> None:
-        """Hand a goal to the client."""
+        """Sends a goal to the client."""
         acting = _Acting(action, action_type, goal)
         if self._closed or len(self._acting) >= MOST_GOALS:
             _abort(acting)
@@ -197,13 +197,13 @@ class RosbridgeActions:
             raise
 
     def take_feedback(self, operation: Operation) -> None:
-        """Pass the client's feedback on."""
+        """Forwards the client's feedback."""
         acting = self._find(operation)
         values = operation.get("values")
         acting.goal.feedback(decode_plain(values or {}, f"{acting.action_type}_Feedback"))
 
     def take_result(self, operation: Operation) -> None:
-        """Pass the client's result on; a failure without values ends in a result of zeros."""
+        """Forwards the client's result; a failure without values yields a result of zeros."""
         acting = self._find(operation)
         success = operation.get("result", True) is True
         default = GoalStatus.SUCCEEDED if success else GoalStatus.ABORTED
@@ -226,7 +226,7 @@ class RosbridgeActions:
         return acting
 
     def close(self) -> None:
-        """The client has left: what it asked for is cancelled, what it acts on is aborted."""
+        """Cancels the client's goals and aborts the goals that it executes."""
         self._closed = True
         for name in self._offers:
             self._graph.actions.withdraw(name)

@@ -1,9 +1,8 @@
-"""Turns of the clients that are sent much, so that one that is sent little hardly waits.
+"""Schedules clients with much traffic in turns, so that clients with little traffic hardly wait.
 
-A loop of asyncio runs whatever is ready, in order: an answer to one client waits, several times on
-its way, until each of fifty others has been sent the messages that it subscribed to. Clients that
-cost more than their share write in turn here, a few in each round of the loop, which never idles
-for it.
+An asyncio loop runs ready callbacks in order: an answer to one client waits, several times, until
+fifty other clients have received their messages. Clients that cost more than their share write in
+turns here, a few in each round of the loop, which never idles because of it.
 """
 
 from __future__ import annotations
@@ -14,18 +13,19 @@ from collections import deque
 from collections.abc import Callable
 
 TURN_S = 0.3e-3
-"""CPU time of frames read or sent before other clients get their turn, though there are more."""
+"""CPU time of a client's frames after which other clients have their turn."""
 TURNS_A_ROUND = 6
-"""Clients sent much that write in one round of the loop."""
+"""Clients with much traffic that write in one round of the loop."""
 FRACTION = 0.5
-"""Of the loop's time that all clients share equally; a client that costs more is sent much."""
+"""Fraction of the loop's time that all clients share equally; a client above its share has much
+traffic."""
 CREDIT_S = 0.5e-3
-"""What it may cost in advance."""
+"""Cost that a client may run up in advance."""
 _MOST_OWED_S = 0.01
 
 
 class BulkTurns:
-    """A line of the clients of one loop."""
+    """Queue of the clients of one loop."""
 
     def __init__(self, now_s: Callable[[], float] = time.monotonic) -> None:
         self.now_s = now_s
@@ -46,7 +46,7 @@ class BulkTurns:
     def _grant(self, loop: asyncio.AbstractEventLoop) -> None:
         for _ in range(min(TURNS_A_ROUND, len(self._waiting))):
             next_one = self._waiting.popleft()
-            if not next_one.done():  # it has not been cancelled
+            if not next_one.done():  # not cancelled
                 next_one.set_result(None)
         self._is_granting = bool(self._waiting)
         if self._is_granting:
@@ -54,7 +54,7 @@ class BulkTurns:
 
 
 class Writer:
-    """Turns of one client that is written to."""
+    """Turns of one client's writer."""
 
     def __init__(self, bulk: BulkTurns) -> None:
         self._bulk = bulk
@@ -64,16 +64,16 @@ class Writer:
         bulk.num_clients += 1
 
     def close(self) -> None:
-        """The client is written to no more."""
+        """Removes the client."""
         self._bulk.num_clients -= 1
 
     async def begin(self) -> None:
-        """Waits until the client may be written to."""
+        """Waits until the client's writer may send."""
         if self._is_sent_much():
             await self._bulk.turn()
 
     async def spend(self, cost_s: float) -> None:
-        """Notes what a frame has cost; waits where it is the turn of others."""
+        """Adds the cost of a frame; waits if it is the turn of others."""
         self._owed_s = min(self._owed_s + cost_s, _MOST_OWED_S)
         self._spent_s += cost_s
         if self._spent_s >= TURN_S:

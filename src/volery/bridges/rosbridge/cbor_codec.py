@@ -1,9 +1,9 @@
-"""CBOR as rosbridge speaks it: plain values, and arrays of numbers as typed arrays (RFC 8746).
+"""Encodes CBOR for rosbridge: plain values, and arrays of numbers as typed arrays (RFC 8746).
 
-Arrays are always sent in little-endian order, as the tags 69 to 71, 77 to 79, 85 and 86; arrays of
-8-bit numbers are byte strings (unsigned) or tag 72 (signed). Read are also big-endian ones and
-half and clamped types. Other tags are refused: they would let a stranger build regular
-expressions, cycles and numbers of any size.
+Arrays are sent in little-endian order, as the tags 69 to 71, 77 to 79, 85 and 86; arrays of 8-bit
+numbers are byte strings (unsigned) or tag 72 (signed). The decoder also accepts big-endian, half
+and clamped types. Other tags are refused: they would let a client build regular expressions, cycles
+and numbers of any size.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from volery.core.errors import BridgeError
 
 MOST_DEPTH = 64
-"""Nesting beyond this is refused; no ROS message comes near it."""
+"""Largest depth of nesting; no ROS message comes near it."""
 
 _TAGS = {
     "u2": 69,
@@ -58,14 +58,14 @@ _BYTE_STRING, _TEXT, _ARRAY, _MAP, _TAG = 2, 3, 4, 5, 6
 
 
 def encode_cbor(value: Any) -> bytes:
-    """CBOR of dicts, lists, text, bytes, numbers, None and one-dimensional numpy arrays.
+    """Returns CBOR of dicts, lists, text, bytes, numbers, None and 1-dimensional numpy arrays.
 
-    Written by hand because large arrays are then copied once.
+    This encoder copies large arrays once.
 
     Raises
     ------
     BridgeError
-        The value holds something else.
+        The value contains another type.
 
     """
     parts: list[Any] = []
@@ -74,12 +74,12 @@ def encode_cbor(value: Any) -> bytes:
 
 
 def decode_cbor(data: bytes) -> Any:
-    """Plain values of CBOR; typed arrays become read-only numpy arrays, little-endian.
+    """Returns plain values of CBOR; typed arrays become read-only numpy arrays, little-endian.
 
     Raises
     ------
     BridgeError
-        The bytes are not CBOR, nest too deeply or hold a tag that is no typed array.
+        The bytes are not CBOR, nest too deeply or have a tag that is no typed array.
 
     """
     try:
@@ -110,18 +110,18 @@ def _head(major: int, number: int) -> bytes:
 def _add(value: Any, parts: list[Any]) -> None:
     adder = _ADDERS.get(type(value))
     if adder is None:
-        raise BridgeError(f"CBOR here has no form for a {type(value).__name__}")
+        raise BridgeError(f"cannot encode a {type(value).__name__} as CBOR")
     adder(value, parts)
 
 
 def _add_int(value: int, parts: list[Any]) -> None:
     if not -(1 << 64) <= value < 1 << 64:
-        raise BridgeError("an integer beyond 64 bits has no form in CBOR here")
+        raise BridgeError("cannot encode an integer beyond 64 bits as CBOR")
     parts.append(_head(0, value) if value >= 0 else _head(1, -1 - value))
 
 
 def _add_text(value: str, parts: list[Any]) -> None:
-    data = value.encode(errors="replace")  # half a character has no UTF-8
+    data = value.encode(errors="replace")  # a lone surrogate has no UTF-8
     parts.append(_head(_TEXT, len(data)))
     parts.append(data)
 
@@ -148,7 +148,7 @@ def _add_array(values: NDArray[Any], parts: list[Any]) -> None:
     kind = f"{values.dtype.kind}{values.dtype.itemsize}"
     if kind != "u1":
         if kind not in _TAGS:
-            raise BridgeError(f"CBOR here has no array of {values.dtype}")
+            raise BridgeError(f"cannot encode an array of {values.dtype} as CBOR")
         parts.append(_head(_TAG, _TAGS[kind]))
         values = np.ascontiguousarray(values, values.dtype.newbyteorder("<"))
     parts.append(_head(_BYTE_STRING, values.nbytes))

@@ -1,12 +1,12 @@
-"""A program's part in a graph that a rosbridge server offers: ours, or a real robot's.
+"""Connects a program to the graph of a rosbridge server: Volery's, or a real robot's.
 
     client = RosbridgeClient("ws://127.0.0.1:9090", name="planner")
     mailbox = client.subscribe("/uav1/odom", "nav_msgs/msg/Odometry", wake=wake)
     client.advertise("/uav1/cmd_vel", "geometry_msgs/msg/Twist")
     client.publish("/uav1/cmd_vel", Twist(...))
 
-It has the methods and the meaning of `graph.session.Session`. It keeps its connection: when that
-breaks it comes back by itself, and announces, subscribes to and offers everything again.
+The client has the methods of `graph.session.Session`. If the connection breaks, the client
+reconnects and repeats its advertisements, subscriptions and services.
 """
 
 from __future__ import annotations
@@ -33,25 +33,25 @@ _KEEPALIVE_S = 20.0
 
 
 class RosbridgeClient(RemoteClient):
-    """One program's part in a remote graph. All methods may be called by any thread.
+    """Connects one program to a remote graph. Any thread may call the methods.
 
     Parameters
     ----------
     url
         `ws://host:port/path` or `wss://...`.
     name
-        Who it is, for people.
+        Name of the client, for messages.
     token
-        Shown to the server, if given.
+        Sent to the server, if given.
     generation
-        Spelling of types and times that the server understands; ours understands both.
+        Spelling of types and times of the server; Volery's accepts both.
     connect_timeout_s
-        How long to try at first; 0: do not wait, keep trying in the background.
+        Timeout of the first connection; 0: do not wait, connect in the background.
 
     Raises
     ------
     BridgeError
-        The URL is none, or nobody answers there in time.
+        The URL is invalid, or no server answers in time.
 
     """
 
@@ -84,17 +84,17 @@ class RosbridgeClient(RemoteClient):
 
     @property
     def problem(self) -> tuple[str, ...]:
-        """The newest complaints of the server."""
+        """Newest error reports of the server."""
         return tuple(self._state.complaints)
 
     @property
     def dropped(self) -> int:
-        """Publications that found no connection, or too slow a one."""
+        """Number of publications without a connection, or over too slow a connection."""
         return self._state.dropped
 
     @property
     def info(self) -> SessionInfo:
-        """What the client does at present."""
+        """Current state of the client."""
         return self._state.info(self.name)
 
     def _type_of(self, topic: str) -> str:
@@ -115,7 +115,7 @@ class RosbridgeClient(RemoteClient):
             try:
                 await self._connect_once()
                 self._why = "the server has closed the connection"
-            except (WebSocketException, OSError, ValueError) as error:  # or no such address can be
+            except (WebSocketException, OSError, ValueError) as error:  # or no such address exists
                 self._why = reason_of(error)
             finally:
                 self._lose(f"the connection to {self.url} is broken")
@@ -159,4 +159,4 @@ class RosbridgeClient(RemoteClient):
 
 
 def _no_address(url: str) -> BridgeError:
-    return BridgeError(f"'{url}' is no address of a rosbridge: ws://HOST:PORT")
+    return BridgeError(f"'{url}' is not a rosbridge address; use ws://HOST:PORT")

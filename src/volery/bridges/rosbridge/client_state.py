@@ -1,7 +1,7 @@
-"""rosbridge v2 from the client's side: frames in, frames out, no sockets.
+"""State of a rosbridge v2 client: frames in, frames out, no sockets.
 
-What was announced, subscribed to and offered is remembered, and sent again by `begin` after every
-connection. Methods may be called by any thread unless they say otherwise.
+Advertisements, subscriptions and services are stored, and sent again by `begin` after every
+connection. Any thread may call the methods unless stated otherwise.
 """
 
 from __future__ import annotations
@@ -52,18 +52,18 @@ class _Offer:
 class _Call:
     reply: ServiceReply
     take: Callable[[Any], Any]
-    """Makes the response of its plain form."""
+    """Decodes the response from its plain form."""
 
 
 class ClientState(RemoteTopics):
-    """What a client wants of the server, and what is on its way.
+    """Holds a client's requests to the server, and the frames to send.
 
     Parameters
     ----------
     token
-        Shown first on every connection.
+        Sent first on every connection.
     wake
-        Told that `frames` has something to give.
+        Called when `frames` has new frames.
 
     """
 
@@ -91,7 +91,7 @@ class ClientState(RemoteTopics):
     # --------------------------------------------------------------------------------- connection
 
     def begin(self, *, cbor: bool) -> None:
-        """A connection stands: ask for everything anew. cbor: whether the server takes CBOR."""
+        """Starts a connection: repeats all requests. cbor: whether the server accepts CBOR."""
         with self._lock:
             self._connected, self._cbor = True, cbor
             self._orders.clear()
@@ -103,7 +103,7 @@ class ClientState(RemoteTopics):
                 self._order(self._offering(service, offer.srvtype))
 
     def lose(self, why: str) -> None:
-        """The connection is gone: open calls fail, publications are dropped."""
+        """Handles the loss of the connection: open calls fail, publications are dropped."""
         with self._lock:
             self._connected = False
             self.dropped += len(self._publications)
@@ -115,7 +115,7 @@ class ClientState(RemoteTopics):
             call.reply.fail(GraphError(why))
 
     def frames(self) -> Iterator[Frame]:
-        """Whatever is to be sent: orders and answers first, then publications."""
+        """Yields the frames to send: requests and answers first, then publications."""
         while True:
             with self._lock:
                 if self._orders:
@@ -128,12 +128,12 @@ class ClientState(RemoteTopics):
             yield frame
 
     def info(self, name: str) -> SessionInfo:
-        """What the client does at present."""
+        """Returns the current state of the client."""
         with self._lock:
             return SessionInfo(name, self.announced, self.mailboxes, tuple(self._offers))
 
     def _order(self, operation: Operation) -> None:
-        """Queue an operation if there is a connection; `begin` repeats what lasts."""
+        """Queues an operation if there is a connection; `begin` repeats lasting ones."""
         if self._connected:
             self._orders.append(encode_json(operation))
             self._wake()
@@ -141,7 +141,7 @@ class ClientState(RemoteTopics):
     # ---------------------------------------------------------------------------------- services
 
     def call(self, service: str, request: Any | None, reply: ServiceReply) -> None:
-        """Call a service; without a request rosapi is asked for its type first."""
+        """Calls a service; without a request rosapi is first asked for its type."""
         if request is not None:
             srvtype = request.__msgtype__.removesuffix("_Request")
             args = self._plain.encode(request, request.__msgtype__)
@@ -150,7 +150,7 @@ class ClientState(RemoteTopics):
 
         def ask(srvtype: str) -> None:
             if not srvtype:
-                reply.fail(GraphError(f"nobody offers service '{service}'"))
+                reply.fail(GraphError(f"service '{service}' has no server"))
                 return
             answer = f"{srvtype}_Response"
             self._call(service, {}, reply, lambda values: decode_plain(values, answer))
@@ -159,7 +159,7 @@ class ClientState(RemoteTopics):
         self._call("/rosapi/service_type", {"service": service}, asking, _service_type_of)
 
     def ask_rosapi(self, service: str, args: dict[str, Any], found: Future[str]) -> None:
-        """Ask rosapi for the type of something."""
+        """Asks rosapi for the type of a topic or service."""
         reply = ServiceReply(found.set_result, found.set_exception)
         self._call(f"/rosapi/{service}", args, reply, _type_of)
 
@@ -180,23 +180,23 @@ class ClientState(RemoteTopics):
             self._calls.pop(number, None)
 
     def offer(self, service: str, srvtype: str, handler: Handler) -> None:
-        """Offer a service."""
+        """Creates a service."""
         _check_type(f"{srvtype}_Request")
         with self._lock:
             if service in self._offers:
-                raise GraphError(f"service '{service}' is offered already")
+                raise GraphError(f"service '{service}' exists already")
             self._offers[service] = _Offer(srvtype, handler)
             self._order(self._offering(service, srvtype))
 
     def withdraw(self, service: str, who: str) -> None:
-        """Offer a service no more; its open requests fail."""
+        """Destroys a service; its open requests fail."""
         with self._lock:
             offer = self._offers.pop(service, None)
             if offer is None:
-                raise GraphError(f"{who} does not offer service '{service}'")
+                raise GraphError(f"{who} has no service '{service}'")
             self._order({"op": "unadvertise_service", "service": service})
         for reply in tuple(offer.pending):
-            reply.fail(GraphError(f"service '{service}': {who} has left"))
+            reply.fail(GraphError(f"service '{service}': {who} is closed"))
 
     # ------------------------------------------------------------------------------------- words
 
@@ -249,7 +249,7 @@ class ClientState(RemoteTopics):
     # ------------------------------------------------------------------------------------- input
 
     def receive(self, frame: Frame, now_s: float) -> None:
-        """Take a frame from the server, in the client's thread; what is wrong is a complaint."""
+        """Handles a frame from the server, in the client's thread; stores errors as complaints."""
         try:
             self._handle(decode_frame(frame), now_s)
         except VoleryError as error:
@@ -299,7 +299,7 @@ class ClientState(RemoteTopics):
 
         offer = self._offers.get(service)
         if offer is None:
-            respond(f"service '{service}' is not offered here", False)
+            respond(f"service '{service}' does not exist here", False)
             return
 
         def answer(message: Any) -> None:
@@ -319,18 +319,18 @@ class ClientState(RemoteTopics):
             offer.pending.add(reply)
             reply.when_done(lambda: offer.pending.discard(reply))
             offer.handler(request, reply)
-        except Exception as error:  # a handler's mistake is the caller's answer
+        except Exception as error:  # report an error of the handler to the caller
             reply.fail(GraphError(f"{type(error).__name__}: {error}"))
 
 
 def _type_of(values: Any) -> str:
-    """ROS 2 name of the message type in rosapi's answer; empty where there is none."""
+    """Returns the ROS 2 name of the message type in rosapi's answer; empty if there is none."""
     found = values.get("type") if isinstance(values, dict) else None
     return ros2_name(found) if isinstance(found, str) and found else ""
 
 
 def _service_type_of(values: Any) -> str:
-    """The same of a service."""
+    """Returns the ROS 2 name of the service type in rosapi's answer; empty if there is none."""
     found = values.get("type") if isinstance(values, dict) else None
     return ros2_name(found, "srv") if isinstance(found, str) and found else ""
 

@@ -1,4 +1,4 @@
-"""Reading the fields of a rosbridge operation."""
+"""Reads the fields of a rosbridge operation."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from volery.graph.qos import (
 )
 
 Id = str | int | float | None
-"""What a client may name an operation by; it is echoed as it came."""
+"""Client's name of an operation, returned unchanged."""
 
 MOST_NAME = 1000
-"""Characters of a name or an id."""
+"""Largest number of characters of a name or an id."""
 
 
 def read_text(operation: Operation, key: str) -> str:
-    """Text that must be there. `BridgeError` otherwise."""
+    """Returns a required text. Raises `BridgeError` otherwise."""
     value = operation.get(key)
     if not isinstance(value, str) or not value:
         raise BridgeError(f"{operation['op']}: '{key}' must be text and not empty")
@@ -33,14 +33,14 @@ def read_text(operation: Operation, key: str) -> str:
 
 
 def read_optional_text(operation: Operation, key: str) -> str | None:
-    """Text that may be missing, null or empty: None then. `BridgeError` for anything else."""
+    """Returns a text; None if missing, null or empty. Raises `BridgeError` for other values."""
     if operation.get(key) in (None, ""):
         return None
     return read_text(operation, key)
 
 
 def read_id(operation: Operation) -> Id:
-    """The operation's id. `BridgeError` where it is neither text nor number."""
+    """Returns the operation's id. Raises `BridgeError` if it is neither text nor number."""
     value = operation.get("id")
     if value is None or (isinstance(value, str) and len(value) <= MOST_NAME):
         return value
@@ -52,7 +52,7 @@ def read_id(operation: Operation) -> Id:
 def read_number(
     operation: Operation, key: str, default: float, least: float, greatest: float
 ) -> float:
-    """A number within bounds, or the default. `BridgeError` otherwise."""
+    """Returns a number within bounds, or the default. Raises `BridgeError` otherwise."""
     value: Any = operation.get(key)
     if value is None:
         return default
@@ -64,7 +64,7 @@ def read_number(
 
 
 def read_choice(operation: Operation, key: str, choices: tuple[str, ...]) -> str:
-    """One of some words, the first if it is missing. `BridgeError` otherwise."""
+    """Returns one of some words, the first if missing. Raises `BridgeError` otherwise."""
     value = operation.get(key)
     if value is None or value == "":
         return choices[0]
@@ -74,9 +74,10 @@ def read_choice(operation: Operation, key: str, choices: tuple[str, ...]) -> str
 
 
 def read_qos(operation: Operation) -> QoSProfile | None:
-    """Quality of service as newer rosbridges take it, or None. `BridgeError` for what cannot be.
+    """Returns the quality of service in the form of newer rosbridges, or None.
 
-    Of `{"depth", "reliability", "durability", "history", "lifespan"}` the first three count here.
+    Reads the first three of `{"depth", "reliability", "durability", "history", "lifespan"}`. Raises
+    `BridgeError` for invalid values.
     """
     given = operation.get("qos")
     if given is None:
@@ -95,12 +96,12 @@ def read_qos(operation: Operation) -> QoSProfile | None:
 
 
 def absolute(name: str) -> str:
-    """Name in the graph of what a client calls `chatter` or `/chatter`."""
+    """Returns the name in the graph of a client's `chatter` or `/chatter`."""
     return name if name.startswith("/") else f"/{name}"
 
 
 def with_id(operation: Operation, name: Id) -> Operation:
-    """The operation, named if there is a name."""
+    """Returns the operation, with the id if there is one."""
     if name is not None:
         operation["id"] = name
     return operation

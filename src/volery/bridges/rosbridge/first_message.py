@@ -1,8 +1,8 @@
-"""Connections that take little until their client has shown the token, and few frames at any time.
+"""Connections that read little until their client has sent the token, and few frames at any time.
 
-The first message may be short only: a longer one is refused by the length that it announces. Behind
-it nothing is read before the server has looked at it, whatever it holds. So a client may send large
-messages right behind its token, and one without a token fills no memory.
+The first message must be short: a longer one is refused by its announced length. Nothing after it
+is read before the server has checked it. So a client may send large messages right after its token,
+and a client without a token fills no memory.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from volery.bridges.frame_limits import MAX_FRAGMENTS, FrameLimits, HeldTranspor
 from volery.bridges.rosbridge.message_budget import MAX_UNAUTHORIZED_BYTES
 
 _READ_BYTES = 32 << 10
-"""At once: all frames in it are cut before anybody else has a turn. Of asyncio's 256 KiB, full of
-small frames, others would have to wait for a tenth of a second."""
+"""Bytes read at once; all their frames are parsed before another client has its turn. With the
+default of asyncio, 256 KiB, full of small frames, others would wait for a tenth of a second."""
 _CONTROL = (Opcode.PING, Opcode.PONG)
 _MESSAGES = (Opcode.TEXT, Opcode.BINARY, Opcode.CONT)
 
 
 class GuardedConnection(ServerConnection):
-    """A connection of a server that asks for a token; see `guarded`."""
+    """A connection of a server that may require a token; see `guarded`."""
 
     has_token = False
-    """Whether the server has a token to ask for."""
+    """Whether the server requires a token."""
     max_bytes = MAX_UNAUTHORIZED_BYTES
-    """Of a message from a client that is let in."""
+    """Largest message of an authorized client."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
@@ -41,29 +41,29 @@ class GuardedConnection(ServerConnection):
             self.protocol.recv_frame = self._recv_first  # type: ignore[method-assign]
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Read in small pieces; as of asyncio."""
+        """Implements asyncio's method; reads in small pieces."""
         transport.max_size = _READ_BYTES  # type: ignore[attr-defined]
         self._held = HeldTransport(cast("asyncio.Transport", transport))
         self._limits = FrameLimits(self._held, self.loop)
         super().connection_made(cast("asyncio.BaseTransport", self._held))
 
     def resume_writing(self) -> None:
-        """As of asyncio: the client has read."""
+        """Implements asyncio's method: the client has read."""
         super().resume_writing()
         self._limits.answers_read()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """As of asyncio."""
+        """Implements asyncio's method."""
         self._held.end()
         super().connection_lost(exc)
 
     def allow(self) -> None:
-        """Take messages of any size that the server takes: the client has shown the token."""
+        """Accepts messages of the server's full size: the client has sent the token."""
         self._unguard()
         self.transport.resume_reading()
 
     def _recv_frame(self, frame: Frame) -> None:
-        """Raises `ProtocolError`, and so ends the connection, beyond a number of fragments."""
+        """Raises `ProtocolError`, which ends the connection, beyond a number of fragments."""
         if frame.opcode is Opcode.CONT:
             if not self._limits.fragment():
                 raise ProtocolError(f"more than {MAX_FRAGMENTS} fragments")
@@ -78,7 +78,7 @@ class GuardedConnection(ServerConnection):
     def _recv_first(self, frame: Frame) -> None:
         self._recv_frame(frame)
         if frame.fin and frame.opcode in _MESSAGES:
-            self._unguard()  # what has come already may begin with a long message
+            self._unguard()  # bytes that have arrived already may begin with a long message
             self.transport.pause_reading()
 
     def _unguard(self) -> None:

@@ -1,4 +1,4 @@
-"""Operations in fragments, both ways."""
+"""Splits operations into fragments and assembles them."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from volery.bridges.rosbridge.wire import Operation, encode_json
 from volery.core.errors import BridgeError
 
 MOST_OPEN = 32
-"""Messages of one client that may be under way at once."""
+"""Messages of one client that may be incomplete at once."""
 MOST_FRAGMENTS = 100_000
 """Fragments of one message."""
 MOST_SECONDS = 30.0
 """Time from the first to the last fragment of a message."""
 
 _OVERHEAD_BYTES = 64
-"""What keeping a fragment costs beside its text, so that empty ones count too."""
+"""Cost of storing a fragment besides its text, so that empty ones count too."""
 
 
 def split(text: str, size: int, name: str) -> Iterator[str]:
-    """Fragments of JSON text with at most `size` characters of it each, in order.
+    """Yields fragments of JSON text with at most `size` characters each, in order.
 
     name: the id they share.
     """
@@ -41,7 +41,7 @@ class _Open:
 
 
 class Assembly:
-    """Puts fragments together. What never becomes whole goes after a while."""
+    """Assembles fragments. Incomplete messages are dropped after a while."""
 
     def __init__(self, most_bytes: int) -> None:
         self._most_bytes = most_bytes
@@ -50,19 +50,19 @@ class Assembly:
 
     @property
     def waiting(self) -> int:
-        """How many messages are incomplete."""
+        """Number of incomplete messages."""
         return len(self._open)
 
     def add(self, operation: Operation, now_s: float) -> str | None:
-        """Take a fragment in; returns the whole text with the last one.
+        """Adds a fragment; returns the whole text with the last one.
 
-        A fragment that comes again changes nothing.
+        Repeated fragments are ignored.
 
         Raises
         ------
         BridgeError
-            It is malformed, contradicts the others, or there would be too much; the message that
-            it belongs to is given up.
+                It is malformed, contradicts the others, or there would be too much; its message is
+                dropped.
 
         """
         self.drop_old(now_s)
@@ -81,7 +81,7 @@ class Assembly:
             cost = len(data) + _OVERHEAD_BYTES
             if self._size + cost > self._most_bytes:
                 self._forget(key)
-                raise BridgeError(f"fragment: more than {self._most_bytes} bytes are under way")
+                raise BridgeError(f"fragment: more than {self._most_bytes} bytes are incomplete")
             message.parts[number] = data
             message.size += cost
             self._size += cost
@@ -91,7 +91,7 @@ class Assembly:
         return "".join(message.parts[k] for k in range(total))
 
     def drop_old(self, now_s: float) -> None:
-        """Give up what has been under way for too long."""
+        """Drops messages that have been incomplete for too long."""
         for key in [k for k, m in self._open.items() if now_s - m.began_s > MOST_SECONDS]:
             self._forget(key)
 
@@ -101,7 +101,7 @@ class Assembly:
             if total > MOST_FRAGMENTS:
                 raise BridgeError(f"fragment: more than {MOST_FRAGMENTS} of one message")
             if len(self._open) >= MOST_OPEN:
-                raise BridgeError(f"fragment: more than {MOST_OPEN} messages are under way")
+                raise BridgeError(f"fragment: more than {MOST_OPEN} messages are incomplete")
             message = self._open[key] = _Open(total, now_s)
         if message.total != total:
             self._forget(key)

@@ -1,4 +1,4 @@
-"""The tree of frames that `/tf` and `/tf_static` describe."""
+"""The tree of frames that `/tf` and `/tf_static` define."""
 
 from __future__ import annotations
 
@@ -28,24 +28,24 @@ class Known(NamedTuple):
     stamp: Time
 
     def differs(self, other: Known, angle_rad: float, distance_m: float) -> bool:
-        """Whether it has turned or moved by more."""
+        """Returns whether it has turned or moved by more than the limits."""
         cosine = abs(sum(a * b for a, b in zip(self.rotation, other.rotation, strict=True)))
         turned = 2.0 * math.acos(min(cosine, 1.0))
         return turned > angle_rad or math.dist(self.position, other.position) > distance_m
 
     def message(self, parent: str, child: str) -> TransformStamped:
-        """The pose of `child` in `parent`."""
+        """Returns the pose of `child` in `parent`."""
         transform = Transform(Vector3(*self.position), Quaternion(*self.rotation))
         return TransformStamped(Header(self.stamp, parent), child, transform)
 
     def inverse(self) -> Known:
-        """Pose of the other frame in this one."""
+        """Returns the pose of the other frame in this one."""
         rotation = (*(-v for v in self.rotation[:3]), self.rotation[3])
         back = _rotated(rotation, self.position)
         return Known(tuple(-v for v in back), rotation, self.stamp)
 
     def times(self, inner: Known) -> Known:
-        """Pose in the outermost frame of what has the pose `inner` in this one."""
+        """Returns the pose in the outermost frame of a frame with the pose `inner` in this one."""
         moved = _rotated(self.rotation, inner.position)
         position = tuple(a + b for a, b in zip(self.position, moved, strict=True))
         stamp = max(self.stamp, inner.stamp, key=lambda time: (time.sec, time.nanosec))
@@ -59,7 +59,7 @@ class Frames:
         self._parents: dict[str, tuple[str, Known]] = {}
 
     def learn(self, transforms: Iterable[Any]) -> None:
-        """Take in transforms; those of frames beyond ten thousand are passed over."""
+        """Stores transforms; ignores those of frames beyond ten thousand."""
         for stamped in transforms:
             child = stamped.child_frame_id.lstrip("/")
             if child not in self._parents and len(self._parents) >= _MOST_FRAMES:
@@ -71,7 +71,7 @@ class Frames:
             self._parents[child] = (stamped.header.frame_id.lstrip("/"), pose)
 
     def pose(self, source: str, target: str) -> Known | None:
-        """Pose of `source` in `target`; None where the two are not connected."""
+        """Returns the pose of `source` in `target`; None if the two are not connected."""
         ups, downs = self._to_root(source), self._to_root(target)
         common = next((name for name in ups if name in downs), None)
         if common is None:
@@ -79,12 +79,12 @@ class Frames:
         return downs[common].inverse().times(ups[common])
 
     def _to_root(self, frame: str) -> dict[str, Known]:
-        """Pose of a frame in itself and in each of those above it, from the nearest on."""
+        """Returns the pose of a frame in itself and in each of its ancestors, the nearest first."""
         pose = Known((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), Time(0, 0))
         found = {frame: pose}
         while len(found) < _LONGEST_CHAIN and frame in self._parents:
             frame, step = self._parents[frame]
-            if frame in found:  # a ring
+            if frame in found:  # a cycle
                 break
             pose = step.times(pose)
             found[frame] = pose

@@ -1,14 +1,14 @@
-"""How much one message of a client may hold, counted before anything is made of it.
+"""Limits the contents of one message of a client, counted before it is decoded.
 
-Both decoders keep Python's lock for a whole message, so what a message costs must be known first.
-Counts are of bytes, not of parsed values: exact for CBOR; for JSON an upper bound, which takes
-punctuation inside of texts for structure.
+Both decoders hold Python's lock for a whole message, so the cost of a message must be known first.
+Counts are of bytes, not of parsed values: exact for CBOR; for JSON an upper bound, which counts
+punctuation inside of texts as structure.
 
 Measured on one core of a 2-core machine (AMD EPYC, Python 3.11), decoding with `json` or `cbor2`
 and `graph.codecs.json_decoding` together: 90 to 180 ns a number in a list, .3 to .5 us a member of
 an object, 4 to 10 us an object that becomes a message, .4 us a list, 2 ms a MB of base64 text, .1
 to .6 ms a MB of a byte string or typed array; counting: .1 ms a MB of JSON, .3 us a value of CBOR
-that is looked at by itself. A message within all budgets takes about 40 ms at most.
+that is inspected by itself. A message within all budgets takes about 40 ms at most.
 """
 
 from __future__ import annotations
@@ -21,25 +21,25 @@ from numpy.typing import NDArray
 from volery.core.errors import BridgeError
 
 MAX_MESSAGE_BYTES = 10_000_000
-"""Of any message unless a server has another limit; as `max_message_size` of rosbridge_server. A
+"""Largest message unless a server has another limit, as `max_message_size` of rosbridge_server. A
 WebSocket's message is copied several times: 25 MB would delay other clients by 50 to 100 ms."""
 MAX_TEXT_BYTES = 16 * 1024 * 1024
-"""Of a message as JSON: 12 MB as base64 text."""
+"""Largest message as JSON: 12 MB as base64 text."""
 MAX_PICTURE_BYTES = 4 * 1024 * 1024
-"""Of a message as JSON inside a PNG picture."""
+"""Largest message as JSON inside a PNG image."""
 MAX_VALUES = 200_000
-"""Values of all kinds in one message, and names of members."""
+"""Largest number of values of all kinds and names of members in one message."""
 MAX_MEMBERS = 50_000
-"""Members of all objects together."""
+"""Largest number of members of all objects together."""
 MAX_APART = 50_000
-"""Values of CBOR outside of arrays of numbers with one head, which are looked at one by one."""
+"""Largest number of CBOR values outside of arrays of numbers, which are inspected one by one."""
 MAX_CONTAINERS = 5_000
-"""Objects and lists in one message."""
+"""Largest number of objects and lists in one message."""
 MAX_UNAUTHORIZED_BYTES = 4096
-"""Of the first message of a client that has not shown the token yet."""
+"""Largest first message of a client that has not sent the token yet."""
 
 _SMALL_BYTES = 4_000
-"""A message of fewer bytes cannot exceed any budget: everything takes a byte at least."""
+"""Size below which a message cannot exceed any budget: each item takes a byte at least."""
 _SLICE_BYTES = 1 << 18
 _COMMA, _COLON, _OBJECT, _LIST = b",:{["
 
@@ -47,11 +47,11 @@ _BYTE_STRING, _TEXT, _ARRAY, _MAP, _TAG, _SIMPLE = 2, 3, 4, 5, 6, 7
 _INDEFINITE = 31
 _BREAK = 0xFF
 _LEAST_RUN = 64
-"""A shorter run of numbers is walked one by one."""
+"""Length below which runs of numbers are counted one by one."""
 
 
 def check_json(text: str) -> None:
-    """Raise `BridgeError` for JSON text that holds more than a message may."""
+    """Raises `BridgeError` for JSON text that exceeds a budget."""
     if len(text) <= _SMALL_BYTES:
         return
     _check(len(text), MAX_TEXT_BYTES, "bytes as JSON")
@@ -66,16 +66,16 @@ def check_json(text: str) -> None:
 
 
 def check_cbor(data: bytes) -> None:
-    """Raise `BridgeError` for CBOR that holds more than a message may.
+    """Raises `BridgeError` for CBOR that exceeds a budget.
 
-    What is no CBOR passes as far as it was looked at; the decoder ends at the same byte.
+    Invalid CBOR passes up to the error; the decoder fails at the same byte.
     """
     if len(data) > _SMALL_BYTES:
         _Walk(data).check()
 
 
 class _Walk:
-    """One walk over the heads of CBOR items, linear in their number, without recursion."""
+    """One pass over the heads of CBOR items, linear in their number, without recursion."""
 
     def __init__(self, data: bytes) -> None:
         self._data = data
@@ -83,7 +83,7 @@ class _Walk:
         self._values = self._members = self._containers = self._apart = 0
 
     def check(self) -> None:
-        """Count everything; `BridgeError` beyond a budget."""
+        """Counts everything. Raises `BridgeError` beyond a budget."""
         data, end, position = self._data, len(self._data), 0
         while position < end:
             head = data[position]
@@ -106,13 +106,13 @@ class _Walk:
         self._check()
 
     def _announced(self, number: int, major: int) -> None:
-        """Count what a container says that it holds, before it is looked at."""
+        """Counts the announced items of a container before they are inspected."""
         if major == _MAP:
             self._members += number
         _check(self._values + number, MAX_VALUES, "values")
 
     def _pass_numbers(self, position: int, number: int) -> int:
-        """Where the equally long numbers that an array begins with end."""
+        """Returns the end of the equally long numbers at the start of an array."""
         if position >= len(self._data):
             return position
         head = self._data[position]

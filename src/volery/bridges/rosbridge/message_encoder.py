@@ -1,4 +1,4 @@
-"""Published messages in the forms that rosbridge's clients ask for, each made once for all."""
+"""Encodes published messages in the forms of rosbridge's clients, each form once."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.messages import Published
 
 Generation = Literal["ros1", "ros2"]
-"""Whose field names (`secs` or `sec`), type names and serialization clients are given."""
+"""Generation whose field names (`secs` or `sec`), type names and serialization clients receive."""
 COMPRESSIONS = ("none", "png", "cbor", "cbor-raw")
 
 MOST_KEPT = 64
-"""Messages kept for a second client; they are taken within the same turn of the loop as a rule."""
+"""Messages stored for further clients, which usually read them in the same turn of the loop."""
 MOST_KEPT_BYTES = 32 * 1024 * 1024
 
 _BYTES = {"uint8", "char", "byte"}
@@ -37,7 +37,7 @@ class MessageEncoder:
         self._json = JsonCodec(ros1_names=generation == "ros1")
         self._splicing = JsonCodec(ros1_names=generation == "ros1", arrays=self._json_array)
         self._mark = f"<{secrets.token_hex(16)}>"
-        """Stands where base64 text goes; no message can hold it by chance."""
+        """Placeholder of base64 text, which no message contains by chance."""
         self._base64: list[str] = []
         self._cbor = JsonCodec(
             ros1_names=generation == "ros1",
@@ -54,18 +54,18 @@ class MessageEncoder:
         }
 
     def plain(self, message: Any, msgtype: str) -> dict[str, Any]:
-        """A message as JSON values. `GraphError` if it does not fit its type."""
+        """Returns a message as JSON values. Raises `GraphError` if it does not fit its type."""
         return self._json.encode(message, msgtype)
 
     def frame(self, published: Published, compression: str, topic: str) -> Frame:
-        """The `publish` operation of a message under the name that the client has for the topic.
+        """Returns the `publish` operation of a message under the client's name of the topic.
 
         Raises
         ------
         GraphError
             The message does not fit its type.
         BridgeError
-            There is no such form of it.
+            The message has no such form.
 
         """
         key = (id(published), compression, topic)
@@ -73,7 +73,7 @@ class MessageEncoder:
         if kept is not None:
             return kept[1]
         frame = self._makers[compression](published, topic)
-        # the message is kept beside its form, so that no other one can get its id meanwhile
+        # the message is stored with its form, so that no other message can have its id meanwhile
         self._kept[key] = (published, frame)
         self._kept_bytes += len(frame)
         while len(self._kept) > MOST_KEPT or self._kept_bytes > MOST_KEPT_BYTES:
@@ -91,7 +91,10 @@ class MessageEncoder:
         return "".join(chain.from_iterable(zip_longest(parts, self._base64, fillvalue="")))
 
     def _json_array(self, values: NDArray[Any], base: str) -> Any:
-        """Array as JSON; base64 waits apart, for the writer would look at its every letter."""
+        """Returns an array as JSON.
+
+        Base64 text is inserted later, because the encoder would scan it.
+        """
         if base in _BYTES:
             self._base64.append(base64.b64encode(values.data).decode("ascii"))
             return self._mark

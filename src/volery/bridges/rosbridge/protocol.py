@@ -1,13 +1,12 @@
-"""rosbridge v2 as one client sees it: frames in, frames out, no sockets.
+"""The rosbridge v2 protocol for one client: frames in, frames out, no sockets.
 
     peer = RosbridgePeer(session, shared, wake=wake, post=post)
     peer.receive('{"op": "subscribe", "topic": "/uav1/odom"}')
     for frame in peer.frames(now_s):
         send(frame)
 
-Whatever is wrong with an operation is told to the client as a `status` that carries the operation's
-id; nothing that a client sends raises. All methods belong to one thread; `wake` and `post` are
-called by others too.
+The client receives the errors that it causes as a `status` with the operation's id; no input of a
+client raises. All methods belong to one thread; other threads may call `wake` and `post`.
 """
 
 from __future__ import annotations
@@ -51,41 +50,41 @@ LEVELS = ("error", "none", "warning", "info")
 _LOUDNESS = {"none": 0, "error": 1, "warning": 2, "info": 3}
 
 MOST_WAITING_BYTES = 8 * 1024 * 1024
-"""Answers that may wait for a client; beyond, no more is read of it until it reads."""
+"""Bytes of answers that may wait for a client; beyond, reading from the client pauses."""
 MOST_WRAPS = 3
-"""An operation may lie in a picture in fragments, not deeper."""
+"""Depth of wrapping: an operation may be inside an image in fragments, not deeper."""
 
 
 @dataclass(frozen=True)
 class ServerContext:
-    """What all clients of a server have in common."""
+    """Shared by all clients of a server."""
 
     forms: MessageEncoder = field(default_factory=MessageEncoder)
     now_ns: Callable[[], int] = lambda: 0
     """Simulated time."""
     token: str | None = None
-    """What a client must show before anything else; None: nothing."""
+    """Token that a client must send first; None: none."""
     most_bytes: int = MAX_MESSAGE_BYTES
-    """Largest message, also once put together from fragments or a picture."""
+    """Largest message, also after assembly from fragments or an image."""
 
 
 class RosbridgePeer:
-    """One client.
+    """Serves one client.
 
     Parameters
     ----------
     session
-        Its part in the graph; closed by `close`.
+        The client's session of the graph; closed by `close`.
     shared
-        What it has in common with others.
+        Shared by all clients of the server.
     wake
-        Told, from any thread, that `frames` has something to give.
+        Called, from any thread, when `frames` has new frames.
     post
-        Has a function called in the thread of this peer.
+        Calls a function in the thread of this peer.
     authorized
-        Whether it has shown the token already.
+        Whether the client has sent the token already.
     gate
-        What it may do; None: everything.
+        Restricts the client; None: no restriction.
 
     """
 
@@ -101,9 +100,9 @@ class RosbridgePeer:
     ) -> None:
         self.authorized = authorized or shared.token is None
         self.on_authorized: Callable[[], None] = lambda: None
-        """Called when the client has shown the token."""
+        """Called when the client has sent the token."""
         self.refused: str | None = None
-        """Why the connection must end, once it must."""
+        """Why the connection must end; None while it may continue."""
         self._session = session
         self._shared = shared
         self._gate = gate
@@ -145,16 +144,16 @@ class RosbridgePeer:
 
     @property
     def reading(self) -> Reading:
-        """What the client is charged for, and when to read on from it."""
+        """Account of reading from the client, which limits its rate."""
         return self._session.reading
 
     @property
     def writing(self) -> Reading:
-        """The same of writing to it."""
+        """Account of writing to the client."""
         return self._session.writing
 
     def receive(self, frame: Frame, now_s: float) -> None:
-        """Take a frame from the client. now_s: of a clock that never goes back."""
+        """Handles a frame from the client. now_s: of a monotonic clock."""
         if self._closed or self.refused:
             return
         self._now_s = now_s
@@ -171,7 +170,7 @@ class RosbridgePeer:
         except VoleryError as error:
             self._status("error", str(error), operation)
         except Exception as error:
-            # A mistake of ours in serving one client must not end the service of others.
+            # An error of ours in serving one client must not end the service of others.
             self._status("error", f"internal error: {type(error).__name__}: {error}", operation)
 
     def _handle(self, operation: Operation, now_s: float, depth: int) -> None:
@@ -200,7 +199,7 @@ class RosbridgePeer:
                 self._status("info", f"{op}: done", operation)
 
     def _passes(self, operation: Operation) -> bool:
-        """Whether the client may do that; who asked for something is answered that it may not."""
+        """Returns whether the client may execute an operation; answers refused requests."""
         if self._gate is None:
             return True
         try:
@@ -213,7 +212,7 @@ class RosbridgePeer:
             return False
 
     def _handle_inner(self, operation: Operation, now_s: float, depth: int) -> None:
-        """An unwrapped operation; its errors carry its own id."""
+        """Handles an unwrapped operation; its errors carry its own id."""
         try:
             self._handle(operation, now_s, depth + 1)
         except VoleryError as error:
@@ -235,16 +234,16 @@ class RosbridgePeer:
 
     @property
     def congested(self) -> bool:
-        """Whether so much waits for the client that no more should be read of it."""
+        """Whether so many bytes wait for the client that reading from it should pause."""
         return self._waiting_bytes > MOST_WAITING_BYTES
 
     def send(self, operation: Operation, fragment_size: int | None, compression: str) -> None:
-        """Queue an operation for the client.
+        """Queues an operation for the client.
 
         Raises
         ------
         BridgeError
-            It cannot be written, or it comes from others and the client does not read.
+            It cannot be encoded, or it is from other clients and this client does not read.
 
         """
         if self._closed:
@@ -261,7 +260,7 @@ class RosbridgePeer:
         self._queue(encode_png(text) if compression == "png" else text, fragment_size)
 
     def frames(self, now_s: float) -> Iterator[Frame]:
-        """Whatever is to be sent now: answers first, then messages of all topics in turn."""
+        """Yields the frames to send now: answers first, then messages of all topics in turn."""
         self._now_s = now_s
         self._services.expire(now_s)
         self._assembly.drop_old(now_s)
@@ -277,10 +276,10 @@ class RosbridgePeer:
             else:
                 yield frame
             yield from self._answers()
-        yield from self._answers()  # topics that ended have been told of
+        yield from self._answers()  # statuses of topics that ended
 
     def due_s(self, now_s: float) -> float | None:
-        """When to call `frames` again though nobody woke; None: not before `wake`."""
+        """Returns when to call `frames` again without a wake-up; None: not before `wake`."""
         times = (self._topics.due_s(now_s), self._services.due_s())
         return min((time for time in times if time is not None), default=None)
 
@@ -309,14 +308,14 @@ class RosbridgePeer:
         if _LOUDNESS[level] > _LOUDNESS[self._level]:
             return
         message: dict[str, Any] = {"op": "status", "level": level, "msg": text}
-        with suppress(BridgeError):  # an id that cannot be echoed
+        with suppress(BridgeError):  # an id that cannot be returned
             with_id(message, read_id(operation) if operation else None)
         self.send(message, None, "none")
 
     # --------------------------------------------------------------------------------------- end
 
     def close(self) -> None:
-        """The client has gone: take back everything; a second time nothing happens."""
+        """Releases everything of a client that has left; further calls do nothing."""
         if self._closed:
             return
         self._closed = True
@@ -325,7 +324,7 @@ class RosbridgePeer:
         self._outbox.clear()
 
     def _poster(self, post: Post) -> Post:
-        """`post`, whose errors become statuses."""
+        """Returns `post` with errors reported as statuses."""
 
         def guarded(action: Callable[[], None]) -> None:
             def act() -> None:

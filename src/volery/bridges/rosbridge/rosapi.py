@@ -1,7 +1,7 @@
-"""The rosapi services: what clients of rosbridge ask about the graph.
+"""The rosapi services, with which rosbridge clients inspect the graph.
 
-They are ordinary services of the graph under `/rosapi/`, so that clients of every bridge may ask.
-Every session is a node there, and the simulation itself is the node `/volery`.
+They are ordinary services of the graph below `/rosapi/`, so that clients of every bridge may call
+them. Every session is a node there; the simulation itself is the node `/volery`.
 """
 
 from __future__ import annotations
@@ -29,18 +29,18 @@ Answer = Callable[[Any], dict[str, Any]]
 
 
 class RosApi:
-    """The services, once `start`ed.
+    """Offers the services after `start`.
 
     Parameters
     ----------
     gateway
-        Of the graph.
+        Gateway of the graph.
     generation
-        How types are spelled in answers.
+        Spelling of types in responses.
     now_ns
         Simulated time.
     parameters
-        Shared by all who start the services one after the other.
+        Shared by successive instances.
 
     """
 
@@ -63,7 +63,7 @@ class RosApi:
         self._session: Session | None = None
 
     def start(self) -> None:
-        """Offer the services; those that somebody offers already stay his."""
+        """Creates the services, except for those that exist already."""
         table = self._table().items()
         missing = [(k, v) for k, v in table if not self._graph.has_service(PREFIX + k)]
         if not missing:
@@ -74,7 +74,7 @@ class RosApi:
             session.offer(PREFIX + name, srvtype, self._handler(srvtype, answer))
 
     def stop(self) -> None:
-        """Take them back."""
+        """Destroys the services."""
         if self._session is not None:
             self._session.close()
             self._session = None
@@ -90,7 +90,7 @@ class RosApi:
         return handle
 
     def _table(self) -> dict[str, tuple[str, Answer]]:
-        """Services by name: their type and what answers."""
+        """Returns the services by name: their types and handlers."""
         return {
             "topics": ("Topics", self._topics),
             "topics_for_type": ("TopicsForType", self._topics_for_type),
@@ -204,7 +204,7 @@ class RosApi:
     # ------------------------------------------------------------------------------------- nodes
 
     def _sessions(self) -> dict[str, SessionInfo]:
-        """Sessions by the name that each has as a node."""
+        """Returns the sessions by their node names."""
         found: dict[str, SessionInfo] = {}
         for info in self._gateway.sessions():
             base = "/" + re.sub(r"\W+", "_", info.name, flags=re.ASCII).strip("_")
@@ -280,7 +280,10 @@ class RosApi:
         return self._tried(lambda: self._parameters.delete(request.name))
 
     def _tried(self, action: Callable[[], None]) -> dict[str, Any]:
-        """How an action went, as rosapi tells it; the call fails where that cannot be told."""
+        """Returns the result of an action in rosapi's form.
+
+        Fails the call if there is no such form.
+        """
         try:
             action()
         except GraphError as error:

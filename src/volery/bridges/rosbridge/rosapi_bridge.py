@@ -1,4 +1,4 @@
-"""Offers rosapi beside bridges whose own protocol cannot tell what there is on the graph."""
+"""Adds rosapi to bridges whose own protocol cannot list the contents of the graph."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from volery.graph.session import Gateway
 
 
 class RosApiBridge:
-    """A bridge, and the rosapi services where nobody offers them yet."""
+    """A bridge with the rosapi services, unless they exist already."""
 
     def __init__(self, bridge: Bridge) -> None:
         self.bridge = bridge
@@ -16,17 +16,17 @@ class RosApiBridge:
 
     @property
     def name(self) -> str:
-        """What the bridge is and where."""
+        """Name and address of the bridge."""
         return self.bridge.name
 
     async def start(self, gateway: Gateway) -> None:
-        """Open the bridge. `BridgeError` where that is not possible."""
+        """Opens the bridge. Raises `BridgeError` if that fails."""
         await self.bridge.start(gateway)
         self._rosapi = RosApi(gateway, "ros2", gateway.graph.now_ns)
         self._rosapi.start()
 
     async def stop(self) -> None:
-        """Close the bridge."""
+        """Closes the bridge."""
         if self._rosapi is not None:
             self._rosapi.stop()
             self._rosapi = None

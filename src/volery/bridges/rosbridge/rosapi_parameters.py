@@ -1,7 +1,7 @@
-"""Parameters as rosapi's services name them: those that nodes declared, and all others.
+"""Parameters by rosapi's names: those that nodes declared, and all others.
 
 In ROS 1 names are paths, `/uav1/gap_following/height_m`; in ROS 2 a node and its parameter,
-`/uav1/gap_following:height_m`. Both are understood. Values are JSON text.
+`/uav1/gap_following:height_m`. Both are accepted. Values are JSON text.
 """
 
 from __future__ import annotations
@@ -16,37 +16,37 @@ from volery.graph.parameters import Parameters as Declared
 
 MOST_PARAMETERS = 10_000
 MOST_VALUE = 1_000_000
-"""Characters of the JSON text of one parameter."""
+"""Largest number of characters of a parameter's JSON text."""
 
 
 class Parameters:
-    """Parameters of nobody, by name, each the JSON text of its value."""
+    """Parameters that no node declared, by name, each the JSON text of its value."""
 
     def __init__(self) -> None:
         self._values: dict[str, str] = {"/use_sim_time": "true"}
 
     def names(self) -> list[str]:
-        """All names, sorted."""
+        """Returns all names, sorted."""
         return sorted(self._values)
 
     def get(self, name: str) -> str | None:
-        """Value, or None."""
+        """Returns a value, or None."""
         return self._values.get(absolute(name))
 
     def set(self, name: str, value: str) -> None:
-        """Set a value. `GraphError` where there would be too much."""
+        """Sets a value. Raises `GraphError` if there would be too much."""
         if len(value) > MOST_VALUE or len(self._values) >= MOST_PARAMETERS:
             raise GraphError(f"parameter '{name}': too large, or too many parameters")
         self._values[absolute(name)] = value
 
     def delete(self, name: str) -> None:
-        """Remove a parameter. `GraphError` if there is none."""
+        """Removes a parameter. Raises `GraphError` if there is none."""
         if self._values.pop(absolute(name), None) is None:
             raise GraphError(f"no parameter '{name}'")
 
 
 class NamedParameters:
-    """Parameters of nodes and of nobody, by one kind of name.
+    """Parameters of nodes and others, with one form of names.
 
     ros1: whether nodes' parameters are listed as paths.
     """
@@ -57,12 +57,12 @@ class NamedParameters:
         self._between = "/" if ros1 else ":"
 
     def names(self) -> list[str]:
-        """All names, sorted."""
+        """Returns all names, sorted."""
         declared = [f"{node}{self._between}{name}" for node, name in self._declared.names()]
         return sorted([*self._others.names(), *declared])
 
     def get(self, name: str) -> str | None:
-        """Value, or None where there is none of that name."""
+        """Returns a value, or None for an unknown name."""
         try:
             parameter = self._find(name)
         except GraphError:
@@ -70,7 +70,7 @@ class NamedParameters:
         return self._others.get(name) if parameter is None else _text(parameter.value)
 
     def set(self, name: str, value: str) -> None:
-        """Set a value. `GraphError` where it is no JSON, or its node does not take it."""
+        """Sets a value. Raises `GraphError` if it is no JSON, or its node refuses it."""
         try:
             plain = json.loads(value, parse_constant=_refuse)
         except (ValueError, RecursionError):
@@ -82,15 +82,15 @@ class NamedParameters:
             parameter.set(plain)
 
     def delete(self, name: str) -> None:
-        """Remove a parameter. `GraphError` if there is none, or a node has declared it."""
+        """Removes a parameter. Raises `GraphError` if there is none, or a node has declared it."""
         if self._find(name) is not None:
             raise GraphError(f"parameter '{name}' is declared by its node")
         self._others.delete(name)
 
     def _find(self, name: str) -> Parameter | None:
-        """Parameter of a node, None for one of nobody.
+        """Returns the parameter of a node, None for one that no node declared.
 
-        `GraphError` where a node is named that has none of that name: nobody would read it.
+        Raises `GraphError` if the named node has no such parameter, because no node would read it.
         """
         full = absolute(name)
         node, colon, last = full.rpartition(":")
@@ -102,12 +102,12 @@ class NamedParameters:
 
 
 def _refuse(word: str) -> None:
-    """Python reads NaN and Infinity too."""
+    """Refuses NaN and Infinity, which Python would accept."""
     raise ValueError(word)
 
 
 def _text(value: Any) -> str:
-    """JSON text of a value; numbers that JSON has not are null."""
+    """Returns the JSON text of a value; numbers without a JSON form are null."""
     try:
         return json.dumps(value, allow_nan=False)
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""Descriptions of message types as rosapi's services give them."""
+"""Describes message types in the form of rosapi's services."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ _EXAMPLES = {"string": "", "bool": "False", "float32": "0.0", "float64": "0.0"}
 
 
 def display_name(msgtype: str, *, ros1: bool) -> str:
-    """Name of a type as clients of that generation spell it."""
+    """Returns the name of a type in a generation's spelling."""
     return ros1_name(msgtype) if ros1 else msgtype
 
 
 def type_definitions(msgtype: str, *, ros1: bool) -> list[TypeDef]:
-    """A type and all that it is made of, each once. `GraphError` if it is unknown.
+    """Returns a type and all types that it nests, each once. Raises `GraphError` if it is unknown.
 
-    Nested types are named `std_msgs/Header` in both generations, as rosapi does; the first one is
-    named as it was asked for.
+    Nested types are named `std_msgs/Header` in both generations, as in rosapi; the first one has
+    the requested name.
     """
     if msgtype not in typestore().types:
         raise GraphError(f"message type '{msgtype}' is not known")
@@ -38,7 +38,7 @@ def type_definitions(msgtype: str, *, ros1: bool) -> list[TypeDef]:
 
 
 def full_text(msgtype: str, *, ros1: bool) -> str:
-    """Definition with those of all nested types, as bags hold it."""
+    """Returns the definition with those of all nested types, as in bags."""
     if ros1:
         return ros1_codec().definition_text(msgtype)
     return str(typestore().generate_msgdef(msgtype, ros_version=2)[0])
@@ -77,7 +77,7 @@ def _inner_name(name: str, ros1: bool) -> str:
 
 
 def _element(described: Any) -> tuple[str, int]:
-    """Type of a field or of its elements, and how many: -1 for no array, 0 for any number."""
+    """Returns the type of a field or its elements, and their number: -1 no array, 0 any."""
     kind, detail = described
     if kind == Nodetype.NAME:
         return str(detail), -1

@@ -39,50 +39,51 @@ from volery.graph.session import Gateway
 _log = logging.getLogger(__name__)
 _handshakes = logging.getLogger(f"{__name__}.handshakes")
 _handshakes.addFilter(RepeatFilter(bare=("opening handshake failed",)))
-"""Of `websockets`, to which clients give cause for warnings without end."""
+"""Logger of `websockets`, in which clients can cause any number of warnings."""
 
 DEFAULT_PORT = 9090
 MOST_CLIENTS = 1000
 HANDSHAKE_TIMEOUT_S = 10.0
-"""For the request of a WebSocket, its wait for the check of a token included."""
+"""Timeout of a WebSocket's request, including the wait for the check of its token."""
 _ONCE = ("Host", "Origin", "Authorization")
-"""Headers that say where a request comes from: two of them say nothing."""
+"""Headers that identify a request's origin; a repeated one is ambiguous."""
 
 
 class RosbridgeServer:
     """Serves clients of the graph over WebSocket.
 
-    Whoever reaches the port commands the UAVs. So it listens on loopback unless `anywhere` is set,
-    and then asks for a token: as `{"op": "auth", "token": ...}` (also what roslib's `authenticate`
-    sends as `mac`), as `?token=` in the URL, or in the header `Authorization: Bearer`.
+    Clients of the port control the UAVs. So the server listens on loopback unless `anywhere` is
+    set, and then requires a token: as `{"op": "auth", "token": ...}` (also what roslib's
+    `authenticate` sends as `mac`), as `?token=` in the URL, or in the header
+    `Authorization: Bearer`.
 
-    A web page of a stranger, open in a browser on this machine, reaches loopback too. Browsers tell
-    whose page it is, and only pages from localhost, from the very address that is connected to, and
-    from `origins` are let in. Programs tell no origin and are let in.
+    A web page of another site, open in a browser on this machine, can connect to loopback too.
+    Browsers send the page's origin, and only pages from localhost, from the server's own address,
+    and from `origins` are accepted. Programs without an origin are accepted.
 
-    A client that does not read loses messages of its own; it delays nobody and is dismissed when it
-    answers no pings.
+    A client that does not read loses its own messages; it does not delay others, and the server
+    disconnects it when it answers no pings.
 
     Parameters
     ----------
     host, port
-        Where to listen; port 0 takes a free one, see `port`.
+        Listening address; port 0 takes a free port, see `port`.
     path
         The only path served, such as `/rosbridge`; None: every path.
     token
-        What clients must show; needed beyond loopback.
+        Token that clients must send; needed beyond loopback.
     anywhere
-        Consent to listening beyond loopback.
+        Allows listening beyond loopback.
     max_message_bytes
-        Largest message taken from a client.
+        Largest message accepted from a client.
     generation
-        Spelling and serialization that clients are given: `ros1` has `secs` and `nsecs`, types as
+        Spelling and serialization for clients: `ros1` has `secs` and `nsecs`, types as
         `std_msgs/String` and ROS 1 bytes in CBOR-RAW, `ros2` has `sec` and `nanosec`,
-        `std_msgs/msg/String` and CDR. Both are always understood.
+        `std_msgs/msg/String` and CDR. Both are always accepted.
     origins
-        Further web origins to let in, such as `https://studio.example.org`.
+        Further accepted web origins, such as `https://studio.example.org`.
     keepalive_s
-        Time between two pings, and how long an answer may take; None: no pings.
+        Time between two pings, and timeout of an answer; None: no pings.
 
     """
 
@@ -123,17 +124,17 @@ class RosbridgeServer:
 
     @property
     def name(self) -> str:
-        """What it is and where."""
+        """Name and address of the bridge."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"rosbridge ws://{host}:{self.port}{self._path or ''}"
 
     @property
     def clients(self) -> int:
-        """How many are connected."""
+        """Number of connected clients."""
         return len(self._clients)
 
     async def start(self, gateway: Gateway) -> None:
-        """Begin to serve.
+        """Starts the server.
 
         Raises
         ------
@@ -158,9 +159,9 @@ class RosbridgeServer:
                 logger=_handshakes,
                 process_request=self._check_request,
                 select_subprotocol=_select_subprotocol,
-                compression=None,  # deflating would cost more time than loopback and LANs do
+                compression=None,  # compression would cost more time than loopback and LANs do
                 max_size=self._most_bytes,
-                max_queue=1,  # what waits to be handled may be as large
+                max_queue=1,  # waiting messages may be as large
                 create_connection=guarded(self._token, self._most_bytes),
                 ping_interval=self._keepalive_s,
                 ping_timeout=self._keepalive_s,
@@ -178,7 +179,7 @@ class RosbridgeServer:
         self._transforms.start()
 
     async def stop(self) -> None:
-        """Let everybody go."""
+        """Disconnects all clients."""
         if self._rosapi is not None:
             self._rosapi.stop()
             self._rosapi = None
@@ -190,12 +191,12 @@ class RosbridgeServer:
             await self._server.wait_closed()
             self._server = None
 
-    # ------------------------------------------------------------------------------- who may come
+    # ---------------------------------------------------------------------------------- access
 
     async def _check_request(
         self, connection: ServerConnection, request: Request
     ) -> Response | None:
-        """Refuse strangers before they are connected."""
+        """Refuses unauthorized requests before they are connected."""
         url = urlsplit(request.path)
         if self._path is not None and url.path.rstrip("/") != self._path.rstrip("/"):
             return connection.respond(HTTPStatus.NOT_FOUND, f"rosbridge is at {self._path}\n")
@@ -207,7 +208,7 @@ class RosbridgeServer:
         origin = request.headers.get("Origin")
         if not self._origins.let_in(origin, request.headers.get("Host", "")):
             return connection.respond(
-                HTTPStatus.FORBIDDEN, f"pages of {origin} are not let in; list it in `origins`\n"
+                HTTPStatus.FORBIDDEN, f"pages of {origin} are not accepted; add it to `origins`\n"
             )
         given = parse_qs(url.query).get("token", [None])[0]
         scheme, _, bearer = request.headers.get("Authorization", "").partition(" ")
@@ -223,7 +224,7 @@ class RosbridgeServer:
         return None
 
     async def _is_token(self, given: str, connection: ServerConnection) -> bool:
-        """Whether this is the token, told in turn with others of the same address."""
+        """Returns whether this is the token; attempts of one address are checked in turn."""
         async with self._guesses.turn(_address_of(connection)):
             is_right = shows_token(given, self._token)
             if not is_right:
@@ -273,7 +274,7 @@ def _address_of(connection: ServerConnection) -> str:
 
 
 def _allow(connection: ServerConnection) -> None:
-    """Take large messages: the client has shown the token."""
+    """Accepts large messages: the client has sent the token."""
     if isinstance(connection, GuardedConnection):
         connection.allow()
 

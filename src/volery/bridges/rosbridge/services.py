@@ -1,4 +1,4 @@
-"""Services of one rosbridge client: those it calls, and those it offers."""
+"""Services of one rosbridge client: those it calls, and those it serves."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ MOST_CALLS = 1000
 Send = Callable[[Operation, int | None, str], None]
 """Sends an operation, with a fragment size and a compression."""
 Post = Callable[[Callable[[], None]], None]
-"""Has a function called in the client's thread, from any other."""
+"""Calls a function in the client's thread, from any other."""
 
 
 class RosbridgeServices:
-    """The services of one client. Its methods belong to the client's thread."""
+    """The services of one client. All methods belong to the client's thread."""
 
     def __init__(self, session: Session, forms: MessageEncoder, send: Send, post: Post) -> None:
         self._session = session
@@ -51,7 +51,7 @@ class RosbridgeServices:
     # ------------------------------------------------------------------------------------- calls
 
     def call(self, operation: Operation, now_s: float) -> None:
-        """Call a service for the client."""
+        """Calls a service for the client."""
         name, key = read_text(operation, "service"), read_id(operation)
         fragment_size = int(read_number(operation, "fragment_size", 0, 0, 1e9)) or None
         compression = read_choice(operation, "compression", ("none", "png", "cbor", "cbor-raw"))
@@ -105,28 +105,28 @@ class RosbridgeServices:
         self._session.call(service, request, reply)
 
     def _find(self, name: str) -> tuple[str, str]:
-        """Name in the graph, and type, of what a client calls `/add` or, long ago, `/add#3`."""
+        """Returns name in the graph and type of a client's `/add` or, in old clients, `/add#3`."""
         service = absolute(name.partition("#")[0])
         srvtype = self._session.graph.services().get(service)
         if srvtype is None:
-            raise GraphError(f"nobody offers service '{service}'")
+            raise GraphError(f"service '{service}' has no server")
         return service, srvtype
 
     def expire(self, now_s: float) -> None:
-        """Fail calls whose time is over."""
+        """Fails calls that have timed out."""
         late = [reply for deadline_s, reply in self._calls.values() if deadline_s <= now_s]
         for reply in late:
             reply.fail(GraphError("no answer in time"))
 
     def due_s(self) -> float | None:
-        """When the next call's time is over; None if there is no such."""
+        """Returns the time of the next timeout; None if there is none."""
         deadline_s = min((deadline_s for deadline_s, _ in self._calls.values()), default=None)
         return None if deadline_s == float("inf") else deadline_s
 
-    # ------------------------------------------------------------------------------------ offers
+    # ----------------------------------------------------------------------------------- servers
 
     def advertise(self, operation: Operation) -> None:
-        """Offer a service of the client's; a second time of the same type nothing changes."""
+        """Creates a service of the client; a repetition with the same type changes nothing."""
         name = read_text(operation, "service")
         srvtype = ros2_name(read_text(operation, "type"), "srv")
         if f"{srvtype}_Request" not in typestore().types:
@@ -145,13 +145,13 @@ class RosbridgeServices:
         self._offers[service] = (name, srvtype)
 
     def unadvertise(self, operation: Operation) -> None:
-        """Offer a service no more; open requests fail."""
+        """Destroys a service; open requests fail."""
         service = absolute(read_text(operation, "service"))
         self._session.withdraw(service)
         self._offers.pop(service, None)
 
     def _request(self, name: str, srvtype: str, request: Any, reply: ServiceReply) -> None:
-        """Hand a request to the client."""
+        """Sends a request to the client."""
         if len(self._requests) >= MOST_CALLS:
             reply.fail(GraphError(f"service '{name}': its server is busy"))
             return
@@ -169,7 +169,7 @@ class RosbridgeServices:
         self._requests.pop(number, None)
 
     def respond(self, operation: Operation) -> None:
-        """Take the client's response to a request."""
+        """Handles the client's response to a request."""
         number: Id = read_id(operation)
         found = self._requests.pop(number, None) if isinstance(number, str) else None
         if found is None:
@@ -177,19 +177,19 @@ class RosbridgeServices:
         service, srvtype, reply = found
         values = operation.get("values", {})
         if operation.get("result", True) is not True:
-            why = values if isinstance(values, str) else "its server says that it failed"
+            why = values if isinstance(values, str) else "its server reports a failure"
             reply.fail(GraphError(f"service '{service}': {why}"))
             return
         try:
             response = decode_plain({} if values is None else values, f"{srvtype}_Response")
         except GraphError as error:
-            reply.fail(GraphError(f"service '{service}' answered wrongly: {error}"))
+            reply.fail(GraphError(f"service '{service}' sent a wrong response: {error}"))
             raise
         reply.answer(response)
 
 
 def _arguments(operation: Operation, msgtype: str) -> Any:
-    """Arguments as an object, also where they came as a list in the order of the fields."""
+    """Returns arguments as an object, also if they came as a list in the order of the fields."""
     args = operation.get("args")
     if args is None:
         return {}

@@ -1,8 +1,8 @@
-"""Offers `/republish_tfs`, by which the TF clients of roslib and roslibpy follow frames.
+"""Offers `/republish_tfs`, with which the TF clients of roslib and roslibpy follow frames.
 
-Fields and behaviour are those of tf2_web_republisher (RobotWebTools): each request gets a topic
-that carries the poses of some frames in another one, whenever they have changed enough. The work
-is done in a thread of its own, by the time of the computer.
+Fields and behaviour are those of tf2_web_republisher (RobotWebTools): each request creates a topic
+with the poses of some frames in another one, published whenever they have changed enough. The work
+runs in its own thread, in wall time.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _SRVTYPE = "tf2_web_republisher/srv/RepublishTFs"
 _ARRAY = "tf2_web_republisher/msg/TFArray"
 _TF = "tf2_msgs/msg/TFMessage"
 _MOST_FRAMES = 500
-"""That are followed for all clients together."""
+"""Frames that are followed for all clients together."""
 _MOST_HZ, _USUAL_HZ = 30.0, 10.0
 _USUAL_TIMEOUT_S = 10.0
 _LONGEST_TIMEOUT_S = 600.0
@@ -34,7 +34,7 @@ _DEPTH = 1000
 
 
 class _Wish(NamedTuple):
-    """What a client asks for; equal ones share a topic."""
+    """A client's request; equal requests share a topic."""
 
     sources: tuple[str, ...]
     target: str
@@ -45,7 +45,7 @@ class _Wish(NamedTuple):
 
 @dataclass
 class _Topic:
-    """What is published for a wish."""
+    """Topic of a request."""
 
     name: str
     timeout_s: float
@@ -56,7 +56,7 @@ class _Topic:
 
 
 class TfRepublisher:
-    """The service, once `start`ed; its session and thread begin with the first request."""
+    """The service, after `start`; its session and thread begin with the first request."""
 
     def __init__(self, gateway: Gateway) -> None:
         self._gateway = gateway
@@ -71,13 +71,13 @@ class TfRepublisher:
         self._ended = threading.Event()
 
     def start(self) -> None:
-        """Offer the service; one that somebody offers already stays theirs."""
+        """Creates the service unless it exists already."""
         if not self._gateway.graph.has_service(SERVICE):
             self._gateway.graph.offer_async(SERVICE, _SRVTYPE, self._ask)
             self._is_offered = True
 
     def stop(self) -> None:
-        """Take it back, with its topics."""
+        """Destroys the service and its topics."""
         if self._is_offered:
             self._gateway.graph.withdraw(SERVICE)
         self._ended.set()
@@ -96,7 +96,7 @@ class TfRepublisher:
             reply.fail(error)
 
     def _follow(self, wish: _Wish, timeout_s: float) -> str:
-        """The topic of a wish. `GraphError` where there are too many."""
+        """Returns the topic of a request. Raises `GraphError` if there are too many."""
         if self._ended.is_set():
             raise GraphError(f"{SERVICE} has ended")
         with self._lock:
@@ -139,7 +139,7 @@ class TfRepublisher:
                 self._serve(wish, topic, now_s)
 
     def _serve(self, wish: _Wish, topic: _Topic, now_s: float) -> None:
-        """Publish what has changed, if it is due; end a topic that nobody subscribes to."""
+        """Publishes the changed frames, if due; ends a topic without subscribers."""
         assert self._session is not None
         before, topic.subscribers = (
             topic.subscribers,
@@ -157,7 +157,7 @@ class TfRepublisher:
                 self._session.unadvertise(topic.name)
             return
         if topic.subscribers > before:
-            topic.sent.clear()  # the new one knows nothing yet
+            topic.sent.clear()  # new subscribers need all frames
         if now_s < topic.due_s:
             return
         topic.due_s = now_s + 1.0 / wish.rate_hz

@@ -1,4 +1,4 @@
-"""Checks the token of a client that has not shown it with its request for a connection."""
+"""Checks the token of a client that did not send it in its request for a connection."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from volery.core.token_guesses import TokenGuesses
 
 @dataclass(frozen=True)
 class TokenCheck:
-    """What the frames of one client pass until it is authorized."""
+    """Checks the frames of one client until it is authorized."""
 
     guesses: TokenGuesses
     address: str
@@ -23,7 +23,7 @@ class TokenCheck:
     """Called once the client is authorized."""
 
     async def receive(self, peer: RosbridgePeer, frame: Frame) -> None:
-        """Hands a frame to the peer, in turn with other clients of the same address."""
+        """Passes a frame to the peer, in turn with other clients of the same address."""
         async with self.guesses.turn(self.address):
             peer.receive(frame, time.monotonic())
             if peer.refused is not None:

@@ -1,4 +1,4 @@
-"""Topics of one rosbridge client: what it publishes, and streams of what it subscribed to."""
+"""Topics of one rosbridge client: its publications and subscriptions."""
 
 from __future__ import annotations
 
@@ -29,37 +29,37 @@ from volery.graph.session import Session
 from volery.graph.subscription_queue import SubscriptionQueue
 
 MOST_STREAMS = 10_000
-"""Topics that a client may subscribe to, and publish on."""
+"""Largest number of topics that a client may subscribe to, and publish."""
 MOST_REQUESTS = 1000
-"""Subscriptions of one topic by one client."""
+"""Largest number of subscriptions of one topic by one client."""
 
 _HEADER = "std_msgs/msg/Header"
 
 
 @dataclass(frozen=True)
 class SubscriptionOptions:
-    """How one subscription wants its messages."""
+    """Options of one subscription."""
 
     throttle_s: float = 0.0
-    """Least time between two messages."""
+    """Minimum time between two messages."""
     queue_length: int = 0
-    """Messages that wait at most; 0: one if throttled, else the usual depth."""
+    """Largest number of queued messages; 0: one if throttled, else the default depth."""
     fragment_size: int | None = None
-    """Characters a fragment."""
+    """Characters per fragment."""
     compression: str = "none"
     reliable: bool = False
     """Whether no message may be lost."""
 
     @property
     def depth(self) -> int:
-        """Length of the mailbox."""
+        """Depth of the queue."""
         if self.queue_length:
             return self.queue_length
         return 1 if self.throttle_s else DEFAULT_DEPTH
 
 
 def read_wishes(operation: Operation) -> SubscriptionOptions:
-    """Wishes of a `subscribe` operation. `BridgeError` for values that cannot be."""
+    """Reads the options of a `subscribe` operation. Raises `BridgeError` for invalid values."""
     size = read_number(operation, "fragment_size", 0, 0, 1e9)
     qos = read_qos(operation)
     length = int(read_number(operation, "queue_length", 0, 0, MOST_DEPTH))
@@ -73,7 +73,10 @@ def read_wishes(operation: Operation) -> SubscriptionOptions:
 
 
 def combine(wishes: list[SubscriptionOptions]) -> SubscriptionOptions:
-    """What satisfies all: lowest throttle, longest queue, smallest fragments, most compact form."""
+    """Returns options that satisfy all subscriptions.
+
+    These are the lowest throttle, longest queue, smallest fragments and most compact form.
+    """
     sizes = [w.fragment_size for w in wishes if w.fragment_size]
     return SubscriptionOptions(
         min(w.throttle_s for w in wishes),
@@ -85,24 +88,24 @@ def combine(wishes: list[SubscriptionOptions]) -> SubscriptionOptions:
 
 
 class TopicStream:
-    """One topic on its way to one client."""
+    """One topic's messages for one client."""
 
     def __init__(self, name: str, msgtype: str | None) -> None:
         self.name = name
-        """As the client calls the topic."""
+        """The client's name of the topic."""
         self.msgtype = msgtype
         self.requests: dict[Id, SubscriptionOptions] = {}
         self.wishes = SubscriptionOptions()
         self.mailbox: SubscriptionQueue | None = None
         self._tuned = (0, False)
         self._left: deque[Published] = deque()
-        """What waited in a mailbox that another one has replaced."""
+        """Messages of a queue that another one has replaced."""
         self._next_s = float("-inf")
 
     def tune(self, session: Session, wake: Callable[[], None], *, anew: bool) -> None:
-        """Fit the mailbox to the requests.
+        """Adapts the queue to the requests.
 
-        anew: somebody joined, who shall get what is latched though it was sent before.
+        anew: a new subscription needs latched messages even if they were sent before.
         """
         self.wishes = combine(list(self.requests.values()))
         depth, reliable = tuned = self.wishes.depth, self.wishes.reliable
@@ -115,14 +118,14 @@ class TopicStream:
         if self.mailbox is not None:
             session.unsubscribe(self.mailbox)
             waiting = self.mailbox.take()
-        # both mailboxes were open for a moment: what came meanwhile lies in both
+        # both queues were open for a moment and may have the same messages
         seen = {id(published) for published in (*self._left, *waiting)}
         new = [published for published in mailbox.take() if id(published) not in seen]
         self._left = deque((*self._left, *waiting, *new), maxlen=None if reliable else depth)
         self.mailbox, self._tuned = mailbox, tuned
 
     def take(self, now_s: float) -> Published | None:
-        """The next message, if there is one and its time has come."""
+        """Returns the next message, if one is due."""
         if now_s < self._next_s or self.mailbox is None:
             return None
         if self._left:
@@ -138,11 +141,11 @@ class TopicStream:
 
     @property
     def failure(self) -> str | None:
-        """Why nothing comes any more, if so."""
+        """Why no more messages will arrive, if so."""
         return None if self.mailbox is None else self.mailbox.failure
 
     def due_s(self, now_s: float) -> float | None:
-        """When to look again; None until the mailbox wakes."""
+        """Returns when to check again; None until the queue wakes."""
         if self.mailbox is None or not (self._left or self.mailbox.info.waiting):
             return None
         return max(now_s, self._next_s)
@@ -170,12 +173,12 @@ class RosbridgeTopics:
         self._streams: dict[str, TopicStream] = {}
         self._published: dict[str, str] = {}
         self._ready: deque[TopicStream] = deque()
-        """Streams whose mailboxes have woken; the simulation's thread appends."""
+        """Streams whose queues have woken; the simulation's thread appends."""
         self._held: list[TopicStream] = []
-        """Streams with messages whose time has not come."""
+        """Streams whose messages are not due yet."""
 
     def advertise(self, operation: Operation) -> None:
-        """Announce a topic that the client will publish on."""
+        """Advertises a topic of the client."""
         topic = absolute(read_text(operation, "topic"))
         msgtype = ros2_name(read_text(operation, "type"))
         if topic not in self._published and len(self._published) >= MOST_STREAMS:
@@ -186,13 +189,13 @@ class RosbridgeTopics:
         self._published[topic] = msgtype
 
     def unadvertise(self, operation: Operation) -> None:
-        """Take an announcement back."""
+        """Ends an advertisement."""
         topic = absolute(read_text(operation, "topic"))
         self._session.unadvertise(topic)
         self._published.pop(topic, None)
 
     def publish(self, operation: Operation) -> None:
-        """Publish a message; a topic that exists need not be announced."""
+        """Publishes a message; an existing topic need not be advertised."""
         topic = absolute(read_text(operation, "topic"))
         msgtype = self._published.get(topic)
         if msgtype is None:
@@ -208,7 +211,7 @@ class RosbridgeTopics:
         self._session.publish(topic, message)
 
     def _stamp(self, message: Any, plain: dict[str, Any], msgtype: str) -> None:
-        """Give a header that came without a stamp the present time, as rosbridge does."""
+        """Sets the stamp of a header without one to the current time, as rosbridge does."""
         fields = typestore().fielddefs[msgtype][1]
         if not fields or fields[0][0] != "header" or fields[0][1][1] != _HEADER:
             return
@@ -218,7 +221,7 @@ class RosbridgeTopics:
             stamp.sec, stamp.nanosec = stamp_from_ns(self._now_ns())
 
     def subscribe(self, operation: Operation) -> None:
-        """Begin to send a topic, or fit its stream to one more request."""
+        """Subscribes to a topic, or adapts its stream to one more request."""
         name, key = read_text(operation, "topic"), read_id(operation)
         given = read_optional_text(operation, "type")
         msgtype = ros2_name(given) if given not in (None, "*") else None
@@ -243,7 +246,7 @@ class RosbridgeTopics:
         self._streams[name] = stream
 
     def unsubscribe(self, operation: Operation) -> None:
-        """End one subscription of a topic, or all of them where none is named."""
+        """Ends one subscription of a topic, or all of them if none is named."""
         name, key = read_text(operation, "topic"), read_id(operation)
         stream = self._streams.get(name)
         if stream is None or (key is not None and key not in stream.requests):
@@ -258,21 +261,21 @@ class RosbridgeTopics:
         self._end(stream)
 
     def _end(self, stream: TopicStream) -> None:
-        """Send a topic no more."""
+        """Ends a stream."""
         stream.requests.clear()
         self._streams.pop(stream.name, None)
         if stream.mailbox is not None:
             self._session.unsubscribe(stream.mailbox)
 
     def take(self, now_s: float) -> Iterator[tuple[TopicStream, Published]]:
-        """Messages whose time has come, in turn one of every stream."""
+        """Yields due messages, one of every stream in turn."""
         ready = [self._ready.popleft() for _ in range(len(self._ready))]
         busy = list(dict.fromkeys((*self._held, *ready)))
         self._held = []
         while busy:
             still = []
             for stream in busy:
-                if not stream.requests:  # left while others were being sent
+                if not stream.requests:  # unsubscribed while others were being sent
                     continue
                 published = stream.take(now_s)
                 if published is not None:
@@ -286,7 +289,7 @@ class RosbridgeTopics:
             busy = still
 
     def due_s(self, now_s: float) -> float | None:
-        """When to `take` again without being woken; None if there is nothing to wait for."""
+        """Returns when to `take` again without a wake-up; None if nothing is pending."""
         times = [stream.due_s(now_s) for stream in self._held if stream.requests]
         return min((time for time in times if time is not None), default=None)
 
@@ -296,4 +299,4 @@ class RosbridgeTopics:
             self._wake()
 
         stream.tune(self._session, wake, anew=anew)
-        wake()  # what is latched, or waited in the mailbox before this one, is there already
+        wake()  # latched messages, and those of the previous queue, are available already

@@ -1,4 +1,4 @@
-"""One client's WebSocket, whoever serves it: its frames to its peer, what that says back to it.
+"""Exchanges frames between one client's WebSocket and its peer.
 
 await converse(channel, bell, peer, bulk)
 """
@@ -18,29 +18,32 @@ from volery.bridges.rosbridge.token_check import TokenCheck
 from volery.bridges.rosbridge.wire import Frame
 
 POLICY_VIOLATION = 1008
-"""RFC 6455, 7.4.1: the client broke a rule, such as to show a token."""
+"""RFC 6455, 7.4.1: the client violated a policy, such as to send a token."""
 SERVICE_RESTART = 1012
-"""IANA's WebSocket Close Code Number Registry: the client should connect again."""
+"""IANA's WebSocket Close Code Number Registry: the client should reconnect."""
 
 _LONGEST_SILENCE_S = 10.0
-"""Time a client has to show its token."""
+"""Time within which a client must send its token."""
 
 
 class WebSocketSession(Protocol):
-    """A WebSocket that stands. All methods raise where it does no more."""
+    """An open WebSocket. All methods raise after it has closed."""
 
     async def recv(self) -> Frame:
-        """Wait for a message."""
+        """Waits for a message."""
 
     async def send(self, message: Frame, /) -> None:
-        """Send a message; returns when the network has taken so much that it may take the next."""
+        """Sends a message; returns when the network is ready for the next one."""
 
     async def close(self, code: int = ..., reason: str = ...) -> None:
-        """Take leave."""
+        """Closes the connection."""
 
 
 class Bell:
-    """Wakes a writer from any thread; rung often before it is heard, it costs the ringer once."""
+    """Wakes a writer from any thread.
+
+    Repeated calls before the writer runs cost only one wake-up.
+    """
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self.heard = asyncio.Event()
@@ -48,19 +51,19 @@ class Bell:
         self._rung = False
 
     def ring(self) -> None:
-        """Wake the writer."""
+        """Wakes the writer."""
         if not self._rung:
             self._rung = True
             self._wake()
 
     def silence(self) -> None:
-        """Called before looking at what there is: who rings afterwards is heard again."""
+        """Resets the bell, before the writer checks for frames; later calls wake it again."""
         self.heard.clear()
         self._rung = False
 
 
 def post_to(loop: asyncio.AbstractEventLoop) -> Callable[[Callable[[], Any]], None]:
-    """What a peer's `post` is where its client is served in `loop`."""
+    """Returns a peer's `post` for a client that is served in `loop`."""
 
     def post(action: Callable[[], Any]) -> None:
         wake_of(loop, action)()
@@ -75,11 +78,11 @@ async def converse(
     bulk: BulkTurns,
     checkpoint: TokenCheck | None = None,
 ) -> Exception | None:
-    """Serve a client until it leaves or must go, then close its peer.
+    """Serves a client until it leaves or must be disconnected, then closes its peer.
 
-    bell: what the peer's `wake` rings. bulk: turns of all clients of this loop. checkpoint: of a
-    client that must show a token. Returns what ended the service unless that was its own end:
-    mostly that the connection was closed.
+    bell: rung by the peer's `wake`. bulk: turns of all clients of this loop. checkpoint: of a
+    client that must send a token. Returns the exception that ended the service, usually the closed
+    connection.
     """
     read = asyncio.Event()
     writer = Writer(bulk)
@@ -104,7 +107,7 @@ async def _read(
     read: asyncio.Event,
     checkpoint: TokenCheck | None,
 ) -> None:
-    """Hand the client's frames to its peer until it leaves or must go."""
+    """Passes the client's frames to its peer until it leaves or must be disconnected."""
     spent_s = 0.0
     while peer.refused is None:
         silence_s = None if peer.authorized else _LONGEST_SILENCE_S
@@ -112,21 +115,21 @@ async def _read(
             async with asyncio.timeout(silence_s):  # unlike wait_for it loses no cancellation
                 frame = await channel.recv()
         except TimeoutError:
-            await channel.close(POLICY_VIOLATION, "no token was shown")
+            await channel.close(POLICY_VIOLATION, "no token was sent")
             return
         peer.reading.begin()
         if peer.authorized or checkpoint is None:
             peer.receive(frame, time.monotonic())
         else:
             await checkpoint.receive(peer, frame)
-            peer.reading.begin()  # the checkpoint lets others have their turn
+            peer.reading.begin()  # the checkpoint gives others their turn
         spent_s += peer.reading.end(1, len(frame))
-        if spent_s >= TURN_S:  # `recv` does not wait where a frame is there
+        if spent_s >= TURN_S:  # `recv` does not wait if a frame is available
             spent_s = 0.0
             await asyncio.sleep(0)
         while (pause_s := peer.reading.pause_s()) and peer.refused is None:
             await asyncio.sleep(pause_s)
-        while peer.congested:  # it asks for more than it reads
+        while peer.congested:  # the client requests more than it reads
             read.clear()
             await read.wait()
     for answer in peer.frames(time.monotonic()):
@@ -137,7 +140,7 @@ async def _read(
 async def _write(
     channel: WebSocketSession, peer: RosbridgePeer, bell: Bell, turns: Writer, read: asyncio.Event
 ) -> None:
-    """Send what the peer has to say, as fast as the client reads."""
+    """Sends the peer's frames, as fast as the client reads."""
     while True:
         bell.silence()
         await turns.begin()
@@ -160,7 +163,7 @@ async def _write(
 
 
 def _next(peer: RosbridgePeer, frames: Iterator[Frame]) -> tuple[Frame | None, float]:
-    """Returns the next frame and the s that making it costs, charged to the client."""
+    """Returns the next frame and the time to make it, s, charged to the client."""
     peer.writing.begin()
     frame = next(frames, None)
     return frame, peer.writing.end(1, 0 if frame is None else len(frame))

@@ -1,7 +1,7 @@
-"""Frames of rosbridge v2: operations as JSON text, as CBOR, inside PNG pictures.
+"""Encodes rosbridge v2 frames: operations as JSON text, as CBOR, inside PNG images.
 
-An operation is a dict with the key `op`. A text frame holds JSON, a binary frame CBOR. Large ones
-may travel as a PNG picture or in fragments (`bridges.rosbridge.fragments`).
+An operation is a dict with the key `op`. A text frame contains JSON, a binary frame CBOR. Large
+operations may be sent as a PNG image or in fragments (`bridges.rosbridge.fragments`).
 """
 
 from __future__ import annotations
@@ -20,26 +20,27 @@ from volery.bridges.rosbridge.message_budget import check_cbor, check_json
 from volery.core.errors import BridgeError
 
 Frame = str | bytes
-"""What one WebSocket message carries."""
+"""Content of one WebSocket message."""
 Operation = dict[str, Any]
 
 CBOR_PROTOCOL = "rosbridge-cbor"
-"""WebSocket subprotocol by which a client learns that it may send CBOR."""
+"""WebSocket subprotocol that tells a client that it may send CBOR."""
 MOST_MESSAGE_BYTES = 64 * 1024 * 1024
-"""Largest message that a client takes from a server; `message_budget` has what servers take."""
+"""Largest message that a client accepts from a server; `message_budget` has the limits of servers.
+"""
 
 _PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 
 
 def decode_frame(frame: Frame, *, limited: bool = False) -> Operation:
-    """Operation that a frame holds.
+    """Returns the operation in a frame.
 
-    limited: it comes from a client, and may hold no more than `message_budget` allows.
+    limited: the frame is from a client and must obey `message_budget`.
 
     Raises
     ------
     BridgeError
-        It holds none, or too much.
+        The frame has no operation, or exceeds the budget.
 
     """
     if limited:
@@ -51,18 +52,18 @@ def decode_frame(frame: Frame, *, limited: bool = False) -> Operation:
 
 
 def encode_json(operation: Operation) -> str:
-    """JSON text, pure ASCII. Arrays become lists, bytes base64, numbers that are not finite null.
+    """Returns ASCII JSON text; arrays become lists, bytes base64, non-finite numbers null.
 
     Raises
     ------
     BridgeError
-        It holds what JSON cannot say.
+        The operation has a value without a JSON form.
 
     """
     try:
         return _dump(operation)
     except ValueError:
-        pass  # a number that is not finite, which is rare
+        pass  # a non-finite number, which is rare
     except (TypeError, RecursionError) as error:
         raise BridgeError(f"not writable as JSON: {error}") from None
     try:
@@ -72,7 +73,10 @@ def encode_json(operation: Operation) -> str:
 
 
 def encode_png(text: str) -> str:
-    """Operation that carries JSON text as a picture: RGB, nearly square, padded with newlines."""
+    """Returns the operation that carries JSON text as an image.
+
+    The image is RGB, nearly square, padded with newlines.
+    """
     from PIL import Image
 
     data = text.encode()
@@ -85,12 +89,12 @@ def encode_png(text: str) -> str:
 
 
 def decode_png(operation: Operation, most_bytes: int, *, limited: bool = False) -> Operation:
-    """Operation inside a picture whose pixels hold at most `most_bytes`; `limited`: as above.
+    """Returns the operation in an image of at most `most_bytes` pixel bytes; `limited`: as above.
 
     Raises
     ------
     BridgeError
-        There is no picture, it is too large, or it holds no operation.
+        There is no image, it is too large, or it has no operation.
 
     """
     from PIL import Image, UnidentifiedImageError
@@ -101,7 +105,7 @@ def decode_png(operation: Operation, most_bytes: int, *, limited: bool = False) 
     try:
         data = base64.b64decode(text, validate=True)
         if not data.startswith(_PNG_MAGIC):
-            raise BridgeError("png: 'data' is no PNG picture")
+            raise BridgeError("png: 'data' is not a PNG image")
         with Image.open(BytesIO(data), formats=("PNG",)) as image:
             if 3 * image.width * image.height > most_bytes:
                 raise BridgeError(f"png: more than {most_bytes} bytes of pixels")
@@ -111,7 +115,7 @@ def decode_png(operation: Operation, most_bytes: int, *, limited: bool = False) 
         raise BridgeError(f"png: not readable: {error}") from None
     found = decode_frame(inside, limited=limited)
     if found["op"] == "png":
-        raise BridgeError("png: a picture inside a picture")
+        raise BridgeError("png: an image inside an image")
     return found
 
 
@@ -127,7 +131,7 @@ def _dump(value: Any) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """What arrives as CBOR and leaves as JSON."""
+    """Converts values that arrive as CBOR and leave as JSON."""
     if isinstance(value, np.ndarray):
         if value.dtype == np.uint8:
             return base64.b64encode(value.tobytes()).decode("ascii")

@@ -1,11 +1,11 @@
-"""The ROS side of the sensor link: it connects, and fills a graph of its own with what it gets.
+"""The ROS side of the sensor link: connects, and publishes received frames on its own graph.
 
     with BridgeHost(gateway) as bridges:
         bridges.open(SensorLinkClient("127.0.0.1", 10100, image_port=10101))
 
-Everything that the environment measures appears under its topic (`/uav1/laser/horizontal/scan`);
-poses published on `/uavN/pose_command` and `/uavN/goal_pose` go to the environment. When the
-connection breaks it is made again.
+All measurements of the environment appear under their topics (`/uav1/laser/horizontal/scan`); poses
+published on `/uavN/pose_command` and `/uavN/goal_pose` are sent to the environment. The client
+reconnects after a break.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ _NOTICES_KEPT = 100
 
 
 class SensorLinkClient:
-    """A bridge to an environment that speaks the sensor link.
+    """A bridge to an environment with the sensor link.
 
-    image_port: None leaves images alone. Counters are for reading only.
+    image_port: None ignores images. Counters are for reading only.
     """
 
     def __init__(
@@ -62,25 +62,25 @@ class SensorLinkClient:
         self._commands: dict[tuple[SensorLinkKind, int], SubscriptionQueue] = {}
         self._sent = 0
         self.received = 0
-        """Messages received."""
+        """Number of received messages."""
         self.lost = 0
-        """Messages missing from the sequences."""
+        """Number of messages missing from the sequences."""
         self.corrupt = 0
-        """Frames that came damaged on connections which have ended."""
+        """Number of damaged frames on connections which have ended."""
         self.refused = 0
-        """Frames that could not be made into a message of this graph."""
+        """Number of frames that could not be converted to a message of this graph."""
         self.unsent = 0
-        """Commands that found no connection, or one that did not move."""
+        """Number of commands without a connection, or on a stalled one."""
         self.notices: deque[str] = deque(maxlen=_NOTICES_KEPT)
-        """What the environment had to say, newest last."""
+        """Notices of the environment, newest last."""
 
     @property
     def name(self) -> str:
-        """What it is and where."""
+        """Name and address of the bridge."""
         return f"sensor link to {self._host}:{self._port}"
 
     async def start(self, gateway: Gateway) -> None:
-        """Connect. `BridgeError` where nobody listens."""
+        """Connects. Raises `BridgeError` if no server listens."""
         self._session: Session = gateway.open(self.name)
         self._wake = wake_of(asyncio.get_running_loop(), self._send_commands)
         ports = [self._port] if self._image_port is None else [self._port, self._image_port]
@@ -89,7 +89,7 @@ class SensorLinkClient:
             self._tasks.append(asyncio.create_task(self._stay(port, *streams)))
 
     async def stop(self) -> None:
-        """Disconnect."""
+        """Disconnects."""
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -102,7 +102,7 @@ class SensorLinkClient:
             reader, writer = await asyncio.open_connection(self._host, port, limit=2 * _READ_BYTES)
         except (OSError, OverflowError) as error:
             raise BridgeError(
-                f"sensor link: nobody listens on {self._host}:{port} ({error}): "
+                f"sensor link: no server on {self._host}:{port} ({error}): "
                 "start the simulation with this bridge, or name its port"
             ) from None
         if port == self._port:
@@ -112,7 +112,7 @@ class SensorLinkClient:
     async def _stay(
         self, port: int, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
     ) -> None:
-        """Read until the end of the connection, make it again, for ever."""
+        """Reads until the end of the connection and reconnects, for ever."""
         while True:
             try:
                 await self._read(reader)
@@ -165,13 +165,13 @@ class SensorLinkClient:
         key = (frame.kind, topic)
         before = self._sequences.get(key)
         self._sequences[key] = frame.sequence
-        if before is not None and frame.sequence > before:  # else the environment began anew
+        if before is not None and frame.sequence > before:  # else the environment restarted
             self.lost += frame.sequence - before - 1
 
     # ------------------------------------------------------------------------------------ commands
 
     def _listen_to(self, uav: int) -> None:
-        """Carry the commands for a UAV from now on."""
+        """Forwards the commands for a UAV from now on."""
         if (SensorLinkKind.POSE_COMMAND, uav) in self._commands:
             return
         for kind, topic in COMMAND_TOPICS.items():

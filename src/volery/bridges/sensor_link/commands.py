@@ -1,4 +1,4 @@
-"""What the ROS side sends over the sensor link, checked and published in the graph."""
+"""Checks and publishes the commands that the ROS side sends over the sensor link."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ COMMAND_TOPICS = {
     SensorLinkKind.POSE_COMMAND: "pose_command",
     SensorLinkKind.GOAL_POSE: "goal_pose",
 }
-"""Topics below the UAV's."""
+"""Topics below the UAV's namespace."""
 
 _DEPTH = 2
-"""A pose makes those before it void: while the simulation is busy few need to wait."""
+"""Queue depth: a pose replaces earlier ones, so that few need to wait."""
 _UNIT_TOLERANCE = 0.01
 
 
@@ -30,7 +30,10 @@ class SensorLinkCommands:
         self._inlets: dict[tuple[int, int], IncomingQueue] = {}
 
     def take(self, frame: SensorLinkFrame) -> None:
-        """Publish the command of a frame; `BridgeError` tells why it cannot be."""
+        """Publishes the command of a frame.
+
+        Raises `BridgeError` with the reason if it is invalid.
+        """
         topic = (
             COMMAND_TOPICS.get(SensorLinkKind(frame.kind))
             if frame.kind in list(SensorLinkKind)
@@ -38,7 +41,7 @@ class SensorLinkCommands:
         )
         if topic is None:
             known = ", ".join(f"{kind.name} ({int(kind)})" for kind in COMMAND_TOPICS)
-            raise BridgeError(f"frames of type {frame.kind} are not taken here, only {known}")
+            raise BridgeError(f"frames of type {frame.kind} are not accepted here, only {known}")
         kind = SensorLinkKind(frame.kind)
         _, pose = decode_payload(kind, frame.payload, frame.stamp_ns)
         _check_pose(pose, may_keep_heading=kind is SensorLinkKind.GOAL_POSE)
@@ -61,8 +64,8 @@ class SensorLinkCommands:
 
 def _check_pose(stamped: Any, *, may_keep_heading: bool) -> None:
     if stamped.header.frame_id not in ("", "map"):
-        raise BridgeError(f"poses are in 'map', not in '{stamped.header.frame_id}'")
+        raise BridgeError(f"poses must be in 'map', not in '{stamped.header.frame_id}'")
     turn = stamped.pose.orientation
     length = math.hypot(turn.x, turn.y, turn.z, turn.w)
     if abs(length - 1.0) > _UNIT_TOLERANCE and not (may_keep_heading and length == 0.0):
-        raise BridgeError(f"a quaternion has length 1, not {length:.3g}")
+        raise BridgeError(f"a quaternion must have length 1, not {length:.3g}")

@@ -1,7 +1,7 @@
-"""Frames that wait for one client of the sensor link: the newest few of each sensor.
+"""Frames for one client of the sensor link: the newest few of each sensor.
 
-A client who does not read loses frames of its own, costs a bounded amount of memory and delays
-nobody. Sensors take turns, so that one with a high rate does not starve the others.
+A client that does not read loses its own frames, costs a bounded amount of memory and does not
+delay others. Sensors take turns, so that one with a high rate does not starve the others.
 """
 
 from __future__ import annotations
@@ -11,17 +11,17 @@ from collections.abc import Hashable
 
 
 class SensorLinkOutbox:
-    """Bounded queues of frames, one a sensor. depth: frames that may wait in each."""
+    """Bounded queues of frames, one per sensor. depth: frames that may wait in each."""
 
     def __init__(self, depth: int) -> None:
         self._depth = depth
         self._waiting: dict[Hashable, deque[bytes]] = {}
         self._turns: deque[Hashable] = deque()
         self.dropped = 0
-        """Frames that had to go for newer ones."""
+        """Number of frames dropped for newer ones."""
 
     def put(self, sensor: Hashable, frame: bytes) -> None:
-        """Add a frame; the sensor's oldest goes where there is no room."""
+        """Adds a frame; without room the sensor's oldest one is dropped."""
         queue = self._waiting.get(sensor)
         if queue is None:
             queue = self._waiting[sensor] = deque(maxlen=self._depth)
@@ -31,7 +31,7 @@ class SensorLinkOutbox:
         queue.append(frame)
 
     def take(self) -> bytes | None:
-        """Remove and return the next frame; None where nothing waits."""
+        """Removes and returns the next frame; None if nothing waits."""
         if not self._turns:
             return None
         sensor = self._turns.popleft()

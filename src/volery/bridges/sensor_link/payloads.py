@@ -3,11 +3,11 @@
 All numbers are little-endian, without padding. `text` is a u8 length and so many bytes of UTF-8.
 Every payload of a sensor ends with two texts: its `name`, which is its topic below the UAV's
 (`laser/horizontal/scan`; the frame's head has the UAV's number), and the `frame_id` of its header.
-Distances are in metres, angles in radians, quaternions x y z w. The stamp stands in the head.
+Distances are in metres, angles in radians, quaternions x y z w. The stamp is in the head.
 
 LASER_SCAN (1), `sensor_msgs/LaserScan`: 7 x f32 `angle_min`, `angle_max`, `angle_increment` (rad,
 counter-clockwise from above), `time_increment`, `scan_time` (s), `range_min`, `range_max` (m) ·
-u32 r · u32 i · r x f32 `ranges` (m; +inf: nothing in reach, -inf: too close) · i x f32
+u32 r · u32 i · r x f32 `ranges` (m; +inf: no return, -inf: too close) · i x f32
 `intensities` (i is 0 or r) · text name · text frame_id
 
 POSE (2), `nav_msgs/Odometry`: 3 x f64 position (m, ENU, in frame_id) · 4 x f64 attitude, body to
@@ -20,18 +20,18 @@ specific force (m/s2, FLU) · 3 x f64 variances of each of the three; the first 
 attitude is not known · text name · text frame_id
 
 SONAR (4), `sensor_msgs/Range`: u8 radiation type (0 ultrasound, 1 infrared) · 5 x f32 field of view
-(rad), `min_range`, `max_range`, `range` (m; +inf nothing in reach, -inf too close), variance (m2) ·
+(rad), `min_range`, `max_range`, `range` (m; +inf no return, -inf too close), variance (m2) ·
 text name · text frame_id
 
 IMAGE (5), `sensor_msgs/Image`: u32 height · u32 width (pixels) · u32 step (bytes a row) · u8
 big-endian (0 or 1) · u32 n · n bytes of pixels · text encoding (`rgb8`, `32FC1` in metres...) ·
 text name · text frame_id
 
-NOTICE (127), to whoever sent something that cannot be done: the rest is UTF-8 for people.
+NOTICE (127), to the sender of an invalid frame: the rest is UTF-8 text.
 
 POSE_COMMAND (128) and GOAL_POSE (129), `geometry_msgs/PoseStamped`: 3 x f64 position (m, ENU, in
 frame_id, which is `map` or empty) · 4 x f64 attitude; all zeros in a goal keep the heading · text
-frame_id. The first puts a UAV with the kinematic plant there, the second sends any UAV there.
+frame_id. The first teleports a UAV with the kinematic plant, the second sends any UAV there.
 """
 
 from __future__ import annotations
@@ -74,24 +74,24 @@ _IMAGE = struct.Struct("<3IBI")
 _COMMAND = struct.Struct("<7d")
 _LONGEST_TEXT_BYTES = 255
 _STAMP_LIMIT_NS = (1 << 31) * NS_PER_S
-"""ROS stamps have seconds of 31 bits."""
+"""Limit of ROS stamps, whose seconds have 31 bits."""
 
 Encoder = Callable[[Any, str], bytes]
 Decoder = Callable[["_Reader", int], tuple[str, Any]]
 
 
 class Payload(NamedTuple):
-    """How one type of payload is made and read."""
+    """Encoder and decoder of one type of payload."""
 
     msgtype: str
     encode: Encoder
-    """Message and name to bytes."""
+    """Converts message and name to bytes."""
     decode: Decoder
-    """Bytes and stamp in nanoseconds to name and message."""
+    """Converts bytes and stamp in nanoseconds to name and message."""
 
 
 class _Reader:
-    """Takes fields off a payload; `BridgeError` where there are not enough bytes."""
+    """Reads fields from a payload. Raises `BridgeError` if there are not enough bytes."""
 
     def __init__(self, data: bytes) -> None:
         self._data = data
@@ -126,7 +126,7 @@ class _Reader:
 
 
 def encode_payload(kind: SensorLinkKind, message: Any, name: str = "") -> bytes:
-    """Payload of a ROS message; `name`: its topic below the UAV's, unused for commands.
+    """Returns the payload of a ROS message; `name`: its topic below the UAV's, unused for commands.
 
     Raises
     ------
@@ -141,12 +141,12 @@ def encode_payload(kind: SensorLinkKind, message: Any, name: str = "") -> bytes:
 
 
 def decode_payload(kind: int, payload: bytes, stamp_ns: int) -> tuple[str, Any]:
-    """Name and ROS message of a payload; its arrays are read-only.
+    """Returns name and ROS message of a payload; its arrays are read-only.
 
     Raises
     ------
     BridgeError
-        The type is not known, or the bytes are no payload of that type.
+        The type is unknown, or the bytes are no payload of that type.
 
     """
     if kind not in PAYLOADS:
@@ -160,17 +160,17 @@ def decode_payload(kind: int, payload: bytes, stamp_ns: int) -> tuple[str, Any]:
 
 
 def encode_notice(text: str) -> bytes:
-    """Payload of a NOTICE."""
+    """Returns the payload of a NOTICE."""
     return text.encode()
 
 
 def decode_notice(payload: bytes) -> str:
-    """Text of a NOTICE, whatever was sent."""
+    """Returns the text of a NOTICE; invalid bytes are replaced."""
     return payload.decode(errors="replace")
 
 
 def stamp_of(message: Any) -> int:
-    """Nanoseconds of a message's header."""
+    """Returns the stamp of a message's header, ns."""
     stamp = message.header.stamp
     return int(stamp.sec) * NS_PER_S + int(stamp.nanosec)
 

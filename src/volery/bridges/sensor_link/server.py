@@ -1,9 +1,10 @@
-"""The environment's side of the sensor link: it listens, and tells everyone who connects.
+"""The environment's side of the sensor link: listens, and sends frames to all clients.
 
     bridges.open(SensorLink(port=10100, image_port=10101))
 
-Every client gets the frames of all sensors of all UAVs, and may send poses. Images go out on a port
-of their own, so that scans wait for none. Form of the frames: `volery.bridges.sensor_link.wire`.
+Every client receives the frames of all sensors of all UAVs, and may send poses. Images have a port
+of their own, so that scans do not wait for them. Form of the frames:
+`volery.bridges.sensor_link.wire`.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ DEPTH = 20
 """Frames of one sensor that wait for a client: half a second of a scanner with 40 Hz."""
 IMAGE_DEPTH = 1
 MOST_CLIENTS = 64
-"""On each port."""
+"""Largest number of clients on each port."""
 
 _COMMAND_LIMIT_BYTES = 4096
 _WRITE_BUFFER_BYTES = 128 << 10
@@ -49,15 +50,15 @@ _WRITE_BUFFER_BYTES = 128 << 10
 
 @dataclass(frozen=True)
 class ClientInfo:
-    """How a client fares."""
+    """State of a client."""
 
     name: str
     received: int
-    """Frames that came from it whole."""
+    """Number of valid frames from it."""
     corrupt: int
-    """Those that did not."""
+    """Number of damaged frames from it."""
     dropped: int
-    """Frames that it was too slow for."""
+    """Number of frames for which it was too slow."""
     waiting: int
 
 
@@ -69,13 +70,13 @@ class SensorLink:
     host
         Address to listen on.
     port, image_port
-        Ports of sensors and of images; 0 takes a free one, and the attribute tells which.
+        Ports of sensors and of images; 0 takes a free port, see the attribute.
     anywhere
-        Consent to a `host` beyond loopback: the protocol carries no password.
+        Allows a `host` beyond loopback: the protocol carries no password.
     image_rate_hz
-        Images of each camera a simulated second, at most; None: all.
+        Largest rate of each camera's images, Hz of simulated time; None: all.
     depth
-        Frames of each sensor that wait for a client that does not keep up; the newest are kept.
+        Queue depth of each sensor for a slow client; the oldest frames are dropped.
 
     """
 
@@ -97,7 +98,7 @@ class SensorLink:
 
     @property
     def name(self) -> str:
-        """What it is and where."""
+        """Name and address of the bridge."""
         return f"sensor link {self._host}:{self.port}, images {self.image_port}"
 
     @property
@@ -112,16 +113,16 @@ class SensorLink:
 
     @property
     def clients(self) -> tuple[ClientInfo, ...]:
-        """Everyone who is connected, those who get images last."""
+        """All connected clients, those of images last."""
         return (*self._sensors.infos(), *self._images.infos())
 
     async def start(self, gateway: Gateway) -> None:
-        """Listen. `BridgeError` where a port is in use or the host is not ours."""
+        """Starts listening. Raises `BridgeError` if a port is in use or the host is not local."""
         for port in (self._sensors, self._images):
             await port.open(gateway)
 
     async def stop(self) -> None:
-        """Let all clients go."""
+        """Disconnects all clients."""
         for port in (self._sensors, self._images):
             await port.close()
 
@@ -152,7 +153,7 @@ class _Port:
     async def open(self, gateway: Gateway) -> None:
         loop = asyncio.get_running_loop()
         try:
-            self._listener = open_listener(  # whose clients may listen in silence
+            self._listener = open_listener(  # clients may only receive
                 self._host, self.port, self._name, max_unproven=None
             )
             self._server = await loop.create_server(
@@ -184,7 +185,7 @@ class _Port:
         return self._depth
 
     def admit(self, client: _Client) -> bool:
-        """Whether there is room for one more, who is then a client."""
+        """Adds a client if there is room; returns whether there is."""
         if self._listener is None or self._server is None:
             return False
         if len(self._clients) >= MOST_CLIENTS and not self._listener.make_room_for(
@@ -196,12 +197,12 @@ class _Port:
         return True
 
     def prove(self, client: _Client) -> None:
-        """Notes that a client has sent a valid frame."""
+        """Records that a client has sent a valid frame."""
         if self._listener is not None:
             self._listener.prove(client.transport)
 
     def note_stranger(self, protocol: str) -> None:
-        """Counts a client that speaks another protocol."""
+        """Counts a client with another protocol."""
         if self._listener is not None:
             self._listener.note_stranger(protocol)
 
@@ -219,7 +220,7 @@ class _Port:
 
 
 class _Client(asyncio.Protocol):
-    """A connection: frames out as it takes them, commands in."""
+    """A connection: sends frames as fast as the client reads, receives commands."""
 
     def __init__(self, port: _Port, gateway: Gateway, name: str) -> None:
         self._port = port
@@ -271,13 +272,15 @@ class _Client(asyncio.Protocol):
                 self._port.prove(self)
             if self._parser.other_version is not None and not self._told_version:
                 self._told_version = True
-                self._notify(f"version {VERSION} is spoken here, not {self._parser.other_version}")
+                self._notify(
+                    f"this server uses version {VERSION}, not {self._parser.other_version}"
+                )
             if self._parser.too_long is not None and not self._told_length:
                 self._told_length = True
                 self._notify(self._parser.too_long)
 
     def _read_on(self) -> None:
-        """Read from the client when its share of time allows it."""
+        """Reads from the client if its share of time allows it."""
         if self.transport.is_closing():
             return
         pause_s = self._session.reading.pause_s()
@@ -295,12 +298,12 @@ class _Client(asyncio.Protocol):
         self._flush()
 
     def put(self, stream: SensorStream, frame: bytes) -> None:
-        """Send a frame, or let it wait."""
+        """Sends a frame, or queues it."""
         self._outbox.put(stream, frame)
         self._flush()
 
     def end(self) -> None:
-        """Let the client go, with whatever it has not taken."""
+        """Disconnects the client; unsent frames are dropped."""
         self.transport.abort()
 
     @property

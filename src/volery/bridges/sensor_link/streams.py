@@ -1,4 +1,4 @@
-"""From the graph's sensor topics to frames of the sensor link, encoded once for all clients."""
+"""Converts the graph's sensor topics to frames of the sensor link, once for all clients."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ _UAV_TOPIC = re.compile(r"/uav([1-9]\d{0,4})/(.+)")
 _MOST_UAVS = 0xFFFF
 _NEW_TOPICS_PERIOD_S = 0.5
 _CRC_STEP_BYTES = 64 << 10
-"""A fifth of a millisecond: so long others wait for an image's CRC."""
+"""Bytes of a fifth of a millisecond, for which others wait for an image's CRC."""
 
 Send = Callable[["SensorStream", bytes], None]
-"""Takes a sensor's frame for all clients."""
+"""Receives a sensor's frame for all clients."""
 
 
 class SensorStream:
-    """One sensor's messages on their way to clients."""
+    """One sensor's messages for the clients."""
 
     def __init__(self, kind: SensorLinkKind, uav: int, name: str) -> None:
         self.kind = kind
@@ -47,11 +47,11 @@ class SensorStream:
         self.sequence = 0
         self.last_ns = 0
         self.next_ns = 0
-        """What is published before is not sent, unless time went back."""
+        """Time before which messages are not sent, unless time went back."""
 
 
 class Due(NamedTuple):
-    """A message to be sent, and its number among those of its sensor."""
+    """A message to send, and its number among those of its sensor."""
 
     stream: SensorStream
     published: Published
@@ -59,10 +59,10 @@ class Due(NamedTuple):
 
 
 class SensorStreams:
-    """The sensors of some kinds. All methods belong to the event loop's thread.
+    """Streams of the sensors of some kinds. All methods belong to the event loop's thread.
 
-    While nobody is connected nothing is subscribed. depth: messages a sensor that may wait here.
-    period_ns: simulated time between two messages of a sensor that are sent, 0: all are.
+    Without clients nothing is subscribed. depth: messages per sensor that may wait here. period_ns:
+    simulated time between two sent messages of a sensor, 0: all are sent.
     """
 
     def __init__(
@@ -89,7 +89,7 @@ class SensorStreams:
         self._tasks: list[asyncio.Task[None]] = []
 
     def open(self) -> None:
-        """Begin to receive, and send; a second time nothing happens."""
+        """Starts to receive and send; further calls do nothing."""
         if self._session is None:
             self._session = self._gateway.open(self._name)
             self._wake = wake_of(asyncio.get_running_loop(), self._come.set)
@@ -99,7 +99,7 @@ class SensorStreams:
             ]
 
     def close(self) -> None:
-        """Receive no more; sequences go on where they are if it is opened again."""
+        """Stops receiving; after another `open` the sequences continue."""
         if self._session is not None:
             for task in self._tasks:
                 task.cancel()
@@ -133,7 +133,7 @@ class SensorStreams:
 
         try:
             stream.mailbox = self._session.subscribe(topic, msgtype, depth=self._depth, wake=stir)
-        except GraphError:  # the topic has just got another type
+        except GraphError:  # the topic's type has just changed
             return
         stir()
 
@@ -156,10 +156,10 @@ class SensorStreams:
         return due
 
     def _is_due(self, stream: SensorStream, time_ns: int) -> bool:
-        """Whether the stream's rate lets a message of this time through."""
+        """Returns whether the stream's rate allows a message of this time."""
         period, went_back = self._period_ns, time_ns < stream.last_ns
         stream.last_ns = time_ns
-        early_ns = period // 100  # a camera of just this rate may round its instants
+        early_ns = period // 100  # a camera of exactly this rate may round its times
         if period and time_ns + early_ns < stream.next_ns and not went_back:
             return False
         late = went_back or time_ns >= stream.next_ns + period
@@ -191,7 +191,10 @@ async def _crc_in_steps(data: bytes, check: int) -> int:
 
 
 def period_from_hz(rate_hz: float | None) -> int:
-    """Nanoseconds between two images; 0 for None, which sends all. `BridgeError` if not > 0."""
+    """Returns nanoseconds between two images; 0 for None, which sends all.
+
+    Raises `BridgeError` for a rate out of range.
+    """
     if rate_hz is None:
         return 0
     if not 0.0 < rate_hz <= 1e6:

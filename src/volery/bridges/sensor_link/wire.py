@@ -1,4 +1,4 @@
-"""The sensor link's frames: bytes to frames and back, without any socket.
+"""Encodes and parses the sensor link's frames, without a socket.
 
 The environment (the simulation) listens, the ROS side connects; both send frames of one form. All
 numbers are little-endian and packed without padding:
@@ -12,12 +12,12 @@ numbers are little-endian and packed without padding:
 | 8 | 4 | u32 | n, bytes of payload, at most `limit_of(kind)` |
 | 12 | 4 | u32 | sequence: one more with each frame of this type, UAV and sensor, modulo 2**32 |
 | 16 | 8 | i64 | stamp of the message, ns of simulated time |
-| 24 | 2 | u16 | CRC of bytes 4 to 23: a damaged length is noticed before anyone waits for it |
+| 24 | 2 | u16 | CRC of bytes 4 to 23: a damaged length is detected before a reader waits for it |
 | 26 | n | | payload, see `payloads` |
 | 26 + n | 2 | u16 | CRC of all bytes from 4 to 25 + n |
 
-The CRC is that of `core.framing`. A gap in the sequence tells how many frames a reader was too slow
-for.
+The CRC is that of `core.framing`. A gap in the sequence is the number of frames that a slow
+reader has missed.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ SYNC = b"\xaaVLY"
 VERSION = 1
 HEAD_BYTES = 26
 IMAGE_LIMIT_BYTES = 64 << 20
-"""Enough for an image of 4096 x 4096 pixels with 4 bytes each."""
+"""Largest payload of an image: 4096 x 4096 pixels with 4 bytes each."""
 OTHER_LIMIT_BYTES = 1 << 20
 
 _HEAD = struct.Struct("<BBHIIq")
 
 
 class SensorLinkKind(IntEnum):
-    """Types of payload; below 128 from the environment, from there on to it."""
+    """Types of payload; below 128 from the environment, others to it."""
 
     LASER_SCAN = 1
     POSE = 2
@@ -54,7 +54,7 @@ class SensorLinkKind(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class SensorLinkFrame:
-    """One frame, its checks passed; `kind` may be a type that is not known here."""
+    """One valid frame; `kind` may be an unknown type."""
 
     kind: int
     uav: int
@@ -64,12 +64,12 @@ class SensorLinkFrame:
 
 
 def limit_of(kind: int) -> int:
-    """Most bytes that a payload of this type may have."""
+    """Returns the most bytes that a payload of this type may have."""
     return IMAGE_LIMIT_BYTES if kind == SensorLinkKind.IMAGE else OTHER_LIMIT_BYTES
 
 
 def encode_head(kind: int, uav: int, sequence: int, stamp_ns: int, payload_bytes: int) -> bytes:
-    """The first 26 bytes of a frame.
+    """Returns the first 26 bytes of a frame.
 
     Raises
     ------
@@ -90,20 +90,20 @@ def encode_head(kind: int, uav: int, sequence: int, stamp_ns: int, payload_bytes
 
 
 def encode_frame(kind: int, uav: int, sequence: int, stamp_ns: int, payload: bytes) -> bytes:
-    """A whole frame. `BridgeError` where something does not fit."""
+    """Returns a whole frame. Raises `BridgeError` if something does not fit."""
     head = encode_head(kind, uav, sequence, stamp_ns, len(payload))
     return b"".join((head, payload, crc_bytes(crc16(payload, crc_of_head(head)))))
 
 
 def crc_of_head(head: bytes) -> int:
-    """What the CRC of a frame is behind its head; continue it with `crc16` over the payload."""
+    """Returns the CRC of a frame after its head; continue it with `crc16` over the payload."""
     return crc16(head[len(SYNC) :])
 
 
 class SensorLinkParser(FrameScanner[SensorLinkFrame]):
     """Finds the sensor link's frames in a stream of bytes.
 
-    limit_bytes: frames with longer payloads count as damaged, beside the limits of their types.
+    limit_bytes: frames with longer payloads count as damaged, besides the limits of their types.
     """
 
     def __init__(self, limit_bytes: int = IMAGE_LIMIT_BYTES) -> None:
@@ -112,10 +112,10 @@ class SensorLinkParser(FrameScanner[SensorLinkFrame]):
         self.other_version: int | None = None
         """Version of the last frame that was dropped for its version alone."""
         self.too_long: str | None = None
-        """What was said of the last frame that was dropped for its length alone."""
+        """Error of the last frame that was dropped for its length alone."""
 
     def payload_bytes(self, head: bytes | bytearray) -> int | Flaw:
-        """Length that a head tells, within the limits."""
+        """Returns the length in a head, within the limits."""
         version, kind, _, length, _, _ = _HEAD.unpack(head)
         if version != VERSION:
             self.other_version = version
@@ -127,7 +127,7 @@ class SensorLinkParser(FrameScanner[SensorLinkFrame]):
         return int(length)
 
     def frame_of(self, view: memoryview) -> SensorLinkFrame:
-        """The frame of whole bytes."""
+        """Returns the frame of whole bytes."""
         _, kind, uav, _, sequence, stamp_ns = _HEAD.unpack_from(view, len(SYNC))
         payload = bytes(view[HEAD_BYTES : len(view) - CRC_BYTES])
         return SensorLinkFrame(kind, uav, sequence, stamp_ns, payload)

@@ -1,1 +1,1 @@
-"""The built-in autopilot: MAVLink in and out by the rules of PX4; it opens no sockets."""
+"""The built-in autopilot: receives and sends MAVLink by the rules of PX4; opens no sockets."""

@@ -1,4 +1,4 @@
-"""COMMAND_ACK: the results of commands."""
+"""Sends the results of commands as COMMAND_ACK."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot.state import Source
 
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
-"""MAV_RESULT."""
+"""Values of MAV_RESULT."""
 
 
 def acknowledge(autopilot: Autopilot, source: Source, command: int, result: int) -> None:

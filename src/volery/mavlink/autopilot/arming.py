@@ -1,6 +1,6 @@
-"""Arming: what must be well before the rotors may turn, and when they stop for good.
+"""Arming and disarming: checks before the rotors may turn, and when they stop.
 
-The rotors of an armed UAV stand still until it takes off: its flight modes know no idling.
+The rotors of an armed UAV stand still until take-off: the flight modes have no idling.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def problems(autopilot: Autopilot) -> list[str]:
-    """What keeps the UAV from being armed; nothing where all is well."""
+    """Returns the problems that prevent arming; an empty list if there are none."""
     memory = autopilot.memory
     state = memory.state
     if state is None:
@@ -41,7 +41,7 @@ def problems(autopilot: Autopilot) -> list[str]:
 
 
 def obstacle(autopilot: Autopilot) -> str:
-    """The first trouble, or what is wrong with the mission that it would begin; empty: none."""
+    """Returns the first problem, including those of the mission to start; empty: none."""
     found = problems(autopilot)
     if not found and autopilot.memory.mode is Mode.MISSION:
         return feasibility.problem(autopilot)
@@ -49,7 +49,10 @@ def obstacle(autopilot: Autopilot) -> str:
 
 
 def arm(autopilot: Autopilot) -> str:
-    """Arm; why not, empty where it is armed. Nobody can force it: PX4 checks for all outside."""
+    """Arms the UAV; returns why not, empty if armed.
+
+    Arming cannot be forced: PX4 checks all requests.
+    """
     memory = autopilot.memory
     if memory.armed:
         return ""
@@ -66,7 +69,10 @@ def arm(autopilot: Autopilot) -> str:
 
 
 def disarm(autopilot: Autopilot, *, forced: bool) -> str:
-    """Disarm; in the air only by force, and then it falls. Why not, empty where it is done."""
+    """Disarms the UAV; returns why not, empty if disarmed.
+
+    In the air only if `forced`, and then the UAV falls.
+    """
     state = autopilot.state
     landed = state.mode in ("LANDED", "CRASHED")
     if not landed:
@@ -82,7 +88,7 @@ def disarm(autopilot: Autopilot, *, forced: bool) -> str:
 
 
 def finish(autopilot: Autopilot, text: str) -> None:
-    """Be disarmed from now on."""
+    """Sets the state to disarmed and reports `text`."""
     memory = autopilot.memory
     if not memory.armed:
         return

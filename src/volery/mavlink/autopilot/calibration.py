@@ -1,8 +1,9 @@
-"""Calibration of sensors: announced and finished as by PX4; it changes nothing.
+"""Calibration of sensors: starts and ends like PX4's, without an effect.
 
-The simulated sensors of a UAV at rest need none. STATUSTEXTs, by which ground stations follow it:
-`calibration_messages.h` of PX4 1.18. What has to be turned by hand (magnetometer, accelerometer on
-six sides) and sensors that are not there (radio, airspeed) are not offered.
+The simulated sensors of a UAV at rest need no calibration. The STATUSTEXTs that ground stations
+parse follow `calibration_messages.h` of PX4 1.18. Calibrations that turn the vehicle by hand
+(magnetometer, accelerometer on six sides) and those of missing sensors (radio, airspeed) are not
+supported.
 """
 
 from __future__ import annotations
@@ -25,14 +26,14 @@ _OFFERED: dict[tuple[float, ...], str] = {
     (0, 0, 0, 0, 2): "level",
     (0, 0, 0, 0, 4): "accel",
 }
-"""Sensor by the first five parameters."""
+"""Sensor by the first five parameters of the command."""
 _DURATION_NS = 2_000_000_000
 _STEP_PERCENT = 5
-"""Duration is a modelling choice, the step is PX4's."""
+"""The duration is a modelling choice, the step is PX4's."""
 
 
 def start(autopilot: Autopilot, _source: Source, command: Command) -> int:
-    """Starts PREFLIGHT_CALIBRATION; without any sensor it cancels the present one."""
+    """Handles PREFLIGHT_CALIBRATION; without a sensor it cancels the current calibration."""
     memory = autopilot.memory
     params = [0.0 if math.isnan(param) else param for param in command.params]
     if not any(params):

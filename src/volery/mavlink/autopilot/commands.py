@@ -1,4 +1,4 @@
-"""Commands and their answers: each COMMAND_LONG and COMMAND_INT gets one COMMAND_ACK."""
+"""Executes commands: each COMMAND_LONG and COMMAND_INT gets one COMMAND_ACK."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ if TYPE_CHECKING:
 
 DO_SET_MODE = 176
 _FENCE_TELLS = (0, 1)
-"""GF_ACTION of fences that keep nobody from flying there."""
+"""GF_ACTION values of fences that do not restrict flight."""
 _CHANGE_MODE = 1
-"""MAV_DO_REPOSITION_FLAGS."""
+"""Flag of MAV_DO_REPOSITION_FLAGS."""
 _ABOVE_HOME = (3, 6, 10, 11)
 
 
@@ -53,12 +53,12 @@ class Command(NamedTuple):
 
 
 def take(autopilot: Autopilot, source: Source, command: Command) -> None:
-    """Do it, and answer whoever asked."""
+    """Executes a command and acknowledges it to its sender."""
     acknowledge(autopilot, source, command.number, do(autopilot, source, command))
 
 
 def do(autopilot: Autopilot, source: Source, command: Command) -> int:
-    """MAV_RESULT of doing it."""
+    """Executes a command; returns its MAV_RESULT."""
     handler = _HANDLERS.get(command.number)
     if handler is None:
         return UNSUPPORTED
@@ -107,7 +107,7 @@ def _return(autopilot: Autopilot, _source: Source, _command: Command) -> int:
 def _set_mode(autopilot: Autopilot, _source: Source, command: Command) -> int:
     base, main, sub = command.params[:3]
     if not (math.isfinite(base) and int(base) & 1 and math.isfinite(main)):
-        return DENIED  # PX4's modes are custom ones
+        return DENIED  # PX4's modes are custom modes
     mode = mode_of(int(main), int(sub) if math.isfinite(sub) else 0)
     if mode is None:
         autopilot.say(4, "This flight mode is not offered")
@@ -123,9 +123,9 @@ def _switch(autopilot: Autopilot, mode: Mode) -> int:
 
 
 def _reposition(autopilot: Autopilot, _source: Source, command: Command) -> int:
-    """DO_REPOSITION: fly somewhere, hold there; what is nan stays as it is.
+    """Handles DO_REPOSITION: flies to a position and holds there; nan parameters keep their value.
 
-    Only its flag to change the mode takes a UAV out of another mode than hold, as in PX4.
+    Only the command's flag to change the mode leaves a mode other than hold, as in PX4.
     """
     speed, flags, _, yaw, latitude, longitude, altitude = command.params
     if any(math.isinf(param) for param in command.params):
@@ -155,7 +155,7 @@ def _reposition(autopilot: Autopilot, _source: Source, command: Command) -> int:
 
 
 def _orbit(autopilot: Autopilot, source: Source, command: Command) -> int:
-    # Above the sea in any frame, as PX4 reads it: MAVSDK sends it as relative.
+    # Above sea level in any frame, as in PX4: MAVSDK sends it as relative.
     height = _height_in_map(autopilot, command.params[6], None)
     result = orbit.prepare(autopilot, source, command, height)
     return _switch(autopilot, Mode.ORBIT) if result == ACCEPTED else result
@@ -163,7 +163,7 @@ def _orbit(autopilot: Autopilot, source: Source, command: Command) -> int:
 
 def _change_speed(autopilot: Autopilot, _source: Source, command: Command) -> int:
     speed = command.params[1]
-    if speed in (-1.0, -2.0):  # as it was
+    if speed in (-1.0, -2.0):  # the default speed
         speed = math.nan
     elif not (math.isfinite(speed) and speed > 0.0):
         return DENIED
@@ -191,7 +191,7 @@ def _set_home(autopilot: Autopilot, _source: Source, command: Command) -> int:
 
 
 def _start_mission(autopilot: Autopilot, _source: Source, command: Command) -> int:
-    """MISSION_START: arm, and fly it from an item on; -1: from where it was."""
+    """Handles MISSION_START: arms, and flies the mission from an item on; -1: current item."""
     why = feasibility.obstacle(autopilot)
     if why:
         autopilot.say(2, f"Mission start denied: {why}")
@@ -223,14 +223,14 @@ def _pause(autopilot: Autopilot, _source: Source, command: Command) -> int:
 
 
 def _check(autopilot: Autopilot, _source: Source, _command: Command) -> int:
-    """RUN_PREARM_CHECKS: tell everything that keeps it from being armed."""
+    """Handles RUN_PREARM_CHECKS: reports all problems that prevent arming."""
     for why in arming.problems(autopilot):
         autopilot.say(2, f"Preflight Fail: {why}")
     return ACCEPTED
 
 
 def _terminate(autopilot: Autopilot, _source: Source, command: Command) -> int:
-    """DO_FLIGHTTERMINATION: rotors off for good."""
+    """Handles DO_FLIGHTTERMINATION: stops the rotors permanently."""
     if not command.params[0] > 0.5:
         return ACCEPTED
     why = arming.disarm(autopilot, forced=True)
@@ -238,12 +238,12 @@ def _terminate(autopilot: Autopilot, _source: Source, command: Command) -> int:
 
 
 def _reboot(autopilot: Autopilot, _source: Source, _command: Command) -> int:
-    """A simulated autopilot goes on as it is; `/reset_uav` begins anew."""
+    """Handles a reboot, which is not supported; `/reset_uav` resets the UAV."""
     return DENIED if autopilot.memory.armed else UNSUPPORTED
 
 
 def _height_in_map(autopilot: Autopilot, altitude: float, frame: int | None) -> float:
-    """Z in the map of an altitude: above home in frames that say so, else above the sea."""
+    """Returns z in the map of an altitude: above home in relative frames, else above sea level."""
     base: Vector = autopilot.memory.home or autopilot.memory.origin
     if frame is not None and frame in _ABOVE_HOME:
         return base[2] + altitude
@@ -274,4 +274,4 @@ _HANDLERS: dict[int, Callable[[Autopilot, Source, Command], int]] = {
     512: requests.send,
     **dict.fromkeys(requests.RETIRED, requests.send_as_of_old),
 }
-"""By MAV_CMD."""
+"""Handlers by MAV_CMD."""

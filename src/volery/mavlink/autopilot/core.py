@@ -1,12 +1,12 @@
-"""The autopilot of one UAV: MAVLink frames and flight states in, frames and orders out.
+"""The autopilot of one UAV: receives MAVLink frames and flight states, returns frames and commands.
 
     autopilot = Autopilot(1, vehicle, build)
     autopilot.receive(link=0, profile=ONBOARD, data=frames, now_ns=...)
-    autopilot.update(state)                      # a hundred times a simulated second
+    autopilot.update(state)       # a hundred times a simulated second
     for link, data in autopilot.take_sent(): ...
 
-Everything that happens follows from what comes in and its simulated time, so a recorded flight
-repeats. What changes is in `memory`.
+The behaviour depends only on the inputs and their simulated time, so that a recorded flight
+repeats. The state is in `memory`.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ from volery.mavlink.framing import Framer
 
 ALL_LINKS = 65535
 MOST_LINKS = 64
-"""Of one vehicle; who opens more is not heard (modelling choice)."""
+"""Links of one vehicle; frames of further links are ignored (modelling choice)."""
 INFO, WARNING, CRITICAL, EMERGENCY = 6, 4, 2, 0
-"""MAV_SEVERITY."""
+"""Values of MAV_SEVERITY."""
 
 
 class Autopilot:
@@ -66,7 +66,7 @@ class Autopilot:
     # ------------------------------------------------------------------------------------- links
 
     def receive(self, link: int, profile: int, data: bytes, now_ns: int) -> None:
-        """Take whole frames from a link; a link that was unknown begins with them."""
+        """Handles whole frames of a link; the first frames open a link."""
         memory = self.memory
         memory.now_ns = now_ns
         if link not in memory.links:
@@ -80,12 +80,12 @@ class Autopilot:
                 self._take(link, message)
 
     def close_link(self, number: int) -> None:
-        """Forget a link."""
+        """Removes a link."""
         self.memory.links.pop(number, None)
         self.log.transfers.forget(number)
 
     def send(self, message: Any, link: int = ALL_LINKS) -> None:
-        """Send a message on one link, or on all of them."""
+        """Sends a message on one link, or on all links."""
         links = self.memory.links
         chosen = links.values() if link == ALL_LINKS else filter(None, [links.get(link)])
         for one in chosen:
@@ -93,27 +93,27 @@ class Autopilot:
             one.sequence = (one.sequence + 1) % 256
 
     def send_payload(self, number: int, payload: bytes, link: int) -> None:
-        """Send the packed fields of a message on one link: for messages that come in thousands."""
+        """Sends the packed fields of a message on one link; for messages sent by the thousand."""
         one = self.memory.links.get(link)
         if one is not None:
             self._sent.append((link, self._codec.frame(number, payload, one.sequence)))
             one.sequence = (one.sequence + 1) % 256
 
     def say(self, severity: int, text: str) -> None:
-        """Tell people something."""
+        """Sends a status text to all links and logs it."""
         self.log.note(self, severity, text)
         for message in status_texts(severity, text):
             self.send(message)
 
     def take_sent(self) -> list[tuple[int, bytes]]:
-        """What was sent since the last call, by link."""
+        """Returns the frames sent since the last call, with their links."""
         sent, self._sent = self._sent, []
         return sent
 
     # ------------------------------------------------------------------------------------ flight
 
     def update(self, state: FlightState) -> None:
-        """Fly on with a new state of the UAV, and send what is due."""
+        """Updates the flight with a new state of the UAV, and sends what is due."""
         memory = self.memory
         memory.now_ns = state.time_ns
         first = memory.state is None
@@ -134,26 +134,26 @@ class Autopilot:
         self.log.transfers.send_some(self)
 
     def announce(self) -> None:
-        """Tell of a change of mode at once."""
+        """Reports a change of mode at once."""
         self.send(HEARTBEAT(self))
 
-    # ------------------------------------------------------------------------------- short words
+    # ---------------------------------------------------------------------------- derived values
 
     @property
     def state(self) -> FlightState:
-        """The newest state; `CommandError` before the first one."""
+        """Newest state of the UAV. Raises `CommandError` before the first one."""
         if self.memory.state is None:
-            raise CommandError("nothing is known of the UAV yet")
+            raise CommandError("no state of the UAV received yet")
         return self.memory.state
 
     @property
     def yaw(self) -> float:
-        """Rad in the map."""
+        """Yaw in the map, rad."""
         x, y, z, w = self.state.attitude
         return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
     def geodetic(self) -> Vector:
-        """Latitude and longitude in degrees and altitude of the UAV, worked out once a state."""
+        """Returns latitude, longitude, degrees, and altitude, m; computed once per state."""
         time_ns, place = self._place
         if time_ns != self.state.time_ns:
             place = self.earth.geodetic(self.state.position)
@@ -161,7 +161,7 @@ class Autopilot:
         return place
 
     def parameter(self, name: str) -> Value:
-        """Value of a parameter."""
+        """Returns the value of a parameter."""
         return self.memory.parameters[name]
 
     # ------------------------------------------------------------------------------------ inside
@@ -187,7 +187,7 @@ class Autopilot:
         try:
             handler(self, source, message)
         except CommandError:
-            return  # what has an answer was answered; a setpoint that is refused is just not flown
+            return  # the request was answered before; a refused setpoint is not flown
 
     def _is_meant(self, message: Any) -> bool:
         system = getattr(message, "target_system", 0)
@@ -196,5 +196,5 @@ class Autopilot:
 
 
 def message_class(name: str) -> Any:
-    """Pymavlink's class of a message by its name."""
+    """Returns pymavlink's class of a message by its name."""
     return getattr(dialect(), f"MAVLink_{name.lower()}_message")

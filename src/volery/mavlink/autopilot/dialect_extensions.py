@@ -1,6 +1,6 @@
-"""Messages of MAVLink's `common` that pymavlink's `common` does not have, as the codec packs them.
+"""Messages of MAVLink's `common` that pymavlink's `common` lacks, in the codec's form.
 
-Their layouts and CRC_EXTRAs: MAVLink's definitions, as PX4 1.18 is built with them.
+Their layouts and CRC_EXTRAs are those of MAVLink's definitions with which PX4 1.18 is built.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot.core import Autopilot
 
 _ADVANCED = 1
-"""MAV_MODE_PROPERTY_ADVANCED, which PX4 says of all but altitude and position."""
+"""Flag MAV_MODE_PROPERTY_ADVANCED, which PX4 sets for all modes but altitude and position."""
 _STANDARD = {
     Mode.POSITION: 1,
     Mode.ORBIT: 2,
@@ -26,14 +26,14 @@ _STANDARD = {
     Mode.LAND: 7,
     Mode.TAKE_OFF: 8,
 }
-"""MAV_STANDARD_MODE; the others have a name instead."""
+"""MAV_STANDARD_MODE of modes; the others have a name instead."""
 _NAMES = {Mode.HOLD: b"Hold", Mode.OFFBOARD: b"Offboard", Mode.FOLLOW_TARGET: b"Follow Target"}
 _OLDEST, _SPOKEN = 100, 200
-"""Versions of MAVLink, times a hundred: frames of both are heard, those of 2 sent."""
+"""Versions of MAVLink, times a hundred: both are received, 2 is sent."""
 
 
 class _Message:
-    """Fields by name; what pymavlink's messages tell the codec of themselves."""
+    """A message: fields by name, and attributes of pymavlink's messages that the codec reads."""
 
     id: ClassVar[int]
     crc_extra: ClassVar[int]
@@ -47,7 +47,7 @@ class _Message:
 
 
 class ProtocolVersion(_Message):
-    """PROTOCOL_VERSION: the hashes are 0 where nobody knows them."""
+    """PROTOCOL_VERSION; unknown hashes are 0."""
 
     id, crc_extra = 300, NEWER[300]
     unpacker = struct.Struct("<HHH8s8s")
@@ -58,7 +58,7 @@ class ProtocolVersion(_Message):
 
 
 class AvailableModes(_Message):
-    """AVAILABLE_MODES: one of the modes."""
+    """AVAILABLE_MODES: one mode."""
 
     id, crc_extra = 435, NEWER[435]
     unpacker = struct.Struct("<IIBBB35s")
@@ -77,7 +77,7 @@ class CurrentMode(_Message):
 
 
 def protocol_version(_autopilot: Autopilot) -> Any:
-    """Which frames are understood."""
+    """Returns the supported versions of MAVLink."""
     return ProtocolVersion(
         version=_SPOKEN,
         min_version=_OLDEST,
@@ -88,7 +88,7 @@ def protocol_version(_autopilot: Autopilot) -> Any:
 
 
 def current_mode(autopilot: Autopilot) -> Any:
-    """The mode; the intended one is not known once a failsafe has acted."""
+    """Returns CURRENT_MODE; the intended mode is unknown after a failsafe has acted."""
     mode = autopilot.memory.mode
     return CurrentMode(
         custom_mode=mode.custom_mode,
@@ -98,7 +98,7 @@ def current_mode(autopilot: Autopilot) -> Any:
 
 
 def available_modes(which: float) -> list[Any]:
-    """The mode of an index from 1, or all of them of 0; none of others."""
+    """Returns the mode of an index from 1, all modes for 0, none for other numbers."""
     index = round(which) if math.isfinite(which) else 0
     modes = tuple(Mode)
     numbers = range(1, len(modes) + 1) if index == 0 else (index,)

@@ -1,4 +1,4 @@
-"""What happens by itself when something goes wrong, on simulated time."""
+"""Failsafes: monitor the UAV and change the mode on problems, on simulated time."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot.vehicle import FlightState
 
 PERIOD_NS = 100_000_000
-"""Between two looks (modelling choice)."""
+"""Time between two checks (modelling choice)."""
 _FIX_PATIENCE_NS = 5_000_000_000
-"""Without a fix the estimate counts for this long, PX4's EKF2_NOAID_TOUT."""
+"""Time without a fix after which the estimate is invalid, PX4's EKF2_NOAID_TOUT."""
 
 
 def check(autopilot: Autopilot, state: FlightState) -> None:
-    """Look whether anything is wrong; tell of it once, and act on it once."""
+    """Checks for problems; reports each problem once and acts on it once."""
     memory = autopilot.memory
     memory.fix_lost = memory.now_ns - memory.fix_ns > _FIX_PATIENCE_NS
     flies = memory.armed and mode_transitions.flies(autopilot)
@@ -38,7 +38,10 @@ def check(autopilot: Autopilot, state: FlightState) -> None:
 
 
 def act(autopilot: Autopilot, mode: Mode | None) -> None:
-    """Enter the mode of a failsafe; a landing stays one, and who has no place lands at once."""
+    """Enters the mode of a failsafe; landings continue.
+
+    A UAV without a position lands at once.
+    """
     memory = autopilot.memory
     if mode is None:
         return
@@ -52,7 +55,10 @@ def act(autopilot: Autopilot, mode: Mode | None) -> None:
 
 
 def _is_under_way(autopilot: Autopilot) -> bool:
-    """Whether a UAV in hold still flies somewhere, by a reposition or by another's orders."""
+    """Returns whether a UAV in hold flies to a position.
+
+    The cause is a reposition or another client's command.
+    """
     return autopilot.memory.leg is not None or autopilot.memory.order not in ("hold", "HOLD")
 
 
@@ -91,7 +97,10 @@ def _fence(autopilot: Autopilot, state: FlightState) -> tuple[str, Mode | None] 
 
 
 def _link(autopilot: Autopilot, _state: FlightState) -> tuple[str, Mode | None] | None:
-    """As in PX4 one that was never heard counts as lost, and who lands already goes on landing."""
+    """Checks the ground link.
+
+    As in PX4, a link never seen counts as lost, and landings continue.
+    """
     action = int(autopilot.parameter("NAV_DLL_ACT"))
     if not action or mode_requirements.ground_is_there(autopilot):
         return None
@@ -117,4 +126,4 @@ _LOOKS: dict[str, Callable[[Autopilot, FlightState], tuple[str, Mode | None] | N
     "link": _link,
     "sticks": _sticks,
 }
-"""The first to be looked at, and the last one that finds something decides; landings stay."""
+"""Checks in order: the last one that finds a problem decides; landings continue."""

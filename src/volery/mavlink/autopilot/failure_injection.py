@@ -1,7 +1,7 @@
-"""INJECT_FAILURE: the faults of the simulation under MAVLink's numbers, for the own UAV alone.
+"""Handles INJECT_FAILURE: injects the simulation's faults into the own UAV.
 
-As in PX4 only where SYS_FAILURE_EN is 1; an instance of a unit has one failure at most, and
-FAILURE_TYPE_OK ends it (`FailureTable.cpp` of PX4 1.18). Faults that others have injected stay.
+As in PX4, this needs SYS_FAILURE_EN = 1; an instance of a unit has one failure at most, and
+FAILURE_TYPE_OK ends it (`FailureTable.cpp` of PX4 1.18). Faults injected by other clients stay.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 INJECT_FAILURE = 420
 _GPS, _MOTOR = 4, 101
 _SENSORS = {0: "imu", 1: "imu", 2: "mag", 3: "pressure", _GPS: "fix", 7: "range"}
-"""Usual name of the sensor by FAILURE_UNIT; gyroscope and accelerometer are one."""
+"""Default name of the sensor by FAILURE_UNIT; gyroscope and accelerometer are one."""
 _OK, _OFF, _STUCK = 0, 1, 2
-"""FAILURE_TYPE."""
+"""Values of FAILURE_TYPE."""
 _EFFECTS = {_OFF: "dropped", _STUCK: "stuck"}
 
 
 def inject(autopilot: Autopilot, _source: Source, command: Command) -> int:
-    """Lets a unit of the UAV fail, or ends its failure."""
+    """Injects a failure of a unit of the UAV, or ends it."""
     unit, kind, instance = (
         round(part) if math.isfinite(part) else 0 for part in command.params[:3]
     )
@@ -47,12 +47,15 @@ def inject(autopilot: Autopilot, _source: Source, command: Command) -> int:
 
 
 def _is_supported(unit: int, kind: int) -> bool:
-    """Whether a unit can fail so."""
+    """Returns whether a unit supports a kind of failure."""
     return kind in ((_OK, _OFF) if unit == _MOTOR else (_OK, _OFF, _STUCK))
 
 
 def _instances_of(autopilot: Autopilot, unit: int, instance: int) -> tuple[int, ...]:
-    """Instances of a unit, from 1, that a command is about (0: all); none of what is not there."""
+    """Returns the instances of a unit, from 1, to which a command applies (0: all).
+
+    The result is empty for missing units.
+    """
     if unit == _MOTOR:
         all_of_them = tuple(range(1, autopilot.build.rotors + 1))
     else:
@@ -61,7 +64,7 @@ def _instances_of(autopilot: Autopilot, unit: int, instance: int) -> tuple[int, 
 
 
 def _fault_of(unit: int, kind: int, instance: int) -> dict[str, Any] | None:
-    """The fault of the simulation; None where all is to be well."""
+    """Returns the fault of the simulation; None to end the failure."""
     if kind == _OK:
         return None
     if unit == _MOTOR:
@@ -72,14 +75,14 @@ def _fault_of(unit: int, kind: int, instance: int) -> dict[str, Any] | None:
 
 
 def _change(autopilot: Autopilot, key: tuple[int, int], fault: dict[str, Any] | None) -> str:
-    """Ends the failure of an instance and begins the next one; why not, empty where it is done."""
+    """Replaces the failure of an instance; returns why not, empty on success."""
     failures = autopilot.memory.failures
     before = failures.pop(key, None)
     if before is not None:
         why = autopilot.vehicle.end_fault(before)
         if why:
             return why
-        for other in failures.values():  # of the same sensor: it fails on
+        for other in failures.values():  # another failure of the same sensor persists
             if other.get("sensor", "") == before.get("sensor"):
                 autopilot.vehicle.fail(other)
     if fault is None:

@@ -1,7 +1,8 @@
-"""Whether a mission can be flown, by the rules of PX4's feasibility checker for multicopters.
+"""Checks whether a mission can be flown, by the rules of PX4's feasibility checker.
 
-Which rules, and what is said: `FeasibilityChecker.cpp` and `mission_feasibility_checker.cpp` of PX4
-1.18. A plan that fails is kept, as PX4 keeps it, and is not begun.
+The rules are those of multicopters. Rules and texts follow `FeasibilityChecker.cpp` and
+`mission_feasibility_checker.cpp` of PX4 1.18. As in PX4, a plan that fails is stored but cannot
+start.
 """
 
 from __future__ import annotations
@@ -19,12 +20,12 @@ if TYPE_CHECKING:
 
 
 def obstacle(autopilot: Autopilot) -> str:
-    """What keeps a mission from being begun; empty where one is there that can be flown."""
+    """Returns what prevents the start of a mission; empty if a mission can start."""
     return mode_requirements.missing(autopilot, Mode.MISSION) or problem(autopilot)
 
 
 def problem(autopilot: Autopilot) -> str:
-    """Why the mission on board cannot be flown now; empty where it can, or where there is none."""
+    """Returns why the stored mission cannot be flown now; empty if it can, or if there is none."""
     items = autopilot.memory.plans[plans.MISSION]
     if items and items[0].command == plans.LAND and autopilot.state.mode == "LANDED":
         return "Mission rejected: starts with landing"
@@ -32,7 +33,7 @@ def problem(autopilot: Autopilot) -> str:
 
 
 def look(autopilot: Autopilot) -> None:
-    """Look at a new mission or fence: tell what is wrong, and hold where it was being flown."""
+    """Checks a new mission or fence: reports a problem, and holds if the mission was active."""
     from volery.mavlink.autopilot import mode_transitions
 
     if autopilot.memory.state is None:
@@ -67,7 +68,7 @@ def _problem_with_fence(autopilot: Autopilot, items: list[plans.MissionItem]) ->
 
 
 def _warn_of_far_start(autopilot: Autopilot) -> None:
-    """Of a first waypoint beyond MIS_DIST_1WP, which may still be flown."""
+    """Warns of a first waypoint beyond MIS_DIST_1WP, which may still be flown."""
     limit = float(autopilot.parameter("MIS_DIST_1WP"))
     items = autopilot.memory.plans[plans.MISSION]
     first = next((item for item in items if item.command in plans.PLACED and item.placed), None)

@@ -1,6 +1,6 @@
-"""Answers MAVLink FTP as a server without files, so that no client waits.
+"""Answers MAVLink FTP like a server without files, so that clients do not wait for a timeout.
 
-Its header and answers: `mavlink_ftp.cpp` of PX4 1.18.
+Header and answers follow `mavlink_ftp.cpp` of PX4 1.18.
 """
 
 from __future__ import annotations
@@ -15,22 +15,22 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot.state import Source
 
 _HEADER = struct.Struct("<HBBBBBBI")
-"""Sequence, session, opcode, size, opcode that is answered, end of a burst, padding, offset."""
+"""Sequence, session, opcode, size, answered opcode, end of a burst, padding, offset."""
 _PAYLOAD = 251
 _MOST_DATA = _PAYLOAD - _HEADER.size
 _ACK, _NAK = 128, 129
 _FAIL, _INVALID_SIZE, _INVALID_SESSION, _UNKNOWN_COMMAND, _NOT_FOUND = 1, 3, 4, 7, 10
 _FAULTS = {
-    **dict.fromkeys((0, 2), 0),  # nothing, and the end of all sessions
-    **dict.fromkeys((1, 5, 7, 15), _INVALID_SESSION),  # end, read, write, burst
-    **dict.fromkeys((3, 4, 8, 10, 12, 13, 14, 16), _NOT_FOUND),  # of a path
-    **dict.fromkeys((6, 9, 11), _FAIL),  # what would make something
+    **dict.fromkeys((0, 2), 0),  # none, and terminate all sessions
+    **dict.fromkeys((1, 5, 7, 15), _INVALID_SESSION),  # terminate, read, write, burst
+    **dict.fromkeys((3, 4, 8, 10, 12, 13, 14, 16), _NOT_FOUND),  # operations on a path
+    **dict.fromkeys((6, 9, 11), _FAIL),  # operations that create something
 }
-"""Error by opcode; 0 is none."""
+"""Error by opcode; 0: none."""
 
 
 def answer_file_request(autopilot: Autopilot, source: Source, message: Any) -> None:
-    """Answer a FILE_TRANSFER_PROTOCOL."""
+    """Answers a FILE_TRANSFER_PROTOCOL message."""
     payload = bytes(message.payload)
     sequence, session, opcode, size, _, _, _, offset = _HEADER.unpack_from(payload)
     fault = _INVALID_SIZE if size > _MOST_DATA else _FAULTS.get(opcode, _UNKNOWN_COMMAND)

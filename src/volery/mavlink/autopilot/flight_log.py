@@ -1,7 +1,7 @@
 """Logs the flights of one vehicle as ULog, as PX4 does: from arming to disarming by default.
 
-What is logged follows from states of the vehicle and simulated time alone; logging changes nothing
-of a flight. A log ends early where it fills its storage or the disk is full.
+The contents depend only on states of the vehicle and simulated time; logging does not affect the
+flight. A log ends early if it fills its storage or the disk is full.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot.core import Autopilot
 
 DISABLED, UNTIL_DISARM, BOOT_UNTIL_DISARM, ALWAYS = -1, 0, 1, 2
-"""SDLOG_MODE."""
+"""Values of SDLOG_MODE."""
 _RATES = tuple(
     (period_ns, tuple(topic for topic in TOPICS if topic.period_ns == period_ns))
     for period_ns in sorted({topic.period_ns for topic in TOPICS})
@@ -29,14 +29,14 @@ _RATES = tuple(
 
 
 class FlightLog:
-    """Records the logs of one vehicle, and sends them to clients that ask for them."""
+    """Records the logs of one vehicle, and sends them to clients on request."""
 
     def __init__(self, storage: LogStorage | None = None) -> None:
         self.storage = storage or LogStorage()
         self.transfers = LogTransfers()
         self.is_recording = False
         self._is_stopped = False
-        """Whether the present log has ended before its flight."""
+        """Whether the current log has ended before its flight."""
         self._has_flown = False
         """Whether the vehicle has been disarmed since the start."""
         self._was_armed = False
@@ -65,11 +65,11 @@ class FlightLog:
             self._append(autopilot, ulog.parameter(name, autopilot.parameter(name)))
 
     def end(self) -> None:
-        """Ends the present log; the next state may begin another one."""
+        """Ends the current log; the next state may start another one."""
         self.is_recording = self._is_stopped = False
 
     def close(self) -> None:
-        """Ends and forgets all logs."""
+        """Ends and deletes all logs."""
         self.end()
         self.transfers.clear()
         self.storage.close()
@@ -125,12 +125,12 @@ def _sample_of(autopilot: Autopilot, logged: LoggedTopic) -> bytes:
         return b""
     try:
         return logged.topic.sample(values)
-    except (struct.error, OverflowError):  # a number that no float holds
+    except (struct.error, OverflowError):  # a number that no float can represent
         return b""
 
 
 def _beginning(autopilot: Autopilot) -> bytes:
-    """Header, definitions, and the numbers of the topics."""
+    """Returns header, definitions, and the numbers of the topics."""
     patch, minor, major = custom_version()[:3]
     return b"".join(
         (

@@ -1,4 +1,4 @@
-"""What each mode does at each state of the UAV."""
+"""Runs the active flight mode at each state of the UAV."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def fly(autopilot: Autopilot, state: FlightState) -> None:
-    """Go on with the present mode; nothing while it is disarmed or somebody else flies."""
+    """Runs the current mode, except while disarmed or while another client controls the UAV."""
     memory = autopilot.memory
     if not memory.armed or state.crashed or memory.order.isupper():
         return

@@ -1,7 +1,8 @@
-"""Follow-me: beside a target whose position FOLLOW_TARGET brings, as PX4's AutoFollowTarget.
+"""Follow-me: flies next to a target, as PX4's AutoFollowTarget.
 
-Position and velocity of the target are filtered as by PX4's `TargetEstimator.cpp` (without its
-acceleration); the position beside it is by its course, height and angle by parameters.
+FOLLOW_TARGET messages report the target's position. Position and velocity of the target are
+filtered like in PX4's `TargetEstimator.cpp` (without its acceleration). The UAV's position relative
+to the target depends on the target's course and on the parameters of height and angle.
 """
 
 from __future__ import annotations
@@ -22,19 +23,19 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot.vehicle import FlightState, Vector
 
 _STALE_NS = 3_000_000_000
-"""A target that is silent for so long stands still."""
+"""Time after which a silent target is assumed to stand still."""
 _MOVES_M_S = 0.1
-"""Speed from which a velocity is a course."""
+"""Speed above which a velocity defines a course."""
 _HEIGHT_FIRST_M = 3.0
-"""Only nearer to its height the UAV moves along the ground."""
+"""Height difference below which the UAV moves along the ground."""
 _FARTHEST_M = 1e6
 _PERIOD_NS = 20_000_000
 _FACED_M = 1.0
-"""A target nearer than this along the ground is not faced."""
+"""Distance along the ground below which the UAV does not face the target."""
 
 
 def take(autopilot: Autopilot, _source: Source, message: Any) -> None:
-    """Filters the position and the velocity of a FOLLOW_TARGET, in the mode that follows it."""
+    """Filters position and velocity of a FOLLOW_TARGET message in follow mode."""
     if autopilot.memory.mode is not Mode.FOLLOW_TARGET:
         return
     latitude, longitude = message.lat * 1e-7, message.lon * 1e-7
@@ -62,7 +63,7 @@ def take(autopilot: Autopilot, _source: Source, message: Any) -> None:
 def _fuse(
     autopilot: Autopilot, target: FollowTarget, measured: Vector, velocity: Vector | None
 ) -> None:
-    """Corrects an estimate by a measurement: PX4's filter by FLW_TGT_RS."""
+    """Corrects an estimate by a measurement: PX4's filter with FLW_TGT_RS."""
     share = min(max(float(autopilot.parameter("FLW_TGT_RS")), 0.1), 1.0)
     beta = share ** (1.0 / 3.0)
     gain, rate_gain = 1.0 - share, 1.5 * (1.0 - beta) ** 2 * (1.0 + beta)
@@ -81,7 +82,7 @@ def _fuse(
 
 
 def fly(autopilot: Autopilot, state: FlightState) -> None:
-    """Flies to the position beside the target, and with it; holds until there is a target."""
+    """Flies to the position next to the target and along with it; holds until there is a target."""
     memory, target = autopilot.memory, autopilot.memory.followed
     if target is None or state.mode == "LANDED":
         return
@@ -112,14 +113,14 @@ def fly(autopilot: Autopilot, state: FlightState) -> None:
 
 
 def _position_now(autopilot: Autopilot, target: FollowTarget) -> Vector:
-    """Returns the position of the target, moved on by its velocity."""
+    """Returns the target's position, extrapolated by its velocity."""
     since_s = min(autopilot.memory.now_ns - target.time_ns, _STALE_NS) * 1e-9
     x, y, z = (p + since_s * v for p, v in zip(target.position, target.velocity, strict=True))
     return x, y, z
 
 
 def _position_beside(autopilot: Autopilot, target: FollowTarget, there: Vector) -> Vector:
-    """Returns where the UAV wants to be; beside a target without a course: on its own side."""
+    """Returns the UAV's goal; next to a target without a course, on the UAV's own side."""
     if target.course is None:
         here = autopilot.state.position
         angle = math.atan2(here[1] - there[1], here[0] - there[0])

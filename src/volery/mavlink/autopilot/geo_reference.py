@@ -1,4 +1,4 @@
-"""Places on the earth of one vehicle, without arrays: it is asked hundreds of times a second."""
+"""Converts positions of one vehicle to the earth and back, without arrays: hundreds a second."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from volery.mavlink.autopilot.vehicle import Vector
 
 
 class GeoReference:
-    """The map on the earth: latitude and longitude in degrees, altitude in m."""
+    """Relates the map to the earth: latitude and longitude in degrees, altitude in m."""
 
     def __init__(self, latitude: float, longitude: float, altitude: float) -> None:
         self._frame = LocalFrame.from_degrees(latitude, longitude, altitude)
@@ -17,7 +17,7 @@ class GeoReference:
         self._centre = ecef_from_geodetic(self._frame.origin_geodetic).tolist()
 
     def geodetic(self, place: Vector) -> Vector:
-        """Degrees, degrees, m of a place in the map."""
+        """Returns degrees, degrees, m of a position in the map."""
         x, y, z = (
             centre + row[0] * place[0] + row[1] * place[1] + row[2] * place[2]
             for centre, row in zip(self._centre, self._columns, strict=True)
@@ -26,7 +26,7 @@ class GeoReference:
         return math.degrees(latitude), math.degrees(longitude), altitude
 
     def place(self, latitude: float, longitude: float, altitude: float) -> Vector:
-        """The place in the map of degrees, degrees, m."""
+        """Returns the position in the map of degrees, degrees, m."""
         geodetic = [math.radians(latitude), math.radians(longitude), altitude]
         x, y, z = self._frame.enu_from_geodetic(geodetic).tolist()
         return x, y, z

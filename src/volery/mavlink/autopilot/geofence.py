@@ -1,4 +1,4 @@
-"""The geofence: a largest distance and height from home, polygons and circles to stay in or out."""
+"""Checks the geofence: distance and height limits from home, inclusion and exclusion areas."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 
 
 def breach(autopilot: Autopilot, place: Vector) -> str:
-    """What a place in the map breaks; empty where it is allowed.
+    """Returns which limit a position in the map violates; empty if it is allowed.
 
-    Where there are shapes to stay in, it is enough to be in one of them, as in PX4's polygons.
+    Being inside one of several inclusion areas is enough, as for PX4's polygons.
     """
     home = autopilot.memory.home or autopilot.memory.origin
     farthest = float(autopilot.parameter("GF_MAX_HOR_DIST"))
@@ -51,7 +51,7 @@ def _point(autopilot: Autopilot, item: plans.MissionItem) -> tuple[float, float]
 
 
 def _contains(corners: list[tuple[float, float]], place: Vector) -> bool:
-    """Whether a polygon holds a place: a ray to the east crosses its sides an odd number of times.
+    """Returns whether a polygon contains a point: a ray to the east crosses an odd number of sides.
 
     (W. R. Franklin, "PNPOLY - Point Inclusion in Polygon Test".)
     """

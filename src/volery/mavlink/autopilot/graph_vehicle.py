@@ -1,6 +1,6 @@
-"""A UAV of the graph as the autopilot's vehicle.
+"""Connects the autopilot to a UAV of the graph.
 
-Services carry everything: what is asked first is done first, and what is refused is told.
+All commands are service calls: they are processed in order, and a refusal is reported.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _NOTHING = (0.0, 0.0, 0.0)
 
 
 class GraphVehicle:
-    """Commands the UAV in whose namespace `node` lives."""
+    """Commands the UAV in whose namespace `node` runs."""
 
     def __init__(self, node: Node) -> None:
         self._target = node.create_client(_SET_TARGET, "set_position_target")
@@ -50,38 +50,38 @@ class GraphVehicle:
         self._go_to = node.create_client(_GO_TO, "go_to")
 
     def take_off(self, height_m: float) -> str:
-        """As `Vehicle`."""
+        """Implements `Vehicle.take_off`."""
         request = zero_message(f"{_TAKE_OFF_TO}_Request")
         request.altitude = height_m
         return _ask(self._take_off, request)
 
     def hold(self) -> str:
-        """As `Vehicle`."""
+        """Implements `Vehicle.hold`."""
         return _ask(self._clients["hold"])
 
     def land(self) -> str:
-        """As `Vehicle`."""
+        """Implements `Vehicle.land`."""
         return _ask(self._clients["land"])
 
     def sink(self, speed: float) -> str:
-        """As `Vehicle`."""
+        """Implements `Vehicle.sink`."""
         request = zero_message(f"{_LANDING_SPEED}_Request")
         request.speed = speed
         return _ask(self._sink, request)
 
     def stop(self) -> str:
-        """As `Vehicle`."""
+        """Implements `Vehicle.stop`."""
         return _ask(self._clients["kill"])
 
     def go_to(self, position: Vector, yaw: float | None) -> str:
-        """As `Vehicle`."""
+        """Implements `Vehicle.go_to`."""
         request = zero_message(f"{_GO_TO}_Request")
         request.position = Point(*position)
         request.yaw, request.keep_heading = yaw or 0.0, yaw is None
         return _ask(self._go_to, request)
 
     def steer(self, velocity: Vector, yaw: float | None, yaw_rate: float) -> None:
-        """As `Vehicle`."""
+        """Implements `Vehicle.steer`."""
         self._steer(_NO_PLACE | _NO_PUSH, _NOTHING, velocity, _NOTHING, yaw, yaw_rate)
 
     def follow(
@@ -92,35 +92,35 @@ class GraphVehicle:
         yaw: float | None,
         yaw_rate: float,
     ) -> None:
-        """As `Vehicle`."""
+        """Implements `Vehicle.follow`."""
         self._steer(0, position, velocity, acceleration, yaw, yaw_rate)
 
     def push(self, acceleration: Vector, yaw: float | None, yaw_rate: float) -> None:
-        """As `Vehicle`."""
+        """Implements `Vehicle.push`."""
         self._steer(_NO_PLACE | _NO_VELOCITY, _NOTHING, _NOTHING, acceleration, yaw, yaw_rate)
 
     def tilt(self, attitude: Turn, thrust: float) -> None:
-        """As `Vehicle`."""
+        """Implements `Vehicle.tilt`."""
         message = zero_message(_ATTITUDE)
         message.type_mask = _NO_RATES
         message.orientation, message.thrust = Quaternion(*attitude), thrust
         self._turn(message)
 
     def spin(self, rates: Vector, thrust: float) -> None:
-        """As `Vehicle`."""
+        """Implements `Vehicle.spin`."""
         message = zero_message(_ATTITUDE)
         message.type_mask = _NO_ATTITUDE
         message.body_rate, message.thrust = Vector3(*rates), thrust
         self._turn(message)
 
     def fail(self, fault: dict[str, Any]) -> str:
-        """As `Vehicle`."""
+        """Implements `Vehicle.fail`."""
         request = zero_message(f"{_INJECT}_Request")
         request.fault = json.dumps({**fault, "uav": self._uav})
         return _ask(self._inject, request)
 
     def end_fault(self, fault: dict[str, Any]) -> str:
-        """As `Vehicle`."""
+        """Implements `Vehicle.end_fault`."""
         request = zero_message(f"{_END_FAULT}_Request")
         request.fault = json.dumps({**fault, "uav": self._uav})
         return _ask(self._end_fault, request)
@@ -151,7 +151,7 @@ class GraphVehicle:
 
 
 def _ask(client: Any, request: Any = None) -> str:
-    """Call a service that answers with success and a message; why not, empty where it does."""
+    """Calls a service; returns why it failed, empty on success."""
     try:
         response = client.call(request)
     except GraphError as error:
@@ -160,7 +160,7 @@ def _ask(client: Any, request: Any = None) -> str:
 
 
 def build_of(node: Node) -> VehicleInfo:
-    """What of the UAV never changes. `GraphError` where the graph does not tell."""
+    """Returns the constant properties of the UAV. Raises `GraphError` if the service fails."""
     told = node.create_client(_GET_VEHICLE_INFO, "get_vehicle_info").call()
     if not told.success:
         raise GraphError(told.message)
@@ -179,7 +179,7 @@ def build_of(node: Node) -> VehicleInfo:
 
 
 def state_of(message: Any) -> FlightState:
-    """Of a FlightState message."""
+    """Converts a FlightState message."""
     stamp, pose = message.header.stamp, message.pose
     place, turn = pose.position, pose.orientation
     v, w, a = message.velocity, message.angular_velocity, message.acceleration

@@ -1,6 +1,6 @@
-"""The gripper: it releases and grabs at once, and carries nothing.
+"""The gripper: releases and grabs at once, without a payload.
 
-A PX4 with a gripper says IN_PROGRESS first, which MAVSDK 4.1 takes for an unknown result.
+A PX4 with a gripper answers IN_PROGRESS first, which MAVSDK 4.1 reports as an unknown result.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _ACTIONS = (0, 1)
 
 
 def act(_autopilot: Autopilot, _source: Source, command: Command) -> int:
-    """Does DO_GRIPPER's action."""
+    """Handles DO_GRIPPER."""
     action = command.params[1]
     known = math.isfinite(action) and round(action) in _ACTIONS
     return ACCEPTED if known else DENIED

@@ -1,4 +1,4 @@
-"""Home: where heights count from, and where returns lead."""
+"""The home position: the reference of heights and the goal of returns."""
 
 from __future__ import annotations
 
@@ -9,23 +9,27 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot.core import Autopilot
 
 _FARTHEST_M, _HIGHEST_M = 1e6, 1e5
-"""From the map's origin: beyond, a flat map says nothing (modelling choice; PX4 knows no limit)."""
+"""Limits from the map's origin, beyond which a flat map is invalid (modelling choice; PX4 has
+none)."""
 
 
 def set_here(autopilot: Autopilot) -> None:
-    """Let home be where the UAV is."""
+    """Sets home to the UAV's position."""
     autopilot.memory.home, autopilot.memory.chosen_home = autopilot.state.position, None
     _tell(autopilot)
 
 
 def set_on_arming(autopilot: Autopilot) -> None:
-    """Let home be where the UAV is armed; a place that somebody chose stays, as in PX4."""
+    """Sets home to the position of arming; a home chosen by a client stays, as in PX4."""
     if autopilot.memory.chosen_home is None:
         set_here(autopilot)
 
 
 def choose(autopilot: Autopilot, latitude: float, longitude: float, z: float) -> str:
-    """Let home be a place in degrees and a height in the map, m; why not, empty where it is so."""
+    """Sets home to a position in degrees and a height in the map, m.
+
+    Returns why not, empty if home is set.
+    """
     origin = autopilot.build.origin
     if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
         return "Home is not on the earth"

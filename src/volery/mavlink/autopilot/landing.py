@@ -1,8 +1,8 @@
-"""How fast a landing goes down: fast high up, slowly near the ground.
+"""Sets the descent speed of a landing: fast high up, slow near the ground.
 
-As PX4's FlightTaskAuto does it: MPC_Z_VEL_MAX_DN from MPC_LAND_ALT1 upwards, MPC_LAND_SPEED from
-MPC_LAND_ALT2 downwards, in between by the height, and MPC_Z_V_AUTO_DN at most. Height is that above
-home, as of a PX4 without a distance sensor.
+Follows PX4's FlightTaskAuto: MPC_Z_VEL_MAX_DN above MPC_LAND_ALT1, MPC_LAND_SPEED below
+MPC_LAND_ALT2, interpolated by height in between, and MPC_Z_V_AUTO_DN at most. The height is that
+above home, as in a PX4 without a distance sensor.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot.vehicle import FlightState
 
 _STEP_M_S = 0.02
-"""Smaller changes are not worth a command."""
+"""Smallest change that is sent as a command."""
 
 
 def follow(autopilot: Autopilot, state: FlightState) -> None:
-    """Have the present landing sink as the height asks for."""
+    """Sets the current landing's descent speed by its height."""
     memory = autopilot.memory
     ground = (memory.home or memory.origin)[2]
     speed = speed_at(autopilot, state.position[2] - ground)
@@ -30,7 +30,7 @@ def follow(autopilot: Autopilot, state: FlightState) -> None:
 
 
 def speed_at(autopilot: Autopilot, height_m: float) -> float:
-    """m/s at a height above ground."""
+    """Returns the descent speed, m/s, at a height above ground."""
     slow, fast, most = (
         float(autopilot.parameter(name))
         for name in ("MPC_LAND_SPEED", "MPC_Z_VEL_MAX_DN", "MPC_Z_V_AUTO_DN")

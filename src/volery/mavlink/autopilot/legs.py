@@ -1,7 +1,8 @@
-"""The way to a place, at a speed that parameters and missions may set.
+"""Flies to a position at a speed set by parameters and missions.
 
-Far out the UAV is told velocities: along the ground the largest from which it can still brake, in
-the height likewise. Near the place it is told the place itself, which its own controllers keep.
+Far away the UAV receives velocities: along the ground the largest from which it can still brake,
+and likewise in height. Near the goal it receives the position itself, which its own controllers
+hold.
 """
 
 from __future__ import annotations
@@ -17,14 +18,14 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot.state import MissionLeg
 
 _NEAR_M = 1.5
-"""Where the place itself is told."""
+"""Distance below which the position itself is commanded."""
 _GAIN = 0.95
-"""1/s of the speed near the place, PX4's MPC_XY_P."""
+"""Gain of the speed near the goal, 1/s, PX4's MPC_XY_P."""
 _ARRIVED_M, _ARRIVED_M_S = 0.3, 0.5
 
 
 def fly_leg(autopilot: Autopilot, leg: MissionLeg) -> bool:
-    """Fly on; whether the UAV is there and rests."""
+    """Flies on; returns whether the UAV has arrived and is at rest."""
     state = autopilot.state
     x, y, z = (goal - here for goal, here in zip(leg.target, state.position, strict=True))
     level, away = math.hypot(x, y), math.hypot(x, y, z)
@@ -49,13 +50,13 @@ def fly_leg(autopilot: Autopilot, leg: MissionLeg) -> bool:
 
 
 def bearing(autopilot: Autopilot, target: tuple[float, float, float]) -> float | None:
-    """Rad in the map from the UAV to a place; None where that is right here."""
+    """Returns the yaw in the map, rad, from the UAV to a position; None if it is too close."""
     dx, dy = target[0] - autopilot.state.position[0], target[1] - autopilot.state.position[1]
     return math.atan2(dy, dx) if math.hypot(dx, dy) > 1.0 else None
 
 
 def approach_speed(distance: float, brake: float) -> float:
-    """m/s from which `brake` m/s^2 stops in time; proportional near the place."""
+    """Returns the speed, m/s, from which `brake` m/s^2 stops in time; linear near the goal."""
     linear = brake / _GAIN**2
     if distance <= linear:
         return _GAIN * distance

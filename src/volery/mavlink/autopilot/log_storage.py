@@ -1,7 +1,7 @@
 """Stores the newest flight logs of one vehicle in a bounded, unnamed temporary file.
 
-The file is a ring: what is written overwrites the oldest logs. It has no name, so nothing is left
-of it when the process ends, however that happens.
+The file is a ring: new data overwrites the oldest logs. The file has no name, so that the system
+removes it at the end of the process, even after a crash.
 """
 
 from __future__ import annotations
@@ -13,15 +13,18 @@ import weakref
 from dataclasses import dataclass
 
 CAPACITY_BYTES = 16 << 20
-"""Of one vehicle: about half an hour (modelling choice)."""
+"""Storage of one vehicle: about half an hour (modelling choice)."""
 MAX_LOGS = 20
 _BLOCK_BYTES = 1 << 16
-"""What waits in memory until it is written."""
+"""Bytes held in memory before they are written."""
 
 
 @dataclass(eq=False)
 class StoredLog:
-    """One log: `start` counts bytes since the first log began; time_s: simulated, of its start."""
+    """One log.
+
+    start: its byte offset since the first log began; time_s: simulated time of its start.
+    """
 
     start: int
     time_s: int
@@ -45,7 +48,7 @@ class LogStorage:
         return self._written + len(self._block)
 
     def begin(self, time_s: int) -> None:
-        """Begins a new log. `OSError` where there is no room for a temporary file."""
+        """Starts a new log. Raises `OSError` if there is no room for a temporary file."""
         if self._file < 0:
             with tempfile.TemporaryFile() as file:
                 self._file = os.dup(file.fileno())
@@ -53,9 +56,9 @@ class LogStorage:
         self.logs = [*self.logs[1 - MAX_LOGS :], StoredLog(self._end, time_s)]
 
     def append(self, data: bytes) -> bool:
-        """Adds to the newest log; False where that fills the file: nothing is added.
+        """Appends to the newest log; returns False without a change if the data fills the file.
 
-        `OSError` where the disk is full.
+        Raises `OSError` if the disk is full.
         """
         log = self.logs[-1]
         if log.size + len(data) > self._capacity:
@@ -67,9 +70,9 @@ class LogStorage:
         return True
 
     def read(self, log: StoredLog, offset: int, num_bytes: int) -> bytes:
-        """Returns bytes of a log, fewer at its end, none of one that is no longer stored.
+        """Returns bytes of a log, fewer at its end, none of a log that is no longer stored.
 
-        `OSError` as of files.
+        Raises `OSError` if the file cannot be read.
         """
         if log not in self.logs or not 0 <= offset < log.size:
             return b""
@@ -80,11 +83,11 @@ class LogStorage:
         return b"".join(os.pread(self._file, size, at) for at, size in self._pieces(start, stop))
 
     def erase(self, *, keeps_newest: bool) -> None:
-        """Forgets the logs, but for the newest one where that still grows."""
+        """Deletes the logs, except for the newest one with `keeps_newest`."""
         self.logs = self.logs[-1:] if keeps_newest else []
 
     def close(self) -> None:
-        """Gives the file back; a new log opens another one."""
+        """Closes the file; a new log opens another one."""
         if self._finalizer is not None:
             self._finalizer()
         self._file = -1
@@ -105,7 +108,7 @@ class LogStorage:
         self._block.clear()
 
     def _pieces(self, start: int, stop: int) -> list[tuple[int, int]]:
-        """Offsets in the file and sizes of the bytes from `start` to `stop`."""
+        """Returns offsets in the file and sizes of the bytes from `start` to `stop`."""
         pieces = []
         while start < stop:
             at = start % self._capacity

@@ -1,7 +1,7 @@
-"""What a flight log holds of a vehicle: PX4's topics with their names, units and usual rates.
+"""Topics of a flight log: PX4's topics with their names, units and usual rates.
 
-Fields are those of PX4 1.18 that are known here (NED, FRD, quaternions w x y z); rates are those of
-its default profile (`logged_topics.cpp`), as far as the state of the vehicle comes so often.
+Fields are the known ones of PX4 1.18 (NED, FRD, quaternions w x y z). Rates are those of its
+default profile (`logged_topics.cpp`), limited by the rate of the vehicle's state.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ _NAV_STATES = {
 }
 _DISARMED, _ARMED, _ROTARY_WING = 1, 2, 1
 _MOTORS = 12
-"""Of `actuator_motors`."""
+"""Motors of `actuator_motors`."""
 _WARNINGS = (("BAT_EMERGEN_THR", 3), ("BAT_CRIT_THR", 2), ("BAT_LOW_THR", 1))
 
 
 class LoggedTopic(NamedTuple):
-    """A topic, how often it is sampled, and what of the vehicle it holds.
+    """A topic, its sampling period, and the function that reads its values.
 
-    values: None where there is nothing to log.
+    values: returns None if there is nothing to log.
     """
 
     topic: UlogTopic
@@ -86,7 +86,7 @@ def _local_position(autopilot: Autopilot) -> Values:
 
 @lru_cache(maxsize=256)
 def _reference(earth: GeoReference, origin: Vector) -> Vector:
-    """Latitude and longitude in degrees and altitude where the local frame begins."""
+    """Returns latitude, longitude, degrees, and altitude, m, of the local frame's origin."""
     return earth.geodetic(origin)
 
 

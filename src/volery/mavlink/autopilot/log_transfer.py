@@ -1,8 +1,8 @@
-"""MAVLink's log protocol: clients list the flight logs of a vehicle and read them.
+"""Implements MAVLink's log protocol: clients list the flight logs of a vehicle and read them.
 
-As in PX4 each link has one request at a time, which a new one replaces, and a log keeps the number
-of the link's last list. Answers go out at a bounded rate of simulated time, which the links share:
-so requests without end cost no more than one.
+As in PX4, each link has one request at a time, which a new one replaces, and a log has the number
+of the link's last list. Answers are sent at a bounded rate of simulated time, shared by the links,
+so that many requests cost no more than one.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot.state import Source
 
 FRAMES_PER_STATE = 10
-"""That go out with each state of the vehicles, a hundred times a simulated second: 90 kB/s
+"""Frames sent with each state of the vehicles, a hundred times a simulated second: 90 kB/s
 (modelling choice)."""
 _FRAMES_PER_TURN = 5
-"""Of a link, then the next one has its turn."""
+"""Frames of a link before the next link has its turn."""
 _DATA_BYTES = 90
-"""Of a LOG_DATA; one with fewer is the last one."""
+"""Bytes of a LOG_DATA message; one with fewer bytes is the last one."""
 _LOG_DATA = 120
 _HEAD = struct.Struct("<IHB")
 
 
 @dataclass
 class _Request:
-    """What a link has asked for: entries of its list, or bytes of a log."""
+    """Request of a link: entries of its list, or bytes of a log."""
 
     listed: tuple[StoredLog, ...]
     entries: range = field(default=range(0))
@@ -44,7 +44,7 @@ class _Request:
 
 
 class TransferPace:
-    """Shares the rate among the vehicles of a run that have something to send."""
+    """Shares the rate among the vehicles of a run that have data to send."""
 
     def __init__(self) -> None:
         self._now_ns = -1
@@ -52,7 +52,7 @@ class TransferPace:
         self._share = FRAMES_PER_STATE
 
     def share(self, now_ns: int) -> int:
-        """Returns how many frames a vehicle may send at a time at which it has some."""
+        """Returns how many frames a vehicle with data may send at a time."""
         if now_ns != self._now_ns:
             self._now_ns = now_ns
             self._share = max(1, FRAMES_PER_STATE // max(1, self._num_sending))
@@ -62,16 +62,16 @@ class TransferPace:
 
 
 class LogTransfers:
-    """Answers under way, by link."""
+    """Requests in progress, by link."""
 
     def __init__(self, pace: TransferPace | None = None) -> None:
         self.pace = pace or TransferPace()
         self._requests: dict[int, _Request] = {}
         self._waiting: deque[int] = deque()
-        """Links with something to send, the next one first."""
+        """Links with data to send, the next one first."""
 
     def list_logs(self, autopilot: Autopilot, link: int, first: int, last: int) -> None:
-        """Begins to send the entries of the logs `first` to `last`."""
+        """Starts to send the entries of the logs `first` to `last`."""
         listed = tuple(autopilot.log.storage.logs)
         last = min(last, len(listed) - 1)
         entries = range(min(first, last), last + 1) if listed else range(1)
@@ -80,7 +80,7 @@ class LogTransfers:
     def send_data(
         self, autopilot: Autopilot, link: int, number: int, offset: int, count: int
     ) -> None:
-        """Begins to send `count` bytes of a log from `offset` on."""
+        """Starts to send `count` bytes of a log from `offset` on."""
         before = self._requests.get(link)
         listed = tuple(autopilot.log.storage.logs) if before is None else before.listed
         if number < len(listed):
@@ -89,18 +89,18 @@ class LogTransfers:
             self._set(link, _Request(listed, range(0), log, number, offset, count))
 
     def forget(self, link: int) -> None:
-        """Ends what a link has asked for."""
+        """Cancels the request of a link."""
         self._requests.pop(link, None)
         with suppress(ValueError):
             self._waiting.remove(link)
 
     def clear(self) -> None:
-        """Ends everything."""
+        """Cancels all requests."""
         self._requests.clear()
         self._waiting.clear()
 
     def send_some(self, autopilot: Autopilot) -> None:
-        """Goes on with the answers, the links in turn."""
+        """Continues the answers, the links in turn."""
         num_frames = self.pace.share(autopilot.memory.now_ns) if self._waiting else 0
         while num_frames > 0 and self._waiting:
             link = self._waiting.popleft()
@@ -120,11 +120,11 @@ class LogTransfers:
 def _send_entries(
     autopilot: Autopilot, link: int, request: _Request, turn: int
 ) -> tuple[int, bool]:
-    """Sends the next LOG_ENTRY messages; how many, and whether they were the last ones."""
+    """Sends the next LOG_ENTRY messages; returns how many, and whether they were the last ones."""
     entry, listed = dialect().MAVLink_log_entry_message, request.listed
     chosen, request.entries = request.entries[:turn], request.entries[turn:]
     for number in chosen:
-        if not listed:  # the one that says so
+        if not listed:  # a single entry reports that there are none
             autopilot.send(entry(0, 0, 0, 0, 0), link)
             continue
         log = listed[number]
@@ -133,7 +133,7 @@ def _send_entries(
 
 
 def _send_data(autopilot: Autopilot, link: int, request: _Request, turn: int) -> tuple[int, bool]:
-    """Sends the next LOG_DATA messages; how many, and whether they were the last ones."""
+    """Sends the next LOG_DATA messages; returns how many, and whether they were the last ones."""
     assert request.log is not None
     wanted = min(request.remaining, turn * _DATA_BYTES)
     try:
@@ -150,22 +150,22 @@ def _send_data(autopilot: Autopilot, link: int, request: _Request, turn: int) ->
 
 
 def list_logs(autopilot: Autopilot, source: Source, message: Any) -> None:
-    """Answers a LOG_REQUEST_LIST."""
+    """Handles LOG_REQUEST_LIST."""
     autopilot.log.transfers.list_logs(autopilot, source[0], message.start, message.end)
 
 
 def send_data(autopilot: Autopilot, source: Source, message: Any) -> None:
-    """Answers a LOG_REQUEST_DATA; of a log that is not there nothing is sent, as by PX4."""
+    """Handles LOG_REQUEST_DATA; nothing is sent for a missing log, as in PX4."""
     parts = int(message.id), int(message.ofs), int(message.count)
     autopilot.log.transfers.send_data(autopilot, source[0], *parts)
 
 
 def erase(autopilot: Autopilot, _source: Source, _message: Any) -> None:
-    """Obeys a LOG_ERASE: erases all logs but that of the present flight."""
+    """Handles LOG_ERASE: deletes all logs except for that of the current flight."""
     autopilot.log.transfers.clear()
     autopilot.log.storage.erase(keeps_newest=autopilot.log.is_recording)
 
 
 def end(autopilot: Autopilot, source: Source, _message: Any) -> None:
-    """Obeys a LOG_REQUEST_END."""
+    """Handles LOG_REQUEST_END."""
     autopilot.log.transfers.forget(source[0])

@@ -1,4 +1,4 @@
-"""Flying by hand: MANUAL_CONTROL in position and altitude mode."""
+"""Manual control: flies by MANUAL_CONTROL in position and altitude mode."""
 
 from __future__ import annotations
 
@@ -14,19 +14,20 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot.vehicle import FlightState
 
 _DEAD = 0.1
-"""Share of the way around the middle that means nothing, PX4's MPC_HOLD_DZ."""
+"""Dead zone around the centre, as a fraction of full deflection, PX4's MPC_HOLD_DZ."""
 _HEIGHT_GAIN, _CLIMB_GAIN, _CLIMB_INTEGRAL = 1.0, 4.0, 2.0
-"""1/s, 1/s, 1/s^2 of the altitude mode, as PX4's MPC_Z_P, MPC_Z_VEL_P_ACC, MPC_Z_VEL_I_ACC."""
+"""Gains of the altitude mode, 1/s, 1/s, 1/s^2, as PX4's MPC_Z_P, MPC_Z_VEL_P_ACC, MPC_Z_VEL_I_ACC.
+"""
 _GRAVITY = 9.80665
 _TICK_S = 0.01
 _MOST_PUSH = 3.0
-"""m/s^2 that the integral may come to (modelling choice)."""
+"""Limit of the integral, m/s^2 (modelling choice)."""
 _LIFT_M = 1.0
-"""Height of a start by sticks (modelling choice)."""
+"""Height of a take-off by manual control (modelling choice)."""
 
 
 def take(autopilot: Autopilot, _source: object, message: Any) -> None:
-    """Hear a MANUAL_CONTROL; parts that are out of range make it unheard."""
+    """Handles MANUAL_CONTROL; ignores messages with values out of range."""
     if message.target not in (0, autopilot.system):
         return
     parts = (message.x, message.y, message.z, message.r)
@@ -37,7 +38,7 @@ def take(autopilot: Autopilot, _source: object, message: Any) -> None:
 
 
 def fly_position(autopilot: Autopilot, state: FlightState) -> None:
-    """Velocities by the sticks; where they are in the middle, the place is kept."""
+    """Commands velocities by the sticks; with centred sticks the UAV holds its position."""
     if not _is_up(autopilot, state):
         return
     forward, right, up, turn = _alive(autopilot.memory.sticks)
@@ -59,7 +60,7 @@ def fly_position(autopilot: Autopilot, state: FlightState) -> None:
 
 
 def fly_altitude(autopilot: Autopilot, state: FlightState) -> None:
-    """Tilts by the sticks; the height is kept, and nothing else."""
+    """Commands tilts by the sticks; only the height is held."""
     if not _is_up(autopilot, state):
         return
     memory = autopilot.memory
@@ -88,7 +89,7 @@ def fly_altitude(autopilot: Autopilot, state: FlightState) -> None:
 
 
 def _is_up(autopilot: Autopilot, state: FlightState) -> bool:
-    """Whether it flies; from the ground it starts where the stick is pushed up."""
+    """Returns whether the UAV flies; on the ground, raising the stick starts a take-off."""
     if state.mode == "LANDED":
         if autopilot.memory.sticks.up > _DEAD and autopilot.memory.order != "take_off":
             mode_transitions.order(autopilot, "take_off", autopilot.vehicle.take_off(_LIFT_M))
@@ -101,7 +102,7 @@ def _climb(autopilot: Autopilot, up: float) -> float:
 
 
 def _alive(sticks: ManualInput) -> tuple[float, float, float, float]:
-    """Deflections beyond the dead zone, from 0 there to 1."""
+    """Returns deflections beyond the dead zone, from 0 there to 1."""
     forward, right, up, turn = (
         math.copysign(max(0.0, abs(part) - _DEAD) / (1.0 - _DEAD), part)
         for part in (sticks.forward, sticks.right, sticks.up, sticks.turn)

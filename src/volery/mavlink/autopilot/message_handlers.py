@@ -1,4 +1,4 @@
-"""Which message does what."""
+"""Maps received messages to their handlers."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot.state import Source
 
 _GROUND_STATION = 6
-"""MAV_TYPE_GCS."""
+"""Value MAV_TYPE_GCS."""
 
 
 def _heartbeat(autopilot: Autopilot, _source: Source, message: Any) -> None:
@@ -40,7 +40,7 @@ def _ping(autopilot: Autopilot, source: Source, message: Any) -> None:
 
 
 def _time_sync(autopilot: Autopilot, source: Source, message: Any) -> None:
-    """Answer with the simulated time since the start."""
+    """Answers with the simulated time since the start."""
     if message.tc1 == 0:
         answer = dialect().MAVLink_timesync_message(autopilot.memory.now_ns, message.ts1)
         autopilot.send(answer, source[0])
@@ -61,14 +61,14 @@ def _command_int(autopilot: Autopilot, source: Source, message: Any) -> None:
 
 
 def _set_mode(autopilot: Autopilot, source: Source, message: Any) -> None:
-    """The old message: PX4 makes a command of it, and answers that."""
+    """Handles the old SET_MODE message: PX4 executes and acknowledges it as a command."""
     custom = message.custom_mode
     params = (float(message.base_mode), custom >> 16 & 255, custom >> 24 & 255, *(math.nan,) * 4)
     commands.take(autopilot, source, commands.Command(commands.DO_SET_MODE, params, None))
 
 
 def _data_stream(autopilot: Autopilot, source: Source, message: Any) -> None:
-    """The old way to ask for streams: what MAVProxy asks for at its start; PX4 does not hear it."""
+    """Ignores the old REQUEST_DATA_STREAM, which MAVProxy sends at its start, as PX4 does."""
 
 
 HANDLERS: dict[str, Callable[[Autopilot, Source, Any], None]] = {

@@ -1,4 +1,4 @@
-"""Missions: one item after the other."""
+"""Flies missions, one item after the other."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot.vehicle import FlightState, Vector
 
 _FACES_RAD = math.radians(5.0)
-"""A heading that is reached (modelling choice)."""
+"""Yaw error below which a heading is reached (modelling choice)."""
 _LOITER_RADIUS_M = 80.0
-"""Of items that name none: the default of PX4's NAV_LOITER_RAD."""
+"""Radius of items without one: the default of PX4's NAV_LOITER_RAD."""
 _FACING = plans.PLACED - {plans.LAND, plans.TAKE_OFF}
-"""Items on whose way a region of interest is faced."""
+"""Items on whose leg the UAV faces a region of interest."""
 _MOST_STEPS = 2 * plans.MOST_ITEMS[plans.MISSION]
-"""Items that are passed at one instant; jumps cannot hang it."""
+"""Limit of items passed at one instant, so that jumps cannot loop forever."""
 
 
 def fly(autopilot: Autopilot, state: FlightState) -> None:
-    """Go on with the mission; at its end the place is held."""
+    """Continues the mission; at its end the UAV holds its position."""
     memory = autopilot.memory
     mission, items = memory.mission, memory.plans[plans.MISSION]
     if mission.complete or not items:
@@ -44,7 +44,7 @@ def fly(autopilot: Autopilot, state: FlightState) -> None:
 
 
 def _face_interest(autopilot: Autopilot, mission: Mission, item: plans.MissionItem) -> None:
-    """On the way to a place look at the region of interest, as PX4's multicopters do."""
+    """Faces the region of interest during a leg, as PX4's multicopters do."""
     leg = autopilot.memory.leg
     if mission.interest is None or leg is None or leg.locked or item.command not in _FACING:
         return
@@ -55,14 +55,14 @@ def _face_interest(autopilot: Autopilot, mission: Mission, item: plans.MissionIt
 
 
 def _reach(autopilot: Autopilot, mission: Mission) -> None:
-    """Tell that the current item is done, and go to the next one."""
+    """Reports that the current item is done, and proceeds to the next one."""
     mission.reached = mission.current
     autopilot.send(dialect().MAVLink_mission_item_reached_message(mission.current))
     items = autopilot.memory.plans[plans.MISSION]
     _advance(mission, items)
     if mission.complete:
         mission.speed = math.nan
-        if autopilot.memory.mode is Mode.MISSION:  # else its last item was the way home
+        if autopilot.memory.mode is Mode.MISSION:  # else its last item was a return
             landed = autopilot.state.mode == "LANDED"
             autopilot.say(6, f"Mission finished, {'landed' if landed else 'loitering'}")
 
@@ -88,7 +88,7 @@ def _advance(mission: Mission, items: list[plans.MissionItem]) -> None:
 def _do(
     autopilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
 ) -> bool:
-    """Do an item; whether it is done."""
+    """Executes an item; returns whether it is done."""
     if state.mode == "LANDED" and item.command != plans.TAKE_OFF:
         return _do_on_ground(autopilot, mission, item, state)
     doing = {
@@ -112,7 +112,7 @@ def _do(
 def _do_on_ground(
     autopilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
 ) -> bool:
-    """From the ground it starts by itself where a place is wanted, as PX4 does."""
+    """Executes an item on the ground; a position starts a take-off, as in PX4."""
     if item.command == plans.LAND:
         return True
     if item.command in (plans.DELAY, plans.CONDITION_DELAY):
@@ -125,7 +125,7 @@ def _do_on_ground(
 
 
 def _set(autopilot: Autopilot, mission: Mission, item: plans.MissionItem) -> bool:
-    """What takes no time."""
+    """Executes an item that takes no time."""
     if item.command == plans.CHANGE_SPEED and item.params[1] > 0.0:
         mission.speed = item.params[1]
     elif item.command in payload_items.INTEREST:
@@ -174,7 +174,9 @@ def _waypoint(
         target = place_of(autopilot, item)
         # params count clockwise from north
         yaw = 0.5 * math.pi - math.radians(item.params[3])
-        turns = math.isfinite(yaw) and item.command != plans.LOITER_TIME  # which says no heading
+        turns = (
+            math.isfinite(yaw) and item.command != plans.LOITER_TIME
+        )  # LOITER_TIME has no heading
         facing = yaw if turns else bearing(autopilot, target)
         memory.leg = MissionLeg(target, facing, mode_transitions.cruise(autopilot))
     leg = memory.leg
@@ -196,7 +198,7 @@ def _waypoint(
 def _change_height(
     autopilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
 ) -> bool:
-    """LOITER_TO_ALT: at the present height to within its radius, then to its height."""
+    """Handles LOITER_TO_ALT: approaches at the current height, then changes the height."""
     memory = autopilot.memory
     if state.mode == "TAKE_OFF":
         return False
@@ -218,7 +220,7 @@ def _change_height(
 
 
 def _is_near(autopilot: Autopilot, item: plans.MissionItem, leg: MissionLeg) -> bool:
-    """Whether it is within the radius of acceptance, the item's own or NAV_ACC_RAD."""
+    """Returns whether the UAV is within the acceptance radius, the item's own or NAV_ACC_RAD."""
     own = item.params[1] if item.command == plans.WAYPOINT else 0.0
     radius = own if math.isfinite(own) and own > 0.0 else float(autopilot.parameter("NAV_ACC_RAD"))
     x, y, _ = autopilot.state.position
@@ -235,7 +237,7 @@ def _land(
 ) -> bool:
     memory = autopilot.memory
     if memory.order == "land":
-        return False  # done once it is on the ground
+        return False  # done once the UAV is on the ground
     if not mission.entered:
         mission.entered = True
         x, y, z = state.position
@@ -262,7 +264,7 @@ def _delay(
 def _face(
     autopilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
 ) -> bool:
-    """CONDITION_YAW: turn on the spot, relative or from north clockwise."""
+    """Handles CONDITION_YAW: turns on the spot, relative or clockwise from north."""
     memory = autopilot.memory
     if not mission.entered:
         mission.entered = True
@@ -288,7 +290,7 @@ def _has_waited(autopilot: Autopilot, mission: Mission, seconds: float) -> bool:
 
 
 def place_of(autopilot: Autopilot, item: plans.MissionItem) -> Vector:
-    """Where an item lies in the map, m; above home or the sea as its frame says."""
+    """Returns an item's position in the map, m; above home or sea level according to its frame."""
     x, y, _ = autopilot.state.position
     if item.placed:
         x, y, _ = autopilot.earth.place(item.latitude, item.longitude, autopilot.build.origin[2])

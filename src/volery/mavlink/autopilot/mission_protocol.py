@@ -1,7 +1,7 @@
-"""The mission protocol: plans up and down, for missions, fences and rally points alike.
+"""The mission protocol: uploads and downloads plans of missions, fences and rally points.
 
-One transfer a kind at a time; who comes second is denied. The receiver asks again for what does not
-come: here each 250 ms, as PX4 does, and gives up after 5 s.
+One transfer per kind at a time; a second client is denied. As in PX4, the receiver repeats a
+request each 250 ms; here it gives up after 5 s.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ GIVE_UP_NS = 5_000_000_000
 
 
 def begin_upload(autopilot: Autopilot, source: Source, message: Any) -> None:
-    """Answer a MISSION_COUNT by asking for the first item."""
+    """Answers MISSION_COUNT by a request for the first item."""
     kind, count = int(message.mission_type), int(message.count)
     if kind not in plans.MOST_ITEMS:
         _answer(autopilot, source, plans.UNSUPPORTED, kind)
@@ -44,7 +44,7 @@ def begin_upload(autopilot: Autopilot, source: Source, message: Any) -> None:
 
 
 def take_item(autopilot: Autopilot, source: Source, message: Any) -> None:
-    """Take the item that was asked for; the last one of a plan may come again: its ACK was lost."""
+    """Stores the requested item; the last one may come again, because its ACK was lost."""
     kind, sequence = int(message.mission_type), int(message.seq)
     transfer = autopilot.memory.transfers.get(kind)
     if transfer is None or not transfer.upload or transfer.source != source:
@@ -54,7 +54,7 @@ def take_item(autopilot: Autopilot, source: Source, message: Any) -> None:
         return
     transfer.time_ns = autopilot.memory.now_ns
     if sequence != len(transfer.items):
-        return  # early or repeated: what is awaited is asked for again, as PX4 does
+        return  # early or repeated: the awaited item is requested again, as in PX4
     item = plans.item_of(message)
     fault = plans.fault_of(item, kind, transfer.count)
     if fault:
@@ -73,7 +73,7 @@ def take_item(autopilot: Autopilot, source: Source, message: Any) -> None:
 
 
 def begin_download(autopilot: Autopilot, source: Source, message: Any) -> None:
-    """Answer a MISSION_REQUEST_LIST with the number of items."""
+    """Answers MISSION_REQUEST_LIST with the number of items."""
     kind = int(message.mission_type)
     if kind not in plans.MOST_ITEMS:
         _answer(autopilot, source, plans.UNSUPPORTED, kind)
@@ -84,7 +84,7 @@ def begin_download(autopilot: Autopilot, source: Source, message: Any) -> None:
 
 
 def send_item(autopilot: Autopilot, source: Source, message: Any) -> None:
-    """Send one item, in the form that was asked for."""
+    """Sends one item, in the requested form."""
     kind, sequence = int(message.mission_type), int(message.seq)
     items = autopilot.memory.plans.get(kind)
     if items is None or sequence >= len(items):
@@ -105,7 +105,7 @@ def send_item(autopilot: Autopilot, source: Source, message: Any) -> None:
 
 
 def take_ack(autopilot: Autopilot, source: Source, message: Any) -> None:
-    """End an upload that its sender cancels; of downloads nothing is kept that could end."""
+    """Ends an upload that its sender cancels; downloads have no state."""
     kind = int(message.mission_type)
     transfer = autopilot.memory.transfers.get(kind)
     if transfer is None or not transfer.upload or transfer.source != source:
@@ -115,7 +115,7 @@ def take_ack(autopilot: Autopilot, source: Source, message: Any) -> None:
 
 
 def clear(autopilot: Autopilot, source: Source, message: Any) -> None:
-    """Forget one plan or all of them."""
+    """Deletes one plan or all plans."""
     kind = int(message.mission_type)
     kinds = tuple(plans.MOST_ITEMS) if kind == plans.ALL else (kind,)
     if not set(kinds) <= set(plans.MOST_ITEMS):
@@ -128,12 +128,12 @@ def clear(autopilot: Autopilot, source: Source, message: Any) -> None:
 
 
 def set_current(autopilot: Autopilot, _source: Source, message: Any) -> None:
-    """Go on with another item of the mission; the old message, which has no answer."""
+    """Handles the old MISSION_SET_CURRENT, which has no answer."""
     jump_to(autopilot, int(message.seq))
 
 
 def jump_to(autopilot: Autopilot, sequence: int) -> bool:
-    """Make an item the current one; whether there is such an item."""
+    """Makes an item the current one; returns whether the item exists."""
     if not 0 <= sequence < len(autopilot.memory.plans[plans.MISSION]):
         return False
     speed = autopilot.memory.mission.speed
@@ -143,7 +143,7 @@ def jump_to(autopilot: Autopilot, sequence: int) -> bool:
 
 
 def keep_transfers_going(autopilot: Autopilot) -> None:
-    """Ask again for what has not come, give up on who is gone."""
+    """Repeats unanswered requests and drops silent peers."""
     now_ns = autopilot.memory.now_ns
     for transfer in tuple(autopilot.memory.transfers.values()):
         if now_ns - transfer.time_ns > GIVE_UP_NS:

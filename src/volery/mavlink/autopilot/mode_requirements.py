@@ -1,4 +1,4 @@
-"""What a mode needs that others send: sticks, setpoints, a mission."""
+"""Requirements of modes on other clients: manual control, setpoints, a mission."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot.core import Autopilot
 
 _LEAST_OFFBOARD_HZ = 2.0
-"""PX4 enters offboard only where setpoints come more often than that."""
+"""Setpoint rate above which PX4 enters offboard."""
 
 
 def missing(autopilot: Autopilot, mode: Mode) -> str:
-    """What of it is not there for a mode; empty where nothing is missing."""
+    """Returns what a mode lacks; empty if nothing is missing."""
     if mode.by_sticks and not sticks_are_there(autopilot):
         return "no manual control input"
     if mode is Mode.OFFBOARD and not offboard_is_fresh(autopilot):
@@ -28,19 +28,19 @@ def missing(autopilot: Autopilot, mode: Mode) -> str:
 
 
 def sticks_are_there(autopilot: Autopilot) -> bool:
-    """Whether MANUAL_CONTROL has come within COM_RC_LOSS_T."""
+    """Returns whether MANUAL_CONTROL has arrived within COM_RC_LOSS_T."""
     age_ns = autopilot.memory.now_ns - autopilot.memory.sticks.time_ns
     return age_ns <= float(autopilot.parameter("COM_RC_LOSS_T")) * 1e9
 
 
 def offboard_is_fresh(autopilot: Autopilot) -> bool:
-    """Whether setpoints come often enough to fly by."""
+    """Returns whether setpoints arrive often enough."""
     offboard, now_ns = autopilot.memory.offboard, autopilot.memory.now_ns
     return offboard.setpoint is not None and now_ns - offboard.time_ns < 1e9 / _LEAST_OFFBOARD_HZ
 
 
 def ground_is_there(autopilot: Autopilot) -> bool:
-    """Whether a ground station's heartbeat has come within COM_DL_LOSS_T."""
+    """Returns whether a ground station's heartbeat has arrived within COM_DL_LOSS_T."""
     heard_ns = autopilot.memory.ground_heard_ns
     limit_ns = int(autopilot.parameter("COM_DL_LOSS_T")) * 1_000_000_000
     return heard_ns >= 0 and autopilot.memory.now_ns - heard_ns <= limit_ns

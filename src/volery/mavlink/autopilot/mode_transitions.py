@@ -1,7 +1,7 @@
-"""Changes of mode: what a mode needs, what it begins with, and who else flies the UAV.
+"""Changes of mode: requirements, first commands, and other clients' control of the UAV.
 
-Other clients of the graph may command the UAV beside the autopilot: it then tells the mode that
-comes nearest and keeps its hands off until it is asked for one.
+Other clients of the graph may command the UAV too. The autopilot then reports the most similar mode
+and sends no commands until a mode is requested.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ _FOLLOWS = {
     "stop": {"LOW_LEVEL", "LANDED"},
     "": {"LANDED"},
 }
-"""Modes of the UAV that an order leads to."""
+"""Modes of the UAV that follow from a command."""
 _OUTSIDE = {"TAKE_OFF": Mode.TAKE_OFF, "LAND": Mode.LAND, "RETURN": Mode.RETURN}
-"""What is told where somebody else flies it; else: hold."""
+"""Mode reported while another client controls the UAV; else: hold."""
 _PATIENCE_NS = 50_000_000
-"""For this long an order may take to show."""
+"""Time that a command may take to show in the UAV's mode."""
 
 
 def flies(autopilot: Autopilot) -> bool:
-    """Whether the UAV is off the ground, by whomever."""
+    """Returns whether the UAV is off the ground, under any control."""
     return autopilot.state.mode not in ("LANDED", "CRASHED")
 
 
 def cruise(autopilot: Autopilot) -> float:
-    """m/s of ways to places: of the mission, of a command, of MPC_XY_CRUISE."""
+    """Returns the cruise speed, m/s: of the mission, of a command, or of MPC_XY_CRUISE."""
     memory = autopilot.memory
     asked = (memory.mission.speed if memory.mode is Mode.MISSION else math.nan, memory.cruise)
     speed = next(
@@ -53,12 +53,12 @@ def cruise(autopilot: Autopilot) -> float:
 
 
 def go_to(autopilot: Autopilot, place: Vector, yaw: float | None) -> None:
-    """Fly to a place at cruising speed."""
+    """Flies to a position at cruise speed."""
     autopilot.memory.leg = MissionLeg(place, yaw, cruise(autopilot))
 
 
 def obstacle_to(autopilot: Autopilot, mode: Mode) -> str:
-    """Why a mode cannot be entered now; empty where it can."""
+    """Returns why a mode cannot be entered now; empty if it can."""
     memory = autopilot.memory
     if autopilot.state.crashed:
         return "the vehicle has crashed"
@@ -70,9 +70,9 @@ def obstacle_to(autopilot: Autopilot, mode: Mode) -> str:
 
 
 def ask_for(autopilot: Autopilot, mode: Mode) -> str:
-    """Enter a mode that somebody asks for; why not, empty where it is entered.
+    """Enters a requested mode; returns why not, empty if entered.
 
-    A disarmed UAV may be in any: what is missing keeps it from being armed, as in PX4.
+    A disarmed UAV may enter any mode: missing requirements prevent arming, as in PX4.
     """
     why = obstacle_to(autopilot, mode) if autopilot.memory.armed else ""
     if not why:
@@ -82,7 +82,7 @@ def ask_for(autopilot: Autopilot, mode: Mode) -> str:
 
 
 def enter(autopilot: Autopilot, mode: Mode) -> None:
-    """Fly in a mode from now on."""
+    """Enters a mode."""
     memory = autopilot.memory
     changed = memory.mode is not mode
     memory.mode = mode
@@ -108,7 +108,7 @@ def enter(autopilot: Autopilot, mode: Mode) -> None:
 
 
 def rise(autopilot: Autopilot) -> None:
-    """Take off from the ground, or climb as high in the air."""
+    """Takes off from the ground, or climbs by the same height in the air."""
     height = autopilot.memory.take_off_height
     if not math.isfinite(height):
         height = float(autopilot.parameter("MIS_TAKEOFF_ALT"))
@@ -126,7 +126,7 @@ def rise(autopilot: Autopilot) -> None:
 
 
 def order(autopilot: Autopilot, what: str, why_not: str = "") -> None:
-    """Note what the UAV was told, and tell people where it did not take it."""
+    """Records a command to the UAV, and reports why the UAV refused it."""
     autopilot.memory.order, autopilot.memory.sinks = what, math.nan
     autopilot.memory.ordered_ns = autopilot.memory.now_ns
     if why_not:
@@ -135,7 +135,7 @@ def order(autopilot: Autopilot, what: str, why_not: str = "") -> None:
 
 
 def follow_vehicle(autopilot: Autopilot, state: FlightState) -> None:
-    """Notice take-offs, landings, crashes, and others who fly the UAV."""
+    """Detects take-offs, landings, crashes, and other clients' control of the UAV."""
     memory = autopilot.memory
     if state.crashed:
         if memory.armed:
@@ -157,7 +157,7 @@ def follow_vehicle(autopilot: Autopilot, state: FlightState) -> None:
 
 
 def _step_back(autopilot: Autopilot, state: FlightState) -> None:
-    """Somebody else flies it: tell so, and keep the hands off."""
+    """Reports that another client controls the UAV, and stops sending commands."""
     memory = autopilot.memory
     memory.order = state.mode if state.mode != "LANDED" else ""
     memory.leg = memory.way_home = None
@@ -173,7 +173,7 @@ def _step_back(autopilot: Autopilot, state: FlightState) -> None:
 
 
 def _begins(autopilot: Autopilot) -> bool:
-    """Whether a take-off is under way that has not left the ground."""
+    """Returns whether a take-off has started that has not left the ground."""
     return (
         autopilot.memory.order == "take_off"
         and autopilot.memory.now_ns - autopilot.memory.ordered_ns < 1e9

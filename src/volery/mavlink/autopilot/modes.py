@@ -1,4 +1,4 @@
-"""Flight modes as PX4 numbers and MAVROS names them.
+"""Flight modes with PX4's numbers and MAVROS's names.
 
 Numbers: PX4's `px4_custom_mode.h`; names: MAVROS's `uas_stringify.cpp`.
 """
@@ -12,12 +12,12 @@ _MANUAL_INPUT, _STABILIZE, _GUIDED, _AUTO = 64, 16, 8, 4
 
 
 class Mode(Enum):
-    """What the autopilot does: PX4's main mode, sub mode, MAVROS's name, flags of the heartbeat."""
+    """Mode of the autopilot: PX4's main mode, sub mode, MAVROS's name, flags of the heartbeat."""
 
     ALTITUDE = (2, 0, "ALTCTL", _MANUAL_INPUT | _STABILIZE)
     POSITION = (3, 0, "POSCTL", _MANUAL_INPUT | _STABILIZE | _GUIDED)
     ORBIT = (3, 1, "CMODE(16973824)", _AUTO | _STABILIZE | _GUIDED)
-    """For which MAVROS has no name but its number."""
+    """Has only a number as its name in MAVROS."""
     TAKE_OFF = (4, 2, "AUTO.TAKEOFF", _AUTO | _STABILIZE | _GUIDED)
     HOLD = (4, 3, "AUTO.LOITER", _AUTO | _STABILIZE | _GUIDED)
     MISSION = (4, 4, "AUTO.MISSION", _AUTO | _STABILIZE | _GUIDED)
@@ -28,33 +28,33 @@ class Mode(Enum):
 
     @property
     def custom_mode(self) -> int:
-        """As a heartbeat tells it."""
+        """Value of `custom_mode` in a heartbeat."""
         return int(self.value[0]) << 16 | int(self.value[1]) << 24
 
     @property
     def mavros(self) -> str:
-        """MAVROS's name."""
+        """Name in MAVROS."""
         return str(self.value[2])
 
     @property
     def flags(self) -> int:
-        """Of MAV_MODE_FLAG, besides 'custom mode' and 'armed'."""
+        """Flags of MAV_MODE_FLAG, besides 'custom mode' and 'armed'."""
         return int(self.value[3])
 
     @property
     def by_sticks(self) -> bool:
-        """Whether a person flies."""
+        """Whether an operator controls the UAV manually."""
         return self in (Mode.ALTITUDE, Mode.POSITION)
 
 
 def mode_of(main: int, sub: int) -> Mode | None:
-    """The mode of PX4's numbers; None where there is no such mode here."""
-    if main == 4 and sub == 9:  # precision landing, without a target to see, is a landing
+    """Returns the mode of PX4's numbers; None for an unsupported mode."""
+    if main == 4 and sub == 9:  # a precision landing without a visible target is a landing
         sub = 6
     found = (mode for mode in Mode if mode.value[0] == main and mode.value[1] in (sub, 0))
     return next(found, None)
 
 
 def mode_named(name: str) -> Mode | None:
-    """The mode of MAVROS's name."""
+    """Returns the mode of MAVROS's name; None if unknown."""
     return next((mode for mode in Mode if mode.mavros == name), None)

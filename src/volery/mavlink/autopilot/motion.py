@@ -1,6 +1,6 @@
-"""What is told of a vehicle's motion: NED, FRD, and MAVLink's units (degE7, mm, cm/s, mbar).
+"""Builds messages about a vehicle's motion: NED, FRD, MAVLink's units (degE7, mm, cm/s, mbar).
 
-Unknown fields hold the values that the dialect gives for that.
+Unknown fields have the values that the dialect defines for this.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ if TYPE_CHECKING:
 
 _GRAVITY = 9.80665
 _LOCAL_NED, _BY_AUTOPILOT = 1, 8
-"""MAV_FRAME, MAV_ESTIMATOR_TYPE."""
+"""Values of MAV_FRAME and MAV_ESTIMATOR_TYPE."""
 
 
 def ms(autopilot: Autopilot) -> int:
-    """Milliseconds since the start."""
+    """Returns milliseconds since the start."""
     return autopilot.memory.now_ns // 1_000_000 & 0xFFFFFFFF
 
 
 def us(autopilot: Autopilot) -> int:
-    """Microseconds since the start."""
+    """Returns microseconds since the start."""
     return autopilot.memory.now_ns // 1_000
 
 
 def local_motion(autopilot: Autopilot) -> tuple[Vector, Vector]:
-    """Place from the local origin and velocity, NED."""
+    """Returns position from the local origin and velocity, NED."""
     state, origin = autopilot.state, autopilot.memory.origin
     x, y, z = (here - there for here, there in zip(state.position, origin, strict=True))
     return ned_of_enu((x, y, z)), ned_of_enu(state.velocity)
@@ -47,13 +47,13 @@ def _roll_pitch_yaw(q: Quaternion) -> Vector:
 
 
 def degrees_e7(geodetic: Vector) -> tuple[int, int, int]:
-    """degE7, degE7, mm."""
+    """Returns degE7, degE7, mm."""
     latitude, longitude, altitude = geodetic
     return round(latitude * 1e7), round(longitude * 1e7), round(altitude * 1e3)
 
 
 def clipped(value: float, bits: int) -> int:
-    """A whole number that fits a signed field."""
+    """Returns an integer that fits a signed field."""
     limit = (1 << bits - 1) - 1
     return max(-limit, min(limit, round(value)))
 
@@ -64,7 +64,7 @@ def _heading_cdeg(autopilot: Autopilot) -> int:
 
 
 def gps_raw_int(autopilot: Autopilot) -> Any:
-    """As the estimate has it; of a UAV that has lost its fix: none."""
+    """Returns GPS_RAW_INT from the estimate; without a fix if the UAV has lost its own."""
     place = degrees_e7(autopilot.geodetic())
     north, east, _ = ned_of_enu(autopilot.state.velocity)
     speed = math.hypot(north, east)
@@ -85,7 +85,7 @@ def gps_raw_int(autopilot: Autopilot) -> Any:
 
 
 def attitude(autopilot: Autopilot) -> Any:
-    """ATTITUDE."""
+    """Returns ATTITUDE."""
     angles = _roll_pitch_yaw(q_ned_frd_of_enu_flu(autopilot.state.attitude))
     return dialect().MAVLink_attitude_message(
         ms(autopilot), *angles, *frd_of_flu(autopilot.state.rates)
@@ -93,7 +93,7 @@ def attitude(autopilot: Autopilot) -> Any:
 
 
 def attitude_quaternion(autopilot: Autopilot) -> Any:
-    """ATTITUDE_QUATERNION."""
+    """Returns ATTITUDE_QUATERNION."""
     x, y, z, w = q_ned_frd_of_enu_flu(autopilot.state.attitude)
     sign = -1.0 if w < 0.0 else 1.0
     turned = (sign * w, sign * x, sign * y, sign * z)
@@ -102,13 +102,13 @@ def attitude_quaternion(autopilot: Autopilot) -> Any:
 
 
 def local_position(autopilot: Autopilot) -> Any:
-    """LOCAL_POSITION_NED, from where the vehicle stood at the start."""
+    """Returns LOCAL_POSITION_NED, from the vehicle's position at the start."""
     place, velocity = local_motion(autopilot)
     return dialect().MAVLink_local_position_ned_message(ms(autopilot), *place, *velocity)
 
 
 def odometry(autopilot: Autopilot) -> Any:
-    """ODOMETRY in the local frame, velocities too, as PX4 sends it; covariances are not known."""
+    """Returns ODOMETRY in the local frame, velocities too, as PX4 does; covariances are unknown."""
     place, velocity = local_motion(autopilot)
     x, y, z, w = q_ned_frd_of_enu_flu(autopilot.state.attitude)
     unknown = [math.nan] + [0.0] * 20
@@ -128,7 +128,7 @@ def odometry(autopilot: Autopilot) -> Any:
 
 
 def global_position(autopilot: Autopilot) -> Any:
-    """GLOBAL_POSITION_INT."""
+    """Returns GLOBAL_POSITION_INT."""
     state = autopilot.state
     home = autopilot.memory.home or autopilot.memory.origin
     velocity = (clipped(part * 100.0, 16) for part in ned_of_enu(state.velocity))
@@ -142,7 +142,7 @@ def global_position(autopilot: Autopilot) -> Any:
 
 
 def highres_imu(autopilot: Autopilot) -> Any:
-    """Specific force and rates as the controllers feel them, pressure of the standard air."""
+    """Returns HIGHRES_IMU: specific force and rates of the controllers, standard pressure."""
     state = autopilot.state
     altitude = state.position[2] + autopilot.build.origin[2]
     force = specific_force(state)
@@ -161,7 +161,7 @@ def highres_imu(autopilot: Autopilot) -> Any:
 
 
 def specific_force(state: FlightState) -> Vector:
-    """m/s^2, body: what an accelerometer without errors feels."""
+    """Returns the specific force, m/s^2, body: the output of an ideal accelerometer."""
     x, y, z, w = state.attitude
     ax, ay, az = state.acceleration
     az += _GRAVITY
@@ -174,7 +174,7 @@ def specific_force(state: FlightState) -> Vector:
 
 
 def scaled_pressure(autopilot: Autopilot) -> Any:
-    """SCALED_PRESSURE of the barometer; None where there is none."""
+    """Returns SCALED_PRESSURE of the barometer; None without a barometer."""
     memory = autopilot.memory
     if not math.isfinite(memory.pressure):
         return None
@@ -185,7 +185,7 @@ def scaled_pressure(autopilot: Autopilot) -> Any:
 
 
 def vfr_hud(autopilot: Autopilot) -> Any:
-    """VFR_HUD."""
+    """Returns VFR_HUD."""
     state = autopilot.state
     speed = math.hypot(*state.velocity[:2])
     throttle = round(100.0 * sum(state.rotors) / max(len(state.rotors), 1))
@@ -196,7 +196,7 @@ def vfr_hud(autopilot: Autopilot) -> Any:
 
 
 def altitude(autopilot: Autopilot) -> Any:
-    """ALTITUDE."""
+    """Returns ALTITUDE."""
     z = autopilot.state.position[2]
     home = autopilot.memory.home or autopilot.memory.origin
     amsl = z + autopilot.build.origin[2]
@@ -207,9 +207,9 @@ def altitude(autopilot: Autopilot) -> Any:
 
 
 def target_motion(autopilot: Autopilot) -> list[float] | None:
-    """Position from the local origin, velocity and acceleration (NED), yaw and yaw rate aimed at.
+    """Returns target position from the local origin, velocity, acceleration (NED), yaw, yaw rate.
 
-    nan where something is left open; None where no motion is aimed at.
+    Unset values are nan; None without a target of motion.
     """
     target = autopilot.memory.target
     if target is None or target.attitude is not None or target.rates is not None:
@@ -222,7 +222,7 @@ def target_motion(autopilot: Autopilot) -> list[float] | None:
 
 
 def position_target(autopilot: Autopilot) -> Any:
-    """POSITION_TARGET_LOCAL_NED; None where nothing is aimed at."""
+    """Returns POSITION_TARGET_LOCAL_NED; None without a target."""
     parts = target_motion(autopilot)
     if parts is None:
         return None
@@ -232,7 +232,7 @@ def position_target(autopilot: Autopilot) -> Any:
 
 
 def attitude_target(autopilot: Autopilot) -> Any:
-    """ATTITUDE_TARGET; None where no attitude is wanted."""
+    """Returns ATTITUDE_TARGET; None without a target attitude."""
     target = autopilot.memory.target
     if target is None or (target.attitude is None and target.rates is None):
         return None
@@ -245,7 +245,7 @@ def attitude_target(autopilot: Autopilot) -> Any:
 
 
 def servo_output(autopilot: Autopilot) -> Any:
-    """SERVO_OUTPUT_RAW: shares of full speed as pulses of 1000 to 2000 us."""
+    """Returns SERVO_OUTPUT_RAW: fractions of full speed as pulses of 1000 to 2000 us."""
     pulses = [round(1000.0 + 1000.0 * min(share, 1.0)) for share in autopilot.state.rotors]
     pulses = (pulses + [0] * 16)[:16]
     return dialect().MAVLink_servo_output_raw_message(

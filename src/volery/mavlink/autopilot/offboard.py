@@ -1,7 +1,8 @@
-"""Offboard: setpoints from outside, flown as they come; PX4's rules for beginning and losing them.
+"""Offboard mode: flies external setpoints, by PX4's rules of start and loss.
 
-Setpoints are heard in every mode, so that offboard can be entered while they come. One sender at a
-time is heard: another one's setpoints count when the first has been silent for COM_OF_LOSS_T.
+Setpoints are received in every mode, so that offboard can be entered while they arrive. The
+autopilot follows one sender at a time: another sender's setpoints count once the first has been
+silent for COM_OF_LOSS_T.
 """
 
 from __future__ import annotations
@@ -24,23 +25,23 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot.vehicle import FlightState, Vector
 
 _GAIN = 0.95
-"""1/s: PX4's MPC_XY_P and, within a twentieth, MPC_Z_P."""
+"""Gain, 1/s: PX4's MPC_XY_P and, within a twentieth, MPC_Z_P."""
 _TRACKED_M = 2.0
-"""A moving place nearer than this is tracked; towards a farther one it is flown first."""
+"""Distance below which a moving position is tracked; the UAV first flies towards a farther one."""
 _REFRESH_NS, _FEEDBACK_NS = 100_000_000, 20_000_000
-"""How often velocities are told again, and where they follow from the place."""
+"""Periods at which velocities are repeated, and at which they are computed from the position."""
 _LIFTED_M = 0.3
-"""Height from which setpoints are flown after a start from the ground."""
+"""Height from which setpoints are flown after a take-off from the ground."""
 _ABOVE_HOME = (3, 6, 10, 11)
 
 
 def take_local(autopilot: Autopilot, source: Source, message: Any) -> None:
-    """Hear a SET_POSITION_TARGET_LOCAL_NED."""
+    """Handles SET_POSITION_TARGET_LOCAL_NED."""
     take(autopilot, source, local_setpoint(message, autopilot.memory.origin))
 
 
 def take_global(autopilot: Autopilot, source: Source, message: Any) -> None:
-    """Hear a SET_POSITION_TARGET_GLOBAL_INT."""
+    """Handles SET_POSITION_TARGET_GLOBAL_INT."""
     x, y, _ = autopilot.earth.place(message.lat_int * 1e-7, message.lon_int * 1e-7, 0.0)
     above = message.coordinate_frame in _ABOVE_HOME
     home = autopilot.memory.home or autopilot.memory.origin
@@ -49,12 +50,12 @@ def take_global(autopilot: Autopilot, source: Source, message: Any) -> None:
 
 
 def take_attitude(autopilot: Autopilot, source: Source, message: Any) -> None:
-    """Hear a SET_ATTITUDE_TARGET."""
+    """Handles SET_ATTITUDE_TARGET."""
     take(autopilot, source, attitude_setpoint(message))
 
 
 def take(autopilot: Autopilot, source: Source, setpoint: OffboardSetpoint) -> None:
-    """Hear a setpoint; in offboard mode it is flown at once."""
+    """Stores a setpoint; in offboard mode it is flown at once."""
     memory = autopilot.memory
     offboard, now_ns = memory.offboard, memory.now_ns
     if source != offboard.source:
@@ -76,7 +77,7 @@ def _is_lost(autopilot: Autopilot) -> bool:
 
 
 def fly(autopilot: Autopilot, state: FlightState) -> None:
-    """Go on with the newest setpoint; act where none comes any more."""
+    """Continues with the newest setpoint; handles the loss of setpoints."""
     from volery.mavlink.autopilot.failsafes import act
 
     setpoint = autopilot.memory.offboard.setpoint
@@ -120,9 +121,9 @@ def _hold_attitude(autopilot: Autopilot, setpoint: OffboardSetpoint, *, fresh: b
 
 
 def _is_up(autopilot: Autopilot, state: FlightState, setpoint: OffboardSetpoint) -> bool:
-    """Whether it is high enough to follow setpoints; from the ground it starts for those upwards.
+    """Returns whether the UAV is high enough for setpoints; upward setpoints start a take-off.
 
-    Attitudes need no start: their thrust decides.
+    Attitudes need no take-off: their thrust decides.
     """
     memory = autopilot.memory
     if state.mode == "LANDED":
@@ -187,7 +188,7 @@ def _push(autopilot: Autopilot, setpoint: OffboardSetpoint, *, fresh: bool) -> N
 def _steer(
     autopilot: Autopilot, state: FlightState, setpoint: OffboardSetpoint, *, fresh: bool
 ) -> None:
-    """Fly velocities; axes that have a place are drawn to it."""
+    """Commands velocities; axes with a position are controlled towards it."""
     age_ns = autopilot.memory.now_ns - autopilot.memory.ordered_ns
     placed = any(map(math.isfinite, setpoint.position)) or setpoint.in_heading
     if not fresh and age_ns < (_FEEDBACK_NS if placed else _REFRESH_NS):
@@ -213,7 +214,7 @@ def _turn(setpoint: OffboardSetpoint) -> tuple[float | None, float]:
 
 
 def _turned(autopilot: Autopilot, vector: Vector) -> Vector:
-    """From the level heading frame to the map; what is nan counts as nothing."""
+    """Rotates a vector from the horizontal heading frame to the map; nan counts as zero."""
     x, y, z = (part if math.isfinite(part) else 0.0 for part in vector)
     c, s = math.cos(autopilot.yaw), math.sin(autopilot.yaw)
     return c * x - s * y, s * x + c * y, z

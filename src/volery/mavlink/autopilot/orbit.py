@@ -1,8 +1,4 @@
-"""DO_ORBIT: round a centre at a height, as PX4's `FlightTaskOrbit.cpp`.
-
-Parameters that are nan stay as they are; of a first orbit they are a radius and a speed of 1 m and
-m/s, round the position of the UAV. A positive radius turns clockwise.
-"""
+"""m and m/s, around the position of the UAV. A positive radius turns clockwise."""
 
 from __future__ import annotations
 
@@ -29,15 +25,15 @@ _MIN_RADIUS_M, _MAX_RADIUS_M = 1.0, 1000.0
 _MAX_SPEED_M_S, _MAX_ACCELERATION = 10.0, 2.0
 """PX4's limits; a speed that the acceleration does not allow is reduced."""
 _TO_CENTRE, _INITIAL_HEADING, _UNCONTROLLED, _TANGENT, _BY_STICKS, _UNCHANGED = range(6)
-"""ORBIT_YAW_BEHAVIOUR."""
+"""Values of ORBIT_YAW_BEHAVIOUR."""
 _GAIN = 1.0
-"""1/s of the way back to the circle, PX4's."""
+"""Gain of the approach to the circle, 1/s, PX4's."""
 _ON_CIRCLE_M = 0.5
 _PERIOD_NS = 20_000_000
 
 
 def prepare(autopilot: Autopilot, _source: Source, command: Command, height: float) -> int:
-    """Returns the result of DO_ORBIT, whose altitude is `height` in the map (nan: as it is)."""
+    """Returns the result of DO_ORBIT, whose altitude is `height` in the map (nan: unchanged)."""
     if any(math.isinf(param) for param in command.params):
         return DENIED
     latitude, longitude = command.params[4:6]
@@ -102,7 +98,7 @@ def fly(autopilot: Autopilot, state: FlightState) -> None:
 
 
 def status(autopilot: Autopilot) -> Any:
-    """Returns ORBIT_EXECUTION_STATUS; None while it does not orbit."""
+    """Returns ORBIT_EXECUTION_STATUS; None if the UAV is not orbiting."""
     orbit = autopilot.memory.orbit
     if orbit is None or autopilot.memory.mode is not Mode.ORBIT:
         return None
@@ -131,7 +127,7 @@ def _approach(
 def _facing(
     orbit: Orbit, outward: tuple[float, float], turning: float
 ) -> tuple[float | None, float]:
-    """Returns the yaw in the map, None: as it turns, and that rate."""
+    """Returns the yaw in the map (None: free) and the yaw rate."""
     if orbit.facing == _INITIAL_HEADING:
         return orbit.initial_yaw, 0.0
     if orbit.facing in (_UNCONTROLLED, _BY_STICKS):
@@ -143,7 +139,7 @@ def _facing(
 
 
 def _climb(autopilot: Autopilot, above: float) -> float:
-    """Returns the speed of the way back to the height, m/s."""
+    """Returns the speed of the approach to the orbit's height, m/s."""
     way = "DN" if above > 0.0 else "UP"
     limit = float(autopilot.parameter(f"MPC_Z_V_AUTO_{way}"))
     return min(limit, approach_speed(abs(above), 0.5 * float(autopilot.parameter("MPC_ACC_HOR"))))

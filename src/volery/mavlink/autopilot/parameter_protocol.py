@@ -1,4 +1,4 @@
-"""The parameter protocol, as PX4 speaks it."""
+"""The parameter protocol, as implemented by PX4."""
 
 from __future__ import annotations
 
@@ -23,25 +23,25 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot.state import LinkState, Source
 
 _DOES_NOT_EXIST, _OUT_OF_RANGE, _READ_ONLY, _WRONG_TYPE = 1, 2, 5, 7
-"""MAV_PARAM_ERROR."""
+"""Values of MAV_PARAM_ERROR."""
 A_TICK = 2
 """Values that a list sends at each state of the vehicle: 200 a second, no burst for slow lines."""
 
 
 def send_list(autopilot: Autopilot, source: Source, _message: Any) -> None:
-    """Begin to send all values on the link, their check first."""
+    """Starts to send all values on the link, the check value first."""
     _tell_check(autopilot, source[0])
     autopilot.memory.links[source[0]].parameters_to_send = list(reversed(range(len(NAMES))))
 
 
 def send_some(autopilot: Autopilot, link: LinkState) -> None:
-    """Go on with a list."""
+    """Continues a list."""
     for _ in range(min(A_TICK, len(link.parameters_to_send))):
         _tell(autopilot, link.number, NAMES[link.parameters_to_send.pop()])
 
 
 def send_one(autopilot: Autopilot, source: Source, message: Any) -> None:
-    """Answer a PARAM_REQUEST_READ; of a parameter that is not there with PARAM_ERROR."""
+    """Answers PARAM_REQUEST_READ; for an unknown parameter with PARAM_ERROR."""
     name, index = message.param_id, message.param_index
     if 0 <= index < len(NAMES):
         name = NAMES[index]
@@ -54,9 +54,12 @@ def send_one(autopilot: Autopilot, source: Source, message: Any) -> None:
 
 
 def set_one(autopilot: Autopilot, source: Source, message: Any) -> None:
-    """Set a parameter and tell all links; of what is refused, why, and the value that holds."""
+    """Sets a parameter and reports it on all links.
+
+    After a refusal, reports the reason and the current value.
+    """
     name = message.param_id
-    if name == CHECK:  # whose list is up to date asks for an end of it
+    if name == CHECK:  # a client whose list is up to date cancels it
         autopilot.memory.links[source[0]].parameters_to_send = []
         _tell_fault(autopilot, source, name, _READ_ONLY)
         return
@@ -84,7 +87,7 @@ def set_one(autopilot: Autopilot, source: Source, message: Any) -> None:
 def _tell_fault(
     autopilot: Autopilot, source: Source, name: str, fault: int, index: int = -1
 ) -> None:
-    """PARAM_ERROR, which pymavlink has since 2025."""
+    """Sends PARAM_ERROR, which pymavlink has since 2025."""
     message = getattr(dialect(), "MAVLink_param_error_message", None)
     if message is not None:
         link, system, component = source

@@ -1,7 +1,7 @@
-"""Parameters: all of them act, under PX4's names and with PX4's defaults where it has them.
+"""Parameters of the autopilot: all have an effect, with PX4's names and, if any, PX4's defaults.
 
 `DEFAULTS` is the documented set; docs/mavlink.md lists it. Values are ints (INT32) or floats
-(REAL32), which travel as PX4 sends them: the bytes of an int in place of a float's.
+(REAL32), sent as in PX4: the bytes of an int in the place of a float's.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from typing import NamedTuple
 
 Value = int | float
 UINT32, INT32, REAL32 = 5, 6, 9
-"""MAV_PARAM_TYPE."""
+"""Values of MAV_PARAM_TYPE."""
 
 
 class AutopilotParameter(NamedTuple):
-    """One parameter: default, allowed range, what it does. `fixed` ones cannot be set."""
+    """One parameter: default, allowed range, effect. `fixed` ones cannot be set."""
 
     default: Value
     low: float
@@ -122,21 +122,21 @@ DEFAULTS: dict[str, AutopilotParameter] = {
 }
 NAMES = tuple(sorted(DEFAULTS))
 CHECK = "_HASH_CHECK"
-"""Under which name the check of all values is told."""
+"""Name under which the check of all values is sent."""
 
 
 def defaults() -> dict[str, Value]:
-    """All values as they begin."""
+    """Returns all default values."""
     return {name: DEFAULTS[name].default for name in NAMES}
 
 
 def type_of(name: str) -> int:
-    """MAV_PARAM_TYPE of a parameter."""
+    """Returns the MAV_PARAM_TYPE of a parameter."""
     return INT32 if isinstance(DEFAULTS[name].default, int) else REAL32
 
 
 def refusal(name: str, value: Value) -> str:
-    """Why a parameter cannot be set to a value; empty where it can."""
+    """Returns why a parameter cannot be set to a value; empty if it can."""
     parameter = DEFAULTS.get(name)
     if parameter is None:
         return f"no parameter {name}"
@@ -148,7 +148,7 @@ def refusal(name: str, value: Value) -> str:
 
 
 def on_wire(name: str, value: Value) -> float:
-    """The float that carries a value."""
+    """Returns the float that carries a value."""
     if type_of(name) == INT32:
         packed: float = struct.unpack("<f", struct.pack("<i", int(value)))[0]
         return packed
@@ -156,9 +156,9 @@ def on_wire(name: str, value: Value) -> float:
 
 
 def check_of(values: dict[str, Value]) -> int:
-    """CRC-32 over names and values, by which stations know whether theirs are up to date.
+    """Returns the CRC-32 over names and values, with which stations check theirs.
 
-    As PX4's `param_hash_check`: the remainder begins with 0 and is not inverted.
+    As in PX4's `param_hash_check`, the remainder begins with 0 and is not inverted.
     """
     packed = (struct.pack("<i" if type_of(name) == INT32 else "<f", values[name]) for name in NAMES)
     data = b"".join(
@@ -168,7 +168,7 @@ def check_of(values: dict[str, Value]) -> int:
 
 
 def from_wire(kind: int, carried: float) -> Value | None:
-    """The value in a float of MAV_PARAM_TYPE `kind`; None for types that PX4 does not have."""
+    """Returns the value in a float of MAV_PARAM_TYPE `kind`; None for other types than PX4's."""
     if kind == INT32:
         value: int = struct.unpack("<i", struct.pack("<f", carried))[0]
         return value

@@ -1,9 +1,9 @@
-"""Items of missions for cameras, gimbals, grippers and their like, and markers.
+"""Items of missions for cameras, gimbals, grippers and similar payloads, and markers.
 
-Surveys and corridors are full of them. An autopilot takes them whether or not there is a payload;
-without one they change nothing but the heading (regions of interest), and are passed one after the
-other. Which ones there are, in which frames, and which of their parameters may be set:
-`mavlink_mission.cpp` and `mavlink_command_params.hpp` of PX4 1.18.
+Surveys and corridors contain many of them. An autopilot accepts them with or without a payload;
+without one they change only the heading (regions of interest), and are passed one after the other.
+The supported items, frames and settable parameters follow `mavlink_mission.cpp` and
+`mavlink_command_params.hpp` of PX4 1.18.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ import math
 _GRIPPER, _WINCH = 211, 42600
 _ROI_LOCATION, _ROI_OLD, _ROI_OLDEST = 195, 201, 80
 INTEREST = {_ROI_LOCATION, 196, 197, _ROI_OLD, _ROI_OLDEST}
-"""Regions of interest; only `_ROI_LOCATION` has a place."""
+"""Regions of interest; only `_ROI_LOCATION` has a position."""
 _MISSION_FRAME, _GLOBAL_FRAMES = 2, (0, 3, 5, 6)
-"""MAV_FRAME."""
+"""Values of MAV_FRAME."""
 _MODES_WITH_PLACE, _MODES_WITHOUT = (0, 3), (0, 1, 2)
 """MAV_ROI of the old commands, in global frames and in that of missions."""
 _ALL = 0b1111111
@@ -47,19 +47,22 @@ _USED = {
     2501: 0b0000011,
     _WINCH: 0b0001111,
 }
-"""Parameters that may be set, by MAV_CMD: the lowest bit stands for the first of the seven."""
+"""Parameters that may be set, by MAV_CMD: the lowest bit is the first of the seven."""
 COMMANDS = frozenset(_USED)
 MARKERS = COMMANDS - {_GRIPPER, _WINCH, 187}
-"""What may stand before a take-off; PX4 counts the others as places."""
+"""Items that may precede a take-off; PX4 treats the others as positions."""
 
 _ACCEPTED, _BAD_FRAME, _UNSUPPORTED, _INVALID_PARAM1 = 0, 2, 3, 6
-"""MAV_MISSION_RESULT; those of the parameters follow one another."""
+"""Values of MAV_MISSION_RESULT; those of the parameters are consecutive."""
 _UNSET_DEGREES = ((2**31 - 1) * 1e-7, -(2**31) * 1e-7)
-"""Whole numbers that mean "not set" in place of a latitude or longitude."""
+"""Values that mean "not set" for a latitude or longitude."""
 
 
 def fault_of(command: int, frame: int, fields: tuple[float, ...]) -> int:
-    """MAV_MISSION_RESULT of an item; `fields`: four parameters, degrees, degrees, height."""
+    """Returns the MAV_MISSION_RESULT of an item.
+
+    fields: four parameters, degrees, degrees, height.
+    """
     if frame != _MISSION_FRAME and frame not in _GLOBAL_FRAMES:
         return _BAD_FRAME
     somewhere = frame != _MISSION_FRAME
@@ -76,7 +79,7 @@ def fault_of(command: int, frame: int, fields: tuple[float, ...]) -> int:
 
 
 def is_place_of_interest(command: int) -> bool:
-    """Whether an item says which place is to be faced."""
+    """Returns whether an item defines a position to face."""
     return command == _ROI_LOCATION
 
 

@@ -1,4 +1,4 @@
-"""Missions, fences and rally points: their items and what must hold for each of them."""
+"""Missions, fences and rally points: their items and the checks on each item."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 from volery.mavlink.autopilot import payload_items
 
 MISSION, FENCE, RALLY, ALL = 0, 1, 2, 255
-"""MAV_MISSION_TYPE."""
+"""Values of MAV_MISSION_TYPE."""
 MOST_ITEMS = {MISSION: 500, FENCE: 200, RALLY: 50}
-"""Modelling choice, of the size of PX4's on a flight controller."""
+"""Largest numbers of items (modelling choice), similar to PX4 on a flight controller."""
 
 WAYPOINT, LOITER_UNLIMITED, LOITER_TIME, LOITER_TO_ALTITUDE = 16, 17, 19, 31
 RETURN_TO_LAUNCH, LAND, TAKE_OFF = 20, 21, 22
@@ -21,7 +21,7 @@ RETURN_POINT, POLYGON_IN, POLYGON_OUT, CIRCLE_IN, CIRCLE_OUT = 5000, 5001, 5002,
 RALLY_POINT = 5100
 """MAV_CMD of fences and rally points."""
 PLACED = {WAYPOINT, LOITER_UNLIMITED, LOITER_TIME, LOITER_TO_ALTITUDE, LAND, TAKE_OFF}
-"""Items of missions that lead to a place."""
+"""Items of missions with a position."""
 _KNOWN = {
     MISSION: PLACED
     | {RETURN_TO_LAUNCH, DELAY, CONDITION_DELAY, CONDITION_YAW, JUMP, CHANGE_SPEED, SET_HOME}
@@ -37,19 +37,19 @@ NEED_NO_PLACE = {
     CHANGE_SPEED,
     SET_HOME,
 } | payload_items.MARKERS
-"""What may stand before a take-off."""
+"""Items that may precede a take-off."""
 AMSL, MISSION_FRAME, ABOVE_HOME = (0, 5), (2,), (3, 6, 10, 11)
 """MAV_FRAME: GLOBAL(_INT); MISSION; GLOBAL_RELATIVE_ALT(_INT), and TERRAIN_ALT(_INT), which counts
-from home: no terrain is known on board."""
+from home: the autopilot has no terrain data."""
 
 ACCEPTED, ERROR, BAD_FRAME, UNSUPPORTED, NO_SPACE, INVALID = 0, 1, 2, 3, 4, 5
 INVALID_PARAM1, INVALID_X, INVALID_Y, INVALID_Z, INVALID_SEQUENCE, DENIED = 6, 10, 11, 12, 13, 14
 CANCELLED = 15
-"""MAV_MISSION_RESULT."""
+"""Values of MAV_MISSION_RESULT."""
 
 
 class MissionItem(NamedTuple):
-    """One item. latitude and longitude in degrees, nan where none was given; altitude m."""
+    """One item. latitude and longitude in degrees, nan if not given; altitude m."""
 
     command: int
     frame: int
@@ -58,17 +58,17 @@ class MissionItem(NamedTuple):
     longitude: float
     altitude: float
     goes_on: bool = True
-    """autocontinue"""
+    """Field autocontinue."""
 
     @property
     def placed(self) -> bool:
-        """Whether it says where."""
+        """Whether the item has a position."""
         here = self.latitude == 0.0 and self.longitude == 0.0
         return math.isfinite(self.latitude) and math.isfinite(self.longitude) and not here
 
 
 def item_of(message: Any) -> MissionItem:
-    """Of a MISSION_ITEM_INT or a MISSION_ITEM."""
+    """Converts a MISSION_ITEM_INT or a MISSION_ITEM."""
     frame = int(message.frame)
     params = (message.param1, message.param2, message.param3, message.param4)
     x, y = float(message.x), float(message.y)
@@ -81,7 +81,7 @@ def item_of(message: Any) -> MissionItem:
 
 
 def fault_of(item: MissionItem, kind: int, count: int) -> int:  # noqa: PLR0911
-    """MAV_MISSION_RESULT of an item of a plan of `count` items."""
+    """Returns the MAV_MISSION_RESULT of an item of a plan of `count` items."""
     if item.command not in _KNOWN[kind]:
         return UNSUPPORTED
     if any(math.isinf(param) or abs(param) > 1e9 for param in item.params):
@@ -114,7 +114,7 @@ def _fault_of_place(item: MissionItem, kind: int) -> int:  # noqa: PLR0911
     if kind != FENCE and not (math.isfinite(item.altitude) and abs(item.altitude) < 1e5):
         return INVALID_Z
     circle = item.command in (CIRCLE_IN, CIRCLE_OUT)
-    if circle and not item.params[0] >= 0.0:  # PX4 takes 0, which holds nothing
+    if circle and not item.params[0] >= 0.0:  # PX4 accepts 0, which contains nothing
         return INVALID_PARAM1
     if item.command in (POLYGON_IN, POLYGON_OUT) and not 3 <= item.params[0] <= MOST_ITEMS[FENCE]:
         return INVALID_PARAM1
@@ -122,7 +122,7 @@ def _fault_of_place(item: MissionItem, kind: int) -> int:  # noqa: PLR0911
 
 
 def polygons_are_whole(items: list[MissionItem]) -> bool:
-    """Whether each polygon of a fence has as many corners, one after the other, as it says."""
+    """Returns whether each polygon of a fence has its stated number of consecutive corners."""
     k = 0
     while k < len(items):
         if items[k].command in (POLYGON_IN, POLYGON_OUT):
@@ -137,7 +137,7 @@ def polygons_are_whole(items: list[MissionItem]) -> bool:
 
 
 def flies_for_ever(items: list[MissionItem]) -> bool:
-    """Whether jumps can go round without any item that is flown or waits."""
+    """Returns whether jumps can loop without an item that flies or waits."""
     busy = {*PLACED, DELAY, CONDITION_DELAY, CONDITION_YAW, RETURN_TO_LAUNCH}
     for start, item in enumerate(items):
         if item.command != JUMP:

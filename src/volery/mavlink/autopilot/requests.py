@@ -1,6 +1,6 @@
-"""Commands that ask for messages: once, or again and again.
+"""Handles commands that request messages, once or periodically.
 
-What is answered where there is no such message: `mavlink_receiver.cpp` of PX4 1.18.
+Answers for missing messages follow `mavlink_receiver.cpp` of PX4 1.18.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot.state import Source
 
 _ACCEPTED, _DENIED, _FAILED = 0, 2, 4
-"""MAV_RESULT."""
+"""Values of MAV_RESULT."""
 RETIRED = {410: 242, 519: 300, 520: 148}
-"""MAV_CMD that MAV_CMD_REQUEST_MESSAGE replaced, and the message that each asked for."""
+"""MAV_CMD that MAV_CMD_REQUEST_MESSAGE replaced, and the message that each requested."""
 
 
 def set_interval(autopilot: Autopilot, source: Source, command: Command) -> int:
-    """SET_MESSAGE_INTERVAL; what is sent only to others, or in parts, is not there."""
+    """Handles SET_MESSAGE_INTERVAL; messages sent only to others or in parts are refused."""
     number, period_us, third, fourth, _, _, target = command.params
     if not (math.isfinite(number) and math.isfinite(period_us)):
         return _DENIED
@@ -33,12 +33,12 @@ def set_interval(autopilot: Autopilot, source: Source, command: Command) -> int:
 
 
 def get_interval(autopilot: Autopilot, source: Source, command: Command) -> int:
-    """GET_MESSAGE_INTERVAL: answered by a MESSAGE_INTERVAL; -1 of what is not sent."""
+    """Handles GET_MESSAGE_INTERVAL: answers with MESSAGE_INTERVAL; -1: not sent."""
     return _tell_interval(autopilot, source, command.params[0])
 
 
 def send(autopilot: Autopilot, source: Source, command: Command) -> int:
-    """REQUEST_MESSAGE."""
+    """Handles REQUEST_MESSAGE."""
     number, what = command.params[:2]
     if not math.isfinite(number):
         return _DENIED
@@ -50,7 +50,7 @@ def send(autopilot: Autopilot, source: Source, command: Command) -> int:
 
 
 def send_as_of_old(autopilot: Autopilot, source: Source, command: Command) -> int:
-    """The commands for a message each."""
+    """Handles the old commands that request one message each."""
     return _send_built(autopilot, source, RETIRED[command.number])
 
 

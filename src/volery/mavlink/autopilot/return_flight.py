@@ -1,4 +1,4 @@
-"""The way home: climb, cross, come down, wait, land."""
+"""Flies the return: climb, cross, descend, wait, land."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def fly(autopilot: Autopilot, state: FlightState) -> None:
-    """Go on with the way home, or begin it."""
+    """Continues or starts the return."""
     memory = autopilot.memory
     if state.mode == "LANDED" or memory.order == "land":
         return
@@ -39,7 +39,7 @@ def fly(autopilot: Autopilot, state: FlightState) -> None:
 
 
 def goal_of(autopilot: Autopilot) -> Vector:
-    """Home, or the rally point that is nearer."""
+    """Returns home or the nearest rally point, whichever is nearer."""
     memory = autopilot.memory
     home = memory.home or memory.origin
     points = [home, *(place_of(autopilot, item) for item in memory.plans[plans.RALLY])]

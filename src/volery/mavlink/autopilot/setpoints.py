@@ -1,8 +1,8 @@
-"""Offboard setpoints: from MAVLink's messages, by PX4's rules, to what the UAV can be told.
+"""Converts offboard setpoints from MAVLink's messages to commands for the UAV, by PX4's rules.
 
-PX4 gives each axis a place, a velocity and an acceleration, nan where a mask ignores it. A setpoint
-says something where at least one of the three vectors has a finite component; mixtures (velocity
-along the ground, a height) are allowed, as in PX4.
+PX4 gives each axis a position, a velocity and an acceleration, nan if a mask ignores it. A setpoint
+is valid if at least one of the three vectors has a finite component; mixtures (velocity along the
+ground, a height) are allowed, as in PX4.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from volery.core.frames import enu_of_ned, flu_of_frd, q_enu_flu_of_ned_frd
 from volery.mavlink.autopilot.vehicle import Quaternion, Vector
 
 LOCAL, BODY = (1, 7), (8, 12)
-"""MAV_FRAME: LOCAL_NED and LOCAL_OFFSET_NED; BODY_NED and BODY_FRD. PX4 takes 1, 8 and 12 only."""
+"""MAV_FRAME: LOCAL_NED and LOCAL_OFFSET_NED; BODY_NED and BODY_FRD. PX4 accepts 1, 8 and 12 only.
+"""
 _GLOBAL, _ABOVE_HOME = 5, (6, 11)
 """MAV_FRAME_GLOBAL_INT; GLOBAL_RELATIVE_ALT_INT and, over level ground, TERRAIN_ALT_INT."""
 _FORCE, _NO_YAW, _NO_YAW_RATE = 512, 1024, 2048
@@ -23,38 +24,38 @@ _NOTHING = (math.nan, math.nan, math.nan)
 
 
 class OffboardSetpoint(NamedTuple):
-    """What is to be flown: ENU, FLU, rad; nan where something is left open."""
+    """Setpoint of motion: ENU, FLU, rad; nan: unset."""
 
     position: Vector = _NOTHING
-    """m, in the map."""
+    """Position in the map, m."""
     velocity: Vector = _NOTHING
     acceleration: Vector = _NOTHING
     yaw: float = math.nan
     yaw_rate: float = math.nan
     in_heading: bool = False
-    """Velocity and acceleration turn with the heading."""
+    """Whether velocity and acceleration turn with the heading."""
     attitude: Quaternion | None = None
     rates: Vector | None = None
     thrust: float = math.nan
 
 
 def local_setpoint(message: Any, origin: Vector) -> OffboardSetpoint:
-    """Of a SET_POSITION_TARGET_LOCAL_NED. `CommandError` says why PX4 would not take it."""
+    """Converts SET_POSITION_TARGET_LOCAL_NED. Raises `CommandError` if PX4 would refuse it."""
     if message.coordinate_frame not in (1, 8, 12):
-        raise CommandError(f"setpoints in frame {message.coordinate_frame} are not flown")
+        raise CommandError(f"setpoints in frame {message.coordinate_frame} are not supported")
     place = _masked((message.x, message.y, message.z), message.type_mask, 0)
     in_heading = message.coordinate_frame != 1
     if in_heading and not _empty(place):
-        raise CommandError("places in the body's frame are not flown")
+        raise CommandError("positions in the body frame are not supported")
     east, north, up = enu_of_ned(place)
     position = (origin[0] + east, origin[1] + north, origin[2] + up)
     return _motion(message, position, in_heading)
 
 
 def global_setpoint(message: Any, position: Vector) -> OffboardSetpoint:
-    """Of a SET_POSITION_TARGET_GLOBAL_INT whose place is `position`, m, map."""
+    """Converts SET_POSITION_TARGET_GLOBAL_INT with the position `position`, m, map."""
     if message.coordinate_frame not in (0, 3, _GLOBAL, *_ABOVE_HOME):
-        raise CommandError(f"setpoints in frame {message.coordinate_frame} are not flown")
+        raise CommandError(f"setpoints in frame {message.coordinate_frame} are not supported")
     north, east, down = _masked((position[1], position[0], -position[2]), message.type_mask, 0)
     return _motion(message, (east, north, -down), in_heading=False)
 
@@ -62,13 +63,13 @@ def global_setpoint(message: Any, position: Vector) -> OffboardSetpoint:
 def _motion(message: Any, position: Vector, in_heading: bool) -> OffboardSetpoint:
     mask = message.type_mask
     if mask & _FORCE:
-        raise CommandError("setpoints of forces are not flown")
+        raise CommandError("setpoints of forces are not supported")
     velocity = _masked((message.vx, message.vy, message.vz), mask, 3)
     push = _masked((message.afx, message.afy, message.afz), mask, 6)
     turned = flu_of_frd if in_heading else enu_of_ned
     velocity, push = turned(velocity), turned(push)
     if _empty(position) and _empty(velocity) and _empty(push):
-        raise CommandError("a setpoint without a number says nothing")
+        raise CommandError("a setpoint needs at least one finite value")
     for vector in (position, velocity, push):
         if any(math.isinf(part) or abs(part) > 1e6 for part in vector):
             raise CommandError("a setpoint is out of range")
@@ -79,12 +80,12 @@ def _motion(message: Any, position: Vector, in_heading: bool) -> OffboardSetpoin
     if math.isfinite(yaw):
         yaw = math.remainder(yaw, 2.0 * math.pi)
     if in_heading and math.isfinite(yaw):
-        yaw = math.nan  # PX4 reads it relative to the heading; there only rates make sense
+        yaw = math.nan  # in PX4 it is relative to the heading; only rates are useful there
     return OffboardSetpoint(position, velocity, push, yaw, rate, in_heading)
 
 
 def attitude_setpoint(message: Any) -> OffboardSetpoint:
-    """Of a SET_ATTITUDE_TARGET: an attitude, or body rates, with a thrust from 0 to 1."""
+    """Converts SET_ATTITUDE_TARGET: an attitude, or body rates, with a thrust from 0 to 1."""
     mask, thrust = message.type_mask, message.thrust
     if mask & 64 or not 0.0 <= thrust <= 1.0:
         raise CommandError("an attitude needs a thrust from 0 to 1")

@@ -1,4 +1,4 @@
-"""The system shell over SERIAL_CONTROL: a few commands that only read, with PX4's prompt."""
+"""The system shell over SERIAL_CONTROL: a few read-only commands, with PX4's prompt."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 _SHELL_DEVICE = 10
 _REPLY, _RESPOND = 1, 2
-"""SERIAL_CONTROL_DEV and SERIAL_CONTROL_FLAG."""
+"""Values of SERIAL_CONTROL_DEV and SERIAL_CONTROL_FLAG."""
 _CHUNK_BYTES = 70
 _MAX_LINE = 200
 _MAX_SHELLS = 8
@@ -26,9 +26,9 @@ _HELP = {
 
 
 def take(autopilot: Autopilot, source: Source, message: Any) -> None:
-    """Runs what a SERIAL_CONTROL completes to a line, and replies where that is asked for.
+    """Runs a line that a SERIAL_CONTROL message completes, and replies if requested.
 
-    One line a message: what follows it in the same message is dropped.
+    One line per message: the rest of the message is dropped.
     """
     shells = autopilot.memory.shells
     if message.device != _SHELL_DEVICE or message.flags & _REPLY or autopilot.memory.state is None:
@@ -46,7 +46,7 @@ def take(autopilot: Autopilot, source: Source, message: Any) -> None:
 
 
 def _run(autopilot: Autopilot, words: list[str]) -> str:
-    """Returns what a command prints."""
+    """Returns the output of a command."""
     if not words:
         return ""
     if words == ["help"]:

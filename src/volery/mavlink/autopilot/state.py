@@ -1,4 +1,4 @@
-"""All that changes in an autopilot, as plain data: a snapshot keeps it as it is."""
+"""The state of an autopilot as plain data, which a snapshot saves."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from volery.mavlink.autopilot.setpoints import OffboardSetpoint
 from volery.mavlink.autopilot.vehicle import FlightState, Vector
 
 Source = tuple[int, int, int]
-"""Who sent something: link, system, component."""
+"""Sender of a message: link, system, component."""
 
 
 @dataclass
 class LinkState:
-    """One connection: its streams and who was heard on it."""
+    """One connection: its streams and transfers."""
 
     number: int
     profile: int
     periods_ns: dict[int, int] = field(default_factory=dict)
-    """Of its streams, by message id."""
+    """Periods of its streams, by message id."""
     due: list[tuple[int, int]] = field(default_factory=list)
-    """Instants (ns) and ids of what is to be sent, a heap."""
+    """Times (ns) and ids of messages to send, a heap."""
     sequence: int = 0
     parameters_to_send: list[int] = field(default_factory=list)
-    """Indices, the next one last."""
+    """Indices of parameters to send, the next one last."""
 
 
 @dataclass
 class ManualInput:
-    """The newest MANUAL_CONTROL: forward, right, up (each -1 to 1), turn to the right."""
+    """Newest MANUAL_CONTROL: forward, right, up (each -1 to 1), turn to the right."""
 
     forward: float = 0.0
     right: float = 0.0
@@ -44,21 +44,21 @@ class ManualInput:
 
 @dataclass
 class Offboard:
-    """Setpoints as they come, whether they are flown or not."""
+    """Received setpoints, flown or not."""
 
     setpoint: OffboardSetpoint | None = None
     time_ns: int = -(1 << 62)
     begun_ns: int = -(1 << 62)
-    """Since when they have come without a gap."""
+    """Time since which they have arrived without a gap."""
     source: Source | None = None
-    """Whose they are: others are not heard until that one falls silent."""
+    """Sender; others are ignored until this one is silent."""
     refused: set[Source] = field(default_factory=set)
-    """Others, who have been told so."""
+    """Other senders that have been notified."""
 
 
 @dataclass
 class MissionTransfer:
-    """A plan on its way, up or down."""
+    """A plan in transfer, up or down."""
 
     kind: int
     source: Source
@@ -66,69 +66,69 @@ class MissionTransfer:
     count: int
     items: list[MissionItem] = field(default_factory=list)
     time_ns: int = 0
-    """Of the last sign of the other side."""
+    """Time of the last message of the other side."""
     asked_ns: int = 0
     retries: int = 0
 
 
 @dataclass
 class MissionLeg:
-    """A way to a place, flown by velocities until it is near."""
+    """A leg to a position, flown by velocities until the UAV is near."""
 
     target: Vector
     yaw: float | None
     speed: float
     locked: bool = False
-    """Whether the UAV was told the place itself."""
+    """Whether the position itself was commanded."""
 
 
 @dataclass
 class Mission:
-    """How far a mission is."""
+    """Progress of a mission."""
 
     current: int = 0
     entered: bool = False
-    """Whether the current item has been begun."""
+    """Whether the current item has started."""
     since_ns: int = 0
-    """When the current item began to wait."""
+    """Time at which the current item began to wait."""
     waiting: bool = False
     jumps_left: dict[int, int] = field(default_factory=dict)
     speed: float = math.nan
-    """m/s that a DO_CHANGE_SPEED asked for."""
+    """Speed of a DO_CHANGE_SPEED, m/s."""
     interest: Vector | None = None
-    """m, map: the place that a region of interest has it face."""
+    """Position of the region of interest to face, m, map."""
     reached: int = -1
     complete: bool = False
 
 
 @dataclass
 class Orbit:
-    """A circle to fly on. center: m, map; radius: m, positive: clockwise; speed: m/s."""
+    """Circle to fly on. center: m, map; radius: m, positive: clockwise; speed: m/s."""
 
     center: Vector
     radius: float
     speed: float
     facing: int
-    """ORBIT_YAW_BEHAVIOUR."""
+    """Value of ORBIT_YAW_BEHAVIOUR."""
     initial_yaw: float
-    """rad, map."""
+    """Yaw at the start, rad, map."""
     approaches: bool = True
 
 
 @dataclass
 class FollowTarget:
-    """Estimate of what is followed: m, m/s, map, at a time."""
+    """Estimate of the followed target: m, m/s, map, at a time."""
 
     position: Vector
     velocity: Vector
     time_ns: int
     course: float | None = None
-    """rad, map; None: it has not moved yet."""
+    """Course, rad, map; None: the target has not moved yet."""
 
 
 @dataclass
 class Calibration:
-    """A calibration under way; percent: the last one reported, -1: none."""
+    """A calibration in progress; percent: the last one reported, -1: none."""
 
     sensor: str
     start_ns: int
@@ -136,7 +136,7 @@ class Calibration:
 
 
 class ReturnState(NamedTuple):
-    """Where a way home leads, and how far it has come."""
+    """Goal and progress of a return."""
 
     goal: Vector
     phase: str
@@ -145,7 +145,7 @@ class ReturnState(NamedTuple):
 
 @dataclass
 class AutopilotState:
-    """The whole."""
+    """State of an autopilot."""
 
     state: FlightState | None = None
     now_ns: int = 0
@@ -153,47 +153,47 @@ class AutopilotState:
     armed: bool = False
     armed_ns: int = 0
     airborne: bool = False
-    """Whether it has left the ground since it was armed."""
+    """Whether the UAV has left the ground since arming."""
     landed_ns: int = 0
     take_off_height: float = math.nan
-    """m above the ground that the next take-off was asked for."""
+    """Requested height above the ground of the next take-off, m."""
     take_off_goal: Vector | None = None
-    """m, map: where the present take-off from the ground ends."""
+    """Goal of the current take-off from the ground, m, map."""
     order: str = ""
-    """The last one to the UAV: what modes of its own may follow."""
+    """Last command to the UAV; it determines which of the UAV's modes may follow."""
     ordered_ns: int = 0
     sinks: float = math.nan
-    """m/s at which the present landing was told to go down; nan: nothing was told."""
+    """Commanded descent speed of the current landing, m/s; nan: none."""
     target: OffboardSetpoint | None = None
-    """What is flown, for who watches."""
+    """Current target, for telemetry."""
     home: Vector | None = None
     chosen_home: Vector | None = None
-    """Latitude and longitude in degrees and altitude of a home that somebody chose, as he did."""
+    """Latitude, longitude, degrees, and altitude, m, of a home that a client chose."""
     origin: Vector = (0.0, 0.0, 0.0)
-    """m, map: where the local frame begins, the place at the start."""
+    """Origin of the local frame, m, map: the position at the start."""
     cruise: float = math.nan
-    """m/s asked for by command; nan: the parameter's."""
+    """Speed set by command, m/s; nan: the parameter's."""
     parameters: dict[str, Value] = field(default_factory=defaults)
     plans: dict[int, list[MissionItem]] = field(default_factory=lambda: {0: [], 1: [], 2: []})
-    """By MAV_MISSION_TYPE: mission, fence, rally."""
+    """Items by MAV_MISSION_TYPE: mission, fence, rally."""
     transfers: dict[int, MissionTransfer] = field(default_factory=dict)
     last_items: dict[int, tuple[Source, int]] = field(default_factory=dict)
-    """By MAV_MISSION_TYPE: whose upload came through last, and the number of its last item."""
+    """Sender of the last complete upload and the number of its last item, by MAV_MISSION_TYPE."""
     mission: Mission = field(default_factory=Mission)
     leg: MissionLeg | None = None
     way_home: ReturnState | None = None
     sticks: ManualInput = field(default_factory=ManualInput)
     climb_thrust: float = 0.0
-    """Altitude mode: what its integral has come to, share of the hover thrust."""
+    """Integral of the altitude mode, as a fraction of the hover thrust."""
     altitude_target: float = math.nan
     offboard: Offboard = field(default_factory=Offboard)
     links: dict[int, LinkState] = field(default_factory=dict)
     ground_heard_ns: int = -1
-    """When a ground station's heartbeat came last; -1: never."""
+    """Time of the last heartbeat of a ground station; -1: never."""
     fix_ns: int = 0
-    """When satellites gave the last fix; of UAVs without a receiver it is always fresh."""
+    """Time of the last satellite fix; always current for UAVs without a receiver."""
     has_receiver: bool = False
-    """Whether satellite fixes come at all."""
+    """Whether satellite fixes arrive at all."""
     fix_lost: bool = False
     fix_denied: bool = False
     """Whether a UAV without a receiver has no fix: an injected failure."""
@@ -205,10 +205,10 @@ class AutopilotState:
     shells: dict[Source, str] = field(default_factory=dict)
     """Unfinished lines of the system shell."""
     pressure: float = math.nan
-    """Pa, of the barometer; nan: there is none."""
+    """Pressure of the barometer, Pa; nan: no barometer."""
     air_temperature: float = math.nan
-    """degC, beside the pressure."""
+    """Air temperature with the pressure, degC."""
     warned: set[str] = field(default_factory=set)
-    """Failsafes that have been told of, and acted on."""
+    """Failsafes that have been reported and handled."""
     failsafe: bool = False
     next_check_ns: int = 0

@@ -1,4 +1,4 @@
-"""Streams: which message goes out on which link how often, in simulated time.
+"""Streams: sends messages on each link at their rates, in simulated time.
 
 Rates are those of PX4's links: `onboard` for a companion computer, `normal` for a ground station
 (`mavlink_main.cpp` of PX4 1.18). SET_MESSAGE_INTERVAL changes them for its link.
@@ -43,15 +43,15 @@ RATES_HZ: dict[int, dict[int, float]] = {
     | {230: 1.0, 242: 0.5, 245: 5.0, 331: 30.0, 360: 5.0, 436: 0.5},
     GROUND: _NORMAL,
 }
-"""By profile and message id."""
+"""Rates by profile and message id."""
 FASTEST_NS = 10_000_000
-"""As often as the vehicle's state comes."""
+"""Period of the vehicle's state."""
 _HEARTBEAT = 0
-"""Which cannot be asked to come otherwise."""
+"""Message whose rate cannot be changed."""
 
 
 def begin(link: LinkState, now_ns: int) -> LinkState:
-    """Give a link the streams of its profile."""
+    """Sets a link's streams to those of its profile."""
     rates = RATES_HZ.get(link.profile, _ALWAYS)
     link.periods_ns = {number: round(1e9 / rate) for number, rate in rates.items()}
     link.due = [(now_ns, number) for number in sorted(link.periods_ns)]
@@ -59,9 +59,9 @@ def begin(link: LinkState, now_ns: int) -> LinkState:
 
 
 def ask_for(autopilot: Autopilot, link: LinkState, number: int, period_us: float) -> bool:
-    """Send a message each `period_us` on a link: 0 as at its beginning, -1 never.
+    """Sets the period of a message on a link: 0 the default, -1 never.
 
-    Whether that can be; no faster than the state of the vehicle comes.
+    Returns whether the period is possible. The rate is limited to that of the vehicle's state.
     """
     if number not in telemetry.BUILDERS or number == _HEARTBEAT:
         return False
@@ -80,21 +80,21 @@ def ask_for(autopilot: Autopilot, link: LinkState, number: int, period_us: float
 
 
 def interval_of(link: LinkState, number: int) -> Any:
-    """MESSAGE_INTERVAL of a message; -1 of one that is not sent, or that is not there."""
+    """Returns MESSAGE_INTERVAL of a message; -1 for one that is not sent or does not exist."""
     period_ns = link.periods_ns.get(number)
     period_us = -1 if period_ns is None else period_ns // 1000
     return dialect().MAVLink_message_interval_message(number, min(period_us, 2**31 - 1))
 
 
 def send_due(autopilot: Autopilot) -> None:
-    """Send everything whose time has come; each message is built once for all links."""
+    """Sends all due messages; each message is built once for all links."""
     now_ns = autopilot.memory.now_ns
     built: dict[int, Any] = {}
     for link in tuple(autopilot.memory.links.values()):
         while link.due and link.due[0][0] <= now_ns:
             instant_ns, number = link.due[0]
             period_ns = link.periods_ns.get(number)
-            if period_ns is None:  # nobody wants it any more
+            if period_ns is None:  # no longer requested
                 heapq.heappop(link.due)
                 continue
             late = (now_ns - instant_ns) // period_ns + 1

@@ -1,7 +1,7 @@
-"""What is told of the vehicle: a builder for each message, NED and FRD, by its id.
+"""Builders of the telemetry messages by id, NED and FRD.
 
-Units are MAVLink's: degE7, mm, cm/s, mbar; unknown fields hold the values that the dialect gives
-for that.
+Units are MAVLink's: degE7, mm, cm/s, mbar; unknown fields have the values that the dialect defines
+for this.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from volery.mavlink.autopilot.core import Autopilot
 
 _PX4 = 12
-"""MAV_AUTOPILOT_PX4."""
+"""Value MAV_AUTOPILOT_PX4."""
 _CHUNK = 50
 """Characters of a STATUSTEXT."""
 _LONGEST_TEXT = 250
@@ -28,16 +28,16 @@ HOME_POSITION, MESSAGE_INTERVAL = 242, 244
 _GYRO, _ACCEL, _MAG, _PRESSURE, _GPS = 1, 2, 4, 8, 32
 _CONTROL = 1024 | 2048 | 4096 | 8192 | 16384 | 32768
 _FENCE, _BATTERY, _PREARM = 1 << 20, 1 << 25, 1 << 28
-"""MAV_SYS_STATUS_SENSOR: rates, attitude, yaw, height, place, motors make up `_CONTROL`."""
+"""MAV_SYS_STATUS_SENSOR: `_CONTROL` consists of rates, attitude, yaw, height, position, motors."""
 _CAPABILITIES = 4 | 8 | 16 | 64 | 128 | 256 | 2048 | 8192 | 16384 | 32768
 """MAV_PROTOCOL_CAPABILITY: MISSION_INT, COMMAND_INT, PARAM_ENCODE_BYTEWISE, setpoints of attitude,
-local and global places, FLIGHT_TERMINATION, MAVLINK2, MISSION_FENCE, MISSION_RALLY."""
+local and global positions, FLIGHT_TERMINATION, MAVLINK2, MISSION_FENCE, MISSION_RALLY."""
 _ESTIMATES = 1 | 2 | 4 | 8 | 16 | 32 | 256 | 512
-"""ESTIMATOR_STATUS_FLAGS: attitude, velocities, places; without relative ones to terrain."""
+"""ESTIMATOR_STATUS_FLAGS: attitude, velocities, positions; without those relative to terrain."""
 
 
 def HEARTBEAT(autopilot: Autopilot) -> Any:  # noqa: N802  (named as the message)
-    """Mode, whether it is armed, how it fares."""
+    """Returns HEARTBEAT: mode, armed, system status."""
     memory = autopilot.memory
     base = 1 | memory.mode.flags | (128 if memory.armed else 0)
     status = 4 if memory.armed else 3
@@ -174,7 +174,7 @@ def _autopilot_version(autopilot: Autopilot) -> Any:
 
 
 def status_texts(severity: int, text: str) -> list[Any]:
-    """STATUSTEXT of a text, in pieces where it is long."""
+    """Returns the STATUSTEXT messages of a text, in pieces if it is long."""
     raw = text[:_LONGEST_TEXT].encode("ascii", "replace")
     pieces = [raw[k : k + _CHUNK] for k in range(0, len(raw), _CHUNK)] or [b""]
     number = 0 if len(pieces) == 1 else 1 + sum(raw) % 65535
@@ -211,4 +211,4 @@ BUILDERS: dict[int, Callable[[Autopilot], Any]] = {
     360: orbit.status,
     436: dialect_extensions.current_mode,
 }
-"""By message id; a builder returns None where there is nothing to tell."""
+"""Builders by message id; a builder returns None without data."""

@@ -14,7 +14,7 @@ from volery.mavlink.autopilot.parameters import Value
 
 _MAGIC = b"ULog\x01\x12\x35\x01"
 _FLAG_BITS = bytes(40)
-"""No feature that a reader has to know, no data appended."""
+"""No feature that a reader must support, no data appended."""
 _MESSAGE = struct.Struct("<HB")
 _FIELD = re.compile(r"(\w+?)(?:\[(\d+)\])? (\w+)")
 _CODES = {
@@ -30,7 +30,7 @@ _CODES = {
 
 
 class UlogTopic:
-    """One kind of sample: its name in a log and its fields, in the order that values are given.
+    """One kind of sample: its name in a log and its fields, in the order of the values.
 
     fields: such as "uint64_t timestamp; float[4] q"; the first one is the timestamp.
     """
@@ -49,16 +49,16 @@ class UlogTopic:
         return _message("F", self._format.encode())
 
     def subscription(self) -> bytes:
-        """Returns the message that gives the samples their number."""
+        """Returns the message that assigns a number to the samples."""
         return _message("A", struct.pack("<BH", 0, self._number) + self.name.encode())
 
     def sample(self, values: Sequence[float]) -> bytes:
-        """Returns a sample. `struct.error` or `OverflowError` where a value does not fit."""
+        """Returns a sample. Raises `struct.error` or `OverflowError` if a value does not fit."""
         return self._values.pack(self._size, _DATA, self._number, *values)
 
 
 def header(time_us: int) -> bytes:
-    """Returns the beginning of a log that begins at a time."""
+    """Returns the head of a log that starts at a time."""
     return _MAGIC + struct.pack("<Q", time_us) + _message("B", _FLAG_BITS)
 
 
@@ -74,7 +74,7 @@ def number_info(key: str, value: int) -> bytes:
 
 
 def parameter(name: str, value: Value) -> bytes:
-    """Returns the value of a parameter, at the beginning or when it changes."""
+    """Returns the value of a parameter, at the start or when it changes."""
     kind = "int32_t" if isinstance(value, int) else "float"
     return _message("P", _key(f"{kind} {name}") + struct.pack(f"<{_CODES[kind]}", value))
 

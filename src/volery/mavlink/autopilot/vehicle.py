@@ -1,4 +1,4 @@
-"""What the autopilot knows of its UAV, and what it can ask of it. ENU, FLU, SI, rad."""
+"""The autopilot's interface to its UAV: state, properties and commands. ENU, FLU, SI, rad."""
 
 from __future__ import annotations
 
@@ -10,73 +10,73 @@ Quaternion = tuple[float, float, float, float]
 
 
 class FlightState(NamedTuple):
-    """How a UAV stands at a simulated time, as its controllers know it."""
+    """State of a UAV at a simulated time, as its controllers estimate it."""
 
     time_ns: int
     mode: str
-    """Of the UAV: LANDED, TAKE_OFF, HOLD, GO_TO, VELOCITY, LAND, RETURN, LOW_LEVEL, CRASHED,
+    """Mode of the UAV: LANDED, TAKE_OFF, HOLD, GO_TO, VELOCITY, LAND, RETURN, LOW_LEVEL, CRASHED,
     TRAJECTORY."""
     airborne: bool
     crashed: bool
     position: Vector
-    """m, map."""
+    """Position, m, map."""
     attitude: Quaternion
-    """x y z w, map from body."""
+    """Quaternion x y z w, map from body."""
     velocity: Vector
     rates: Vector
-    """rad/s, body."""
+    """Body rates, rad/s, body."""
     acceleration: Vector
-    """m/s^2, map."""
+    """Acceleration, m/s^2, map."""
     charge: float
-    """0 to 1; nan: no battery."""
+    """State of charge, 0 to 1; nan: no battery."""
     voltage: float
     current: float
     rotors: tuple[float, ...]
-    """Share of full speed."""
+    """Fractions of full speed."""
 
 
 @dataclass(frozen=True)
 class VehicleInfo:
-    """What of a UAV never changes."""
+    """Constant properties of a UAV."""
 
     airframe: str
     rotors: int
     hover_thrust: float
-    """Share of the full thrust that carries it."""
+    """Fraction of the full thrust in hover."""
     speed: float
-    """Limits, m/s and rad."""
+    """Limits of speed, climb, descent, m/s, and tilt, rad."""
     climb: float
     descent: float
     tilt: float
     battery_cells: int
     battery_capacity_ah: float
     origin: Vector
-    """The map's: latitude and longitude in degrees, altitude in m."""
+    """Origin of the map: latitude and longitude in degrees, altitude in m."""
 
 
 class Vehicle(Protocol):
-    """A UAV that does as it is told; what comes back is why it does not, empty where it does."""
+    """Commands of a UAV; methods return why a command was refused, empty if accepted."""
 
     def take_off(self, height_m: float) -> str:
-        """From the ground, straight up."""
+        """Takes off from the ground, straight up, to `height_m`."""
 
     def hold(self) -> str:
-        """Brake, and keep the place."""
+        """Brakes and holds the position."""
 
     def land(self) -> str:
-        """Straight down, until the rotors stop."""
+        """Lands straight down and stops the rotors."""
 
     def sink(self, speed: float) -> str:
-        """How fast the present landing goes down."""
+        """Sets the descent speed of the current landing, m/s."""
 
     def stop(self) -> str:
-        """Rotors off at once: it falls."""
+        """Stops the rotors at once; the UAV falls."""
 
     def go_to(self, position: Vector, yaw: float | None) -> str:
-        """Fly to a place and stay there."""
+        """Flies to a position, m, map, and holds there."""
 
     def steer(self, velocity: Vector, yaw: float | None, yaw_rate: float) -> None:
-        """Fly with a velocity, facing yaw, or turning where that is None."""
+        """Flies with a velocity, m/s, map, at `yaw`, or at `yaw_rate` if yaw is None."""
 
     def follow(
         self,
@@ -86,19 +86,19 @@ class Vehicle(Protocol):
         yaw: float | None,
         yaw_rate: float,
     ) -> None:
-        """Be at a place with a motion: a point of a trajectory."""
+        """Follows a point of a trajectory: position, velocity and acceleration, map."""
 
     def push(self, acceleration: Vector, yaw: float | None, yaw_rate: float) -> None:
-        """Accelerate."""
+        """Accelerates, m/s^2, map."""
 
     def tilt(self, attitude: Quaternion, thrust: float) -> None:
-        """Hold an attitude, with a share of the full thrust."""
+        """Holds an attitude, map from body, with a fraction of the full thrust."""
 
     def fail(self, fault: dict[str, Any]) -> str:
-        """Injects a fault of the simulation, without its `uav`."""
+        """Injects a fault of the simulation, given without its `uav`."""
 
     def end_fault(self, fault: dict[str, Any]) -> str:
-        """Ends a fault that was injected."""
+        """Ends an injected fault."""
 
     def spin(self, rates: Vector, thrust: float) -> None:
-        """Hold body rates, with a share of the full thrust."""
+        """Holds body rates, rad/s, with a fraction of the full thrust."""

@@ -1,13 +1,13 @@
-"""Real ArduCopters fly the UAVs: ArduPilot's JSON interface over UDP, in lock step.
+"""Connects real ArduCopters to the UAVs: ArduPilot's JSON interface over UDP, in lock step.
 
     with Simulation(with_ardupilot(scenario)) as simulation, BridgeHost(simulation.gateway) as
     bridges:
-        bridges.open(ArdupilotBridge())     # 9002 + 10 i; `arducopter --model JSON -I i` speaks
+        bridges.open(ArdupilotBridge())  # 9002 + 10 i; `arducopter --model JSON -I i` connects
         simulation.run(speed=1.0)
 
 Every 1.25 ms of simulated time the bridge sends each ArduPilot the state of its UAV and waits for
-its outputs. An autopilot that times out ends the run or is given up, see `TimeoutPolicy`. One that
-restarts counts its frames from 0 again; its session and its clock begin again.
+its outputs. An autopilot that times out ends the run or is dropped, see `TimeoutPolicy`. A
+restarted autopilot counts its frames from 0 again; its session and its clock restart.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from volery.mavlink.links.connection import why_not
 
 PORT = 9002
 PORT_STEP = 10
-"""ArduPilot's instances shift all their ports by this."""
+"""Offset of all ports of one ArduPilot instance to the next."""
 PERIOD_NS = NS_PER_S // STATE_HZ
 _TRUTH = "ground_truth/odom"
 _TOPICS = {
@@ -50,9 +50,10 @@ _TOPICS = {
 }
 _SLOW = ("range", "battery")
 _GONE_S = 1.5
-"""Of wall time: one that waits for a state asks again every second."""
+"""Wall time of silence after which an autopilot has left: one that waits for a state asks every
+second."""
 _LATE_FRAMES = 16
-"""A frame this far back was held up on its way; farther back, ArduPilot has restarted."""
+"""A frame this far back was delayed in transit; farther back, ArduPilot has restarted."""
 _log = logging.getLogger(__name__)
 
 Address = tuple[Any, ...]
@@ -61,8 +62,8 @@ Address = tuple[Any, ...]
 class ArdupilotBridge:
     """Listens for instance i, the autopilot of the i-th UAV, at `port` + 10 i.
 
-    The gateway knows the rotors of each UAV. notice_s: wall time after which the bridge logs that
-    ArduPilots are missing; None: the caller reports them.
+    The gateway provides the rotors of each UAV. notice_s: wall time after which the bridge logs
+    that ArduPilots are missing; None: the caller reports them.
     """
 
     def __init__(
@@ -83,21 +84,24 @@ class ArdupilotBridge:
 
     @property
     def name(self) -> str:
-        """What it is and where."""
+        """Name and address of the bridge."""
         return f"ArduPilot UDP {self._host}:{self._port}, +{PORT_STEP} for each further UAV"
 
     @property
     def connected(self) -> tuple[str, ...]:
-        """UAVs whose ArduPilot has spoken."""
+        """UAVs whose ArduPilot has connected."""
         return tuple(seat.uav for seat in self._seats if seat.peer is not None)
 
     async def start(self, gateway: Gateway) -> None:
-        """Begin to listen. `BridgeError` where a port is taken, or a UAV cannot be flown so."""
+        """Starts listening.
+
+        Raises `BridgeError` if a port is taken or ArduPilot cannot fly a UAV.
+        """
         check_address(self._host, anywhere=self._anywhere, flag="--allow-remote")
         rotors = gateway.rotor_layouts()
         uavs = [uav for uav in uavs_with(gateway, _TRUTH) if uav in rotors]
         if not uavs:
-            raise BridgeError("no UAV tells the true state that an ArduPilot needs")
+            raise BridgeError("no UAV publishes the true state that an ArduPilot needs")
         for k, uav in enumerate(uavs):
             try:
                 motors = motors_of(rotors[uav])
@@ -111,7 +115,7 @@ class ArdupilotBridge:
         )
 
     async def stop(self) -> None:
-        """Let all ArduPilots go."""
+        """Disconnects all ArduPilots."""
         if self._absence is not None:
             self._absence.cancel()
         for seat in self._seats:
@@ -120,7 +124,7 @@ class ArdupilotBridge:
         await asyncio.sleep(0)
 
     def _missing(self) -> dict[str, str]:
-        """Where the ArduPilots that are not there are to speak, by UAV."""
+        """Returns the addresses of the missing ArduPilots, by UAV."""
         return {
             seat.uav: f"UDP {self._host}:{self._port + PORT_STEP * number}"
             for number, seat in enumerate(self._seats)
@@ -144,7 +148,7 @@ class ArdupilotBridge:
 
 
 class _Seat(asyncio.DatagramProtocol):
-    """Where the ArduPilot of one UAV sits."""
+    """Endpoint of the ArduPilot of one UAV."""
 
     def __init__(
         self, gateway: Gateway, uav: str, motors: tuple[int, ...], patience: TimeoutPolicy
@@ -157,32 +161,32 @@ class _Seat(asyncio.DatagramProtocol):
         self._heard_s = 0.0
         """Wall time of its last frame."""
         self._told: set[str] = set()
-        """Warnings that were given."""
+        """Warnings that were logged."""
         self._line = b""
         self._slow: dict[str, Any] = {}
-        """Newest messages of topics that do not come each time."""
+        """Newest messages of topics that are not published at every exchange."""
         self._begin_ns: int | None = None
         self._meetings = LockStepSession(
             gateway, uav, "ardupilot", self, period_ns=PERIOD_NS, topics=_TOPICS, patience=patience
         )
 
     def close(self) -> None:
-        """Give everything back; a second time nothing happens."""
+        """Closes the endpoint; further calls do nothing."""
         if self.peer is not None:
             self._meetings.turn_rotors([0.0] * len(self._motors))
         self._meetings.close()
         if self._transport is not None:
             self._transport.close()
 
-    # --------------------------------------------------------------------------------- of meetings
+    # ---------------------------------------------------------------------------------- lock step
 
     is_in_step = False
-    """As of `Autopilot`: asyncio's transport is the loop's."""
+    """As in `ExternalAutopilot`: asyncio's transport belongs to the loop."""
     may_sleep = False
-    """As of `Autopilot`: it answers each state, and repeats its question where it heard none."""
+    """As in `ExternalAutopilot`: ArduPilot answers each state, and asks again after a lost one."""
 
     def tell(self, time_ns: int, news: News) -> bool:
-        """As of `Autopilot`."""
+        """Implements `ExternalAutopilot.tell`."""
         self._slow.update({name: news[name] for name in _SLOW if name in news})
         state = _state_of({**self._slow, **news})
         if self.peer is None or self._transport is None or state is None:
@@ -194,31 +198,34 @@ class _Seat(asyncio.DatagramProtocol):
         return True
 
     def begin_anew(self) -> None:
-        """See `ExternalAutopilot`; an ArduPilot whose simulator's clock goes back flies on."""
+        """Implements `ExternalAutopilot.begin_anew`.
+
+        ArduPilot flies on if its simulator's clock goes back.
+        """
         self._begin_ns = None
 
     def drop(self) -> None:
-        """As of `Autopilot`: forget it; it speaks again every second if it lives."""
+        """Implements `ExternalAutopilot.drop`; a live ArduPilot sends again every second."""
         self.peer, self._begin_ns = None, None
         self._meetings.turn_rotors([0.0] * len(self._motors))
 
-    # ---------------------------------------------------------------------------------- of asyncio
+    # ----------------------------------------------------------------------------------- asyncio
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """As of asyncio."""
+        """Implements asyncio's method."""
         self._transport = cast(asyncio.DatagramTransport, transport)  # no such class in 3.11
 
     def datagram_received(self, data: bytes, addr: Address) -> None:
-        """As of asyncio."""
+        """Implements asyncio's method."""
         servos = parse_servos(data)
         if servos is None:
-            self._warn("what speaks to its port is no ArduPilot")
+            self._warn("a sender to its port is not an ArduPilot")
             return
         now_s = time.monotonic()
         if self.peer is None or self._is_new(servos, addr, now_s):
             self._welcome(addr)
         if addr != self.peer:
-            self._warn("its ArduPilot is there already; another one is not heard")
+            self._warn("its ArduPilot is connected already; another one is ignored")
             return
         self._heard_s = now_s
         if servos.number == self._number:
@@ -227,28 +234,28 @@ class _Seat(asyncio.DatagramProtocol):
             self._obey(servos)
 
     def _is_new(self, servos: Servos, addr: Address, now_s: float) -> bool:
-        """Whether an ArduPilot begins: where the present one is gone, or itself restarted."""
+        """Returns whether a frame starts a session: the ArduPilot has left, or it has restarted."""
         if addr != self.peer:
             return now_s - self._heard_s > _GONE_S
         back = self._number - servos.number
         return back > _LATE_FRAMES or (back > 0 and servos.number == 0)
 
     def _warn(self, text: str) -> None:
-        """Once, as datagrams come by the hundred."""
+        """Logs a warning once per text, as datagrams arrive by the hundred."""
         if text not in self._told:
             self._told.add(text)
             _log.warning("%s: %s", self.uav, text)
 
     def error_received(self, exc: Exception) -> None:
-        """As of asyncio: nobody listens at its address just now; its silence will tell."""
+        """Implements asyncio's method: the address has no receiver, which the timeout detects."""
         _log.debug("%s: %s", self.uav, exc)
 
     def _welcome(self, peer: Address) -> None:
         self.peer, self._begin_ns, self._number = peer, None, -1
-        _log.info("%s: an ArduPilot flies it", self.uav)
+        _log.info("%s: an ArduPilot controls it", self.uav)
 
     def _repeat(self) -> None:
-        """Say again what it has not heard."""
+        """Sends the last state again."""
         if self._meetings.waits and self._transport is not None:
             self._transport.sendto(self._line, self.peer)
 
@@ -258,7 +265,7 @@ class _Seat(asyncio.DatagramProtocol):
 
 
 def _state_of(news: News) -> State | None:
-    """What is new of a UAV; None without a reading of its IMU and its true place."""
+    """Returns the new state of a UAV; None without a sample of its IMU and its true pose."""
     if "imu" not in news or _TRUTH not in news:
         return None
     inertial, truth = inertial_of(news["imu"]), news[_TRUTH]
@@ -278,7 +285,7 @@ def _state_of(news: News) -> State | None:
 
 
 def _turned(q: tuple[float, float, float, float], v: Vector) -> Vector:
-    """`v` in the body, in the map: v + 2 w (u x v) + 2 u x (u x v)."""
+    """Returns `v`, given in the map, in the body: v + 2 w (u x v) + 2 u x (u x v)."""
     x, y, z, w = q
     a = 2.0 * (y * v[2] - z * v[1])
     b = 2.0 * (z * v[0] - x * v[2])

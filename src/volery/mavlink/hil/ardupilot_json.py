@@ -1,8 +1,8 @@
-"""ArduPilot's JSON interface for simulators: what it sends, what it reads, which motor is which.
+"""ArduPilot's JSON interface for simulators: frames of outputs, lines of states, order of motors.
 
-As of ArduPilot's `libraries/SITL/SIM_JSON` (4.7-dev, 2025-12): servo outputs come as little-endian
-frames, a state goes back as one line of JSON between line feeds. Its reader looks for keys as
-substrings and takes what follows two characters later, so that no blank may stand after a colon.
+Follows ArduPilot's `libraries/SITL/SIM_JSON` (4.7-dev, 2025-12): servo outputs are little-endian
+frames; a state is one line of JSON between line feeds. Its reader searches for keys as substrings
+and reads the value two characters later, so that no blank may follow a colon.
 """
 
 from __future__ import annotations
@@ -19,17 +19,18 @@ from volery.graph.rotor_layout import RotorLayout
 from volery.mavlink.autopilot.vehicle import Quaternion, Vector
 
 STATE_HZ = 800
-"""ArduCopter's loop of 400 Hz begins with a state, and its pre-arm checks want 720 Hz or more."""
+"""ArduCopter's loop of 400 Hz begins with a state, and its pre-arm checks need 720 Hz or more."""
 _AHEAD = 1.0 + 1e-8
-"""Its reader cuts what a state adds to its clock to whole microseconds: 1249 of 1249.99999998."""
+"""Factor on times: its reader cuts what a state adds to its clock to whole microseconds: 1249 of
+1249.99999998."""
 _FRAMES = {18458: struct.Struct("<HHI16H"), 29569: struct.Struct("<HHI32H")}
-"""By their first number: frames of 16 and of 32 outputs."""
+"""Frame layouts of 16 and of 32 outputs, by their first number."""
 _PWM_OFF, _PWM_FULL = 1000, 2000
-"""microseconds: MOT_PWM_MIN and MOT_PWM_MAX of ArduPilot's simulations."""
+"""Outputs of MOT_PWM_MIN and MOT_PWM_MAX of ArduPilot's simulations, microseconds."""
 _FRAME_TYPES = {"X": (45.0, -135.0, -45.0, 135.0), "plus": (90.0, -90.0, 0.0, 180.0)}
-"""degrees clockwise from ahead of ArduCopter's motors 1 to 4."""
+"""Bearings of ArduCopter's motors 1 to 4, degrees clockwise from ahead."""
 _TURNS = ("ccw", "ccw", "cw", "cw")
-"""Seen from above, of motors 1 to 4."""
+"""Turn directions of motors 1 to 4, seen from above."""
 _NEAR_DEG = 22.5
 
 
@@ -37,15 +38,15 @@ class Servos(NamedTuple):
     """One frame of outputs."""
 
     rate_hz: int
-    """At which ArduPilot would like to be told; it takes other rates, too."""
+    """State rate that ArduPilot requests; it accepts other rates, too."""
     number: int
-    """Counts from 0 at its start; one that comes again was not answered."""
+    """Frame number from 0 at ArduPilot's start; a repeated number means that no state arrived."""
     pwm: tuple[int, ...]
-    """microseconds; 0: no output."""
+    """Outputs, microseconds; 0: no output."""
 
 
 class State(NamedTuple):
-    """What is told of a UAV. FLU, map, SI; None: not measured."""
+    """State of a UAV. FLU, map, SI; None: not measured."""
 
     force: Vector
     rates: Vector
@@ -54,11 +55,11 @@ class State(NamedTuple):
     velocity: Vector
     range_m: float | None = None
     battery: tuple[float, float] | None = None
-    """V, A."""
+    """Voltage, V, and current, A."""
 
 
 def parse_servos(data: bytes) -> Servos | None:
-    """The outputs in a datagram; None where it is something else."""
+    """Returns the outputs in a datagram; None if the datagram holds none."""
     if len(data) < 2:
         return None
     frame = _FRAMES.get(int.from_bytes(data[:2], "little"))
@@ -69,7 +70,7 @@ def parse_servos(data: bytes) -> Servos | None:
 
 
 def state_line(time_s: float, state: State) -> bytes:
-    """The line that tells a state at a time of the simulator's clock."""
+    """Returns the line of a state at a time of the simulator's clock."""
     x, y, z, w = q_ned_frd_of_enu_flu(state.attitude)
     told: dict[str, object] = {
         "timestamp": time_s * _AHEAD,
@@ -86,10 +87,10 @@ def state_line(time_s: float, state: State) -> bytes:
 
 
 def motors_of(rotors: RotorLayout) -> tuple[int, ...]:
-    """Which of ArduCopter's outputs, from 0, turns each rotor of a quadrotor.
+    """Returns the index of ArduCopter's output, from 0, for each rotor of a quadrotor.
 
-    Arms as an X are its FRAME_TYPE 1, arms as a plus 0. `BridgeError` for any other shape, and for
-    rotors that turn the other way.
+    Arms as an X are its FRAME_TYPE 1, arms as a plus 0. Raises `BridgeError` for other shapes and
+    for rotors that turn the other way.
     """
     bearings = [math.degrees(math.atan2(-rotor.y, rotor.x)) for rotor in rotors]
     for motors in _FRAME_TYPES.values():
@@ -97,18 +98,18 @@ def motors_of(rotors: RotorLayout) -> tuple[int, ...]:
         if sorted(found) == [0, 1, 2, 3]:
             if all(_TURNS[k] == r.direction for k, r in zip(found, rotors, strict=True)):
                 return tuple(found)
-            raise BridgeError("its rotors turn the other way than ArduCopter's motors do")
+            raise BridgeError("its rotors turn opposite to ArduCopter's motors")
     raise BridgeError("ArduCopter flies quadrotors with arms as an X or a plus here")
 
 
 def shares(pwm: Sequence[int], motors: Sequence[int]) -> list[float]:
-    """Share of full speed for each rotor."""
+    """Returns each rotor's fraction of full speed."""
     span = _PWM_FULL - _PWM_OFF
     return [min(max((pwm[k] - _PWM_OFF) / span, 0.0), 1.0) for k in motors]
 
 
 def _nearest(bearing: float, motors: Sequence[float]) -> int:
-    """The motor within `_NEAR_DEG` of a bearing; -1 where there is none."""
+    """Returns the motor within `_NEAR_DEG` of a bearing; -1 if there is none."""
     for k, place in enumerate(motors):
         if abs((bearing - place + 180.0) % 360.0 - 180.0) < _NEAR_DEG:
             return k

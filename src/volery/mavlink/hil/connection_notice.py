@@ -1,6 +1,6 @@
-"""Says once that autopilots are waited for which nobody has started, where, and how to start them.
+"""Logs once which autopilots have not connected, at which addresses, and how to start them.
 
-Without it a user sees UAVs stand on the ground for no reason.
+Without the notice, UAVs stay on the ground without an explanation.
 """
 
 from __future__ import annotations
@@ -10,16 +10,16 @@ import logging
 from collections.abc import Callable, Mapping
 
 NOTICE_S = 5.0
-"""Of wall time after a bridge has opened; PX4 connects within one second of its start."""
+"""Wall time after a bridge has opened, s; PX4 connects within one second of its start."""
 _MOST_NAMED = 3
 _log = logging.getLogger(__name__)
 
 
 class ConnectionNotice:
-    """Looks once, in the loop that runs, after `after_s` (None: never) unless `cancel` comes first.
+    """Checks once in the running loop after `after_s` (None: never) unless `cancel` comes first.
 
-    what: the kind of autopilot. missing: where it is awaited, by UAV that has none. hint: how to
-    start it.
+    what: the kind of autopilot. missing: returns addresses, by UAV without autopilot. hint: returns
+    how to start one.
     """
 
     def __init__(
@@ -35,7 +35,7 @@ class ConnectionNotice:
             self._timer = asyncio.get_running_loop().call_later(after_s, self._look)
 
     def cancel(self) -> None:
-        """Say nothing; a second time nothing happens."""
+        """Cancels the check; further calls do nothing."""
         if self._timer is not None:
             self._timer.cancel()
 
@@ -46,9 +46,9 @@ class ConnectionNotice:
 
 
 def notice(what: str, missing: Mapping[str, str], hint: str) -> str:
-    """One line: for whom and where an autopilot is awaited, and how to start one."""
+    """Returns one line with the UAVs, the addresses and how to start an autopilot."""
     places = [f"{uav} ({place})" for uav, place in missing.items()]
     more = len(places) - _MOST_NAMED
     named = ", ".join(places[:_MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
-    stand = "it stands" if len(places) == 1 else "they stand"
-    return f"no {what} yet for {named}: {stand} still until one comes; {hint}"
+    stand = "it stays on the ground" if len(places) == 1 else "they stay on the ground"
+    return f"no {what} yet for {named}: {stand} until one connects; {hint}"

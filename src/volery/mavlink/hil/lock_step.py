@@ -1,9 +1,9 @@
-"""One UAV's meetings with the autopilot outside that flies it, whatever carries them there.
+"""Synchronizes one UAV with its external autopilot in lock step, over any transport.
 
-At each meeting the autopilot is told what is new of its UAV, and the simulation stands still until
-`go_on`. What it asks of the rotors before is in force from the next physics step. One that is
-waited for and stays silent ends the run with an error, or is given up with a warning; without one
-that is asleep time goes on.
+At each exchange the autopilot receives new measurements of its UAV, and the simulation waits until
+`go_on`. Rotor commands sent before that act from the next physics step. An autopilot that times out
+ends the run with an error or is dropped with a warning. Time continues without an autopilot that
+sleeps.
 """
 
 from __future__ import annotations
@@ -31,59 +31,63 @@ _JOIN = "volery_interfaces/srv/JoinLockStep"
 _SPEEDS = "std_msgs/msg/Float32MultiArray"
 _CLOCK = "rosgraph_msgs/msg/Clock"
 _MARGIN_S = 5.0
-"""By which the simulation is more patient than a seat that gives its autopilot up by itself."""
+"""Time by which the simulation's timeout exceeds that of a session that drops its autopilot itself,
+s."""
 _GLANCE_S = 0.05
-"""How often silence is looked at."""
+"""Time between two checks for silence, s."""
 _SLEEP_S = 0.5
-"""Who says nothing for so long of wall time may be asleep, or for a fifth of its patience."""
+"""Wall time of silence after which an autopilot may be asleep, s, at most a fifth of its timeout.
+"""
 _LONGEST_SLEEP = 6.0
-"""Times the patience: so long of wall time it may be."""
+"""Longest sleep, as a factor on the timeout, wall time."""
 _log = logging.getLogger(__name__)
 
 News = Mapping[str, Any]
-"""Newest messages that have come since the last meeting, by topic below the UAV's name."""
+"""Newest messages since the last exchange, by topic below the UAV's name."""
 
 
 class TimeoutPolicy(NamedTuple):
-    """How long an autopilot that has begun to answer may be silent, and what happens then."""
+    """How long a connected autopilot may be silent, and what happens then."""
 
     timeout_s: float = 10.0
-    """Of wall time."""
+    """Wall time, s."""
     drops: bool = False
-    """Whether it is then waited for no more, its rotors still; else the run ends with an error."""
+    """Whether the autopilot is then dropped and its rotors stop; else the run ends with an error.
+    """
 
 
 PATIENCE = TimeoutPolicy()
 
 
 class ExternalAutopilot(Protocol):
-    """The autopilot's side."""
+    """The autopilot's side of a lock-step session."""
 
     @property
     def is_in_step(self) -> bool:
-        """Whether it answers each meeting, and may be told by any thread."""
+        """Whether the autopilot answers each exchange and any thread may call `tell`."""
 
     @property
     def may_sleep(self) -> bool:
-        """Whether it may be well though it does not answer: it flies nothing."""
+        """Whether silence may be normal, because the autopilot controls nothing."""
 
     def tell(self, time_ns: int, news: News) -> bool:
-        """Tell it of a meeting; whether its answer is waited for: it calls `go_on`."""
+        """Sends new messages to the autopilot; returns whether it will answer and call `go_on`."""
 
     def begin_anew(self) -> None:
-        """The simulation was reset: times are earlier than those told before."""
+        """Handles a reset of the simulation: times are earlier than before."""
 
     def drop(self) -> None:
-        """It was silent for too long: let it go."""
+        """Drops the autopilot, which was silent for too long."""
 
 
 class LockStepSession:
     """Joins the lock step for `uav` at once; `close` leaves it.
 
     kind: `px4` or another word for names. topics: message types by topic below the UAV's name.
-    The autopilot is told in the loop's thread, or, once it `is_in_step`, by the simulation's own,
-    which need not wake another for that. Both hold `lock` when they tell it or have it begin anew,
-    and so must who reads or changes what these do. All other calls are the loop's.
+    `ExternalAutopilot.tell` is called in the loop's thread, or, once `is_in_step`, in the
+    simulation's thread, which avoids a wake-up. Both hold `lock` during `tell` and `begin_anew`,
+    and so must code that reads or changes what these do. All other calls belong to the loop's
+    thread.
     """
 
     def __init__(
@@ -106,11 +110,11 @@ class LockStepSession:
         self._done = f"{meeting}/done"
         self._pending = False
         self._since_s = 0.0
-        """Wall time at which the present meeting began."""
+        """Wall time at which the current exchange began."""
         self._is_unsayable = False
-        """Whether it has been said that the autopilot cannot be told something."""
+        """Whether a failed `tell` has been logged."""
         self._asleep_since_s: float | None = None
-        """Wall time since which time goes on without its answers."""
+        """Wall time since which time goes on without the autopilot's answers."""
         self._period_s = period_ns / NS_PER_S
         self._watch = self._loop.create_task(self._watch_silence())
         self._time_ns = -1
@@ -128,20 +132,23 @@ class LockStepSession:
 
     @property
     def time_ns(self) -> int:
-        """Of the present or last meeting."""
+        """Simulated time of the current or last exchange, ns."""
         return self._time_ns
 
     @property
     def waits(self) -> bool:
-        """Whether the simulation stands still until `go_on`."""
+        """Whether the simulation waits for `go_on`."""
         return self._pending
 
     def turn_rotors(self, shares: Sequence[float]) -> None:
-        """Ask for shares of the rotors' full speed, in the order of the airframe."""
+        """Requests rotor speeds as fractions of full speed, in the order of the airframe."""
         self._publish((self._rotors, self._asked(shares)))
 
     def go_on(self, shares: Sequence[float] | None = None) -> None:
-        """End the meeting, `shares` as of `turn_rotors`; without a meeting only those are asked."""
+        """Ends the exchange and requests rotor speeds, `shares` as in `turn_rotors`.
+
+        Without an exchange only the speeds are requested.
+        """
         messages = [] if shares is None else [(self._rotors, self._asked(shares))]
         if shares is not None:
             self._asleep_since_s = None
@@ -151,7 +158,7 @@ class LockStepSession:
         self._publish(*messages)
 
     def close(self) -> None:
-        """Leave the lock step and the graph; a second time nothing happens."""
+        """Leaves the lock step and the graph; further calls do nothing."""
         with self.lock:
             self._pending = False
         self._watch.cancel()
@@ -190,12 +197,10 @@ class LockStepSession:
     def _tell(self, time_ns: int) -> bool:
         try:
             return self._autopilot.tell(time_ns, self._news())
-        except (ArithmeticError, ValueError, struct.error) as error:  # as of an infinite fix
+        except (ArithmeticError, ValueError, struct.error) as error:  # such as an infinite fix
             if not self._is_unsayable:
                 self._is_unsayable = True
-                _log.warning(
-                    "%s: its autopilot cannot be told what is sensed: %s", self._uav, error
-                )
+                _log.warning("%s: cannot send sensor values to its autopilot: %s", self._uav, error)
             return False
 
     def _news(self) -> News:
@@ -203,7 +208,7 @@ class LockStepSession:
         return {name: published[-1].message for name, published in found.items() if published}
 
     async def _watch_silence(self) -> None:
-        """Go on without an autopilot that is asleep; give up one that is silent for too long."""
+        """Goes on without an autopilot that sleeps; drops one that is silent for too long."""
         while True:
             await asyncio.sleep(self._glance_s)
             with self.lock:
@@ -217,7 +222,7 @@ class LockStepSession:
         return min(_GLANCE_S, 0.1 * self._patience.timeout_s)
 
     def _judge(self, silent_s: float) -> None:
-        """Of a meeting that lasts: whether there is still somebody to wait for."""
+        """Handles an exchange that has lasted `silent_s`."""
         timeout_s, since_s = self._patience.timeout_s, self._asleep_since_s
         if since_s is None:
             sleeps = silent_s >= min(_SLEEP_S, 0.2 * timeout_s)
@@ -232,13 +237,14 @@ class LockStepSession:
         if self._asleep_since_s is None:
             self._asleep_since_s = time.monotonic()
             _log.warning(
-                "%s: its autopilot is disarmed and silent; it is not waited for", self._uav
+                "%s: its autopilot is disarmed and silent; the simulation goes on without it",
+                self._uav,
             )
         self.go_on()
 
     def _give_up(self) -> None:
         _log.warning(
-            "%s: its autopilot has been silent for %g s; it is not waited for",
+            "%s: its autopilot has been silent for %g s; the simulation goes on without it",
             self._uav,
             self._patience.timeout_s,
         )
@@ -254,17 +260,17 @@ class LockStepSession:
 
 
 def uavs_with(gateway: Gateway, topic: str) -> list[str]:
-    """UAVs that publish `topic` below their names, in the order of the names' numbers."""
+    """Returns the UAVs that publish `topic` below their names, ordered by the names' numbers."""
     ends = [info.name.split("/") for info in gateway.graph.topics() if info.publishers]
     names = {parts[1] for parts in ends if "/".join(parts[2:]) == topic}
     return sorted(names, key=lambda name: (len(name), name))
 
 
 def _nothing() -> None:
-    """Nobody waits for it."""
+    """Does nothing: no request waits for this response."""
 
 
 def _answered(answer: Any) -> None:
-    """What the simulation says to somebody who joins."""
+    """Logs an error if the request to join was refused."""
     if not getattr(answer, "success", False):
         _log.error("no lock step: %s", getattr(answer, "message", answer))

@@ -1,10 +1,10 @@
-"""A simulated UAV for a real PX4: sensors out, rotors in, in lock step.
+"""Connects a simulated UAV to a real PX4: sensors out, rotors in, in lock step.
 
-The protocol is that of PX4's `simulator_mavlink`: HIL_SENSOR sets its clock, so that times must
-only grow; it answers each with HIL_ACTUATOR_CONTROLS once it has begun to fly the simulation. Until
-the first answer the simulation runs freely, and beside a PX4 with a clock of its own, such as
-hardware, always. A group of sensors (accelerometer, gyroscope,
-magnetometer, barometer) is told whole or not at all.
+The protocol is that of PX4's `simulator_mavlink`: HIL_SENSOR sets its clock, so times must only
+grow; PX4 answers each message with HIL_ACTUATOR_CONTROLS once it controls the simulated UAV. The
+simulation runs freely until the first answer, and always with a PX4 that has its own clock, such as
+hardware. A group of sensors (accelerometer, gyroscope, magnetometer, barometer) is sent whole or
+not at all.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from volery.mavlink.codec import Codec, Parser, dialect
 from volery.mavlink.framing import Framer
 
 PERIOD_NS = 4_000_000
-"""PX4's simulations run at 250 Hz."""
+"""Period of PX4's simulations, 250 Hz."""
 SIMULATOR = 51
 """Component id that PX4's own simulators use."""
 ACCELEROMETER, GYROSCOPE, MAGNETOMETER, BAROMETER = 0x7, 0x38, 0x1C0, 0x1A00
@@ -28,20 +28,20 @@ _ARMED = 128
 _GENERIC, _NO_AUTOPILOT = 0, 8
 """MAV_TYPE and MAV_AUTOPILOT of the simulator."""
 _LOCK_STEP = 1
-"""Of HIL_ACTUATOR_CONTROLS: PX4 was built to take its time from the simulator."""
+"""Flag of HIL_ACTUATOR_CONTROLS: PX4 was built to use the simulator's time."""
 _GAUSS_A_TESLA = 1e4
 _MOST_CM_S = 32767
 
 
 class Inertial(NamedTuple):
-    """Of an IMU: specific force m/s^2 and rates rad/s, FLU."""
+    """Sample of an IMU: specific force m/s^2 and rates rad/s, FLU."""
 
     force: Vector
     rates: Vector
 
 
 class Fix(NamedTuple):
-    """Of a GNSS receiver: degrees, degrees, m; m/s in the map."""
+    """Fix of a GNSS receiver: degrees, degrees, m; m/s in the map."""
 
     latitude: float
     longitude: float
@@ -52,53 +52,53 @@ class Fix(NamedTuple):
 
 
 class SensorValues(NamedTuple):
-    """What was measured for a meeting; None: nothing new of that sensor."""
+    """Measurements of an exchange; None: nothing new of that sensor."""
 
     inertial: Inertial
     field: Vector | None = None
-    """T, FLU."""
+    """Magnetic field, T, FLU."""
     pressure: float | None = None
-    """Pa."""
+    """Pressure, Pa."""
     temperature: float = 20.0
-    """degrees Celsius."""
+    """Air temperature, degrees Celsius."""
     fix: Fix | None = None
 
 
 class Actuators(NamedTuple):
-    """What PX4 wants of its outputs."""
+    """Outputs that PX4 requests."""
 
     controls: tuple[float, ...]
-    """(16,) from -1 to 1."""
+    """Outputs from -1 to 1, shape (16,)."""
     armed: bool
     time_ns: int = 0
-    """Of the reading that they follow from, where PX4 takes its time from the readings."""
+    """Time of the sample that they follow from, if PX4 takes its time from the samples."""
 
 
 class HilLink:
-    """One vehicle's connection to one PX4; `system` is the id that PX4 will have."""
+    """One vehicle's link to one PX4; `system` is PX4's system id."""
 
     def __init__(self, system: int) -> None:
         self._codec = Codec(system, SIMULATOR)
         self._framer, self._parser = Framer(), Parser()
         self._sequence = 0
         self.spoken = False
-        """Whether any frame has come."""
+        """Whether any frame has arrived."""
         self.locked = False
-        """Whether PX4 has begun to answer in lock step, and is to be waited for from now on."""
+        """Whether PX4 answers in lock step, so that the simulation waits for it."""
 
     def tell(self, time_ns: int, sensed: SensorValues) -> bytes:
-        """Frames for a meeting at a simulated time."""
+        """Returns the frames of an exchange at a simulated time."""
         frames = self._sensor(time_ns // 1000, sensed)
         if sensed.fix is not None:
             frames += self._gps(time_ns // 1000, sensed.fix)
         return frames
 
     def heartbeat(self) -> bytes:
-        """A frame that says that a simulator is there, as nobody's ground station."""
+        """Returns a heartbeat of a simulator, which is not that of a ground station."""
         return self._pack(dialect().MAVLink_heartbeat_message(_GENERIC, _NO_AUTOPILOT, 0, 0, 0, 3))
 
     def feed(self, data: bytes) -> list[Actuators]:
-        """Answers in what PX4 sent; its other messages need none."""
+        """Returns the actuator outputs in received bytes; other messages need no answer."""
         answers = []
         for frame in self._framer.feed(data):
             self.spoken = True

@@ -1,13 +1,13 @@
-"""Real PX4s fly the UAVs: a TCP server for each vehicle, in lock step with the simulation.
+"""Connects real PX4s to the UAVs: a TCP server for each vehicle, in lock step with the simulation.
 
     with Simulation(with_px4(scenario)) as simulation, BridgeHost(simulation.gateway) as bridges:
-        bridges.open(Px4Bridge())                        # 4560 + i; PX4 instances connect
+        bridges.open(Px4Bridge())      # 4560 + i; PX4 instances connect
         simulation.run(speed=1.0)
 
-Every 4 ms of simulated time all vehicles are told what their sensors measured, and the simulation
-waits for those PX4s that have begun to answer. One that is silent for too long ends the run with an
-error or is given up, see `TimeoutPolicy`. A PX4 that leaves may connect anew, as a restarted one;
-at a reset of the simulation all are sent away, because none can go back in time.
+Every 4 ms of simulated time all PX4s receive their UAVs' sensor values, and the simulation waits
+for those PX4s that have begun to answer. A PX4 that times out ends the run with an error or is
+dropped, see `TimeoutPolicy`. A PX4 that disconnects may connect again, as a restarted one does. A
+reset of the simulation disconnects all PX4s, because PX4 cannot go back in time.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ from volery.mavlink.links.connection import why_not
 
 PORT = 4560
 _MOST_UNSENT_BYTES = 1 << 16
-"""What may wait for a PX4 that does not read, beside what the kernel holds."""
+"""Largest number of unsent bytes for a PX4 that does not read, besides the kernel's buffers."""
 _MOST_CONNECTIONS = 4
-"""To one UAV's port; all but one end as soon as the server sees them."""
+"""Connections to one UAV's port; all but one end as soon as the server sees them."""
 _log = logging.getLogger(__name__)
 
 
 class Px4Bridge:
     """Serves PX4 instance i, the autopilot of the i-th UAV, at `port` + i.
 
-    notice_s: wall time after which it is said that PX4s are missing; None: somebody else says so.
+    notice_s: wall time after which missing PX4s are logged; None: the caller reports them.
     """
 
     def __init__(
@@ -63,20 +63,20 @@ class Px4Bridge:
 
     @property
     def name(self) -> str:
-        """What it is and where."""
+        """Name and address of the bridge."""
         return f"PX4 {self._host}:{self._port} and following"
 
     @property
     def connected(self) -> tuple[str, ...]:
-        """UAVs whose PX4 is there."""
+        """UAVs whose PX4 is connected."""
         return tuple(seat.uav for seat in self._seats if seat.taken)
 
     def address(self, number: int) -> str:
-        """Where instance `number` is to connect."""
+        """Returns the address to which instance `number` connects."""
         return f"{self._host}:{self._port + number}"
 
     async def start(self, gateway: Gateway) -> None:
-        """Begin to listen. `BridgeError` where a port is taken, or a UAV lacks an IMU."""
+        """Starts listening. Raises `BridgeError` if a port is taken or a UAV lacks an IMU."""
         dialect()
         check_address(self._host, anywhere=self._anywhere, flag="--allow-remote")
         uavs = uavs_with(gateway, "imu")
@@ -92,7 +92,7 @@ class Px4Bridge:
             )
 
     async def stop(self) -> None:
-        """Let all PX4s go."""
+        """Disconnects all PX4s."""
         if self._absence is not None:
             self._absence.cancel()
         for server in self._servers:
@@ -101,11 +101,11 @@ class Px4Bridge:
             seat.close()
         self._servers.clear()
         self._seats.clear()
-        for _ in range(2):  # for connections to be aborted, and to be told so
+        for _ in range(2):  # for connections to be aborted, and their callbacks to run
             await asyncio.sleep(0)
 
     def _missing(self) -> dict[str, str]:
-        """Where the PX4s that are not there are to connect, by UAV."""
+        """Returns the addresses of the missing PX4s, by UAV."""
         return {
             seat.uav: self.address(number)
             for number, seat in enumerate(self._seats)
@@ -129,8 +129,8 @@ class Px4Bridge:
 class _Connection(asyncio.Protocol):
     """One PX4's connection; a second one at the same port ends, or the first without a frame.
 
-    The loop reads. The simulation's thread writes, by a socket of its own on the same connection:
-    it would only wait for the loop to wake up.
+    The loop reads. The simulation's thread writes, on its own socket of the same connection, which
+    avoids waiting for the loop to wake up.
     """
 
     is_for_any_thread = True
@@ -146,7 +146,7 @@ class _Connection(asyncio.Protocol):
         self._hear: Callable[[bytes], None] = _ignore
 
     def send(self, data: bytes) -> bool:
-        """As of `Way`; frames are lost, whole, for a PX4 that does not read."""
+        """Implements `HilConnection.send`; drops whole frames for a PX4 that does not read."""
         self._flush()
         if len(self._unsent) + len(data) > _MOST_UNSENT_BYTES:
             return False
@@ -155,25 +155,27 @@ class _Connection(asyncio.Protocol):
         return not self._unsent
 
     def _flush(self) -> None:
-        with contextlib.suppress(OSError):  # no room now; or it has left, which the loop will tell
+        with contextlib.suppress(
+            OSError
+        ):  # no room now; or PX4 has disconnected, which the loop detects
             if self._unsent and self._out is not None:
                 del self._unsent[: self._out.send(self._unsent)]
 
     def end(self) -> None:
-        """As of `Way`."""
+        """Implements `HilConnection.end`."""
         self._hear = _ignore
         with contextlib.suppress(RuntimeError):  # the loop has ended
             self._loop.call_soon_threadsafe(self._transport.abort)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """As of asyncio."""
+        """Implements asyncio's method."""
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
         if self._seat.taken and not self._seat.has_heard:
             self._seat.give_way()
         if self._seat.taken:
             uav = self._seat.uav
-            _log.warning("%s: its PX4 is connected already; another connection is ended", uav)
+            _log.warning("%s: its PX4 is connected already; another connection is closed", uav)
             transport.abort()
             return
         tend(transport.get_extra_info("socket"))
@@ -181,7 +183,7 @@ class _Connection(asyncio.Protocol):
         self._hear = self._seat.take(self)
 
     def data_received(self, data: bytes) -> None:
-        """As of asyncio."""
+        """Implements asyncio's method."""
         data = self._preamble.feed(data)
         if self._preamble.refused is not None:
             self._listener.note_stranger(self._preamble.refused)
@@ -192,15 +194,15 @@ class _Connection(asyncio.Protocol):
             self._listener.prove(self._transport)
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
-        """As of asyncio."""
+        """Implements asyncio's method."""
         if self._hear is not _ignore:
-            self._seat.leave("its PX4 has left")
+            self._seat.leave("its PX4 has disconnected")
         if self._out is not None:
             self._out.close()
 
 
 def how_to_start(count: int, port: int) -> str:
-    """The command that has PX4s connect to `port` and following."""
+    """Returns the command that starts PX4s for `port` and following."""
     first = port - PORT
     if first < 0 or first + count > MOST_INSTANCES:
         return f"PX4's instances connect to ports {PORT} and following"
@@ -209,4 +211,4 @@ def how_to_start(count: int, port: int) -> str:
 
 
 def _ignore(_data: bytes) -> None:
-    """Pass over what comes from nobody who sits here."""
+    """Ignores bytes of a connection without a session."""

@@ -1,8 +1,8 @@
-"""Derives the parameters by which a PX4 fits the airframe that it flies.
+"""Derives PX4's parameters for the airframe that it controls.
 
 PX4's airframe 10016 (`none_iris`) describes an Iris; these parameters replace its geometry and its
 hover throttle. Their names and ranges are those of PX4 1.18's modules control_allocator and
-mc_pos_control. Rotor i takes output i + 1, in the order of the airframe's file.
+mc_pos_control. Rotor i has output i + 1, in the order of the airframe's file.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from volery.core.errors import BridgeError
 from volery.mavlink.autopilot.vehicle import Vector
 
 MAX_ROTORS = 12
-"""Rotors that PX4's control allocation can have."""
+"""Largest number of rotors in PX4's control allocation."""
 _MULTIROTOR = 0
 _FIRST_MOTOR = 101
 """PX4's output function Motor 1."""
@@ -27,7 +27,7 @@ class Px4Rotor(NamedTuple):
     """A rotor of the airframe."""
 
     position: Vector
-    """Hub from the centre of mass, m, FLU."""
+    """Hub relative to the centre of mass, m, FLU."""
     axis: Vector
     """Direction of its thrust, FLU, unit length."""
     direction: str
@@ -35,22 +35,22 @@ class Px4Rotor(NamedTuple):
 
 
 class Px4Airframe(NamedTuple):
-    """What PX4 must know of an airframe."""
+    """Properties of an airframe that PX4 needs."""
 
     rotors: Sequence[Px4Rotor]
     torque_m: float
     """Reaction torque per thrust of a rotor, m."""
     hover_speed_fraction: float
     """Rotor speed in hover over full speed, which is PX4's hover throttle: by default
-    (`THR_MDL_FAC` 0) it takes its outputs for thrust, and Volery takes them for speed."""
+    (`THR_MDL_FAC` 0) PX4 treats its outputs as thrust, and Volery treats them as speed."""
     tilt_deg: float
-    """Largest tilt that controllers may ask for."""
+    """Largest tilt that controllers may command."""
 
 
 def px4_parameters(airframe: Px4Airframe) -> Mapping[str, float]:
-    """Returns PX4's parameters for an airframe; those that are counts are `int`.
+    """Returns PX4's parameters for an airframe; counts are `int`.
 
-    Raises BridgeError where it has more than `MAX_ROTORS` rotors.
+    Raises `BridgeError` for more than `MAX_ROTORS` rotors.
     """
     count = len(airframe.rotors)
     if count > MAX_ROTORS:

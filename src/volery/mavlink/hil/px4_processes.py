@@ -1,10 +1,11 @@
-"""Starts PX4's software-in-the-loop instances beside a running simulation, and stops them.
+"""Starts and stops PX4's software-in-the-loop instances beside a running simulation.
 
     with Px4Instances(find_px4(folder), count=4):
-        ...                                           # they connect to TCP 4560 + i
+        ...             # they connect to TCP 4560 + i
 
-PX4 must have been built before, as by `make px4_sitl_default`. An instance whose connection to a
-simulation has ended is started anew, and waits for the next one: none can go back in time.
+PX4 must have been built before, for example by `make px4_sitl_default`. An instance whose
+connection to a simulation has ended restarts and waits for the next one: PX4 cannot go back in
+time.
 """
 
 from __future__ import annotations
@@ -24,35 +25,35 @@ from typing import NamedTuple
 from volery.core.errors import BridgeError
 
 AIRFRAME = "none_iris"
-"""PX4's airframe 10016: an iris whose simulator is a program of somebody else."""
+"""PX4's airframe 10016: an Iris with an external simulator."""
 FIRST_PORT = 4560
 _PLACES = ("build/px4_sitl_default", "", "build/px4_sitl_nolockstep")
-"""Below the folder: PX4's sources, a build's folder or an installation."""
+"""Paths below the folder: PX4's sources, a build's folder or an installation."""
 _LOOK_S = 0.2
 _FAREWELL_S = 3.0
-"""Wall time in which an instance may end by itself."""
+"""Wall time in which an instance may exit by itself."""
 _LINES_TOLD = 5
 MOST_INSTANCES = 254
-"""MAVLink's system ids: instance i has i + 1, of which 255 is a ground station's."""
+"""Limit of MAVLink's system ids: instance i has i + 1; 255 is a ground station's."""
 _ESTABLISHED = "01"
 _log = logging.getLogger(__name__)
 
 
 class Px4Build(NamedTuple):
-    """What is needed to run PX4."""
+    """Paths that are needed to run PX4."""
 
     binary: Path
     data: Path
-    """Its folder `etc` of start scripts."""
+    """PX4's folder `etc` of start scripts."""
 
 
 def find_px4(folder: Path) -> Px4Build:
-    """PX4 in its folder of sources, of a build or of an installation. `BridgeError` if not there.
+    """Finds PX4 in its folder of sources, of a build or of an installation.
 
-    It must know the airframe `AIRFRAME`.
+    PX4 must have the airframe `AIRFRAME`. Raises `BridgeError` if there is no such PX4.
     """
     if not folder.is_dir():
-        raise BridgeError(f"{folder}: no such folder; --px4-dir takes that of PX4-Autopilot")
+        raise BridgeError(f"{folder}: no such folder; --px4-dir needs the folder of PX4-Autopilot")
     for place in _PLACES:
         build = Px4Build(folder / place / "bin/px4", folder / place / "etc")
         if build.binary.is_file():
@@ -66,20 +67,20 @@ def find_px4(folder: Path) -> Px4Build:
 
 def _check(build: Px4Build) -> None:
     if not os.access(build.binary, os.X_OK):
-        raise BridgeError(f"{build.binary} is no program that may be run")
+        raise BridgeError(f"{build.binary} is not executable")
     airframes = build.data / "init.d-posix/airframes"
     if not any(airframes.glob(f"[0-9]*_{AIRFRAME}")):
         raise BridgeError(f"{airframes} has no airframe {AIRFRAME}: is this PX4 1.14 or newer?")
 
 
 class Px4Instances:
-    """Instances `first` to `first + count - 1`; a context manager, or `start` and `stop`.
+    """Runs instances `first` to `first + count - 1`; a context manager, or `start` and `stop`.
 
     Instance i has the system id i + 1 and connects to `host` at port 4560 + i.
-    folder: where each has a folder of its own for parameters and logs, which stays; None: one that
-    is removed in the end. speed: factor of real time that its time-outs of radio links allow for.
-    parameters: PX4's parameters of each instance; those that the environment sets as
-    `PX4_PARAM_NAME` come first.
+
+    folder: contains each instance's folder of parameters and logs, which stays; None: a temporary
+    folder. speed: real-time factor by which the timeouts of radio links scale. parameters: PX4's
+    parameters of each instance; environment variables `PX4_PARAM_NAME` take precedence.
     """
 
     def __init__(
@@ -95,7 +96,7 @@ class Px4Instances:
     ) -> None:
         if count < 1 or first < 0 or first + count > MOST_INSTANCES:
             last = MOST_INSTANCES - 1
-            raise BridgeError(f"instances {first} to {first + count - 1}: 0 to {last} can be")
+            raise BridgeError(f"instances {first} to {first + count - 1}: 0 to {last} are allowed")
         self._build = build
         self._numbers = range(first, first + count)
         self._environment = _environment(host, speed)
@@ -106,10 +107,10 @@ class Px4Instances:
         self._ended = threading.Event()
         self._watcher = threading.Thread(target=self._watch, name="volery-px4", daemon=True)
         self.failure: str | None = None
-        """Why an instance ended by itself; None while all is well."""
+        """Why an instance exited by itself; None without a failure."""
 
     def start(self) -> None:
-        """Start all of them. `BridgeError` where that is not possible."""
+        """Starts all instances. Raises `BridgeError` if that fails."""
         self._folder = self._kept or Path(tempfile.mkdtemp(prefix="volery-px4-"))
         try:
             for number, own in zip(self._numbers, self._parameters, strict=True):
@@ -123,7 +124,7 @@ class Px4Instances:
         self._watcher.start()
 
     def stop(self) -> None:
-        """End all of them; a second time nothing happens."""
+        """Ends all instances; further calls do nothing."""
         self._ended.set()
         if self._watcher.is_alive():
             self._watcher.join()
@@ -136,12 +137,12 @@ class Px4Instances:
             shutil.rmtree(self._folder, ignore_errors=True)
 
     def words_of(self, number: int) -> str:
-        """What an instance said last, indented lines; empty for one that there is not."""
+        """Returns an instance's last output, indented lines; empty for an unknown instance."""
         found = [one for one in self._instances if one.number == number]
         return "".join(f"\n  {line}" for one in found for line in one.lines())
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait a while; whether one has failed, or they were stopped."""
+        """Waits up to `timeout_s`; returns whether an instance has failed or all were stopped."""
         return self._ended.wait(timeout_s)
 
     def __enter__(self) -> Px4Instances:
@@ -161,13 +162,13 @@ class Px4Instances:
                     self._ended.set()
                     return
                 if instance.was_left(links):
-                    _log.info("PX4 %d has lost its simulation and begins anew", instance.number)
+                    _log.info("PX4 %d has lost its simulation and restarts", instance.number)
                     instance.end()
                     instance.start()
 
 
 class _Instance:
-    """One PX4."""
+    """One PX4 process."""
 
     def __init__(
         self, build: Px4Build, number: int, folder: Path, environment: Mapping[str, str]
@@ -180,7 +181,7 @@ class _Instance:
         self._was_linked = False
 
     def start(self) -> None:
-        """Start it; `OSError` where that is not possible."""
+        """Starts the process. Raises `OSError` if that fails."""
         self._folder.mkdir(parents=True, exist_ok=True)
         self._was_linked = False
         with self._output.open("wb") as output:
@@ -196,36 +197,36 @@ class _Instance:
 
     @property
     def has_ended(self) -> bool:
-        """Whether it ended by itself."""
+        """Whether the process exited by itself."""
         return self._process is not None and self._process.poll() is not None
 
     def was_left(self, links: frozenset[int] | None) -> bool:
-        """Whether it was connected to a simulation and is not any more."""
+        """Returns whether the connection to a simulation has ended since the last call."""
         linked = links is not None and FIRST_PORT + self.number in links
         left = links is not None and self._was_linked and not linked
         self._was_linked = linked
         return left
 
     def last_words(self) -> str:
-        """How it ended and what it said last."""
+        """Returns the exit code and the last output."""
         code = None if self._process is None else self._process.returncode
         lines = self.lines()
         head = f"PX4 {self.number} ended with code {code}"
-        return "\n  ".join([f"{head}; it said:", *lines]) if lines else head
+        return "\n  ".join([f"{head}; last output:", *lines]) if lines else head
 
     def lines(self) -> list[str]:
-        """Its last lines of output."""
+        """Returns the last lines of output."""
         try:
             return self._output.read_text(errors="replace").splitlines()[-_LINES_TOLD:]
         except OSError:
             return []
 
     def ask_to_end(self) -> None:
-        """Tell it to end."""
+        """Asks the process to exit."""
         self._signal(signal.SIGINT)
 
     def end(self) -> None:
-        """End it, by force where it does not by itself."""
+        """Ends the process, by force if needed."""
         if self._process is None:
             return
         self._signal(signal.SIGINT)
@@ -243,7 +244,7 @@ class _Instance:
 
 
 def _environment(host: str, speed: float | None) -> dict[str, str]:
-    """What PX4's start scripts are told; of other PX4_ variables only parameters pass."""
+    """Returns the environment of PX4's start scripts; only parameters pass of PX4_ variables."""
     kept = {
         name: value
         for name, value in os.environ.items()
@@ -256,12 +257,12 @@ def _environment(host: str, speed: float | None) -> dict[str, str]:
 
 
 def _parameter_variables(parameters: Mapping[str, float]) -> dict[str, str]:
-    """Variables by which PX4's start script sets parameters."""
+    """Returns the variables by which PX4's start script sets parameters."""
     return {f"PX4_PARAM_{name}": f"{value:g}" for name, value in parameters.items()}
 
 
 def established_ports() -> frozenset[int] | None:
-    """Ports to which somebody on this machine is connected by TCP; None where that is not told."""
+    """Returns the remote ports of TCP connections of this machine; None if unknown."""
     ports: set[int] = set()
     try:
         for line in Path("/proc/net/tcp").read_text().splitlines()[1:]:

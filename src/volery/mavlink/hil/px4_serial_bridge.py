@@ -1,9 +1,10 @@
-"""Hardware in the loop: one UAV is flown by a PX4 at the other end of a serial line.
+"""Hardware in the loop: a PX4 at the other end of a serial line controls one UAV.
 
-    bridges.open(Px4Serial("/dev/ttyACM0"))        # hardware with SYS_HITL = 1
+    bridges.open(Px4SerialBridge("/dev/ttyACM0"))  # hardware with SYS_HITL = 1
 
-The same messages as over TCP. Hardware has a clock of its own and is not waited for, so that the
-simulation must run in real time; a PX4 that takes its time from the simulator is waited for.
+The messages are those of the TCP bridge. Hardware has its own clock and the simulation does not
+wait for it, so that the simulation must run in real time; the simulation waits for a PX4 that uses
+the simulator's time.
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ _LEAST_BAUD = 230400
 class Px4SerialBridge:
     """Serves the first UAV that no other autopilot bridge serves.
 
-    path: of the device. baud: its speed. notice_s: wall time after which it is said that nothing is
-    heard there; None: the caller says so.
+    path: of the device. baud: its speed. notice_s: wall time without a frame after which the bridge
+    logs that the PX4 is missing; None: the caller reports it.
     """
 
     is_for_any_thread = False
@@ -51,20 +52,20 @@ class Px4SerialBridge:
 
     @property
     def name(self) -> str:
-        """What it is and where."""
+        """Name and address of the bridge."""
         return f"PX4 serial {self._path} at {self._baud} baud"
 
     @property
     def uav(self) -> str | None:
-        """The UAV that it serves; None while it is closed."""
+        """The UAV that it serves; None while the bridge is closed."""
         return None if self._seat is None else self._seat.uav
 
     async def start(self, gateway: Gateway) -> None:
-        """Open the line. `BridgeError` where that is not possible, or no UAV is left."""
+        """Opens the line. Raises `BridgeError` if that fails or no UAV is left."""
         dialect()
         if self._baud < _LEAST_BAUD:
             raise BridgeError(
-                f"{self._path}: {self._baud} baud is too slow for HIL; {_LEAST_BAUD} or more"
+                f"{self._path}: {self._baud} baud is too slow for HIL; use {_LEAST_BAUD} or more"
             )
         uavs = uavs_with(gateway, "imu")
         flown = uavs_with(gateway, "rotor_speeds")
@@ -78,7 +79,7 @@ class Px4SerialBridge:
         self._absence = ConnectionNotice("PX4", self._missing, _how_to_start, self._notice_s)
 
     async def stop(self) -> None:
-        """Close the line."""
+        """Closes the line."""
         if self._absence is not None:
             self._absence.cancel()
         if self._beats is not None:
@@ -90,13 +91,13 @@ class Px4SerialBridge:
         self.end()
 
     def send(self, data: bytes) -> bool:
-        """As of `Way`: what does not fit on the line now follows, or is lost."""
+        """Implements `HilConnection.send`: excess bytes follow later, or are lost."""
         if self._line is not None:
             self._line.send(data)
         return True
 
     def end(self) -> None:
-        """As of `Way`."""
+        """Implements `HilConnection.end`."""
         if self._line is not None:
             self._line.close()
             self._line = None
@@ -106,14 +107,14 @@ class Px4SerialBridge:
             self._hear(data)
 
     def _missing(self) -> dict[str, str]:
-        """Where nothing is heard, by UAV."""
+        """Returns the lines without frames, by UAV."""
         seat = self._seat
         if seat is None or seat.has_heard:
             return {}
         return {seat.uav: f"{self._path} at {self._baud} baud"}
 
     async def _beat(self) -> None:
-        """PX4 opens its side for the simulator that it hears."""
+        """Sends heartbeats, because PX4 opens its side only after the simulator's first frame."""
         while self._seat is not None:
             self.send(self._seat.heartbeat())
             await asyncio.sleep(_BEAT_S)

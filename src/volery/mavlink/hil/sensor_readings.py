@@ -1,4 +1,4 @@
-"""What a UAV's sensors have measured, from their messages on the graph."""
+"""Reads a UAV's sensor values from their messages on the graph."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ _NOWHERE = Fix(math.nan, math.nan, math.nan, (0.0, 0.0, 0.0), 0.0, 0.0)
 
 
 class SensorReadings:
-    """Reads one UAV's sensors; the temperature of the air is remembered."""
+    """Reads one UAV's sensors; remembers the air temperature."""
 
     def __init__(self) -> None:
         self._temperature = 20.0
 
     def read(self, news: Mapping[str, Any]) -> SensorValues | None:
-        """What is new in the messages by topic; None without a reading of the IMU."""
+        """Returns what is new in the messages by topic; None without a sample of the IMU."""
         imu = news.get("imu")
         if imu is None:
             return None
@@ -45,12 +45,12 @@ class SensorReadings:
 
 
 def inertial_of(imu: Any) -> Inertial:
-    """Specific force and rates of an Imu message."""
+    """Returns specific force and rates of an Imu message."""
     return Inertial(parts(imu.linear_acceleration), parts(imu.angular_velocity))
 
 
 def parts(vector: Any) -> Vector:
-    """The three numbers of a Vector3 or Point."""
+    """Returns the three numbers of a Vector3 or Point."""
     return float(vector.x), float(vector.y), float(vector.z)
 
 

@@ -1,4 +1,4 @@
-"""Where the PX4 of one UAV sits: what HIL messages carry, between meetings and some connection."""
+"""Session of one UAV's PX4: exchanges HIL messages in lock step over any connection."""
 
 from __future__ import annotations
 
@@ -14,27 +14,28 @@ from volery.mavlink.hil.sensor_readings import TOPICS, SensorReadings
 
 _STILL = (0.0,) * 16
 _NOISE_BYTES = 64
-"""What may come before the first frame of a PX4, which begins with a heartbeat of 21 bytes."""
+"""Largest number of bytes before the first frame of a PX4, which begins with a heartbeat of 21
+bytes."""
 _log = logging.getLogger(__name__)
 
 
 class HilConnection(Protocol):
-    """What carries bytes to a PX4."""
+    """Transport of bytes to a PX4."""
 
     is_for_any_thread: bool
-    """Whether `send` and `end` may be called by any, one at a time."""
+    """Whether any thread may call `send` and `end`, one at a time."""
 
     def send(self, data: bytes) -> bool:
-        """Send frames; whether all of them are under way."""
+        """Sends frames; returns whether all of them were passed on."""
 
     def end(self) -> None:
-        """End the connection."""
+        """Ends the connection."""
 
 
 class HilSession:
-    """One PX4's part in the lock step; `system` is the id that it has. Use `take` and `leave`.
+    """Runs one PX4's part in the lock step; `system` is its id. Use `take` and `leave`.
 
-    An answer releases the meeting only if it was made after it, as its time says.
+    An answer ends the exchange only if it was made after it, according to its time.
     """
 
     def __init__(self, gateway: Gateway, uav: str, system: int, patience: TimeoutPolicy) -> None:
@@ -51,16 +52,16 @@ class HilSession:
 
     @property
     def taken(self) -> bool:
-        """Whether a PX4 is there."""
+        """Whether a PX4 is connected."""
         return self._way is not None
 
     @property
     def has_heard(self) -> bool:
-        """Whether a MAVLink frame has come from who is there."""
+        """Whether a MAVLink frame has arrived over the current connection."""
         return self.taken and self._link.spoken
 
     def take(self, way: HilConnection) -> Callable[[bytes], None]:
-        """Let a new PX4 sit down; what it sends is to be given to the result."""
+        """Attaches a new PX4; returns the function that takes the bytes it sends."""
         with self._meetings.lock:
             self._way = way
             self._link = HilLink(self._system)
@@ -69,11 +70,11 @@ class HilSession:
         return partial(self._hear, way)
 
     def heartbeat(self) -> bytes:
-        """A frame that says who is there."""
+        """Returns a heartbeat of the simulator."""
         return self._link.heartbeat()
 
     def leave(self, why: str) -> None:
-        """The connection has ended; the rotors stop."""
+        """Handles the end of the connection; the rotors stop."""
         with self._meetings.lock:
             if self._way is None:
                 return
@@ -82,7 +83,7 @@ class HilSession:
             self._meetings.go_on(_STILL)
 
     def close(self) -> None:
-        """Give everything back; a second time nothing happens."""
+        """Closes the session; further calls do nothing."""
         with self._meetings.lock:
             way, self._way = self._way, None
         if way is not None:
@@ -90,16 +91,16 @@ class HilSession:
             way.end()
         self._meetings.close()
 
-    # --------------------------------------------------------------------------------- of meetings
+    # ---------------------------------------------------------------------------------- lock step
 
     @property
     def is_in_step(self) -> bool:
-        """As of `Autopilot`."""
+        """Implements `ExternalAutopilot.is_in_step`."""
         way = self._way
         return way is not None and way.is_for_any_thread and self._link.locked
 
     def tell(self, time_ns: int, news: News) -> bool:
-        """As of `Autopilot`."""
+        """Implements `ExternalAutopilot.tell`."""
         sensed = self._sensing.read(news)
         if self._way is None or sensed is None:
             return False
@@ -108,19 +109,19 @@ class HilSession:
 
     @property
     def may_sleep(self) -> bool:
-        """See `ExternalAutopilot`; a disarmed PX4 in Offboard is silent for long."""
+        """Implements `ExternalAutopilot.may_sleep`: a disarmed PX4 in Offboard is silent."""
         return self._way is not None and not self._is_armed
 
     def begin_anew(self) -> None:
-        """As of `Autopilot`: a PX4 cannot go back in time."""
-        self._end("the simulation was reset, and its PX4 must begin anew")
+        """Implements `ExternalAutopilot.begin_anew`: a PX4 cannot go back in time."""
+        self._end("the simulation was reset and its PX4 must restart")
 
     def give_way(self) -> None:
         """Ends the connection of a client that has sent no MAVLink frame, for another one."""
-        self._end("what was connected has sent no MAVLink; another connection takes its place")
+        self._end("the connected client has sent no MAVLink; another connection replaces it")
 
     def drop(self) -> None:
-        """As of `Autopilot`."""
+        """Implements `ExternalAutopilot.drop`."""
         self._end("the connection to its PX4 was closed")
 
     def _end(self, why: str) -> None:
@@ -131,7 +132,7 @@ class HilSession:
 
     def _hear(self, way: HilConnection, data: bytes) -> None:
         with self._meetings.lock:
-            if way is self._way:  # it was not let go meanwhile
+            if way is self._way:  # still the current connection
                 self._take_in(data)
 
     def _take_in(self, data: bytes) -> None:
@@ -140,7 +141,9 @@ class HilSession:
             self._noise += len(data)
             if self._noise > _NOISE_BYTES and not self._told:
                 self._told = True
-                _log.warning("%s: what is connected does not speak MAVLink: no PX4?", self.uav)
+                _log.warning(
+                    "%s: the connected client does not send MAVLink; connect a PX4", self.uav
+                )
         for actuators in answers:
             self._is_armed = actuators.armed
             if actuators.time_ns >= self._meetings.time_ns:
@@ -150,5 +153,5 @@ class HilSession:
 
 
 def _shares(actuators: Actuators) -> Sequence[float]:
-    """Shares of the rotors' full speed that are asked for."""
+    """Returns the requested fractions of the rotors' full speed."""
     return [max(0.0, part) for part in actuators.controls] if actuators.armed else _STILL

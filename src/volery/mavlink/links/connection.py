@@ -1,4 +1,4 @@
-"""What MAVLink's bridges share: one connection that carries all vehicles."""
+"""Shared parts of MAVLink's bridges: a connection that carries all vehicles."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from volery.mavlink.links.vehicle_registry import VehicleRegistry
 
 
 class MavlinkConnection:
-    """One connection that carries all vehicles: TCP clients and serial lines.
+    """One connection that carries all vehicles: a TCP client or a serial line.
 
-    account: limits what is read of it; None: nothing does.
+    account: limits what is read; None: no limit.
     """
 
     def __init__(
@@ -27,7 +27,7 @@ class MavlinkConnection:
     ) -> None:
         self.number = number
         self.has_spoken = False
-        """Whether a valid frame has come."""
+        """Whether a valid frame has arrived."""
         self._account = account
         self._signing = Signing(key, number)
         self._fleet, self._profile = fleet, profile
@@ -35,12 +35,12 @@ class MavlinkConnection:
         self._systems: set[int] = set()
 
     def greet(self, system: int) -> None:
-        """Have a vehicle send on it."""
+        """Makes a vehicle send on this connection."""
         self._systems.add(system)
         self._fleet.send(system, self.number, self._profile, b"")
 
     def take(self, data: bytes) -> float:
-        """Brings what came to the vehicles that it is for.
+        """Routes received bytes to their vehicles.
 
         Returns for how many seconds nothing more must be read.
         """
@@ -66,11 +66,11 @@ class MavlinkConnection:
         return 0.0 if self._account is None else max(self._account.charge(), self._fleet.pause_s)
 
     def sign(self, data: bytes) -> bytes:
-        """Frames as they go over this connection."""
+        """Returns the frames as sent over this connection, signed if it has a key."""
         return self._signing.sign(data)
 
     def leave(self) -> None:
-        """Tell the vehicles that it is there no more."""
+        """Removes this connection's links from the vehicles."""
         if self._account is not None:
             self._account.close()
         for system in self._systems:
@@ -78,6 +78,6 @@ class MavlinkConnection:
 
 
 def why_not(error: Exception) -> str:
-    """Why an address cannot be listened at."""
+    """Returns why a bridge cannot listen on an address."""
     taken = isinstance(error, OSError) and error.errno == errno.EADDRINUSE
     return "the port is taken" if taken else str(error)

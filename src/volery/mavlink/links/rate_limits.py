@@ -1,9 +1,9 @@
-"""Limits what clients of a MAVLink port may send in a time.
+"""Limits the rate at which clients of a MAVLink port may send.
 
 Each frame takes time of the port's thread and of the simulation. A client has an account of frames
-that fills at a rate; while it is overdrawn nothing is read of the client, so TCP slows it down and
-UDP loses what does not fit. Clients that overdraw at the same time share one rate; the others
-notice nothing.
+that fills at a rate. While the account is overdrawn, nothing is read from the client, so TCP slows
+the client down and UDP loses what does not fit. Clients that overdraw at the same time share one
+rate; other clients are not affected.
 """
 
 from __future__ import annotations
@@ -12,20 +12,20 @@ import time
 from collections.abc import Callable
 
 FRAMES_PER_S = 400.0
-"""Of all clients of a port that send more than they may; a frame for three vehicles counts as three
-(modelling choice)."""
+"""Rate shared by all clients of a port that exceed their account; a frame for three vehicles counts
+as three (modelling choice)."""
 _FRAMES_PER_S_AND_VEHICLE = 20.0
-"""At least: setpoints for all vehicles of a large swarm over one connection."""
+"""Minimum rate per vehicle: setpoints for all vehicles of a large swarm over one connection."""
 _BURST_FRAMES = 500.0
-"""At once: a mission of many waypoints, all parameters."""
+"""Size of an account: a mission of many waypoints, all parameters."""
 _SHORTEST_PAUSE_S = 0.05
-"""Of one client that has overdrawn, so that few long turns read it, not a turn for each frame."""
+"""Shortest pause of an overdrawn client, so that few long turns read it, not one turn per frame."""
 _BYTES_PER_NOISE = 24
-"""Bytes of no frame that cost as much as a frame: each is a possible start of one."""
+"""Bytes outside frames that cost as much as a frame: each is a possible start of one."""
 
 
 class IntakeLimits:
-    """What the clients of one port share."""
+    """Holds the limits that the clients of one port share."""
 
     def __init__(
         self, frames_per_s: float = FRAMES_PER_S, clock: Callable[[], float] = time.monotonic
@@ -35,12 +35,12 @@ class IntakeLimits:
         self._overdrawn: set[IntakeAccount] = set()
 
     def fit(self, num_vehicles: int) -> None:
-        """Sets the rate for so many vehicles."""
+        """Sets the rate for a number of vehicles."""
         self._frames_per_s = max(FRAMES_PER_S, _FRAMES_PER_S_AND_VEHICLE * num_vehicles)
 
     @property
     def rate(self) -> float:
-        """Frames a second of one client at present."""
+        """Current rate of one client, frames per second."""
         return self._frames_per_s / max(1, len(self._overdrawn))
 
     def account(self) -> IntakeAccount:
@@ -48,7 +48,7 @@ class IntakeLimits:
         return IntakeAccount(self)
 
     def note(self, account: IntakeAccount, *, is_overdrawn: bool) -> None:
-        """Counts a client among those that send too much, or no more."""
+        """Adds a client to or removes it from the clients that send too much."""
         if is_overdrawn:
             self._overdrawn.add(account)
         else:
@@ -64,9 +64,9 @@ class IntakeAccount:
         self._at_s = limits.clock()
 
     def charge(self, num_frames: int = 0, noise_bytes: int = 0) -> float:
-        """Returns for how many seconds nothing must be read of the client that has sent this.
+        """Returns for how many seconds nothing must be read from the client that has sent this.
 
-        noise_bytes: those of no frame. Call it again, without arguments, when the time is over.
+        noise_bytes: bytes outside frames. Call it again, without arguments, after that time.
         """
         now_s = self._limits.clock()
         filled = self._frames + (now_s - self._at_s) * self._limits.rate
@@ -78,5 +78,5 @@ class IntakeAccount:
         return max(_SHORTEST_PAUSE_S, -self._frames / self._limits.rate)
 
     def close(self) -> None:
-        """The client has left."""
+        """Removes the client."""
         self._limits.note(self, is_overdrawn=False)

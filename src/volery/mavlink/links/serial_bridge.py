@@ -1,4 +1,4 @@
-"""MAVLink on a serial line, to a radio or another program: all vehicles on it."""
+"""Carries all vehicles' MAVLink on a serial line to a radio or another program."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from volery.mavlink.links.vehicle_registry import Sink, VehicleRegistry
 
 
 class MavlinkSerial:
-    """All vehicles on one serial line: a radio, or a pseudo-terminal of another program.
+    """Serves all vehicles on one serial line: a radio, or a pseudo-terminal of another program.
 
     path: of the device. baud: its speed.
     """
@@ -28,11 +28,11 @@ class MavlinkSerial:
 
     @property
     def name(self) -> str:
-        """What it is and where."""
+        """Name and address of the bridge."""
         return f"MAVLink serial {self._path} at {self._baud} baud"
 
     async def start(self, gateway: Gateway) -> None:
-        """Open the line. `BridgeError` where that is not possible."""
+        """Opens the line. Raises `BridgeError` if that fails."""
         dialect()
         self._line = SerialLine(self._path, self._baud, self._take)
         self._fleet = VehicleRegistry(gateway, self.name, self._join, lambda _system: None)
@@ -41,7 +41,7 @@ class MavlinkSerial:
         self._looks = asyncio.create_task(self._fleet.keep_looking())
 
     async def stop(self) -> None:
-        """Close the line."""
+        """Closes the line."""
         if self._looks is not None:
             self._looks.cancel()
             await asyncio.gather(self._looks, return_exceptions=True)

@@ -1,4 +1,4 @@
-"""A serial line, raw, in the loop of a bridge."""
+"""Reads and writes a raw serial line in the loop of a bridge."""
 
 from __future__ import annotations
 
@@ -12,11 +12,14 @@ from collections.abc import Callable
 from volery.core.errors import BridgeError
 
 _MOST_UNSENT_BYTES = 1 << 14
-"""What may wait for a slow line; frames beyond are lost, as PX4 drops them."""
+"""Largest number of unsent bytes; frames beyond are dropped, as PX4 does."""
 
 
 class SerialLine:
-    """Opens `path` at `baud` and calls `take` with what comes. `BridgeError` where it cannot."""
+    """Opens `path` at `baud` and calls `take` with received bytes.
+
+    Raises `BridgeError` if that fails.
+    """
 
     def __init__(self, path: str, baud: int, take: Callable[[bytes], None]) -> None:
         self._take = take
@@ -24,7 +27,7 @@ class SerialLine:
         self._loop = asyncio.get_running_loop()
         speed = getattr(termios, f"B{baud}", None)
         if speed is None:
-            raise BridgeError(f"{path}: no serial line runs at {baud} baud")
+            raise BridgeError(f"{path}: {baud} baud is not a supported speed")
         try:
             self._file = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         except OSError as error:
@@ -36,19 +39,19 @@ class SerialLine:
             termios.tcsetattr(self._file, termios.TCSANOW, settings)
         except termios.error as error:
             os.close(self._file)
-            raise BridgeError(f"{path} is no serial line: {error.args[-1]}") from None
+            raise BridgeError(f"{path} is not a serial line: {error.args[-1]}") from None
         self.number = self._file
-        """Unlike that of any other open line."""
+        """Differs from that of any other open line."""
         self._loop.add_reader(self._file, self._read)
 
     def send(self, data: bytes) -> None:
-        """Send frames, or lose them where the line is too slow."""
+        """Sends frames; drops them if the line is too slow."""
         if len(self._unsent) + len(data) <= _MOST_UNSENT_BYTES:
             self._unsent += data
             self._write()
 
     def close(self) -> None:
-        """Give the line back; a second time nothing happens."""
+        """Closes the line; further calls do nothing."""
         if self._file >= 0:
             self._loop.remove_reader(self._file)
             self._loop.remove_writer(self._file)

@@ -1,7 +1,8 @@
-"""Signed frames of MAVLink 2: who has the key may speak, and nobody may say it again.
+"""Signs frames of MAVLink 2 and checks signatures: only holders of the key send, replays fail.
 
-A frame's signature is its link's number, a time stamp in 10 us since 2015 and six bytes of the
-SHA-256 of the key and all that comes before. As of https://mavlink.io/en/guide/message_signing.html.
+A frame's signature consists of its link's number, a time stamp in 10 us since 2015 and six bytes of
+the SHA-256 of the key and all preceding bytes, see
+https://mavlink.io/en/guide/message_signing.html.
 """
 
 from __future__ import annotations
@@ -18,36 +19,36 @@ from volery.mavlink.codec import check_of, crc_extra_of
 from volery.mavlink.framing import SIGNED, MavlinkFrame, lengths_of
 
 _RADIO_STATUS = 109
-"""Made by radios, which have no key."""
+"""Message of radios, which have no key."""
 _BEGIN_S = 1_420_070_400.0
 """2015-01-01 in UNIX time."""
 _PER_S = 100_000
 _FRESH = 60 * _PER_S
-"""How far behind the first stamp of a stream may be."""
+"""Largest age of a stream's first stamp."""
 _LAST = 2**48 - 1
 _STAMP_AND_HASH, _HASH = 12, 6
-"""Last bytes of a frame."""
+"""Bytes at the end of a frame: stamp and hash; hash."""
 _SECOND = 0xFD
 """Start of a frame of MAVLink 2."""
 _log = logging.getLogger(__name__)
 
 
 def key_of(path: Path) -> bytes:
-    """The key that a file's text stands for: its SHA-256, as ground stations make it.
+    """Returns the key of a file's text: its SHA-256, as ground stations compute it.
 
-    Blanks and line ends around the text do not count. `BridgeError` where there is none.
+    Blanks and line ends around the text are ignored. Raises `BridgeError` if there is no text.
     """
     try:
         text = path.read_text(encoding="utf-8").strip()
     except (OSError, UnicodeDecodeError) as error:
         raise BridgeError(f"{path} cannot be read as a key for MAVLink: {error}") from None
     if not text:
-        raise BridgeError(f"{path} is empty; a key for MAVLink is a text")
+        raise BridgeError(f"{path} is empty; a key for MAVLink needs a text")
     return hashlib.sha256(text.encode()).digest()
 
 
 class Signing:
-    """Signs what goes over one link and checks what comes; without a key all passes as it is.
+    """Signs frames sent over one link and checks received ones; without a key all frames pass.
 
     key: (32,) bytes, or None. link: a number from 0 to 255. clock: UNIX time in s.
     """
@@ -64,11 +65,11 @@ class Signing:
 
     @property
     def has_key(self) -> bool:
-        """Whether only signed frames count."""
+        """Whether only signed frames are accepted."""
         return self._key is not None
 
     def sign(self, data: bytes) -> bytes:
-        """The same frames of MAVLink 2, signed."""
+        """Returns the same MAVLink 2 frames, signed."""
         if self._key is None:
             return data
         signed, at = [], 0
@@ -78,19 +79,19 @@ class Signing:
         return b"".join(signed)
 
     def accepts(self, frame: MavlinkFrame) -> bool:
-        """Whether a frame that came counts."""
+        """Returns whether a received frame is valid."""
         if self._key is None or frame.message == _RADIO_STATUS:
             return True
         data = frame.data
         if data[0] != _SECOND or not data[2] & SIGNED:
-            return self._refuse(frame, "it does not sign")
+            return self._refuse(frame, "it sends unsigned frames")
         if not hmac.compare_digest(_hash(self._key, data[:-_HASH]), data[-_HASH:]):
             return self._refuse(frame, "its signature does not match the key")
         stamp = int.from_bytes(data[-_STAMP_AND_HASH:-_HASH], "little")
         stream = (frame.system, frame.component, data[-_STAMP_AND_HASH - 1])
         before = self._newest.get(stream, self._now() - _FRESH - 1)
         if stamp <= before:
-            if stream in self._newest:  # it came twice, or late
+            if stream in self._newest:  # a replay, or late
                 return False
             return self._refuse(frame, "its clock is more than a minute behind")
         self._newest[stream] = stamp
@@ -98,11 +99,11 @@ class Signing:
         return True
 
     def _refuse(self, frame: MavlinkFrame, why: str) -> bool:
-        """Say why a sender is not heard, once each; False."""
+        """Logs why frames of a sender are ignored, once per reason; returns False."""
         source = (frame.system, frame.component, why)
         if source not in self._told:
             self._told.add(source)
-            _log.warning("MAVLink: system %d, component %d is not heard: %s", *source)
+            _log.warning("MAVLink: system %d, component %d is ignored: %s", *source)
         return False
 
     def _signed(self, frame: bytes, key: bytes) -> bytes:

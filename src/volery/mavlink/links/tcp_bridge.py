@@ -1,4 +1,4 @@
-"""A TCP server for MAVLink: every connection carries all vehicles, as of a MAVLink router."""
+"""Serves MAVLink over TCP: every connection carries all vehicles, like a MAVLink router."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from volery.mavlink.links.rate_limits import IntakeLimits
 from volery.mavlink.links.vehicle_registry import Sink, VehicleRegistry
 
 _UNSENT_BYTES = 1 << 18
-"""What may wait for a TCP client who does not read; what comes then is lost for him."""
+"""Largest number of unsent bytes for a TCP client that does not read; later frames are dropped."""
 _MOST_CLIENTS = 32
-"""Of the TCP server (modelling choice). Above, the oldest that has sent no valid frame ends."""
+"""Clients of the TCP server (modelling choice). Beyond, the oldest without a valid frame ends."""
 _BITE_BYTES = 2048
-"""Read at once, so that no client delays others or the simulation for long."""
+"""Bytes read at once, so that no client delays others or the simulation for long."""
 
 
 class MavlinkTcp:
     """Serves all vehicles to each client, as a MAVLink router does.
 
-    host, port: where it listens; port 0 takes a free one, and the attribute tells which.
+    host, port: listening address; port 0 takes a free port, which the attribute then holds.
     """
 
     def __init__(
@@ -52,11 +52,11 @@ class MavlinkTcp:
 
     @property
     def name(self) -> str:
-        """What it is and where."""
+        """Name and address of the bridge."""
         return f"MAVLink TCP {self.host}:{self.port}"
 
     async def start(self, gateway: Gateway) -> None:
-        """Begin to listen. `BridgeError` where that is not possible."""
+        """Starts listening. Raises `BridgeError` if that fails."""
         dialect()
         check_address(self.host, anywhere=self._anywhere, flag="--allow-remote")
         loop = asyncio.get_running_loop()
@@ -66,7 +66,7 @@ class MavlinkTcp:
                 self.port,
                 "MAVLink TCP",
                 max_connections=_MOST_CLIENTS,
-                max_unproven=None,  # a program may listen in silence
+                max_unproven=None,  # a program may only receive
             )
             self._server = await loop.create_server(lambda: _TcpClient(self), sock=self._listener)
         except (OSError, OverflowError) as error:
@@ -79,7 +79,7 @@ class MavlinkTcp:
         self._looks = asyncio.create_task(self._fleet.keep_looking())
 
     async def stop(self) -> None:
-        """Let everybody go."""
+        """Ends all connections."""
         if self._looks is not None:
             self._looks.cancel()
             await asyncio.gather(self._looks, return_exceptions=True)
@@ -133,7 +133,7 @@ class MavlinkTcp:
 
 
 class _TcpClient(asyncio.BufferedProtocol):
-    """One connection."""
+    """One TCP client."""
 
     transport: asyncio.Transport
     party: MavlinkConnection
@@ -147,12 +147,12 @@ class _TcpClient(asyncio.BufferedProtocol):
         self._pause: asyncio.TimerHandle | None = None
 
     def send(self, data: bytes) -> None:
-        """Send frames, whole or not at all."""
+        """Sends frames, whole or not at all."""
         if not self._full:
             write_while_open(self.transport, self.party.sign(data))
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """As of asyncio."""
+        """Implements asyncio's method."""
         assert isinstance(transport, asyncio.Transport)
         self.transport = transport
         transport.set_write_buffer_limits(_UNSENT_BYTES)
@@ -160,11 +160,11 @@ class _TcpClient(asyncio.BufferedProtocol):
         self._bridge._opened(self)
 
     def get_buffer(self, sizehint: int) -> bytearray:  # noqa: ARG002
-        """As of asyncio."""
+        """Implements asyncio's method."""
         return self._bite
 
     def buffer_updated(self, nbytes: int) -> None:
-        """As of asyncio."""
+        """Implements asyncio's method."""
         data = self.preamble.feed(bytes(self._bite[:nbytes]))
         if self.preamble.refused is not None:
             self._bridge._end_stranger(self)
@@ -188,15 +188,15 @@ class _TcpClient(asyncio.BufferedProtocol):
             self.transport.resume_reading()
 
     def pause_writing(self) -> None:
-        """As of asyncio."""
+        """Implements asyncio's method."""
         self._full = True
 
     def resume_writing(self) -> None:
-        """As of asyncio."""
+        """Implements asyncio's method."""
         self._full = False
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
-        """As of asyncio."""
+        """Implements asyncio's method."""
         if self._pause is not None:
             self._pause.cancel()
         self._bridge._closed(self)

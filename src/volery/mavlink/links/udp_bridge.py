@@ -1,6 +1,6 @@
-"""MAVLink over UDP, as PX4's simulations have it: `bridges.open(MavlinkUdp())`.
+"""Serves MAVLink over UDP, as PX4's simulations do: `bridges.open(MavlinkUdp())`.
 
-UAVs without an autopilot are not there for it; see `volery.mavlink.scenario_setup`.
+UAVs without an autopilot are ignored; see `volery.mavlink.scenario_setup`.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from volery.mavlink.links.udp_reader import UdpReader, connected_beside
 from volery.mavlink.links.vehicle_registry import Sink, VehicleRegistry
 
 _MOST_WITH_PEERS = 64
-"""Vehicles whose agreed peers have sockets of their own; those of further vehicles share one."""
+"""Vehicles whose configured peers have their own sockets; peers of further vehicles share one."""
 _MOST_DATAGRAM = 1400
-"""Bytes: below the MTU of Ethernet."""
+"""Largest datagram, bytes: below the MTU of Ethernet."""
 
 
 class MavlinkUdp:
-    """Two links for each vehicle: to a companion computer and to a ground station.
+    """Opens two links per vehicle: to a companion computer and to a ground station.
 
-    host: where those are. port: of the first companion computer, 14540; the others follow, and the
-    vehicles' own ports keep their distance to it, so that several runs can stand side by side.
-    Vehicles send from the beginning, to the stated ports and to whoever has spoken to them last.
-    key: of 32 bytes, by which both sides sign; see `signing`.
+    host: their address. port: of the first companion computer, 14540; the others follow. The
+    vehicles' own ports shift by the same offset, so that several runs can coexist. Vehicles send
+    from the start, to the configured ports and to the last sender. key: 32 bytes, with which both
+    sides sign; see `signing`.
     """
 
     def __init__(
@@ -58,12 +58,12 @@ class MavlinkUdp:
 
     @property
     def name(self) -> str:
-        """What it is and where."""
+        """Name and address of the bridge."""
         onboard = ports.ONBOARD_TO + self._shift
         return f"MAVLink UDP {self._host}:{onboard} and following, {self._ground}"
 
     async def start(self, gateway: Gateway) -> None:
-        """Begin to send. `BridgeError` where a port is taken."""
+        """Starts to send. Raises `BridgeError` if a port is taken."""
         dialect()
         check_address(self._host, anywhere=self._anywhere, flag="--allow-remote")
         self._fleet = VehicleRegistry(gateway, self.name, self._join, self._leave)
@@ -71,7 +71,7 @@ class MavlinkUdp:
         self._looks = asyncio.create_task(self._fleet.keep_looking())
 
     async def stop(self) -> None:
-        """Give all ports back."""
+        """Closes all ports."""
         if self._looks is not None:
             self._looks.cancel()
             await asyncio.gather(self._looks, return_exceptions=True)
@@ -122,9 +122,9 @@ class MavlinkUdp:
 
 
 class _UdpLink:
-    """One port of one vehicle, which is the link's number.
+    """One port of one vehicle; the port is the link's number.
 
-    for_peer: whether the peer at `to` has a socket of its own there.
+    for_peer: whether the peer at `to` has its own socket.
     """
 
     def __init__(
@@ -158,7 +158,7 @@ class _UdpLink:
         fleet.send(system, own, profile, b"")
 
     def send(self, data: bytes) -> None:
-        """Send frames; where nobody listens they are lost, as by radio."""
+        """Sends frames; without a receiver they are lost, as by radio."""
         data = self._signing.sign(data)
         for peer in self._peers:
             for part in _pieces(data):
@@ -166,7 +166,7 @@ class _UdpLink:
                     self._socket.sendto(part, peer)
 
     def close(self) -> None:
-        """Give the port back."""
+        """Closes the port."""
         for inlet in self._inlets:
             inlet.close()
         self._fleet.close_link(self._system, self.number)
@@ -187,15 +187,15 @@ class _UdpLink:
         noise_bytes = len(data) - sum(len(frame.data) for frame in heard)
         cost_s = account.charge(max(1, len(heard)), noise_bytes)
         pause_s = max(cost_s, self._fleet.pause_s)
-        if self._signing.has_key and not frames:  # a stranger
+        if self._signing.has_key and not frames:  # unknown sender
             return b"", pause_s
-        if peer not in self._peers:  # the place agreed upon, and who spoke last
+        if peer not in self._peers:  # the configured peer, and the last sender
             self._peers = [self._peers[0], peer[:2]]
         return frames, pause_s
 
 
 def _pieces(data: bytes) -> list[bytes]:
-    """Frames in datagrams, none of them cut."""
+    """Splits frames into datagrams without cutting a frame."""
     if len(data) <= _MOST_DATAGRAM:
         return [data]
     pieces, start, at = [], 0, 0

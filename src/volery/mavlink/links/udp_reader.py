@@ -1,8 +1,8 @@
 """Reads UDP sockets of a MAVLink link, as far as the senders' account allows.
 
-The agreed peer of a link has a socket of its own: a second socket of the same port that is
-connected to it. The system gives it what that peer sends, so others who flood the port do not crowd
-it out.
+The configured peer of a link has its own socket: a second socket of the same port that is connected
+to the peer. The system delivers this peer's datagrams there, so that a flood from other senders
+does not displace them.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from typing import Any
 from volery.mavlink.links.rate_limits import IntakeAccount
 
 _DATAGRAMS_A_TURN = 32
-"""After so many others have their turn."""
+"""Datagrams after which other sockets have their turn."""
 _MOST_BYTES = 65535
 _ERROR_PAUSE_S = 0.2
-"""After the system has reported that nothing receives what was sent: it does so each time."""
+"""Pause after the system reported that a port has no receiver, which it does for each datagram."""
 
 Take = Callable[[bytes, Any, IntakeAccount], tuple[bytes, float]]
-"""Takes a datagram and its sender; returns its frames, and how long (s) none must be read."""
+"""Parses a datagram and its sender; returns its frames, and how long (s) none must be read."""
 
 
 class UdpReader:
     """Reads one socket in the running loop.
 
-    take: called for each datagram. deliver: for the frames of a turn, joined. may_read: for how
-    many seconds nothing must be read at present.
+    take: called for each datagram. deliver: called with the joined frames of a turn. may_read:
+    returns for how many seconds nothing must be read now.
     """
 
     def __init__(
@@ -89,9 +89,9 @@ class UdpReader:
 
 
 def connected_beside(bound: socket.socket, peer: tuple[str, int]) -> socket.socket | None:
-    """Returns a socket of the same port that is connected to a peer; None where that is impossible.
+    """Returns a socket of the same port that is connected to a peer; None if that is impossible.
 
-    Both share the port for a moment only: afterwards it is taken for all others, as before.
+    Both sockets share the port for a moment only; afterwards it is taken for all others, as before.
     """
     beside = socket.socket(bound.family, socket.SOCK_DGRAM)
     beside.setblocking(False)

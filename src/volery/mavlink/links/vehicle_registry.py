@@ -1,4 +1,4 @@
-"""The autopilots of a graph as a bridge sees them: their frames, and vehicles that are added.
+"""Tracks the autopilots of a graph for a bridge: their frames, and vehicles that appear or leave.
 
 Works in the loop of the bridge; the session carries everything to the simulation's thread.
 """
@@ -22,16 +22,16 @@ PACKETS = "volery_interfaces/msg/MavlinkPackets"
 _IN, _OUT = "/mavlink/in", "/mavlink/out"
 _DEPTH = 1000
 _MOST_WAITING = 2000
-"""Messages with frames that the simulation has not taken yet, above which clients wait."""
+"""Messages with frames that the simulation has not processed, above which clients wait."""
 _PAUSE_S = 0.02
 _LOOK_S = 0.2
-"""Between two looks who has come and gone."""
+"""Time between two scans for vehicles, s."""
 _BEAT_S = 1.0
-"""Of wall time without a frame after which the last heartbeat is repeated: while the simulation
-stands still, its vehicles are still there."""
+"""Wall time without a frame after which the last heartbeat is repeated, so that vehicles of a
+paused simulation stay connected."""
 
 Sink = Callable[[int, bytes], None]
-"""Takes frames for a link, by its number."""
+"""Receives frames for a link, by its number."""
 
 
 @dataclass(eq=False)
@@ -47,10 +47,10 @@ class RegisteredVehicle:
 
 
 class VehicleRegistry:
-    """All vehicles of a gateway's graph that have autopilots.
+    """Tracks all vehicles of a gateway's graph that have autopilots.
 
-    `joined(craft)` is called for each, and gives back what takes its frames; `left(craft)` when it
-    is there no more.
+    `joined(name, system)` is called for each vehicle and returns the sink of its frames;
+    `left(system)` is called when the vehicle is gone.
     """
 
     def __init__(
@@ -69,16 +69,16 @@ class VehicleRegistry:
 
     @property
     def systems(self) -> tuple[int, ...]:
-        """Ids of those that are there."""
+        """Ids of the present vehicles."""
         return tuple(self._craft)
 
     @property
     def pause_s(self) -> float:
-        """For how long nothing must be read of a client: the simulation has not kept up."""
+        """Time for which no client must be read, because the simulation has not kept up, s."""
         return _PAUSE_S if self._session.waiting > _MOST_WAITING else 0.0
 
     def look(self) -> None:
-        """See who has come and gone, and what has been silent."""
+        """Finds vehicles that appeared or left, and repeats heartbeats of silent ones."""
         graph = self._session.graph
         there = {
             info.name.removesuffix(_OUT)[1:]
@@ -97,21 +97,21 @@ class VehicleRegistry:
                 craft.sink(-1, craft.heartbeat)
 
     async def keep_looking(self) -> None:
-        """Look again and again."""
+        """Calls `look` periodically."""
         while True:
             await asyncio.sleep(_LOOK_S)
             self.look()
 
     def send(self, system: int, link: int, profile: int, data: bytes) -> None:
-        """Bring frames of a link to a vehicle; a link begins with the first ones, or none."""
+        """Sends frames of a link to a vehicle; the first call opens the link."""
         self._publish(system, link=link, profile=profile, closed=False, data=data)
 
     def close_link(self, system: int, link: int) -> None:
-        """Tell a vehicle that a link is there no more."""
+        """Closes a link of a vehicle."""
         self._publish(system, link=link, profile=0, closed=True, data=b"")
 
     def close(self) -> None:
-        """Leave the graph."""
+        """Leaves the graph."""
         self._closed = True
         for craft in tuple(self._craft.values()):
             self._forget(craft)
@@ -168,8 +168,8 @@ class VehicleRegistry:
 
 
 _MAGIC, _HEAD = 0xFD, 10
-"""A frame of MAVLink 2: ten bytes, the payload, two of its checksum."""
+"""Bytes of a MAVLink 2 frame: ten, the payload, two of its checksum."""
 
 
 def _nowhere(_link: int, _data: bytes) -> None:
-    """Take frames of a vehicle whose bridge is not open yet."""
+    """Drops frames of a vehicle whose bridge is not open yet."""

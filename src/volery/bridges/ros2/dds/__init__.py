@@ -1,1 +1,1 @@
-"""ROS 2 over DDS, as rmw_cyclonedds maps it."""
+"""ROS 2 over DDS, with the mapping of rmw_cyclonedds."""

@@ -1,4 +1,4 @@
-"""Who else is there: publishers, subscriptions and services of other participants."""
+"""Discovers publishers, subscriptions and services of other participants."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from volery.bridges.ros2.middleware import Profile, RemotePublisher
 from volery.bridges.ros2.names import ros_type, service_of, topic_of
 
 _ALIVE = 16
-"""DDS_ALIVE_INSTANCE_STATE."""
+"""Value DDS_ALIVE_INSTANCE_STATE."""
 _REQUEST = "_Request"
 
 
@@ -25,7 +25,7 @@ _HASH = re.compile(rb"typehash=(RIHS\d+_\w+);")
 
 
 class DdsEndpoint(NamedTuple):
-    """A reader or writer of somebody else."""
+    """A reader or writer of another participant."""
 
     dds_topic: str
     msgtype: str
@@ -34,7 +34,7 @@ class DdsEndpoint(NamedTuple):
 
 
 class Discovery:
-    """Keeps track of the endpoints of others."""
+    """Tracks the endpoints of others."""
 
     def __init__(self, participant: DomainParticipant, ear: ReaderThread) -> None:
         self._own = participant.guid.bytes
@@ -52,11 +52,11 @@ class Discovery:
             ear.listen(source, self._taker(known))
 
     def when_changed(self, tell: Callable[[], None]) -> None:
-        """Have `tell` called when others come or go."""
+        """Calls `tell` when others appear or leave."""
         self._told.append(tell)
 
     def publishers(self) -> list[RemotePublisher]:
-        """Publishers of others on topics of ROS 2."""
+        """Returns publishers of others on topics of ROS 2."""
         with self._lock:
             writers = tuple(self._writers.values())
         named = ((topic_of(w.dds_topic), w) for w in writers)
@@ -67,14 +67,14 @@ class Discovery:
         ]
 
     def topic_types(self) -> dict[str, str]:
-        """Topics that others publish or subscribe to; publishers' types count first."""
+        """Returns topics that others publish or subscribe to; publishers' types count first."""
         with self._lock:
             endpoints = (*self._readers.values(), *self._writers.values())
         named = ((topic_of(e.dds_topic), e.msgtype) for e in endpoints)
         return {topic: msgtype for topic, msgtype in named if topic}
 
     def asked_types(self) -> set[tuple[str, str]]:
-        """Services that others ask, and the types that they take them for."""
+        """Returns services that others call, and the types that they expect."""
         with self._lock:
             writers = tuple(self._writers.values())
         named = ((service_of(w.dds_topic), w.msgtype) for w in writers)
@@ -85,7 +85,7 @@ class Discovery:
         }
 
     def service_types(self) -> dict[str, str]:
-        """Services that others offer."""
+        """Returns services of others."""
         with self._lock:
             readers = tuple(self._readers.values())
         found = {}
@@ -96,7 +96,7 @@ class Discovery:
         return found
 
     def foreign_clients(self) -> dict[str, str]:
-        """Services with clients that do not speak as rmw_cyclonedds does, and what they are."""
+        """Returns services with clients that are not rmw_cyclonedds, and the reasons."""
         with self._lock:
             writers = tuple(self._writers.items())
         mark = f"{CLIENT}=".encode()

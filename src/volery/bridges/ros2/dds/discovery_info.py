@@ -1,7 +1,7 @@
-"""Which nodes have which endpoints, told to everybody as rmw_dds_common does.
+"""Publishes which nodes have which endpoints, as rmw_dds_common does.
 
-DDS knows participants and endpoints but no nodes. Every participant therefore publishes what its
-nodes are on the latched topic `ros_discovery_info`.
+DDS has participants and endpoints but no nodes. Every participant therefore publishes its nodes on
+the latched topic `ros_discovery_info`.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ PROFILE = Profile(latched=True, depth=1)
 
 
 class DiscoveryInfo:
-    """The nodes of one participant and their endpoints; `publish` tells of what has changed."""
+    """The nodes of one participant and their endpoints; `publish` sends changes."""
 
     def __init__(self, participant: DomainParticipant) -> None:
         self._gid = participant.guid.bytes
@@ -42,24 +42,24 @@ class DiscoveryInfo:
         self._writer = DataWriter(participant, topic, qos=qos_of(PROFILE, user_data))
 
     def add_node(self, node: NodeName) -> None:
-        """Have a node in it."""
+        """Adds a node."""
         with self._lock:
             self._nodes.setdefault(node, ([], []))
             self._stale = True
 
     def remove_node(self, node: NodeName) -> None:
-        """Strike a node off."""
+        """Removes a node."""
         with self._lock:
             self._stale = self._nodes.pop(node, None) is not None or self._stale
 
     def add(self, node: NodeName, entity: Any, *, writes: bool) -> None:
-        """Add an endpoint of a node's."""
+        """Adds an endpoint of a node."""
         with self._lock:
             self._nodes.setdefault(node, ([], []))[writes].append(entity.guid.bytes)
             self._stale = True
 
     def remove(self, node: NodeName, entity: Any, *, writes: bool) -> None:
-        """Strike an endpoint off; before it is deleted."""
+        """Removes an endpoint, before it is deleted."""
         gid = entity.guid.bytes
         with self._lock:
             gids = self._nodes.get(node, ([], []))[writes]
@@ -68,7 +68,7 @@ class DiscoveryInfo:
                 self._stale = True
 
     def publish(self) -> None:
-        """Tell others, if anything has changed."""
+        """Publishes the nodes if they have changed."""
         with self._lock:
             if not self._stale:
                 return
@@ -78,7 +78,7 @@ class DiscoveryInfo:
 
 
 def record_message(gid: bytes, nodes: dict[NodeName, tuple[list[bytes], list[bytes]]]) -> Any:
-    """The record of a participant; nodes: its readers and writers by node."""
+    """Returns the record of a participant; nodes: its readers and writers by node."""
     entry = message_type(_NODE_TYPE)
     return message_type(TYPE)(
         _gid(gid),

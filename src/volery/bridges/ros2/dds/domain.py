@@ -1,4 +1,4 @@
-"""DDS domains: which interfaces they use, and one configuration of each in a process."""
+"""DDS domains: their interfaces, and one configuration of each per process."""
 
 from __future__ import annotations
 
@@ -17,31 +17,33 @@ from volery.bridges.ros2.dds.loopback_sockets import confine
 from volery.core.errors import BridgeError
 
 _ENCLAVE = b"enclave=/;"
-"""Security enclave of the participant, as rmw tells it."""
+"""Security enclave of the participant, in the form of rmw."""
 _MOST_PARTICIPANTS = 32
-"""On one machine without multicast: what rmw_cyclonedds probes for with LOCALHOST discovery."""
+"""Participants on one machine without multicast, for which rmw_cyclonedds probes with LOCALHOST
+discovery."""
 _RECEIVE_BUFFER = "4 MiB"
-"""Where the system allows it: a picture of 1 MB in pieces overruns the usual 208 KiB."""
+"""Receive buffer, if the system allows it: an image of 1 MB in pieces overruns the usual 208 KiB.
+"""
 
 _lock = threading.Lock()
 _domains: dict[int, tuple[Domain, str, int]] = {}
-"""Domains in use: their configuration and how many participants they have here."""
+"""Domains in use: their configuration and their number of participants here."""
 
 
 def configuration(interfaces: Sequence[str] = (), lease_s: float = 10.0) -> str:
-    """Configuration of Cyclone DDS in XML.
+    """Returns a configuration of Cyclone DDS in XML.
 
-    interfaces: names or addresses; with none, peers are looked for on this machine alone, through
-    loopback without multicast, which many systems do not have there. lease_s: after how long of
-    silence others take a participant for gone.
+    interfaces: names or addresses; without any, peers are discovered on this machine alone, through
+    loopback without multicast, which many systems lack there. lease_s: time of silence after which
+    others treat a participant as gone.
     """
     if interfaces:
         chosen = "".join(f"<NetworkInterface {_called(name)}/>" for name in interfaces)
         how, peers = "", ""
     else:
         chosen = '<NetworkInterface address="127.0.0.1"/>'
-        # RTPS messages stay at Cyclone's 14,720 bytes: larger ones halve what 1 MB takes, but
-        # overrun the usual receive buffers of 208 KiB, which Fast DDS leaves as they are.
+        # RTPS messages stay at Cyclone's 14,720 bytes: larger ones halve the time of 1 MB, but
+        # overrun the usual receive buffers of 208 KiB, which Fast DDS does not change.
         how = "<AllowMulticast>false</AllowMulticast>"
         peers = (
             "<ParticipantIndex>auto</ParticipantIndex>"
@@ -54,8 +56,8 @@ def configuration(interfaces: Sequence[str] = (), lease_s: float = 10.0) -> str:
         f"<General><Interfaces>{chosen}</Interfaces>{how}</General>"
         f"<Discovery>{lease}{peers}</Discovery>"
         f'<Internal><SocketReceiveBufferSize max="{_RECEIVE_BUFFER}"/></Internal>'
-        # Else each malformed packet of whoever sends some would be printed on stderr, or, where
-        # that alone is turned down, in a file cyclonedds.log of the present folder.
+        # Else each malformed packet would be printed on stderr, or, if only that is disabled, in a
+        # file cyclonedds.log of the current folder.
         "<Tracing><Verbosity>severe</Verbosity>"
         f"<OutputFile>{os.devnull}</OutputFile></Tracing>"
         "</Domain></CycloneDDS>"
@@ -70,9 +72,7 @@ def _check_there(interfaces: Sequence[str]) -> None:
     there = [name for _number, name in socket.if_nameindex()]
     for name in interfaces:
         if not _is_address(name) and name not in there:
-            raise BridgeError(
-                f"there is no network interface '{name}'; there are {', '.join(there)}"
-            )
+            raise BridgeError(f"unknown network interface '{name}'; known are {', '.join(there)}")
 
 
 def _called(interface: str) -> str:
@@ -81,7 +81,7 @@ def _called(interface: str) -> str:
 
 
 def join_domain(domain_id: int, interfaces: Sequence[str]) -> DomainParticipant:
-    """A new participant. `BridgeError` where the domain cannot be joined like this."""
+    """Returns a new participant. Raises `BridgeError` if the domain cannot be joined like this."""
     _check_there(interfaces)
     config = configuration(interfaces)
     with _lock:
@@ -99,7 +99,7 @@ def join_domain(domain_id: int, interfaces: Sequence[str]) -> DomainParticipant:
                 library.delete(domain)
             raise BridgeError(
                 f"cannot join DDS domain {domain_id}: {error}. Do the interfaces exist, and do "
-                f"fewer than {_MOST_PARTICIPANTS} other programs of this machine take part?"
+                f"fewer than {_MOST_PARTICIPANTS} other programs of this machine use it?"
             ) from None
         if not interfaces:
             confine(domain_id)
@@ -108,7 +108,7 @@ def join_domain(domain_id: int, interfaces: Sequence[str]) -> DomainParticipant:
 
 
 def leave_domain(domain_id: int, participant: DomainParticipant) -> None:
-    """Delete a participant, and with the last one the domain."""
+    """Deletes a participant, and with the last one the domain."""
     with _lock:
         library.delete(participant)
         domain, config, count = _domains.pop(domain_id)

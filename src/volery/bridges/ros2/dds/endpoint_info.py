@@ -1,8 +1,8 @@
-"""What endpoints tell of themselves, for any number of threads that read it at once.
+"""Reads the descriptions of endpoints, in any number of threads at once.
 
-The package reads quality of service into variables that all threads share, and gives other threads
-their turn in between: two that read at once get parts of each other's, or nothing. Its C functions
-are therefore given functions of ours, which read what is needed here into variables of their own.
+The package reads quality of service into variables that all threads share, and releases the lock in
+between: two concurrent reads get parts of each other's data, or nothing. Its C functions therefore
+receive functions of this module, which read into variables of their own.
 """
 
 from __future__ import annotations
@@ -29,29 +29,29 @@ class EndpointInfo(NamedTuple):
     dds_topic: str | None
     type_name: str | None
     terms: EndpointQos | None
-    """None, like the names, in the sample that tells that it has left."""
+    """None, like the names, in the sample of an endpoint that has left."""
     sample_info: Any
-    """None where it was looked up."""
+    """None if the endpoint was looked up."""
 
 
 class EndpointQos(NamedTuple):
-    """Its policies, as far as they matter here."""
+    """Quality of service of an endpoint, as far as needed."""
 
     profile: Profile
-    """What it offers or asks for; the depth is not looked at."""
+    """Offered or requested profile, without the depth."""
     user_data: bytes
-    """Words that came with it: `typehash=...;`."""
+    """User data of the endpoint: `typehash=...;`."""
 
 
 def announcements(participant: DomainParticipant, topic: BuiltinTopic) -> BuiltinDataReader:
-    """Reader of endpoints as they come and go; its samples are `EndpointInfo`."""
+    """Returns a reader of appearing and leaving endpoints; its samples are `EndpointInfo`."""
     reader = BuiltinDataReader(participant, topic)
     reader._constructor, reader._cqos_conv = _announced, terms_at
     return reader
 
 
 def matched_reader(writer: Any, handle: int) -> EndpointInfo | None:
-    """The reader of a writer that has the instance handle; None if it has left."""
+    """Returns the reader of a writer with the instance handle; None if it has left."""
     found: EndpointInfo | None = ddspy_get_matched_subscription_data(
         writer._ref, handle, _announced, terms_at
     )
@@ -59,7 +59,7 @@ def matched_reader(writer: Any, handle: int) -> EndpointInfo | None:
 
 
 def matched_writer(reader: Any, handle: int) -> EndpointInfo | None:
-    """The writer of a reader that has the instance handle; None if it has left."""
+    """Returns the writer of a reader with the instance handle; None if it has left."""
     found: EndpointInfo | None = ddspy_get_matched_publication_data(
         reader._ref, handle, _announced, terms_at
     )
@@ -67,7 +67,7 @@ def matched_writer(reader: Any, handle: int) -> EndpointInfo | None:
 
 
 def terms_at(qos: int) -> EndpointQos:
-    """Terms in a `dds_qos_t`, by its address."""
+    """Returns the quality of service in a `dds_qos_t`, by its address."""
     profile = Profile(reliable=library.is_reliable(qos), latched=library.is_latched(qos))
     return EndpointQos(profile, library.user_data(qos))
 

@@ -1,4 +1,4 @@
-"""Publishers, subscriptions, and the two halves of services, as rmw_cyclonedds makes them."""
+"""Publishers, subscriptions, and the two halves of services, compatible with rmw_cyclonedds."""
 
 from __future__ import annotations
 
@@ -36,16 +36,16 @@ from volery.bridges.ros2.type_hashes import message_hash
 from volery.bridges.ros2.warning_filter import WarningFilter
 
 _HEADER = struct.Struct("<Qq")
-"""rmw_cyclonedds' cdds_request_header_t: whose question, and its number."""
+"""rmw_cyclonedds' cdds_request_header_t: the client and the number of its request."""
 _CDR_HEADER = 4
 _LONGEST_WAIT_S = 0.1
 _PAUSE_S = 0.001
 _MOST_WAITING = 1000
-"""Questions of one client that have no answer yet; the oldest is given up beyond."""
+"""Open requests of one client; beyond, the oldest fails."""
 
 
 class DdsTopicName:
-    """What endpoints are made of: the participant, its ear and its record."""
+    """Context of endpoints: the participant, its reader thread and its record."""
 
     def __init__(
         self, participant: DomainParticipant, ear: ReaderThread, record: DiscoveryInfo
@@ -66,15 +66,15 @@ class DdsWriter:
 
     @property
     def matched(self) -> bool:
-        """Whether anybody subscribes."""
+        """Whether the topic has subscribers."""
         return library.subscriptions(self._writer) > 0
 
     def write(self, cdr: bytes) -> None:
-        """Send one message."""
+        """Sends one message."""
         library.write(self._writer, cdr)
 
     def close(self) -> None:
-        """Publish no more."""
+        """Ends the publication."""
         self._half.close()
 
 
@@ -88,12 +88,12 @@ class DdsReader:
         self._half.reader(topic, qos_of(spec.profile, user_data), lambda data, _writer: take(data))
 
     def close(self) -> None:
-        """Subscribe no more."""
+        """Ends the subscription."""
         self._half.close()
 
 
 class DdsServer:
-    """A service on offer."""
+    """A service server."""
 
     def __init__(self, place: DdsTopicName, spec: ServiceSpec, take: TakeRequest) -> None:
         requests, replies = _topics(place, spec)
@@ -108,20 +108,20 @@ class DdsServer:
         self._clients = ServicePeers(CLIENT, partial(matched_writer, self._reader))
 
     def close(self) -> None:
-        """Offer it no more."""
+        """Destroys the service."""
         self._half.close()
 
     def look_at(self, foreign: Mapping[str, str]) -> None:
-        """Warn if it is among the services that others ask in vain; foreign: why, by service.
+        """Warns if clients that cannot be answered call the service; foreign: reasons, by service.
 
-        Their requests may be too short for Cyclone DDS to hand them over.
+        Their requests may be too short for Cyclone DDS to deliver them.
         """
         why = foreign.get(self._name)
         if why:
             self._complaints.tell(self._name, f"a client is not answered: it {why}")
 
     def look_at_types(self, asked: set[tuple[str, str]]) -> None:
-        """Warn of those who take it for a service of another type, and wait in vain."""
+        """Warns of clients that expect a service of another type and will not be answered."""
         for name, srvtype in asked:
             if name == self._name and srvtype != self._srvtype:
                 text = f"is a {self._srvtype}; a client of {srvtype} is not answered"
@@ -141,9 +141,10 @@ class DdsServer:
         self._take(_without_header(data), answer)
 
     def _wait_for_listeners(self) -> None:
-        """Wait until whoever asked can hear: its two halves are not discovered at once.
+        """Waits until the client can receive: its two halves are not discovered at once.
 
-        rmw_cyclonedds does so too, and as long. Who is waited for in vain is so only once.
+        rmw_cyclonedds waits too, and as long. A client that stays incomplete is waited for only
+        once.
         """
         end_s = time.monotonic() + _LONGEST_WAIT_S
         while (halves := self._halves()) != self._missed and halves[0] < halves[1]:
@@ -152,7 +153,7 @@ class DdsServer:
             time.sleep(_PAUSE_S)
 
     def _halves(self) -> tuple[int, int]:
-        """How many can hear answers, and how many can ask."""
+        """Returns how many endpoints can receive answers, and how many can send requests."""
         return library.subscriptions(self._writer), library.publications(self._reader)
 
 
@@ -173,12 +174,12 @@ class DdsCaller:
 
     @property
     def ready(self) -> bool:
-        """Whether a server is there, both halves of it."""
+        """Whether both halves of a server are connected."""
         return library.publications(self._reader) > 0 and "" in self._problems()
 
     @property
     def problem(self) -> str:
-        """Why nobody answers though a server is there."""
+        """Why a connected server does not answer."""
         found = self._problems()
         return f"its server {found[0]}" if found and all(found) else ""
 
@@ -186,7 +187,7 @@ class DdsCaller:
         return [self._servers.problem(h) for h in library.readers_of(self._writer)]
 
     def call(self, request: bytes, on_response: TakeMessage, on_loss: Callable[[], None]) -> None:
-        """Send a request."""
+        """Sends a request."""
         number = next(self._numbers)
         with self._lock:
             self._waiting[number] = (on_response, on_loss)
@@ -197,7 +198,7 @@ class DdsCaller:
         library.write(self._writer, request[:_CDR_HEADER] + header + request[_CDR_HEADER:])
 
     def give_up(self) -> None:
-        """Tell all who wait that no answer will come, if there is no server any more."""
+        """Fails all open requests if there is no server any more."""
         if self._waiting and not self.ready:
             with self._lock:
                 waiting, self._waiting = tuple(self._waiting.values()), {}
@@ -205,7 +206,7 @@ class DdsCaller:
                 on_loss()
 
     def close(self) -> None:
-        """Call no more."""
+        """Destroys the client."""
         self._half.close()
         with self._lock:
             waiting, self._waiting = tuple(self._waiting.values()), {}
@@ -215,7 +216,7 @@ class DdsCaller:
     def _on_reply(self, data: bytes, _server: int) -> None:
         guid, number = _HEADER.unpack_from(data, _CDR_HEADER)
         if guid != self._guid:
-            return  # somebody else's
+            return  # another client's
         with self._lock:
             waiting = self._waiting.pop(number, None)
         if waiting is not None:
@@ -223,7 +224,7 @@ class DdsCaller:
 
 
 class _Half:
-    """The entities of one endpoint, which come and go together."""
+    """The entities of one endpoint, which are created and deleted together."""
 
     def __init__(self, place: DdsTopicName, node: NodeName) -> None:
         self._place = place
@@ -233,16 +234,19 @@ class _Half:
         self._numbers: list[int] = []
 
     def writer(self, topic: Topic, qos: Any) -> Any:
-        """A writer of the node's."""
+        """Adds a writer of the node."""
         return self._add(topic, DataWriter(self._place.participant, topic, qos=qos), writes=True)
 
     def reader(self, topic: Topic, qos: Any, take: Callable[[bytes, int], None]) -> Any:
-        """A reader of the node's; `take` gets the bytes of each sample and its writer's handle."""
+        """Adds a reader of the node.
+
+        `take` receives the bytes of each sample and its writer's handle.
+        """
         reader = DataReader(self._place.participant, topic, qos=qos)
 
         def take_all(samples: list[Any]) -> None:
             for sample in samples:
-                if sample.sample_info.valid_data:  # else it only tells that a writer has left
+                if sample.sample_info.valid_data:  # else it only reports that a writer has left
                     take(sample.cdr, sample.sample_info.publication_handle)
 
         self._numbers.append(self._place.ear.listen(reader, take_all))
@@ -255,7 +259,7 @@ class _Half:
         return entity
 
     def close(self) -> None:
-        """Delete them; nothing happens a second time."""
+        """Deletes the entities; further calls do nothing."""
         while self._numbers:
             self._place.ear.forget(self._numbers.pop())
         while self._entities:
@@ -267,7 +271,7 @@ class _Half:
 
 
 def _topics(place: DdsTopicName, spec: ServiceSpec) -> tuple[Topic, Topic]:
-    """Topics of a service's requests and replies."""
+    """Returns the topics of a service's requests and replies."""
     requests = request_struct(f"{spec.srvtype}_Request")
     responses = request_struct(f"{spec.srvtype}_Response")
     return (
@@ -277,7 +281,7 @@ def _topics(place: DdsTopicName, spec: ServiceSpec) -> tuple[Topic, Topic]:
 
 
 def _identity(word: str) -> bytes:
-    """How rmw_cyclonedds tells which halves belong together: `clientid=1.2f. ... ;`."""
+    """Returns the mark by which rmw_cyclonedds matches two halves: `clientid=1.2f. ... ;`."""
     return f"{word}={'.'.join(f'{byte:x}' for byte in os.urandom(16))};".encode()
 
 

@@ -1,7 +1,7 @@
-"""Types of the graph as Cyclone DDS knows them: structures whose samples stay bytes.
+"""Types of the graph for Cyclone DDS: structures whose samples stay bytes.
 
-The structure is what peers and the C library compare and check; the bytes are made and read by
-`rosbags`, which is some twenty times faster than the package's own coder.
+Peers and the C library compare and check the structure; `rosbags` encodes and decodes the bytes,
+which is some twenty times faster than the package's own codec.
 """
 
 from __future__ import annotations
@@ -32,25 +32,25 @@ _BASE: dict[str, Any] = {
     },
 }
 _REQUEST_HEADER = {"guid": types.uint64, "seq": types.int64}
-"""What rmw_cyclonedds puts before requests and responses: who asked, and which question."""
+"""Header of rmw_cyclonedds' requests and responses: the client, and the number of its request."""
 
 _lock = threading.RLock()
 
 
 def message_struct(msgtype: str) -> type[Any]:
-    """Structure of a message; its samples have their bytes in `cdr`."""
+    """Returns the structure of a message; its samples have their bytes in `cdr`."""
     with _lock:
         return _complete(_struct(msgtype, headed=False))
 
 
 def request_struct(msgtype: str) -> type[Any]:
-    """Structure of a service's request or response with what comes before it."""
+    """Returns the structure of a service's request or response with its header."""
     with _lock:
         return _complete(_struct(msgtype, headed=True))
 
 
 def _complete(struct: type[Any]) -> type[Any]:
-    """Have its description made, which the package does when a first topic is, without a lock."""
+    """Creates the type's description now; the package creates it later, without a lock."""
     struct.__idl__.fill_type_data()
     return struct
 
@@ -67,14 +67,14 @@ def _struct(msgtype: str, *, headed: bool) -> type[Any]:
 
 
 def _keep(cls: Any, data: bytes, *_: Any, **__: Any) -> Any:
-    """A sample that keeps the bytes it came in."""
+    """Returns a sample that holds its encoded bytes."""
     sample = cls.__new__(cls)
     sample.cdr = data
     return sample
 
 
 def _type_of(described: Any) -> Any:
-    """Type of a field, of one as `rosbags` describes it."""
+    """Returns the type of a field from its `rosbags` description."""
     kind, detail = described
     if kind == Nodetype.NAME:
         return _struct(detail, headed=False)

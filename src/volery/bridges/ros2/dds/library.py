@@ -1,4 +1,4 @@
-"""The few functions of Cyclone DDS's C library that are called past its Python package.
+"""Calls some functions of Cyclone DDS's C library directly, without its Python package.
 
 The package's own `write` holds Python's lock while it works. Called through ctypes, the same C
 function runs without it, so that neither engine nor bridges wait for a network.
@@ -67,61 +67,64 @@ _durability = _function(
 )
 
 _BEST_EFFORT, _VOLATILE = 0, 0
-"""DDS_RELIABILITY_BEST_EFFORT, DDS_DURABILITY_VOLATILE."""
+"""Values DDS_RELIABILITY_BEST_EFFORT, DDS_DURABILITY_VOLATILE."""
 _MOST_AT_ONCE = 256
 _ALIGNMENT = 4
 
 
 def write(writer: Any, cdr: bytes) -> bool:
-    """Write a sample given as CDR; whether it went out."""
+    """Writes a sample given as CDR; returns whether it was sent."""
     rest = -len(cdr) % _ALIGNMENT
-    data = cdr + bytes(rest) if rest else cdr  # the C side sends whole words
+    data = cdr + bytes(rest) if rest else cdr  # the C library sends whole words
     sample = Sample(ctypes.cast(ctypes.c_char_p(data), ctypes.c_void_p), len(data))
     return bool(_write(writer._ref, ctypes.byref(sample)) == 0)
 
 
 def delete(entity: Any) -> None:
-    """End an entity and those below it now, whoever still refers to them in Python."""
-    Entity._entities.pop(entity._ref, None)  # else it would be deleted again with the object
+    """Deletes an entity and its children now, even if Python objects still refer to them."""
+    Entity._entities.pop(entity._ref, None)  # else the object would delete it again
     _delete(entity._ref)
 
 
 def attach(waitset: Any, condition: Any, number: int) -> None:
-    """Have `wait` return `number` while a condition is true."""
+    """Makes `wait` return `number` while a condition is true."""
     _attach(waitset._ref, condition._ref, number)
 
 
 def detach(waitset: Any, condition: Any) -> None:
-    """Undo `attach`."""
+    """Undoes `attach`."""
     _detach(waitset._ref, condition._ref)
 
 
 def wait(waitset: Any, timeout_ns: int) -> list[int] | None:
-    """Numbers of conditions that are true; empty after `timeout_ns`, None once it is deleted."""
+    """Returns numbers of true conditions; empty after `timeout_ns`, None after deletion."""
     found = (ctypes.c_ssize_t * _MOST_AT_ONCE)()
     count = _wait(waitset._ref, found, _MOST_AT_ONCE, timeout_ns)
     return None if count < 0 else found[: min(count, _MOST_AT_ONCE)]
 
 
 def subscriptions(writer: Any) -> int:
-    """How many readers a writer has."""
+    """Returns the number of a writer's readers."""
     return max(int(_matched(writer._ref, None, 0)), 0)
 
 
 def readers_of(writer: Any) -> list[int]:
-    """Instance handles of a writer's readers, some hundreds at most; none once it is deleted."""
+    """Returns instance handles of a writer's readers, some hundreds at most.
+
+    None after deletion.
+    """
     found = (ctypes.c_uint64 * _MOST_AT_ONCE)()
     count = int(_matched(writer._ref, found, _MOST_AT_ONCE))
     return found[: min(max(count, 0), _MOST_AT_ONCE)]
 
 
 def publications(reader: Any) -> int:
-    """How many writers a reader has."""
+    """Returns the number of a reader's writers."""
     return max(int(_served(reader._ref, None, 0)), 0)
 
 
 def user_data(qos: int) -> bytes:
-    """User data in a `dds_qos_t`, by its address."""
+    """Returns the user data in a `dds_qos_t`, by its address."""
     value, size = ctypes.c_void_p(), ctypes.c_size_t()
     if not _user_data(qos, ctypes.byref(value), ctypes.byref(size)) or not value:
         return b""
@@ -132,13 +135,13 @@ def user_data(qos: int) -> bytes:
 
 
 def is_reliable(qos: int) -> bool:
-    """Whether a `dds_qos_t` does not say best effort."""
+    """Returns whether a `dds_qos_t` is not best effort."""
     kind = ctypes.c_int()
     told = _reliability(qos, ctypes.byref(kind), ctypes.byref(ctypes.c_int64()))
     return not (told and kind.value == _BEST_EFFORT)
 
 
 def is_latched(qos: int) -> bool:
-    """Whether a `dds_qos_t` says that a writer keeps samples for readers that come late."""
+    """Returns whether a `dds_qos_t` stores samples for late readers."""
     kind = ctypes.c_int()
     return bool(_durability(qos, ctypes.byref(kind))) and kind.value != _VOLATILE

@@ -1,7 +1,7 @@
-"""Keeps what others send from afar out of a participant that shall stay on this machine.
+"""Blocks remote packets for a participant that is limited to this machine.
 
-Cyclone DDS sends through the interfaces it is given, but its sockets hear all of them. Those of a
-participant on loopback are therefore bound to that device.
+Cyclone DDS sends through its configured interfaces, but its sockets receive from all of them. Those
+of a participant on loopback are therefore bound to that device.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _log = logging.getLogger(__name__)
 
 
 def confine(domain_id: int) -> int:
-    """Bind this process's sockets of a domain to loopback; how many there are."""
+    """Binds this process's sockets of a domain to loopback; returns their number."""
     first = _BASE_PORT + _PORTS_A_DOMAIN * domain_id
     own = _own_sockets()
     numbers = [own[inode] for inode in _bound_within(first) if inode in own]
@@ -42,7 +42,7 @@ def confine(domain_id: int) -> int:
 
 
 def _bind_to_loopback(number: int) -> None:
-    """By C's own call: a `socket.socket` around it would give it Python's default time-out."""
+    """Calls the C function: a `socket.socket` around it would set Python's default timeout."""
     libc = ctypes.CDLL(None, use_errno=True)
     level, option = socket.SOL_SOCKET, socket.SO_BINDTODEVICE
     if libc.setsockopt(number, level, option, _LOOPBACK, len(_LOOPBACK)) != 0:
@@ -51,7 +51,7 @@ def _bind_to_loopback(number: int) -> None:
 
 
 def _bound_within(first: int) -> list[str]:
-    """Inodes of the machine's UDP sockets that are bound to ports of the domain."""
+    """Returns inodes of the machine's UDP sockets that are bound to ports of the domain."""
     found = []
     for table in _TABLES:
         path = Path("/proc/self/net") / table
@@ -64,12 +64,12 @@ def _bound_within(first: int) -> list[str]:
 
 
 def _own_sockets() -> dict[str, int]:
-    """File descriptors of this process's sockets by inode."""
+    """Returns file descriptors of this process's sockets by inode."""
     found = {}
     for name in os.listdir("/proc/self/fd"):
         try:
             target = os.readlink(f"/proc/self/fd/{name}")
-        except OSError:  # it has closed meanwhile
+        except OSError:  # closed meanwhile
             continue
         if target.startswith("socket:["):
             found[target[len("socket:[") : -1]] = int(name)

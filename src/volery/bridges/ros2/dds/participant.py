@@ -28,7 +28,7 @@ from volery.bridges.ros2.names import NodeName
 
 
 class DdsParticipant:
-    """One process's part in a domain.
+    """One process's participant in a domain.
 
     Parameters
     ----------
@@ -55,27 +55,27 @@ class DdsParticipant:
         self._closed = False
 
     def add_node(self, node: NodeName) -> None:
-        """Have a node appear with the next `announce`."""
+        """Adds a node, published by the next `announce`."""
         self._record.add_node(node)
 
     def remove_node(self, node: NodeName) -> None:
-        """Have a node disappear with the next `announce`."""
+        """Removes a node, published by the next `announce`."""
         self._record.remove_node(node)
 
     def announce(self) -> None:
-        """Publish which nodes there are and what they have."""
+        """Publishes the nodes and their endpoints."""
         self._record.publish()
 
     def writer(self, spec: TopicSpec) -> DdsWriter:
-        """Publish."""
+        """Creates a publisher."""
         return DdsWriter(self._place, spec)
 
     def reader(self, spec: TopicSpec, take: TakeMessage) -> DdsReader:
-        """Subscribe."""
+        """Creates a subscription."""
         return DdsReader(self._place, spec, take)
 
     def server(self, spec: ServiceSpec, take: TakeRequest) -> DdsServer:
-        """Offer a service."""
+        """Creates a service."""
         server = DdsServer(self._place, spec, take)
         with self._lock:
             self._servers.add(server)
@@ -84,30 +84,30 @@ class DdsParticipant:
         return server
 
     def caller(self, spec: ServiceSpec) -> DdsCaller:
-        """Become a client of a service."""
+        """Creates a client of a service."""
         caller = DdsCaller(self._place, spec)
         with self._lock:
             self._callers.add(caller)
         return caller
 
     def publishers(self) -> list[RemotePublisher]:
-        """Publishers of others."""
+        """Returns publishers of others."""
         return self._discovery.publishers()
 
     def topic_types(self) -> Mapping[str, str]:
-        """Topics that others publish or subscribe to, and their types."""
+        """Returns topics that others publish or subscribe to, and their types."""
         return self._discovery.topic_types()
 
     def service_types(self) -> Mapping[str, str]:
-        """Services that others offer, and their types."""
+        """Returns services of others, and their types."""
         return self._discovery.service_types()
 
     def when_changed(self, tell: Callable[[], None]) -> None:
-        """Have `tell` called when others come or go."""
+        """Calls `tell` when others appear or leave."""
         self._discovery.when_changed(tell)
 
     def close(self) -> None:
-        """Leave the graph with everything; a second time nothing happens."""
+        """Leaves the graph; further calls do nothing."""
         if not self._closed:
             self._closed = True
             self._ear.close()

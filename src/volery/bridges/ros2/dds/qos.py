@@ -1,4 +1,4 @@
-"""Quality of service as rmw_cyclonedds sets it."""
+"""Converts profiles to quality of service as rmw_cyclonedds sets it."""
 
 from __future__ import annotations
 
@@ -12,11 +12,14 @@ from volery.bridges.ros2.middleware import Profile
 _FOREVER = duration(infinite=True)
 _UNLIMITED = -1
 _SAMPLES_KEPT = 10_000
-"""Of what is latched, in all."""
+"""Largest number of latched samples in all."""
 
 
 def qos_of(profile: Profile, user_data: bytes = b"") -> Qos:
-    """Policies of a reader or writer; history is keep-last, so that a writer never waits."""
+    """Returns the policies of a reader or writer.
+
+    History is keep-last, so that a writer never waits.
+    """
     history = Policy.History.KeepLast(profile.depth)
     policies: list[Any] = [
         Policy.Reliability.Reliable(_FOREVER)

@@ -1,4 +1,4 @@
-"""The thread in which a participant hears of data, for all its readers at once."""
+"""The thread that receives data for all readers of a participant."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Take = Callable[[list[Any]], None]
 
 
 class ReaderThread:
-    """Waits for data and hands it out; calls `now_and_then` some times a second."""
+    """Waits for data and delivers it; calls `now_and_then` some times a second."""
 
     def __init__(self, participant: DomainParticipant, now_and_then: Callable[[], None]) -> None:
         self._waitset = WaitSet(participant)
@@ -47,7 +47,7 @@ class ReaderThread:
         self._thread.start()
 
     def listen(self, reader: Any, take: Take) -> int:
-        """Hand a reader's samples to `take`; a number for `forget`."""
+        """Delivers a reader's samples to `take`; returns a number for `forget`."""
         number = next(self._numbers)
         condition = ReadCondition(reader, _ANY)
         self._readers[number] = (reader, condition, take)
@@ -55,13 +55,13 @@ class ReaderThread:
         return number
 
     def forget(self, number: int) -> None:
-        """Hear no more of a reader, which may be deleted then."""
+        """Stops reading a reader, which may then be deleted."""
         found = self._readers.pop(number, None)
         if found is not None:
             library.detach(self._waitset, found[1])
 
     def close(self) -> None:
-        """End the thread."""
+        """Ends the thread."""
         self._closing = True
         self._bell.set(True)
         if threading.current_thread() is not self._thread:
@@ -83,8 +83,8 @@ class ReaderThread:
     def _look_around(self) -> None:
         try:
             self._now_and_then()
-        except Exception:  # nor must that end the thread
-            _log.exception("ROS 2: what is due now and then failed")
+        except Exception:  # an error here must not end the thread
+            _log.exception("ROS 2: a periodic task failed")
 
     def _serve(self, number: int) -> None:
         found = self._readers.get(number)
@@ -93,7 +93,7 @@ class ReaderThread:
         reader, _, take = found
         try:
             take(reader.take(_MOST_AT_ONCE))
-        except DDSException:  # it was deleted meanwhile
+        except DDSException:  # deleted meanwhile
             return
-        except Exception:  # one reader's trouble must not end the others
-            _log.exception("ROS 2: what came could not be taken in")
+        except Exception:  # an error of one reader must not end the others
+            _log.exception("ROS 2: a received sample could not be processed")

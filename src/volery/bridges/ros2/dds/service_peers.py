@@ -1,10 +1,11 @@
-"""Which endpoints of others speak of services as rmw_cyclonedds does, and why the rest does not.
+"""Identifies service endpoints compatible with rmw_cyclonedds, and explains the others.
 
-Both that and rmw_fastrtps call a service's topics the same, but rmw_cyclonedds begins each request
-and response with who asked and a number. rmw_fastrtps tells both in the parameters of RTPS samples
-(PID_RELATED_SAMPLE_IDENTITY), which Cyclone DDS neither hands over nor lets set, so that a
-stranger's bytes would be misread. Endpoints of rmw_cyclonedds have `clientid=` or `serviceid=` in
-their user data. The first two bytes of a GUID name the vendor of the DDS (RTPS 2.5, 9.3.1.5).
+rmw_cyclonedds and rmw_fastrtps give a service's topics the same names, but rmw_cyclonedds begins
+each request and response with the client and a number. rmw_fastrtps sends both in the parameters of
+RTPS samples (PID_RELATED_SAMPLE_IDENTITY), which Cyclone DDS neither reads nor sets, so that bytes
+of another implementation would be misread. Endpoints of rmw_cyclonedds have `clientid=` or
+`serviceid=` in their user data. The first two bytes of a GUID name the vendor of the DDS (RTPS 2.5,
+9.3.1.5).
 """
 
 from __future__ import annotations
@@ -19,13 +20,13 @@ _VENDORS = {b"\x01\x10": "Cyclone DDS", b"\x01\x01": "RTI Connext DDS", b"\x01\x
 
 
 def why_foreign(word: str, key: bytes) -> str:
-    """Returns why an endpoint without `word` in its user data is not understood.
+    """Returns why an endpoint without `word` in its user data is not supported.
 
     key: its GUID.
     """
     if key.startswith(_FAST_DDS):
         return (
-            "speaks as rmw_fastrtps does, not as rmw_cyclonedds; start it with "
+            "uses rmw_fastrtps, not rmw_cyclonedds; start it with "
             "RMW_IMPLEMENTATION=rmw_cyclonedds_cpp"
         )
     vendor = _VENDORS.get(key[:2], f"a DDS of vendor {key[:2].hex('.')}")
@@ -42,7 +43,7 @@ _MOST_KNOWN = 10_000
 class ServicePeers:
     """The matched endpoints of one side, by their instance handles.
 
-    look_up: what an endpoint tells of itself; None once it has left.
+    look_up: returns the description of an endpoint; None if it has left.
     """
 
     def __init__(self, word: str, look_up: Callable[[int], EndpointInfo | None]) -> None:
@@ -52,7 +53,7 @@ class ServicePeers:
         self._known: dict[int, str] = {}
 
     def problem(self, handle: int) -> str:
-        """Why an endpoint is not understood; empty if it is, and for one that has left already."""
+        """Returns why an endpoint is not supported; empty if it is, and for one that has left."""
         known = self._known.get(handle)
         if known is None:
             found = self._look_up(handle)

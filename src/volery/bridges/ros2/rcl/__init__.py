@@ -1,1 +1,1 @@
-"""The middleware `rclpy`: nodes of ours on the ROS 2 that is sourced, whichever rmw that uses."""
+"""The middleware `rclpy`: runs Volery's nodes on the sourced ROS 2, with any rmw."""

@@ -1,4 +1,4 @@
-"""Publishers, subscriptions, and the two halves of services, on nodes of rclpy's."""
+"""Publishers, subscriptions, and the two halves of services, on nodes of rclpy."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ class RclWriter:
 
     @property
     def matched(self) -> bool:
-        """Whether anybody subscribes."""
+        """Whether the topic has subscribers."""
         return bool(self._publisher.get_subscription_count())
 
     def write(self, cdr: bytes) -> None:
-        """Send one message."""
+        """Sends one message."""
         self._publisher.publish(cdr)
 
     def close(self) -> None:
-        """Publish no more."""
+        """Ends the publication."""
         self._node.destroy_publisher(self._publisher)
 
 
@@ -52,15 +52,14 @@ class RclReader:
         )
 
     def close(self) -> None:
-        """Subscribe no more."""
+        """Ends the subscription."""
         self._node.destroy_subscription(self._subscription)
 
 
 class RclServer:
-    """A service on offer.
+    """A service server.
 
-    rclpy sends what a callback returns; an answer that comes later is sent by the same method of
-    its service, which is therefore called then.
+    rclpy sends what a callback returns; a later answer is sent by the same method of its service.
     """
 
     def __init__(self, node: Any, spec: ServiceSpec, take: TakeRequest) -> None:
@@ -74,7 +73,7 @@ class RclServer:
         self._service.send_response = self._on_request
 
     def close(self) -> None:
-        """Offer it no more."""
+        """Destroys the service."""
         self._node.destroy_service(self._service)
 
     def _on_request(self, request: Any, header: Any) -> None:
@@ -96,16 +95,16 @@ class RclCaller:
 
     @property
     def ready(self) -> bool:
-        """Whether a server is there."""
+        """Whether the service has a server."""
         return bool(self._client.service_is_ready())
 
     @property
     def problem(self) -> str:
-        """All servers are understood."""
+        """Empty, because all servers are supported."""
         return ""
 
     def call(self, request: bytes, on_response: TakeMessage, on_loss: Callable[[], None]) -> None:
-        """Send a request."""
+        """Sends a request."""
         with self._lock:
             future = self._client.call_async(deserialize_message(request, self._kind.Request))
             self._waiting[future] = on_loss
@@ -119,12 +118,12 @@ class RclCaller:
         future.add_done_callback(take)
 
     def give_up(self) -> None:
-        """Tell all who wait that no answer will come, if there is no server any more."""
+        """Fails all open requests if there is no server any more."""
         if self._waiting and not self.ready:
             self._lose()
 
     def close(self) -> None:
-        """Call no more."""
+        """Destroys the client."""
         self._lose()
         self._node.destroy_client(self._client)
 

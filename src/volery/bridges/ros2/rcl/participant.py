@@ -1,7 +1,7 @@
 """A participant in a ROS 2 graph on the sourced rclpy; a `middleware.Participant`.
 
-Messages cross as bytes: rclpy publishes and delivers them serialised. For nodes (`volery node ...
---via rclpy`), not for the bridge: rclpy has no way to leave out what the same process publishes.
+Messages stay bytes: rclpy publishes and delivers them serialized. For nodes (`volery node ... --via
+rclpy`), not for the bridge: rclpy cannot exclude messages of the same process.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from volery.bridges.ros2.rcl.endpoints import RclCaller, RclReader, RclServer, R
 from volery.bridges.ros2.rcl.qos import remote_publisher
 
 _LOOK_S = 0.2
-"""Between two looks at who else is there: rclpy tells nobody that the graph has changed."""
+"""Period of graph queries: rclpy does not report changes of the graph."""
 _NO_DESCRIPTIONS = Parameter("start_type_description_service", value=False)
 
 _log = logging.getLogger(__name__)
 
 
 class RclParticipant:
-    """One process's part in the graph of the sourced ROS 2.
+    """One process's participant in the graph of the sourced ROS 2.
 
     domain_id: ROS_DOMAIN_ID.
     """
@@ -58,12 +58,12 @@ class RclParticipant:
         self._thread.start()
 
     def add_node(self, node: NodeName) -> None:
-        """Have a node appear. Its parameters are served as those of all our nodes."""
+        """Adds a node. Its parameters are served like those of all Volery nodes."""
         with self._lock:
             self._node(node)
 
     def remove_node(self, node: NodeName) -> None:
-        """Have a node disappear."""
+        """Removes a node."""
         with self._lock:
             found = self._nodes.pop(node, None)
         if found is not None:
@@ -71,29 +71,29 @@ class RclParticipant:
             found.destroy_node()
 
     def announce(self) -> None:
-        """Nothing: rclpy tells of everything at once."""
+        """Does nothing: rclpy publishes everything at once."""
 
     def writer(self, spec: TopicSpec) -> RclWriter:
-        """Publish."""
+        """Creates a publisher."""
         return RclWriter(self._node(spec.node), spec)
 
     def reader(self, spec: TopicSpec, take: TakeMessage) -> RclReader:
-        """Subscribe; what this participant itself publishes comes too."""
+        """Creates a subscription, which also receives this participant's own messages."""
         return RclReader(self._node(spec.node), spec, take)
 
     def server(self, spec: ServiceSpec, take: TakeRequest) -> RclServer:
-        """Offer a service."""
+        """Creates a service."""
         return RclServer(self._node(spec.node), spec, take)
 
     def caller(self, spec: ServiceSpec) -> RclCaller:
-        """Become a client of a service."""
+        """Creates a client of a service."""
         caller = RclCaller(self._node(spec.node), spec)
         with self._lock:
             self._callers.add(caller)
         return caller
 
     def publishers(self) -> list[RemotePublisher]:
-        """Publishers of others, as of now."""
+        """Returns the current publishers of others."""
         with self._lock:
             own, eye = set(self._nodes), next(iter(self._nodes.values()), None)
         if eye is None:
@@ -106,25 +106,25 @@ class RclParticipant:
         ]
 
     def topic_types(self) -> Mapping[str, str]:
-        """Topics that are published or subscribed to, and their types."""
+        """Returns topics that are published or subscribed to, and their types."""
         with self._lock:
             eye = next(iter(self._nodes.values()), None)
         found = [] if eye is None else eye.get_topic_names_and_types()
         return {name: types[0] for name, types in found if types}
 
     def service_types(self) -> Mapping[str, str]:
-        """Services that are offered, and their types."""
+        """Returns existing services, and their types."""
         with self._lock:
             eye = next(iter(self._nodes.values()), None)
         found = [] if eye is None else eye.get_service_names_and_types()
         return {name: types[0] for name, types in found if types}
 
     def when_changed(self, tell: Callable[[], None]) -> None:
-        """Have `tell` called when others come or go."""
+        """Calls `tell` when others appear or leave."""
         self._told.append(tell)
 
     def close(self) -> None:
-        """Leave the graph with everything; a second time nothing happens."""
+        """Leaves the graph; further calls do nothing."""
         if self._closing:
             return
         self._closing = True
@@ -158,9 +158,9 @@ class RclParticipant:
                 if time.monotonic() > due_s:
                     due_s = time.monotonic() + _LOOK_S
                     self._look()
-            except Exception:  # one message's trouble must not end the others
+            except Exception:  # an error of one message must not end the others
                 if not self._closing:
-                    _log.exception("rclpy: what came could not be taken in")
+                    _log.exception("rclpy: a received message could not be processed")
 
     def _look(self) -> None:
         with self._lock:

@@ -1,4 +1,4 @@
-"""Quality of service, and who offers it, in the words of rclpy."""
+"""Converts profiles and publishers to and from rclpy."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from volery.bridges.ros2.middleware import Profile, RemotePublisher
 
 
 def qos_of(profile: Profile) -> Any:
-    """`rclpy.qos.QoSProfile` of a publisher or subscription; history is keep-last."""
+    """Returns the `rclpy.qos.QoSProfile` of a publisher or subscription; history is keep-last."""
     from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
     return QoSProfile(
@@ -24,7 +24,7 @@ def qos_of(profile: Profile) -> Any:
 
 
 def profile_of(offered: Any) -> Profile:
-    """What a publisher of somebody else offers."""
+    """Returns the profile of another participant's publisher."""
     return Profile(
         reliable=offered.reliability.name != "BEST_EFFORT",
         latched=offered.durability.name == "TRANSIENT_LOCAL",
@@ -32,7 +32,7 @@ def profile_of(offered: Any) -> Profile:
 
 
 def remote_publisher(topic: str, info: Any) -> RemotePublisher:
-    """A publisher as rclpy's `TopicEndpointInfo` tells of it."""
+    """Returns a publisher from rclpy's `TopicEndpointInfo`."""
     told = str(getattr(info, "topic_type_hash", ""))  # Humble has none
     type_hash = told if told.startswith("RIHS") else None
     return RemotePublisher(topic, info.topic_type, profile_of(info.qos_profile), type_hash)

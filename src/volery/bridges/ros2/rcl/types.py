@@ -1,4 +1,4 @@
-"""Classes of messages and services of the sourced ROS 2, and whether they mean what ours do."""
+"""Classes of messages and services of the sourced ROS 2, compared with Volery's definitions."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from volery.graph.messages import typestore
 
 _WORDS = {"bool": "boolean", "byte": "octet", "char": "uint8", "float32": "float"}
 _WORDS |= {"float64": "double"}
-"""What `rosidl_generator_py` calls base types; others are called the same."""
+"""Names of base types in `rosidl_generator_py`; other names are equal."""
 _NESTED_IN = "/msg/"
 _FILLER = "structure_needs_at_least_one_member"
-"""What messages without fields have on the wire; classes of ROS 2 do not tell of it."""
+"""Encoded field of messages without fields; classes of ROS 2 do not list it."""
 
 
 @cache
 def message_class(msgtype: str) -> Any:
-    """Class of a message. `GraphError` where ROS 2 has none, or one with other fields."""
+    """Returns the class of a message. Raises `GraphError` if ROS 2 has none, or other fields."""
     found = _found(msgtype)
     _compare(msgtype, found)
     return found
@@ -29,7 +29,10 @@ def message_class(msgtype: str) -> Any:
 
 @cache
 def service_class(srvtype: str) -> Any:
-    """Class of a service, with `Request` and `Response`; `GraphError` as for messages."""
+    """Returns the class of a service, with `Request` and `Response`.
+
+    Raises `GraphError` likewise.
+    """
     found = _found(srvtype)
     for part in ("Request", "Response"):
         _compare(f"{srvtype}_{part}", getattr(found, part))
@@ -37,7 +40,7 @@ def service_class(srvtype: str) -> Any:
 
 
 def described(msgtype: str) -> dict[str, str]:
-    """Fields and their types, in the words of `get_fields_and_field_types` of ROS 2's classes."""
+    """Returns fields and types in the form of `get_fields_and_field_types` of ROS 2's classes."""
     fields = typestore().fielddefs[msgtype][1]
     return {name: _word(kind) for name, kind in fields if name != _FILLER}
 
@@ -69,7 +72,7 @@ def _found(name: str) -> Any:
 
 
 def _compare(msgtype: str, found: Any) -> None:
-    """Bytes pass between the two unread, so that their fields must be the same."""
+    """Compares the fields, because bytes pass between the two without decoding."""
     ours, theirs = described(msgtype), dict(found.get_fields_and_field_types())
     if ours != theirs or list(ours) != list(theirs):
         raise GraphError(f"the sourced ROS 2 has another definition of '{msgtype}'")

@@ -1,1 +1,1 @@
-"""ROS 2 over zenoh, as rmw_zenoh maps it."""
+"""ROS 2 over zenoh, with the mapping of rmw_zenoh."""

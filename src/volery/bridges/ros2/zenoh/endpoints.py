@@ -1,4 +1,4 @@
-"""Publishers, subscriptions, and the two halves of services over zenoh, as rmw_zenoh makes them."""
+"""Publishers, subscriptions and services over zenoh, compatible with rmw_zenoh."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from volery.bridges.ros2.zenoh.names import (
 )
 
 _LONGEST_CALL_S = 3600.0
-"""Results of actions take their time."""
+"""Timeout of calls; results of actions take their time."""
 
 
 class ZenohTopicName:
-    """What endpoints are made of."""
+    """Context of endpoints."""
 
     def __init__(self, session: Any, domain_id: int, ids: Callable[[Any], tuple[int, int]]) -> None:
         self.session = session
@@ -41,12 +41,12 @@ class ZenohTopicName:
         """(node) -> number of the node and a new one for an endpoint of it."""
 
     def declare(self, token: str) -> Any:
-        """Have a liveliness token seen."""
+        """Declares a liveliness token."""
         return self.session.liveliness().declare_token(token)
 
 
 class ZenohWriter:
-    """A publisher; what it latches is kept in a cache that late subscribers ask."""
+    """A publisher; latched messages are in a cache that late subscribers query."""
 
     def __init__(self, place: ZenohTopicName, spec: TopicSpec) -> None:
         key = topic_key(place.domain_id, spec.topic, spec.msgtype)
@@ -56,7 +56,7 @@ class ZenohWriter:
         )
         how = {
             "reliability": reliability,
-            "congestion_control": zenoh.CongestionControl.DROP,  # nobody can hold it up
+            "congestion_control": zenoh.CongestionControl.DROP,  # no subscriber can block it
         }
         self._latched = profile.latched
         if profile.latched:
@@ -76,16 +76,16 @@ class ZenohWriter:
 
     @property
     def matched(self) -> bool:
-        """Whether anybody subscribes; of what is latched, somebody might."""
+        """Whether the topic has subscribers; True for latched topics, which late ones query."""
         return self._latched or bool(self._publisher.matching_status.matching)
 
     def write(self, cdr: bytes) -> None:
-        """Send one message."""
+        """Sends one message."""
         attachment = Attachment(next(self._numbers), time.time_ns(), self._gid)
         self._publisher.put(cdr, attachment=attachment.encode())
 
     def close(self) -> None:
-        """Publish no more."""
+        """Ends the publication."""
         _undeclare(self._token, self._publisher)
 
 
@@ -112,12 +112,12 @@ class ZenohReader:
         )
 
     def close(self) -> None:
-        """Subscribe no more."""
+        """Ends the subscription."""
         _undeclare(self._token, self._subscriber)
 
 
 class ZenohServer:
-    """A service on offer."""
+    """A service server."""
 
     def __init__(self, place: ZenohTopicName, spec: ServiceSpec, take: TakeRequest) -> None:
         self._key = service_key(place.domain_id, spec.service, spec.srvtype)
@@ -127,14 +127,14 @@ class ZenohServer:
         self._token = place.declare(service_token(place.domain_id, place.zid, ids, SERVER, spec))
 
     def close(self) -> None:
-        """Offer it no more."""
+        """Destroys the service."""
         _undeclare(self._token, self._queryable)
 
     def _on_query(self, query: Any) -> None:
         asked = query.attachment
         attachment = None if asked is None else Attachment.decode(asked.to_bytes())
         if attachment is None or query.payload is None:
-            query.drop()  # no client of ROS 2: it shall not wait
+            query.drop()  # not a ROS 2 client: it must not wait
             return
 
         def answer(cdr: bytes) -> None:
@@ -164,16 +164,16 @@ class ZenohCaller:
 
     @property
     def ready(self) -> bool:
-        """Whether a server is there."""
+        """Whether the service has a server."""
         return self._is_there(self._spec)
 
     @property
     def problem(self) -> str:
-        """All servers are understood."""
+        """Empty, because all servers are supported."""
         return ""
 
     def call(self, request: bytes, on_response: TakeMessage, on_loss: Callable[[], None]) -> None:
-        """Send a request."""
+        """Sends a request."""
         question = _Question(on_response, on_loss)
         with self._lock:
             self._waiting.add(question)
@@ -198,12 +198,12 @@ class ZenohCaller:
         )
 
     def give_up(self) -> None:
-        """Tell all who wait that no answer will come, if there is no server any more."""
+        """Fails all open requests if there is no server any more."""
         if self._waiting and not self.ready:
             self._lose_all()
 
     def close(self) -> None:
-        """Call no more."""
+        """Destroys the client."""
         _undeclare(self._token)
         self._lose_all()
 
@@ -215,7 +215,7 @@ class ZenohCaller:
 
 
 class _Question:
-    """A request that has no answer yet; it gets one or is lost, once."""
+    """A request without an answer yet; it is answered or lost, once."""
 
     def __init__(self, on_response: TakeMessage, on_loss: Callable[[], None]) -> None:
         self._on_response = on_response
@@ -224,12 +224,12 @@ class _Question:
         self._done = False
 
     def answer(self, data: bytes) -> None:
-        """Hand the response out."""
+        """Delivers the response."""
         if self._finish():
             self._on_response(data)
 
     def lose(self) -> None:
-        """Say that there will be none."""
+        """Reports that there will be no response."""
         if self._finish():
             self._on_loss()
 
@@ -240,7 +240,7 @@ class _Question:
 
 
 def _undeclare(*declared: Any) -> None:
-    """Take declarations back; those of a closed session are gone anyway."""
+    """Removes declarations; those of a closed session are gone anyway."""
     for one in declared:
         try:
             one.undeclare()

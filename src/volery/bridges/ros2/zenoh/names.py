@@ -1,4 +1,4 @@
-"""Keys, liveliness tokens and attachments as rmw_zenoh makes them.
+"""Keys, liveliness tokens and attachments of rmw_zenoh.
 
 https://github.com/ros2/rmw_zenoh/blob/rolling/docs/design.md
 """
@@ -28,20 +28,20 @@ GID_BYTES = 16
 
 
 class ZenohEndpoint(NamedTuple):
-    """What a liveliness token tells of a publisher, subscription, server or client."""
+    """Content of a liveliness token of a publisher, subscription, server or client."""
 
     session: str
     kind: str
     node: NodeName
     name: str
     msgtype: str
-    """Of a service: the service's."""
+    """For a service: the service's type."""
     type_hash: str
     profile: Profile
 
 
 class Attachment(NamedTuple):
-    """What goes with every message, request and response."""
+    """Attachment of every message, request and response."""
 
     number: int
     time_ns: int
@@ -49,12 +49,12 @@ class Attachment(NamedTuple):
     gid: bytes
 
     def encode(self) -> bytes:
-        """Its 33 bytes."""
+        """Returns the 33 bytes of the attachment."""
         return _ATTACHMENT.pack(self.number, self.time_ns, GID_BYTES, self.gid)
 
     @classmethod
     def decode(cls, data: bytes) -> Attachment | None:
-        """From bytes; None for what is none."""
+        """Returns the attachment in bytes; None if they are invalid."""
         if len(data) != _ATTACHMENT.size:
             return None
         number, time_ns, length, gid = _ATTACHMENT.unpack(data)
@@ -62,24 +62,24 @@ class Attachment(NamedTuple):
 
 
 def topic_key(domain_id: int, topic: str, msgtype: str) -> str:
-    """Key of a topic's messages."""
+    """Returns the key of a topic's messages."""
     return f"{domain_id}/{topic.strip('/')}/{dds_type(msgtype)}/{message_hash(msgtype)}"
 
 
 def service_key(domain_id: int, service: str, srvtype: str) -> str:
-    """Key of a service's requests."""
+    """Returns the key of a service's requests."""
     return f"{domain_id}/{service.strip('/')}/{dds_type(srvtype)}/{service_hash(srvtype)}"
 
 
 def node_token(domain_id: int, session: str, number: int, node: NodeName) -> str:
-    """Token of a node; number: its own within the session."""
+    """Returns the token of a node; number: its own within the session."""
     return f"{SPACE}/{domain_id}/{session}/{number}/{number}/{NODE}/{_node_words(node)}"
 
 
 def topic_token(
     domain_id: int, session: str, ids: tuple[int, int], kind: str, spec: TopicSpec
 ) -> str:
-    """Token of a publisher or subscription; ids: those of its node and its own."""
+    """Returns the token of a publisher or subscription; ids: those of its node and its own."""
     what = f"{dds_type(spec.msgtype)}/{message_hash(spec.msgtype)}/{qos_words(spec.profile)}"
     return _endpoint(domain_id, session, ids, kind, spec.node, spec.topic, what)
 
@@ -87,7 +87,7 @@ def topic_token(
 def service_token(
     domain_id: int, session: str, ids: tuple[int, int], kind: str, spec: ServiceSpec
 ) -> str:
-    """Token of a server or client; ids: those of its node and its own."""
+    """Returns the token of a server or client; ids: those of its node and its own."""
     what = f"{dds_type(spec.srvtype)}/{service_hash(spec.srvtype)}/{qos_words(Profile())}"
     return _endpoint(domain_id, session, ids, kind, spec.node, spec.service, what)
 
@@ -106,14 +106,14 @@ def _endpoint(
 
 
 def qos_words(profile: Profile) -> str:
-    """Quality of service in full: `1:2:1,10:,:,:,,`."""
+    """Returns the complete text of a quality of service: `1:2:1,10:,:,:,,`."""
     reliability = _RELIABLE if profile.reliable else _BEST_EFFORT
     durability = _TRANSIENT_LOCAL if profile.latched else _VOLATILE
     return f"{reliability}:{durability}:{_KEEP_LAST},{profile.depth}:{_REST}"
 
 
 def read_token(token: str) -> ZenohEndpoint | None:
-    """What a token tells; None for that of a node, and for what is no token of an endpoint."""
+    """Returns the endpoint of a token; None for nodes and invalid tokens."""
     parts = token.split("/")
     if len(parts) != _ENDPOINT_PARTS or parts[0] != SPACE:
         return None
@@ -127,7 +127,7 @@ def read_token(token: str) -> ZenohEndpoint | None:
 
 
 def _read_qos(words: str) -> Profile:
-    """Quality of service of a token, where defaults may be left out: `::,10:,:,:,,`."""
+    """Returns the profile in a token's text, in which defaults may be missing: `::,10:,:,:,,`."""
     reliability, durability, history, *_ = [*words.split(":"), "", "", ""]
     depth = history.partition(",")[2]
     return Profile(
@@ -138,7 +138,7 @@ def _read_qos(words: str) -> Profile:
 
 
 def _node_words(node: NodeName) -> str:
-    """Enclave, namespace and name of a node."""
+    """Returns enclave, namespace and name of a node."""
     return f"{_SLASH}/{_mangled(node.namespace)}/{node.name}"
 
 

@@ -39,14 +39,14 @@ from volery.bridges.ros2.zenoh.session import open_session
 
 
 class ZenohParticipant:
-    """One process's part in a domain.
+    """One process's participant in a domain.
 
     Parameters
     ----------
     domain_id
         ROS_DOMAIN_ID.
     router
-        HOST:PORT; empty: that of this machine, which the participant becomes where there is none.
+        HOST:PORT; empty: this machine's, which the participant becomes if there is none.
 
     """
 
@@ -67,7 +67,7 @@ class ZenohParticipant:
         )
 
     def add_node(self, node: NodeName) -> None:
-        """Have a node appear."""
+        """Adds a node."""
         with self._lock:
             if node not in self._nodes:
                 number = next(self._numbers)
@@ -75,56 +75,56 @@ class ZenohParticipant:
                 self._nodes[node] = number, self._place.declare(token)
 
     def remove_node(self, node: NodeName) -> None:
-        """Have a node disappear."""
+        """Removes a node."""
         with self._lock:
             found = self._nodes.pop(node, None)
         if found is not None:
             found[1].undeclare()
 
     def announce(self) -> None:
-        """Tokens tell everything at once."""
+        """Does nothing: tokens are published at once."""
 
     def writer(self, spec: TopicSpec) -> ZenohWriter:
-        """Publish."""
+        """Creates a publisher."""
         return ZenohWriter(self._place, spec)
 
     def reader(self, spec: TopicSpec, take: TakeMessage) -> ZenohReader:
-        """Subscribe."""
+        """Creates a subscription."""
         return ZenohReader(self._place, spec, take)
 
     def server(self, spec: ServiceSpec, take: TakeRequest) -> ZenohServer:
-        """Offer a service."""
+        """Creates a service."""
         return ZenohServer(self._place, spec, take)
 
     def caller(self, spec: ServiceSpec) -> ZenohCaller:
-        """Become a client of a service."""
+        """Creates a client of a service."""
         caller = ZenohCaller(self._place, spec, self._is_there)
         with self._lock:
             self._callers.add(caller)
         return caller
 
     def publishers(self) -> list[RemotePublisher]:
-        """Publishers of others."""
+        """Returns publishers of others."""
         return [
             RemotePublisher(e.name, e.msgtype, e.profile, e.type_hash)
             for e in self._of_kind(PUBLISHER)
         ]
 
     def topic_types(self) -> Mapping[str, str]:
-        """Topics that others publish or subscribe to, and their types."""
+        """Returns topics that others publish or subscribe to, and their types."""
         found = (*self._of_kind(SUBSCRIPTION), *self._of_kind(PUBLISHER))
         return {e.name: e.msgtype for e in found}
 
     def service_types(self) -> Mapping[str, str]:
-        """Services that others offer, and their types."""
+        """Returns services of others, and their types."""
         return {e.name: e.msgtype for e in self._of_kind(SERVER)}
 
     def when_changed(self, tell: Callable[[], None]) -> None:
-        """Have `tell` called when others come or go."""
+        """Calls `tell` when others appear or leave."""
         self._told.append(tell)
 
     def close(self) -> None:
-        """Leave the graph with everything; a second time nothing happens."""
+        """Leaves the graph; further calls do nothing."""
         if not self._closed:
             self._closed = True
             self._session.close()

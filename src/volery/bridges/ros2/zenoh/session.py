@@ -1,7 +1,7 @@
-"""A zenoh session as rmw_zenoh configures it: a peer of the router of this machine.
+"""Opens a zenoh session as configured by rmw_zenoh: a peer of the router of this machine.
 
-rmw_zenoh wants a router, which tells peers of each other. Where none answers at its usual place on
-this machine, the session becomes one itself, so that nothing else needs to be started.
+rmw_zenoh needs a router, which connects peers. If no router answers at the default address of this
+machine, the session becomes the router itself, so that nothing else needs to be started.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ _GLANCE_S = 0.5
 
 
 def open_session(router: str) -> tuple[Any, str]:
-    """A session, and where it is, for people. router: HOST:PORT; empty: that of this machine.
+    """Returns a session and its address as text. router: HOST:PORT; empty: this machine's.
 
     Raises
     ------
     BridgeError
-        The router that was named does not answer.
+        The given router does not answer.
 
     """
     address = router or DEFAULT_ROUTER
@@ -53,7 +53,7 @@ def open_session(router: str) -> tuple[Any, str]:
 
 
 def _answers(address: str) -> bool:
-    """Whether somebody listens there."""
+    """Returns whether a server listens at an address."""
     host, _, port = address.rpartition(":")
     try:
         with socket.create_connection((host.strip("[]"), int(port)), _GLANCE_S):
