@@ -16,7 +16,7 @@ from volery.graph.messages import typestore
 from volery.runtime.services.grid_maps import grid_of
 from volery.world.grid_maps import block_mesh
 from volery.world.grid_maps.grid_map import MOST_CELLS
-from volery.world.grid_maps.reading import parse_cells
+from volery.world.grid_maps.parsing import parse_cells
 
 OCCUPANCY = "nav_msgs/msg/OccupancyGrid"
 _MATRICES = [b"0,1,0\n1,1,0\n", b"0 1\n1 0\n\n", b"\xef\xbb\xbf0;1;\r\n1;0;\r\n", b"1.0,0e0\n0,1\n"]

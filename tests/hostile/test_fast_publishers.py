@@ -27,7 +27,7 @@ from volery.graph.read_budget import (
     MAX_FRACTION,
     MAX_WAITING,
     ReadBudgets,
-    Reading,
+    ReadScope,
 )
 
 PUBLISH = json.dumps({"op": "publish", "topic": "/cmd", "msg": {}})
@@ -189,7 +189,7 @@ def test_ros_tcp_reads_no_more_until_time_has_paid():
     shares = Shares()
     shares.busy = True
     budget = shares.budgets.open()
-    reading = Reading(budget, lambda: 0)
+    reading = ReadScope(budget, lambda: 0)
     taken = []
 
     async def serve():

@@ -10,7 +10,7 @@ from live_graph import LiveGraph
 from volery.bridges.bridge_host import BridgeHost
 from volery.mavlink.codec import dialect
 from volery.mavlink.links.connection import MavlinkConnection
-from volery.mavlink.links.rate_limits import FRAMES_PER_S, IntakeLimits
+from volery.mavlink.links.rate_limits import FRAMES_PER_S, RateLimits
 from volery.mavlink.links.tcp_bridge import MavlinkTcp
 from volery.mavlink.links.udp_bridge import _UdpLink
 
@@ -40,14 +40,14 @@ def flood(accounts, clock, seconds, frames_per_s, step_s=0.01):
 
 def test_a_flood_is_held_to_the_rate():
     clock = Clock()
-    limits = IntakeLimits(clock=clock)
+    limits = RateLimits(clock=clock)
     (through,) = flood([limits.account()], clock, 60.0, 10_000)
     assert through == pytest.approx(60.0 * FRAMES_PER_S, rel=0.1)
 
 
 def test_floods_share_one_rate_and_others_notice_nothing():
     clock = Clock()
-    limits = IntakeLimits(clock=clock)
+    limits = RateLimits(clock=clock)
     modest = limits.account()
     flooding = [limits.account() for _ in range(10)]
     begun = flood(flooding, clock, 10.0, 10_000)
@@ -62,13 +62,13 @@ def test_floods_share_one_rate_and_others_notice_nothing():
 
 def test_noise_costs_as_frames_do():
     clock = Clock()
-    account = IntakeLimits(clock=clock).account()
+    account = RateLimits(clock=clock).account()
     paused_s = sum(account.charge(0, 2048) for _ in range(100))
     assert paused_s > 1.0
 
 
 def test_the_rate_grows_with_the_vehicles():
-    limits = IntakeLimits(clock=Clock())
+    limits = RateLimits(clock=Clock())
     limits.fit(3)
     assert limits.rate == FRAMES_PER_S
     limits.fit(50)
@@ -76,7 +76,7 @@ def test_the_rate_grows_with_the_vehicles():
 
 
 def test_who_floods_is_read_in_few_long_turns():
-    account = IntakeLimits(clock=Clock()).account()
+    account = RateLimits(clock=Clock()).account()
     assert account.charge(500) == 0.0
     assert account.charge(1) >= 0.05
 
@@ -114,7 +114,7 @@ def test_frames_that_come_together_reach_a_vehicle_as_one_message():
 
 def test_who_floods_no_more_is_read_again():
     clock = Clock()
-    limits = IntakeLimits(clock=clock)
+    limits = RateLimits(clock=clock)
     account = limits.account()
     pause_s = account.charge(5000)
     clock.now_s += pause_s + 0.001
@@ -207,7 +207,7 @@ def udp_link():
         own, peer = free_port(), agreed.getsockname()
 
         async def opened():
-            limits = IntakeLimits(frames_per_s=1e-3)
+            limits = RateLimits(frames_per_s=1e-3)
             return _UdpLink(vehicles, 1, 1, own, peer, None, limits, for_peer=True)
 
         async def closed():

@@ -26,7 +26,7 @@ from volery.bridges.frame_limits import (
     MAX_FRAGMENTS,
     MAX_FRAMES_AHEAD,
     FrameLimits,
-    HeldTransport,
+    PausedTransport,
 )
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.core.listener import MAX_UNPROVEN
@@ -181,7 +181,7 @@ def test_frames_are_counted_over_time():
             pass
 
     closing_handle, loop, transport = Handle(), Loop(), Transport()
-    held = HeldTransport(transport)
+    held = PausedTransport(transport)
     limits = FrameLimits(held, loop)
     for _ in range(5 * MAX_FRAMES_AHEAD):
         loop.now_s += 1.0 / FRAMES_PER_S

@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.coverage.plan import plan_coverage
-from volery.bench.peers.conversation import Conversation
 from volery.bench.peers.failure import PeerError
+from volery.bench.peers.peer_process import PeerProcess
 from volery.bench.registry import Measured
 
 _ROUNDS = 5
@@ -103,7 +103,7 @@ def _beside(case: Case, peer: Path, versions: dict[str, str]) -> dict[str, float
     }
     with (
         tempfile.TemporaryDirectory() as folder,
-        Conversation(python, _SCRIPT, request, Path(folder)) as conversation,
+        PeerProcess(python, _SCRIPT, request, Path(folder)) as conversation,
     ):
         told = ", ".join(f"{k} {v}" for k, v in conversation.versions().items())
         ours, theirs = _medians([lambda: _timed(case), conversation.round])

@@ -23,7 +23,7 @@ _UNREAD, _FAST = "unread answers", "too many frames"
 class FrameLimits:
     """Limits one connection. All methods belong to the thread of its loop."""
 
-    def __init__(self, transport: HeldTransport, loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(self, transport: PausedTransport, loop: asyncio.AbstractEventLoop) -> None:
         self._transport = transport
         self._loop = loop
         self._num_fragments = 0
@@ -63,7 +63,7 @@ class FrameLimits:
             self._transport.release_later(_FAST, self._loop, late / FRAMES_PER_S)
 
 
-class HeldTransport:
+class PausedTransport:
     """A transport that is read while neither its protocol nor any other reason pauses it."""
 
     def __init__(self, transport: asyncio.Transport) -> None:

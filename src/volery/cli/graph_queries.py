@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from volery.core.errors import BridgeError
-from volery.graph.connection import GraphConnection, TellsServices, TellsTopics, call_and_wait
+from volery.graph.connection import GraphConnection, ListsServices, ListsTopics, call_and_wait
 from volery.graph.messages import message_type
 
 TIMEOUT_S = 10.0
@@ -19,7 +19,7 @@ def ask_rosapi(link: GraphConnection, question: str, **fields: Any) -> Any:
 
 def topic_types(link: GraphConnection) -> dict[str, str]:
     """Returns the topics of the graph and their types, by name."""
-    if isinstance(link, TellsTopics):
+    if isinstance(link, ListsTopics):
         return dict(sorted(link.topic_types().items()))
     answer = ask_rosapi(link, "Topics")
     return dict(sorted(zip(answer.topics, answer.types, strict=True)))
@@ -27,7 +27,7 @@ def topic_types(link: GraphConnection) -> dict[str, str]:
 
 def type_of_topic(link: GraphConnection, topic: str) -> str:
     """Returns the type of a topic. Raises `BridgeError` if there is no such topic."""
-    if isinstance(link, TellsTopics):
+    if isinstance(link, ListsTopics):
         found = link.topic_types().get(topic, "")
     else:
         found = ask_rosapi(link, "TopicType", topic=topic).type
@@ -38,14 +38,14 @@ def type_of_topic(link: GraphConnection, topic: str) -> str:
 
 def service_names(link: GraphConnection) -> list[str]:
     """Returns the services of the graph, sorted."""
-    if isinstance(link, TellsServices):
+    if isinstance(link, ListsServices):
         return sorted(link.service_types())
     return sorted(ask_rosapi(link, "Services").services)
 
 
 def type_of_service(link: GraphConnection, service: str) -> str:
     """Returns the type of a service. Raises `BridgeError` if the service has no server."""
-    if isinstance(link, TellsServices):
+    if isinstance(link, ListsServices):
         found = link.service_types().get(service, "")
     else:
         found = ask_rosapi(link, "ServiceType", service=service).type

@@ -26,8 +26,8 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from volery.core.connection_limits import SHARED, ConnectionLimits
+from volery.core.pending_connections import Look, PendingConnection, PendingConnections
 from volery.core.rare_log import RareLog
-from volery.core.waiting_room import Look, WaitingConnection, WaitingRoom
 
 MAX_UNPROVEN = 64
 """Limit of one listener's connections without a valid frame (modelling choice)."""
@@ -89,10 +89,10 @@ class Listener(socket.socket):
         self.refusals = RareLog(_log)
         """Refused and ended connections, by reason."""
         self._greeting = b"" if opening is None else opening.greeting
-        self._room: WaitingRoom | None = None
-        if opening is not None and WaitingRoom.is_available:
+        self._room: PendingConnections | None = None
+        if opening is not None and PendingConnections.is_available:
             number = super().fileno()
-            self._room = WaitingRoom(number, opening.look, opening.patience_s, self._expire)
+            self._room = PendingConnections(number, opening.look, opening.patience_s, self._expire)
 
     def add_port(self) -> None:
         """Adds the port to the name in logs."""
@@ -155,7 +155,7 @@ class Listener(socket.socket):
                     return accepted
         return None
 
-    def _attend(self, room: WaitingRoom) -> tuple[socket.socket, Any] | None:
+    def _attend(self, room: PendingConnections) -> tuple[socket.socket, Any] | None:
         """Handles one event; returns a connection that has become ready."""
         event = room.next_event()
         if event.descriptor not in room:
@@ -173,7 +173,7 @@ class Listener(socket.socket):
             room.release(event.descriptor).sock.close()
         return None
 
-    def _expire(self, waiting: WaitingConnection) -> None:
+    def _expire(self, waiting: PendingConnection) -> None:
         self.note_slow_client()
         waiting.sock.close()
 

@@ -17,11 +17,11 @@ from volery.control.fleet import Fleet
 from volery.core import atmosphere
 from volery.core.rows import Rows, in_one_piece
 from volery.sensors.samples import (
-    GnssReadings,
-    ImuReadings,
-    MagneticReadings,
-    PressureReadings,
-    RangeReadings,
+    GnssSamples,
+    ImuSamples,
+    MagneticSamples,
+    PressureSamples,
+    RangeSamples,
     Samples,
     SensorId,
 )
@@ -94,7 +94,7 @@ class Estimation:
     def take(self, samples: Samples) -> None:
         """Passes a bank's samples to the estimators that use them."""
         heard, rows = self._listeners(samples.sensors)
-        if isinstance(samples, ImuReadings):
+        if isinstance(samples, ImuSamples):
             if len(rows):
                 self.estimator.predict(
                     rows,
@@ -105,15 +105,15 @@ class Estimation:
             self._tell_fleet()
         elif not len(rows):
             return
-        elif isinstance(samples, GnssReadings):
+        elif isinstance(samples, GnssSamples):
             self._take_fixes(samples, heard, rows)
-        elif isinstance(samples, PressureReadings):
+        elif isinstance(samples, PressureSamples):
             self._take_pressures(samples, heard, rows)
-        elif isinstance(samples, MagneticReadings):
+        elif isinstance(samples, MagneticSamples):
             self.estimator.fuse_magnetic(
                 rows, samples.stamp_ns, _heard(samples.field, heard), samples.field_variance
             )
-        elif isinstance(samples, RangeReadings) and self.setup.ground_height_m is not None:
+        elif isinstance(samples, RangeSamples) and self.setup.ground_height_m is not None:
             self.estimator.fuse_range(
                 rows,
                 samples.stamp_ns,
@@ -193,7 +193,7 @@ class Estimation:
         self.estimator.set_state(state)
         self._pose_ns[:] = state["pose_ns"]
 
-    def _take_fixes(self, samples: GnssReadings, heard: Rows | slice, rows: Rows) -> None:
+    def _take_fixes(self, samples: GnssSamples, heard: Rows | slice, rows: Rows) -> None:
         drift = self.setup.gnss_drift_variance[rows]
         noise = np.maximum(_heard(samples.position_variance, heard) - drift, _LEAST_VARIANCE)
         self.estimator.fuse_gnss(
@@ -207,7 +207,7 @@ class Estimation:
             _heard(samples.has_fix, heard),
         )
 
-    def _take_pressures(self, samples: PressureReadings, heard: Rows | slice, rows: Rows) -> None:
+    def _take_pressures(self, samples: PressureSamples, heard: Rows | slice, rows: Rows) -> None:
         pressure = _heard(samples.pressure, heard)
         height = atmosphere.altitude(pressure) - self.setup.origin_altitude_m
         slope = atmosphere.altitude(pressure + 1.0) - atmosphere.altitude(pressure)

@@ -76,7 +76,7 @@ class GraphConnection(Protocol):
 
 
 @runtime_checkable
-class TellsTopics(Protocol):
+class ListsTopics(Protocol):
     """A connection whose protocol lists the topics."""
 
     def topic_types(self) -> dict[str, str]:
@@ -84,7 +84,7 @@ class TellsTopics(Protocol):
 
 
 @runtime_checkable
-class TellsServices(Protocol):
+class ListsServices(Protocol):
     """A connection whose protocol lists the services."""
 
     def service_types(self) -> dict[str, str]:

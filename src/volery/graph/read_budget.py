@@ -127,7 +127,7 @@ class ReadBudget:
         self._owed_s = max(0.0, self._owed_s - earned_s)
 
 
-class Reading:
+class ReadScope:
     """Budget that a bridge checks before it reads on from a client; see `Session.reading`.
 
     waiting: returns the number of the client's commands that the simulation has not processed yet.

@@ -27,7 +27,7 @@ from volery.graph.graph import Graph, Publisher, Subscription
 from volery.graph.messages import message_type
 from volery.graph.nodes.failures import report_failure
 from volery.graph.qos import DEFAULT_DEPTH, check_depth
-from volery.graph.read_budget import ReadBudgets, Reading, write_budgets
+from volery.graph.read_budget import ReadBudgets, ReadScope, write_budgets
 from volery.graph.rotor_layout import RotorLayout
 from volery.graph.service_reply import ServiceReply
 from volery.graph.subscription_queue import (
@@ -181,9 +181,9 @@ class Session:
         self._posted = itertools.count(1)
         self._last_posted = 0
         self._taken = 0
-        self.reading = Reading(gateway.read_budgets.open(), lambda: self.waiting)
+        self.reading = ReadScope(gateway.read_budgets.open(), lambda: self.waiting)
         """Budget that a bridge checks before it continues to read from the client."""
-        self.writing = Reading(gateway.write_budgets.open(), lambda: 0)
+        self.writing = ReadScope(gateway.write_budgets.open(), lambda: 0)
         """Budget that a bridge checks before it continues to write to the client."""
         self._latched_bytes: dict[str, int] = {}
         self._watch = watch or _look_away

@@ -22,13 +22,13 @@ from volery.graph.messages import FluidPressure, NavSatFix, Temperature, message
 from volery.graph.nodes.node import Node
 from volery.mavlink.autopilot import core, streams
 from volery.mavlink.autopilot.graph_vehicle import GraphVehicle, build_of, state_of
-from volery.mavlink.autopilot.log_transfer import TransferPace
+from volery.mavlink.autopilot.log_transfer import TransferRate
 from volery.mavlink.autopilot.state import AutopilotState
 from volery.mavlink.mavros import Mavros
 
 PACKETS = "volery_interfaces/msg/MavlinkPackets"
 _STATE = "volery_interfaces/msg/FlightState"
-_PACES: WeakKeyDictionary[Any, TransferPace] = WeakKeyDictionary()
+_PACES: WeakKeyDictionary[Any, TransferRate] = WeakKeyDictionary()
 """Transfer pace of the vehicles of each graph, which share it."""
 MOST_SYSTEMS = 250
 """Largest system id of a vehicle; ids above are ground stations' by convention."""
@@ -51,7 +51,7 @@ class AutopilotNode(Node):
         self.declare_parameter("mavlink_id", self.system_id)
         build = build_of(self)
         self.core = core.Autopilot(self.system_id, GraphVehicle(self), build, given)
-        self.core.log.transfers.pace = _PACES.setdefault(self._context.graph, TransferPace())
+        self.core.log.transfers.pace = _PACES.setdefault(self._context.graph, TransferRate())
         self._packets = message_type(PACKETS)
         self._out = self.create_publisher(self._packets, "mavlink/out", 1000)
         self._mavros = [Mavros(self, self.core, "mavros")]

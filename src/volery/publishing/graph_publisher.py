@@ -48,13 +48,13 @@ from volery.publishing.sensor_topics import SensorTopic
 from volery.sensors.lidar_model import LidarModel
 from volery.sensors.mount import Mount, make_mount
 from volery.sensors.samples import (
-    BatteryReadings,
+    BatterySamples,
     CameraFrames,
-    ImuReadings,
+    ImuSamples,
     JointAngles,
     LidarScans,
-    OdometryReadings,
-    RangeReadings,
+    OdometrySamples,
+    RangeSamples,
     Samples,
     SensorId,
 )
@@ -92,12 +92,12 @@ class GraphPublisher:
         self._by_kind: dict[type[Any], Callable[[Any], None]] = {
             LidarScans: self._lidars.publish,
             CameraFrames: self.cameras.publish,
-            ImuReadings: self._imus,
-            RangeReadings: self._ranges,
-            OdometryReadings: self._odometry,
+            ImuSamples: self._imus,
+            RangeSamples: self._ranges,
+            OdometrySamples: self._odometry,
             JointAngles: self._joints,
             **dict.fromkeys(SENSOR_TOPICS, self._by_topic),
-            BatteryReadings: self._batteries,
+            BatterySamples: self._batteries,
         }
 
     def announce(
@@ -113,18 +113,18 @@ class GraphPublisher:
         base = f"{sensor.uav_name}/base_link"
         if kind is JointAngles:
             self._advertise(f"/{sensor.uav_name}/joint_states", JointState)
-        elif kind is OdometryReadings:
+        elif kind is OdometrySamples:
             self._advertise(_odometry_topic(sensor), Odometry)
             if sensor.name == "odom" and in_map:
                 self._static.append(_fixed_frame("map", f"{sensor.uav_name}/odom"))
-        elif kind is BatteryReadings:
+        elif kind is BatterySamples:
             self._advertise(f"/{sensor.uav_name}/{sensor.name}", BatteryState)
         else:
             if kind in SENSOR_TOPICS:
                 for topic in SENSOR_TOPICS[kind]:
                     self._advertise(topic.name_of(sensor), topic.message_class)
             else:
-                message_class = Imu if kind is ImuReadings else Range
+                message_class = Imu if kind is ImuSamples else Range
                 self._advertise(f"/{sensor.uav_name}/{sensor.name}", message_class)
             self._static.append(_mount_transform(base, sensor.path, mount))
 
@@ -198,7 +198,7 @@ class GraphPublisher:
 
     # ---------------------------------------------------------------------------------- by kind
 
-    def _imus(self, readings: ImuReadings) -> None:
+    def _imus(self, readings: ImuSamples) -> None:
         rate_covariance = _diagonal(readings.angular_velocity_variance)
         force_covariance = _diagonal(readings.specific_force_variance)
         for i, sensor in enumerate(readings.sensors):
@@ -217,7 +217,7 @@ class GraphPublisher:
                 )
             )
 
-    def _ranges(self, readings: RangeReadings) -> None:
+    def _ranges(self, readings: RangeSamples) -> None:
         for i, sensor in enumerate(readings.sensors):
             publisher = self._publishers[f"/{sensor.uav_name}/{sensor.name}"]
             if not publisher.wanted:
@@ -234,7 +234,7 @@ class GraphPublisher:
                 )
             )
 
-    def _odometry(self, readings: OdometryReadings) -> None:
+    def _odometry(self, readings: OdometrySamples) -> None:
         transforms = []
         for i, sensor in enumerate(readings.sensors):
             position = readings.position_odom[i].tolist()
@@ -307,7 +307,7 @@ class GraphPublisher:
                     if message is not None:
                         publisher.publish(message)
 
-    def _batteries(self, readings: BatteryReadings) -> None:
+    def _batteries(self, readings: BatterySamples) -> None:
         for i, sensor in enumerate(readings.sensors):
             publisher = self._publishers[f"/{sensor.uav_name}/{sensor.name}"]
             if publisher.wanted:
@@ -318,7 +318,7 @@ class GraphPublisher:
             self._publishers[topic] = self._graph.advertise(topic, message_class)
 
 
-def _battery_state(readings: BatteryReadings, i: int) -> BatteryState:
+def _battery_state(readings: BatterySamples, i: int) -> BatteryState:
     """Returns a BatteryState: current below 0 while discharging, NaN for unknown values."""
     cells = int(readings.cells[i])
     voltage, share = float(readings.voltage[i]), float(readings.charge[i])

@@ -20,7 +20,7 @@ from volery.graph.messages import (
     header,
 )
 from volery.publishing.sensor_topics import SensorTopic
-from volery.sensors.samples import GnssReadings, MagneticReadings, PressureReadings, SensorId
+from volery.sensors.samples import GnssSamples, MagneticSamples, PressureSamples, SensorId
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ _NOT_MEASURED = -1.0
 """Variance of a quantity of the message that the sensor does not measure (sensor_msgs/Imu)."""
 
 
-def fix(readings: GnssReadings, row: int) -> NavSatFix:
+def fix(readings: GnssSamples, row: int) -> NavSatFix:
     """Returns the position; without a fix, NaN with unknown covariance."""
     latitude, longitude, altitude = readings.frame.geodetic_from_enu(readings.position_map[row])
     has_fix = bool(readings.has_fix[row])
@@ -47,7 +47,7 @@ def fix(readings: GnssReadings, row: int) -> NavSatFix:
     )
 
 
-def fix_velocity(readings: GnssReadings, row: int) -> TwistWithCovarianceStamped | None:
+def fix_velocity(readings: GnssSamples, row: int) -> TwistWithCovarianceStamped | None:
     """Returns the velocity along the map's axes; None without a fix."""
     if not readings.has_fix[row]:
         return None
@@ -61,7 +61,7 @@ def fix_velocity(readings: GnssReadings, row: int) -> TwistWithCovarianceStamped
     )
 
 
-def pressure(readings: PressureReadings, row: int) -> FluidPressure:
+def pressure(readings: PressureSamples, row: int) -> FluidPressure:
     """Returns the static pressure, Pa."""
     return FluidPressure(
         header(readings.stamp_ns, _frame(readings.sensors[row])),
@@ -70,7 +70,7 @@ def pressure(readings: PressureReadings, row: int) -> FluidPressure:
     )
 
 
-def temperature(readings: PressureReadings, row: int) -> Temperature:
+def temperature(readings: PressureSamples, row: int) -> Temperature:
     """Returns the temperature of the air, degrees Celsius."""
     return Temperature(
         header(readings.stamp_ns, _frame(readings.sensors[row])),
@@ -79,7 +79,7 @@ def temperature(readings: PressureReadings, row: int) -> Temperature:
     )
 
 
-def magnetic_field(readings: MagneticReadings, row: int) -> MagneticField:
+def magnetic_field(readings: MagneticSamples, row: int) -> MagneticField:
     """Returns the magnetic flux density in the sensor's frame, T."""
     return MagneticField(
         header(readings.stamp_ns, _frame(readings.sensors[row])),
@@ -89,15 +89,15 @@ def magnetic_field(readings: MagneticReadings, row: int) -> MagneticField:
 
 
 NAVIGATION_TOPICS: dict[type[Any], tuple[SensorTopic, ...]] = {
-    GnssReadings: (
+    GnssSamples: (
         SensorTopic("", NavSatFix, fix),
         SensorTopic("_velocity", TwistWithCovarianceStamped, fix_velocity),
     ),
-    PressureReadings: (
+    PressureSamples: (
         SensorTopic("", FluidPressure, pressure),
         SensorTopic("/temperature", Temperature, temperature),
     ),
-    MagneticReadings: (SensorTopic("", MagneticField, magnetic_field),),
+    MagneticSamples: (SensorTopic("", MagneticField, magnetic_field),),
 }
 """Topics of each kind of samples."""
 

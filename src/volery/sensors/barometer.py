@@ -18,7 +18,7 @@ from volery.core.clock import NS_PER_S, Schedule
 from volery.sensors.bank import NoisyBank
 from volery.sensors.model import SensorModel, load_model
 from volery.sensors.noise import gauss_markov_of_sigma
-from volery.sensors.samples import PressureReadings, SensorId, owned
+from volery.sensors.samples import PressureSamples, SensorId, owned
 
 Array = NDArray[np.float64]
 
@@ -68,7 +68,7 @@ class BarometerBank(NoisyBank):
         )
         self._drift = self._wander.sigma * self._noise.start()[:, 0]
 
-    def sample(self, k: int, time_ns: int, fleet: Fleet) -> PressureReadings:
+    def sample(self, k: int, time_ns: int, fleet: Fleet) -> PressureSamples:
         """Returns pressures (S,) Pa and temperatures (S,) K of measurement `k`; see `Bank`."""
         lever = rotations.rotate(fleet.state.attitude[self._rows], self._position_body)
         z = fleet.state.position_map[self._rows, 2] + lever[:, 2]
@@ -76,7 +76,7 @@ class BarometerBank(NoisyBank):
         noise = self._noise.measurement(k)
         pressure += self._drift + self._model.noise_pa * noise[:, 0]
         self._drift = self._wander.decay * self._drift + self._wander.step * noise[:, 1]
-        return PressureReadings(
+        return PressureSamples(
             self.sensors,
             time_ns,
             owned(pressure),

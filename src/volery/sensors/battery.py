@@ -8,7 +8,7 @@ from volery.control.fleet import Fleet
 from volery.core.clock import Schedule
 from volery.core.errors import DataFileError
 from volery.sensors.bank import Memoryless, uav_rows
-from volery.sensors.samples import BatteryReadings, SensorId, owned
+from volery.sensors.samples import BatterySamples, SensorId, owned
 
 
 class BatteryBank(Memoryless):
@@ -36,10 +36,10 @@ class BatteryBank(Memoryless):
         self._capacity_ah = owned(np.array([pack.capacity_ah for pack in packs]))
         self._cells = owned(np.array([pack.cells for pack in packs]))
 
-    def sample(self, k: int, time_ns: int, fleet: Fleet) -> BatteryReadings:  # noqa: ARG002
+    def sample(self, k: int, time_ns: int, fleet: Fleet) -> BatterySamples:  # noqa: ARG002
         """Returns voltages, currents and charges (S,) of measurement `k`; see `Bank`."""
         state, rows = fleet.state, self._rows
-        return BatteryReadings(
+        return BatterySamples(
             self.sensors,
             time_ns,
             owned(state.battery_voltage[rows]),

@@ -12,7 +12,7 @@ from volery.core import rotations
 from volery.core.clock import Schedule
 from volery.core.rows import in_one_piece
 from volery.sensors.bank import Memoryless
-from volery.sensors.samples import OdometryReadings, SensorId, owned
+from volery.sensors.samples import OdometrySamples, SensorId, owned
 
 Array = NDArray[np.float64]
 
@@ -42,13 +42,13 @@ class EstimateBank(Memoryless):
         self._taken = in_one_piece(rows)
         self._gyro_variance = gyro_variance
 
-    def sample(self, k: int, time_ns: int, fleet: Fleet) -> OdometryReadings:  # noqa: ARG002
+    def sample(self, k: int, time_ns: int, fleet: Fleet) -> OdometrySamples:  # noqa: ARG002
         """Returns the present estimates: poses in the map frame, twists in the body frame (FLU)."""
         state, rows = self._estimator.state, self._taken
         velocity, attitude = state.velocity_map[rows], state.attitude[rows].copy()
         covariance = self._estimator.covariance(self._rows)
         twist = twist_covariance(covariance, velocity, attitude, self._gyro_variance)
-        return OdometryReadings(
+        return OdometrySamples(
             self.sensors,
             time_ns,
             owned(state.position_map[rows].copy()),

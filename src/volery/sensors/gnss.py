@@ -21,7 +21,7 @@ from volery.sensors.bank import NoisyBank, rows_of
 from volery.sensors.gnss_denial import NOWHERE, GnssDenial
 from volery.sensors.model import SensorModel, load_model
 from volery.sensors.noise import gauss_markov_of_sigma
-from volery.sensors.samples import GnssReadings, SensorId, owned
+from volery.sensors.samples import GnssSamples, SensorId, owned
 from volery.vehicle.pose_history import KEPT_NS, PoseHistory, pose_at
 
 Array = NDArray[np.float64]
@@ -102,7 +102,7 @@ class GnssBank(NoisyBank):
         self._denied_from_ns = np.full(len(sensors), FOREVER_NS)
         self._denied_until_ns = np.full(len(sensors), FOREVER_NS)
 
-    def sample(self, k: int, time_ns: int, fleet: Fleet) -> GnssReadings:
+    def sample(self, k: int, time_ns: int, fleet: Fleet) -> GnssSamples:
         """Returns fix number `k` of all receivers, in the map frame; see `Bank`."""
         position, velocity = _antennas(fleet.history, self._rows, self._lever_body, time_ns)
         has_fix = self._acquire(time_ns, position)
@@ -114,7 +114,7 @@ class GnssBank(NoisyBank):
         velocity[~has_fix] = np.nan
         known = 1.0 if self._noise.enabled else 0.0
         shape = position.shape
-        return GnssReadings(
+        return GnssSamples(
             self.sensors,
             time_ns,
             self._frame,

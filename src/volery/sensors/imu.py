@@ -20,7 +20,7 @@ from volery.sensors.bank import NoisyBank
 from volery.sensors.inertial_kernels import feel_motion
 from volery.sensors.model import SensorModel, load_model
 from volery.sensors.noise import gauss_markov
-from volery.sensors.samples import ImuReadings, SensorId, owned
+from volery.sensors.samples import ImuSamples, SensorId, owned
 
 Array = NDArray[np.float64]
 
@@ -89,7 +89,7 @@ class ImuBank(NoisyBank):
         self._start_ns = np.zeros(len(sensors), np.int64)
         self._switch_on(np.arange(len(sensors)), 0)
 
-    def sample(self, k: int, time_ns: int, fleet: Fleet) -> ImuReadings:
+    def sample(self, k: int, time_ns: int, fleet: Fleet) -> ImuSamples:
         """Returns rates (rad/s) and specific forces (m/s^2), (S, 3) each, in the sensor frames.
 
         They belong to measurement number `k`; see `Bank`.
@@ -113,7 +113,7 @@ class ImuBank(NoisyBank):
                 age_s = (time_ns - self._start_ns) / NS_PER_S
                 reading += self._warm_up_bias * np.exp(-age_s / self._warm_up_s)[:, None]
             self._bias = self._wander.decay * self._bias + self._wander.step * noise[:, 6:]
-        return ImuReadings(
+        return ImuSamples(
             self.sensors,
             time_ns,
             owned(reading[:, :3].copy()),

@@ -80,7 +80,7 @@ class WarmUp(SensorModel):
     time_constant_s: PositiveFloat = 1.0
 
 
-class ParticleSight(SensorModel):
+class ParticleVisibility(SensorModel):
     """Interaction with particles in the air; `particle_echoes` explains the model."""
 
     beam_diameter_m: NonNegativeFloat = 0.005
@@ -104,7 +104,7 @@ class LidarModel(SensorModel):
     mixed_pixels: MixedPixels
     intensity: Intensity | None = None
     warm_up: WarmUp = WarmUp()
-    particles: ParticleSight = ParticleSight()
+    particles: ParticleVisibility = ParticleVisibility()
     exact: bool = False
     """Exact ranges: without noise, rounding, dropout and mixing."""
 

@@ -15,7 +15,7 @@ from volery.sensors.bank import NoisyBank
 from volery.sensors.inertial_kernels import feel_vector
 from volery.sensors.model import SensorModel, load_model
 from volery.sensors.noise import gauss_markov
-from volery.sensors.samples import MagneticReadings, SensorId, owned
+from volery.sensors.samples import MagneticSamples, SensorId, owned
 
 Array = NDArray[np.float64]
 Row = tuple[float, float, float]
@@ -70,7 +70,7 @@ class MagnetometerBank(NoisyBank):
         self._wander = gauss_markov(model.random_walk_t_s_sqrt_hz, model.bias_correlation_s, dt)
         self._bias = np.zeros((len(sensors), 3))
 
-    def sample(self, k: int, time_ns: int, fleet: Fleet) -> MagneticReadings:
+    def sample(self, k: int, time_ns: int, fleet: Fleet) -> MagneticSamples:
         """Returns fields (S, 3) T in the sensor frames, of measurement `k`; see `Bank`."""
         outer = np.empty((len(self._rows), 3))
         feel_vector(
@@ -80,7 +80,7 @@ class MagnetometerBank(NoisyBank):
         noise = self._noise.measurement(k)
         field += self._bias + self._white * noise[:, :3]
         self._bias = self._wander.decay * self._bias + self._wander.step * noise[:, 3:]
-        return MagneticReadings(
+        return MagneticSamples(
             self.sensors,
             time_ns,
             owned(field),

@@ -15,7 +15,7 @@ from volery.core.rows import in_one_piece
 from volery.sensors.bank import Memoryless, NoisyBank, uav_rows
 from volery.sensors.inertial_kernels import body_twists
 from volery.sensors.model import SensorModel, load_model
-from volery.sensors.samples import OdometryReadings, SensorId, owned
+from volery.sensors.samples import OdometrySamples, SensorId, owned
 
 Array = NDArray[np.float64]
 _NUMBERS_A_SAMPLE = 10
@@ -69,7 +69,7 @@ class OdometryBank(NoisyBank):
         self._flown = np.zeros(len(sensors))
         self._last_position = self._position_odom.copy()
 
-    def sample(self, k: int, time_ns: int, fleet: Fleet) -> OdometryReadings:
+    def sample(self, k: int, time_ns: int, fleet: Fleet) -> OdometrySamples:
         """Returns poses in the odometry frame and twists in the body frame (FLU), with variances.
 
         They belong to measurement number `k` of all S sources; see `Bank`.
@@ -92,7 +92,7 @@ class OdometryBank(NoisyBank):
             variance[:, [0, 1, 2, 5]] = self._flown[:, None] * self._drift**2
             # Effect of the yaw error on a straight path of any direction.
             variance[:, :2] += (self._drift[3] ** 2 * self._flown**3 / 3.0)[:, None]
-        return OdometryReadings(
+        return OdometrySamples(
             self.sensors,
             time_ns,
             owned(self._position_odom.copy()),
@@ -128,11 +128,11 @@ class GroundTruthBank(Memoryless):
         self._rows = uav_rows(sensors)
         self._taken = in_one_piece(self._rows)
 
-    def sample(self, k: int, time_ns: int, fleet: Fleet) -> OdometryReadings:  # noqa: ARG002
+    def sample(self, k: int, time_ns: int, fleet: Fleet) -> OdometrySamples:  # noqa: ARG002
         """Returns the present state of all S UAVs of the bank."""
         twist = _twist_body(fleet, self._rows)
         zero = np.zeros((len(self._rows), 6))
-        return OdometryReadings(
+        return OdometrySamples(
             self.sensors,
             time_ns,
             owned(fleet.state.position_map[self._taken].copy()),

@@ -79,7 +79,7 @@ class CameraFrames:
 
 
 @dataclass(frozen=True)
-class ImuReadings:
+class ImuSamples:
     """Rates and specific forces in the sensors' frames."""
 
     MEASURED: ClassVar[dict[str, int]] = {"angular_velocity": 3, "specific_force": 3}
@@ -95,7 +95,7 @@ class ImuReadings:
 
 
 @dataclass(frozen=True)
-class RangeReadings:
+class RangeSamples:
     """Distances of single-cone range finders."""
 
     MEASURED: ClassVar[dict[str, int]] = {"ranges": 1}
@@ -112,7 +112,7 @@ class RangeReadings:
 
 
 @dataclass(frozen=True)
-class OdometryReadings:
+class OdometrySamples:
     """Poses in the odometry frame and twists in the body frame."""
 
     MEASURED: ClassVar[dict[str, int]] = {"position_odom": 3}
@@ -149,7 +149,7 @@ class JointAngles:
 
 
 @dataclass(frozen=True)
-class GnssReadings:
+class GnssSamples:
     """Fixes of GNSS receivers: position and velocity of the antennas."""
 
     MEASURED: ClassVar[dict[str, int]] = {"position_map": 3}
@@ -172,7 +172,7 @@ class GnssReadings:
 
 
 @dataclass(frozen=True)
-class PressureReadings:
+class PressureSamples:
     """Static pressure and temperature of the air at the sensors."""
 
     MEASURED: ClassVar[dict[str, int]] = {"pressure": 1}
@@ -187,7 +187,7 @@ class PressureReadings:
 
 
 @dataclass(frozen=True)
-class MagneticReadings:
+class MagneticSamples:
     """Magnetic flux density in the sensors' frames."""
 
     MEASURED: ClassVar[dict[str, int]] = {"field": 3}
@@ -200,7 +200,7 @@ class MagneticReadings:
 
 
 @dataclass(frozen=True)
-class BatteryReadings:
+class BatterySamples:
     """Measurements of battery monitors."""
 
     MEASURED: ClassVar[dict[str, int]] = {"voltage": 1, "current": 1}
@@ -224,14 +224,14 @@ class BatteryReadings:
 Samples: TypeAlias = (
     LidarScans
     | CameraFrames
-    | ImuReadings
-    | RangeReadings
-    | OdometryReadings
+    | ImuSamples
+    | RangeSamples
+    | OdometrySamples
     | JointAngles
-    | GnssReadings
-    | PressureReadings
-    | MagneticReadings
-    | BatteryReadings
+    | GnssSamples
+    | PressureSamples
+    | MagneticSamples
+    | BatterySamples
 )
 
 

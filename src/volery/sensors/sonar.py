@@ -14,7 +14,7 @@ from volery.core import rotations
 from volery.core.clock import Schedule
 from volery.sensors.bank import NoisyBank
 from volery.sensors.model import SensorModel, load_model
-from volery.sensors.samples import RangeReadings, SensorId, owned
+from volery.sensors.samples import RangeSamples, SensorId, owned
 from volery.world.scene import Scene
 
 Array = NDArray[np.float64]
@@ -67,7 +67,7 @@ class SonarBank(NoisyBank):
         self._variance = model.noise_m**2 + rounding if self._noise.enabled else 0.0
         self._cone = _cone_directions(math.radians(model.field_of_view_deg) / 2.0)
 
-    def sample(self, k: int, time_ns: int, fleet: Fleet) -> RangeReadings:
+    def sample(self, k: int, time_ns: int, fleet: Fleet) -> RangeSamples:
         """Returns ranges (S,) m of measurement number `k`; see `Bank`."""
         rows, rays = self._rows, len(self._cone)
         attitude = fleet.state.attitude[rows]
@@ -89,7 +89,7 @@ class SonarBank(NoisyBank):
             nearest = np.round(nearest / step) * step
         nearest[nearest > self._model.range_max_m] = np.inf
         nearest[nearest < self._model.range_min_m] = -np.inf
-        return RangeReadings(
+        return RangeSamples(
             self.sensors,
             time_ns,
             owned(nearest),

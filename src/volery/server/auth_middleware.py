@@ -20,7 +20,7 @@ from starlette.websockets import WebSocket
 
 from volery.bridges.origins import Origins, name_of
 from volery.core.network_access import LOOPBACK
-from volery.core.token_guesses import TokenGuesses
+from volery.core.token_attempts import TokenAttempts
 from volery.server.auth import Role, Sessions, Tokens
 from volery.server.replies import RefusedError, refused
 
@@ -42,7 +42,7 @@ _HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
 }
 _WRONG_TOKEN_S = 0.5
-"""Delay after a wrong token, in addition to the turn (`TokenGuesses`)."""
+"""Delay after a wrong token, in addition to the turn (`TokenAttempts`)."""
 _GONE_S = 0.2
 """Time for a refused WebSocket to close."""
 _HARMLESS = {"GET", "HEAD", "OPTIONS"}
@@ -81,7 +81,7 @@ class AuthMiddleware:
         self._cookie = cookie
         self._only_loopback = only_loopback
         self._sessions = Sessions()
-        self._guesses = TokenGuesses()
+        self._guesses = TokenAttempts()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Passes a request on, or refuses it."""

@@ -23,8 +23,8 @@ from volery.bridges.unsent import bound_unsent
 from volery.core.errors import BridgeError
 from volery.core.listener import Listener, Opening, open_listener
 from volery.core.network_access import LOOPBACK
+from volery.core.pending_connections import look_at_http
 from volery.core.rare_log import RepeatFilter
-from volery.core.waiting_room import look_at_http
 from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.schema import Scenario
 from volery.server.app import make_app

@@ -8,7 +8,7 @@ from typing import cast
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import CloseCode, Frame
 
-from volery.bridges.frame_limits import MAX_FRAGMENTS, FrameLimits, HeldTransport
+from volery.bridges.frame_limits import MAX_FRAGMENTS, FrameLimits, PausedTransport
 
 READ_BYTES = 16 << 10
 """Max bytes of a read; all frames in it are handled before another client has its turn."""
@@ -20,7 +20,7 @@ class PageWebSocket(WebSocketsSansIOProtocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Implements asyncio.Protocol."""
         transport.max_size = READ_BYTES  # type: ignore[attr-defined]
-        self._held = HeldTransport(cast("asyncio.Transport", transport))
+        self._held = PausedTransport(cast("asyncio.Transport", transport))
         self._limits = FrameLimits(self._held, self.loop)
         super().connection_made(cast("asyncio.BaseTransport", self._held))
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.frames import gltf_from_enu
-from volery.world.cover_picture import cover_places, cover_png
 from volery.world.ground_cover import GroundCover
+from volery.world.ground_cover_image import cover_places, cover_png
 from volery.world.materials import Material
 from volery.world.mesh import Mesh
 from volery.world.scene_content import PLAIN, Look

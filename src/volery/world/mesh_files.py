@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from volery.core.errors import DataFileError
 from volery.core.frames import enu_from_gltf
 from volery.core.plurals import counted
-from volery.world.gltf_reading import Part, read_gltf
+from volery.world.gltf_import import Part, read_gltf
 from volery.world.mesh import Mesh
 
 MOST_BYTES = 128_000_000

@@ -9,7 +9,7 @@ from volery.autonomy.slam.keyframe_graph import KeyframeGraph
 from volery.autonomy.slam.keyframes import Keyframe
 from volery.autonomy.slam.loop_closure import LoopClosure
 from volery.autonomy.slam.pose_graph import PoseGraphEdge
-from volery.autonomy.slam.relocalization import PlaceHypothesis, chosen
+from volery.autonomy.slam.relocalization import PoseHypothesis, chosen
 from volery.autonomy.slam.settings import ScanMatching
 from volery.autonomy.slam.tracker import Tracker
 
@@ -98,7 +98,7 @@ def test_keyframes_of_a_session_that_was_never_placed_are_not_tried():
 def guess(older, x, margin, newer=26):
     """A guess that the keyframe `newer` lies at (x, 0, 0)."""
     edge = PoseGraphEdge(older, newer, np.array([x - 7.0 * older, 0.0, 0.0, 0.0]), np.ones(4), True)
-    return PlaceHypothesis(edge, margin, np.array([x, 0.0, 0.0, 0.0]))
+    return PoseHypothesis(edge, margin, np.array([x, 0.0, 0.0, 0.0]))
 
 
 @pytest.mark.parametrize(

@@ -15,10 +15,10 @@ from volery.bench.document import render
 from volery.bench.peers import rays
 from volery.bench.peers.catalogue import PEERS, Contest, HoverContest, Peer, RayContest
 from volery.bench.peers.contests import measure_peers
-from volery.bench.peers.conversation import Conversation
 from volery.bench.peers.environments import environment
 from volery.bench.peers.failure import PeerError, last_line
 from volery.bench.peers.hover import check_hover, hover_task
+from volery.bench.peers.peer_process import PeerProcess
 from volery.bench.peers.task import Task
 from volery.bench.registry import Measured, Result
 from volery.cli.app import app
@@ -124,7 +124,7 @@ def test_words_and_answers(tmp_path: Path) -> None:
     script = tmp_path / "good.py"
     script.write_text(GOOD)
     request = {"packages": ["numpy"], "places": [[0.0, 1.0, 2.0]]}
-    with Conversation(HERE, script, request, tmp_path) as conversation:
+    with PeerProcess(HERE, script, request, tmp_path) as conversation:
         assert conversation.versions() == {"numpy": np.__version__}
         assert 0.002 <= conversation.round() < 1.0
         assert conversation.facts() == {"position_error_m": 0.01, "request": request}
@@ -141,7 +141,7 @@ def test_words_and_answers(tmp_path: Path) -> None:
 def test_failures_of_a_script_are_told(tmp_path: Path, script: str, message: str) -> None:
     file = tmp_path / "bad.py"
     file.write_text(script)
-    with Conversation(HERE, file, {"packages": []}, tmp_path, round_timeout_s=0.5) as conversation:
+    with PeerProcess(HERE, file, {"packages": []}, tmp_path, round_timeout_s=0.5) as conversation:
 
         def converse() -> None:
             conversation.versions()

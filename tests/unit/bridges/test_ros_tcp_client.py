@@ -19,7 +19,7 @@ from volery.bridges.ros_tcp.client import RosTcpClient
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.bridges.rosbridge.rosapi_bridge import RosApiBridge
 from volery.core.errors import BridgeError, GraphError
-from volery.graph.connection import TellsTopics, call_and_wait
+from volery.graph.connection import ListsTopics, call_and_wait
 from volery.graph.messages import Header, String, Time, message_type
 from volery.graph.service_reply import ServiceReply
 
@@ -137,7 +137,7 @@ def test_publications_of_several_topics_keep_their_order(loop, client):
 def test_topics_are_told_with_the_graphs_own_types(loop, client):
     loop.graph.advertise("/out", STRING)
     loop.graph.advertise("/clock", "rosgraph_msgs/msg/Clock")
-    assert isinstance(client, TellsTopics)
+    assert isinstance(client, ListsTopics)
     assert client.topic_types() == {"/clock": "rosgraph_msgs/msg/Clock", "/out": STRING}
     with pytest.raises(GraphError, match="no topic '/none'"):
         client.subscribe("/none", wake=lambda: None)

@@ -16,7 +16,7 @@ from volery.bridges.logs import log_writer as bag_module
 from volery.bridges.logs.chunks import open_chunks
 from volery.bridges.logs.log_writer import open_log
 from volery.bridges.logs.records import LogWalk
-from volery.bridges.logs.timeline import Place, Timeline
+from volery.bridges.logs.timeline import Timeline, TimelinePosition
 from volery.core.errors import RecordingError
 from volery.graph import messages as m
 
@@ -41,7 +41,7 @@ def write(path, entries, chunk_every=7, end=True):
 
 def everything(log):
     line = Timeline(log)
-    place, found, over = Place(0, 0), [], False
+    place, found, over = TimelinePosition(0, 0), [], False
     while not over:
         shown, place, over = line.take(place, 1 << 61, set(log.topics))
         found += shown

@@ -5,7 +5,7 @@ import pytest
 
 from volery.core.errors import CommandError
 from volery.sensors.faults import FaultKind, FaultTable
-from volery.sensors.samples import ImuReadings, RangeReadings, SensorId
+from volery.sensors.samples import ImuSamples, RangeSamples, SensorId
 
 SENSORS = tuple(SensorId(i, f"uav{i + 1}", "range") for i in range(3))
 
@@ -14,16 +14,16 @@ def ranges(k):
     """Reading k of three sonars: 10 k + row."""
     values = 10.0 * k + np.arange(3.0)
     values.flags.writeable = False
-    return RangeReadings(SENSORS, k, values, 0.4, 0.2, 7.0, 1e-4)
+    return RangeSamples(SENSORS, k, values, 0.4, 0.2, 7.0, 1e-4)
 
 
 def imus():
     zero = np.zeros((3, 3))
-    return ImuReadings(SENSORS, 0, zero, zero + 9.0, 0.1, 0.2)
+    return ImuSamples(SENSORS, 0, zero, zero + 9.0, 0.1, 0.2)
 
 
 def table():
-    return FaultTable(SENSORS, RangeReadings.MEASURED)
+    return FaultTable(SENSORS, RangeSamples.MEASURED)
 
 
 def test_without_faults_samples_pass_untouched():
@@ -69,7 +69,7 @@ def test_a_bias_is_added_to_what_is_measured():
 
 
 def test_a_bias_of_several_quantities():
-    faults = FaultTable(SENSORS, ImuReadings.MEASURED)
+    faults = FaultTable(SENSORS, ImuSamples.MEASURED)
     faults.set(1, "biased", [0.1, 0.2, 0.3, 1.0, 2.0, 3.0])
     sent = faults.apply(imus())
     np.testing.assert_allclose(sent.angular_velocity, [[0] * 3, [0.1, 0.2, 0.3], [0] * 3])
@@ -109,7 +109,7 @@ def test_wrong_faults_are_refused(row, kind, value, said):
 
 def test_a_bias_of_an_imu_needs_all_its_numbers():
     with pytest.raises(CommandError, match="6 finite numbers"):
-        FaultTable(SENSORS, ImuReadings.MEASURED).set(0, "biased", 0.1)
+        FaultTable(SENSORS, ImuSamples.MEASURED).set(0, "biased", 0.1)
 
 
 def test_who_has_worked_for_long_gets_stuck_and_is_mended_also_after_a_snapshot():

@@ -12,7 +12,7 @@ from volery.core.errors import CommandError, DataFileError
 from volery.scenario.access import SHIPPED_DATA
 from volery.world.grid_maps import GridMap, read_cells
 from volery.world.grid_maps.grid_map import MOST_CELLS
-from volery.world.grid_maps.reading import parse_cells
+from volery.world.grid_maps.parsing import parse_cells
 
 PATTERN = np.array([[1, 0, 0, 1], [0, 0, 1, 0], [1, 1, 0, 0]], dtype=bool)
 """Row 0: lowest y."""

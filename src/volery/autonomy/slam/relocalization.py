@@ -37,7 +37,7 @@ the hypotheses contradict each other.
 """
 
 
-class PlaceHypothesis(NamedTuple):
+class PoseHypothesis(NamedTuple):
     """A hypothesis of the current session's pose in the map."""
 
     edge: PoseGraphEdge
@@ -53,7 +53,7 @@ class Relocalization:
         self.doubted: set[int] = set()
         """Keyframes with uncertain poses."""
         self._cursor = 0
-        self._guesses: list[PlaceHypothesis] = []
+        self._guesses: list[PoseHypothesis] = []
         self._hint: Array | None = None
 
     def begin(self, doubted: set[int], hint: Array | None = None) -> None:
@@ -87,12 +87,12 @@ class Relocalization:
             if found is not None:
                 place = compose(poses[row], found.edge.measured)
                 moved = compose(place, between(poses[newest], np.zeros(4)))
-                self._guesses.append(PlaceHypothesis(found.edge, found.margin, moved))
+                self._guesses.append(PoseHypothesis(found.edge, found.margin, moved))
         return chosen(self._guesses, newest, poses[newest], self._hint)
 
 
 def chosen(
-    guesses: Sequence[PlaceHypothesis], newest: int, pose: Array, hint: Array | None = None
+    guesses: Sequence[PoseHypothesis], newest: int, pose: Array, hint: Array | None = None
 ) -> PoseGraphEdge | None:
     """Returns the best hypothesis of the newest keyframe, at `pose` (4,), if it is certain.
 
@@ -117,9 +117,9 @@ def chosen(
     return max(fresh, key=lambda guess: guess.margin).edge
 
 
-def _weight(guesses: Sequence[PlaceHypothesis]) -> float:
+def _weight(guesses: Sequence[PoseHypothesis]) -> float:
     """Returns the sum of margins of the hypotheses whose older keyframes share no returns."""
-    counted: list[PlaceHypothesis] = []
+    counted: list[PoseHypothesis] = []
     for guess in sorted(guesses, key=lambda guess: -guess.margin):
         if all(abs(guess.edge.origin - other.edge.origin) > 2 * AROUND for other in counted):
             counted.append(guess)

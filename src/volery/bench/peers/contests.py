@@ -12,9 +12,9 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 from volery.bench.peers.catalogue import PEERS, Contest, HoverContest, Peer
-from volery.bench.peers.conversation import Conversation
 from volery.bench.peers.environments import environment
 from volery.bench.peers.failure import PeerError
+from volery.bench.peers.peer_process import PeerProcess
 from volery.bench.peers.task import Task
 from volery.bench.registry import Measured
 
@@ -86,7 +86,7 @@ class _Match:
         if python is not None:
             request = {**self._task.request, "packages": self._peer.packages}
             try:
-                with Conversation(python, script, request, folder) as conversation:
+                with PeerProcess(python, script, request, folder) as conversation:
                     return self._beside(conversation)
             except PeerError as failure:
                 name = f"{self._peer.name}_{self._contest.case}"
@@ -96,7 +96,7 @@ class _Match:
         self._task.check(None)
         return Measured(self._figures("ours_", self._task.amount / ours), failures)
 
-    def _beside(self, conversation: Conversation) -> Measured:
+    def _beside(self, conversation: PeerProcess) -> Measured:
         versions = conversation.versions()
         ours, theirs = _medians([self._ours, conversation.round], self._seconds)
         further = self._task.check(conversation.facts())

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from volery.bridges.logs.chunks import open_chunks
 from volery.bridges.logs.decoding import LogDecoder
-from volery.bridges.logs.timeline import Place, Shown, Timeline
+from volery.bridges.logs.timeline import Shown, Timeline, TimelinePosition
 from volery.bridges.topic_patterns import topic_filter
 from volery.core.errors import GraphError, RecordingError
 from volery.graph.graph import Graph, Publisher
@@ -59,7 +59,7 @@ class Playback:
         """Time of the log's own clock there; during a publication, the message's time."""
         self.refused: dict[str, str] = {}
         """Topics that cannot be played, and why not."""
-        self._place = Place(0, 0)
+        self._place = TimelinePosition(0, 0)
         self._decoder = LogDecoder()
         self._publishers: dict[int, Publisher] = {}
         self._is_latched = topic_filter(LATCHED)
@@ -113,7 +113,7 @@ class Playback:
         """Seeks to a time within the log and publishes the state of that time."""
         self.position_ns = min(max(time_ns, self.start_ns), self.end_ns)
         if self.position_ns == self.start_ns:
-            self._place = Place(0, 0)
+            self._place = TimelinePosition(0, 0)
         else:
             self._place = self._line.after(self.position_ns)
         self._show(self._wanted())

@@ -51,7 +51,7 @@ class ReplayInfo:
     """Topics with skipped messages, each with the first reason."""
 
 
-class _Place(NamedTuple):
+class _Cursor(NamedTuple):
     """Position of a replay: start of its lap, and the number of the log's next record."""
 
     lap_ns: int
@@ -144,7 +144,7 @@ class Replay:
             raise RecordingError(f"{self._stream.path}: this replay was started before")
         self._started = self._running = True
         self._graph, self._timers, self._now_ns = graph, timers, now_ns
-        self._go_on(_Place(now_ns() + self._offset_ns, 0))
+        self._go_on(_Cursor(now_ns() + self._offset_ns, 0))
 
     def stop(self) -> None:
         """Stops publishing and clears latched messages; further calls do nothing."""
@@ -157,23 +157,23 @@ class Replay:
 
     # A restored snapshot brings back an earlier deadline: its position selects the next record.
 
-    def _go_on(self, place: _Place) -> None:
+    def _go_on(self, place: _Cursor) -> None:
         """Publishes what is due from `place` on, then waits for the next message."""
         self._stream.seek(place.record)
         while (record := self._stream.peek()) is not None:
             due_ns = self._due_ns(place.lap_ns, record)
             if due_ns is not None and due_ns > self._now_ns():
-                self._wait(due_ns, _Place(place.lap_ns, self._stream.index))
+                self._wait(due_ns, _Cursor(place.lap_ns, self._stream.index))
                 return
             self._stream.advance()
             if due_ns is not None:
                 self._publish(record)
         self._end_lap(place)
 
-    def _wait(self, due_ns: int, place: _Place) -> None:
+    def _wait(self, due_ns: int, place: _Cursor) -> None:
         self._timers.at(due_ns, partial(self._wake, place))
 
-    def _wake(self, place: _Place) -> None:
+    def _wake(self, place: _Cursor) -> None:
         if not self._stopped:
             self._running = True
             self._go_on(place)
@@ -203,7 +203,7 @@ class Replay:
             return
         self._published += 1
 
-    def _end_lap(self, place: _Place) -> None:
+    def _end_lap(self, place: _Cursor) -> None:
         self._laps += 1
         span_ns = self._stream.last_ns - self._stream.first_ns - self._begin_ns
         if not self._loop or self._stream.selected == 0 or span_ns < 0:
@@ -214,7 +214,7 @@ class Replay:
         gap_ns = span_ns / (self._stream.selected - 1) if self._stream.selected > 1 else 0.0
         lap_ns = max(round((span_ns + gap_ns) / self._rate), _SHORTEST_LAP_NS)
         next_lap = place.lap_ns + lap_ns
-        self._wait(next_lap, _Place(next_lap, 0))
+        self._wait(next_lap, _Cursor(next_lap, 0))
 
 
 def _check(rate: float, offset_s: float, begin_s: float) -> None:

@@ -36,7 +36,7 @@ class _Piece(NamedTuple):
     """Latest time on the line up to here, which never decreases."""
 
 
-class Place(NamedTuple):
+class TimelinePosition(NamedTuple):
     """Position of a message on the line: piece, and message in it."""
 
     piece: int
@@ -55,7 +55,7 @@ class Passage(NamedTuple):
     """Some messages, the position after them, and whether they were the last ones there."""
 
     shown: list[Shown]
-    place: Place
+    place: TimelinePosition
     over: bool
 
 
@@ -74,16 +74,16 @@ class Timeline:
         """Whether the log's own time went back somewhere."""
         return any(piece.shift_ns for piece in self._pieces)
 
-    def shift_ns(self, place: Place) -> int:
+    def shift_ns(self, place: TimelinePosition) -> int:
         """Returns the offset of the line to the log's own time, before a position."""
         number = min(place.piece, len(self._pieces) - 1)
         at_its_start = number == place.piece and place.message <= self._pieces[number].first
         return self._pieces[max(number - at_its_start, 0)].shift_ns
 
-    def after(self, time_ns: int) -> Place:
+    def after(self, time_ns: int) -> TimelinePosition:
         """Returns the position of the first message that is later than `time_ns`."""
         number = bisect_left(self._ends, time_ns + 1)
-        place = Place(number, 0)
+        place = TimelinePosition(number, 0)
         for _ in range(_MAX_FRUITLESS):
             passage = self.take(place, time_ns, frozenset())
             place = passage.place
@@ -91,7 +91,7 @@ class Timeline:
                 break
         return place
 
-    def take(self, place: Place, until_ns: int, channels: Set[int]) -> Passage:
+    def take(self, place: TimelinePosition, until_ns: int, channels: Set[int]) -> Passage:
         """Returns messages of `channels` from a position on, up to `until_ns`, at most one chunk.
 
         At most one chunk is read, even if an index announces messages that are not in it.
@@ -107,16 +107,16 @@ class Timeline:
                 for k in range(max(message, piece.first), len(heads)):
                     head = heads[k]
                     if head.time_ns + shift_ns > until_ns:
-                        return Passage(shown, Place(number, k), over=True)
+                        return Passage(shown, TimelinePosition(number, k), over=True)
                     if head.channel in channels:
                         record = self.log.record(content, head)
                         shown.append(Shown(head.time_ns + shift_ns, head.channel, record))
                 number, message = number + 1, 0
                 break
             number, message = number + 1, 0
-        return Passage(shown, Place(number, 0), over=number == len(self._pieces))
+        return Passage(shown, TimelinePosition(number, 0), over=number == len(self._pieces))
 
-    def last_before(self, place: Place, channels: Set[int]) -> list[Shown]:
+    def last_before(self, place: TimelinePosition, channels: Set[int]) -> list[Shown]:
         """Returns the last message of each channel before a position, in the order of the log."""
         missing = set(channels)
         found: list[Shown] = []
@@ -135,7 +135,7 @@ class Timeline:
                     found.append(Shown(head.time_ns + piece.shift_ns, head.channel, record))
         return found[::-1]
 
-    def since(self, place: Place, time_ns: int, channels: Set[int]) -> list[Shown]:
+    def since(self, place: TimelinePosition, time_ns: int, channels: Set[int]) -> list[Shown]:
         """Returns all messages of `channels` before a position and after `time_ns`, in order."""
         found: list[Shown] = []
         fruitless = 0
@@ -153,7 +153,7 @@ class Timeline:
         return found[::-1]
 
     def _backwards(
-        self, place: Place
+        self, place: TimelinePosition
     ) -> Iterator[tuple[_Piece, Callable[[], Content], Callable[[], tuple[Head, ...]]]]:
         """Yields the pieces before a position, the last one first.
 

@@ -85,7 +85,7 @@ class DeferredConnection:
 
         The queue is empty until the graph is connected.
         """
-        mailbox = _LateMailbox(topic, depth, wake, reliable=reliable)
+        mailbox = _DeferredQueue(topic, depth, wake, reliable=reliable)
 
         def fill(link: GraphConnection) -> None:
             mailbox.real = link.subscribe(topic, msgtype, depth=depth, reliable=reliable, wake=wake)
@@ -97,7 +97,7 @@ class DeferredConnection:
         """Implements `GraphConnection.unsubscribe`."""
 
         def empty(link: GraphConnection) -> None:
-            if isinstance(mailbox, _LateMailbox) and mailbox.real is not None:
+            if isinstance(mailbox, _DeferredQueue) and mailbox.real is not None:
                 link.unsubscribe(mailbox.real)
 
         self._announce(empty)
@@ -132,7 +132,7 @@ class DeferredConnection:
         action(self._link)
 
 
-class _LateMailbox(SubscriptionQueue):
+class _DeferredQueue(SubscriptionQueue):
     """Forwards to the queue of the connection to the graph."""
 
     real: SubscriptionQueue | None = None

@@ -24,8 +24,8 @@ from volery.bridges.ros_tcp.wire import MOST_PAYLOAD_BYTES, Generation, RosTcpFr
 from volery.core.errors import BridgeError
 from volery.core.listener import Listener, Opening, open_listener
 from volery.core.network_access import check_address
+from volery.core.pending_connections import look_at_binary
 from volery.core.preamble import Preamble
-from volery.core.waiting_room import look_at_binary
 from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.qos import DEFAULT_DEPTH
 from volery.graph.session import Gateway

@@ -23,7 +23,7 @@ from volery.bridges.ros_tcp.payloads import (
 from volery.bridges.ros_tcp.wire import Generation, RosTcpFrame, number_field, text_field
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.qos import DEFAULT_DEPTH
-from volery.graph.read_budget import Reading
+from volery.graph.read_budget import ReadScope
 from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Gateway
 from volery.graph.subscription_queue import Wake
@@ -76,7 +76,7 @@ class EndpointSession:
         }
 
     @property
-    def reading(self) -> Reading:
+    def reading(self) -> ReadScope:
         """Account of reading from the client, which limits its rate."""
         return self._session.reading
 

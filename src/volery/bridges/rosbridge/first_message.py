@@ -14,7 +14,7 @@ from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ProtocolError
 from websockets.frames import Frame, Opcode
 
-from volery.bridges.frame_limits import MAX_FRAGMENTS, FrameLimits, HeldTransport
+from volery.bridges.frame_limits import MAX_FRAGMENTS, FrameLimits, PausedTransport
 from volery.bridges.rosbridge.message_budget import MAX_UNAUTHORIZED_BYTES
 
 _READ_BYTES = 32 << 10
@@ -43,7 +43,7 @@ class GuardedConnection(ServerConnection):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Implements asyncio's method; reads in small pieces."""
         transport.max_size = _READ_BYTES  # type: ignore[attr-defined]
-        self._held = HeldTransport(cast("asyncio.Transport", transport))
+        self._held = PausedTransport(cast("asyncio.Transport", transport))
         self._limits = FrameLimits(self._held, self.loop)
         super().connection_made(cast("asyncio.BaseTransport", self._held))
 

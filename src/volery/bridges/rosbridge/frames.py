@@ -20,14 +20,14 @@ _MOST_FRAMES = 10_000
 Numbers = tuple[float, ...]
 
 
-class Known(NamedTuple):
+class KnownFrames(NamedTuple):
     """Pose of a frame in another one: position (3,) m, quaternion x y z w, and its time."""
 
     position: Numbers
     rotation: Numbers
     stamp: Time
 
-    def differs(self, other: Known, angle_rad: float, distance_m: float) -> bool:
+    def differs(self, other: KnownFrames, angle_rad: float, distance_m: float) -> bool:
         """Returns whether it has turned or moved by more than the limits."""
         cosine = abs(sum(a * b for a, b in zip(self.rotation, other.rotation, strict=True)))
         turned = 2.0 * math.acos(min(cosine, 1.0))
@@ -38,25 +38,25 @@ class Known(NamedTuple):
         transform = Transform(Vector3(*self.position), Quaternion(*self.rotation))
         return TransformStamped(Header(self.stamp, parent), child, transform)
 
-    def inverse(self) -> Known:
+    def inverse(self) -> KnownFrames:
         """Returns the pose of the other frame in this one."""
         rotation = (*(-v for v in self.rotation[:3]), self.rotation[3])
         back = _rotated(rotation, self.position)
-        return Known(tuple(-v for v in back), rotation, self.stamp)
+        return KnownFrames(tuple(-v for v in back), rotation, self.stamp)
 
-    def times(self, inner: Known) -> Known:
+    def times(self, inner: KnownFrames) -> KnownFrames:
         """Returns the pose in the outermost frame of a frame with the pose `inner` in this one."""
         moved = _rotated(self.rotation, inner.position)
         position = tuple(a + b for a, b in zip(self.position, moved, strict=True))
         stamp = max(self.stamp, inner.stamp, key=lambda time: (time.sec, time.nanosec))
-        return Known(position, _product(self.rotation, inner.rotation), stamp)
+        return KnownFrames(position, _product(self.rotation, inner.rotation), stamp)
 
 
 class Frames:
     """The newest pose of each frame in its parent."""
 
     def __init__(self) -> None:
-        self._parents: dict[str, tuple[str, Known]] = {}
+        self._parents: dict[str, tuple[str, KnownFrames]] = {}
 
     def learn(self, transforms: Iterable[Any]) -> None:
         """Stores transforms; ignores those of frames beyond ten thousand."""
@@ -65,12 +65,12 @@ class Frames:
             if child not in self._parents and len(self._parents) >= _MOST_FRAMES:
                 continue
             move, turn = stamped.transform.translation, stamped.transform.rotation
-            pose = Known(
+            pose = KnownFrames(
                 (move.x, move.y, move.z), (turn.x, turn.y, turn.z, turn.w), stamped.header.stamp
             )
             self._parents[child] = (stamped.header.frame_id.lstrip("/"), pose)
 
-    def pose(self, source: str, target: str) -> Known | None:
+    def pose(self, source: str, target: str) -> KnownFrames | None:
         """Returns the pose of `source` in `target`; None if the two are not connected."""
         ups, downs = self._to_root(source), self._to_root(target)
         common = next((name for name in ups if name in downs), None)
@@ -78,9 +78,9 @@ class Frames:
             return None
         return downs[common].inverse().times(ups[common])
 
-    def _to_root(self, frame: str) -> dict[str, Known]:
+    def _to_root(self, frame: str) -> dict[str, KnownFrames]:
         """Returns the pose of a frame in itself and in each of its ancestors, the nearest first."""
-        pose = Known((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), Time(0, 0))
+        pose = KnownFrames((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), Time(0, 0))
         found = {frame: pose}
         while len(found) < _LONGEST_CHAIN and frame in self._parents:
             frame, step = self._parents[frame]

@@ -42,7 +42,7 @@ from volery.bridges.rosbridge.wire import (
 )
 from volery.core.errors import BridgeError, VoleryError
 from volery.core.network_access import shows_token
-from volery.graph.read_budget import Reading
+from volery.graph.read_budget import ReadScope
 from volery.graph.session import Session
 
 LEVELS = ("error", "none", "warning", "info")
@@ -143,12 +143,12 @@ class RosbridgePeer:
     # ---------------------------------------------------------------------------------------- in
 
     @property
-    def reading(self) -> Reading:
+    def reading(self) -> ReadScope:
         """Account of reading from the client, which limits its rate."""
         return self._session.reading
 
     @property
-    def writing(self) -> Reading:
+    def writing(self) -> ReadScope:
         """Account of writing to the client."""
         return self._session.writing
 

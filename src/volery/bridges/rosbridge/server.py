@@ -31,9 +31,9 @@ from volery.bridges.unsent import bound_unsent
 from volery.core.errors import BridgeError
 from volery.core.listener import Listener, Opening, open_listener
 from volery.core.network_access import check_address, check_token, shows_token, tend
+from volery.core.pending_connections import look_at_http
 from volery.core.rare_log import RepeatFilter
-from volery.core.token_guesses import TokenGuesses
-from volery.core.waiting_room import look_at_http
+from volery.core.token_attempts import TokenAttempts
 from volery.graph.session import Gateway
 
 _log = logging.getLogger(__name__)
@@ -112,7 +112,7 @@ class RosbridgeServer:
         self._parameters = parameters
         self._server: Server | None = None
         self._listener: Listener | None = None
-        self._guesses = TokenGuesses()
+        self._guesses = TokenAttempts()
         self._rosapi: RosApi | None = None
         self._transforms: TfRepublisher | None = None
         self._clients: set[ServerConnection] = set()

@@ -14,7 +14,7 @@ import time
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from volery.bridges.rosbridge.frames import Frames, Known
+from volery.bridges.rosbridge.frames import Frames, KnownFrames
 from volery.core.errors import GraphError
 from volery.graph.messages import TFMessage, message_type
 from volery.graph.service_reply import ServiceReply
@@ -52,7 +52,7 @@ class _Topic:
     unused_since_s: float
     due_s: float = 0.0
     subscribers: int = 0
-    sent: dict[str, Known] = field(default_factory=dict)
+    sent: dict[str, KnownFrames] = field(default_factory=dict)
 
 
 class TfRepublisher:

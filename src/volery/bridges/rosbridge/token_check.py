@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 from volery.bridges.rosbridge.protocol import RosbridgePeer
 from volery.bridges.rosbridge.wire import Frame
-from volery.core.token_guesses import TokenGuesses
+from volery.core.token_attempts import TokenAttempts
 
 
 @dataclass(frozen=True)
 class TokenCheck:
     """Checks the frames of one client until it is authorized."""
 
-    guesses: TokenGuesses
+    guesses: TokenAttempts
     address: str
     wait_closed: Callable[[], Awaitable[None]]
     """Waits for the end of the connection."""

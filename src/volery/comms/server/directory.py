@@ -12,10 +12,10 @@ from collections.abc import Iterator
 from volery.comms.addresses import is_meant, is_station
 from volery.comms.control_payloads import Reason
 from volery.comms.protocol import StationFrame, StationFrameKind
-from volery.comms.server.mailbox import StationQueue
 from volery.comms.server.rate import RateLimit
 from volery.comms.server.records import StationRecord
 from volery.comms.server.settings import RouterSettings
+from volery.comms.server.station_queue import StationQueue
 from volery.core.clock import NS_PER_S
 
 _SWEEP_NS = NS_PER_S // 4

@@ -6,8 +6,8 @@ from collections import deque
 from dataclasses import dataclass, field
 
 from volery.comms.protocol import StationFrameParser
-from volery.comms.server.mailbox import StationQueue
 from volery.comms.server.rate import RateLimit
+from volery.comms.server.station_queue import StationQueue
 
 
 @dataclass(slots=True)

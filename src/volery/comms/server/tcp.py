@@ -23,7 +23,7 @@ from volery.core.errors import CommsError
 from volery.core.listener import Listener, open_listener
 from volery.core.network_access import check_address, check_token, tend, write_while_open
 from volery.core.preamble import Preamble
-from volery.core.token_guesses import TokenGuesses
+from volery.core.token_attempts import TokenAttempts
 
 PORT = 10200
 _TICK_S = 0.05
@@ -64,7 +64,7 @@ class CommsServer:
         self._server: asyncio.Server | None = None
         self._ticks: asyncio.TimerHandle | None = None
         self._listener: Listener | None = None
-        self._guesses: TokenGuesses | None = None
+        self._guesses: TokenAttempts | None = None
         self._checks: set[asyncio.Task[None]] = set()
         self._links: dict[int, _StationLink] = {}
         self._sends = False
@@ -104,7 +104,7 @@ class CommsServer:
             why = "the port is taken" if taken else str(error)
             raise CommsError(f"cannot listen on {self.host}:{self.port}: {why}") from None
         self.port = self._server.sockets[0].getsockname()[1]
-        self._guesses = None if self._settings.token is None else TokenGuesses()
+        self._guesses = None if self._settings.token is None else TokenAttempts()
         self._tick()
 
     async def stop(self) -> None:
@@ -148,7 +148,7 @@ class CommsServer:
             self._checks.add(check)
             check.add_done_callback(self._checks.discard)
 
-    async def _check(self, link: _StationLink, guesses: TokenGuesses) -> None:
+    async def _check(self, link: _StationLink, guesses: TokenAttempts) -> None:
         """Passes a station's early data to the router, one token check at a time."""
         async with guesses.turn(link.address):
             self.router.hold(link.number, is_held=False)

@@ -53,7 +53,7 @@ _REPEAT_S = 2.0
 """Period at which unchanged messages are repeated."""
 
 
-class _Told:
+class _Announced:
     """One topic of a UAV, sent to ground stations on change and periodically."""
 
     def __init__(self, name: str, msgtype: str, mailbox: SubscriptionQueue) -> None:
@@ -101,7 +101,7 @@ class StationBridge:
         self._token = token
         self._planes = planes_per_batch
         self._stations: dict[str, Station] = {}
-        self._told: dict[tuple[str, str], _Told] = {}
+        self._told: dict[tuple[str, str], _Announced] = {}
         self._task: asyncio.Task[None] | None = None
         self._session: Session | None = None
 
@@ -153,7 +153,7 @@ class StationBridge:
                 if session.graph.topic_type(topic) != msgtype:
                     continue  # no such topic so far
                 mailbox = session.subscribe(topic, msgtype, depth=1, wake=lambda: None)
-                self._told[key] = _Told(name, msgtype, mailbox)
+                self._told[key] = _Announced(name, msgtype, mailbox)
             payload = self._told[key].payload(self._loop.time())
             if payload is not None:
                 _send(station, ALL_GROUND, payload)

@@ -75,7 +75,7 @@ class Station:
         self._on_refusal = on_refusal
         self._on_joined = on_joined
         self._address = (host, port)
-        self._pipe: _Pipe | None = None
+        self._pipe: _ServerConnection | None = None
         self._task: asyncio.Task[None] | None = None
         self._acknowledges: asyncio.TimerHandle | None = None
         self._changed = asyncio.Event()
@@ -163,7 +163,7 @@ class Station:
         try:
             # Not `wait_for`: in Python 3.11 that can lose a cancellation.
             async with asyncio.timeout(_CONNECT_S):
-                await self._loop.create_connection(lambda: _Pipe(self), *self._address)
+                await self._loop.create_connection(lambda: _ServerConnection(self), *self._address)
         except (TimeoutError, OSError, OverflowError):
             return
 
@@ -177,7 +177,7 @@ class Station:
         self.core.tick(now_ns)
         self._flush()
 
-    def _opened(self, pipe: _Pipe) -> None:
+    def _opened(self, pipe: _ServerConnection) -> None:
         self._pipe = pipe
         self.core.connected(time.monotonic_ns())
         self._flush()
@@ -200,7 +200,7 @@ class Station:
         self.core.acknowledge(time.monotonic_ns())
         self._flush()
 
-    def _lost(self, pipe: _Pipe) -> None:
+    def _lost(self, pipe: _ServerConnection) -> None:
         if self._pipe is pipe:
             self._pipe, before = None, self.joined
             self.core.disconnected()
@@ -215,7 +215,7 @@ class Station:
             write_while_open(pipe.transport, data)
 
 
-class _Pipe(asyncio.Protocol):
+class _ServerConnection(asyncio.Protocol):
     """One connection of a station."""
 
     transport: asyncio.Transport

@@ -43,7 +43,7 @@ class _Request:
     remaining: int = 0
 
 
-class TransferPace:
+class TransferRate:
     """Shares the rate among the vehicles of a run that have data to send."""
 
     def __init__(self) -> None:
@@ -64,8 +64,8 @@ class TransferPace:
 class LogTransfers:
     """Requests in progress, by link."""
 
-    def __init__(self, pace: TransferPace | None = None) -> None:
-        self.pace = pace or TransferPace()
+    def __init__(self, pace: TransferRate | None = None) -> None:
+        self.pace = pace or TransferRate()
         self._requests: dict[int, _Request] = {}
         self._waiting: deque[int] = deque()
         """Links with data to send, the next one first."""

@@ -34,7 +34,7 @@ from volery.mavlink.hil.ardupilot_json import (
 )
 from volery.mavlink.hil.connection_notice import NOTICE_S, ConnectionNotice
 from volery.mavlink.hil.lock_step import PATIENCE, LockStepSession, News, TimeoutPolicy, uavs_with
-from volery.mavlink.hil.sensor_readings import inertial_of, parts
+from volery.mavlink.hil.sensor_samples import inertial_of, parts
 from volery.mavlink.links.connection import why_not
 
 PORT = 9002
@@ -80,7 +80,7 @@ class ArdupilotBridge:
         self._host, self._port = host, port
         self._patience = patience
         self._anywhere = anywhere
-        self._seats: list[_Seat] = []
+        self._seats: list[_Session] = []
 
     @property
     def name(self) -> str:
@@ -107,7 +107,7 @@ class ArdupilotBridge:
                 motors = motors_of(rotors[uav])
             except BridgeError as error:
                 raise BridgeError(f"{uav}: {error}") from None
-            seat = _Seat(gateway, uav, motors, self._patience)
+            seat = _Session(gateway, uav, motors, self._patience)
             self._seats.append(seat)
             await self._listen(seat, self._port + PORT_STEP * k)
         self._absence = ConnectionNotice(
@@ -137,7 +137,7 @@ class ArdupilotBridge:
         chosen = f" -I {instance}" if instance >= 0 and not odd else ""
         return f"start with: arducopter --model JSON{chosen} ... (docs/mavlink.md)"
 
-    async def _listen(self, seat: _Seat, port: int) -> None:
+    async def _listen(self, seat: _Session, port: int) -> None:
         loop = asyncio.get_running_loop()
         try:
             await loop.create_datagram_endpoint(lambda: seat, local_addr=(self._host, port))
@@ -147,7 +147,7 @@ class ArdupilotBridge:
             ) from None
 
 
-class _Seat(asyncio.DatagramProtocol):
+class _Session(asyncio.DatagramProtocol):
     """Endpoint of the ArduPilot of one UAV."""
 
     def __init__(

@@ -10,7 +10,7 @@ from typing import Protocol
 from volery.graph.session import Gateway
 from volery.mavlink.hil.lock_step import LockStepSession, News, TimeoutPolicy
 from volery.mavlink.hil.protocol import PERIOD_NS, Actuators, HilLink
-from volery.mavlink.hil.sensor_readings import TOPICS, SensorReadings
+from volery.mavlink.hil.sensor_samples import TOPICS, SensorSamples
 
 _STILL = (0.0,) * 16
 _NOISE_BYTES = 64
@@ -45,7 +45,7 @@ class HilSession:
         self._link = HilLink(system)
         self._noise, self._told = 0, False
         self._is_armed = False
-        self._sensing = SensorReadings()
+        self._sensing = SensorSamples()
         self._meetings = LockStepSession(
             gateway, uav, "px4", self, period_ns=PERIOD_NS, topics=TOPICS, patience=patience
         )

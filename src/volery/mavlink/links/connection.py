@@ -6,7 +6,7 @@ import errno
 
 from volery.mavlink.codec import Parser
 from volery.mavlink.framing import Framer
-from volery.mavlink.links.rate_limits import IntakeAccount
+from volery.mavlink.links.rate_limits import RateAccount
 from volery.mavlink.links.signing import Signing
 from volery.mavlink.links.vehicle_registry import VehicleRegistry
 
@@ -23,7 +23,7 @@ class MavlinkConnection:
         number: int,
         profile: int,
         key: bytes | None = None,
-        account: IntakeAccount | None = None,
+        account: RateAccount | None = None,
     ) -> None:
         self.number = number
         self.has_spoken = False

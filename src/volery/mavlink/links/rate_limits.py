@@ -24,7 +24,7 @@ _BYTES_PER_NOISE = 24
 """Bytes outside frames that cost as much as a frame: each is a possible start of one."""
 
 
-class IntakeLimits:
+class RateLimits:
     """Holds the limits that the clients of one port share."""
 
     def __init__(
@@ -32,7 +32,7 @@ class IntakeLimits:
     ) -> None:
         self.clock = clock
         self._frames_per_s = frames_per_s
-        self._overdrawn: set[IntakeAccount] = set()
+        self._overdrawn: set[RateAccount] = set()
 
     def fit(self, num_vehicles: int) -> None:
         """Sets the rate for a number of vehicles."""
@@ -43,11 +43,11 @@ class IntakeLimits:
         """Current rate of one client, frames per second."""
         return self._frames_per_s / max(1, len(self._overdrawn))
 
-    def account(self) -> IntakeAccount:
+    def account(self) -> RateAccount:
         """Returns the account of a new client."""
-        return IntakeAccount(self)
+        return RateAccount(self)
 
-    def note(self, account: IntakeAccount, *, is_overdrawn: bool) -> None:
+    def note(self, account: RateAccount, *, is_overdrawn: bool) -> None:
         """Adds a client to or removes it from the clients that send too much."""
         if is_overdrawn:
             self._overdrawn.add(account)
@@ -55,10 +55,10 @@ class IntakeLimits:
             self._overdrawn.discard(account)
 
 
-class IntakeAccount:
+class RateAccount:
     """One client's account."""
 
-    def __init__(self, limits: IntakeLimits) -> None:
+    def __init__(self, limits: RateLimits) -> None:
         self._limits = limits
         self._frames = _BURST_FRAMES
         self._at_s = limits.clock()

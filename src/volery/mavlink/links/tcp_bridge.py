@@ -13,7 +13,7 @@ from volery.mavlink.autopilot.streams import GROUND
 from volery.mavlink.codec import dialect
 from volery.mavlink.links import ports
 from volery.mavlink.links.connection import MavlinkConnection, why_not
-from volery.mavlink.links.rate_limits import IntakeLimits
+from volery.mavlink.links.rate_limits import RateLimits
 from volery.mavlink.links.vehicle_registry import Sink, VehicleRegistry
 
 _UNSENT_BYTES = 1 << 18
@@ -44,7 +44,7 @@ class MavlinkTcp:
         self._anywhere = anywhere
         self._server: asyncio.Server | None = None
         self._listener: Listener | None = None
-        self._intake = IntakeLimits()
+        self._intake = RateLimits()
         self._fleet: VehicleRegistry | None = None
         self._looks: asyncio.Task[None] | None = None
         self._clients: dict[int, _TcpClient] = {}

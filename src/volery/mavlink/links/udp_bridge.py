@@ -17,7 +17,7 @@ from volery.mavlink.codec import dialect
 from volery.mavlink.framing import Framer, lengths_of
 from volery.mavlink.links import ports
 from volery.mavlink.links.connection import why_not
-from volery.mavlink.links.rate_limits import IntakeAccount, IntakeLimits
+from volery.mavlink.links.rate_limits import RateAccount, RateLimits
 from volery.mavlink.links.signing import Signing
 from volery.mavlink.links.udp_reader import UdpReader, connected_beside
 from volery.mavlink.links.vehicle_registry import Sink, VehicleRegistry
@@ -51,7 +51,7 @@ class MavlinkUdp:
         self._shift = port - ports.ONBOARD_TO
         self._ground = ports.GROUND_TO + self._shift if ground_port is None else ground_port
         self._anywhere = anywhere
-        self._intake = IntakeLimits()
+        self._intake = RateLimits()
         self._links: dict[int, list[_UdpLink]] = {}
         self._fleet: VehicleRegistry | None = None
         self._looks: asyncio.Task[None] | None = None
@@ -135,7 +135,7 @@ class _UdpLink:
         own: int,
         to: tuple[str, int],
         key: bytes | None,
-        intake: IntakeLimits,
+        intake: RateLimits,
         *,
         for_peer: bool,
     ) -> None:
@@ -179,7 +179,7 @@ class _UdpLink:
         return UdpReader(sock, account, self._take, deliver, lambda: self._fleet.pause_s)
 
     def _take(
-        self, data: bytes, peer: tuple[str, int], account: IntakeAccount
+        self, data: bytes, peer: tuple[str, int], account: RateAccount
     ) -> tuple[bytes, float]:
         """Returns the frames of a datagram, and for how many seconds none must be read after it."""
         heard = self._framer.datagram(data)

@@ -13,7 +13,7 @@ import socket
 from collections.abc import Callable
 from typing import Any
 
-from volery.mavlink.links.rate_limits import IntakeAccount
+from volery.mavlink.links.rate_limits import RateAccount
 
 _DATAGRAMS_A_TURN = 32
 """Datagrams after which other sockets have their turn."""
@@ -21,7 +21,7 @@ _MOST_BYTES = 65535
 _ERROR_PAUSE_S = 0.2
 """Pause after the system reported that a port has no receiver, which it does for each datagram."""
 
-Take = Callable[[bytes, Any, IntakeAccount], tuple[bytes, float]]
+Take = Callable[[bytes, Any, RateAccount], tuple[bytes, float]]
 """Parses a datagram and its sender; returns its frames, and how long (s) none must be read."""
 
 
@@ -35,7 +35,7 @@ class UdpReader:
     def __init__(
         self,
         sock: socket.socket,
-        account: IntakeAccount,
+        account: RateAccount,
         take: Take,
         deliver: Callable[[bytes], None],
         may_read: Callable[[], float],

@@ -20,15 +20,15 @@ from volery.scenario.camera import CameraSensor
 from volery.sensors.lidar_model import LidarModel, load_lidar
 from volery.sensors.mount import Mount, make_mount
 from volery.sensors.samples import (
-    BatteryReadings,
+    BatterySamples,
     CameraFrames,
-    GnssReadings,
-    ImuReadings,
+    GnssSamples,
+    ImuSamples,
     LidarScans,
-    MagneticReadings,
-    OdometryReadings,
-    PressureReadings,
-    RangeReadings,
+    MagneticSamples,
+    OdometrySamples,
+    PressureSamples,
+    RangeSamples,
     Samples,
     SensorId,
 )
@@ -40,15 +40,15 @@ if TYPE_CHECKING:
 RESULT_OF: dict[str, type[Samples]] = {
     "lidar": LidarScans,
     "camera": CameraFrames,
-    "imu": ImuReadings,
-    "sonar": RangeReadings,
-    "odometry": OdometryReadings,
-    "estimate": OdometryReadings,
-    "ground_truth": OdometryReadings,
-    "gnss": GnssReadings,
-    "barometer": PressureReadings,
-    "magnetometer": MagneticReadings,
-    "battery": BatteryReadings,
+    "imu": ImuSamples,
+    "sonar": RangeSamples,
+    "odometry": OdometrySamples,
+    "estimate": OdometrySamples,
+    "ground_truth": OdometrySamples,
+    "gnss": GnssSamples,
+    "barometer": PressureSamples,
+    "magnetometer": MagneticSamples,
+    "battery": BatterySamples,
 }
 """Samples of each kind of sensor."""
 

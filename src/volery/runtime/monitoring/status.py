@@ -27,7 +27,7 @@ _WINDOW_S = 1.0
 """Wall time over which rates are averaged, s."""
 
 
-class Pace(NamedTuple):
+class RunTiming(NamedTuple):
     """Describes the speed of a simulation."""
 
     real_time_factor: float
@@ -47,7 +47,7 @@ class Speedometer:
     def __init__(self) -> None:
         self._samples: deque[_Sample] = deque()
 
-    def read(self, wall_s: float, time_ns: int, stage_seconds: Mapping[str, float]) -> Pace:
+    def read(self, wall_s: float, time_ns: int, stage_seconds: Mapping[str, float]) -> RunTiming:
         """Returns the speed at wall time `wall_s` and simulated `time_ns`; 0 without progress."""
         samples = self._samples
         if samples and time_ns < samples[-1].time_ns:  # an earlier state was restored
@@ -59,9 +59,9 @@ class Speedometer:
         then = samples[0]
         simulated_s = (now.time_ns - then.time_ns) / NS_PER_S
         if simulated_s <= 0.0:
-            return Pace(0.0, [0.0] * len(now.stages))
+            return RunTiming(0.0, [0.0] * len(now.stages))
         load = [(b - a) / simulated_s for a, b in zip(then.stages, now.stages, strict=True)]
-        return Pace(simulated_s / (now.wall_s - then.wall_s), load)
+        return RunTiming(simulated_s / (now.wall_s - then.wall_s), load)
 
     def forget(self) -> None:
         """Discards all samples after a jump of simulated time."""
@@ -103,7 +103,7 @@ class Status:
         self._speedometer.forget()
         self._next_s = 0.0
 
-    def _message(self, pace: Pace, stages: list[str]) -> Any:
+    def _message(self, pace: RunTiming, stages: list[str]) -> Any:
         simulation, gateway = self._simulation, self._simulation.gateway
         load = np.array(pace.load)
         load.flags.writeable = False

@@ -26,7 +26,7 @@ _OVERHEAD_BYTES = 400
 """Memory of a stored command besides its content, bytes."""
 
 
-class _Kept(NamedTuple):
+class _StoredCommand(NamedTuple):
     number: int
     time_ns: int
     moment: CommandTime
@@ -43,7 +43,7 @@ class CommandLog:
         self._engine = engine
         self._publisher = graph.advertise(records.TOPIC, records.TYPE)
         self._publisher.lasting = True
-        self._kept: list[_Kept] = []
+        self._kept: list[_StoredCommand] = []
         self._kept_bytes = 0
         self._has_lost_some = False
         self._next_number = 0
@@ -67,7 +67,7 @@ class CommandLog:
         """Publishes and stores a command that is about to take effect."""
         cdr = None if records.is_large(taken) else records.content_bytes(taken)
         moment = self._engine.moment
-        kept = _Kept(self._next_number, self._engine.time_ns, moment, taken, cdr)
+        kept = _StoredCommand(self._next_number, self._engine.time_ns, moment, taken, cdr)
         self._next_number += 1
         if self._publisher.wanted:
             self._publisher.publish(_message(kept))
@@ -91,7 +91,7 @@ class CommandLog:
         for kept in self._kept:
             yield Published(records.TOPIC, records.TYPE, self._engine.time_ns, _whole(kept))
 
-    def _keep(self, kept: _Kept) -> None:
+    def _keep(self, kept: _StoredCommand) -> None:
         if self._has_lost_some:
             self._kept = [_bare(kept)]
             return
@@ -113,12 +113,12 @@ def _accept(_taken: ClientCommand) -> str:
     return ""
 
 
-def _bare(kept: _Kept) -> _Kept:
+def _bare(kept: _StoredCommand) -> _StoredCommand:
     """Returns a command without its content."""
     return kept._replace(taken=kept.taken._replace(content=None), cdr=b"")
 
 
-def _whole(kept: _Kept) -> object:
+def _whole(kept: _StoredCommand) -> object:
     """Returns the message of a stored command with its content."""
     if kept.cdr is None:
         return _message(kept._replace(cdr=records.content_bytes(kept.taken)))
@@ -126,7 +126,7 @@ def _whole(kept: _Kept) -> object:
     return _message(kept._replace(taken=kept.taken._replace(content=content)))
 
 
-def _message(kept: _Kept) -> object:
+def _message(kept: _StoredCommand) -> object:
     return records.record_of(
         kept.taken,
         kept.cdr,

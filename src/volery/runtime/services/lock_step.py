@@ -28,7 +28,7 @@ def open_lock_step(simulation: Any) -> None:
 
     def join(request: Any) -> Any:
         try:
-            _Meetings(simulation, request)
+            _LockStepTopics(simulation, request)
         except CommandError as error:
             return response(success=False, message=str(error), now=time_from_ns(0))
         return response(success=True, message="", now=time_from_ns(simulation.time_ns))
@@ -36,7 +36,7 @@ def open_lock_step(simulation: Any) -> None:
     simulation.graph.offer(SERVICE, TYPE, join)
 
 
-class _Meetings:
+class _LockStepTopics:
     """Runs the barriers with one client."""
 
     def __init__(self, simulation: Any, request: Any) -> None:

@@ -18,7 +18,7 @@ from volery.core.geodesy import LocalFrame
 from volery.core.plurals import counted
 from volery.server.uploads.kinds import FARTHEST_M, MOST_CELLS, MOST_TREES, MOST_TRIANGLES
 from volery.world.city.geojson import read_features
-from volery.world.grid_maps.reading import read_cells
+from volery.world.grid_maps.parsing import read_cells
 from volery.world.inventory import read_inventory
 from volery.world.mesh_files import read_mesh
 

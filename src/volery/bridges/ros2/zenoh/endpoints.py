@@ -157,7 +157,7 @@ class ZenohCaller:
         self._key = service_key(place.domain_id, spec.service, spec.srvtype)
         self._gid = os.urandom(GID_BYTES)
         self._numbers = itertools.count(1)
-        self._waiting: set[_Question] = set()
+        self._waiting: set[_Query] = set()
         self._lock = threading.Lock()
         ids = place.ids(spec.node)
         self._token = place.declare(service_token(place.domain_id, place.zid, ids, CLIENT, spec))
@@ -174,7 +174,7 @@ class ZenohCaller:
 
     def call(self, request: bytes, on_response: TakeMessage, on_loss: Callable[[], None]) -> None:
         """Sends a request."""
-        question = _Question(on_response, on_loss)
+        question = _Query(on_response, on_loss)
         with self._lock:
             self._waiting.add(question)
 
@@ -214,7 +214,7 @@ class ZenohCaller:
             question.lose()
 
 
-class _Question:
+class _Query:
     """A request without an answer yet; it is answered or lost, once."""
 
     def __init__(self, on_response: TakeMessage, on_loss: Callable[[], None]) -> None:

@@ -1,6 +1,6 @@
 """Draws a coverage plan: areas and tours.
 
-python -m volery.report.coverage_picture docs/pictures/coverage.png
+python -m volery.report.coverage_image docs/pictures/coverage.png
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from volery.autonomy.coverage.plan import CoveragePlan, plan_coverage
 from volery.core.plurals import counted
 from volery.report.palette import uav_color
-from volery.world.grid_maps.reading import read_cells
+from volery.world.grid_maps.parsing import read_cells
 
 _MAP = Path(__file__).parent.parent / "world/data/gridmaps/random-32-32-10.map"
 _STARTS = [(1, 1), (1, 11), (1, 20), (1, 30)]

@@ -24,7 +24,7 @@ _IPV6_PREFIX = 64
 """Length of the prefix that one customer's addresses share, bits."""
 
 
-class TokenGuesses:
+class TokenAttempts:
     """The limits of one server, used in one event loop. penalty_s: None: PENALTY_S."""
 
     def __init__(self, penalty_s: float | None = None, max_penalties: int = MAX_PENALTIES) -> None:

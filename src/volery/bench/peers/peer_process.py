@@ -23,7 +23,7 @@ START_TIMEOUT_S = 300.0
 ROUND_TIMEOUT_S = 180.0
 
 
-class Conversation:
+class PeerProcess:
     """Runs `script` with the interpreter `python`; all errors are PeerErrors.
 
     `request` is the plain data for the script's `prepare`; it is written into `folder`.

@@ -21,7 +21,7 @@ TOPICS = {
 _NOWHERE = Fix(math.nan, math.nan, math.nan, (0.0, 0.0, 0.0), 0.0, 0.0)
 
 
-class SensorReadings:
+class SensorSamples:
     """Reads one UAV's sensors; remembers the air temperature."""
 
     def __init__(self) -> None:

@@ -10,7 +10,12 @@ import pytest
 
 from volery.core.connection_limits import ConnectionLimits
 from volery.core.listener import Opening, open_listener
-from volery.core.waiting_room import LOOK_BYTES, WaitingRoom, look_at_binary, look_at_http
+from volery.core.pending_connections import (
+    LOOK_BYTES,
+    PendingConnections,
+    look_at_binary,
+    look_at_http,
+)
 
 REQUEST = b"GET / HTTP/1.1\r\nHost: x\r\n\r\n"
 HANG_S = 20.0
@@ -67,7 +72,9 @@ HTTP = Opening(look_at_http)
 
 @pytest.mark.parametrize("has_epoll", [True, False])
 def test_a_request_in_pieces_is_served_whole(monkeypatch, has_epoll):
-    monkeypatch.setattr(WaitingRoom, "is_available", has_epoll and WaitingRoom.is_available)
+    monkeypatch.setattr(
+        PendingConnections, "is_available", has_epoll and PendingConnections.is_available
+    )
 
     async def scene():
         async with Server(HTTP) as server, client(server) as (reader, writer):

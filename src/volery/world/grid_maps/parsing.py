@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from volery.core.errors import DataFileError
 from volery.world.grid_maps.grid_map import MOST_CELLS
+from volery.world.grid_maps.image_files import parse_picture
 from volery.world.grid_maps.matrix import parse_matrix
 from volery.world.grid_maps.moving_ai import parse_moving_ai
-from volery.world.grid_maps.picture import parse_picture
 
 MOST_BYTES = 4 * MOST_CELLS
 """Maximum size of a file: a matrix of the most cells with separators and blanks."""

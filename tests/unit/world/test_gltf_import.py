@@ -9,8 +9,8 @@ import pytest
 import trimesh
 
 from volery.core.errors import DataFileError
-from volery.world import gltf_reading
-from volery.world.gltf_reading import read_gltf
+from volery.world import gltf_import
+from volery.world.gltf_import import read_gltf
 from volery.world.mesh_files import read_mesh
 
 MANY = 10**6
@@ -169,7 +169,7 @@ def test_lies_are_told(parts_of, content, message):
 
 
 def test_shapes_shown_too_often(tmp_path, parts_of, monkeypatch):
-    monkeypatch.setattr(gltf_reading, "MOST_PARTS", 10)
+    monkeypatch.setattr(gltf_import, "MOST_PARTS", 10)
     content = document(SQUARE[:3])
     content["nodes"] = [{"mesh": 0}] * 11
     content["scenes"] = [{"nodes": list(range(11))}]

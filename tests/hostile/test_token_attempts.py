@@ -22,7 +22,7 @@ from volery.comms.addresses import Identity
 from volery.comms.server.settings import RouterSettings
 from volery.comms.server.tcp import CommsServer
 from volery.comms.station.tcp import Station
-from volery.core.token_guesses import TokenGuesses
+from volery.core.token_attempts import TokenAttempts
 from volery.server.auth import Tokens
 from volery.server.page_server import PageServer
 from volery.server.settings import PageSettings
@@ -42,7 +42,7 @@ class Guesser:
     """Clients of the mechanism, with a log of what happened."""
 
     def __init__(self, penalty_s, **options):
-        self.guesses = TokenGuesses(penalty_s, **options)
+        self.guesses = TokenAttempts(penalty_s, **options)
         self.log = []
         self.left = asyncio.Event()
 
@@ -128,7 +128,7 @@ def test_a_network_of_ipv6_addresses_counts_as_one():
 @pytest.fixture
 def slow(monkeypatch):
     """A guess holds the turn of its address until its guesser leaves."""
-    monkeypatch.setattr("volery.core.token_guesses.PENALTY_S", HOUR_S)
+    monkeypatch.setattr("volery.core.token_attempts.PENALTY_S", HOUR_S)
 
 
 @pytest.fixture

@@ -55,7 +55,7 @@ class Event(NamedTuple):
     """Whether the client has stopped sending."""
 
 
-class WaitingConnection(NamedTuple):
+class PendingConnection(NamedTuple):
     """A waiting connection."""
 
     sock: socket.socket
@@ -64,7 +64,7 @@ class WaitingConnection(NamedTuple):
     """Start of the wait on the loop's clock, s."""
 
 
-class WaitingRoom:
+class PendingConnections:
     """The waiting connections of one listening socket, and that socket.
 
     All methods are called in the thread of the server's asyncio loop. On a system without epoll
@@ -81,13 +81,13 @@ class WaitingRoom:
         listening: int,
         look: Callable[[bytes], Look],
         patience_s: float | None,
-        expire: Callable[[WaitingConnection], None],
+        expire: Callable[[PendingConnection], None],
     ) -> None:
         self._listening = listening
         self._look = look
         self._patience_s = patience_s
         self._expire = expire
-        self._waiting: dict[int, WaitingConnection] = {}
+        self._waiting: dict[int, PendingConnection] = {}
         """By file descriptor, oldest first."""
         self._timer: asyncio.TimerHandle | None = None
         self._epoll = select.epoll()
@@ -110,7 +110,7 @@ class WaitingRoom:
         """Adds a connection."""
         loop = asyncio.get_running_loop()
         sock.setblocking(False)
-        self._waiting[sock.fileno()] = WaitingConnection(sock, address, loop.time())
+        self._waiting[sock.fileno()] = PendingConnection(sock, address, loop.time())
         flags = select.EPOLLIN | select.EPOLLRDHUP | select.EPOLLET  # once per piece
         self._epoll.register(sock.fileno(), flags)
         if self._timer is None and self._patience_s is not None:
@@ -121,7 +121,7 @@ class WaitingRoom:
         look = self._look_at(self._waiting[event.descriptor].sock)
         return None if event.is_end and look == _NOTHING else look
 
-    def release(self, descriptor: int) -> WaitingConnection:
+    def release(self, descriptor: int) -> PendingConnection:
         """Removes and returns a waiting connection."""
         waiting = self._waiting.pop(descriptor)
         self._epoll.unregister(descriptor)

@@ -1,6 +1,6 @@
 """Takes the README's screenshots of the page: scenarios in headless Chromium.
 
-    python -m volery.bench.page_pictures [NAME...] [--folder FOLDER]
+    python -m volery.bench.page_screenshots [NAME...] [--folder FOLDER]
 
 WebGL is drawn in software, so the simulation is paused until a screenshot is taken.
 """
