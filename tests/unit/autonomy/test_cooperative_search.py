@@ -290,7 +290,7 @@ def test_a_call_while_it_climbs_is_followed_afterwards():
     [
         ("uav9", (25.0, 15.0, 0.0), "not in the team"),
         ("uav1", (25.0, 15.0, 0.0), "not in the team"),
-        ("", (25.0, 15.0, 0.0), "nobody"),
+        ("", (25.0, 15.0, 0.0), "the caller is not in the team"),
         ("uav2", (45.0, 15.0, 0.0), "area"),
         ("uav2", (float("nan"), 15.0, 0.0), "area"),
     ],
@@ -364,7 +364,7 @@ def test_finish_at_one_ends_it_for_all():
     bodies.sees.clear()
     assert bodies.graph.call("/uav2/search/finish").success
     bodies.run_until(bodies.all_in(SearchPhase.DONE), 60.0)
-    assert "no part" in bodies.call("uav1", "uav2").message
+    assert "no longer takes part" in bodies.call("uav1", "uav2").message
 
 
 def test_who_cannot_be_told_sees_the_others_go_home():
@@ -438,7 +438,7 @@ def test_a_kept_state_is_gone_back_to():
 @pytest.mark.parametrize(
     ("parameters", "reason"),
     [
-        ({"team": ["uav2", "uav3"]}, "must name 'uav1' itself"),
+        ({"team": ["uav2", "uav3"]}, "must contain 'uav1'"),
         ({"team": ["uav1", "uav1"]}, "each UAV once"),
         ({"area_m": [0.0, 0.0, 8.0, 30.0]}, "12 m a side"),
         ({"area_m": [0.0, 0.0, 1.0, 30.0]}, "wider than its borders"),

@@ -299,7 +299,7 @@ def test_identify_writes_a_model_that_loads(tmp_path: Path) -> None:
     assert model.fit_error is not None
     missing = runner.invoke(app, ["identify", "f450", "--out", str(tmp_path / "no" / "a.toml")])
     assert missing.exit_code == 2
-    assert "no folder" in missing.output
+    assert "does not exist" in missing.output
 
 
 def test_help_names_all_benches_and_tables_of_profiles() -> None:

@@ -144,7 +144,7 @@ def test_steps_while_playing_are_refused(simulate, flat_data):
 @pytest.mark.parametrize(
     ("end", "why"),
     [
-        (lambda s: s.resume(), "goes on"),
+        (lambda s: s.resume(), "the simulation continues"),
         (lambda s: s.reset(), "reset"),
         (lambda s: s.quit(), "quits"),
         (lambda s: s.close(), "closed"),
@@ -200,7 +200,7 @@ def test_the_action_can_be_cancelled_and_refused(simulate, flat_data):
         simulation.quit()
     assert behind.status is GoalStatus.SUCCEEDED
     simulation.graph.actions.withdraw("/simulate_steps")
-    with pytest.raises(GraphError, match="nobody"):
+    with pytest.raises(GraphError, match="no server"):
         send(simulation, 1)
 
 
