@@ -175,7 +175,10 @@ def test_the_services_are_told_without_rosbridge_too():
         (("topic", "list", "--via", "ros-tcp://127.0.0.1:1"), "no ROS-TCP server"),
         (("topic", "list", "--via", "ros-tcp://127.0.0.1:x"), "is not a graph connection"),
         (("topic", "--via", "pigeon://post", "list"), "'pigeon://post' is not a graph connection"),
-        (("service", "--via", "a://b", "call", "/x", "--via", "c://d"), "'c://d' is not a graph connection"),
+        (
+            ("service", "--via", "a://b", "call", "/x", "--via", "c://d"),
+            "'c://d' is not a graph connection",
+        ),
     ],
 )
 def test_slips_are_told_in_a_line(run, words, reason):
