@@ -34,7 +34,7 @@ _REASON = "a `warmup_tasks` of a node, or `runtime.warmup`, lacks what compiles 
 @pytest.mark.timeout(900)
 def test_nothing_is_compiled_in_flight(tmp_path: Path) -> None:
     """On a fresh machine; the search flies until places were seen again and ways planned anew."""
-    flights = (("forest_search", 60), ("forest_survey", 8), ("coverage", 8), ("obstacle_field", 6))
+    flights = (("forest_search", 80), ("forest_survey", 8), ("coverage", 8), ("obstacle_field", 6))
     told: dict[str, dict[str, str]] = {}
     for scenario, seconds in flights:
         printed = _run(tmp_path, "-c", _FLY, scenario, str(seconds))

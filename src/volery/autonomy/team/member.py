@@ -105,7 +105,7 @@ class TeamMember:
             self._targets_type, "target_detection/targets", self._on_detections, 5
         )
         if settings.corrected:
-            node.create_subscription(TFMessage, "/tf", self._frame.on_tf, 50)
+            node.create_subscription(TFMessage, "/tf", self._on_tf, 50)
 
     def get_state(self) -> dict[str, Any]:
         """Returns the state for a snapshot."""
@@ -210,6 +210,9 @@ class TeamMember:
         coverage = self.coverage
         if coverage is not None and coverage.look(pose.position[:2], self._settings.sight_m):
             self.progress_ns = self.pose_ns
+
+    def _on_tf(self, message: TFMessage) -> None:
+        self._frame.on_tf(message)  # a restored state has another frame
 
     def _on_battery(self, message: BatteryState) -> None:
         self.battery = float(message.percentage)
