@@ -316,12 +316,6 @@ def _raster(
     return image
 
 
-def _plant_colors(share: Any) -> NDArray[np.uint8]:
-    """Returns colours (n, 4) of heights given as fractions (n,) of the max height."""
-    scale = _DARKEST + (1.0 - _DARKEST) * np.asarray(share)
-    return np.asarray(colormaps["viridis"](scale, bytes=True))
-
-
 def _tall(heights: NDArray[np.floating]) -> float:
     return max(float(np.quantile(heights, 0.98)), 1.0) if len(heights) else 1.0
 
