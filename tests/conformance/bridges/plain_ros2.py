@@ -44,9 +44,9 @@ CONFIG = """<CycloneDDS><Domain id="any">
     <Peers><Peer address="localhost"/></Peers></Discovery>
 </Domain></CycloneDDS>"""
 MATCH_S = 3.0
-HEAD = 2000
-"""Bytes of a message that are reported. A line stays below 4096 bytes, which pipes take as one, so
-that a process that is stopped while it writes leaves no half line."""
+PICTURE_HEAD = 1000
+"""Bytes of a picture that are reported. A pipe takes a line below 4096 bytes as one: a process that
+is stopped while it writes leaves no half line."""
 
 
 @dataclass
@@ -213,11 +213,12 @@ class Peer:
 
     def subscribe(self, topic, type, reliable, latched):
         def take(raw):
-            head = base64.b64encode(raw[:HEAD]).decode()
-            self.tell(heard=topic, data=head, size=len(raw))
+            told = raw[:PICTURE_HEAD] if kind is Image_ else raw
+            self.tell(heard=topic, data=base64.b64encode(told).decode(), size=len(raw))
 
+        kind = TYPES[type]
         quality = qos(reliable=reliable, latched=latched)
-        reader = self.hear(f"rt{topic}", TYPES[type], take, quality)
+        reader = self.hear(f"rt{topic}", kind, take, quality)
         return self.matched(reader.get_matched_publications)
 
     def call(self, service):

@@ -1,12 +1,13 @@
-"""Tests writing to connections that break."""
+"""Tests writing to connections that break, and to peers that do not read."""
 
 import asyncio
 import socket
 import struct
+from contextlib import suppress
 from types import SimpleNamespace
 
 from volery.comms.server.tcp import CommsServer
-from volery.core.network_access import write_while_open
+from volery.core.network_access import MAX_UNSENT_BYTES, tend, write_while_open
 from volery.mavlink.links.tcp_bridge import _TcpClient
 
 
@@ -67,3 +68,18 @@ def test_asyncio_warns_of_such_writes(caplog):
     """Or `write_while_open` is not needed any more."""
     asyncio.run(_write_after_reset(lambda transport, data: transport.write(data)))
     assert "socket.send() raised exception" in caplog.text
+
+
+def test_a_peer_that_does_not_read_takes_little():
+    with socket.create_server(("127.0.0.1", 0)) as server, socket.socket() as peer:
+        peer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        peer.connect(server.getsockname())
+        sock, _ = server.accept()
+        with sock:
+            tend(sock)
+            sock.setblocking(False)
+            sent = 0
+            with suppress(BlockingIOError):
+                while sent < 100 * MAX_UNSENT_BYTES:
+                    sent += sock.send(bytes(10_000))
+    assert 10_000 < sent < 2 * MAX_UNSENT_BYTES
