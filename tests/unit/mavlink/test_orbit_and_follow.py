@@ -108,6 +108,18 @@ def test_stays_on_its_side_of_a_target_that_stands(flight):
     assert uav.position_map == pytest.approx([12.0, 0.0, 12.0], abs=0.4)
 
 
+def test_stays_above_ground_where_the_target_is_below(flight):
+    uav, station = flight
+    assert station.mode(4, 8) == ACCEPTED
+    assert station.set("FLW_TGT_ALT_M", 2) == 2
+    for k in range(40):
+        target(station, k, 20.0, (2.0, 0.0, 0.0), ALTITUDE - 8.0)
+        station.seconds(0.5)
+        assert uav.position_map[2] > 0.6
+    assert uav.mode.name == "VELOCITY"
+    assert uav.position_map[2] < 1.5
+
+
 @pytest.mark.parametrize("north", [NAN, 1e7])
 def test_targets_that_are_none_are_not_followed(flight, north):
     uav, station = flight

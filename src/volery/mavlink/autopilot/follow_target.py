@@ -28,6 +28,8 @@ _MOVES_M_S = 0.1
 """Speed above which a velocity defines a course."""
 _HEIGHT_FIRST_M = 3.0
 """Height difference below which the UAV moves along the ground."""
+_LOWEST_M, _ASCENT_M_S = 1.0, 0.5
+"""Height above home below which the UAV climbs, whatever the target's altitude, and its speed."""
 _FARTHEST_M = 1e6
 _PERIOD_NS = 20_000_000
 _FACED_M = 1.0
@@ -105,6 +107,8 @@ def fly(autopilot: Autopilot, state: FlightState) -> None:
     limit = float(autopilot.parameter(f"MPC_Z_V_AUTO_{'UP' if z > 0.0 else 'DN'}"))
     brake = 0.5 * float(autopilot.parameter("MPC_ACC_HOR"))
     climb = math.copysign(min(limit, approach_speed(abs(z), brake)), z)
+    if state.position[2] - _home(autopilot)[2] < _LOWEST_M:
+        level, climb = (0.0, 0.0), _ASCENT_M_S
     dx, dy = there[0] - state.position[0], there[1] - state.position[1]
     yaw = math.atan2(dy, dx) if math.hypot(dx, dy) > _FACED_M else None
     memory.target = OffboardSetpoint(position=goal, yaw=math.nan if yaw is None else yaw)
@@ -128,9 +132,13 @@ def _position_beside(autopilot: Autopilot, target: FollowTarget, there: Vector) 
         angle = target.course - math.radians(float(autopilot.parameter("FLW_TGT_FA")))
     distance, height = (float(autopilot.parameter(f"FLW_TGT_{name}")) for name in ("DST", "HT"))
     follows_height = autopilot.parameter("FLW_TGT_ALT_M") == 2
-    base = there[2] if follows_height else (autopilot.memory.home or autopilot.memory.origin)[2]
+    base = there[2] if follows_height else _home(autopilot)[2]
     return (
         there[0] + distance * math.cos(angle),
         there[1] + distance * math.sin(angle),
         base + height,
     )
+
+
+def _home(autopilot: Autopilot) -> Vector:
+    return autopilot.memory.home or autopilot.memory.origin
