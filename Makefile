@@ -11,7 +11,7 @@ PAGE_SOURCES := web/index.html web/package.json web/tsconfig.json web/vite.confi
 	$(shell find web/src web/public -type f)
 
 .DEFAULT_GOAL := help
-.PHONY: help run serve web page test lint bench docs-benchmarks clean
+.PHONY: help dev run serve web page test lint bench docs-benchmarks clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -50,6 +50,8 @@ web: $(PAGE) ## build the page of the browser into the package (needs Node.js 20
 
 page: # the page where it can be built; without it everything else works
 	@.ci/node_fits && $(MAKE) --no-print-directory web || echo "going on without the page"
+
+dev: $(VENV)/.installed-tests page ## install Volery for development: editable, with test tools and linters
 
 run: $(VENV)/.installed page ## fly the main job on a page that stays until Ctrl-C, leave a log and a report under runs/
 	@mkdir -p $(OUT)
