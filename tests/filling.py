@@ -11,7 +11,7 @@ from rosbags.typesys.base import normalize_fieldname
 from volery.graph.codecs.definition_files import INTEGER_RANGES
 from volery.graph.codecs.definition_store import EMPTY_MEMBER
 from volery.graph.codecs.zero import DTYPES
-from volery.graph.messages import typestore
+from volery.graph.typestore import typestore
 
 
 def filled(msgtype: str, rng: np.random.Generator) -> Any:

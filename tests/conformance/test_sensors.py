@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from volery.core.clock import Schedule
-from volery.graph.messages import typestore
+from volery.graph.typestore import typestore
 from volery.runtime.build.sensor_suites import RESULT_OF, noise_key
 from volery.sensors import model as sensor_models
 

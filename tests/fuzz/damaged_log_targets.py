@@ -31,7 +31,8 @@ from volery.graph.codecs import definition_store
 from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.codecs.zero import zero_message
 from volery.graph.graph import Graph
-from volery.graph.messages import Published, String, typestore
+from volery.graph.messages import Published, String
+from volery.graph.typestore import typestore
 from volery.runtime.replay.slam.sources import open_source
 
 definition_store.MAX_FOREIGN = 60  # damaged definitions would be learned for ever

@@ -12,7 +12,7 @@ from PIL import Image
 from volery.core.errors import CommandError, DataFileError
 from volery.graph.codecs.cdr import encode_cdr
 from volery.graph.codecs.zero import zero_message
-from volery.graph.messages import typestore
+from volery.graph.typestore import typestore
 from volery.runtime.services.grid_maps import grid_of
 from volery.world.grid_maps import block_mesh
 from volery.world.grid_maps.grid_map import MOST_CELLS

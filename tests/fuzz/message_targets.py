@@ -22,8 +22,9 @@ from volery.graph.codecs.json_codec import JsonCodec
 from volery.graph.codecs.json_decoding import decode_plain
 from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.codecs.ros1_names import ros1_name, ros2_name
-from volery.graph.messages import message_type, typestore
+from volery.graph.messages import message_type
 from volery.graph.object_count import CDR, ROS1, check_objects
+from volery.graph.typestore import typestore
 
 TYPES = (
     "std_msgs/msg/String",

@@ -9,7 +9,7 @@ from rosbags.interfaces import Nodetype
 from whole_world import NASTY_TEXTS, nasty_values
 
 from volery.graph.codecs.zero import zero_message
-from volery.graph.messages import typestore
+from volery.graph.typestore import typestore
 
 FLOATS = (float("nan"), float("inf"), -float("inf"), 1e308, -1e308, -1.0, 0.0)
 _DUMMY = "structure_needs_at_least_one_member"

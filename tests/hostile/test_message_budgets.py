@@ -28,8 +28,8 @@ from volery.bridges.rosbridge.wire import decode_frame, encode_png
 from volery.core.errors import BridgeError, GraphError
 from volery.graph import object_count
 from volery.graph.codecs.ros1 import ros1_codec
-from volery.graph.messages import typestore
 from volery.graph.object_count import CDR, MAX_OBJECTS, ROS1, check_objects
+from volery.graph.typestore import typestore
 
 MEGABYTE = 2**20
 TYPES = ("tf2_msgs/msg/TFMessage", "sensor_msgs/msg/PointCloud2", "sensor_msgs/msg/JointState")

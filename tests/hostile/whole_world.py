@@ -6,8 +6,8 @@ import numpy as np
 from rosbags.interfaces import Nodetype
 
 from volery.bridges.rosbridge.rosapi import RosApi
-from volery.graph.messages import typestore
 from volery.graph.service_reply import ServiceReply
+from volery.graph.typestore import typestore
 
 SENSORS = [
     {"kind": "lidar", "noise": False},

@@ -11,7 +11,8 @@ from ros1_bench import HERE, SYSTEM_PYTHON, Program, peer, require_ros1, shared_
 
 from volery.bridges.logs.log_writer import open_log
 from volery.bridges.logs.recovery import recover
-from volery.graph.messages import Published, String, Time, message_type, typestore
+from volery.graph.messages import Published, String, Time, message_type
+from volery.graph.typestore import typestore
 
 require_ros1()
 

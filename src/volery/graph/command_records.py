@@ -17,9 +17,10 @@ from rosbags.interfaces import Nodetype
 
 from volery.graph.codecs.cdr import decode_cdr, encode_cdr
 from volery.graph.codecs.json_codec import JsonCodec
-from volery.graph.messages import message_type, time_from_ns, typestore
+from volery.graph.messages import message_type, time_from_ns
 from volery.graph.session import ClientCommand
 from volery.graph.subscription_queue import array_bytes
+from volery.graph.typestore import typestore
 
 TOPIC = "/volery/log"
 TYPE = "volery_interfaces/msg/CommandRecord"

@@ -20,7 +20,7 @@ from rosbags.interfaces import Nodetype
 from volery.core.errors import GraphError
 from volery.graph.codecs.zero import DTYPES
 from volery.graph.message_defaults import is_plain_name
-from volery.graph.messages import typestore
+from volery.graph.typestore import typestore
 
 Copy = Callable[[Any], Any]
 

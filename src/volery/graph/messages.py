@@ -8,17 +8,16 @@ class is optional, as in rclpy: see `message_defaults`.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.stores import ros2_jazzy as _ros2
 
 from volery.core.clock import NS_PER_S, stamp_from_ns
-from volery.graph.codecs.definition_store import DefinitionStore
-from volery.graph.message_defaults import make_arguments_optional
+from volery.graph.codecs.ros1 import ros1_codec
+from volery.graph.typestore import typestore
 
 Time = _ros2.builtin_interfaces__msg__Time
 Point = _ros2.geometry_msgs__msg__Point
@@ -68,36 +67,6 @@ String = _ros2.std_msgs__msg__String
 TFMessage = _ros2.tf2_msgs__msg__TFMessage
 MultiDOFJointTrajectory = _ros2.trajectory_msgs__msg__MultiDOFJointTrajectory
 MultiDOFJointTrajectoryPoint = _ros2.trajectory_msgs__msg__MultiDOFJointTrajectoryPoint
-
-_DEFINITIONS = Path(__file__).parent / "definitions"
-
-
-@cache
-def typestore() -> DefinitionStore:
-    """Returns the ROS 2 types (Jazzy) and those of the definition files in `definitions/`.
-
-    Each file is read at the first request for one of its types.
-    """
-    store = DefinitionStore(get_typestore(Stores.ROS2_JAZZY), __name__)
-    store.index_folder(_DEFINITIONS)
-    return store
-
-
-_BASE_DEFAULTS = {("geometry_msgs/msg/Quaternion", "w"): 1.0}
-"""Defaults in the definition files of ROS 2, which the types of `rosbags` lack."""
-
-
-def _base_default(msgtype: str, field: str) -> Any:
-    return _BASE_DEFAULTS.get((msgtype, field))
-
-
-def _make_base_arguments_optional() -> None:
-    base = get_typestore(Stores.ROS2_JAZZY)
-    for name, cls in base.types.items():
-        make_arguments_optional(name, cls, base.types, base.fielddefs, _base_default)
-
-
-_make_base_arguments_optional()
 
 
 def add_definitions(folder: str | Path, *, foreign: bool = False) -> list[str]:
@@ -172,6 +141,4 @@ class Published:
     @cached_property
     def ros1(self) -> bytes:
         """The message in the ROS 1 wire format; `seq` of headers is 0."""
-        from volery.graph.codecs.ros1 import ros1_codec  # imports this module
-
         return ros1_codec().encode(self.message, self.msgtype)

@@ -18,7 +18,7 @@ from rosbags.interfaces import Nodetype
 
 from volery.core.errors import GraphError
 from volery.graph.codecs.ros1 import ros1_codec
-from volery.graph.messages import typestore
+from volery.graph.typestore import typestore
 
 MAX_OBJECTS = 20_000
 """Limit of messages and texts in arrays of a client's message: 3,300 transforms; 30 to 40 ms."""

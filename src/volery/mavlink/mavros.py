@@ -33,12 +33,13 @@ from volery.graph.messages import (
     message_type,
 )
 from volery.mavlink.autopilot import arming, commands, mode_transitions, offboard
+from volery.mavlink.autopilot.command_protocol import Command
 from volery.mavlink.autopilot.modes import mode_named
 from volery.mavlink.autopilot.setpoints import OffboardSetpoint
 
 if TYPE_CHECKING:
     from volery.graph.nodes.node import Node
-    from volery.mavlink.autopilot.core import Autopilot
+    from volery.mavlink.autopilot.context import AutopilotContext
     from volery.mavlink.autopilot.state import Source
     from volery.mavlink.autopilot.vehicle import Vector
 
@@ -56,10 +57,10 @@ _NOTHING = (math.nan, math.nan, math.nan)
 
 
 class Mavros:
-    """Topics below `prefix` of the autopilot `autopilot`, on the graph of `node`."""
+    """Topics of an autopilot below `prefix`, on the graph of `node`."""
 
-    def __init__(self, node: Node, autopilot: Autopilot, prefix: str) -> None:
-        self._autopilot = autopilot
+    def __init__(self, node: Node, context: AutopilotContext, prefix: str) -> None:
+        self._context = context
         self._prefix = prefix if prefix.startswith("/") else f"{node.get_namespace()}/{prefix}"
         self._told: dict[str, int] = {}
         self._last_state: tuple[Any, ...] = ()
@@ -93,7 +94,7 @@ class Mavros:
 
     def tell(self) -> None:
         """Publishes what is due."""
-        autopilot, memory = self._autopilot, self._autopilot.memory
+        context, memory = self._context, self._context.memory
         state = (memory.armed, memory.mode)
         if self._is_due("slow", _SLOW_NS) or state != self._last_state:
             self._last_state = state
@@ -103,7 +104,7 @@ class Mavros:
                 (self._battery, self._battery_message),
             ):
                 if publisher.wanted:
-                    publisher.publish(build(autopilot))
+                    publisher.publish(build(context))
         if self._is_due("fast", _FAST_NS):
             for publisher, build in (
                 (self._pose, self._pose_message),
@@ -112,10 +113,10 @@ class Mavros:
                 (self._global, self._global_message),
             ):
                 if publisher.wanted:
-                    publisher.publish(build(autopilot))
+                    publisher.publish(build(context))
 
     def _is_due(self, what: str, period_ns: int) -> bool:
-        now_ns = self._autopilot.memory.now_ns
+        now_ns = self._context.memory.now_ns
         last_ns = self._told.get(what, -period_ns)
         if 0 <= now_ns - last_ns < period_ns:
             return False
@@ -123,10 +124,10 @@ class Mavros:
         return True
 
     def _header(self, frame: str = "map") -> Any:
-        return header(self._autopilot.memory.now_ns, frame)
+        return header(self._context.memory.now_ns, frame)
 
-    def _state_message(self, autopilot: Autopilot) -> Any:
-        memory = autopilot.memory
+    def _state_message(self, context: AutopilotContext) -> Any:
+        memory = context.memory
         message = zero_message(_STATE)
         message.header = self._header("")
         message.connected, message.armed = True, memory.armed
@@ -136,49 +137,49 @@ class Mavros:
         message.system_status = 4 if memory.armed else 3
         return message
 
-    def _extended_message(self, autopilot: Autopilot) -> Any:
+    def _extended_message(self, context: AutopilotContext) -> Any:
         message = zero_message(_EXTENDED)
         message.header = self._header("")
         landed = {"LANDED": 1, "CRASHED": 1, "TAKE_OFF": 3, "LAND": 4}
-        message.landed_state = landed.get(autopilot.state.mode, 2)
+        message.landed_state = landed.get(context.state.mode, 2)
         return message
 
-    def _battery_message(self, autopilot: Autopilot) -> Any:
+    def _battery_message(self, context: AutopilotContext) -> Any:
         message = zero_message("sensor_msgs/msg/BatteryState")
         message.header = self._header("")
-        message.voltage, message.current = autopilot.state.voltage, -autopilot.state.current
+        message.voltage, message.current = context.state.voltage, -context.state.current
         message.percentage, message.present = (
-            autopilot.state.charge,
-            math.isfinite(autopilot.state.charge),
+            context.state.charge,
+            math.isfinite(context.state.charge),
         )
         return message
 
-    def _local_pose(self, autopilot: Autopilot) -> Any:
-        origin = autopilot.memory.origin
-        x, y, z = (p - o for p, o in zip(autopilot.state.position, origin, strict=True))
-        return Pose(Point(x, y, z), Quaternion(*autopilot.state.attitude))
+    def _local_pose(self, context: AutopilotContext) -> Any:
+        origin = context.memory.origin
+        x, y, z = (p - o for p, o in zip(context.state.position, origin, strict=True))
+        return Pose(Point(x, y, z), Quaternion(*context.state.attitude))
 
-    def _pose_message(self, autopilot: Autopilot) -> Any:
-        return PoseStamped(self._header(), self._local_pose(autopilot))
+    def _pose_message(self, context: AutopilotContext) -> Any:
+        return PoseStamped(self._header(), self._local_pose(context))
 
-    def _velocity_message(self, autopilot: Autopilot) -> Any:
-        twist = Twist(Vector3(*autopilot.state.velocity), Vector3(*autopilot.state.rates))
+    def _velocity_message(self, context: AutopilotContext) -> Any:
+        twist = Twist(Vector3(*context.state.velocity), Vector3(*context.state.rates))
         return TwistStamped(self._header(), twist)
 
-    def _odom_message(self, autopilot: Autopilot) -> Any:
-        turned = rotate(conjugate(autopilot.state.attitude), autopilot.state.velocity).tolist()
-        twist = Twist(Vector3(*turned), Vector3(*autopilot.state.rates))
+    def _odom_message(self, context: AutopilotContext) -> Any:
+        turned = rotate(conjugate(context.state.attitude), context.state.velocity).tolist()
+        twist = Twist(Vector3(*turned), Vector3(*context.state.rates))
         nothing = np.zeros(36)
         return Odometry(
             self._header(),
             "base_link",
-            PoseWithCovariance(self._local_pose(autopilot), nothing),
+            PoseWithCovariance(self._local_pose(context), nothing),
             TwistWithCovariance(twist, nothing),
         )
 
-    def _global_message(self, autopilot: Autopilot) -> Any:
-        latitude, longitude, altitude = autopilot.earth.geodetic(autopilot.state.position)
-        status: Any = NavSatStatus(-1 if autopilot.memory.fix_lost else 0, 1)
+    def _global_message(self, context: AutopilotContext) -> Any:
+        latitude, longitude, altitude = context.earth.geodetic(context.state.position)
+        status: Any = NavSatStatus(-1 if context.memory.fix_lost else 0, 1)
         covariance = np.zeros(9)
         return NavSatFix(
             self._header("base_link"), status, latitude, longitude, altitude, covariance, 0
@@ -192,12 +193,12 @@ class Mavros:
                 setpoint = read(message)
             except CommandError:
                 return  # an invalid setpoint has no response
-            offboard.take(self._autopilot, _SOURCE, setpoint)
+            offboard.take(self._context, _SOURCE, setpoint)
 
         return take
 
     def _in_map(self, point: Any) -> Vector:
-        x, y, z = self._autopilot.memory.origin
+        x, y, z = self._context.memory.origin
         return x + point.x, y + point.y, z + point.z
 
     def _place(self, message: Any) -> OffboardSetpoint:
@@ -224,7 +225,7 @@ class Mavros:
         )
 
     def _arm(self, request: Any, response: Any) -> Any:
-        why = arming.obstacle(self._autopilot) if request.value else "not landed"
+        why = arming.obstacle(self._context) if request.value else "not landed"
         result = self._do(400, (1.0 if request.value else 0.0, 0.0))
         if result:
             _log.warning("%s: arming %s: %s", self._prefix, request.value, why)
@@ -236,7 +237,7 @@ class Mavros:
         why = (
             "there is no such mode"
             if mode is None
-            else mode_transitions.ask_for(self._autopilot, mode)
+            else mode_transitions.ask_for(self._context, mode)
         )
         if why:
             self._refuse(f"mode '{request.custom_mode}': {why}")
@@ -246,7 +247,7 @@ class Mavros:
     def _refuse(self, what: str) -> None:
         """Reports why a request is refused; the responses have no field for the reason."""
         _log.warning("%s: %s", self._prefix, what)
-        self._autopilot.say(2, what)
+        self._context.say(2, what)
 
     def _take_off(self, request: Any, response: Any) -> Any:
         params = (0.0, 0.0, 0.0, request.yaw, request.latitude, request.longitude)
@@ -267,7 +268,7 @@ class Mavros:
 
     def _do(self, number: int, params: tuple[float, ...]) -> int:
         filled = (*params, *(math.nan,) * (7 - len(params)))
-        return commands.do(self._autopilot, _SOURCE, commands.Command(number, filled, None))
+        return commands.do(self._context, _SOURCE, Command(number, filled, None))
 
 
 def _velocity(twist: Any) -> OffboardSetpoint:

@@ -51,12 +51,13 @@ class AutopilotNode(Node):
         self.declare_parameter("mavlink_id", self.system_id)
         build = build_of(self)
         self.core = core.Autopilot(self.system_id, GraphVehicle(self), build, given)
-        self.core.log.transfers.pace = _PACES.setdefault(self._context.graph, TransferRate())
+        context = self.core.context
+        context.log.transfers.pace = _PACES.setdefault(self._context.graph, TransferRate())
         self._packets = message_type(PACKETS)
         self._out = self.create_publisher(self._packets, "mavlink/out", 1000)
-        self._mavros = [Mavros(self, self.core, "mavros")]
+        self._mavros = [Mavros(self, context, "mavros")]
         if self.system_id == 1:
-            self._mavros.append(Mavros(self, self.core, "/mavros"))
+            self._mavros.append(Mavros(self, context, "/mavros"))
         self.create_subscription(self._packets, "mavlink/in", self._take, 1000)
         self.create_subscription(message_type(_STATE), "flight_state", self._fly, 1)
         self.create_subscription(NavSatFix, "fix", self._take_fix, 1)
@@ -64,25 +65,21 @@ class AutopilotNode(Node):
         self.create_subscription(Temperature, "pressure/temperature", self._take_temperature, 1)
 
     def get_state(self) -> AutopilotState:
-        """Returns the whole state.
-
-        Links belong to the bridges, so a restore keeps the current ones.
-        """
-        return self.core.memory
+        """Returns the whole state, without links: they belong to the bridges."""
+        return self.core.context.memory
 
     def set_state(self, state: AutopilotState) -> None:
         """Restores a saved state, with the current links."""
-        links = self.core.memory.links
-        self.core.memory = state
-        self.core.log.end()
-        state.links = links
-        for link in links.values():
+        context = self.core.context
+        context.memory = state
+        context.log.end()
+        for link in context.links.open.values():
             streams.begin(link, state.now_ns)
 
     def destroy_node(self) -> None:
         """Destroys the node and closes the flight logs."""
         super().destroy_node()
-        self.core.log.close()
+        self.core.context.log.close()
 
     def _take(self, message: Any) -> None:
         if message.closed:
@@ -99,16 +96,16 @@ class AutopilotNode(Node):
         self._flush()
 
     def _take_fix(self, fix: Any) -> None:
-        memory = self.core.memory
+        memory = self.core.context.memory
         memory.has_receiver = True
         if fix.status.status >= 0:
             memory.fix_ns = self.get_clock().now_ns()
 
     def _take_pressure(self, pressure: Any) -> None:
-        self.core.memory.pressure = float(pressure.fluid_pressure)
+        self.core.context.memory.pressure = float(pressure.fluid_pressure)
 
     def _take_temperature(self, temperature: Any) -> None:
-        self.core.memory.air_temperature = float(temperature.temperature)
+        self.core.context.memory.air_temperature = float(temperature.temperature)
 
     def _flush(self) -> None:
         """Publishes the pending frames, one message per link."""

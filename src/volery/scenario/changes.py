@@ -12,9 +12,10 @@ from pydantic import Field, ValidationError
 
 from volery.core.errors import ScenarioError
 from volery.scenario.base import Data, NonNegative
-from volery.scenario.load import describe_validation_error, parse_scenario
+from volery.scenario.load import parse_scenario
 from volery.scenario.schema import InventoryForest, ProceduralForest, Scenario
 from volery.scenario.sensor_sets import SensorSet, fit
+from volery.scenario.validation import describe_validation_error
 
 _WHERE = "changes"
 _APART_M = 3.0

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import difflib
 from pathlib import Path
-from typing import TypeVar
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from volery.core.errors import DataFileError
 from volery.scenario.base import Bounded, implausible
 from volery.scenario.data_file_bases import FileData, read_toml, read_with_bases
-from volery.scenario.load import describe_validation_error
-
-Model = TypeVar("Model", bound=BaseModel)
+from volery.scenario.validation import Model, describe_validation_error
 
 
 def load_data_file(path: Path, model: type[Model], bases: Path | None = None) -> Model:

@@ -9,6 +9,7 @@ from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
 from volery.core.errors import CommandError
 from volery.scenario.base import Data, Vector3
+from volery.scenario.validation import describe_validation_error
 
 SimulatedTime = Annotated[float, Field(ge=0.0, le=1e8)]
 """Time in s; the bound is three years, far within integer nanoseconds."""
@@ -120,8 +121,6 @@ def parse_fault(data: Fault | Mapping[str, Any]) -> Fault:
         return data
     if not isinstance(data, Mapping):
         raise CommandError(f"a fault is a table such as {{'kind': 'motor', ...}}, not {data!r}")
-    from volery.scenario.load import describe_validation_error
-
     kind = data.get("kind")
     if kind not in _KINDS:
         raise CommandError(f"fault: kind must be one of {', '.join(_KINDS)}, not {kind!r}")

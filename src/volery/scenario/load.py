@@ -7,15 +7,11 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
-
 from volery.core.errors import ScenarioError, reason_of
 from volery.scenario import library
 from volery.scenario.access import ScenarioAccess
 from volery.scenario.schema import Scenario
-
-_MOST_SHOWN = 60
-"""Characters of a value in an error."""
+from volery.scenario.validation import validated
 
 
 def load_scenario(
@@ -53,126 +49,7 @@ def parse_scenario(
     is for scenarios that a program makes. Raises `ScenarioError`, naming key and allowed values,
     for invalid data.
     """
-    try:
-        scenario = Scenario.model_validate(data)
-    except ValidationError as error:
-        raise ScenarioError(describe_validation_error(error, where, Scenario, data)) from None
-    return scenario.with_access(access)
-
-
-def describe_validation_error(
-    error: ValidationError, where: str, model: type[BaseModel], data: Any
-) -> str:
-    """Returns one line per fault: file, key, found value and allowed values.
-
-    `data` is the validated input, which distinguishes keys from pydantic's names of union branches.
-    """
-    faults = error.errors()
-    inner = [f["loc"] for f in faults]
-    # A list with an invalid item is also reported as too short, which is redundant.
-    faults = [
-        f
-        for f in faults
-        if f["type"] != "too_short"
-        or not any(len(p) > len(f["loc"]) and p[: len(f["loc"])] == f["loc"] for p in inner)
-    ]
-    lines = [_describe(fault, model, data) for fault in faults]
-    if len(lines) == 1:
-        return f"{where}: {lines[0]}"
-    return f"{where}: {len(lines)} faults\n" + "\n".join(f"  {line}" for line in lines)
-
-
-def _describe(fault: Any, model: type[BaseModel], data: Any) -> str:
-    key = _key(fault["loc"], data, keep_last=fault["type"] == "missing")
-    message = str(fault["msg"]).removeprefix("Value error, ")
-    if fault["type"] == "extra_forbidden":
-        allowed = _sibling_keys(model, fault["loc"])
-        near = difflib.get_close_matches(str(fault["loc"][-1]), allowed, n=1)
-        hint = f"; did you mean '{near[0]}'?" if near else "."
-        return f"unknown key '{key}'{hint} Allowed here: {', '.join(allowed)}"
-    if fault["type"] == "missing":
-        return f"key '{key}' is missing"
-    if not key:
-        return message
-    one_table = fault["type"] == "tuple_type" and isinstance(fault.get("input"), dict)
-    if one_table and _names_tables(model, fault["loc"]):
-        return f"key '{key}': there may be several of them; write [[{key}]], not [{key}]"
-    if fault["type"] == "tuple_type":
-        message = "a list is needed, in brackets"
-    found = fault.get("input")
-    shown = f" (found {_short(found)})" if isinstance(found, str | int | float | bool) else ""
-    return f"key '{key}': {message}{shown}"
-
-
-def _short(value: str | float) -> str:
-    """Returns a value for an error: a token, not the text of a file."""
-    text = repr(value)
-    return text if len(text) <= _MOST_SHOWN else f"{text[:_MOST_SHOWN]}..."
-
-
-def _key(location: tuple[int | str, ...], data: Any, *, keep_last: bool) -> str:
-    key = ""
-    tagged: Any = None
-    for position, part in enumerate(location):
-        if isinstance(data, dict) and data.get("kind") == part and data is not tagged:
-            tagged = data  # the name of a union branch, even if a key has the same name
-            continue
-        is_key = isinstance(part, int) or (isinstance(data, dict) and part in data)
-        if not is_key and not (keep_last and position == len(location) - 1):
-            continue  # the name of a union branch
-        if isinstance(data, dict):
-            data = data.get(part)
-        elif isinstance(data, list | tuple) and isinstance(part, int):
-            data = data[part] if part < len(data) else None
-        key += f"[{part}]" if isinstance(part, int) else f".{part}" if key else str(part)
-    return key
-
-
-def _names_tables(model: type[BaseModel], location: tuple[int | str, ...]) -> bool:
-    """Returns whether the key is the header of an array of tables."""
-    schema = model.model_json_schema()
-    node: Any = schema
-    for part in location:
-        node = _descend(schema, node, part)
-    items = _resolve(schema, node.get("items", {}))
-    nested = any(isinstance(part, int) for part in location)
-    return not nested and ("oneOf" in items or "properties" in items)
-
-
-def _sibling_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
-    """Returns the keys allowed at the position of the unknown key, from the JSON schema."""
-    schema = model.model_json_schema()
-    node: Any = schema
-    for part in location[:-1]:
-        node = _descend(schema, node, part)
-    node = _resolve(schema, node)
-    return sorted(node.get("properties", {}))
-
-
-def _resolve(schema: Any, node: Any) -> Any:
-    while "$ref" in node:
-        node = schema["$defs"][node["$ref"].rsplit("/", 1)[1]]
-    return node
-
-
-def _descend(schema: Any, node: Any, part: int | str) -> Any:
-    node = _resolve(schema, node)
-    if isinstance(part, int):
-        return _resolve(schema, node.get("items", {}))
-    if part in node.get("properties", {}):
-        return _resolve(schema, node["properties"][part])
-    for option in (*node.get("oneOf", ()), *node.get("anyOf", ())):
-        found = _resolve(schema, option)
-        kind = found.get("properties", {}).get("kind", {})
-        if part == kind.get("const") or part in found.get("properties", {}):
-            return found if part == kind.get("const") else _descend(schema, found, part)
-        if "oneOf" in found:
-            return _descend(schema, found, part)
-    extra = node.get("additionalProperties") or node.get("patternProperties", {})
-    if isinstance(extra, dict) and extra:
-        inner = extra if ("$ref" in extra or "type" in extra) else next(iter(extra.values()))
-        return _resolve(schema, inner)
-    return {}
+    return validated(data, Scenario, where).with_access(access)
 
 
 def _find(name_or_path: str | Path) -> Path:

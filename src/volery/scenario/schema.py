@@ -29,10 +29,12 @@ from volery.scenario.camera import CameraSensor, Daylight
 from volery.scenario.city import City
 from volery.scenario.faults import Fault
 from volery.scenario.grid_map import GridMapWorld
+from volery.scenario.merging import merged
 from volery.scenario.navigation import DeniedArea, MagneticField, NavigationSensor, Origin
 from volery.scenario.node_names import NODE_PATTERN
 from volery.scenario.radio import Radio
 from volery.scenario.user_mesh import UserMesh
+from volery.scenario.validation import validated
 from volery.scenario.weather import Weather
 from volery.scenario.wind import Wind
 
@@ -443,11 +445,8 @@ class Scenario(Data):
         rest of the world unchanged. Raises `ScenarioError`, naming key and allowed values, for
         invalid values.
         """
-        from volery.scenario.load import parse_scenario  # imports this class
-        from volery.scenario.merging import merged
-
         data = merged(self.model_dump(exclude_unset=True), changes)
-        return parse_scenario(data, where=f"{self.name}: with_()", access=self.access)
+        return validated(data, Scenario, f"{self.name}: with_()").with_access(self.access)
 
     @property
     def access(self) -> ScenarioAccess:

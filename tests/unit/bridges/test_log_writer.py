@@ -23,7 +23,8 @@ from volery.bridges.logs import log_writer
 from volery.bridges.logs.log_writer import open_log
 from volery.bridges.logs.reader import summarize
 from volery.core.errors import RecordingError
-from volery.graph.messages import Published, typestore
+from volery.graph.messages import Published
+from volery.graph.typestore import typestore
 
 Flight = Callable[[float], list[Published]]
 FORMATS = [".mcap", ".bag"]

@@ -13,7 +13,8 @@ from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.records import LogWalk
 from volery.bridges.logs.recovery import recover, recovered_name
 from volery.core.errors import RecordingError
-from volery.graph.messages import Published, typestore
+from volery.graph.messages import Published
+from volery.graph.typestore import typestore
 
 Flight = Callable[[float], list[Published]]
 FORMATS = [".mcap", ".bag"]

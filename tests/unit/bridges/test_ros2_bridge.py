@@ -41,10 +41,10 @@ from volery.graph.messages import (
     header,
     message_type,
     time_from_ns,
-    typestore,
 )
 from volery.graph.parameter_values import parameter_message, plain_of
 from volery.graph.parameters import Parameter
+from volery.graph.typestore import typestore
 
 STRING = "std_msgs/msg/String"
 TRIGGER = "std_srvs/srv/Trigger"

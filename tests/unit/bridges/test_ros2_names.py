@@ -25,8 +25,9 @@ from volery.bridges.ros2.profiles import common_profile, profile_of
 from volery.bridges.ros2.type_hashes import message_hash, service_hash
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.codecs.cdr import decode_cdr, encode_cdr
-from volery.graph.messages import add_definitions, typestore
+from volery.graph.messages import add_definitions
 from volery.graph.parameter_values import plain_of, type_of, value_message
+from volery.graph.typestore import typestore
 
 
 @pytest.mark.parametrize("name", ["/a", "/uav1/laser/horizontal/scan", "/_hidden/x9", "/a__b"])

@@ -13,7 +13,7 @@ from mcap.writer import CompressionType, Writer
 from rosbags.rosbag1 import Writer as BagWriter
 
 from volery.bridges.logs import log_writer as bag_module
-from volery.bridges.logs.chunks import open_chunks
+from volery.bridges.logs.log_formats import open_chunks
 from volery.bridges.logs.log_writer import open_log
 from volery.bridges.logs.records import LogWalk
 from volery.bridges.logs.timeline import Timeline, TimelinePosition

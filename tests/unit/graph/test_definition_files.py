@@ -19,6 +19,7 @@ from volery.graph.codecs.definition_files import (
     read_definition_file,
 )
 from volery.graph.codecs.definition_store import DefinitionStore
+from volery.graph.typestore import typestore
 
 SHIPPED = Path(messages.__file__).parent / "definitions"
 
@@ -39,7 +40,7 @@ def write(folder: Path, **files: str) -> Path:
 
 
 def test_every_shipped_file_loads_and_codes() -> None:
-    store = messages.typestore()
+    store = typestore()
     files = find_definition_files(SHIPPED)
     assert len(files) > 90
     for file in files:
@@ -82,19 +83,19 @@ def test_reader_agrees_with_rosbags() -> None:
 )
 def test_types_load_on_demand(name: str) -> None:
     assert messages.message_type(name).__msgtype__ == name
-    assert name in messages.typestore().names()
+    assert name in typestore().names()
 
 
 def test_type_hash_of_a_standard_service_part() -> None:
     """The same definition gives the same hash by another way."""
-    ours = messages.typestore().hash_rihs01("mavros_msgs/msg/ParamValue")
+    ours = typestore().hash_rihs01("mavros_msgs/msg/ParamValue")
     other = get_typestore(Stores.ROS2_JAZZY)
     other.register(get_types_from_msg("int64 integer\nfloat64 real", "mavros_msgs/msg/ParamValue"))
     assert ours == other.hash_rihs01("mavros_msgs/msg/ParamValue")
 
 
 def test_action_messages() -> None:
-    fields = messages.typestore().fielddefs
+    fields = typestore().fielddefs
     base = "simulation_interfaces/action/SimulateSteps"
     assert [name for name, _ in fields[f"{base}_Goal"][1]] == ["steps"]
     assert fields[f"{base}_SendGoal_Request"][1] == [
@@ -116,14 +117,15 @@ def test_unknown_names() -> None:
         messages.message_type("std_srvs/srv/Nothing_Request")
     with pytest.raises(AttributeError):
         messages.std_srvs__srv__Nothing  # noqa: B018
-    assert "std_srvs/srv/Nothing" not in messages.typestore().types
+    assert "std_srvs/srv/Nothing" not in typestore().types
 
 
 def test_import_reads_no_definition_file() -> None:
     """What start-up pays for is what it uses."""
     code = (
-        "from volery.graph import messages\n"
-        "loaded = [n for n in dict.keys(messages.typestore().types) if n.startswith('mavros')]\n"
+        "import volery.graph.messages\n"
+        "from volery.graph.typestore import typestore\n"
+        "loaded = [n for n in dict.keys(typestore().types) if n.startswith('mavros')]\n"
         "assert not loaded, loaded\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -7,7 +7,8 @@ import pytest
 
 from volery.core.errors import GraphError
 from volery.graph.graph import MOST_UNUSED, Graph
-from volery.graph.messages import LaserScan, String, Twist, header, message_type, typestore
+from volery.graph.messages import LaserScan, String, Twist, header, message_type
+from volery.graph.typestore import typestore
 
 
 @pytest.fixture

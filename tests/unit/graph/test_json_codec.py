@@ -18,8 +18,9 @@ from volery.graph import messages as m
 from volery.graph.codecs.json_codec import JsonCodec
 from volery.graph.codecs.json_decoding import decode_plain
 from volery.graph.codecs.zero import zero_message
+from volery.graph.typestore import typestore
 
-TYPES = m.typestore().names()
+TYPES = typestore().names()
 TWIST = "geometry_msgs/msg/Twist"
 SCAN = "sensor_msgs/msg/LaserScan"
 
@@ -247,4 +248,4 @@ def test_anything_is_read_or_refused(name: str, plain: Any) -> None:
         message = decode_plain(plain, name)
     except GraphError:
         return
-    m.typestore().serialize_cdr(message, name)
+    typestore().serialize_cdr(message, name)

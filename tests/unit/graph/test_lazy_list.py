@@ -12,8 +12,8 @@ from volery.graph.messages import (
     TransformStamped,
     Vector3,
     header,
-    typestore,
 )
+from volery.graph.typestore import typestore
 
 TYPE = "tf2_msgs/msg/TFMessage"
 

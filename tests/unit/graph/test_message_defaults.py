@@ -19,8 +19,8 @@ from volery.graph.messages import (
     Twist,
     Vector3,
     message_type,
-    typestore,
 )
+from volery.graph.typestore import typestore
 
 
 def test_arguments_may_stay_away():

@@ -17,11 +17,13 @@ from rosbags.typesys import Stores, get_typestore
 from volery.core.errors import GraphError
 from volery.graph import messages as m
 from volery.graph.codecs.cdr import decode_cdr, encode_cdr
+from volery.graph.codecs.definition_store import DefinitionStore
 from volery.graph.codecs.ros1 import Ros1Codec, ros1_codec, ros1_name, ros2_name
 from volery.graph.codecs.zero import zero_message
+from volery.graph.typestore import typestore
 
 ROS1 = get_typestore(Stores.ROS1_NOETIC)
-TYPES = m.typestore().names()
+TYPES = typestore().names()
 SHARED = [name for name in TYPES if name in ROS1.fielddefs]
 ADDED_BY_ROS2 = frozenset(
     [
@@ -142,9 +144,7 @@ def test_round_trips(codec: Ros1Codec, name: str) -> None:
         assert codec.encode(back, name, seq=seed) == data
         cdr = encode_cdr(message, name)
         assert_same(decode_cdr(cdr, name), message, name)
-        swapped = m.typestore().serialize_cdr(
-            message, name, little_endian=sys.byteorder != "little"
-        )
+        swapped = typestore().serialize_cdr(message, name, little_endian=sys.byteorder != "little")
         assert_same(decode_cdr(swapped, name), message, name)
         zero = zero_message(name)
         assert_same(decode_cdr(encode_cdr(zero, name), name), zero, name)
@@ -190,7 +190,7 @@ def test_lying_lengths(codec: Ros1Codec) -> None:
 
 def test_array_of_messages_without_content(tmp_path: Any) -> None:
     """Such elements take no bytes in ROS 1, so no length of theirs is too long for the data."""
-    store = m.DefinitionStore(get_typestore(Stores.ROS2_JAZZY), "nowhere")
+    store = DefinitionStore(get_typestore(Stores.ROS2_JAZZY), "nowhere")
     (tmp_path / "farm" / "msg").mkdir(parents=True)
     (tmp_path / "farm" / "msg" / "Voids.msg").write_text("std_msgs/Empty[] voids\n")
     store.add_folder(tmp_path)
@@ -230,7 +230,7 @@ def test_garbage(name: str, data: bytes) -> None:
 @given(st.integers(0, 2**16), st.integers(0, 2**16), st.integers(0, 255), st.booleans())
 def test_damaged_messages(name: str, seed: int, where: int, byte: int, big: bool) -> None:
     message = filled(name, np.random.default_rng(seed))
-    cdr = bytes(m.typestore().serialize_cdr(message, name, little_endian=not big))
+    cdr = bytes(typestore().serialize_cdr(message, name, little_endian=not big))
     for decode, raw in (
         (ros1_codec().decode, ros1_codec().encode(message, name)),
         (decode_cdr, cdr),

@@ -165,7 +165,7 @@ def test_a_low_battery_warns_returns_and_lands(flight):
     simulation, station = flight
     station.set("COM_LOW_BAT_ACT", 3)
     station.up(2.0)
-    memory = simulation._crew.nodes[0].core.memory
+    memory = simulation._crew.nodes[0].core.context.memory
     core = simulation._crew.nodes[0].core
     update = core.update
     drained = {"charge": 0.5, "voltage": 11.0, "current": 9.0}

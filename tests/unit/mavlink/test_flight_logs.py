@@ -243,7 +243,7 @@ def test_a_closed_link_leaves_nothing(flight):
     (autopilot,) = (node for node in simulation.nodes if node.get_name() == "autopilot")
     autopilot.core.close_link(station.link)
     station.seconds(0.1)
-    transfers = autopilot.core.log.transfers
+    transfers = autopilot.core.context.log.transfers
     assert not transfers._requests
     assert not transfers._waiting
 
@@ -331,7 +331,8 @@ def test_the_file_has_no_name_and_goes_with_its_owner(monkeypatch, tmp_path):
 def test_a_log_that_is_full_or_cannot_be_written_is_told_of_once(flight, monkeypatch):
     simulation, station = flight
     (autopilot,) = (node for node in simulation.nodes if node.get_name() == "autopilot")
-    autopilot.core.log.storage = LogStorage(10_000)
+    storage = autopilot.core.context.log.storage
+    storage._capacity = 10_000
     fly_once(station, 1.0)
     assert station.texts.count("Flight log is full: logging ends") == 1
     (entry,) = entries(station)
@@ -341,7 +342,8 @@ def test_a_log_that_is_full_or_cannot_be_written_is_told_of_once(flight, monkeyp
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    autopilot.core.log.storage = LogStorage()
+    storage.close()
+    storage._capacity = log_storage.CAPACITY_BYTES
     monkeypatch.setattr(log_storage, "_BLOCK_BYTES", 1000)
     monkeypatch.setattr(os, "pwrite", full)
     fly_once(station, 1.0)

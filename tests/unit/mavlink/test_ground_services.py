@@ -105,7 +105,7 @@ def test_the_shell_keeps_no_endless_lines(flight):
     (autopilot,) = (node for node in simulation.nodes if node.get_name() == "autopilot")
     for _ in range(8):
         shell(station, "x" * 70)
-        assert all(len(line) <= 200 for line in autopilot.core.memory.shells.values())
+        assert all(len(line) <= 200 for line in autopilot.core.context.memory.shells.values())
     assert "param show" in shell(station, "\nhelp\n") + shell(station, "help\n")
 
 

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from volery.graph.messages import typestore
+from volery.graph.typestore import typestore
 from volery.sensors.lidar_model import load_lidar
 
 

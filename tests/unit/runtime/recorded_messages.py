@@ -1,6 +1,6 @@
 """Clients that watch a simulation, as bridges let them: a session with mailboxes."""
 
-from volery.graph.messages import typestore
+from volery.graph.typestore import typestore
 
 
 class Watcher:

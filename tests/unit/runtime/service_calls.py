@@ -1,8 +1,9 @@
 """Asking services of a simulation, as bridges do, with plain data for requests."""
 
 from volery.graph.codecs.zero import zero_message
-from volery.graph.messages import message_type, typestore
+from volery.graph.messages import message_type
 from volery.graph.service_reply import ServiceReply
+from volery.graph.typestore import typestore
 
 STANDARD = "simulation_interfaces"
 

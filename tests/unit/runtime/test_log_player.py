@@ -165,7 +165,8 @@ def test_only_what_is_listened_to_is_decoded(flight, monkeypatch):
 
 def test_it_keeps_the_time_that_is_asked_for(flight, monkeypatch):
     wall = FakeWallClock()
-    monkeypatch.setattr("volery.runtime.replay.log_player.time", wall.time)
+    for module in ("log_player", "playback_control"):
+        monkeypatch.setattr(f"volery.runtime.replay.{module}.time", wall.time)
     with LogPlayer(flight, speed=4.0) as player:
         monkeypatch.setattr(player._inbox, "wait", wall.wait)
         visitor = Visitor(player)

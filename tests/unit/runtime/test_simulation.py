@@ -16,8 +16,8 @@ from volery.graph.messages import (
     Vector3,
     header,
     message_type,
-    typestore,
 )
+from volery.graph.typestore import typestore
 from volery.runtime.monitoring import progress
 
 Duration = message_type("builtin_interfaces/msg/Duration")

@@ -204,12 +204,3 @@ class ChunkedLog(ABC):
             for c in self.chunks
         )
         self.chunks = [chunk for chunk in whole if chunk.counts]
-
-
-def open_chunks(path: Path) -> ChunkedLog:
-    """Opens the chunks of a log. Raises `RecordingError` if the file is missing or no log."""
-    from volery.bridges.logs.bag_chunks import BagChunks
-    from volery.bridges.logs.mcap_chunks import McapChunks
-    from volery.bridges.logs.records import log_format
-
-    return McapChunks(path) if log_format(path) == "mcap" else BagChunks(path)

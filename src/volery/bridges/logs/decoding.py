@@ -12,7 +12,8 @@ from volery.bridges.logs.records import LogRecord, LogTopic
 from volery.core.errors import GraphError
 from volery.graph.codecs.cdr import decode_cdr
 from volery.graph.codecs.ros1 import ros1_codec, ros2_name
-from volery.graph.messages import add_definitions, typestore
+from volery.graph.messages import add_definitions
+from volery.graph.typestore import typestore
 
 _SEPARATOR = re.compile(r"^=+\s*$", re.MULTILINE)
 _NESTED = re.compile(r"\s*MSG:\s*(\S+)[^\n]*\n?")

@@ -292,6 +292,6 @@ class BagLog(LogWriter):
 
 
 def _ros2_typestore() -> Typestore:
-    from volery.graph.messages import typestore
+    from volery.graph.typestore import typestore
 
     return typestore()

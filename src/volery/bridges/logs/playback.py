@@ -11,8 +11,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
-from volery.bridges.logs.chunks import open_chunks
 from volery.bridges.logs.decoding import LogDecoder
+from volery.bridges.logs.log_formats import open_chunks
 from volery.bridges.logs.timeline import Shown, Timeline, TimelinePosition
 from volery.bridges.topic_patterns import topic_filter
 from volery.core.errors import GraphError, RecordingError

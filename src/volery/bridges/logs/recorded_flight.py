@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from volery.bridges.logs.budgets import UnpackingBudget
-from volery.bridges.logs.chunks import ChunkedLog, open_chunks
+from volery.bridges.logs.chunks import ChunkedLog
 from volery.bridges.logs.decoding import LogDecoder
+from volery.bridges.logs.log_formats import open_chunks
 from volery.bridges.logs.records import LogRecord
 from volery.core.errors import GraphError, RecordingError
 from volery.graph import command_records

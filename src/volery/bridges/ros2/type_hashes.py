@@ -13,7 +13,7 @@ from typing import Any
 
 from rosbags.interfaces import Nodetype
 
-from volery.graph.messages import typestore
+from volery.graph.typestore import typestore
 
 UNKNOWN = "RIHS01_" + "0" * 64
 """Hash of a type without one."""

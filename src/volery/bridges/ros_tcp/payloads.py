@@ -11,8 +11,9 @@ from volery.graph.codecs.cdr import CODING_ERRORS, decode_cdr, encode_cdr
 from volery.graph.codecs.definition_store import EMPTY_MEMBER
 from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.codecs.ros1_names import ros1_name, ros2_name
-from volery.graph.messages import Published, message_type, typestore
+from volery.graph.messages import Published, message_type
 from volery.graph.object_count import CDR, ROS1, check_objects
+from volery.graph.typestore import typestore
 
 _CDR_HEADER_BYTES = 4
 

@@ -19,7 +19,8 @@ from rosbags.interfaces import Nodetype
 from volery.bridges.ros_tcp.wire import Bytes
 from volery.core.errors import GraphError
 from volery.graph.codecs.ros1 import ros1_codec
-from volery.graph.messages import Published, typestore
+from volery.graph.messages import Published
+from volery.graph.typestore import typestore
 
 LARGE_BYTES = 16 << 10
 """Size below which a copy costs less than splitting a message."""

@@ -30,10 +30,10 @@ from volery.core.errors import GraphError, VoleryError
 from volery.graph.codecs.json_codec import JsonCodec
 from volery.graph.codecs.json_decoding import decode_plain
 from volery.graph.codecs.ros1_names import ros1_name, ros2_name
-from volery.graph.messages import typestore
 from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Handler, SessionInfo
 from volery.graph.subscription_queue import Wake
+from volery.graph.typestore import typestore
 
 MOST_WAITING = 1000
 """Publications that may wait for the network."""

@@ -10,7 +10,7 @@ from volery.core.errors import GraphError
 from volery.graph.codecs.definition_store import EMPTY_MEMBER
 from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.codecs.ros1_names import ros1_name
-from volery.graph.messages import typestore
+from volery.graph.typestore import typestore
 
 TypeDef = dict[str, Any]
 """Fields of rosapi_msgs/msg/TypeDef."""

@@ -21,9 +21,9 @@ from volery.core.errors import BridgeError, GraphError
 from volery.graph.codecs.definition_store import EMPTY_MEMBER
 from volery.graph.codecs.json_decoding import decode_plain
 from volery.graph.codecs.ros1_names import ros2_name
-from volery.graph.messages import typestore
 from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Session
+from volery.graph.typestore import typestore
 
 MOST_CALLS = 1000
 """Open calls of one client, and open requests to it."""

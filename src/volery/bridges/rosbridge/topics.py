@@ -23,10 +23,11 @@ from volery.core.clock import stamp_from_ns
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.codecs.json_decoding import decode_plain
 from volery.graph.codecs.ros1_names import ros2_name
-from volery.graph.messages import Published, typestore
+from volery.graph.messages import Published
 from volery.graph.qos import DEFAULT_DEPTH, MOST_DEPTH
 from volery.graph.session import Session
 from volery.graph.subscription_queue import SubscriptionQueue
+from volery.graph.typestore import typestore
 
 MOST_STREAMS = 10_000
 """Largest number of topics that a client may subscribe to, and publish."""

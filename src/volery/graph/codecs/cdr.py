@@ -15,7 +15,7 @@ from rosbags.typesys.base import normalize_fieldname
 from volery.core.errors import GraphError
 from volery.graph.codecs.definition_files import NUMBERS
 from volery.graph.codecs.definition_store import element_type
-from volery.graph.messages import typestore
+from volery.graph.typestore import typestore
 
 _HEADER_BYTES = 4
 _BIG_ENDIAN = b"\x00\x00"

@@ -20,7 +20,8 @@ from volery.core.plurals import counted
 from volery.graph.codecs.definition_files import INTEGER_RANGES, NUMBERS
 from volery.graph.codecs.definition_store import EMPTY_MEMBER
 from volery.graph.codecs.zero import DTYPES, value_maker
-from volery.graph.messages import single, typestore
+from volery.graph.messages import single
+from volery.graph.typestore import typestore
 
 Convert = Callable[[Any], Any]
 

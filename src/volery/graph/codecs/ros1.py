@@ -33,7 +33,7 @@ from volery.graph.codecs.cdr import CODING_ERRORS, is_number_array, own_array
 from volery.graph.codecs.definition_store import EMPTY_MEMBER, DefinitionStore, element_type
 from volery.graph.codecs.ros1_names import ros1_name, ros2_name
 from volery.graph.codecs.zero import value_maker
-from volery.graph.messages import typestore
+from volery.graph.typestore import typestore
 
 __all__ = ["Ros1Codec", "ros1_codec", "ros1_name", "ros2_name"]
 

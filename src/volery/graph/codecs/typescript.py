@@ -16,7 +16,7 @@ from typing import Any
 from rosbags.interfaces import Nodetype
 
 from volery.graph.codecs.definition_store import EMPTY_MEMBER
-from volery.graph.messages import typestore
+from volery.graph.typestore import typestore
 
 _HEAD = """\
 // Written by `python -m volery.graph.codecs.typescript` from the definitions of the messages.

@@ -11,7 +11,7 @@ from rosbags.interfaces import Nodetype
 
 from volery.core.errors import GraphError
 from volery.graph.codecs.definition_store import EMPTY_MEMBER
-from volery.graph.messages import typestore
+from volery.graph.typestore import typestore
 
 DTYPES: dict[str, np.dtype[Any]] = {
     "bool": np.dtype(np.bool_),

@@ -18,7 +18,8 @@ from types import ModuleType
 from typing import Any
 
 from volery.core.errors import GraphError
-from volery.graph.messages import message_type, typestore
+from volery.graph.messages import message_type
+from volery.graph.typestore import typestore
 
 _KINDS = ("msg", "srv", "action")
 

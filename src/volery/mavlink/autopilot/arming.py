@@ -6,18 +6,15 @@ The rotors of an armed UAV stand still until take-off: the flight modes have no 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from volery.mavlink.autopilot import feasibility, home, mode_requirements
+from volery.mavlink.autopilot.context import AutopilotContext
 from volery.mavlink.autopilot.modes import Mode
 
-if TYPE_CHECKING:
-    from volery.mavlink.autopilot.core import Autopilot
 
-
-def problems(autopilot: Autopilot) -> list[str]:
+def problems(context: AutopilotContext) -> list[str]:
     """Returns the problems that prevent arming; an empty list if there are none."""
-    memory = autopilot.memory
+    memory = context.memory
     state = memory.state
     if state is None:
         return ["nothing is known of the vehicle"]
@@ -26,75 +23,75 @@ def problems(autopilot: Autopilot) -> list[str]:
         found.append("the vehicle has crashed")
     if memory.mode in (Mode.RETURN, Mode.LAND) and not memory.armed:
         found.append("mode not suitable for arming")
-    if memory.fix_lost and not autopilot.parameter("COM_ARM_WO_GPS"):
+    if memory.fix_lost and not context.parameter("COM_ARM_WO_GPS"):
         found.append("no satellite fix")
-    if math.isfinite(state.charge) and state.charge < float(autopilot.parameter("BAT_LOW_THR")):
+    if math.isfinite(state.charge) and state.charge < float(context.parameter("BAT_LOW_THR")):
         found.append("low battery")
     tilt = 1.0 - 2.0 * (state.attitude[0] ** 2 + state.attitude[1] ** 2)
     if not state.airborne and tilt < 0.7:  # PX4 refuses beyond about 45 deg
         found.append("the vehicle lies on its side")
-    lacks = mode_requirements.missing(autopilot, memory.mode)
+    lacks = mode_requirements.missing(memory, memory.mode)
     found += [lacks] if lacks else []
-    if int(autopilot.parameter("NAV_DLL_ACT")) and not mode_requirements.ground_is_there(autopilot):
+    if int(context.parameter("NAV_DLL_ACT")) and not mode_requirements.ground_is_there(memory):
         found.append("no connection to the ground control station")
     return found
 
 
-def obstacle(autopilot: Autopilot) -> str:
+def obstacle(context: AutopilotContext) -> str:
     """Returns the first problem, including those of the mission to start; empty: none."""
-    found = problems(autopilot)
-    if not found and autopilot.memory.mode is Mode.MISSION:
-        return feasibility.problem(autopilot)
+    found = problems(context)
+    if not found and context.memory.mode is Mode.MISSION:
+        return feasibility.problem(context)
     return found[0] if found else ""
 
 
-def arm(autopilot: Autopilot) -> str:
+def arm(context: AutopilotContext) -> str:
     """Arms the UAV; returns why not, empty if armed.
 
     Arming cannot be forced: PX4 checks all requests.
     """
-    memory = autopilot.memory
+    memory = context.memory
     if memory.armed:
         return ""
-    why = obstacle(autopilot)
+    why = obstacle(context)
     if why:
         return why
     memory.armed, memory.armed_ns = True, memory.now_ns
     memory.airborne, memory.failsafe = False, False
     memory.warned.clear()
-    home.set_on_arming(autopilot)
-    autopilot.say(6, "Armed by external command")
-    autopilot.announce()
+    home.set_on_arming(context)
+    context.say(6, "Armed by external command")
+    context.announce()
     return ""
 
 
-def disarm(autopilot: Autopilot, *, forced: bool) -> str:
+def disarm(context: AutopilotContext, *, forced: bool) -> str:
     """Disarms the UAV; returns why not, empty if disarmed.
 
     In the air only if `forced`, and then the UAV falls.
     """
-    state = autopilot.state
+    state = context.state
     landed = state.mode in ("LANDED", "CRASHED")
     if not landed:
         if not forced:
             return "not landed"
-        why = autopilot.vehicle.stop()
+        why = context.vehicle.stop()
         if why:
             return why
-    finish(autopilot, "Disarmed by external command")
-    autopilot.memory.order = "" if landed else "stop"
-    autopilot.memory.ordered_ns = autopilot.memory.now_ns
+    finish(context, "Disarmed by external command")
+    context.memory.order = "" if landed else "stop"
+    context.memory.ordered_ns = context.memory.now_ns
     return ""
 
 
-def finish(autopilot: Autopilot, text: str) -> None:
+def finish(context: AutopilotContext, text: str) -> None:
     """Sets the state to disarmed and reports `text`."""
-    memory = autopilot.memory
+    memory = context.memory
     if not memory.armed:
         return
     memory.armed, memory.airborne, memory.failsafe = False, False, False
     memory.leg = memory.way_home = memory.target = None
     if memory.mode in (Mode.RETURN, Mode.LAND, Mode.TAKE_OFF, Mode.OFFBOARD):
         memory.mode = Mode.HOLD
-    autopilot.say(6, text)
-    autopilot.announce()
+    context.say(6, text)
+    context.announce()

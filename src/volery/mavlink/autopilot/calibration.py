@@ -9,15 +9,15 @@ supported.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
-from volery.mavlink.autopilot.acknowledgement import ACCEPTED, TEMPORARILY_REJECTED, UNSUPPORTED
-from volery.mavlink.autopilot.state import Calibration
-
-if TYPE_CHECKING:
-    from volery.mavlink.autopilot.commands import Command
-    from volery.mavlink.autopilot.core import Autopilot
-    from volery.mavlink.autopilot.state import Source
+from volery.mavlink.autopilot.command_protocol import (
+    ACCEPTED,
+    TEMPORARILY_REJECTED,
+    UNSUPPORTED,
+    Command,
+)
+from volery.mavlink.autopilot.context import AutopilotContext
+from volery.mavlink.autopilot.state import Calibration, Source
 
 CALIBRATE = 241
 _OFFERED: dict[tuple[float, ...], str] = {
@@ -32,16 +32,16 @@ _STEP_PERCENT = 5
 """The duration is a modelling choice, the step is PX4's."""
 
 
-def start(autopilot: Autopilot, _source: Source, command: Command) -> int:
+def start(context: AutopilotContext, _source: Source, command: Command) -> int:
     """Handles PREFLIGHT_CALIBRATION; without a sensor it cancels the current calibration."""
-    memory = autopilot.memory
+    memory = context.memory
     params = [0.0 if math.isnan(param) else param for param in command.params]
     if not any(params):
         if memory.calibration is not None:
             memory.calibration = None
-            autopilot.say(6, "[cal] calibration cancelled")
+            context.say(6, "[cal] calibration cancelled")
         return ACCEPTED
-    if memory.armed or memory.calibration is not None or autopilot.state.mode != "LANDED":
+    if memory.armed or memory.calibration is not None or context.state.mode != "LANDED":
         return TEMPORARILY_REJECTED
     sensor = _OFFERED.get(tuple(params[:5])) if not any(params[5:]) else None
     if sensor is None:
@@ -50,22 +50,22 @@ def start(autopilot: Autopilot, _source: Source, command: Command) -> int:
     return ACCEPTED
 
 
-def update(autopilot: Autopilot) -> None:
+def update(context: AutopilotContext) -> None:
     """Reports the progress of a calibration."""
-    memory, calibration = autopilot.memory, autopilot.memory.calibration
+    memory, calibration = context.memory, context.memory.calibration
     if calibration is None:
         return
     if calibration.percent < 0:
-        autopilot.say(6, f"[cal] calibration started: 2 {calibration.sensor}")
+        context.say(6, f"[cal] calibration started: 2 {calibration.sensor}")
         calibration.percent = 0
-    if memory.armed or autopilot.state.mode != "LANDED":
+    if memory.armed or context.state.mode != "LANDED":
         memory.calibration = None
-        autopilot.say(2, f"[cal] calibration failed: {calibration.sensor}")
+        context.say(2, f"[cal] calibration failed: {calibration.sensor}")
         return
     percent = min((memory.now_ns - calibration.start_ns) * 100 // _DURATION_NS, 100)
     while calibration.percent + _STEP_PERCENT <= percent:
         calibration.percent += _STEP_PERCENT
-        autopilot.say(6, f"[cal] progress <{calibration.percent}>")
+        context.say(6, f"[cal] progress <{calibration.percent}>")
     if calibration.percent == 100:
         memory.calibration = None
-        autopilot.say(6, f"[cal] calibration done: {calibration.sensor}")
+        context.say(6, f"[cal] calibration done: {calibration.sensor}")

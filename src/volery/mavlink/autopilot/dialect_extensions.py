@@ -7,13 +7,11 @@ from __future__ import annotations
 
 import math
 import struct
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
+from volery.mavlink.autopilot.context import AutopilotContext
 from volery.mavlink.autopilot.modes import Mode
 from volery.mavlink.codec import NEWER
-
-if TYPE_CHECKING:
-    from volery.mavlink.autopilot.core import Autopilot
 
 _ADVANCED = 1
 """Flag MAV_MODE_PROPERTY_ADVANCED, which PX4 sets for all modes but altitude and position."""
@@ -76,7 +74,7 @@ class CurrentMode(_Message):
     ordered_fieldnames = ("custom_mode", "intended_custom_mode", "standard_mode")
 
 
-def protocol_version(_autopilot: Autopilot) -> Any:
+def protocol_version(_context: AutopilotContext) -> Any:
     """Returns the supported versions of MAVLink."""
     return ProtocolVersion(
         version=_SPOKEN,
@@ -87,12 +85,12 @@ def protocol_version(_autopilot: Autopilot) -> Any:
     )
 
 
-def current_mode(autopilot: Autopilot) -> Any:
+def current_mode(context: AutopilotContext) -> Any:
     """Returns CURRENT_MODE; the intended mode is unknown after a failsafe has acted."""
-    mode = autopilot.memory.mode
+    mode = context.memory.mode
     return CurrentMode(
         custom_mode=mode.custom_mode,
-        intended_custom_mode=0 if autopilot.memory.failsafe else mode.custom_mode,
+        intended_custom_mode=0 if context.memory.failsafe else mode.custom_mode,
         standard_mode=_STANDARD.get(mode, 0),
     )
 

@@ -7,14 +7,11 @@ FAILURE_TYPE_OK ends it (`FailureTable.cpp` of PX4 1.18). Faults injected by oth
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from volery.mavlink.autopilot.acknowledgement import ACCEPTED, DENIED, FAILED, UNSUPPORTED
-
-if TYPE_CHECKING:
-    from volery.mavlink.autopilot.commands import Command
-    from volery.mavlink.autopilot.core import Autopilot
-    from volery.mavlink.autopilot.state import Source
+from volery.mavlink.autopilot.command_protocol import ACCEPTED, DENIED, FAILED, UNSUPPORTED, Command
+from volery.mavlink.autopilot.context import AutopilotContext
+from volery.mavlink.autopilot.state import Source
 
 INJECT_FAILURE = 420
 _GPS, _MOTOR = 4, 101
@@ -25,23 +22,23 @@ _OK, _OFF, _STUCK = 0, 1, 2
 _EFFECTS = {_OFF: "dropped", _STUCK: "stuck"}
 
 
-def inject(autopilot: Autopilot, _source: Source, command: Command) -> int:
+def inject(context: AutopilotContext, _source: Source, command: Command) -> int:
     """Injects a failure of a unit of the UAV, or ends it."""
     unit, kind, instance = (
         round(part) if math.isfinite(part) else 0 for part in command.params[:3]
     )
-    if autopilot.parameter("SYS_FAILURE_EN") != 1:
+    if context.parameter("SYS_FAILURE_EN") != 1:
         return DENIED
-    instances = _instances_of(autopilot, unit, instance)
+    instances = _instances_of(context, unit, instance)
     if not instances or not _is_supported(unit, kind):
         return UNSUPPORTED
-    if unit == _GPS and kind in (_OK, _OFF) and not autopilot.memory.has_receiver:
-        autopilot.memory.fix_denied = kind == _OFF
+    if unit == _GPS and kind in (_OK, _OFF) and not context.memory.has_receiver:
+        context.memory.fix_denied = kind == _OFF
         return ACCEPTED
     for number in instances:
-        why = _change(autopilot, (unit, number), _fault_of(unit, kind, number))
+        why = _change(context, (unit, number), _fault_of(unit, kind, number))
         if why:
-            autopilot.say(4, why)
+            context.say(4, why)
             return FAILED
     return ACCEPTED
 
@@ -51,13 +48,13 @@ def _is_supported(unit: int, kind: int) -> bool:
     return kind in ((_OK, _OFF) if unit == _MOTOR else (_OK, _OFF, _STUCK))
 
 
-def _instances_of(autopilot: Autopilot, unit: int, instance: int) -> tuple[int, ...]:
+def _instances_of(context: AutopilotContext, unit: int, instance: int) -> tuple[int, ...]:
     """Returns the instances of a unit, from 1, to which a command applies (0: all).
 
     The result is empty for missing units.
     """
     if unit == _MOTOR:
-        all_of_them = tuple(range(1, autopilot.build.rotors + 1))
+        all_of_them = tuple(range(1, context.build.rotors + 1))
     else:
         all_of_them = (1,) if unit in _SENSORS else ()
     return tuple(number for number in all_of_them if instance in (0, number))
@@ -74,20 +71,20 @@ def _fault_of(unit: int, kind: int, instance: int) -> dict[str, Any] | None:
     return {"kind": "sensor", "sensor": _SENSORS[unit], "effect": _EFFECTS[kind]}
 
 
-def _change(autopilot: Autopilot, key: tuple[int, int], fault: dict[str, Any] | None) -> str:
+def _change(context: AutopilotContext, key: tuple[int, int], fault: dict[str, Any] | None) -> str:
     """Replaces the failure of an instance; returns why not, empty on success."""
-    failures = autopilot.memory.failures
+    failures = context.memory.failures
     before = failures.pop(key, None)
     if before is not None:
-        why = autopilot.vehicle.end_fault(before)
+        why = context.vehicle.end_fault(before)
         if why:
             return why
         for other in failures.values():  # another failure of the same sensor persists
             if other.get("sensor", "") == before.get("sensor"):
-                autopilot.vehicle.fail(other)
+                context.vehicle.fail(other)
     if fault is None:
         return ""
-    why = autopilot.vehicle.fail(fault)
+    why = context.vehicle.fail(fault)
     if not why:
         failures[key] = fault
     return why

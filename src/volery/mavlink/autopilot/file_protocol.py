@@ -6,13 +6,11 @@ Header and answers follow `mavlink_ftp.cpp` of PX4 1.18.
 from __future__ import annotations
 
 import struct
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from volery.mavlink.autopilot.context import AutopilotContext
+from volery.mavlink.autopilot.state import Source
 from volery.mavlink.codec import dialect
-
-if TYPE_CHECKING:
-    from volery.mavlink.autopilot.core import Autopilot
-    from volery.mavlink.autopilot.state import Source
 
 _HEADER = struct.Struct("<HBBBBBBI")
 """Sequence, session, opcode, size, answered opcode, end of a burst, padding, offset."""
@@ -29,7 +27,7 @@ _FAULTS = {
 """Error by opcode; 0: none."""
 
 
-def answer_file_request(autopilot: Autopilot, source: Source, message: Any) -> None:
+def answer_file_request(context: AutopilotContext, source: Source, message: Any) -> None:
     """Answers a FILE_TRANSFER_PROTOCOL message."""
     payload = bytes(message.payload)
     sequence, session, opcode, size, _, _, _, offset = _HEADER.unpack_from(payload)
@@ -38,4 +36,4 @@ def answer_file_request(autopilot: Autopilot, source: Source, message: Any) -> N
     head = _HEADER.pack(sequence + 1 & 0xFFFF, session, kind, len(data), opcode, 0, 0, offset)
     link, system, component = source
     answer = dialect().MAVLink_file_transfer_protocol_message
-    autopilot.send(answer(0, system, component, (head + data).ljust(_PAYLOAD, b"\0")), link)
+    context.links.send(answer(0, system, component, (head + data).ljust(_PAYLOAD, b"\0")), link)

@@ -3,38 +3,35 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from volery.mavlink.autopilot import plans
-
-if TYPE_CHECKING:
-    from volery.mavlink.autopilot.core import Autopilot
-    from volery.mavlink.autopilot.vehicle import Vector
+from volery.mavlink.autopilot.context import AutopilotContext
+from volery.mavlink.autopilot.vehicle import Vector
 
 
-def breach(autopilot: Autopilot, place: Vector) -> str:
+def breach(context: AutopilotContext, place: Vector) -> str:
     """Returns which limit a position in the map violates; empty if it is allowed.
 
     Being inside one of several inclusion areas is enough, as for PX4's polygons.
     """
-    home = autopilot.memory.home or autopilot.memory.origin
-    farthest = float(autopilot.parameter("GF_MAX_HOR_DIST"))
-    highest = float(autopilot.parameter("GF_MAX_VER_DIST"))
+    home = context.memory.home_or_origin
+    farthest = float(context.parameter("GF_MAX_HOR_DIST"))
+    highest = float(context.parameter("GF_MAX_VER_DIST"))
     if farthest > 0.0 and math.dist(place[:2], home[:2]) > farthest:
         return "maximum distance from home"
     if highest > 0.0 and place[2] - home[2] > highest:
         return "maximum altitude above home"
     inside: list[bool] = []
-    items = autopilot.memory.plans[plans.FENCE]
+    items = context.memory.plans[plans.FENCE]
     k = 0
     while k < len(items):
         item = items[k]
         corners = 1
         if item.command in (plans.CIRCLE_IN, plans.CIRCLE_OUT):
-            held = math.dist(_point(autopilot, item), place[:2]) < item.params[0]
+            held = math.dist(_point(context, item), place[:2]) < item.params[0]
         elif item.command in (plans.POLYGON_IN, plans.POLYGON_OUT):
             corners = int(item.params[0])
-            held = _contains([_point(autopilot, one) for one in items[k : k + corners]], place)
+            held = _contains([_point(context, one) for one in items[k : k + corners]], place)
         else:
             held = False
         k += corners
@@ -45,8 +42,8 @@ def breach(autopilot: Autopilot, place: Vector) -> str:
     return "" if not inside or any(inside) else "the area to stay in"
 
 
-def _point(autopilot: Autopilot, item: plans.MissionItem) -> tuple[float, float]:
-    x, y, _ = autopilot.earth.place(item.latitude, item.longitude, autopilot.build.origin[2])
+def _point(context: AutopilotContext, item: plans.MissionItem) -> tuple[float, float]:
+    x, y, _ = context.earth.place(item.latitude, item.longitude, context.build.origin[2])
     return x, y
 
 

@@ -3,46 +3,58 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import Any
 
-if TYPE_CHECKING:
-    from volery.mavlink.autopilot.core import Autopilot
+from volery.core.frames import ned_of_enu
+from volery.mavlink.autopilot import motion
+from volery.mavlink.autopilot.context import AutopilotContext
+from volery.mavlink.codec import dialect
 
 _FARTHEST_M, _HIGHEST_M = 1e6, 1e5
 """Limits from the map's origin, beyond which a flat map is invalid (modelling choice; PX4 has
 none)."""
 
 
-def set_here(autopilot: Autopilot) -> None:
+def set_here(context: AutopilotContext) -> None:
     """Sets home to the UAV's position."""
-    autopilot.memory.home, autopilot.memory.chosen_home = autopilot.state.position, None
-    _tell(autopilot)
+    context.memory.home, context.memory.chosen_home = context.state.position, None
+    context.links.send(position_message(context))
 
 
-def set_on_arming(autopilot: Autopilot) -> None:
+def set_on_arming(context: AutopilotContext) -> None:
     """Sets home to the position of arming; a home chosen by a client stays, as in PX4."""
-    if autopilot.memory.chosen_home is None:
-        set_here(autopilot)
+    if context.memory.chosen_home is None:
+        set_here(context)
 
 
-def choose(autopilot: Autopilot, latitude: float, longitude: float, z: float) -> str:
+def choose(context: AutopilotContext, latitude: float, longitude: float, z: float) -> str:
     """Sets home to a position in degrees and a height in the map, m.
 
     Returns why not, empty if home is set.
     """
-    origin = autopilot.build.origin
+    origin = context.build.origin
     if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
         return "Home is not on the earth"
-    place = autopilot.earth.place(latitude, longitude, origin[2])
+    place = context.earth.place(latitude, longitude, origin[2])
     if not (math.hypot(*place) <= _FARTHEST_M and abs(z) <= _HIGHEST_M):
         return "Home is too far away"
-    autopilot.memory.home = (place[0], place[1], z)
-    autopilot.memory.chosen_home = (latitude, longitude, z + origin[2])
-    _tell(autopilot)
+    context.memory.home = (place[0], place[1], z)
+    context.memory.chosen_home = (latitude, longitude, z + origin[2])
+    context.links.send(position_message(context))
     return ""
 
 
-def _tell(autopilot: Autopilot) -> None:
-    from volery.mavlink.autopilot.telemetry import BUILDERS, HOME_POSITION
-
-    autopilot.send(BUILDERS[HOME_POSITION](autopilot))
+def position_message(context: AutopilotContext) -> Any:
+    """Returns HOME_POSITION; None without a home."""
+    home = context.memory.home
+    if home is None:
+        return None
+    origin = context.memory.origin
+    place = (home[0] - origin[0], home[1] - origin[1], home[2] - origin[2])
+    return dialect().MAVLink_home_position_message(
+        *motion.degrees_e7(context.memory.chosen_home or context.earth.geodetic(home)),
+        *ned_of_enu(place),
+        (math.nan,) * 4,
+        *(math.nan,) * 3,
+        motion.us(context),
+    )

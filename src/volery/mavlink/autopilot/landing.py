@@ -7,34 +7,31 @@ above home, as in a PX4 without a distance sensor.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-if TYPE_CHECKING:
-    from volery.mavlink.autopilot.core import Autopilot
-    from volery.mavlink.autopilot.vehicle import FlightState
+from volery.mavlink.autopilot.context import AutopilotContext
+from volery.mavlink.autopilot.vehicle import FlightState
 
 _STEP_M_S = 0.02
 """Smallest change that is sent as a command."""
 
 
-def follow(autopilot: Autopilot, state: FlightState) -> None:
+def follow(context: AutopilotContext, state: FlightState) -> None:
     """Sets the current landing's descent speed by its height."""
-    memory = autopilot.memory
-    ground = (memory.home or memory.origin)[2]
-    speed = speed_at(autopilot, state.position[2] - ground)
+    memory = context.memory
+    ground = memory.home_or_origin[2]
+    speed = speed_at(context, state.position[2] - ground)
     if not abs(speed - memory.sinks) < _STEP_M_S:
         memory.sinks = speed
-        autopilot.vehicle.sink(speed)
+        context.vehicle.sink(speed)
 
 
-def speed_at(autopilot: Autopilot, height_m: float) -> float:
+def speed_at(context: AutopilotContext, height_m: float) -> float:
     """Returns the descent speed, m/s, at a height above ground."""
     slow, fast, most = (
-        float(autopilot.parameter(name))
+        float(context.parameter(name))
         for name in ("MPC_LAND_SPEED", "MPC_Z_VEL_MAX_DN", "MPC_Z_V_AUTO_DN")
     )
-    low = float(autopilot.parameter("MPC_LAND_ALT2"))
-    high = max(float(autopilot.parameter("MPC_LAND_ALT1")), low)
+    low = float(context.parameter("MPC_LAND_ALT2"))
+    high = max(float(context.parameter("MPC_LAND_ALT1")), low)
     return min(float(np.interp(height_m, (low, high), (slow, fast))), most)

@@ -9,17 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from volery.core.frames import frd_of_flu, ned_of_enu, q_ned_frd_of_enu_flu
 from volery.mavlink.autopilot import motion
+from volery.mavlink.autopilot.context import AutopilotContext
+from volery.mavlink.autopilot.geo_reference import GeoReference
 from volery.mavlink.autopilot.modes import Mode
 from volery.mavlink.autopilot.ulog import UlogTopic
-
-if TYPE_CHECKING:
-    from volery.mavlink.autopilot.core import Autopilot
-    from volery.mavlink.autopilot.geo_reference import GeoReference
-    from volery.mavlink.autopilot.vehicle import Vector
+from volery.mavlink.autopilot.vehicle import Vector
 
 Values = Sequence[float]
 _NAN = math.nan
@@ -49,38 +47,38 @@ class LoggedTopic(NamedTuple):
 
     topic: UlogTopic
     period_ns: int
-    values: Callable[[Autopilot], Values | None]
+    values: Callable[[AutopilotContext], Values | None]
 
 
-def _attitude(autopilot: Autopilot) -> Values:
-    x, y, z, w = q_ned_frd_of_enu_flu(autopilot.state.attitude)
-    time_us = motion.us(autopilot)
+def _attitude(context: AutopilotContext) -> Values:
+    x, y, z, w = q_ned_frd_of_enu_flu(context.state.attitude)
+    time_us = motion.us(context)
     return time_us, time_us, w, x, y, z
 
 
-def _angular_velocity(autopilot: Autopilot) -> Values:
-    time_us = motion.us(autopilot)
-    return time_us, time_us, *frd_of_flu(autopilot.state.rates)
+def _angular_velocity(context: AutopilotContext) -> Values:
+    time_us = motion.us(context)
+    return time_us, time_us, *frd_of_flu(context.state.rates)
 
 
-def _acceleration(autopilot: Autopilot) -> Values:
-    time_us = motion.us(autopilot)
-    return time_us, time_us, *frd_of_flu(motion.specific_force(autopilot.state))
+def _acceleration(context: AutopilotContext) -> Values:
+    time_us = motion.us(context)
+    return time_us, time_us, *frd_of_flu(motion.specific_force(context.state))
 
 
-def _local_position(autopilot: Autopilot) -> Values:
-    time_us, memory = motion.us(autopilot), autopilot.memory
-    place, velocity = motion.local_motion(autopilot)
-    heading = math.remainder(0.5 * math.pi - autopilot.yaw, 2.0 * math.pi)
+def _local_position(context: AutopilotContext) -> Values:
+    time_us, memory = motion.us(context), context.memory
+    place, velocity = motion.local_motion(context)
+    heading = math.remainder(0.5 * math.pi - context.yaw, 2.0 * math.pi)
     has_fix = not memory.fix_lost
     return (
         *(time_us, time_us, has_fix, True, has_fix, True),
         *place,
         *velocity,
         velocity[2],
-        *ned_of_enu(autopilot.state.acceleration),
+        *ned_of_enu(context.state.acceleration),
         *(heading, True, has_fix, True, 0),
-        *_reference(autopilot.earth, memory.origin),
+        *_reference(context.earth, memory.origin),
     )
 
 
@@ -90,15 +88,15 @@ def _reference(earth: GeoReference, origin: Vector) -> Vector:
     return earth.geodetic(origin)
 
 
-def _global_position(autopilot: Autopilot) -> Values:
-    time_us = motion.us(autopilot)
-    return time_us, time_us, *autopilot.geodetic(), not autopilot.memory.fix_lost, True
+def _global_position(context: AutopilotContext) -> Values:
+    time_us = motion.us(context)
+    return time_us, time_us, *context.geodetic(), not context.memory.fix_lost, True
 
 
-def _status(autopilot: Autopilot) -> Values:
-    memory, nav_state = autopilot.memory, _NAV_STATES[autopilot.memory.mode]
+def _status(context: AutopilotContext) -> Values:
+    memory, nav_state = context.memory, _NAV_STATES[context.memory.mode]
     return (
-        motion.us(autopilot),
+        motion.us(context),
         memory.armed_ns // 1000 if memory.armed else 0,
         _ARMED if memory.armed else _DISARMED,
         nav_state,
@@ -106,57 +104,57 @@ def _status(autopilot: Autopilot) -> Values:
         _ROTARY_WING,
         memory.failsafe,
         int(memory.parameters["MAV_TYPE"]),
-        autopilot.system,
+        context.system,
         1,
     )
 
 
-def _land_detected(autopilot: Autopilot) -> Values:
-    return motion.us(autopilot), not autopilot.state.airborne
+def _land_detected(context: AutopilotContext) -> Values:
+    return motion.us(context), not context.state.airborne
 
 
-def _battery(autopilot: Autopilot) -> Values | None:
-    state = autopilot.state
+def _battery(context: AutopilotContext) -> Values | None:
+    state = context.state
     if not math.isfinite(state.charge):
         return None
-    used_mah = (1.0 - state.charge) * autopilot.build.battery_capacity_ah * 1e3
+    used_mah = (1.0 - state.charge) * context.build.battery_capacity_ah * 1e3
     warning = next(
-        (level for name, level in _WARNINGS if state.charge < float(autopilot.parameter(name))), 0
+        (level for name, level in _WARNINGS if state.charge < float(context.parameter(name))), 0
     )
-    cells = autopilot.build.battery_cells
+    cells = context.build.battery_cells
     return (
-        *(motion.us(autopilot), 1, True, state.voltage, state.current, used_mah, state.charge),
+        *(motion.us(context), 1, True, state.voltage, state.current, used_mah, state.charge),
         *(warning, cells),
     )
 
 
-def _motors(autopilot: Autopilot) -> Values:
-    time_us = motion.us(autopilot)
-    speeds = autopilot.state.rotors[:_MOTORS] if autopilot.memory.armed else ()
+def _motors(context: AutopilotContext) -> Values:
+    time_us = motion.us(context)
+    speeds = context.state.rotors[:_MOTORS] if context.memory.armed else ()
     thrusts = [speed * speed for speed in speeds]
     return time_us, time_us, 0, *thrusts, *(_NAN,) * (_MOTORS - len(thrusts))
 
 
-def _trajectory_setpoint(autopilot: Autopilot) -> Values | None:
-    parts = motion.target_motion(autopilot)
+def _trajectory_setpoint(context: AutopilotContext) -> Values | None:
+    parts = motion.target_motion(context)
     if parts is None:
         return None
-    return motion.us(autopilot), *parts[:9], *(_NAN,) * 3, *parts[9:]
+    return motion.us(context), *parts[:9], *(_NAN,) * 3, *parts[9:]
 
 
-def _attitude_setpoint(autopilot: Autopilot) -> Values | None:
-    target = autopilot.memory.target
+def _attitude_setpoint(context: AutopilotContext) -> Values | None:
+    target = context.memory.target
     if target is None or target.attitude is None:
         return None
     x, y, z, w = q_ned_frd_of_enu_flu(target.attitude)
-    return motion.us(autopilot), _NAN, w, x, y, z, 0.0, 0.0, -target.thrust
+    return motion.us(context), _NAN, w, x, y, z, 0.0, 0.0, -target.thrust
 
 
-def _rates_setpoint(autopilot: Autopilot) -> Values | None:
-    target = autopilot.memory.target
+def _rates_setpoint(context: AutopilotContext) -> Values | None:
+    target = context.memory.target
     if target is None or target.rates is None:
         return None
-    return motion.us(autopilot), *frd_of_flu(target.rates), 0.0, 0.0, -target.thrust
+    return motion.us(context), *frd_of_flu(target.rates), 0.0, 0.0, -target.thrust
 
 
 _TIMES = "uint64_t timestamp; uint64_t timestamp_sample"
@@ -179,7 +177,7 @@ _TRAJECTORY = (
     "uint64_t timestamp; float[3] position; float[3] velocity; float[3] acceleration;"
     "float[3] jerk; float yaw; float yawspeed"
 )
-_DESCRIBED: tuple[tuple[str, str, int, Callable[[Autopilot], Values | None]], ...] = (
+_DESCRIBED: tuple[tuple[str, str, int, Callable[[AutopilotContext], Values | None]], ...] = (
     ("vehicle_attitude", f"{_TIMES}; float[4] q", 50, _attitude),
     ("vehicle_angular_velocity", f"{_TIMES}; float[3] xyz", 20, _angular_velocity),
     ("vehicle_acceleration", f"{_TIMES}; float[3] xyz", 50, _acceleration),

@@ -1,4 +1,4 @@
-"""Implements MAVLink's log protocol: clients list the flight logs of a vehicle and read them.
+"""Sends flight logs to clients at a bounded rate.
 
 As in PX4, each link has one request at a time, which a new one replaces, and a log has the number
 of the link's last list. Answers are sent at a bounded rate of simulated time, shared by the links,
@@ -11,14 +11,10 @@ import struct
 from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
 
-from volery.mavlink.autopilot.log_storage import StoredLog
+from volery.mavlink.autopilot.client_links import ClientLinks
+from volery.mavlink.autopilot.log_storage import LogStorage, StoredLog
 from volery.mavlink.codec import dialect
-
-if TYPE_CHECKING:
-    from volery.mavlink.autopilot.core import Autopilot
-    from volery.mavlink.autopilot.state import Source
 
 FRAMES_PER_STATE = 10
 """Frames sent with each state of the vehicles, a hundred times a simulated second: 90 kB/s
@@ -64,25 +60,25 @@ class TransferRate:
 class LogTransfers:
     """Requests in progress, by link."""
 
-    def __init__(self, pace: TransferRate | None = None) -> None:
-        self.pace = pace or TransferRate()
+    def __init__(self, links: ClientLinks, storage: LogStorage) -> None:
+        self.pace = TransferRate()
+        self._links = links
+        self._storage = storage
         self._requests: dict[int, _Request] = {}
         self._waiting: deque[int] = deque()
         """Links with data to send, the next one first."""
 
-    def list_logs(self, autopilot: Autopilot, link: int, first: int, last: int) -> None:
+    def list_logs(self, link: int, first: int, last: int) -> None:
         """Starts to send the entries of the logs `first` to `last`."""
-        listed = tuple(autopilot.log.storage.logs)
+        listed = tuple(self._storage.logs)
         last = min(last, len(listed) - 1)
         entries = range(min(first, last), last + 1) if listed else range(1)
         self._set(link, _Request(listed, entries))
 
-    def send_data(
-        self, autopilot: Autopilot, link: int, number: int, offset: int, count: int
-    ) -> None:
+    def send_data(self, link: int, number: int, offset: int, count: int) -> None:
         """Starts to send `count` bytes of a log from `offset` on."""
         before = self._requests.get(link)
-        listed = tuple(autopilot.log.storage.logs) if before is None else before.listed
+        listed = tuple(self._storage.logs) if before is None else before.listed
         if number < len(listed):
             log = listed[number]
             count = max(0, min(count, log.size - offset))
@@ -99,14 +95,14 @@ class LogTransfers:
         self._requests.clear()
         self._waiting.clear()
 
-    def send_some(self, autopilot: Autopilot) -> None:
+    def send_some(self, now_ns: int) -> None:
         """Continues the answers, the links in turn."""
-        num_frames = self.pace.share(autopilot.memory.now_ns) if self._waiting else 0
+        num_frames = self.pace.share(now_ns) if self._waiting else 0
         while num_frames > 0 and self._waiting:
             link = self._waiting.popleft()
             request, turn = self._requests[link], min(num_frames, _FRAMES_PER_TURN)
-            send = _send_entries if request.log is None else _send_data
-            num_sent, is_done = send(autopilot, link, request, turn)
+            send = self._send_entries if request.log is None else self._send_data
+            num_sent, is_done = send(link, request, turn)
             num_frames -= num_sent
             if not is_done:
                 self._waiting.append(link)
@@ -116,56 +112,32 @@ class LogTransfers:
         if link not in self._waiting:
             self._waiting.append(link)
 
+    def _send_entries(self, link: int, request: _Request, turn: int) -> tuple[int, bool]:
+        """Sends the next LOG_ENTRY messages; returns how many, and whether the last one is sent."""
+        entry, listed = dialect().MAVLink_log_entry_message, request.listed
+        chosen, request.entries = request.entries[:turn], request.entries[turn:]
+        for number in chosen:
+            if not listed:  # a single entry reports that there are none
+                self._links.send(entry(0, 0, 0, 0, 0), link)
+                continue
+            log = listed[number]
+            self._links.send(
+                entry(number, len(listed), len(listed) - 1, log.time_s, log.size), link
+            )
+        return len(chosen), not request.entries
 
-def _send_entries(
-    autopilot: Autopilot, link: int, request: _Request, turn: int
-) -> tuple[int, bool]:
-    """Sends the next LOG_ENTRY messages; returns how many, and whether they were the last ones."""
-    entry, listed = dialect().MAVLink_log_entry_message, request.listed
-    chosen, request.entries = request.entries[:turn], request.entries[turn:]
-    for number in chosen:
-        if not listed:  # a single entry reports that there are none
-            autopilot.send(entry(0, 0, 0, 0, 0), link)
-            continue
-        log = listed[number]
-        autopilot.send(entry(number, len(listed), len(listed) - 1, log.time_s, log.size), link)
-    return len(chosen), not request.entries
-
-
-def _send_data(autopilot: Autopilot, link: int, request: _Request, turn: int) -> tuple[int, bool]:
-    """Sends the next LOG_DATA messages; returns how many, and whether they were the last ones."""
-    assert request.log is not None
-    wanted = min(request.remaining, turn * _DATA_BYTES)
-    try:
-        data = autopilot.log.storage.read(request.log, request.offset, wanted)
-    except OSError:
-        data = b""
-    pieces = [data[k : k + _DATA_BYTES] for k in range(0, len(data), _DATA_BYTES)] or [b""]
-    for piece in pieces:
-        head = _HEAD.pack(request.offset & 0xFFFFFFFF, request.number, len(piece))
-        autopilot.send_payload(_LOG_DATA, head + piece.ljust(_DATA_BYTES, b"\0"), link)
-        request.offset += len(piece)
-        request.remaining -= len(piece)
-    return len(pieces), len(data) < wanted or request.remaining <= 0
-
-
-def list_logs(autopilot: Autopilot, source: Source, message: Any) -> None:
-    """Handles LOG_REQUEST_LIST."""
-    autopilot.log.transfers.list_logs(autopilot, source[0], message.start, message.end)
-
-
-def send_data(autopilot: Autopilot, source: Source, message: Any) -> None:
-    """Handles LOG_REQUEST_DATA; nothing is sent for a missing log, as in PX4."""
-    parts = int(message.id), int(message.ofs), int(message.count)
-    autopilot.log.transfers.send_data(autopilot, source[0], *parts)
-
-
-def erase(autopilot: Autopilot, _source: Source, _message: Any) -> None:
-    """Handles LOG_ERASE: deletes all logs except for that of the current flight."""
-    autopilot.log.transfers.clear()
-    autopilot.log.storage.erase(keeps_newest=autopilot.log.is_recording)
-
-
-def end(autopilot: Autopilot, source: Source, _message: Any) -> None:
-    """Handles LOG_REQUEST_END."""
-    autopilot.log.transfers.forget(source[0])
+    def _send_data(self, link: int, request: _Request, turn: int) -> tuple[int, bool]:
+        """Sends the next LOG_DATA messages; returns how many, and whether the last one is sent."""
+        assert request.log is not None
+        wanted = min(request.remaining, turn * _DATA_BYTES)
+        try:
+            data = self._storage.read(request.log, request.offset, wanted)
+        except OSError:
+            data = b""
+        pieces = [data[k : k + _DATA_BYTES] for k in range(0, len(data), _DATA_BYTES)] or [b""]
+        for piece in pieces:
+            head = _HEAD.pack(request.offset & 0xFFFFFFFF, request.number, len(piece))
+            self._links.send_payload(_LOG_DATA, head + piece.ljust(_DATA_BYTES, b"\0"), link)
+            request.offset += len(piece)
+            request.remaining -= len(piece)
+        return len(pieces), len(data) < wanted or request.remaining <= 0

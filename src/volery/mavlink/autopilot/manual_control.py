@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from volery.core.rotations import from_rpy
 from volery.mavlink.autopilot import mode_transitions
+from volery.mavlink.autopilot.context import AutopilotContext
 from volery.mavlink.autopilot.state import ManualInput
-
-if TYPE_CHECKING:
-    from volery.mavlink.autopilot.core import Autopilot
-    from volery.mavlink.autopilot.vehicle import FlightState
+from volery.mavlink.autopilot.vehicle import FlightState
 
 _DEAD = 0.1
 """Dead zone around the centre, as a fraction of full deflection, PX4's MPC_HOLD_DZ."""
@@ -26,50 +24,50 @@ _LIFT_M = 1.0
 """Height of a take-off by manual control (modelling choice)."""
 
 
-def take(autopilot: Autopilot, _source: object, message: Any) -> None:
+def take(context: AutopilotContext, _source: object, message: Any) -> None:
     """Handles MANUAL_CONTROL; ignores messages with values out of range."""
-    if message.target not in (0, autopilot.system):
+    if message.target not in (0, context.system):
         return
     parts = (message.x, message.y, message.z, message.r)
     if any(abs(part) > 1000 for part in parts):
         return
     x, y, z, r = (part / 1000.0 for part in parts)
-    autopilot.memory.sticks = ManualInput(x, y, 2.0 * z - 1.0, r, autopilot.memory.now_ns)
+    context.memory.sticks = ManualInput(x, y, 2.0 * z - 1.0, r, context.memory.now_ns)
 
 
-def fly_position(autopilot: Autopilot, state: FlightState) -> None:
+def fly_position(context: AutopilotContext, state: FlightState) -> None:
     """Commands velocities by the sticks; with centred sticks the UAV holds its position."""
-    if not _is_up(autopilot, state):
+    if not _is_up(context, state):
         return
-    forward, right, up, turn = _alive(autopilot.memory.sticks)
-    memory = autopilot.memory
+    forward, right, up, turn = _alive(context.memory.sticks)
+    memory = context.memory
     if forward == right == up == turn == 0.0:
         if memory.order != "hold":
-            mode_transitions.order(autopilot, "hold", autopilot.vehicle.hold())
+            mode_transitions.order(context, "hold", context.vehicle.hold())
         return
     if memory.now_ns - memory.ordered_ns < 20_000_000 and memory.order == "steer":
         return
     speed = min(
-        float(autopilot.parameter("MPC_VEL_MANUAL")), float(autopilot.parameter("MPC_XY_VEL_MAX"))
+        float(context.parameter("MPC_VEL_MANUAL")), float(context.parameter("MPC_XY_VEL_MAX"))
     )
-    c, s = math.cos(autopilot.yaw), math.sin(autopilot.yaw)
+    c, s = math.cos(context.yaw), math.sin(context.yaw)
     x, y = speed * (c * forward + s * right), speed * (s * forward - c * right)
-    rate = -turn * math.radians(float(autopilot.parameter("MPC_MAN_Y_MAX")))
-    autopilot.vehicle.steer((x, y, _climb(autopilot, up)), None, rate)
-    mode_transitions.order(autopilot, "steer")
+    rate = -turn * math.radians(float(context.parameter("MPC_MAN_Y_MAX")))
+    context.vehicle.steer((x, y, _climb(context, up)), None, rate)
+    mode_transitions.order(context, "steer")
 
 
-def fly_altitude(autopilot: Autopilot, state: FlightState) -> None:
+def fly_altitude(context: AutopilotContext, state: FlightState) -> None:
     """Commands tilts by the sticks; only the height is held."""
-    if not _is_up(autopilot, state):
+    if not _is_up(context, state):
         return
-    memory = autopilot.memory
+    memory = context.memory
     forward, right, up, turn = _alive(memory.sticks)
     if memory.order != "tilt":
         memory.climb_thrust, memory.altitude_target = 0.0, state.position[2]
     if up != 0.0:
         memory.altitude_target = math.nan
-        wanted = _climb(autopilot, up)
+        wanted = _climb(context, up)
     else:
         if math.isnan(memory.altitude_target):
             memory.altitude_target = state.position[2]
@@ -78,27 +76,27 @@ def fly_altitude(autopilot: Autopilot, state: FlightState) -> None:
     memory.climb_thrust += _CLIMB_INTEGRAL * error * _TICK_S
     memory.climb_thrust = min(max(memory.climb_thrust, -_MOST_PUSH), _MOST_PUSH)
     push = _CLIMB_GAIN * error + memory.climb_thrust
-    most = math.radians(float(autopilot.parameter("MPC_MAN_TILT_MAX")))
+    most = math.radians(float(context.parameter("MPC_MAN_TILT_MAX")))
     roll, pitch = right * most, forward * most
     lean = math.cos(roll) * math.cos(pitch)
-    thrust = autopilot.build.hover_thrust * (1.0 + push / _GRAVITY) / max(lean, 0.3)
-    rate = -turn * math.radians(float(autopilot.parameter("MPC_MAN_Y_MAX")))
-    x, y, z, w = from_rpy(roll, pitch, autopilot.yaw + 0.2 * rate).tolist()
-    autopilot.vehicle.tilt((x, y, z, w), min(max(thrust, 0.05), 1.0))
-    mode_transitions.order(autopilot, "tilt")
+    thrust = context.build.hover_thrust * (1.0 + push / _GRAVITY) / max(lean, 0.3)
+    rate = -turn * math.radians(float(context.parameter("MPC_MAN_Y_MAX")))
+    x, y, z, w = from_rpy(roll, pitch, context.yaw + 0.2 * rate).tolist()
+    context.vehicle.tilt((x, y, z, w), min(max(thrust, 0.05), 1.0))
+    mode_transitions.order(context, "tilt")
 
 
-def _is_up(autopilot: Autopilot, state: FlightState) -> bool:
+def _is_up(context: AutopilotContext, state: FlightState) -> bool:
     """Returns whether the UAV flies; on the ground, raising the stick starts a take-off."""
     if state.mode == "LANDED":
-        if autopilot.memory.sticks.up > _DEAD and autopilot.memory.order != "take_off":
-            mode_transitions.order(autopilot, "take_off", autopilot.vehicle.take_off(_LIFT_M))
+        if context.memory.sticks.up > _DEAD and context.memory.order != "take_off":
+            mode_transitions.order(context, "take_off", context.vehicle.take_off(_LIFT_M))
         return False
-    return not (autopilot.memory.order == "take_off" and state.mode == "TAKE_OFF")
+    return not (context.memory.order == "take_off" and state.mode == "TAKE_OFF")
 
 
-def _climb(autopilot: Autopilot, up: float) -> float:
-    return up * float(autopilot.parameter("MPC_Z_VEL_MAX_UP" if up > 0.0 else "MPC_Z_VEL_MAX_DN"))
+def _climb(context: AutopilotContext, up: float) -> float:
+    return up * float(context.parameter("MPC_Z_VEL_MAX_UP" if up > 0.0 else "MPC_Z_VEL_MAX_DN"))
 
 
 def _alive(sticks: ManualInput) -> tuple[float, float, float, float]:

@@ -4,74 +4,73 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from volery.mavlink.autopilot import (
     commands,
     file_protocol,
     follow_target,
-    log_transfer,
+    log_protocol,
     manual_control,
     mission_protocol,
     offboard,
     parameter_protocol,
     shell,
 )
+from volery.mavlink.autopilot.command_protocol import Command
+from volery.mavlink.autopilot.context import AutopilotContext
+from volery.mavlink.autopilot.state import Source
 from volery.mavlink.codec import dialect
-
-if TYPE_CHECKING:
-    from volery.mavlink.autopilot.core import Autopilot
-    from volery.mavlink.autopilot.state import Source
 
 _GROUND_STATION = 6
 """Value MAV_TYPE_GCS."""
 
 
-def _heartbeat(autopilot: Autopilot, _source: Source, message: Any) -> None:
+def _heartbeat(context: AutopilotContext, _source: Source, message: Any) -> None:
     if message.type == _GROUND_STATION:
-        autopilot.memory.ground_heard_ns = autopilot.memory.now_ns
+        context.memory.ground_heard_ns = context.memory.now_ns
 
 
-def _ping(autopilot: Autopilot, source: Source, message: Any) -> None:
+def _ping(context: AutopilotContext, source: Source, message: Any) -> None:
     if message.target_system == 0 and message.target_component == 0:
         link, system, component = source
         answer = dialect().MAVLink_ping_message(message.time_usec, message.seq, system, component)
-        autopilot.send(answer, link)
+        context.links.send(answer, link)
 
 
-def _time_sync(autopilot: Autopilot, source: Source, message: Any) -> None:
+def _time_sync(context: AutopilotContext, source: Source, message: Any) -> None:
     """Answers with the simulated time since the start."""
     if message.tc1 == 0:
-        answer = dialect().MAVLink_timesync_message(autopilot.memory.now_ns, message.ts1)
-        autopilot.send(answer, source[0])
+        answer = dialect().MAVLink_timesync_message(context.memory.now_ns, message.ts1)
+        context.links.send(answer, source[0])
 
 
-def _command_long(autopilot: Autopilot, source: Source, message: Any) -> None:
+def _command_long(context: AutopilotContext, source: Source, message: Any) -> None:
     params = tuple(float(getattr(message, f"param{k}")) for k in range(1, 8))
-    commands.take(autopilot, source, commands.Command(message.command, params, None))
+    commands.take(context, source, Command(message.command, params, None))
 
 
-def _command_int(autopilot: Autopilot, source: Source, message: Any) -> None:
+def _command_int(context: AutopilotContext, source: Source, message: Any) -> None:
     x, y = (
         math.nan if part == 2**31 - 1 or part == -(2**31) else part * 1e-7
         for part in (message.x, message.y)
     )
     params = (message.param1, message.param2, message.param3, message.param4, x, y, message.z)
-    commands.take(autopilot, source, commands.Command(message.command, params, int(message.frame)))
+    commands.take(context, source, Command(message.command, params, int(message.frame)))
 
 
-def _set_mode(autopilot: Autopilot, source: Source, message: Any) -> None:
+def _set_mode(context: AutopilotContext, source: Source, message: Any) -> None:
     """Handles the old SET_MODE message: PX4 executes and acknowledges it as a command."""
     custom = message.custom_mode
     params = (float(message.base_mode), custom >> 16 & 255, custom >> 24 & 255, *(math.nan,) * 4)
-    commands.take(autopilot, source, commands.Command(commands.DO_SET_MODE, params, None))
+    commands.take(context, source, Command(commands.DO_SET_MODE, params, None))
 
 
-def _data_stream(autopilot: Autopilot, source: Source, message: Any) -> None:
+def _data_stream(context: AutopilotContext, source: Source, message: Any) -> None:
     """Ignores the old REQUEST_DATA_STREAM, which MAVProxy sends at its start, as PX4 does."""
 
 
-HANDLERS: dict[str, Callable[[Autopilot, Source, Any], None]] = {
+HANDLERS: dict[str, Callable[[AutopilotContext, Source, Any], None]] = {
     "HEARTBEAT": _heartbeat,
     "PING": _ping,
     "TIMESYNC": _time_sync,
@@ -97,9 +96,9 @@ HANDLERS: dict[str, Callable[[Autopilot, Source, Any], None]] = {
     "MISSION_CLEAR_ALL": mission_protocol.clear,
     "MISSION_SET_CURRENT": mission_protocol.set_current,
     "FILE_TRANSFER_PROTOCOL": file_protocol.answer_file_request,
-    "LOG_REQUEST_LIST": log_transfer.list_logs,
-    "LOG_REQUEST_DATA": log_transfer.send_data,
-    "LOG_REQUEST_END": log_transfer.end,
-    "LOG_ERASE": log_transfer.erase,
+    "LOG_REQUEST_LIST": log_protocol.list_logs,
+    "LOG_REQUEST_DATA": log_protocol.send_data,
+    "LOG_REQUEST_END": log_protocol.end,
+    "LOG_ERASE": log_protocol.erase,
     "SERIAL_CONTROL": shell.take,
 }

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from volery.mavlink.autopilot import home, mode_transitions, payload_items, plans
+from volery.mavlink.autopilot.context import AutopilotContext
+from volery.mavlink.autopilot.item_positions import item_position
 from volery.mavlink.autopilot.legs import bearing, fly_leg
 from volery.mavlink.autopilot.modes import Mode
-from volery.mavlink.autopilot.state import MissionLeg
+from volery.mavlink.autopilot.state import Mission, MissionLeg
+from volery.mavlink.autopilot.vehicle import FlightState
 from volery.mavlink.codec import dialect
-
-if TYPE_CHECKING:
-    from volery.mavlink.autopilot.core import Autopilot
-    from volery.mavlink.autopilot.state import Mission
-    from volery.mavlink.autopilot.vehicle import FlightState, Vector
 
 _FACES_RAD = math.radians(5.0)
 """Yaw error below which a heading is reached (modelling choice)."""
@@ -26,45 +23,45 @@ _MOST_STEPS = 2 * plans.MOST_ITEMS[plans.MISSION]
 """Limit of items passed at one instant, so that jumps cannot loop forever."""
 
 
-def fly(autopilot: Autopilot, state: FlightState) -> None:
+def fly(context: AutopilotContext, state: FlightState) -> None:
     """Continues the mission; at its end the UAV holds its position."""
-    memory = autopilot.memory
+    memory = context.memory
     mission, items = memory.mission, memory.plans[plans.MISSION]
     if mission.complete or not items:
         if memory.leg is not None and state.mode != "LANDED":
-            fly_leg(autopilot, memory.leg)
+            fly_leg(context, memory.leg)
         return
     for _ in range(_MOST_STEPS):
         if mission is not memory.mission or mission.complete or memory.mode is not Mode.MISSION:
             return
-        _face_interest(autopilot, mission, items[mission.current])
-        if not _do(autopilot, mission, items[mission.current], state):
+        _face_interest(context, mission, items[mission.current])
+        if not _do(context, mission, items[mission.current], state):
             return
-        _reach(autopilot, mission)
+        _reach(context, mission)
 
 
-def _face_interest(autopilot: Autopilot, mission: Mission, item: plans.MissionItem) -> None:
+def _face_interest(context: AutopilotContext, mission: Mission, item: plans.MissionItem) -> None:
     """Faces the region of interest during a leg, as PX4's multicopters do."""
-    leg = autopilot.memory.leg
+    leg = context.memory.leg
     if mission.interest is None or leg is None or leg.locked or item.command not in _FACING:
         return
     x, y, _ = mission.interest
-    away = math.hypot(x - autopilot.state.position[0], y - autopilot.state.position[1])
-    if away > float(autopilot.parameter("NAV_ACC_RAD")):
-        leg.yaw = bearing(autopilot, mission.interest)
+    away = math.hypot(x - context.state.position[0], y - context.state.position[1])
+    if away > float(context.parameter("NAV_ACC_RAD")):
+        leg.yaw = bearing(context, mission.interest)
 
 
-def _reach(autopilot: Autopilot, mission: Mission) -> None:
+def _reach(context: AutopilotContext, mission: Mission) -> None:
     """Reports that the current item is done, and proceeds to the next one."""
     mission.reached = mission.current
-    autopilot.send(dialect().MAVLink_mission_item_reached_message(mission.current))
-    items = autopilot.memory.plans[plans.MISSION]
+    context.links.send(dialect().MAVLink_mission_item_reached_message(mission.current))
+    items = context.memory.plans[plans.MISSION]
     _advance(mission, items)
     if mission.complete:
         mission.speed = math.nan
-        if autopilot.memory.mode is Mode.MISSION:  # else its last item was a return
-            landed = autopilot.state.mode == "LANDED"
-            autopilot.say(6, f"Mission finished, {'landed' if landed else 'loitering'}")
+        if context.memory.mode is Mode.MISSION:  # else its last item was a return
+            landed = context.state.mode == "LANDED"
+            context.say(6, f"Mission finished, {'landed' if landed else 'loitering'}")
 
 
 def _advance(mission: Mission, items: list[plans.MissionItem]) -> None:
@@ -86,11 +83,11 @@ def _advance(mission: Mission, items: list[plans.MissionItem]) -> None:
 
 
 def _do(
-    autopilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
+    context: AutopilotContext, mission: Mission, item: plans.MissionItem, state: FlightState
 ) -> bool:
     """Executes an item; returns whether it is done."""
     if state.mode == "LANDED" and item.command != plans.TAKE_OFF:
-        return _do_on_ground(autopilot, mission, item, state)
+        return _do_on_ground(context, mission, item, state)
     doing = {
         plans.TAKE_OFF: _take_off,
         plans.WAYPOINT: _waypoint,
@@ -103,198 +100,185 @@ def _do(
         plans.CONDITION_YAW: _face,
     }.get(item.command)
     if doing is not None:
-        return doing(autopilot, mission, item, state)
+        return doing(context, mission, item, state)
     if item.command == plans.RETURN_TO_LAUNCH:
-        mode_transitions.enter(autopilot, Mode.RETURN)
-    return _set(autopilot, mission, item)
+        mode_transitions.enter(context, Mode.RETURN)
+    return _set(context, mission, item)
 
 
 def _do_on_ground(
-    autopilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
+    context: AutopilotContext, mission: Mission, item: plans.MissionItem, state: FlightState
 ) -> bool:
     """Executes an item on the ground; a position starts a take-off, as in PX4."""
     if item.command == plans.LAND:
         return True
     if item.command in (plans.DELAY, plans.CONDITION_DELAY):
-        return _delay(autopilot, mission, item, state)
+        return _delay(context, mission, item, state)
     if item.placed and item.command in plans.PLACED:
-        if autopilot.memory.order != "take_off":
-            mode_transitions.rise(autopilot)
+        if context.memory.order != "take_off":
+            mode_transitions.rise(context)
         return False
-    return item.command == plans.RETURN_TO_LAUNCH or _set(autopilot, mission, item)
+    return item.command == plans.RETURN_TO_LAUNCH or _set(context, mission, item)
 
 
-def _set(autopilot: Autopilot, mission: Mission, item: plans.MissionItem) -> bool:
+def _set(context: AutopilotContext, mission: Mission, item: plans.MissionItem) -> bool:
     """Executes an item that takes no time."""
     if item.command == plans.CHANGE_SPEED and item.params[1] > 0.0:
         mission.speed = item.params[1]
     elif item.command in payload_items.INTEREST:
         somewhere = payload_items.is_place_of_interest(item.command)
-        mission.interest = place_of(autopilot, item) if somewhere else None
+        mission.interest = item_position(context, item) if somewhere else None
     elif item.command == plans.SET_HOME:
         if item.params[0] == 1.0 or not item.placed:
-            home.set_here(autopilot)
+            home.set_here(context)
         else:
-            height = place_of(autopilot, item)[2]
-            why = home.choose(autopilot, item.latitude, item.longitude, height)
+            height = item_position(context, item)[2]
+            why = home.choose(context, item.latitude, item.longitude, height)
             if why:
-                autopilot.say(4, why)
+                context.say(4, why)
     return True
 
 
 def _take_off(
-    autopilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
+    context: AutopilotContext, mission: Mission, item: plans.MissionItem, state: FlightState
 ) -> bool:
-    memory = autopilot.memory
-    _, _, z = place_of(autopilot, item)
+    memory = context.memory
+    _, _, z = item_position(context, item)
     if state.mode == "LANDED":
         if memory.order != "take_off":
             memory.take_off_height = max(z - state.position[2], 0.5)
-            mode_transitions.rise(autopilot)
+            mode_transitions.rise(context)
         return False
     if memory.order == "take_off":
-        return state.mode == "HOLD" or _near_height(autopilot, z)
+        return state.mode == "HOLD" or _near_height(context, z)
     if not mission.entered:
         mission.entered = True
         x, y, _ = state.position
         memory.leg = MissionLeg(
-            (x, y, max(z, state.position[2])), None, mode_transitions.cruise(autopilot)
+            (x, y, max(z, state.position[2])), None, mode_transitions.cruise(context)
         )
-    return memory.leg is None or fly_leg(autopilot, memory.leg)
+    return memory.leg is None or fly_leg(context, memory.leg)
 
 
 def _waypoint(
-    autopilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
+    context: AutopilotContext, mission: Mission, item: plans.MissionItem, state: FlightState
 ) -> bool:
-    memory = autopilot.memory
+    memory = context.memory
     if state.mode == "TAKE_OFF":
         return False
     if not mission.entered or memory.leg is None:
         mission.entered = True
-        target = place_of(autopilot, item)
+        target = item_position(context, item)
         # params count clockwise from north
         yaw = 0.5 * math.pi - math.radians(item.params[3])
         turns = (
             math.isfinite(yaw) and item.command != plans.LOITER_TIME
         )  # LOITER_TIME has no heading
-        facing = yaw if turns else bearing(autopilot, target)
-        memory.leg = MissionLeg(target, facing, mode_transitions.cruise(autopilot))
+        facing = yaw if turns else bearing(context, target)
+        memory.leg = MissionLeg(target, facing, mode_transitions.cruise(context))
     leg = memory.leg
-    rests = fly_leg(autopilot, leg)
+    rests = fly_leg(context, leg)
     last = mission.current + 1 == len(memory.plans[plans.MISSION])
     wait_s = item.params[0] if item.command != plans.LOITER_UNLIMITED else math.inf
     waits = math.isfinite(wait_s) and wait_s > 0.0
-    if not (rests if last or waits or mission.waiting else _is_near(autopilot, item, leg)):
-        return mission.waiting and _has_waited(autopilot, mission, wait_s)
+    if not (rests if last or waits or mission.waiting else _is_near(context, item, leg)):
+        return mission.waiting and _has_waited(context, mission, wait_s)
     if item.command == plans.LOITER_UNLIMITED:
         return False
     if not waits:
         return True
     if not mission.waiting:
         mission.waiting, mission.since_ns = True, memory.now_ns
-    return _has_waited(autopilot, mission, wait_s)
+    return _has_waited(context, mission, wait_s)
 
 
 def _change_height(
-    autopilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
+    context: AutopilotContext, mission: Mission, item: plans.MissionItem, state: FlightState
 ) -> bool:
     """Handles LOITER_TO_ALT: approaches at the current height, then changes the height."""
-    memory = autopilot.memory
+    memory = context.memory
     if state.mode == "TAKE_OFF":
         return False
-    x, y, z = place_of(autopilot, item)
+    x, y, z = item_position(context, item)
     if not mission.entered or memory.leg is None:
         mission.entered = True
         target = (x, y, state.position[2])
-        memory.leg = MissionLeg(
-            target, bearing(autopilot, target), mode_transitions.cruise(autopilot)
-        )
+        memory.leg = MissionLeg(target, bearing(context, target), mode_transitions.cruise(context))
     own = abs(item.params[1])
     radius = own if math.isfinite(own) and own > 0.0 else _LOITER_RADIUS_M
-    radius += float(autopilot.parameter("NAV_ACC_RAD"))
+    radius += float(context.parameter("NAV_ACC_RAD"))
     level = math.hypot(x - state.position[0], y - state.position[1])
     if level <= radius and memory.leg.target[2] != z:
         memory.leg = MissionLeg((x, y, z), memory.leg.yaw, memory.leg.speed)
-    fly_leg(autopilot, memory.leg)
-    return level <= radius and _near_height(autopilot, z)
+    fly_leg(context, memory.leg)
+    return level <= radius and _near_height(context, z)
 
 
-def _is_near(autopilot: Autopilot, item: plans.MissionItem, leg: MissionLeg) -> bool:
+def _is_near(context: AutopilotContext, item: plans.MissionItem, leg: MissionLeg) -> bool:
     """Returns whether the UAV is within the acceptance radius, the item's own or NAV_ACC_RAD."""
     own = item.params[1] if item.command == plans.WAYPOINT else 0.0
-    radius = own if math.isfinite(own) and own > 0.0 else float(autopilot.parameter("NAV_ACC_RAD"))
-    x, y, _ = autopilot.state.position
+    radius = own if math.isfinite(own) and own > 0.0 else float(context.parameter("NAV_ACC_RAD"))
+    x, y, _ = context.state.position
     level = math.hypot(leg.target[0] - x, leg.target[1] - y)
-    return level < radius and _near_height(autopilot, leg.target[2])
+    return level < radius and _near_height(context, leg.target[2])
 
 
-def _near_height(autopilot: Autopilot, z: float) -> bool:
-    return abs(z - autopilot.state.position[2]) < float(autopilot.parameter("NAV_MC_ALT_RAD"))
+def _near_height(context: AutopilotContext, z: float) -> bool:
+    return abs(z - context.state.position[2]) < float(context.parameter("NAV_MC_ALT_RAD"))
 
 
 def _land(
-    autopilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
+    context: AutopilotContext, mission: Mission, item: plans.MissionItem, state: FlightState
 ) -> bool:
-    memory = autopilot.memory
+    memory = context.memory
     if memory.order == "land":
         return False  # done once the UAV is on the ground
     if not mission.entered:
         mission.entered = True
         x, y, z = state.position
         if item.placed:
-            x, y, _ = place_of(autopilot, item)
-        memory.leg = MissionLeg((x, y, z), None, mode_transitions.cruise(autopilot))
-    if memory.leg is not None and not fly_leg(autopilot, memory.leg):
+            x, y, _ = item_position(context, item)
+        memory.leg = MissionLeg((x, y, z), None, mode_transitions.cruise(context))
+    if memory.leg is not None and not fly_leg(context, memory.leg):
         return False
     memory.leg = None
-    mode_transitions.order(autopilot, "land", autopilot.vehicle.land())
+    mode_transitions.order(context, "land", context.vehicle.land())
     return False
 
 
 def _delay(
-    autopilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
+    context: AutopilotContext, mission: Mission, item: plans.MissionItem, state: FlightState
 ) -> bool:
-    if autopilot.memory.leg is not None and state.mode != "LANDED":
-        fly_leg(autopilot, autopilot.memory.leg)
+    if context.memory.leg is not None and state.mode != "LANDED":
+        fly_leg(context, context.memory.leg)
     if not mission.waiting:
-        mission.waiting, mission.since_ns = True, autopilot.memory.now_ns
-    return _has_waited(autopilot, mission, item.params[0])
+        mission.waiting, mission.since_ns = True, context.memory.now_ns
+    return _has_waited(context, mission, item.params[0])
 
 
 def _face(
-    autopilot: Autopilot, mission: Mission, item: plans.MissionItem, state: FlightState
+    context: AutopilotContext, mission: Mission, item: plans.MissionItem, state: FlightState
 ) -> bool:
     """Handles CONDITION_YAW: turns on the spot, relative or clockwise from north."""
-    memory = autopilot.memory
+    memory = context.memory
     if not mission.entered:
         mission.entered = True
         angle = math.radians(item.params[0])
         if item.params[3] == 1.0:
             way = -1.0 if item.params[2] == -1.0 else 1.0
-            yaw = autopilot.yaw - way * angle
+            yaw = context.yaw - way * angle
         else:
             yaw = 0.5 * math.pi - angle
         target = state.position if memory.leg is None else memory.leg.target
         memory.leg = MissionLeg(
-            target, math.remainder(yaw, 2.0 * math.pi), mode_transitions.cruise(autopilot)
+            target, math.remainder(yaw, 2.0 * math.pi), mode_transitions.cruise(context)
         )
     leg = memory.leg
     if leg is None or leg.yaw is None:
         return True
-    fly_leg(autopilot, leg)
-    return abs(math.remainder(leg.yaw - autopilot.yaw, 2.0 * math.pi)) < _FACES_RAD
+    fly_leg(context, leg)
+    return abs(math.remainder(leg.yaw - context.yaw, 2.0 * math.pi)) < _FACES_RAD
 
 
-def _has_waited(autopilot: Autopilot, mission: Mission, seconds: float) -> bool:
-    return autopilot.memory.now_ns - mission.since_ns >= seconds * 1e9
-
-
-def place_of(autopilot: Autopilot, item: plans.MissionItem) -> Vector:
-    """Returns an item's position in the map, m; above home or sea level according to its frame."""
-    x, y, _ = autopilot.state.position
-    if item.placed:
-        x, y, _ = autopilot.earth.place(item.latitude, item.longitude, autopilot.build.origin[2])
-    base = autopilot.memory.home or autopilot.memory.origin
-    above = item.frame in plans.ABOVE_HOME
-    z = item.altitude + (base[2] if above else -autopilot.build.origin[2])
-    return x, y, z
+def _has_waited(context: AutopilotContext, mission: Mission, seconds: float) -> bool:
+    return context.memory.now_ns - mission.since_ns >= seconds * 1e9

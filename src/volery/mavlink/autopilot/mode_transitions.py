@@ -7,15 +7,12 @@ and sends no commands until a mode is requested.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from volery.mavlink.autopilot import arming, feasibility, mode_requirements
+from volery.mavlink.autopilot.context import AutopilotContext
 from volery.mavlink.autopilot.modes import Mode
 from volery.mavlink.autopilot.state import MissionLeg
-
-if TYPE_CHECKING:
-    from volery.mavlink.autopilot.core import Autopilot
-    from volery.mavlink.autopilot.vehicle import FlightState, Vector
+from volery.mavlink.autopilot.vehicle import FlightState, Vector
 
 _FOLLOWS = {
     "take_off": {"TAKE_OFF", "HOLD", "LANDED"},
@@ -37,53 +34,51 @@ _PATIENCE_NS = 50_000_000
 """Time that a command may take to show in the UAV's mode."""
 
 
-def flies(autopilot: Autopilot) -> bool:
+def flies(context: AutopilotContext) -> bool:
     """Returns whether the UAV is off the ground, under any control."""
-    return autopilot.state.mode not in ("LANDED", "CRASHED")
+    return context.state.mode not in ("LANDED", "CRASHED")
 
 
-def cruise(autopilot: Autopilot) -> float:
+def cruise(context: AutopilotContext) -> float:
     """Returns the cruise speed, m/s: of the mission, of a command, or of MPC_XY_CRUISE."""
-    memory = autopilot.memory
+    memory = context.memory
     asked = (memory.mission.speed if memory.mode is Mode.MISSION else math.nan, memory.cruise)
-    speed = next(
-        (s for s in asked if math.isfinite(s)), float(autopilot.parameter("MPC_XY_CRUISE"))
-    )
-    return min(speed, float(autopilot.parameter("MPC_XY_VEL_MAX")))
+    speed = next((s for s in asked if math.isfinite(s)), float(context.parameter("MPC_XY_CRUISE")))
+    return min(speed, float(context.parameter("MPC_XY_VEL_MAX")))
 
 
-def go_to(autopilot: Autopilot, place: Vector, yaw: float | None) -> None:
+def go_to(context: AutopilotContext, place: Vector, yaw: float | None) -> None:
     """Flies to a position at cruise speed."""
-    autopilot.memory.leg = MissionLeg(place, yaw, cruise(autopilot))
+    context.memory.leg = MissionLeg(place, yaw, cruise(context))
 
 
-def obstacle_to(autopilot: Autopilot, mode: Mode) -> str:
+def obstacle_to(context: AutopilotContext, mode: Mode) -> str:
     """Returns why a mode cannot be entered now; empty if it can."""
-    memory = autopilot.memory
-    if autopilot.state.crashed:
+    memory = context.memory
+    if context.state.crashed:
         return "the vehicle has crashed"
     if memory.fix_lost and mode not in (Mode.ALTITUDE, Mode.LAND):
         return "no valid position"
     if mode is Mode.MISSION:
-        return feasibility.obstacle(autopilot)
-    return mode_requirements.missing(autopilot, mode)
+        return feasibility.obstacle(context)
+    return mode_requirements.missing(context.memory, mode)
 
 
-def ask_for(autopilot: Autopilot, mode: Mode) -> str:
+def ask_for(context: AutopilotContext, mode: Mode) -> str:
     """Enters a requested mode; returns why not, empty if entered.
 
     A disarmed UAV may enter any mode: missing requirements prevent arming, as in PX4.
     """
-    why = obstacle_to(autopilot, mode) if autopilot.memory.armed else ""
+    why = obstacle_to(context, mode) if context.memory.armed else ""
     if not why:
-        autopilot.memory.failsafe = False
-        enter(autopilot, mode)
+        context.memory.failsafe = False
+        enter(context, mode)
     return why
 
 
-def enter(autopilot: Autopilot, mode: Mode) -> None:
+def enter(context: AutopilotContext, mode: Mode) -> None:
     """Enters a mode."""
-    memory = autopilot.memory
+    memory = context.memory
     changed = memory.mode is not mode
     memory.mode = mode
     memory.leg = memory.way_home = memory.target = None
@@ -92,73 +87,73 @@ def enter(autopilot: Autopilot, mode: Mode) -> None:
         memory.followed = None
     if mode is not Mode.MISSION:
         memory.mission.entered = False
-    if memory.armed and flies(autopilot):
+    if memory.armed and flies(context):
         if mode is Mode.LAND:
-            order(autopilot, "land", autopilot.vehicle.land())
+            order(context, "land", context.vehicle.land())
         elif mode is Mode.TAKE_OFF:
-            rise(autopilot)
+            rise(context)
         elif mode is Mode.OFFBOARD:
             # It continues its motion until the next setpoint; a take-off first reaches the height
             # at which setpoints are flown.
-            order(autopilot, "take_off" if autopilot.state.mode == "TAKE_OFF" else "steer")
+            order(context, "take_off" if context.state.mode == "TAKE_OFF" else "steer")
         else:
-            order(autopilot, "hold", autopilot.vehicle.hold())
+            order(context, "hold", context.vehicle.hold())
     if changed:
-        autopilot.announce()
+        context.announce()
 
 
-def rise(autopilot: Autopilot) -> None:
+def rise(context: AutopilotContext) -> None:
     """Takes off from the ground, or climbs by the same height in the air."""
-    height = autopilot.memory.take_off_height
+    height = context.memory.take_off_height
     if not math.isfinite(height):
-        height = float(autopilot.parameter("MIS_TAKEOFF_ALT"))
-    x, y, z = autopilot.state.position
-    if not flies(autopilot):
+        height = float(context.parameter("MIS_TAKEOFF_ALT"))
+    x, y, z = context.state.position
+    if not flies(context):
         height = max(height, 0.1)
-        autopilot.memory.take_off_height = math.nan
-        autopilot.memory.take_off_goal = x, y, z + height
-        order(autopilot, "take_off", autopilot.vehicle.take_off(height))
+        context.memory.take_off_height = math.nan
+        context.memory.take_off_goal = x, y, z + height
+        order(context, "take_off", context.vehicle.take_off(height))
         return
-    ground = (autopilot.memory.home or autopilot.memory.origin)[2]
-    top = z + height if math.isfinite(autopilot.memory.take_off_height) else max(z, ground + height)
-    autopilot.memory.take_off_height = math.nan
-    go_to(autopilot, (x, y, top), None)
+    ground = context.memory.home_or_origin[2]
+    top = z + height if math.isfinite(context.memory.take_off_height) else max(z, ground + height)
+    context.memory.take_off_height = math.nan
+    go_to(context, (x, y, top), None)
 
 
-def order(autopilot: Autopilot, what: str, why_not: str = "") -> None:
+def order(context: AutopilotContext, what: str, why_not: str = "") -> None:
     """Records a command to the UAV, and reports why the UAV refused it."""
-    autopilot.memory.order, autopilot.memory.sinks = what, math.nan
-    autopilot.memory.ordered_ns = autopilot.memory.now_ns
+    context.memory.order, context.memory.sinks = what, math.nan
+    context.memory.ordered_ns = context.memory.now_ns
     if why_not:
-        autopilot.memory.order = ""
-        autopilot.say(4, why_not)
+        context.memory.order = ""
+        context.say(4, why_not)
 
 
-def follow_vehicle(autopilot: Autopilot, state: FlightState) -> None:
+def follow_vehicle(context: AutopilotContext, state: FlightState) -> None:
     """Detects take-offs, landings, crashes, and other clients' control of the UAV."""
-    memory = autopilot.memory
+    memory = context.memory
     if state.crashed:
         if memory.armed:
-            autopilot.say(0, "Crash detected: motors stopped")
-            arming.finish(autopilot, "Disarmed")
+            context.say(0, "Crash detected: motors stopped")
+            arming.finish(context, "Disarmed")
         return
     settled = memory.now_ns - memory.ordered_ns > _PATIENCE_NS
     if settled and state.mode not in _FOLLOWS.get(memory.order, {memory.order}):
-        _step_back(autopilot, state)
+        _step_back(context, state)
     if state.airborne and not memory.airborne and memory.armed:
         memory.airborne = True
-        autopilot.say(6, "Takeoff detected")
+        context.say(6, "Takeoff detected")
     if state.mode == "LANDED" and memory.airborne:
         memory.airborne, memory.landed_ns = False, memory.now_ns
-        autopilot.say(6, "Landing detected")
+        context.say(6, "Landing detected")
         memory.order, memory.leg = "", None
-    if memory.armed and state.mode == "LANDED" and not _begins(autopilot):
-        _disarm_in_time(autopilot)
+    if memory.armed and state.mode == "LANDED" and not _begins(context):
+        _disarm_in_time(context)
 
 
-def _step_back(autopilot: Autopilot, state: FlightState) -> None:
+def _step_back(context: AutopilotContext, state: FlightState) -> None:
     """Reports that another client controls the UAV, and stops sending commands."""
-    memory = autopilot.memory
+    memory = context.memory
     memory.order = state.mode if state.mode != "LANDED" else ""
     memory.leg = memory.way_home = None
     if state.mode == "LANDED":
@@ -169,24 +164,22 @@ def _step_back(autopilot: Autopilot, state: FlightState) -> None:
     mode = _OUTSIDE.get(state.mode, Mode.HOLD)
     if mode is not memory.mode:
         memory.mode = mode
-    autopilot.announce()
+    context.announce()
 
 
-def _begins(autopilot: Autopilot) -> bool:
+def _begins(context: AutopilotContext) -> bool:
     """Returns whether a take-off has started that has not left the ground."""
     return (
-        autopilot.memory.order == "take_off"
-        and autopilot.memory.now_ns - autopilot.memory.ordered_ns < 1e9
+        context.memory.order == "take_off"
+        and context.memory.now_ns - context.memory.ordered_ns < 1e9
     )
 
 
-def _disarm_in_time(autopilot: Autopilot) -> None:
-    memory = autopilot.memory
+def _disarm_in_time(context: AutopilotContext) -> None:
+    memory = context.memory
     flown = memory.landed_ns > memory.armed_ns
     name = "COM_DISARM_LAND" if flown else "COM_DISARM_PRFLT"
-    limit_s = float(autopilot.parameter(name))
+    limit_s = float(context.parameter(name))
     since_ns = memory.landed_ns if flown else memory.armed_ns
     if limit_s > 0.0 and memory.now_ns - since_ns >= limit_s * 1e9:
-        arming.finish(
-            autopilot, f"Disarmed by {'landing' if flown else 'auto preflight disarming'}"
-        )
+        arming.finish(context, f"Disarmed by {'landing' if flown else 'auto preflight disarming'}")

@@ -8,9 +8,10 @@ silent for COM_OF_LOSS_T.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from volery.mavlink.autopilot import mode_transitions
+from volery.mavlink.autopilot import failsafes, mode_transitions
+from volery.mavlink.autopilot.context import AutopilotContext
 from volery.mavlink.autopilot.modes import Mode
 from volery.mavlink.autopilot.setpoints import (
     OffboardSetpoint,
@@ -18,11 +19,8 @@ from volery.mavlink.autopilot.setpoints import (
     global_setpoint,
     local_setpoint,
 )
-
-if TYPE_CHECKING:
-    from volery.mavlink.autopilot.core import Autopilot
-    from volery.mavlink.autopilot.state import Source
-    from volery.mavlink.autopilot.vehicle import FlightState, Vector
+from volery.mavlink.autopilot.state import MissionLeg, Source
+from volery.mavlink.autopilot.vehicle import FlightState, Vector
 
 _GAIN = 0.95
 """Gain, 1/s: PX4's MPC_XY_P and, within a twentieth, MPC_Z_P."""
@@ -35,97 +33,95 @@ _LIFTED_M = 0.3
 _ABOVE_HOME = (3, 6, 10, 11)
 
 
-def take_local(autopilot: Autopilot, source: Source, message: Any) -> None:
+def take_local(context: AutopilotContext, source: Source, message: Any) -> None:
     """Handles SET_POSITION_TARGET_LOCAL_NED."""
-    take(autopilot, source, local_setpoint(message, autopilot.memory.origin))
+    take(context, source, local_setpoint(message, context.memory.origin))
 
 
-def take_global(autopilot: Autopilot, source: Source, message: Any) -> None:
+def take_global(context: AutopilotContext, source: Source, message: Any) -> None:
     """Handles SET_POSITION_TARGET_GLOBAL_INT."""
-    x, y, _ = autopilot.earth.place(message.lat_int * 1e-7, message.lon_int * 1e-7, 0.0)
+    x, y, _ = context.earth.place(message.lat_int * 1e-7, message.lon_int * 1e-7, 0.0)
     above = message.coordinate_frame in _ABOVE_HOME
-    home = autopilot.memory.home or autopilot.memory.origin
-    z = message.alt + (home[2] if above else -autopilot.build.origin[2])
-    take(autopilot, source, global_setpoint(message, (x, y, z)))
+    home = context.memory.home_or_origin
+    z = message.alt + (home[2] if above else -context.build.origin[2])
+    take(context, source, global_setpoint(message, (x, y, z)))
 
 
-def take_attitude(autopilot: Autopilot, source: Source, message: Any) -> None:
+def take_attitude(context: AutopilotContext, source: Source, message: Any) -> None:
     """Handles SET_ATTITUDE_TARGET."""
-    take(autopilot, source, attitude_setpoint(message))
+    take(context, source, attitude_setpoint(message))
 
 
-def take(autopilot: Autopilot, source: Source, setpoint: OffboardSetpoint) -> None:
+def take(context: AutopilotContext, source: Source, setpoint: OffboardSetpoint) -> None:
     """Stores a setpoint; in offboard mode it is flown at once."""
-    memory = autopilot.memory
+    memory = context.memory
     offboard, now_ns = memory.offboard, memory.now_ns
     if source != offboard.source:
-        if offboard.source is not None and not _is_lost(autopilot):
+        if offboard.source is not None and not _is_lost(context):
             if source not in offboard.refused:
                 offboard.refused.add(source)
-                autopilot.say(4, f"Setpoints of {source[1]}/{source[2]} ignored: another one flies")
+                context.say(4, f"Setpoints of {source[1]}/{source[2]} ignored: another one flies")
             return
         offboard.source = source
         offboard.refused.clear()
     offboard.setpoint, offboard.time_ns = setpoint, now_ns
     if memory.mode is Mode.OFFBOARD and memory.armed and memory.state is not None:
-        _fly(autopilot, memory.state, setpoint, fresh=True)
+        _fly(context, memory.state, setpoint, fresh=True)
 
 
-def _is_lost(autopilot: Autopilot) -> bool:
-    limit_ns = float(autopilot.parameter("COM_OF_LOSS_T")) * 1e9
-    return autopilot.memory.now_ns - autopilot.memory.offboard.time_ns > limit_ns
+def _is_lost(context: AutopilotContext) -> bool:
+    limit_ns = float(context.parameter("COM_OF_LOSS_T")) * 1e9
+    return context.memory.now_ns - context.memory.offboard.time_ns > limit_ns
 
 
-def fly(autopilot: Autopilot, state: FlightState) -> None:
+def fly(context: AutopilotContext, state: FlightState) -> None:
     """Continues with the newest setpoint; handles the loss of setpoints."""
-    from volery.mavlink.autopilot.failsafes import act
-
-    setpoint = autopilot.memory.offboard.setpoint
-    if _is_lost(autopilot) or setpoint is None:
-        action = int(autopilot.parameter("COM_OBL_RC_ACT"))
-        autopilot.say(2, "Failsafe: offboard control lost")
-        act(autopilot, {3: Mode.RETURN, 4: Mode.LAND}.get(action, Mode.HOLD))
+    setpoint = context.memory.offboard.setpoint
+    if _is_lost(context) or setpoint is None:
+        action = int(context.parameter("COM_OBL_RC_ACT"))
+        context.say(2, "Failsafe: offboard control lost")
+        failsafes.act(context, {3: Mode.RETURN, 4: Mode.LAND}.get(action, Mode.HOLD))
         return
-    _fly(autopilot, state, setpoint, fresh=False)
+    _fly(context, state, setpoint, fresh=False)
 
 
 def _fly(
-    autopilot: Autopilot, state: FlightState, setpoint: OffboardSetpoint, *, fresh: bool
+    context: AutopilotContext, state: FlightState, setpoint: OffboardSetpoint, *, fresh: bool
 ) -> None:
-    memory = autopilot.memory
+    memory = context.memory
     memory.target = setpoint
     if setpoint.attitude is not None or setpoint.rates is not None:
-        _hold_attitude(autopilot, setpoint, fresh=fresh)
+        _hold_attitude(context, setpoint, fresh=fresh)
         return
-    if not _is_up(autopilot, state, setpoint):
+    if not _is_up(context, state, setpoint):
         return
     if _is_place(setpoint):
-        _go(autopilot, setpoint, fresh=fresh)
+        _go(context, setpoint, fresh=fresh)
     elif _finite(setpoint.position) and _finite(setpoint.velocity):
-        _track(autopilot, state, setpoint, fresh=fresh)
+        _track(context, state, setpoint, fresh=fresh)
     elif _finite(setpoint.acceleration) and not any(map(math.isfinite, setpoint.velocity)):
-        _push(autopilot, setpoint, fresh=fresh)
+        _push(context, setpoint, fresh=fresh)
     else:
-        _steer(autopilot, state, setpoint, fresh=fresh)
+        _steer(context, state, setpoint, fresh=fresh)
 
 
-def _hold_attitude(autopilot: Autopilot, setpoint: OffboardSetpoint, *, fresh: bool) -> None:
-    if not fresh and autopilot.memory.order in ("tilt", "spin"):
+def _hold_attitude(context: AutopilotContext, setpoint: OffboardSetpoint, *, fresh: bool) -> None:
+    if not fresh and context.memory.order in ("tilt", "spin"):
         return
     if setpoint.attitude is not None:
-        autopilot.vehicle.tilt(setpoint.attitude, setpoint.thrust)
-        mode_transitions.order(autopilot, "tilt")
+        context.vehicle.tilt(setpoint.attitude, setpoint.thrust)
+        mode_transitions.order(context, "tilt")
     elif setpoint.rates is not None:
-        autopilot.vehicle.spin(setpoint.rates, setpoint.thrust)
-        mode_transitions.order(autopilot, "spin")
+        context.vehicle.spin(setpoint.rates, setpoint.thrust)
+        mode_transitions.order(context, "spin")
 
 
-def _is_up(autopilot: Autopilot, state: FlightState, setpoint: OffboardSetpoint) -> bool:
+def _is_up(context: AutopilotContext, state: FlightState, setpoint: OffboardSetpoint) -> bool:
     """Returns whether the UAV is high enough for setpoints; upward setpoints start a take-off.
 
     Attitudes need no take-off: their thrust decides.
     """
-    memory = autopilot.memory
+    memory = context.memory
     if state.mode == "LANDED":
         upwards = (
             setpoint.position[2] > state.position[2] + 0.2
@@ -133,15 +129,13 @@ def _is_up(autopilot: Autopilot, state: FlightState, setpoint: OffboardSetpoint)
             or setpoint.acceleration[2] > 0.1
         )
         if upwards and memory.order != "take_off":
-            mode_transitions.order(
-                autopilot, "take_off", autopilot.vehicle.take_off(2.0 * _LIFTED_M)
-            )
+            mode_transitions.order(context, "take_off", context.vehicle.take_off(2.0 * _LIFTED_M))
         return False
     if memory.order == "take_off":
-        ground = (memory.home or memory.origin)[2]
+        ground = memory.home_or_origin[2]
         if state.mode == "TAKE_OFF" and state.position[2] < ground + _LIFTED_M:
             return False
-        mode_transitions.order(autopilot, "hold", autopilot.vehicle.hold())
+        mode_transitions.order(context, "hold", context.vehicle.hold())
     return True
 
 
@@ -150,62 +144,60 @@ def _is_place(setpoint: OffboardSetpoint) -> bool:
     return _finite(setpoint.position) and not moves and not math.isfinite(setpoint.yaw_rate)
 
 
-def _go(autopilot: Autopilot, setpoint: OffboardSetpoint, *, fresh: bool) -> None:
-    leg = autopilot.memory.leg
+def _go(context: AutopilotContext, setpoint: OffboardSetpoint, *, fresh: bool) -> None:
+    leg = context.memory.leg
     yaw = setpoint.yaw if math.isfinite(setpoint.yaw) else None
     same = leg is not None and (leg.target, leg.yaw) == (setpoint.position, yaw)
-    if same and autopilot.memory.order == "go_to":
+    if same and context.memory.order == "go_to":
         return
     if fresh or not same:
-        from volery.mavlink.autopilot.state import MissionLeg
-
-        autopilot.memory.leg = MissionLeg(setpoint.position, yaw, 0.0, locked=True)
-        mode_transitions.order(autopilot, "go_to", autopilot.vehicle.go_to(setpoint.position, yaw))
+        context.memory.leg = MissionLeg(setpoint.position, yaw, 0.0, locked=True)
+        mode_transitions.order(context, "go_to", context.vehicle.go_to(setpoint.position, yaw))
 
 
 def _track(
-    autopilot: Autopilot, state: FlightState, setpoint: OffboardSetpoint, *, fresh: bool
+    context: AutopilotContext, state: FlightState, setpoint: OffboardSetpoint, *, fresh: bool
 ) -> None:
     if math.dist(setpoint.position, state.position) > _TRACKED_M:
-        _steer(autopilot, state, setpoint, fresh=fresh)
+        _steer(context, state, setpoint, fresh=fresh)
     elif fresh:
         push = setpoint.acceleration if _finite(setpoint.acceleration) else (0.0, 0.0, 0.0)
-        autopilot.vehicle.follow(setpoint.position, setpoint.velocity, push, *_turn(setpoint))
-        mode_transitions.order(autopilot, "follow")
+        context.vehicle.follow(setpoint.position, setpoint.velocity, push, *_turn(setpoint))
+        mode_transitions.order(context, "follow")
 
 
-def _push(autopilot: Autopilot, setpoint: OffboardSetpoint, *, fresh: bool) -> None:
-    if fresh or autopilot.memory.order != "push":
+def _push(context: AutopilotContext, setpoint: OffboardSetpoint, *, fresh: bool) -> None:
+    if fresh or context.memory.order != "push":
         push = (
-            _turned(autopilot, setpoint.acceleration)
+            _turned(context, setpoint.acceleration)
             if setpoint.in_heading
             else setpoint.acceleration
         )
-        autopilot.vehicle.push(push, *_turn(setpoint))
-        mode_transitions.order(autopilot, "push")
+        context.vehicle.push(push, *_turn(setpoint))
+        mode_transitions.order(context, "push")
 
 
 def _steer(
-    autopilot: Autopilot, state: FlightState, setpoint: OffboardSetpoint, *, fresh: bool
+    context: AutopilotContext, state: FlightState, setpoint: OffboardSetpoint, *, fresh: bool
 ) -> None:
     """Commands velocities; axes with a position are controlled towards it."""
-    age_ns = autopilot.memory.now_ns - autopilot.memory.ordered_ns
+    age_ns = context.memory.now_ns - context.memory.ordered_ns
     placed = any(map(math.isfinite, setpoint.position)) or setpoint.in_heading
     if not fresh and age_ns < (_FEEDBACK_NS if placed else _REFRESH_NS):
         return
     x, y, z = (v if math.isfinite(v) else 0.0 for v in setpoint.velocity)
     if setpoint.in_heading:
-        x, y, z = _turned(autopilot, (x, y, z))
+        x, y, z = _turned(context, (x, y, z))
     x, y, z = (
         v + (_GAIN * (goal - here) if math.isfinite(goal) else 0.0)
         for v, goal, here in zip((x, y, z), setpoint.position, state.position, strict=True)
     )
-    size, most = math.hypot(x, y), float(autopilot.parameter("MPC_XY_VEL_MAX"))
+    size, most = math.hypot(x, y), float(context.parameter("MPC_XY_VEL_MAX"))
     if size > most:
         x, y = x * most / size, y * most / size
-    up, down = (float(autopilot.parameter(f"MPC_Z_VEL_MAX_{way}")) for way in ("UP", "DN"))
-    autopilot.vehicle.steer((x, y, min(max(z, -down), up)), *_turn(setpoint))
-    mode_transitions.order(autopilot, "steer")
+    up, down = (float(context.parameter(f"MPC_Z_VEL_MAX_{way}")) for way in ("UP", "DN"))
+    context.vehicle.steer((x, y, min(max(z, -down), up)), *_turn(setpoint))
+    mode_transitions.order(context, "steer")
 
 
 def _turn(setpoint: OffboardSetpoint) -> tuple[float | None, float]:
@@ -213,10 +205,10 @@ def _turn(setpoint: OffboardSetpoint) -> tuple[float | None, float]:
     return (setpoint.yaw if math.isfinite(setpoint.yaw) else None), rate
 
 
-def _turned(autopilot: Autopilot, vector: Vector) -> Vector:
+def _turned(context: AutopilotContext, vector: Vector) -> Vector:
     """Rotates a vector from the horizontal heading frame to the map; nan counts as zero."""
     x, y, z = (part if math.isfinite(part) else 0.0 for part in vector)
-    c, s = math.cos(autopilot.yaw), math.sin(autopilot.yaw)
+    c, s = math.cos(context.yaw), math.sin(context.yaw)
     return c * x - s * y, s * x + c * y, z
 
 

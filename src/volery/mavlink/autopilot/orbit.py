@@ -1,24 +1,25 @@
-"""m and m/s, around the position of the UAV. A positive radius turns clockwise."""
+"""Flies orbits: circles around a position. A positive radius turns clockwise."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from volery.mavlink.autopilot import mode_transitions
-from volery.mavlink.autopilot.acknowledgement import ACCEPTED, DENIED, TEMPORARILY_REJECTED
+from volery.mavlink.autopilot.command_protocol import (
+    ACCEPTED,
+    DENIED,
+    TEMPORARILY_REJECTED,
+    Command,
+)
+from volery.mavlink.autopilot.context import AutopilotContext
 from volery.mavlink.autopilot.legs import approach_speed, fly_leg
 from volery.mavlink.autopilot.modes import Mode
 from volery.mavlink.autopilot.motion import degrees_e7, us
 from volery.mavlink.autopilot.setpoints import OffboardSetpoint
-from volery.mavlink.autopilot.state import MissionLeg, Orbit
+from volery.mavlink.autopilot.state import MissionLeg, Orbit, Source
+from volery.mavlink.autopilot.vehicle import FlightState, Vector
 from volery.mavlink.codec import dialect
-
-if TYPE_CHECKING:
-    from volery.mavlink.autopilot.commands import Command
-    from volery.mavlink.autopilot.core import Autopilot
-    from volery.mavlink.autopilot.state import Source
-    from volery.mavlink.autopilot.vehicle import FlightState, Vector
 
 DO_ORBIT = 34
 _MIN_RADIUS_M, _MAX_RADIUS_M = 1.0, 1000.0
@@ -32,7 +33,7 @@ _ON_CIRCLE_M = 0.5
 _PERIOD_NS = 20_000_000
 
 
-def prepare(autopilot: Autopilot, _source: Source, command: Command, height: float) -> int:
+def prepare(context: AutopilotContext, _source: Source, command: Command, height: float) -> int:
     """Returns the result of DO_ORBIT, whose altitude is `height` in the map (nan: unchanged)."""
     if any(math.isinf(param) for param in command.params):
         return DENIED
@@ -40,14 +41,14 @@ def prepare(autopilot: Autopilot, _source: Source, command: Command, height: flo
     placed = math.isfinite(latitude) and math.isfinite(longitude)
     if placed and not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
         return DENIED
-    if not (autopilot.memory.armed and mode_transitions.flies(autopilot)):
+    if not (context.memory.armed and mode_transitions.flies(context)):
         return TEMPORARILY_REJECTED
-    before = autopilot.memory.orbit if autopilot.memory.mode is Mode.ORBIT else None
-    x, y, z = before.center if before else autopilot.state.position
+    before = context.memory.orbit if context.memory.mode is Mode.ORBIT else None
+    x, y, z = before.center if before else context.state.position
     if placed:
-        x, y, _ = autopilot.earth.place(latitude, longitude, autopilot.build.origin[2])
-    autopilot.memory.orbit = _orbit(
-        command.params, before, (x, y, height if math.isfinite(height) else z), autopilot.yaw
+        x, y, _ = context.earth.place(latitude, longitude, context.build.origin[2])
+    context.memory.orbit = _orbit(
+        command.params, before, (x, y, height if math.isfinite(height) else z), context.yaw
     )
     return ACCEPTED
 
@@ -68,59 +69,59 @@ def _orbit(params: tuple[float, ...], before: Orbit | None, center: Vector, yaw:
     return Orbit(center, radius if clockwise else -radius, speed, facing, yaw)
 
 
-def fly(autopilot: Autopilot, state: FlightState) -> None:
+def fly(context: AutopilotContext, state: FlightState) -> None:
     """Flies to the nearest point of the circle, then along it."""
-    memory, orbit = autopilot.memory, autopilot.memory.orbit
+    memory, orbit = context.memory, context.memory.orbit
     if orbit is None or state.mode == "LANDED":
         return
     x, y, z = (here - there for here, there in zip(state.position, orbit.center, strict=True))
     away = math.hypot(x, y)
     if away < 1e-3:
-        x, y, away = math.cos(autopilot.yaw), math.sin(autopilot.yaw), 1.0
+        x, y, away = math.cos(context.yaw), math.sin(context.yaw), 1.0
         outside = -abs(orbit.radius)
     else:
         outside = away - abs(orbit.radius)
     outward = x / away, y / away
     if orbit.approaches:
-        orbit.approaches = not _approach(autopilot, orbit, outward, abs(outside) + abs(z))
+        orbit.approaches = not _approach(context, orbit, outward, abs(outside) + abs(z))
         return
     if memory.now_ns - memory.ordered_ns < _PERIOD_NS and memory.order == "steer":
         return
     turning = math.copysign(1.0, orbit.radius) * orbit.speed
     along = outward[1] * turning, -outward[0] * turning
     back = _GAIN * outside
-    climb = math.copysign(_climb(autopilot, z), -z)
+    climb = math.copysign(_climb(context, z), -z)
     yaw, rate = _facing(orbit, outward, turning)
     velocity = along[0] - back * outward[0], along[1] - back * outward[1], climb
     memory.target = OffboardSetpoint(velocity=velocity, yaw=math.nan if yaw is None else yaw)
-    autopilot.vehicle.steer(velocity, yaw, rate)
-    mode_transitions.order(autopilot, "steer")
+    context.vehicle.steer(velocity, yaw, rate)
+    mode_transitions.order(context, "steer")
 
 
-def status(autopilot: Autopilot) -> Any:
+def status(context: AutopilotContext) -> Any:
     """Returns ORBIT_EXECUTION_STATUS; None if the UAV is not orbiting."""
-    orbit = autopilot.memory.orbit
-    if orbit is None or autopilot.memory.mode is not Mode.ORBIT:
+    orbit = context.memory.orbit
+    if orbit is None or context.memory.mode is not Mode.ORBIT:
         return None
-    latitude, longitude, _ = degrees_e7(autopilot.earth.geodetic(orbit.center))
-    altitude = orbit.center[2] + autopilot.build.origin[2]
+    latitude, longitude, _ = degrees_e7(context.earth.geodetic(orbit.center))
+    altitude = orbit.center[2] + context.build.origin[2]
     built = dialect().MAVLink_orbit_execution_status_message
-    return built(us(autopilot), orbit.radius, 0, latitude, longitude, altitude)
+    return built(us(context), orbit.radius, 0, latitude, longitude, altitude)
 
 
 def _approach(
-    autopilot: Autopilot, orbit: Orbit, outward: tuple[float, float], off_m: float
+    context: AutopilotContext, orbit: Orbit, outward: tuple[float, float], off_m: float
 ) -> bool:
     """Returns whether the circle is reached."""
-    if autopilot.memory.leg is None:
+    if context.memory.leg is None:
         x, y, z = orbit.center
         size = abs(orbit.radius)
         target = x + size * outward[0], y + size * outward[1], z
         yaw, _ = _facing(orbit, outward, 0.0)
-        autopilot.memory.leg = MissionLeg(target, yaw, mode_transitions.cruise(autopilot))
-    if off_m > _ON_CIRCLE_M and not fly_leg(autopilot, autopilot.memory.leg):
+        context.memory.leg = MissionLeg(target, yaw, mode_transitions.cruise(context))
+    if off_m > _ON_CIRCLE_M and not fly_leg(context, context.memory.leg):
         return False
-    autopilot.memory.leg = None
+    context.memory.leg = None
     return True
 
 
@@ -138,8 +139,8 @@ def _facing(
     return math.atan2(-outward[1], -outward[0]), rate
 
 
-def _climb(autopilot: Autopilot, above: float) -> float:
+def _climb(context: AutopilotContext, above: float) -> float:
     """Returns the speed of the approach to the orbit's height, m/s."""
     way = "DN" if above > 0.0 else "UP"
-    limit = float(autopilot.parameter(f"MPC_Z_V_AUTO_{way}"))
-    return min(limit, approach_speed(abs(above), 0.5 * float(autopilot.parameter("MPC_ACC_HOR"))))
+    limit = float(context.parameter(f"MPC_Z_V_AUTO_{way}"))
+    return min(limit, approach_speed(abs(above), 0.5 * float(context.parameter("MPC_ACC_HOR"))))

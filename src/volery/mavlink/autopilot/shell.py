@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from volery.mavlink.autopilot.context import AutopilotContext
 from volery.mavlink.autopilot.parameters import NAMES
+from volery.mavlink.autopilot.state import Source
 from volery.mavlink.codec import dialect
-
-if TYPE_CHECKING:
-    from volery.mavlink.autopilot.core import Autopilot
-    from volery.mavlink.autopilot.state import Source
 
 _SHELL_DEVICE = 10
 _REPLY, _RESPOND = 1, 2
@@ -25,54 +23,52 @@ _HELP = {
 }
 
 
-def take(autopilot: Autopilot, source: Source, message: Any) -> None:
+def take(context: AutopilotContext, source: Source, message: Any) -> None:
     """Runs a line that a SERIAL_CONTROL message completes, and replies if requested.
 
     One line per message: the rest of the message is dropped.
     """
-    shells = autopilot.memory.shells
-    if message.device != _SHELL_DEVICE or message.flags & _REPLY or autopilot.memory.state is None:
+    shells = context.memory.shells
+    if message.device != _SHELL_DEVICE or message.flags & _REPLY or context.memory.state is None:
         return
     text = shells.pop(source, "") + bytes(message.data[: message.count]).decode("ascii", "replace")
     text = text.replace("\r", "\n").replace("\0", "")
     reply = ""
     line, ended, _ = text.partition("\n")
     if ended:
-        reply = f"{_run(autopilot, line.split())}{_PROMPT}"
+        reply = f"{_run(context, line.split())}{_PROMPT}"
     elif len(line) <= _MAX_LINE and len(shells) < _MAX_SHELLS:
         shells[source] = line
     if message.flags & _RESPOND:
-        _reply(autopilot, source, reply)
+        _reply(context, source, reply)
 
 
-def _run(autopilot: Autopilot, words: list[str]) -> str:
+def _run(context: AutopilotContext, words: list[str]) -> str:
     """Returns the output of a command."""
     if not words:
         return ""
     if words == ["help"]:
         return "Commands:\n" + "".join(f"  {name:<18} {what}\n" for name, what in _HELP.items())
     if words[0] == "ver":
-        return f"HW arch: volery {autopilot.build.airframe}\nPX4 version: 1.18.0 (simulated)\n"
+        return f"HW arch: volery {context.build.airframe}\nPX4 version: 1.18.0 (simulated)\n"
     if words[:2] == ["param", "show"] and len(words) <= 3:
         wanted = words[2] if len(words) == 3 else "*"
-        return _parameters(autopilot, wanted)
+        return _parameters(context, wanted)
     return f"Invalid command: {' '.join(words)[:40]}\ntype 'help' for a list of commands\n"
 
 
-def _parameters(autopilot: Autopilot, wanted: str) -> str:
+def _parameters(context: AutopilotContext, wanted: str) -> str:
     prefix = wanted.removesuffix("*")
     found = [
         name for name in NAMES if name == wanted or (name.startswith(prefix) and wanted[-1:] == "*")
     ]
-    return (
-        "".join(f"  {name}: {autopilot.parameter(name):g}\n" for name in found) or "no parameter\n"
-    )
+    return "".join(f"  {name}: {context.parameter(name):g}\n" for name in found) or "no parameter\n"
 
 
-def _reply(autopilot: Autopilot, source: Source, text: str) -> None:
+def _reply(context: AutopilotContext, source: Source, text: str) -> None:
     raw = text.encode("ascii", "replace")
     control = dialect().MAVLink_serial_control_message
     for k in range(0, len(raw), _CHUNK_BYTES):
         piece = raw[k : k + _CHUNK_BYTES]
         data = list(piece.ljust(_CHUNK_BYTES, b"\0"))
-        autopilot.send(control(_SHELL_DEVICE, _REPLY, 0, 0, len(piece), data), source[0])
+        context.links.send(control(_SHELL_DEVICE, _REPLY, 0, 0, len(piece), data), source[0])

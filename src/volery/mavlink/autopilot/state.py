@@ -17,21 +17,6 @@ Source = tuple[int, int, int]
 
 
 @dataclass
-class LinkState:
-    """One connection: its streams and transfers."""
-
-    number: int
-    profile: int
-    periods_ns: dict[int, int] = field(default_factory=dict)
-    """Periods of its streams, by message id."""
-    due: list[tuple[int, int]] = field(default_factory=list)
-    """Times (ns) and ids of messages to send, a heap."""
-    sequence: int = 0
-    parameters_to_send: list[int] = field(default_factory=list)
-    """Indices of parameters to send, the next one last."""
-
-
-@dataclass
 class ManualInput:
     """Newest MANUAL_CONTROL: forward, right, up (each -1 to 1), turn to the right."""
 
@@ -187,7 +172,6 @@ class AutopilotState:
     """Integral of the altitude mode, as a fraction of the hover thrust."""
     altitude_target: float = math.nan
     offboard: Offboard = field(default_factory=Offboard)
-    links: dict[int, LinkState] = field(default_factory=dict)
     ground_heard_ns: int = -1
     """Time of the last heartbeat of a ground station; -1: never."""
     fix_ns: int = 0
@@ -212,3 +196,8 @@ class AutopilotState:
     """Failsafes that have been reported and handled."""
     failsafe: bool = False
     next_check_ns: int = 0
+
+    @property
+    def home_or_origin(self) -> Vector:
+        """Home, m, map; the local frame's origin until there is a home."""
+        return self.home or self.origin

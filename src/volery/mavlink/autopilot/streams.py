@@ -7,15 +7,13 @@ Rates are those of PX4's links: `onboard` for a companion computer, `normal` for
 from __future__ import annotations
 
 import heapq
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from volery.mavlink.autopilot import telemetry
+from volery.mavlink.autopilot.client_links import LinkState
+from volery.mavlink.autopilot.context import AutopilotContext
 from volery.mavlink.autopilot.parameter_protocol import send_some
 from volery.mavlink.codec import dialect
-
-if TYPE_CHECKING:
-    from volery.mavlink.autopilot.core import Autopilot
-    from volery.mavlink.autopilot.state import LinkState
 
 NONE, ONBOARD, GROUND = 0, 1, 2
 _ALWAYS = {0: 1.0}
@@ -58,7 +56,7 @@ def begin(link: LinkState, now_ns: int) -> LinkState:
     return link
 
 
-def ask_for(autopilot: Autopilot, link: LinkState, number: int, period_us: float) -> bool:
+def ask_for(link: LinkState, number: int, period_us: float, now_ns: int) -> bool:
     """Sets the period of a message on a link: 0 the default, -1 never.
 
     Returns whether the period is possible. The rate is limited to that of the vehicle's state.
@@ -70,12 +68,12 @@ def ask_for(autopilot: Autopilot, link: LinkState, number: int, period_us: float
         return True
     usual = RATES_HZ.get(link.profile, _ALWAYS).get(number)
     if period_us == 0.0 and usual is None:
-        return ask_for(autopilot, link, number, -1.0)
+        return ask_for(link, number, -1.0, now_ns)
     wanted = 1e9 / usual if period_us == 0.0 and usual is not None else period_us * 1e3
     link.periods_ns[number] = max(FASTEST_NS, round(min(wanted, 1e15)))
     link.due = [entry for entry in link.due if entry[1] != number]
     heapq.heapify(link.due)
-    heapq.heappush(link.due, (autopilot.memory.now_ns, number))
+    heapq.heappush(link.due, (now_ns, number))
     return True
 
 
@@ -86,11 +84,11 @@ def interval_of(link: LinkState, number: int) -> Any:
     return dialect().MAVLink_message_interval_message(number, min(period_us, 2**31 - 1))
 
 
-def send_due(autopilot: Autopilot) -> None:
+def send_due(context: AutopilotContext) -> None:
     """Sends all due messages; each message is built once for all links."""
-    now_ns = autopilot.memory.now_ns
+    now_ns = context.memory.now_ns
     built: dict[int, Any] = {}
-    for link in tuple(autopilot.memory.links.values()):
+    for link in tuple(context.links.open.values()):
         while link.due and link.due[0][0] <= now_ns:
             instant_ns, number = link.due[0]
             period_ns = link.periods_ns.get(number)
@@ -100,8 +98,8 @@ def send_due(autopilot: Autopilot) -> None:
             late = (now_ns - instant_ns) // period_ns + 1
             heapq.heapreplace(link.due, (instant_ns + late * period_ns, number))
             if number not in built:
-                built[number] = telemetry.BUILDERS[number](autopilot)
+                built[number] = telemetry.BUILDERS[number](context)
             if built[number] is not None:
-                autopilot.send(built[number], link.number)
+                context.links.send(built[number], link.number)
         if link.parameters_to_send:
-            send_some(autopilot, link)
+            send_some(context, link)

@@ -8,23 +8,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from volery.core.frames import ned_of_enu
-from volery.mavlink.autopilot import arming, dialect_extensions, motion, orbit, plans
+from volery.mavlink.autopilot import arming, dialect_extensions, home, motion, orbit, plans
+from volery.mavlink.autopilot.context import AutopilotContext
 from volery.mavlink.autopilot.modes import Mode
 from volery.mavlink.autopilot.release import custom_version, flight_version
+from volery.mavlink.autopilot.status_messages import heartbeat
 from volery.mavlink.codec import dialect
 
-if TYPE_CHECKING:
-    from volery.mavlink.autopilot.core import Autopilot
-
-_PX4 = 12
-"""Value MAV_AUTOPILOT_PX4."""
-_CHUNK = 50
-"""Characters of a STATUSTEXT."""
-_LONGEST_TEXT = 250
-HOME_POSITION, MESSAGE_INTERVAL = 242, 244
+MESSAGE_INTERVAL = 244
 _GYRO, _ACCEL, _MAG, _PRESSURE, _GPS = 1, 2, 4, 8, 32
 _CONTROL = 1024 | 2048 | 4096 | 8192 | 16384 | 32768
 _FENCE, _BATTERY, _PREARM = 1 << 20, 1 << 25, 1 << 28
@@ -36,32 +29,19 @@ _ESTIMATES = 1 | 2 | 4 | 8 | 16 | 32 | 256 | 512
 """ESTIMATOR_STATUS_FLAGS: attitude, velocities, positions; without those relative to terrain."""
 
 
-def HEARTBEAT(autopilot: Autopilot) -> Any:  # noqa: N802  (named as the message)
-    """Returns HEARTBEAT: mode, armed, system status."""
-    memory = autopilot.memory
-    base = 1 | memory.mode.flags | (128 if memory.armed else 0)
-    status = 4 if memory.armed else 3
-    if memory.failsafe:
-        status = 5
-    if memory.state is not None and memory.state.crashed:
-        status = 6
-    kind = int(memory.parameters["MAV_TYPE"])
-    return dialect().MAVLink_heartbeat_message(kind, _PX4, base, memory.mode.custom_mode, status, 3)
-
-
-def _sys_status(autopilot: Autopilot) -> Any:
-    state = autopilot.state
+def _sys_status(context: AutopilotContext) -> Any:
+    state = context.state
     has_battery = math.isfinite(state.charge)
     present = _GYRO | _ACCEL | _MAG | _PRESSURE | _GPS | _CONTROL | _FENCE | _PREARM
     present |= _BATTERY if has_battery else 0
     health = present
-    if autopilot.memory.fix_lost:
+    if context.memory.fix_lost:
         health &= ~_GPS
-    if arming.problems(autopilot):
+    if arming.problems(context):
         health &= ~_PREARM
-    if has_battery and state.charge < float(autopilot.parameter("BAT_CRIT_THR")):
+    if has_battery and state.charge < float(context.parameter("BAT_CRIT_THR")):
         health &= ~_BATTERY
-    if "fence" in autopilot.memory.warned:
+    if "fence" in context.memory.warned:
         health &= ~_FENCE
     volts, amps, percent = 65535, -1, -1
     if has_battery:
@@ -72,27 +52,27 @@ def _sys_status(autopilot: Autopilot) -> Any:
     )
 
 
-def _system_time(autopilot: Autopilot) -> Any:
-    return dialect().MAVLink_system_time_message(0, motion.ms(autopilot))
+def _system_time(context: AutopilotContext) -> Any:
+    return dialect().MAVLink_system_time_message(0, motion.ms(context))
 
 
-def _extended_sys_state(autopilot: Autopilot) -> Any:
-    landed = {"LANDED": 1, "CRASHED": 1, "TAKE_OFF": 3, "LAND": 4}.get(autopilot.state.mode, 2)
+def _extended_sys_state(context: AutopilotContext) -> Any:
+    landed = {"LANDED": 1, "CRASHED": 1, "TAKE_OFF": 3, "LAND": 4}.get(context.state.mode, 2)
     return dialect().MAVLink_extended_sys_state_message(0, landed)
 
 
-def _battery_status(autopilot: Autopilot) -> Any:
-    state = autopilot.state
+def _battery_status(context: AutopilotContext) -> Any:
+    state = context.state
     if not math.isfinite(state.charge):
         return None
-    cells = max(autopilot.build.battery_cells, 1)
+    cells = max(context.build.battery_cells, 1)
     each = min(round(state.voltage / cells * 1e3), 65534)
     voltages = [each] * min(cells, 10) + [65535] * max(10 - cells, 0)
     more = [each] * min(max(cells - 10, 0), 4)
-    used = round((1.0 - state.charge) * autopilot.build.battery_capacity_ah * 1e3)
+    used = round((1.0 - state.charge) * context.build.battery_capacity_ah * 1e3)
     level = 1
     for name, number in (("LOW", 2), ("CRIT", 3), ("EMERGEN", 4)):
-        if state.charge < float(autopilot.parameter(f"BAT_{name}_THR")):
+        if state.charge < float(context.parameter(f"BAT_{name}_THR")):
             level = number
     return dialect().MAVLink_battery_status_message(
         0,
@@ -110,54 +90,39 @@ def _battery_status(autopilot: Autopilot) -> Any:
     )
 
 
-def _home_position(autopilot: Autopilot) -> Any:
-    home = autopilot.memory.home
-    if home is None:
-        return None
-    origin = autopilot.memory.origin
-    place = (home[0] - origin[0], home[1] - origin[1], home[2] - origin[2])
-    return dialect().MAVLink_home_position_message(
-        *motion.degrees_e7(autopilot.memory.chosen_home or autopilot.earth.geodetic(home)),
-        *ned_of_enu(place),
-        (math.nan,) * 4,
-        *(math.nan,) * 3,
-        motion.us(autopilot),
-    )
+def _global_origin(context: AutopilotContext) -> Any:
+    place = motion.degrees_e7(context.earth.geodetic(context.memory.origin))
+    return dialect().MAVLink_gps_global_origin_message(*place, motion.us(context))
 
 
-def _global_origin(autopilot: Autopilot) -> Any:
-    place = motion.degrees_e7(autopilot.earth.geodetic(autopilot.memory.origin))
-    return dialect().MAVLink_gps_global_origin_message(*place, motion.us(autopilot))
-
-
-def _estimator_status(autopilot: Autopilot) -> Any:
-    flags = _ESTIMATES & ~(16 | 512) if autopilot.memory.fix_lost else _ESTIMATES
+def _estimator_status(context: AutopilotContext) -> Any:
+    flags = _ESTIMATES & ~(16 | 512) if context.memory.fix_lost else _ESTIMATES
     ratios = (0.0,) * 4
     return dialect().MAVLink_estimator_status_message(
-        motion.us(autopilot), flags, *ratios, math.nan, math.nan, math.nan, math.nan
+        motion.us(context), flags, *ratios, math.nan, math.nan, math.nan, math.nan
     )
 
 
-def _mission_current(autopilot: Autopilot) -> Any:
-    mission, items = autopilot.memory.mission, autopilot.memory.plans[plans.MISSION]
+def _mission_current(context: AutopilotContext) -> Any:
+    mission, items = context.memory.mission, context.memory.plans[plans.MISSION]
     if not items:
         state = 1
     elif mission.complete:
         state = 5
-    elif autopilot.memory.mode is Mode.MISSION and autopilot.memory.armed:
+    elif context.memory.mode is Mode.MISSION and context.memory.armed:
         state = 3
     else:
         state = 4 if mission.reached >= 0 else 2
     total = len(items) or 65535
-    mode = 1 if autopilot.memory.mode is Mode.MISSION else 2
+    mode = 1 if context.memory.mode is Mode.MISSION else 2
     return dialect().MAVLink_mission_current_message(mission.current, total, state, mode)
 
 
-def _timesync(autopilot: Autopilot) -> Any:
-    return dialect().MAVLink_timesync_message(0, autopilot.memory.now_ns)
+def _timesync(context: AutopilotContext) -> Any:
+    return dialect().MAVLink_timesync_message(0, context.memory.now_ns)
 
 
-def _autopilot_version(autopilot: Autopilot) -> Any:
+def _autopilot_version(context: AutopilotContext) -> Any:
     return dialect().MAVLink_autopilot_version_message(
         _CAPABILITIES,
         flight_version(),
@@ -169,21 +134,12 @@ def _autopilot_version(autopilot: Autopilot) -> Any:
         [0] * 8,
         0,
         0,
-        autopilot.system,
+        context.system,
     )
 
 
-def status_texts(severity: int, text: str) -> list[Any]:
-    """Returns the STATUSTEXT messages of a text, in pieces if it is long."""
-    raw = text[:_LONGEST_TEXT].encode("ascii", "replace")
-    pieces = [raw[k : k + _CHUNK] for k in range(0, len(raw), _CHUNK)] or [b""]
-    number = 0 if len(pieces) == 1 else 1 + sum(raw) % 65535
-    status = dialect().MAVLink_statustext_message
-    return [status(severity, piece, number, k) for k, piece in enumerate(pieces)]
-
-
-BUILDERS: dict[int, Callable[[Autopilot], Any]] = {
-    0: HEARTBEAT,
+BUILDERS: dict[int, Callable[[AutopilotContext], Any]] = {
+    0: lambda context: heartbeat(context.memory),
     1: _sys_status,
     2: _system_time,
     24: motion.gps_raw_int,
@@ -204,7 +160,7 @@ BUILDERS: dict[int, Callable[[Autopilot], Any]] = {
     147: _battery_status,
     148: _autopilot_version,
     230: _estimator_status,
-    HOME_POSITION: _home_position,
+    242: home.position_message,
     245: _extended_sys_state,
     300: dialect_extensions.protocol_version,
     331: motion.odometry,

@@ -13,27 +13,16 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from contextlib import suppress
-from functools import cached_property
 from pathlib import Path
-from typing import Any
 
-from volery.bridges.logs.playback import Playback
-from volery.bridges.logs.recorded_flight import RecordedScenario, origin_of
-from volery.core.clock import NS_PER_S, ns_from_s, s_from_ns
-from volery.core.errors import CommandError, RecordingError, VoleryError
+from volery.core.clock import NS_PER_S
 from volery.engine.call_budget import CallBudget
-from volery.engine.command_queue import CommandQueue
-from volery.graph.graph import Graph
 from volery.graph.messages import Clock, time_from_ns
 from volery.graph.session import Gateway
-from volery.runtime.build.geometry import Geometry
-from volery.runtime.build.worlds import geometry_of
 from volery.runtime.monitoring.progress import Progress
-from volery.runtime.replay.scenario_record import scenario_of
-from volery.runtime.services.player import PlayerServices, RunState
+from volery.runtime.replay.playback_control import PlaybackControl
+from volery.runtime.services.player import PlayerServices
 from volery.runtime.services.worlds import OnLoad
-from volery.scenario import library
 from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.schema import Scenario
 
@@ -44,13 +33,11 @@ _STATE_S = 0.2
 """Wall time between two messages."""
 _SLACK_S = 0.25
 """Who falls behind by more does not rush afterwards to catch up."""
-_STEP_NS = 1_000_000
-"""A physics step where the log does not tell of its scenario."""
 _GLANCE_S = 0.05
 _NEWCOMERS = "new subscribers"
 
 
-class LogPlayer:
+class LogPlayer(PlaybackControl):
     """Plays the log at `path` on a graph of its own.
 
     `speed` is a factor of real time, None plays as fast as possible; with `loop` it begins again at
@@ -75,11 +62,7 @@ class LogPlayer:
         shelf: ScenarioCatalog | None = None,
         own: Scenario | None = None,
     ) -> None:
-        _check_speed(speed)
-        self.path = Path(path)
-        self._playback = Playback(self.path)
-        self._inbox = CommandQueue()
-        self.graph = Graph(lambda: self._playback.now_ns, self._inbox.post)
+        super().__init__(path, speed=speed, loop=loop, paused=paused, shelf=shelf, own=own)
         self.gateway = Gateway(
             self.graph,
             self._inbox.post,
@@ -87,133 +70,12 @@ class LogPlayer:
             is_busy=lambda: self._is_busy,
             is_late=lambda: self._is_late,
         )
-        self.loop = loop
-        self.quitting = False
-        """Whether somebody called `quit`."""
-        self.origin = self._known_origin()
-        """What was flown, as the log tells; None where it does not."""
-        self.scenario: Scenario | None = self._known_scenario(own, shelf)
-        """The scenario that was flown, for its world; None where that is not known."""
-        self._paused = paused
-        self._speed = speed
-        self._base_ns, self._base_wall = 0, 0.0
-        """It was, or is, to be at this time at that wall time."""
-        self._is_late = False
-        """Whether it does not keep its pace at present."""
         self._budget = CallBudget()
         """For reading the log again, for all new subscribers together."""
         self._clock = self.graph.advertise("/clock", Clock)
-        self._clock_due = self._state_due = 0.0
         self._playback.open(self.graph)
         self._services = PlayerServices(self, on_load, shelf, on_close)
         self._rebase()
-
-    # -------------------------------------------------------------------------------------- time
-
-    @property
-    def time_ns(self) -> int:
-        """Where in the log it is."""
-        return self._playback.position_ns
-
-    @property
-    def time_s(self) -> float:
-        """Where in the log it is."""
-        return s_from_ns(self.time_ns)
-
-    @property
-    def name(self) -> str:
-        """Of the log's file."""
-        return self.path.name
-
-    @property
-    def start_s(self) -> float:
-        """Beginning of the log."""
-        return s_from_ns(self._playback.start_ns)
-
-    @property
-    def end_s(self) -> float:
-        """End of the log."""
-        return s_from_ns(self._playback.end_ns)
-
-    @property
-    def finished(self) -> bool:
-        """Whether it stands at the end, or somebody quit."""
-        return self.quitting or self.time_ns >= self._playback.end_ns
-
-    @cached_property
-    def geometry(self) -> Geometry | None:
-        """What stood in the world at the beginning; None where the scenario is not known."""
-        return None if self.scenario is None else geometry_of(self.scenario)
-
-    @property
-    def paused(self) -> bool:
-        """Whether it stands still."""
-        return self._paused
-
-    @property
-    def speed(self) -> float | None:
-        """Factor of real time, None for as fast as possible."""
-        return self._speed
-
-    @property
-    def state(self) -> RunState:
-        """As `simulation_interfaces` names it: stopped at the start."""
-        if self.quitting:
-            return RunState.QUITTING
-        if not self._paused:
-            return RunState.PLAYING
-        return RunState.STOPPED if self.time_ns == self._playback.start_ns else RunState.PAUSED
-
-    # ---------------------------------------------------------------------------------- steering
-
-    def pause(self) -> None:
-        """Stand still."""
-        self._paused, self._is_late = True, False
-        self._tell_soon()
-
-    def resume(self) -> None:
-        """Go on; at the end, begin anew."""
-        if self.finished:
-            self.seek(self.start_s)
-        self._paused = False
-        self._rebase()
-        self._tell_soon()
-
-    def set_speed(self, speed: float | None) -> None:
-        """Play at `speed` times real time from here on, None for as fast as possible."""
-        _check_speed(speed)
-        self._speed = speed
-        self._rebase()
-        self._tell_soon()
-
-    def seek(self, time_s: float) -> None:
-        """Go to a time of the log, and tell once more what was told last before it."""
-        if not math.isfinite(time_s):
-            raise CommandError(f"a time must be finite, not {time_s}")
-        self._playback.seek(ns_from_s(min(max(time_s, self.start_s), self.end_s)))
-        self._rebase()
-        self._tell_soon()
-
-    def single_step(self, steps: int = 1) -> None:
-        """Go on by physics steps of the recorded flight. `CommandError` unless it is paused."""
-        if not self._paused:
-            raise CommandError("single steps are made while paused; call pause() first")
-        if steps < 1:
-            raise CommandError(f"a single step is at least 1 step, not {steps}")
-        scenario = self.scenario
-        step_ns = _STEP_NS if scenario is None else round(NS_PER_S / scenario.physics.rate_hz)
-        until_ns = self.time_ns + steps * step_ns
-        while not self._playback.advance(until_ns):
-            self.graph.deliver()
-        self._tell_soon()
-
-    def quit(self) -> None:
-        """End `run` as soon as may be."""
-        self.quitting = True
-        self._inbox.wake()
-
-    def use_low_latency(self) -> None:
-        """As of `Simulation`; here what clients ask is done at once anyway."""
 
     # --------------------------------------------------------------------------------- its owner
 
@@ -323,10 +185,6 @@ class LogPlayer:
             self._base_ns, self._base_wall = due_ns, now
         return due_ns
 
-    def _rebase(self) -> None:
-        """Count due times from here and now."""
-        self._base_ns, self._base_wall = self.time_ns, time.perf_counter()
-
     def _tell(self) -> None:
         """Publish clock and state where their wall time has come."""
         now = time.perf_counter()
@@ -336,53 +194,3 @@ class LogPlayer:
         if now >= self._state_due:
             self._state_due = now + _STATE_S
             self._services.tell_state()
-
-    def _tell_soon(self) -> None:
-        self._clock_due = self._state_due = 0.0
-
-    def _known_origin(self) -> RecordedScenario | None:
-        with suppress(RecordingError):
-            return origin_of(self._playback.log)
-        return None
-
-    def _known_scenario(
-        self, own: Scenario | None, shelf: ScenarioCatalog | None
-    ) -> Scenario | None:
-        origin, folder = self.origin, self.path.parent
-        if own is not None and origin is not None:
-            return scenario_of(origin, own, folder=folder)  # another one is a mistake of the user's
-        with suppress(VoleryError):
-            if origin is not None:
-                return scenario_of(origin, _of_shelf(shelf, origin.name), folder=folder)
-        return None
-
-    def describe(self) -> dict[str, Any]:
-        """The log, by the names of `volery_interfaces/srv/PlayerInfo`."""
-        played, topics = self._playback, self._playback.topics
-        return {
-            "file": self.path.name,
-            "format": played.log.format,
-            "size": played.log.size,
-            "topics": [topic.name for topic in topics],
-            "types": [topic.msgtype for topic in topics],
-            "counts": [topic.messages for topic in topics],
-            "refused": list(played.refused),
-            "reasons": list(played.refused.values()),
-            "problem": played.problem,
-            "scenario": "" if self.origin is None else self.origin.name,
-            "seed": 0 if self.origin is None else self.origin.seed,
-        }
-
-
-def _of_shelf(shelf: ScenarioCatalog | None, name: str) -> Scenario | None:
-    """A scenario with files of its own beside it; shipped ones have none."""
-    if shelf is None or name in library.names() or name not in shelf.names():
-        return None
-    with suppress(VoleryError):
-        return shelf.load(name)
-    return None
-
-
-def _check_speed(speed: float | None) -> None:
-    if speed is not None and not (math.isfinite(speed) and speed > 0.0):
-        raise CommandError(f"speed must be a positive factor of real time, not {speed}")

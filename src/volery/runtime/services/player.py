@@ -22,10 +22,8 @@ from volery.runtime.services.simulation_state import WRONG_TRANSITION, RunState
 from volery.runtime.services.worlds import OnLoad, offer_worlds
 
 if TYPE_CHECKING:
-    from volery.runtime.replay.log_player import LogPlayer
+    from volery.runtime.replay.playback_control import PlaybackControl
     from volery.scenario.catalog import ScenarioCatalog
-
-__all__ = ["PlayerServices", "RunState"]
 
 _SRV = "simulation_interfaces/srv"
 _OURS = "volery_interfaces"
@@ -39,7 +37,7 @@ class PlayerServices:
 
     def __init__(
         self,
-        player: LogPlayer,
+        player: PlaybackControl,
         on_load: OnLoad | None,
         shelf: ScenarioCatalog | None,
         on_close: Callable[[], None] | None = None,

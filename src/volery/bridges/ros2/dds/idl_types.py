@@ -14,7 +14,7 @@ from cyclonedds.idl import make_idl_struct, types
 from rosbags.interfaces import Nodetype
 
 from volery.bridges.ros2.names import dds_type
-from volery.graph.messages import typestore
+from volery.graph.typestore import typestore
 
 _BASE: dict[str, Any] = {
     "bool": bool,

@@ -9,7 +9,7 @@ from typing import Any
 from rosbags.interfaces import Nodetype
 
 from volery.core.errors import GraphError
-from volery.graph.messages import typestore
+from volery.graph.typestore import typestore
 
 _WORDS = {"bool": "boolean", "byte": "octet", "char": "uint8", "float32": "float"}
 _WORDS |= {"float64": "double"}
