@@ -85,6 +85,8 @@ def test_its_commands_are_those_of_mavlink(caplog):
         long = "mavros_msgs/srv/CommandLong"
         assert program.call("cmd/command", long, command=400, param1=1.0).success
         assert program.call("cmd/command", long, command=9999).result == 3
+        for interval in (510, 511):  # no link, no streams: FAILED
+            assert program.call("cmd/command", long, command=interval, param1=30.0).result == 4
         assert not program.call("set_mode", "mavros_msgs/srv/SetMode", custom_mode="X").mode_sent
         raw = zero_message("mavros_msgs/msg/PositionTarget")
         raw.coordinate_frame, raw.type_mask = 1, 2552

@@ -24,12 +24,10 @@ def set_interval(context: AutopilotContext, source: Source, command: Command) ->
         return DENIED
     if any(math.isfinite(unused) and round(unused) for unused in (third, fourth, target)):
         return FAILED
-    link = context.links.open[source[0]]
-    return (
-        ACCEPTED
-        if streams.ask_for(link, round(number), period_us, context.memory.now_ns)
-        else FAILED
-    )
+    link = context.links.open.get(source[0])  # MAVROS's topics come over no link
+    if link is None or not streams.ask_for(link, round(number), period_us, context.memory.now_ns):
+        return FAILED
+    return ACCEPTED
 
 
 def get_interval(context: AutopilotContext, source: Source, command: Command) -> int:
@@ -63,8 +61,10 @@ def _send_built(context: AutopilotContext, source: Source, number: int) -> int:
 def _tell_interval(context: AutopilotContext, source: Source, number: float) -> int:
     if not (math.isfinite(number) and 0 <= round(number) <= 65535):
         return DENIED
-    message = streams.interval_of(context.links.open[source[0]], round(number))
-    return _send(context, source, [message])
+    link = context.links.open.get(source[0])
+    if link is None:
+        return FAILED
+    return _send(context, source, [streams.interval_of(link, round(number))])
 
 
 def _send(context: AutopilotContext, source: Source, messages: list[Any]) -> int:
