@@ -39,7 +39,7 @@ def parse_server(text: str) -> tuple[str, int]:
 
 
 def command_station(
-    server: str, number: int, token: str | None, planes_per_batch: int, log: Path | None
+    server: str, number: int, token: str | None, group_size: int, log: Path | None
 ) -> None:
     """Joins a server, prints received messages and sends the commands of the input lines."""
     host, port = parse_server(server)
@@ -55,9 +55,9 @@ def command_station(
             port=port,
             name="gcs",
             token=token,
-            planes_per_batch=planes_per_batch,
+            group_size=group_size,
         )
-        desk.ground = GroundStation(station.send, planes_per_batch, lambda: station.joined)
+        desk.ground = GroundStation(station.send, group_size, lambda: station.joined)
         asyncio.run(desk.work(station))
 
 

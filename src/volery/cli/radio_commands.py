@@ -27,7 +27,7 @@ def comms(
     from volery.cli.comms import serve_stations
     from volery.comms.server.settings import RouterSettings
 
-    settings = RouterSettings(planes_per_batch=group_size, token=token)
+    settings = RouterSettings(group_size=group_size, token=token)
     serve_stations(host, port, settings, anywhere=allow_remote)
 
 

@@ -73,7 +73,7 @@ class Bodies:
             "area_m": AREA,
             "altitude_m": 6.0,
             "gather_s": 3.0,
-            "patience_s": 1.0,
+            "timeout_s": 1.0,
             "hold_s": 1.0,
             **parameters,
         }
@@ -399,7 +399,7 @@ def test_finish_while_they_climb_brings_them_down_again():
 
 
 def test_a_vain_search_ends_in_time():
-    bodies = Bodies(search_s=5.0)
+    bodies = Bodies(max_search_s=5.0)
     bodies.sees.clear()
     bodies.run_until(bodies.all_in(SearchPhase.DONE), 90.0)
 
@@ -443,7 +443,7 @@ def test_a_kept_state_is_gone_back_to():
         ({"area_m": [0.0, 0.0, 8.0, 30.0]}, "12 m a side"),
         ({"area_m": [0.0, 0.0, 1.0, 30.0]}, "wider than its borders"),
         ({"area_m": [0.0, 0.0, 1.0]}, "area_m must be 4 numbers"),
-        ({"layer_m": 0.1}, "layer_m must be a number of at least 0.5"),
+        ({"layer_spacing_m": 0.1}, "layer_spacing_m must be a number of at least 0.5"),
     ],
 )
 def test_parameters_that_make_no_sense(parameters, reason):

@@ -59,7 +59,7 @@ class Glade:
 
     def __init__(self, **parameters):
         self.bench = NodeBench()
-        self.node = self.bench.start(LocalPlanner, odometry="odom", corrected=False, **parameters)
+        self.node = self.bench.start(LocalPlanner, odometry="odom", use_map_tf=False, **parameters)
         self.plans = self.bench.listen("/uav1/planning/trajectory")
         self.status = self.bench.listen("/uav1/planning/status")
         self.now = 0
@@ -277,7 +277,7 @@ def ground_map(*blocks):
 
 def global_planner():
     bench = NodeBench()
-    bench.start(GlobalPlanner, odometry="odom", corrected=False)
+    bench.start(GlobalPlanner, odometry="odom", use_map_tf=False)
     bench.send("/uav1/odom", odometry(0, (-8.0, 0.0, HEIGHT)))
     return bench, bench.listen("/uav1/planning/path"), bench.listen("/uav1/planning/goal_status")
 
@@ -336,7 +336,7 @@ def polygon(*corners, frame="map"):
 
 def exploring():
     bench = NodeBench()
-    bench.start(Exploration, odometry="odom", corrected=False, view_m=8.0)
+    bench.start(Exploration, odometry="odom", use_map_tf=False, view_radius_m=8.0)
     goals, status = bench.listen("/uav1/planning/goal"), bench.listen("/uav1/exploration/status")
     grid = grid_values_message(np.zeros((100, 150), np.int8), 0.4, (-5.0, -5.0, 0.0), "map", 0)
     bench.send("/uav1/projected_map", grid)

@@ -259,7 +259,7 @@ def test_it_stops_before_what_is_not_known():
     _, track = fly(world, (10.0, 0.0), 6.0)
     assert 2.0 < track[-1].position[0] < 4.0
     assert np.linalg.norm(track[-1].velocity) < 0.3
-    bold = RecedingHorizonPlanner(PlannerSettings(LIMITS, unknown_stops=False))
+    bold = RecedingHorizonPlanner(PlannerSettings(LIMITS, avoid_unknown=False))
     _, track = fly(world, (10.0, 0.0), 4.0, bold)
     assert track[-1].position[0] > 4.0
 

@@ -480,6 +480,6 @@ def test_a_station_holds_only_so_much() -> None:
 
 def test_impossible_settings() -> None:
     with pytest.raises(CommsError, match="planes"):
-        RouterSettings(planes_per_batch=0)
+        RouterSettings(group_size=0)
     with pytest.raises(CommsError, match="lane_depth"):
         RouterSettings(lane_depth=0)

@@ -62,7 +62,7 @@ def test_what_is_beyond_is_told(key, value, words):
         ("region_m", [-5000.0, -5000.0, 5000.0, 5000.0]),
         ("seed", 2**63 - 1),
         ("team", ["uav1", "uav2"]),
-        ("corrected", True),
+        ("use_map_tf", True),
         ("gain", 0.0),
     ],
 )

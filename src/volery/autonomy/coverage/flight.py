@@ -85,14 +85,14 @@ class CoverageFlight:
             and bool(self.waypoints.covering[min(self.following, len(self.waypoints.places) - 1)])
         )
 
-    def goal(self, arrival_m: float, now_ns: int) -> Array | None:
+    def goal(self, acceptance_radius_m: float, now_ns: int) -> Array | None:
         """Returns the current waypoint (3,) m, advancing past reached ones; None at the end."""
         assert self.position_map is not None
         assert self.waypoints is not None
         while self.following < len(self.waypoints.places):
             place: Array = self.waypoints.places[self.following]
             away = norm(place - self.position_map)
-            if away > arrival_m:
+            if away > acceptance_radius_m:
                 if away < self.nearest_m - _PROGRESS_M:
                     self.nearest_m, self.since_ns = away, now_ns
                 return place
@@ -100,9 +100,9 @@ class CoverageFlight:
             self._begin_leg(now_ns)
         return None
 
-    def is_lost(self, patience_s: float, now_ns: int) -> bool:
-        """Returns whether odometry or progress have been missing for `patience_s`."""
-        return now_ns - min(self.heard_ns, self.since_ns) > patience_s * 1e9
+    def is_lost(self, timeout_s: float, now_ns: int) -> bool:
+        """Returns whether odometry or progress have been missing for `timeout_s`."""
+        return now_ns - min(self.heard_ns, self.since_ns) > timeout_s * 1e9
 
     def _begin_leg(self, now_ns: int) -> None:
         self.nearest_m, self.since_ns = math.inf, now_ns

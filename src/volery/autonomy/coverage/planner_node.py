@@ -54,10 +54,11 @@ class CoveragePlanner(Node):
     ----------
     uavs: names of the UAVs.
     height_m: z of the tours in the map.
-    layer_m: height difference between UAVs in transit.
-    over_m: z at which blocked cells may be crossed to reach parts without a UAV; 0: never.
-    arrival_m: distance at which a waypoint is reached.
-    patience_s: timeout of a UAV's odometry, and of its progress.
+    layer_spacing_m: height difference between UAVs in transit.
+    crossing_height_m: z at which blocked cells may be crossed to reach parts without a UAV;
+        0: never.
+    acceptance_radius_m: distance at which a waypoint is reached.
+    timeout_s: timeout of a UAV's odometry, and of its progress.
     seed: of the division's random numbers.
 
     """
@@ -74,11 +75,11 @@ class CoveragePlanner(Node):
         names = self.declare_parameter("uavs", ["uav1"]).value
         self._heights = HeightProfile(
             float(self.declare_parameter("height_m", 2.5).value),
-            float(self.declare_parameter("layer_m", 1.5).value),
-            float(self.declare_parameter("over_m", 0.0).value),
+            float(self.declare_parameter("layer_spacing_m", 1.5).value),
+            float(self.declare_parameter("crossing_height_m", 0.0).value),
         )
-        self._arrival_m = float(self.declare_parameter("arrival_m", 0.3).value)
-        self._patience_s = float(self.declare_parameter("patience_s", 10.0).value)
+        self._acceptance_radius_m = float(self.declare_parameter("acceptance_radius_m", 0.3).value)
+        self._timeout_s = float(self.declare_parameter("timeout_s", 10.0).value)
         self._seed = int(self.declare_parameter("seed", 1).value)
 
         self._field: CoverageField | None = None
@@ -249,7 +250,7 @@ class CoveragePlanner(Node):
         elif flight.phase is CoveragePhase.TAKE_OFF and self._ticks % _REPEAT == 0:
             self._ask_to_take_off(number, flight)
         elif flight.phase is CoveragePhase.COVER:
-            goal = flight.goal(self._arrival_m, now)
+            goal = flight.goal(self._acceptance_radius_m, now)
             if goal is None:
                 flight.phase = CoveragePhase.DONE
                 self._land[number].call_async()
@@ -273,7 +274,7 @@ class CoveragePlanner(Node):
 
     def _is_lost(self, flight: CoverageFlight, now: int) -> bool:
         flies = flight.phase in (CoveragePhase.TAKE_OFF, CoveragePhase.COVER)
-        return flies and flight.is_lost(self._patience_s, now)
+        return flies and flight.is_lost(self._timeout_s, now)
 
     # ---------------------------------------------------------------------------------- publishers
 

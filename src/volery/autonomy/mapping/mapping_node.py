@@ -58,11 +58,11 @@ class Mapping(Node):
 
     Parameters
     ----------
-    odometry: topic of the pose; `corrected`: whether `/tf` holds the pose of its frame in the map.
+    odometry: topic of the pose; `use_map_tf`: whether `/tf` holds the pose of its frame in the map.
     level_mount, nodding_mount: [x, y, z] of the LIDARs in the body, m.
-    resolution_m: cell size of the octree; grid_cell_m: of the grid.
-    reach_m: max range; beyond it returns count as free space up to it.
-    scan_rate_hz: scans processed per second and LIDAR; every: step between processed beams.
+    resolution_m: cell size of the octree; grid_resolution_m: of the grid.
+    max_range_m: max range; beyond it returns count as free space up to it.
+    scan_rate_hz: scans processed per second and LIDAR; beam_step: step between processed beams.
     max_nodes: bound of the octree; extent_m: of the grid, and of maps that are loaded.
     half_height_m: half the thickness of the slab that the grid shows.
     voxels_period_s, grid_period_s: periods of publication.
@@ -90,8 +90,8 @@ class Mapping(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("mapping", **options)
         self._resolution = float(self.declare_parameter("resolution_m", 0.2, min_value=0.01).value)
-        self._reach = float(self.declare_parameter("reach_m", 15.0, min_value=0.1).value)
-        every = int(self.declare_parameter("every", 2, min_value=1).value)
+        self._reach = float(self.declare_parameter("max_range_m", 15.0, min_value=0.1).value)
+        beam_step = int(self.declare_parameter("beam_step", 2, min_value=1).value)
         rate = float(
             self.declare_parameter("scan_rate_hz", 5.0, min_value=0.01, max_value=1000.0).value
         )
@@ -100,14 +100,14 @@ class Mapping(Node):
         self._half = float(self.declare_parameter("half_height_m", 0.6, min_value=0.01).value)
         self._folder = self.declare_folder("folder", f"maps{self.get_namespace()}")
         self._limits = MapLimits(self._resolution, extent, nodes)
-        beams = Beams(reach_m=self._reach, every=every)
+        beams = Beams(reach_m=self._reach, every=beam_step)
         self._intakes = {
             name: ScanBuffer(RayMaker(declare_mount(self, name), beams), rate)
             for name in ("level", "nodding")
         }
         self._octree = Octree(self._resolution, nodes)
         self._grid = ProjectedGrid(
-            float(self.declare_parameter("grid_cell_m", 0.4, min_value=0.01).value), extent
+            float(self.declare_parameter("grid_resolution_m", 0.4, min_value=0.01).value), extent
         )
         self._frame = MapFrame()
         self._motion, self._nod = MotionHistory(), NodHistory()

@@ -86,9 +86,9 @@ class Exploration(Node):
 
     Parameters
     ----------
-    odometry: topic of the pose; `corrected`: whether `/tf` holds the pose of its frame in the map.
-    view_m: radius around the vehicle that counts as observed.
-    cell_m: cell size of the area.
+    odometry: topic of the pose; `use_map_tf`: whether `/tf` holds the pose of its frame in the map.
+    view_radius_m: radius around the vehicle that counts as observed.
+    resolution_m: cell size of the area.
 
     """
 
@@ -101,8 +101,8 @@ class Exploration(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("exploration", **options)
-        self._view = float(self.declare_parameter("view_m", 10.0, min_value=0.1).value)
-        self._cell = float(self.declare_parameter("cell_m", 1.0, min_value=0.05).value)
+        self._view = float(self.declare_parameter("view_radius_m", 10.0, min_value=0.1).value)
+        self._cell = float(self.declare_parameter("resolution_m", 1.0, min_value=0.05).value)
         self._frame = MapFrame()
         self._motion: OdometrySample | None = None
         self._area: SearchArea | None = None

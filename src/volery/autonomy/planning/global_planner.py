@@ -55,10 +55,10 @@ class GlobalPlanner(Node):
 
     Parameters
     ----------
-    odometry: topic of the pose; `corrected`: whether `/tf` holds the pose of its frame in the map.
+    odometry: topic of the pose; `use_map_tf`: whether `/tf` holds the pose of its frame in the map.
     height_m: height above ground of the goal; heights_m: [min, max] along the path.
-    radius_m: min distance to obstacles. cell_m: cell size of the planning space.
-    iterations: bound of the search. seed: of its random numbers.
+    safe_radius_m: min distance to obstacles. resolution_m: cell size of the planning space.
+    max_iterations: bound of the search. seed: of its random numbers.
 
     """
 
@@ -77,11 +77,11 @@ class GlobalPlanner(Node):
         if not low < high:
             raise NodeError(f"heights_m must be [min, max] with min < max, not {[low, high]}")
         self._search = PathSearch(
-            radius_m=float(self.declare_parameter("radius_m", 0.8, min_value=0.05).value),
+            radius_m=float(self.declare_parameter("safe_radius_m", 0.8, min_value=0.05).value),
             heights_m=(low, high),
-            iterations=int(self.declare_parameter("iterations", 4000, min_value=1).value),
+            iterations=int(self.declare_parameter("max_iterations", 4000, min_value=1).value),
         )
-        self._cell = float(self.declare_parameter("cell_m", 0.4, min_value=0.05).value)
+        self._cell = float(self.declare_parameter("resolution_m", 0.4, min_value=0.05).value)
         self._seed = int(self.declare_parameter("seed", 1).value)
         self._frame = MapFrame()
         self._map: SolidVoxels | None = None

@@ -60,18 +60,18 @@ class LocalPlanner(Node):
 
     Parameters
     ----------
-    odometry: topic of the pose; `corrected`: whether `/tf` holds the pose of its frame in the map.
+    odometry: topic of the pose; `use_map_tf`: whether `/tf` holds the pose of its frame in the map.
     level_mount, nodding_mount: [x, y, z] of the LIDARs in the body, m.
     height_m: height above ground to fly at; speed_m_s: max speed. Both may be set in flight.
     acceleration_m_s2: max horizontal acceleration.
-    radius_m: min distance of the UAV's centre to obstacles, at rest; 0.1 m more for each m/s.
-    unknown_stops: whether plans avoid unknown space.
-    period_s: time between plans. ahead_s: time from a plan's input to its start; not less than the
-        node's latency.
-    arrival_m: distance to the end at which the path is done.
+    safe_radius_m: min distance of the UAV's centre to obstacles, at rest; 0.1 m more for each m/s.
+    avoid_unknown: whether plans avoid unknown space.
+    period_s: time between plans. start_delay_s: time from a plan's input to its start; not less
+        than the node's latency.
+    acceptance_radius_m: distance to the end at which the path is done.
     scan_rate_hz: scans processed per second and LIDAR. It should be no multiple of a nodding
         mount's rate, else all scans show the same angles. All scans of a nodding LIDAR add hits.
-    cell_m: cell size of the local grid.
+    resolution_m: cell size of the local grid.
     separation_m: horizontal distance to keep from the UAVs that report on `radio/team`.
 
     """
@@ -87,7 +87,9 @@ class LocalPlanner(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("local_planner", **options)
         mounts = {name: declare_mount(self, name) for name in ("level", "nodding")}
-        cell = float(self.declare_parameter("cell_m", 0.25, min_value=0.05, max_value=5.0).value)
+        cell = float(
+            self.declare_parameter("resolution_m", 0.25, min_value=0.05, max_value=5.0).value
+        )
         scan_rate = float(
             self.declare_parameter("scan_rate_hz", 13.3, min_value=0.1, max_value=1000.0).value
         )
@@ -97,12 +99,14 @@ class LocalPlanner(Node):
         self._acceleration = float(
             self.declare_parameter("acceleration_m_s2", 2.5, min_value=0.1).value
         )
-        self._radius = float(self.declare_parameter("radius_m", 0.6, min_value=0.05).value)
-        self._unknown_stops = bool(self.declare_parameter("unknown_stops", True).value)
-        self._ahead_ns = ns_from_s(
-            float(self.declare_parameter("ahead_s", 0.1, min_value=0.0, max_value=10.0).value)
+        self._radius = float(self.declare_parameter("safe_radius_m", 0.6, min_value=0.05).value)
+        self._avoid_unknown = bool(self.declare_parameter("avoid_unknown", True).value)
+        self._start_delay_ns = ns_from_s(
+            float(self.declare_parameter("start_delay_s", 0.1, min_value=0.0, max_value=10.0).value)
         )
-        self._arrival_m = float(self.declare_parameter("arrival_m", 1.0, min_value=0.01).value)
+        self._acceptance_radius_m = float(
+            self.declare_parameter("acceptance_radius_m", 1.0, min_value=0.01).value
+        )
         radius = float(self.declare_parameter("separation_m", 2.0, min_value=0.0).value)
         self._separation = Separation(radius_m=radius)
         self._planning = RecedingHorizonPlanner(self._policy())
@@ -193,7 +197,7 @@ class LocalPlanner(Node):
         height = self._sight.height_above_ground(pose, now)
         present = PrimitiveState(pose.position, pose.velocity, np.zeros(3))
         self._planning.policy = self._policy()
-        then = now + self._ahead_ns
+        then = now + self._start_delay_ns
         if self._paused:
             self._planning.forget()
             self._tell("paused", problems)
@@ -216,7 +220,7 @@ class LocalPlanner(Node):
         way = self._way_here()
         assert way is not None
         carrot = way.carrot(pose.position, _CARROT_M)
-        if way.left_m(pose.position) < self._arrival_m:
+        if way.left_m(pose.position) < self._acceptance_radius_m:
             self._publish(self._planning.hold(start, then), then)
             self._tell("arrived", [])
             return
@@ -244,7 +248,7 @@ class LocalPlanner(Node):
 
     def _policy(self) -> PlannerSettings:
         limits = MotionLimits(float(self._speed.value), self._acceleration, 1.5, 1.5, 1.4)
-        return PlannerSettings(limits, radius_m=self._radius, unknown_stops=self._unknown_stops)
+        return PlannerSettings(limits, radius_m=self._radius, avoid_unknown=self._avoid_unknown)
 
     # ---------------------------------------------------------------------------------- publishers
 

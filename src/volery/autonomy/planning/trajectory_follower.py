@@ -50,7 +50,7 @@ class TrajectoryFollower(Node):
     ----------
     odometry: topic of the pose; plans are in its frame.
     gain: m/s for each m off the plan.
-    lead_s: time by which the commanded velocity is ahead, to compensate for the vehicle's lag.
+    lookahead_s: time by which the commanded velocity is ahead, to compensate for the vehicle's lag.
 
     """
 
@@ -58,8 +58,8 @@ class TrajectoryFollower(Node):
         super().__init__("follower", **options)
         odometry = str(self.declare_parameter("odometry", "odom").value)
         self._gain = float(self.declare_parameter("gain", 1.2, min_value=0.0).value)
-        self._lead_ns = ns_from_s(
-            float(self.declare_parameter("lead_s", 0.25, min_value=0.0, max_value=10.0).value)
+        self._lookahead_ns = ns_from_s(
+            float(self.declare_parameter("lookahead_s", 0.25, min_value=0.0, max_value=10.0).value)
         )
         self._pose: OdometrySample | None = None
         self._heard_ns = 0
@@ -126,7 +126,7 @@ class TrajectoryFollower(Node):
         age_s = min(max((now - pose.time_ns) / NS_PER_S, 0.0), _CARRIED_S)
         here = pose.position + pose.velocity * age_s
         place, _ = plan.at(now)
-        _, velocity = plan.at(now + self._lead_ns)
+        _, velocity = plan.at(now + self._lookahead_ns)
         off = place - here
         if norm(off) > _OFF_M:
             self._tell("stopped", "too far from the plan")

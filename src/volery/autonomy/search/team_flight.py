@@ -135,8 +135,10 @@ class TeamFlight(Node):
 
     def team_in(self, phases: frozenset[SearchPhase]) -> bool:
         """Returns whether a teammate with recent messages is in one of these phases."""
-        now, patience = self.now_ns, self.settings.patience_s
-        return any(m.phase in phases and m.is_heard(now, patience) for m in self.teammates.values())
+        now, timeout_s = self.now_ns, self.settings.timeout_s
+        return any(
+            m.phase in phases and m.is_heard(now, timeout_s) for m in self.teammates.values()
+        )
 
     def ask(self, client: Client, request: Any | None = None, then: Any = None) -> None:
         """Calls a service; `then(response)` is called when the response arrives."""

@@ -48,12 +48,12 @@ class PlanarSlam(Node):
 
     Parameters
     ----------
-    start: [x, y, z, yaw] of the start pose in the map, m and rad; empty: the map begins there.
+    initial_pose: [x, y, z, yaw] in the map, m and rad; empty: the map begins there.
     mount: [x, y, z, roll, pitch, yaw] of the LIDAR in the body, m and rad; empty: as in
         `/tf_static`, else at the body's origin.
-    odometry: whether to subscribe to `odom`.
-    reach_m: max range of returns.
-    nearest_m: min range of returns.
+    use_odometry: whether to subscribe to `odom`.
+    max_range_m: max range of returns.
+    min_range_m: min range of returns.
     loop_closures: whether loop closures correct the map (needs gtsam).
 
     """
@@ -78,7 +78,7 @@ class PlanarSlam(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("slam", **options)
-        start = declare_numbers(self, "start", [], "[x, y, z, yaw]", or_empty=True)
+        start = declare_numbers(self, "initial_pose", [], "[x, y, z, yaw]", or_empty=True)
         mount = declare_numbers(self, "mount", [], "[x, y, z, roll, pitch, yaw]", or_empty=True)
         self._start = np.array(start or [0.0] * 4)
         self._mount = LEVEL
@@ -87,11 +87,11 @@ class PlanarSlam(Node):
             turn = rotations.from_rpy(*mount[3:])
             self._mount = Mount(np.array(mount[:3]), turn)
         kept = ReturnSettings(
-            nearest_m=float(self.declare_parameter("nearest_m", 0.05, min_value=0.0).value),
-            reach_m=float(self.declare_parameter("reach_m", 30.0, min_value=0.1).value),
+            nearest_m=float(self.declare_parameter("min_range_m", 0.05, min_value=0.0).value),
+            reach_m=float(self.declare_parameter("max_range_m", 30.0, min_value=0.1).value),
         )
         self._settings = PlanarSettings(returns=kept)
-        self._hears_odometry = bool(self.declare_parameter("odometry", True).value)
+        self._hears_odometry = bool(self.declare_parameter("use_odometry", True).value)
         self._has_loops = bool(self.declare_parameter("loop_closures", True).value)
         self._uav = self.get_namespace().strip("/") or "uav"
         self._begin()

@@ -61,14 +61,14 @@ class Slam(Node):
 
     Parameters
     ----------
-    start: [x, y, z, yaw] of the start pose in the map, m and rad; empty: the map begins there.
+    initial_pose: [x, y, z, yaw] in the map, m and rad; empty: the map begins there.
     level_mount, nodding_mount: [x, y, z] of the LIDARs in the body, m.
     imu_noise: densities of gyroscope and accelerometer, of their biases' random walks, and
         turn-on biases, in SI units; empty: the ADIS16448's.
-    standing_height_m: height of the body over the ground when landed.
+    landed_height_m: height of the body over the ground when landed.
     odom_rate_hz, pose_rate_hz: rates at which they are published.
     scan_rate_hz: sweeps processed per second and LIDAR.
-    reach_m: max range of returns.
+    max_range_m: max range of returns.
     loop_closures: whether loop closures correct the map (needs gtsam).
 
     """
@@ -91,17 +91,15 @@ class Slam(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("slam", **options)
-        start = declare_numbers(self, "start", [], "[x, y, z, yaw]", or_empty=True)
+        start = declare_numbers(self, "initial_pose", [], "[x, y, z, yaw]", or_empty=True)
         noise = declare_numbers(self, "imu_noise", [], _NOISE, or_empty=True)
         self._start = np.array(start or [0.0] * 4)
         self._mounts = {name: np.array(declare_mount(self, name)) for name in ("level", "nodding")}
         self._imu_noise = ImuNoise(*noise) if noise else ImuNoise()
         self._matching = ScanMatching(
-            reach_m=float(self.declare_parameter("reach_m", 30.0, min_value=0.1).value)
+            reach_m=float(self.declare_parameter("max_range_m", 30.0, min_value=0.1).value)
         )
-        self._standing = float(
-            self.declare_parameter("standing_height_m", 0.2, min_value=0.0).value
-        )
+        self._standing = float(self.declare_parameter("landed_height_m", 0.2, min_value=0.0).value)
         self._has_loops = bool(self.declare_parameter("loop_closures", True).value)
         period = NS_PER_S / float(
             self.declare_parameter("scan_rate_hz", 20.0, min_value=0.1, max_value=1000.0).value

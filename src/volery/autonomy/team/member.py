@@ -104,7 +104,7 @@ class TeamMember:
         node.create_subscription(
             self._targets_type, "target_detection/targets", self._on_detections, 5
         )
-        if settings.corrected:
+        if settings.use_map_tf:
             node.create_subscription(TFMessage, "/tf", self._on_tf, 50)
 
     def get_state(self) -> dict[str, Any]:
@@ -126,7 +126,7 @@ class TeamMember:
 
     def other_workers(self) -> dict[str, Worker]:
         """Returns the other UAVs that share the search, by name."""
-        return self.team.workers(self._now_ns, self._settings.patience_s)
+        return self.team.workers(self._now_ns, self._settings.timeout_s)
 
     def take_sector(self, sector: int, coverage: Coverage) -> None:
         """Claims a sector from now on."""
@@ -145,12 +145,12 @@ class TeamMember:
         silent = sorted(
             name
             for name, mate in self.team.mates.items()
-            if now - mate.heard_ns > self._settings.patience_s * NS_PER_S
+            if now - mate.heard_ns > self._settings.timeout_s * NS_PER_S
             and mate.phase not in (MissionPhase.DONE, MissionPhase.DOWN)
         )
         if silent:
             found.append(f"silent: {', '.join(silent)}")
-        if self.battery < self._settings.low_battery:
+        if self.battery < self._settings.low_battery_fraction:
             found.append("low battery")
         if self.team.strangers:
             found.append(f"another search: {', '.join(sorted(self.team.strangers))}")
@@ -182,7 +182,7 @@ class TeamMember:
     def publish_status(self, problem: str) -> None:
         """Publishes the state of the search for operators."""
         now = self._now_ns
-        heard = [name for name, _ in self.team.heard(now, self._settings.patience_s)]
+        heard = [name for name, _ in self.team.heard(now, self._settings.timeout_s)]
         self._status.publish(
             self._status_type(
                 header(now, "map"),
@@ -208,7 +208,7 @@ class TeamMember:
             return
         self.pose, self.pose_ns = pose, self._now_ns
         coverage = self.coverage
-        if coverage is not None and coverage.look(pose.position[:2], self._settings.sight_m):
+        if coverage is not None and coverage.look(pose.position[:2], self._settings.view_radius_m):
             self.progress_ns = self.pose_ns
 
     def _on_tf(self, message: TFMessage) -> None:

@@ -50,12 +50,13 @@ class TargetDetection(Node):
     ----------
     camera: name of the camera.
     mount_m, mount_rpy_deg: of the camera in the body, as in a scenario.
-    odometry: topic of the pose; corrected: whether `/tf` holds the pose of its frame in the map.
-    hue_deg: [first, last]; saturation, value: minimums; see `search.colour_blob`.
-    share: min fraction of the image.
-    object_m: height of the targets' centre above the ground.
-    reach_m: max horizontal distance of a target.
-    sightings, spread_m: number of observations and standard deviation that confirm a target.
+    odometry: topic of the pose; use_map_tf: whether `/tf` holds the pose of its frame in the map.
+    hue_deg: [first, last]; min_saturation, min_value: minimums; see `search.colour_blob`.
+    min_fraction: min fraction of the image.
+    object_height_m: height of the targets' centre above the ground.
+    max_range_m: max horizontal distance of a target.
+    min_observations, max_sigma_m: number of observations and standard deviation that confirm a
+        target.
 
     """
 
@@ -76,17 +77,21 @@ class TargetDetection(Node):
         self._mount = np.array(declare("mount_m", [0.0, 0.0, 0.0]).value, dtype=np.float64)
         self._turn = [float(a) for a in declare("mount_rpy_deg", [0.0, 0.0, 0.0]).value]
         odometry = str(declare("odometry", "odom").value)
-        if declare("corrected", False).value:
+        if declare("use_map_tf", False).value:
             self.create_subscription(TFMessage, "/tf", self._on_tf, 50)
         first, last = (float(hue) for hue in declare("hue_deg", list(ColourRange()[:2])).value)
         self._colours = ColourRange(
-            first, last, float(declare("saturation", 0.5).value), float(declare("value", 0.2).value)
+            first,
+            last,
+            float(declare("min_saturation", 0.5).value),
+            float(declare("min_value", 0.2).value),
         )
-        self._share = float(declare("share", 0.0005).value)
-        self._object_m = float(declare("object_m", 0.5).value)
-        self._reach_m = float(declare("reach_m", 20.0).value)
+        self._min_fraction = float(declare("min_fraction", 0.0005).value)
+        self._object_height_m = float(declare("object_height_m", 0.5).value)
+        self._max_range_m = float(declare("max_range_m", 20.0).value)
         self._tracks = Tracks(
-            int(declare("sightings", 4).value), spread_m=float(declare("spread_m", 2.0).value)
+            int(declare("min_observations", 4).value),
+            spread_m=float(declare("max_sigma_m", 2.0).value),
         )
         self._doubt = PositionUncertainty()
         self._frame = MapFrame()
@@ -142,10 +147,10 @@ class TargetDetection(Node):
         view = GroundView(self._intrinsics, self._mount.tolist(), self._turn)
         hidden = self._teammates_in(view, pose)
         blob = largest_blob(colour_mask(pixels_of(image), self._colours, hidden))
-        if blob is None or blob.share < self._share:
+        if blob is None or blob.share < self._min_fraction:
             return
-        place = view.place_of(blob.u, blob.v, pose, ground + self._object_m)
-        if place is None or np.hypot(*(place - pose.position)[:2]) > self._reach_m:
+        place = view.place_of(blob.u, blob.v, pose, ground + self._object_height_m)
+        if place is None or np.hypot(*(place - pose.position)[:2]) > self._max_range_m:
             return
         eye = pose.position + rotations.rotate(pose.attitude, self._mount)
         track = self._tracks.add(sighting_of(taken, eye, place, self._doubt))

@@ -92,12 +92,12 @@ class TeamState:
         )
         return True
 
-    def heard(self, now_ns: int, patience_s: float) -> Iterator[tuple[str, TeamMate]]:
+    def heard(self, now_ns: int, timeout_s: float) -> Iterator[tuple[str, TeamMate]]:
         """Yields the UAVs with recent reports, by name."""
         for name, mate in sorted(self.mates.items()):
-            if 0 <= now_ns - mate.heard_ns <= patience_s * NS_PER_S:
+            if 0 <= now_ns - mate.heard_ns <= timeout_s * NS_PER_S:
                 yield name, mate
 
-    def workers(self, now_ns: int, patience_s: float) -> dict[str, Worker]:
+    def workers(self, now_ns: int, timeout_s: float) -> dict[str, Worker]:
         """Returns the UAVs with recent reports that search, or will."""
-        return {n: m.worker for n, m in self.heard(now_ns, patience_s) if m.phase in AT_WORK}
+        return {n: m.worker for n, m in self.heard(now_ns, timeout_s) if m.phase in AT_WORK}

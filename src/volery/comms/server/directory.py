@@ -115,5 +115,5 @@ class Directory:
         return not waits and away_ns > self._settings.keep_many_s * NS_PER_S
 
     def _is_meant(self, address: int, frame: StationFrame) -> bool:
-        planes = self._settings.planes_per_batch
+        planes = self._settings.group_size
         return address != frame.source and is_meant(address, frame.destination, planes)

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from volery.comms.addresses import PLANES_PER_BATCH, SERVER, Identity
+from volery.comms.addresses import GROUP_SIZE, SERVER, Identity
 from volery.comms.control_payloads import (
     Hello,
     Reason,
@@ -63,11 +63,11 @@ class StationCore:
         *,
         name: str = "",
         token: str | None = None,
-        planes_per_batch: int = PLANES_PER_BATCH,
+        group_size: int = GROUP_SIZE,
     ) -> None:
-        self.address = identity.address(planes_per_batch)
+        self.address = identity.address(group_size)
         self._session = session
-        hello = Hello(identity.batch, identity.plane, planes_per_batch, name, token or "")
+        hello = Hello(identity.batch, identity.plane, group_size, name, token or "")
         self._hello = encode_hello(hello)
         self._parser = StationFrameParser()
         self._held = SendBuffer()

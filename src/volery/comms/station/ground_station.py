@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from volery.comms.addresses import PLANES_PER_BATCH, Identity, is_meant, is_station
+from volery.comms.addresses import GROUP_SIZE, Identity, is_meant, is_station
 from volery.comms.control_payloads import Refusal
 from volery.comms.payloads import (
     COMMANDS,
@@ -85,19 +85,19 @@ HEAD = (
 class GroundStation:
     """Stores the states of UAVs, and turns lines into commands.
 
-    send: sends a message, as `Station.send`. planes_per_batch: as of the server. is_joined: whether
+    send: sends a message, as `Station.send`. group_size: as of the server. is_joined: whether
     a server is connected.
     """
 
     def __init__(
         self,
         send: Send,
-        planes_per_batch: int = PLANES_PER_BATCH,
+        group_size: int = GROUP_SIZE,
         is_joined: Callable[[], bool] = lambda: True,
     ) -> None:
         self._send = send
         self._is_joined = is_joined
-        self._planes = planes_per_batch
+        self._planes = group_size
         self._states: dict[int, tuple[Any, int]] = {}
         self._fresh: dict[int, ClockOffset] = {}
         self._missions: dict[int, Any] = {}

@@ -16,7 +16,7 @@ import threading
 from typing import Any
 
 from volery.comms.address_assignment import free_address
-from volery.comms.addresses import ALL, PLANES_PER_BATCH, Identity
+from volery.comms.addresses import ALL, GROUP_SIZE, Identity
 from volery.comms.payloads import decode_named, encode_named
 from volery.comms.protocol import StationFrame, StationFrameKind
 from volery.comms.server.tcp import PORT
@@ -41,8 +41,8 @@ class RadioNode(Node):
     ----------
     topics: "NAME TYPE" each, NAME below the UAV's namespace.
     server: HOST:PORT of `volery comms`.
-    station: linear id; -1: that of the namespace, uavN is N - 1.
-    planes_per_batch, token: as the server requires.
+    station_id: linear id; -1: that of the namespace, uavN is N - 1.
+    group_size, token: as the server requires.
 
     """
 
@@ -50,8 +50,8 @@ class RadioNode(Node):
         super().__init__("radio", **options)
         topics = self.declare_parameter("topics", [""]).value
         host, port = _server_of(str(self.declare_parameter("server", f"127.0.0.1:{PORT}").value))
-        number = int(self.declare_parameter("station", -1).value)
-        planes = int(self.declare_parameter("planes_per_batch", PLANES_PER_BATCH).value)
+        number = int(self.declare_parameter("station_id", -1).value)
+        planes = int(self.declare_parameter("group_size", GROUP_SIZE).value)
         token = str(self.declare_parameter("token", "").value) or None
         name = self.get_namespace().strip("/")
         identity = Identity.of(free_address(name, ()) if number < 0 else number, planes)
@@ -75,7 +75,7 @@ class RadioNode(Node):
                 port=port,
                 name=name,
                 token=token,
-                planes_per_batch=planes,
+                group_size=planes,
             )
             await station.start(timeout_s=None)
             return station

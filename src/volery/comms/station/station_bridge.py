@@ -17,7 +17,7 @@ from functools import partial
 from typing import Any
 
 from volery.comms.address_assignment import free_address
-from volery.comms.addresses import ALL_GROUND, PLANES_PER_BATCH, Identity
+from volery.comms.addresses import ALL_GROUND, GROUP_SIZE, Identity
 from volery.comms.payloads import (
     COMMANDS,
     MISSION,
@@ -85,7 +85,7 @@ def _gist(message: Any) -> object:
 class StationBridge:
     """Runs one station for each UAV.
 
-    host, port, token, planes_per_batch: of the communication server, as for `Station`.
+    host, port, token, group_size: of the communication server, as for `Station`.
     """
 
     def __init__(
@@ -94,12 +94,12 @@ class StationBridge:
         port: int = PORT,
         *,
         token: str | None = None,
-        planes_per_batch: int = PLANES_PER_BATCH,
+        group_size: int = GROUP_SIZE,
     ) -> None:
         self._host = host
         self._port = port
         self._token = token
-        self._planes = planes_per_batch
+        self._planes = group_size
         self._stations: dict[str, Station] = {}
         self._told: dict[tuple[str, str], _Announced] = {}
         self._task: asyncio.Task[None] | None = None
@@ -167,7 +167,7 @@ class StationBridge:
             port=self._port,
             name=uav,
             token=self._token,
-            planes_per_batch=self._planes,
+            group_size=self._planes,
         )
         self._stations[uav] = station
         await station.start(timeout_s=None)

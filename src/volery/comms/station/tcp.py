@@ -14,7 +14,7 @@ import secrets
 import time
 from collections.abc import Callable
 
-from volery.comms.addresses import PLANES_PER_BATCH, Identity
+from volery.comms.addresses import GROUP_SIZE, Identity
 from volery.comms.control_payloads import Refusal
 from volery.comms.protocol import StationFrame, StationFrameKind
 from volery.comms.server.tcp import PORT
@@ -46,7 +46,7 @@ class Station:
         is lost; not by `stop`.
     host, port
         Of the communication server.
-    name, token, planes_per_batch
+    name, token, group_size
         Sent to the server.
 
     """
@@ -62,14 +62,14 @@ class Station:
         port: int = PORT,
         name: str = "",
         token: str | None = None,
-        planes_per_batch: int = PLANES_PER_BATCH,
+        group_size: int = GROUP_SIZE,
     ) -> None:
         self.core = StationCore(
             identity,
             secrets.randbits(32),
             name=name,
             token=token,
-            planes_per_batch=planes_per_batch,
+            group_size=group_size,
         )
         self._on_message = on_message
         self._on_refusal = on_refusal

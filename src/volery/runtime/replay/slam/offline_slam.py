@@ -158,9 +158,9 @@ class OfflineSlam:
 
     def _start_node(self) -> None:
         o, uav = self._options, self.channels.uav
-        parameters: dict[str, Any] = {"reach_m": o.reach_m, "loop_closures": o.loop_closures}
+        parameters: dict[str, Any] = {"max_range_m": o.reach_m, "loop_closures": o.loop_closures}
         if self.start is not None:
-            parameters["start"] = list(self.start)
+            parameters["initial_pose"] = list(self.start)
         level = None if o.level_mount is None else list(o.level_mount)
         options = {"context": self._host.context(), "namespace": f"/{uav}"}
         if not self.channels.has_imu:
