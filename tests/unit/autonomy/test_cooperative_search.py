@@ -104,7 +104,7 @@ class Bodies:
             action(name, request)
             return message_type(f"{srvtype}_Response")(True, "")
 
-        self.graph.offer(f"/{name}/{service}", srvtype, handle)
+        self.graph.create_service(f"/{name}/{service}", srvtype, handle)
 
     def start(self, name):
         context = Context(self.graph, Timers(self.timers), lambda: self.now_ns)
@@ -336,8 +336,10 @@ def test_a_service_that_never_answers_is_called_again_and_given_up():
     bodies = searching()
     bodies.sees = {"uav1"}
     asked = []
-    bodies.graph.withdraw("/uav3/search/join")
-    bodies.graph.offer_async("/uav3/search/join", JOIN, lambda q, _: asked.append(q.finder))
+    bodies.graph.destroy_service("/uav3/search/join")
+    bodies.graph.create_async_service(
+        "/uav3/search/join", JOIN, lambda q, _: asked.append(q.finder)
+    )
     bodies.run_until(lambda: bodies.nodes["uav1"].phase is SearchPhase.HOME)
     assert asked == ["uav1"] * 20
     assert bodies.nodes["uav2"].phase is SearchPhase.HOME
@@ -371,7 +373,7 @@ def test_who_cannot_be_told_sees_the_others_go_home():
     bodies = searching()
     bodies.sees.clear()
     for name in ("uav1", "uav3"):
-        bodies.graph.withdraw(f"/{name}/search/finish")
+        bodies.graph.destroy_service(f"/{name}/search/finish")
     bodies.graph.call("/uav2/search/finish")
     bodies.run_until(bodies.all_in(SearchPhase.DONE), 60.0)
 

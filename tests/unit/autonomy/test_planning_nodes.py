@@ -178,15 +178,15 @@ def test_it_gives_way_to_a_teammate_that_comes_towards_it():
 
 def test_reports_that_are_late_repeated_or_no_numbers_move_no_teammate():
     near, frame = Neighbours(), MapFrame()
-    near.hear(report("uav2", 5 * S, (5.0, 0.0, HEIGHT), (1.0, 0.0, 0.0)), 6 * S)
-    near.hear(report("uav2", 4 * S, (9.0, 0.0, HEIGHT)), 7 * S)
-    near.hear(report("uav2", 5 * S, (9.0, 0.0, HEIGHT)), 7 * S)
-    near.hear(report("uav2", 7 * S, (math.nan, 0.0, HEIGHT)), 7 * S)
-    near.hear(report("uav3", 7 * S, (0.0, 0.0, HEIGHT), (math.inf, 0.0, 0.0)), 7 * S)
+    near.on_report(report("uav2", 5 * S, (5.0, 0.0, HEIGHT), (1.0, 0.0, 0.0)), 6 * S)
+    near.on_report(report("uav2", 4 * S, (9.0, 0.0, HEIGHT)), 7 * S)
+    near.on_report(report("uav2", 5 * S, (9.0, 0.0, HEIGHT)), 7 * S)
+    near.on_report(report("uav2", 7 * S, (math.nan, 0.0, HEIGHT)), 7 * S)
+    near.on_report(report("uav3", 7 * S, (0.0, 0.0, HEIGHT), (math.inf, 0.0, 0.0)), 7 * S)
     (other,) = near.in_odom(frame)
     assert other.position.tolist() == [5.0, 0.0, HEIGHT]
     assert other.time_ns == 6 * S  # by the hearer's clock
-    near.hear(report("uav2", S, (2.0, 0.0, HEIGHT)), 30 * S)  # its clock began anew
+    near.on_report(report("uav2", S, (2.0, 0.0, HEIGHT)), 30 * S)  # its clock began anew
     assert near.in_odom(frame)[0].position.tolist() == [2.0, 0.0, HEIGHT]
 
 

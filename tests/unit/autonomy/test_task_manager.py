@@ -107,14 +107,14 @@ def test_finds_of_one_thing_are_one_target() -> None:
     assert first.covariance[0] == pytest.approx(0.505)
     assert (first.finder, first.sightings, first.stamp_ns) == ("uav1", 10, 2)
     assert second.place[0] == 40.0
-    told = [Detection.from_message(message) for message in found.to_tell(0)]
+    told = [Detection.from_message(message) for message in found.changed(0)]
     assert sorted(told) == sorted(found.finds.values())
 
 
 def test_many_finds_are_told_in_turns_and_broken_ones_not_at_all() -> None:
     found = TargetList(4.0)
     found.take(find("uav1", k, 10.0 * k, stamp=100 - k) for k in range(7))
-    turns = [[message.number for message in found.to_tell(turn)] for turn in range(4)]
+    turns = [[message.number for message in found.changed(turn)] for turn in range(4)]
     assert turns == [[0, 1, 2, 3], [0, 1, 4, 5], [0, 1, 6, 2], [0, 1, 3, 4]]
     broken = find("uav2", 1, math.nan), find("uav2", 2, 5.0, variance=-1.0)
     assert not found.take(broken)

@@ -145,7 +145,7 @@ def test_all_see_actors_and_each_copy_its_own_uavs(scene_class):
     scene = scene_class(None, None)
     actors = two_actors()
     scene.set_actors(actors)
-    scene.set_bodies([body_shape(load_airframe("f450"))], [0, 0, 0, 0], copies=2)
+    scene.set_bodies([body_shape(load_airframe("f450"))], [0, 0, 0, 0], num_envs=2)
     scene.move_bodies([[0, 0, 1.2], [2, 0, 1.2]] * 2, [[0, 0, 0, 1.0]] * 4)
     scene.move_actors(2_000_000_000, 2_000_000_000)  # anna passes y = 0
     o, d = [[0.0, 0.0, 1.2]] * 2, [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]

@@ -41,12 +41,12 @@ class CoverageFlight:
     phase: CoveragePhase = CoveragePhase.GROUND
     position_map: Array | None = None
     climb_m_s: float = 0.0
-    heard_ns: int = 0
+    received_ns: int = 0
     home_map: Array | None = None
     waypoints: WaypointProgress | None = None
     following: int = 0
     """Number of the next waypoint."""
-    told: int = -1
+    published: int = -1
     """Number of the last waypoint sent to it."""
     nearest_m: float = math.inf
     """Min distance to it so far, and since when it has not decreased."""
@@ -54,13 +54,13 @@ class CoverageFlight:
 
     def moved(self, position_map: Array, climb_m_s: float, now_ns: int) -> None:
         """Stores the current position."""
-        self.position_map, self.climb_m_s, self.heard_ns = position_map, climb_m_s, now_ns
+        self.position_map, self.climb_m_s, self.received_ns = position_map, climb_m_s, now_ns
         if self.home_map is None:
             self.home_map = position_map.copy()
 
     def send(self, waypoints: WaypointProgress, now_ns: int) -> None:
         """Sets other waypoints."""
-        self.waypoints, self.following, self.told = waypoints, 0, -1
+        self.waypoints, self.following, self.published = waypoints, 0, -1
         self._begin_leg(now_ns)
 
     @property
@@ -102,7 +102,7 @@ class CoverageFlight:
 
     def is_lost(self, timeout_s: float, now_ns: int) -> bool:
         """Returns whether odometry or progress have been missing for `timeout_s`."""
-        return now_ns - min(self.heard_ns, self.since_ns) > timeout_s * 1e9
+        return now_ns - min(self.received_ns, self.since_ns) > timeout_s * 1e9
 
     def _begin_leg(self, now_ns: int) -> None:
         self.nearest_m, self.since_ns = math.inf, now_ns

@@ -43,7 +43,7 @@ _REPEAT = 10
 """Periods after which a goal and the progress are published again: a UAV ignores goals during
 take-off.
 """
-_STATE = ("_field", "_flights", "_plan", "_covered", "_refused", "_ticks", "_told_covered")
+_STATE = ("_field", "_flights", "_plan", "_covered", "_refused", "_ticks", "_published_covered")
 """Names of the attributes that a snapshot stores."""
 
 
@@ -89,7 +89,7 @@ class CoveragePlanner(Node):
         """Sub-cells (2 * rows, 2 * columns) that a UAV has flown through."""
         self._refused = ""
         self._ticks = 0
-        self._told_covered = -1
+        self._published_covered = -1
 
         self._areas = self.create_publisher(OccupancyGrid, "~/areas", 1, latched=True)
         self._covered_map = self.create_publisher(OccupancyGrid, "~/covered", 1, latched=True)
@@ -210,12 +210,12 @@ class CoveragePlanner(Node):
             assert flight.waypoints is not None
             self._paths[number].publish(messages.path_message(flight.waypoints, now))
         self._areas.publish(messages.areas_message(self._field, owner, now))
-        self._tell_status()
+        self._publish_status()
 
     def _refuse(self, reason: str) -> None:
         if reason != self._refused:
             self._refused = reason
-            self._tell_status()
+            self._publish_status()
 
     # ----------------------------------------------------------------------------------- behaviour
 
@@ -236,7 +236,7 @@ class CoveragePlanner(Node):
         if lost:
             self._plan_again()
         if self._ticks % _REPEAT == 0:
-            self._tell_progress()
+            self._publish_progress()
 
     def _advance(self, number: int, flight: CoverageFlight, now: int) -> None:
         if flight.waypoints is None:
@@ -254,9 +254,9 @@ class CoveragePlanner(Node):
             if goal is None:
                 flight.phase = CoveragePhase.DONE
                 self._land[number].call_async()
-                self._tell_status()
-            elif flight.following != flight.told or self._ticks % _REPEAT == 0:
-                flight.told = flight.following
+                self._publish_status()
+            elif flight.following != flight.published or self._ticks % _REPEAT == 0:
+                flight.published = flight.following
                 self._goals[number].publish(messages.goal_message(goal, now))
 
     def _ask_to_take_off(self, number: int, flight: CoverageFlight) -> None:
@@ -286,17 +286,17 @@ class CoveragePlanner(Node):
         fine = np.kron(self._field.free, np.ones((2, 2), np.bool_))
         return float(np.count_nonzero(self._covered & fine)) / max(free, 1)
 
-    def _tell_progress(self) -> None:
+    def _publish_progress(self) -> None:
         assert self._field is not None
         self._progress.publish(Float32(float(np.float32(self._share))))
         count = int(np.count_nonzero(self._covered))
-        if count != self._told_covered:
-            self._told_covered = count
+        if count != self._published_covered:
+            self._published_covered = count
             now = self.get_clock().now_ns()
             self._covered_map.publish(messages.covered_message(self._field, self._covered, now))
-            self._tell_status()
+            self._publish_status()
 
-    def _tell_status(self) -> None:
+    def _publish_status(self) -> None:
         share = 0.0 if self._field is None else self._share
         self._status.publish(
             messages.status_message(self._flights, self._plan, share, self._refused)

@@ -82,7 +82,7 @@ class CooperativeSearch(TeamFlight):
         "_looks",
         "_waiting_ns",
         "_finishing",
-        "_to_tell",
+        "_pending_calls",
     )
 
     @classmethod
@@ -114,7 +114,7 @@ class CooperativeSearch(TeamFlight):
         self._waiting_ns: int | None = None
         """Time since which all called teammates have arrived, ns."""
         self._finishing = False
-        self._to_tell: list[str] = []
+        self._pending_calls: list[str] = []
         """Teammates that have not been notified yet of the end of the search."""
 
         self._found = self.create_publisher(PointStamped, "~/found", 1, latched=True)
@@ -192,9 +192,9 @@ class CooperativeSearch(TeamFlight):
             self._call_teammates()
             if self.phase is SearchPhase.HOLD:
                 self._hold()
-        for name in self._to_tell:
+        for name in self._pending_calls:
             self.ask(self._finish_clients[name])
-        self._to_tell = []
+        self._pending_calls = []
 
     def _search(self, pose: OdometrySample) -> None:
         if self.claim is not None:  # called during the climb
@@ -248,7 +248,7 @@ class CooperativeSearch(TeamFlight):
         assert self.claim is not None
         finder = self.teammates.get(self.claim.finder)
         timeout_s = self.settings.timeout_s
-        if finder is not None and finder.is_heard(self.now_ns, timeout_s):
+        if finder is not None and finder.is_recent(self.now_ns, timeout_s):
             waits = finder.phase in CAN_COME
         else:
             waits = self.team_in(ON_THE_WAY) or not self.calls.are_settled(self.now_ns)
@@ -301,7 +301,7 @@ class CooperativeSearch(TeamFlight):
     def _finish(self) -> None:
         """Flies home, or stays on the ground, and notifies the teammates once."""
         if not self._finishing:
-            self._finishing, self._to_tell = True, list(self.mates)
+            self._finishing, self._pending_calls = True, list(self.mates)
             if self.phase is SearchPhase.READY:
                 self.enter(SearchPhase.DONE)
 

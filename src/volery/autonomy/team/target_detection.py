@@ -93,7 +93,7 @@ class TargetDetection(Node):
             int(declare("min_observations", 4).value),
             spread_m=float(declare("max_sigma_m", 2.0).value),
         )
-        self._doubt = PositionUncertainty()
+        self._uncertainty = PositionUncertainty()
         self._frame = MapFrame()
         self._mates: dict[str, tuple[int, Array]] = {}
         """Receive time, ns, and position of each teammate's last report."""
@@ -153,14 +153,14 @@ class TargetDetection(Node):
         if place is None or np.hypot(*(place - pose.position)[:2]) > self._max_range_m:
             return
         eye = pose.position + rotations.rotate(pose.attitude, self._mount)
-        track = self._tracks.add(sighting_of(taken, eye, place, self._doubt))
+        track = self._tracks.add(sighting_of(taken, eye, place, self._uncertainty))
         if track.number:
-            self._tell(taken)
+            self._publish_targets(taken)
 
     def _teammates_in(self, view: GroundView, pose: OdometrySample) -> Array:
         """Returns the image discs (K, 3) of teammates, which may have the colour."""
         since = pose.time_ns - round(_MATE_S * NS_PER_S)
-        near = [place for heard_ns, place in self._mates.values() if heard_ns >= since]
+        near = [place for received_ns, place in self._mates.values() if received_ns >= since]
         discs = [view.disc_of(place, _MATE_M, pose) for place in near]
         return np.array([disc for disc in discs if disc is not None]).reshape(-1, 3)
 
@@ -175,7 +175,7 @@ class TargetDetection(Node):
         down = -rotations.rotate(self._pose.attitude, np.array([0.0, 0.0, -1.0]))[2]
         return float(self._pose.position[2] - distance * down)
 
-    def _tell(self, time_ns: int) -> None:
+    def _publish_targets(self, time_ns: int) -> None:
         finder = self.get_namespace().strip("/")
         finds = [find.message() for find in self._tracks.finds(finder)]
         self._targets.publish(self._type(header(time_ns, "map"), finds))

@@ -290,7 +290,7 @@ class TaskManager(Node):
         member.publish_status(self.problem)
 
     def _begin(self, pose: OdometrySample, now: int) -> None:
-        self._began_ns = self.member.heard_ns = now
+        self._began_ns = self.member.received_ns = now
         self._home = pose.position.copy()
         self.ground.stand_m = float(self._home[2])
         self._enter(MissionPhase.WAIT)
@@ -393,7 +393,7 @@ class TaskManager(Node):
         assert self._began_ns is not None
         settings, member = self.settings, self.member
         over = 0.0 < settings.max_search_s * NS_PER_S < now - self._began_ns
-        silence_ns = now - member.heard_ns
+        silence_ns = now - member.received_ns
         alone = bool(member.team.mates) and (0.0 < settings.team_timeout_s * NS_PER_S < silence_ns)
         return self._ordered_home or over or alone or member.battery < settings.low_battery_fraction
 

@@ -19,7 +19,7 @@ class RouterSettings:
     """Max waiting messages of each kind from one source for one station: a station's send
     buffer.
     """
-    mailbox_bytes: int = 8 << 20
+    queue_bytes: int = 8 << 20
     """Max waiting bytes for one station."""
     window: int = 256
     """Max messages in transit to one station without acknowledgement."""
@@ -56,6 +56,6 @@ class RouterSettings:
         """Raises CommsError for invalid values."""
         if not 1 <= self.group_size <= FIRST_GROUND:
             raise CommsError(f"a batch has 1 to {FIRST_GROUND} planes, not {self.group_size}")
-        for name in ("lane_depth", "mailbox_bytes", "window", "burst_messages"):
+        for name in ("lane_depth", "queue_bytes", "window", "burst_messages"):
             if getattr(self, name) < 1:
                 raise CommsError(f"{name} must be at least 1, not {getattr(self, name)}")

@@ -27,7 +27,7 @@ from volery.graph.nodes.node import Node
 
 _PERIOD_S = 0.02
 """Period at which received messages are published: they arrive in another thread."""
-_HEARD_MOST = 1000
+_MAX_INCOMING = 1000
 _END_S = 2.0
 
 
@@ -56,7 +56,7 @@ class RadioNode(Node):
         name = self.get_namespace().strip("/")
         identity = Identity.of(free_address(name, ()) if number < 0 else number, planes)
 
-        self._heard: queue.Queue[StationFrame] = queue.Queue(_HEARD_MOST)
+        self._incoming: queue.Queue[StationFrame] = queue.Queue(_MAX_INCOMING)
         self._publishers = {}
         for text in topics:
             topic, msgtype = _topic_of(text)
@@ -81,7 +81,7 @@ class RadioNode(Node):
             return station
 
         self._station = asyncio.run_coroutine_threadsafe(make(), self._loop).result()
-        self.create_timer(_PERIOD_S, self._publish_heard)
+        self.create_timer(_PERIOD_S, self._publish_incoming)
 
     @property
     def joined(self) -> bool:
@@ -113,15 +113,15 @@ class RadioNode(Node):
         """Queues a frame for the node's thread; drops the oldest if the queue is full."""
         while True:
             with contextlib.suppress(queue.Full):
-                self._heard.put_nowait(frame)
+                self._incoming.put_nowait(frame)
                 return
             with contextlib.suppress(queue.Empty):
-                self._heard.get_nowait()
+                self._incoming.get_nowait()
 
-    def _publish_heard(self) -> None:
+    def _publish_incoming(self) -> None:
         with contextlib.suppress(queue.Empty):
             while True:
-                frame = self._heard.get_nowait()
+                frame = self._incoming.get_nowait()
                 with contextlib.suppress(CommsError):  # other content by another program
                     named = decode_named(frame.payload)
                     publisher = self._publishers.get(named.name)
