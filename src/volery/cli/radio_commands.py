@@ -40,7 +40,9 @@ def gcs(
         int, typer.Option(min=0, max=255, help="Set the number of this ground station.")
     ] = 0,
     group_size: GroupSizeOption = 4,
-    token: TokenOption = None,
+    token: Annotated[
+        str | None, typer.Option(envvar="VOLERY_TOKEN", help="Send this token to the server.")
+    ] = None,
     log: Annotated[Path | None, typer.Option(help="Append all lines to this file.")] = None,
 ) -> None:
     """Monitor and command UAVs over the radio network; type help for the commands."""
