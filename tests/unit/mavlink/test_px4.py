@@ -314,7 +314,7 @@ def test_what_cannot_be_said_is_told_of_and_the_run_goes_on(opened, monkeypatch,
 
     autopilot = StandIn(bridge._port, 50)
     meet(simulation, bridge, 1)
-    monkeypatch.setattr(HilLink, "send_sensors", refuse)
+    monkeypatch.setattr(HilLink, "encode_exchange", refuse)
     simulation.run(0.1)
     assert simulation.time_s == pytest.approx(0.1)
     autopilot.close()
