@@ -30,7 +30,7 @@ def test_nobody_waits_for_the_kernels_of_nodes_and_cameras_without_them() -> Non
 
 def test_a_scenario_needs_what_its_nodes_and_sensors_call() -> None:
     found = named(needs_of(load_scenario("forest_search")))
-    assert {"runtime.warmup.core_tasks:pictures", "runtime.warmup.core_tasks:estimates"} <= found
+    assert {"runtime.warmup.core_tasks:images", "runtime.warmup.core_tasks:estimates"} <= found
     assert {
         "autonomy.slam.warmup:motion",
         "autonomy.slam.warmup:known_places",
