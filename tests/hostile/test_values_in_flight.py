@@ -100,7 +100,7 @@ def flight(name):
 
 def subscribed(node):
     """Topics that a node subscribes to at present."""
-    held = tuple(node._Node__held)
+    held = tuple(node._Node__handles)
     return sorted({handle.topic for handle in held if isinstance(handle, NodeSubscription)})
 
 
