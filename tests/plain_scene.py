@@ -185,7 +185,7 @@ class PlainBackend:
         bodies = handle.bodies
         uavs = len(bodies.scene) - bodies.actors
         for row in range(len(bodies.scene)):
-            own_copy = exclude // bodies.crew == row // bodies.crew
+            own_copy = exclude // bodies.uavs_per_env == row // bodies.uavs_per_env
             seen = (exclude < 0) | ((exclude != row) & own_copy) | (row >= uavs)
             sees = np.broadcast_to(seen, len(origins))
             rows, o, d, turn = _in_body(bodies, row, sees, origins, directions, fraction, distance)

@@ -235,9 +235,9 @@ def test_uavs_come_and_go_among_actors(simulate, actors_data):
 def test_copies_see_them_too(actors_data):
     actors_data["types"]["f450"]["plant"] = "kinematic"
     actors_data["types"]["f450"]["sensors"] = actors_data["types"]["f450"]["sensors"][:2]
-    with VectorizedSimulation(parse_scenario(actors_data), 3) as copies:
-        copies.run(0.1)
-        ranges = copies.reading("uav1", "horizontal")["echoes"][:, 0]
+    with VectorizedSimulation(parse_scenario(actors_data), 3) as envs:
+        envs.run(0.1)
+        ranges = envs.sample("uav1", "horizontal")["echoes"][:, 0]
         middle = ranges[:, ranges.shape[1] // 2]
         np.testing.assert_allclose(middle, 3.8, atol=1e-3)
 

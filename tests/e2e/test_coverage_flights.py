@@ -92,7 +92,7 @@ def test_three_uavs_cover_every_free_cell_and_land(tmp_path, simulate):
 
 
 def test_the_others_share_what_a_lost_uav_leaves(tmp_path, simulate):
-    watch = Watch(simulate(field_data(tmp_path, patience_s=4.0)))
+    watch = Watch(simulate(field_data(tmp_path, timeout_s=4.0)))
     watch.fly(20.0)
     for rotor in range(4):
         watch.simulation.inject_fault({"kind": "motor", "uav": "uav2", "rotor": rotor})
@@ -113,8 +113,8 @@ def test_a_start_outside_the_map_is_told_and_nobody_flies(tmp_path, simulate):
 
 def test_cells_beyond_blocks_are_flown_to_or_told_of(tmp_path, simulate):
     rows = ["00010", "00010", "00010"]
-    for over_m, missing in ((0.0, 3), (7.0, 0)):
-        data = field_data(tmp_path, rows, over_m=over_m, uavs=["uav1"])
+    for crossing_height_m, missing in ((0.0, 3), (7.0, 0)):
+        data = field_data(tmp_path, rows, crossing_height_m=crossing_height_m, uavs=["uav1"])
         data["uavs"] = [{"type": "f450", "position_m": [2, 2]}]
         watch = Watch(simulate(data))
         watch.fly(400.0)

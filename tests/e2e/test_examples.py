@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 NEEDS_A_RUN = {
-    "06_fly_from_outside",
+    "06_fly_over_rosbridge",
     "09_bring_your_own_planner",
     "09_bring_your_own_planner_ros_tcp",
     "13_mavros_offboard",

@@ -35,7 +35,7 @@ NODES = [
     },
     {
         "node": "target_detection",
-        "parameters": {"mount_rpy_deg": [0.0, 30.0, 0.0], "spread_m": 5.0},
+        "parameters": {"mount_rpy_deg": [0.0, 30.0, 0.0], "max_sigma_m": 5.0},
     },
 ]
 Said = dict[str, list[tuple[int, bytes]]]

@@ -13,7 +13,7 @@ from volery.runtime.build.worlds import build_forest, build_terrain
 from volery.scenario.load import parse_scenario
 
 MOUNTS = {"level_mount": [0.0, 0.0, 0.18], "nodding_mount": [0.1, 0.0, -0.08]}
-ODOM = {"odometry": "odom", "corrected": False}
+ODOM = {"odometry": "odom", "use_map_tf": False}
 NODES = [
     {
         "node": "mapping",

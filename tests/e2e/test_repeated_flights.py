@@ -503,7 +503,7 @@ def test_what_a_service_outside_answered_is_answered_again(tmp_path):
             timers.append(threading.Timer(0.1 * random.random(), tell))
             timers[-1].start()
 
-        session.offer("/oracle", "std_srvs/srv/Trigger", answer)
+        session.create_service("/oracle", "std_srvs/srv/Trigger", answer)
         simulation.run(1.2, speed=1.0)
         session.close()  # open requests fail
         simulation.run(0.3, speed=1.0)

@@ -233,7 +233,7 @@ def output_of(program, *words, timeout_s):
 
 def test_the_example_flies_a_square(run):
     volery(run, "service", "call", "/uav1/hold")
-    said = output_of(ROOT / "examples/06_fly_from_outside.py", run.ports[0], 1.5, timeout_s=60)
+    said = output_of(ROOT / "examples/06_fly_over_rosbridge.py", run.ports[0], 1.5, timeout_s=60)
     assert 0.8 < float(re.search(r"([\d.]+) m wide", said)[1]) < 2.5
 
 

@@ -32,7 +32,7 @@ def scenario_of(*, blind):
     node = {
         "node": "slam",
         "latency_s": 0.02,
-        "parameters": {**MOUNTS, "start": [60.0, 120.0, 0.0, 0.0]},
+        "parameters": {**MOUNTS, "initial_pose": [60.0, 120.0, 0.0, 0.0]},
     }
     sensors = [] if blind else [*sensors, {"kind": "imu"}, {"kind": "ground_truth"}]
     uav = {"type": "surveyor", "position_m": [60.0, 120.0], "placement": "nearest_free"}

@@ -1,4 +1,4 @@
-"""Independent copies of a scenario: each is the simulation of its own seed."""
+"""Independent environments of a scenario: each is the simulation of its own seed."""
 
 import numpy as np
 import pytest
@@ -61,75 +61,75 @@ def assert_same(found, expected):
 
 def test_every_copy_is_the_simulation_of_its_seed(simulate, pair_data):
     velocity = [1.0, 0.3, 0.1]
-    with make(pair_data, 3, seeds=[7, 8, 9], threads=2) as copies:
-        copies.command_velocity(velocity)
-        copies.run(0.35)
+    with make(pair_data, 3, seeds=[7, 8, 9], threads=2) as envs:
+        envs.command_velocity(velocity)
+        envs.run(0.35)
         for copy, seed in enumerate((7, 8, 9)):
             expected, last = alone(simulate, pair_data, seed, 0.35, velocity)
-            assert_same(states(copies, copy), expected)
-            force = copies.reading("uav2", "imu")["specific_force"][copy, 0]
+            assert_same(states(envs, copy), expected)
+            force = envs.sample("uav2", "imu")["specific_force"][copy, 0]
             assert force == last["force"]
-            ranges = copies.reading("uav1", "horizontal")["echoes"][copy, 0]
+            ranges = envs.sample("uav1", "horizontal")["echoes"][copy, 0]
             np.testing.assert_array_equal(ranges, last["ranges"])
-        assert len({copies.reading("uav2", "imu")["specific_force"][k, 0] for k in range(3)}) == 3
+        assert len({envs.sample("uav2", "imu")["specific_force"][k, 0] for k in range(3)}) == 3
 
 
 def test_reset_copies_are_fresh_ones_and_the_others_fly_on(simulate, pair_data):
     velocity = [0.5, -0.2, 0.0]
     with (
-        make(pair_data, 4, threads=2) as copies,
+        make(pair_data, 4, threads=2) as envs,
         make(pair_data, 4, threads=1) as undisturbed,
     ):
-        for each in (copies, undisturbed):
+        for each in (envs, undisturbed):
             each.command_velocity(velocity)
             each.run(0.4)
-        assert copies.common_period_s == pytest.approx(0.2)
-        copies.reset([0, 2], seeds=[70, 71])
-        np.testing.assert_allclose(copies.age_s, [0.0, 0.4, 0.0, 0.4])
-        for each in (copies, undisturbed):
+        assert envs.common_period_s == pytest.approx(0.2)
+        envs.reset([0, 2], seeds=[70, 71])
+        np.testing.assert_allclose(envs.age_s, [0.0, 0.4, 0.0, 0.4])
+        for each in (envs, undisturbed):
             each.command_velocity(velocity)
             each.run(0.35)
         for copy in (1, 3):
-            assert_same(states(copies, copy), states(undisturbed, copy))
+            assert_same(states(envs, copy), states(undisturbed, copy))
         for copy, seed in ((0, 70), (2, 71)):
             expected, last = alone(simulate, pair_data, seed, 0.35, velocity)
-            assert_same(states(copies, copy), expected)
-            assert copies.reading("uav2", "imu")["specific_force"][copy, 0] == last["force"]
-            ranges = copies.reading("uav1", "horizontal")["echoes"][copy, 0]
+            assert_same(states(envs, copy), expected)
+            assert envs.sample("uav2", "imu")["specific_force"][copy, 0] == last["force"]
+            ranges = envs.sample("uav1", "horizontal")["echoes"][copy, 0]
             np.testing.assert_array_equal(ranges, last["ranges"])
 
 
 def test_threads_change_nothing(pair_data):
     found = []
     for threads in (1, 2, 3):
-        with make(pair_data, 5, threads=threads) as copies:
-            copies.command_velocity([1.0, 0.0, 0.0])
-            copies.run(0.3)
-            found.append(copies.state().position_map)
+        with make(pair_data, 5, threads=threads) as envs:
+            envs.command_velocity([1.0, 0.0, 0.0])
+            envs.run(0.3)
+            found.append(envs.state().position_map)
     np.testing.assert_array_equal(found[0], found[1])
     np.testing.assert_array_equal(found[0], found[2])
 
 
 def test_states_are_taken_back(pair_data):
-    with make(pair_data, 3) as copies:
-        copies.run(0.21)
-        kept = copies.get_state()
-        copies.run(0.2)
-        first = copies.state().position_map
-        copies.reset([1])
-        copies.set_state(kept)
-        copies.run(0.2)
-        np.testing.assert_array_equal(copies.state().position_map, first)
+    with make(pair_data, 3) as envs:
+        envs.run(0.21)
+        kept = envs.get_state()
+        envs.run(0.2)
+        first = envs.state().position_map
+        envs.reset([1])
+        envs.set_state(kept)
+        envs.run(0.2)
+        np.testing.assert_array_equal(envs.state().position_map, first)
 
 
 def test_copies_do_not_collide_with_each_other(pair_data):
     pair_data["types"]["f450"]["sensors"] = []
-    with make(pair_data, 3, threads=1) as copies:
-        copies.uav(1, "uav1").go_to([8.0, 0.0, 4.2])
-        copies.run(2.5)
-        events = copies.drain_events()
+    with make(pair_data, 3, threads=1) as envs:
+        envs.uav(1, "uav1").go_to([8.0, 0.0, 4.2])
+        envs.run(2.5)
+        events = envs.drain_events()
     hits = [e for e in events if str(e.event.kind) == "collision"]
-    assert {e.copy for e in hits} == {1}
+    assert {e.env for e in hits} == {1}
     assert {(e.event.uav, e.event.partner) for e in hits} == {("uav1", "uav2"), ("uav2", "uav1")}
 
 
@@ -150,10 +150,10 @@ def test_impossible_requests_are_refused(flat_data):
         make(flat_data, 0)
     with pytest.raises(ScenarioError, match="2 environments with 1 seed: each needs one"):
         make(flat_data, 2, seeds=[1])
-    with make(flat_data, 2) as copies:
+    with make(flat_data, 2) as envs:
         with pytest.raises(CommandError, match="numbered 0 to 1"):
-            copies.reset([2])
+            envs.reset([2])
         with pytest.raises(CommandError, match="no sensor 'radar' of 'uav1'; known: uav1 imu"):
-            copies.reading("uav1", "radar")
+            envs.sample("uav1", "radar")
         with pytest.raises(CommandError, match="finite"):
-            copies.command_velocity([np.nan, 0.0, 0.0])
+            envs.command_velocity([np.nan, 0.0, 0.0])

@@ -198,9 +198,9 @@ def server(mutator):
     api.start()
     first, second = bench.peer("first"), bench.peer("second")
     out = bench.graph.advertise("/out", STRING, latched=True)
-    bench.graph.offer("/do", TRIGGER, lambda _: trigger_response(True, "done"))
+    bench.graph.create_service("/do", TRIGGER, lambda _: trigger_response(True, "done"))
     goals = []
-    bench.graph.actions.offer("/act", STEPS, goals.append)
+    bench.graph.actions.create_server("/act", STEPS, goals.append)
     steps = mutator.random.randrange(1, 12)
     for _ in range(steps):
         client = mutator.pick((first, second))
@@ -260,7 +260,7 @@ def client(mutator):
     state.subscribe("/head", "std_msgs/msg/Header", 2, False, lambda: None)
     state.advertise("/in", STRING, latched=True)
     answer = message_type(f"{TRIGGER}_Response")
-    state.offer("/mine", TRIGGER, lambda _, reply: reply.answer(answer(True, "x")))
+    state.create_service("/mine", TRIGGER, lambda _, reply: reply.answer(answer(True, "x")))
     state.call("/do", message_type(f"{TRIGGER}_Request")(), reply())
     state.call("/untyped", None, reply())
     steps = mutator.random.randrange(1, 8)
@@ -271,5 +271,5 @@ def client(mutator):
     state.lose("it is over")
     assert all(call.done for call in calls)
     with contextlib.suppress(GraphError):
-        state.withdraw("/mine", "fuzz")
+        state.destroy_service("/mine", "fuzz")
     return steps

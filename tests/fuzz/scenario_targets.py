@@ -123,7 +123,7 @@ type = "surveyor"
 position_m = [0.0, 0.0]
 [[nodes]]
 node = "coverage"
-parameters = {uavs = ["uav1"], height_m = 2.5, over_m = 0.0, layer_m = 1.5, patience_s = 10.0}
+parameters = {uavs = ["uav1"], height_m = 2.5, layer_spacing_m = 1.5, timeout_s = 10.0}
 [[faults]]
 kind = "motor"
 uav = "uav1"

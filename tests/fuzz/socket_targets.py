@@ -96,7 +96,7 @@ class _Bench(HandGraph):
         super().__init__()
         self.publisher = self.graph.advertise("/out", STRING, latched=True)
         self.graph.subscribe("/uav1/cmd_vel", lambda _: None, "geometry_msgs/msg/Twist")
-        self.graph.offer("/do", TRIGGER, lambda _request: Response(True, "done"))
+        self.graph.create_service("/do", TRIGGER, lambda _request: Response(True, "done"))
         self.before = self.counts()
 
     def counts(self):

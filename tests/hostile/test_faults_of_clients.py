@@ -146,7 +146,7 @@ def test_a_node_that_breaks_later_on_a_clients_value_names_the_client(client):
 
 
 def test_a_service_that_breaks_names_itself_not_pythons_error(client, caplog):
-    client.simulation.graph.offer("/broken", "std_srvs/srv/Trigger", lambda _: {}["uav2"])
+    client.simulation.graph.create_service("/broken", "std_srvs/srv/Trigger", lambda _: {}["uav2"])
     answer = client.call("/broken", None)
     assert "/broken" in str(answer)
     assert not RAW.search(str(answer))

@@ -170,7 +170,7 @@ def test_what_is_sent_too_fast_stays_with_the_sender(bridge, monkeypatch):
         with connect(bridge) as other:  # who is read as before
             until(lambda: len(bridge._clients) == 2)
             other.sendall(heartbeat())
-            until(lambda: sum(one.party.has_spoken for one in bridge._clients.values()) == 2)
+            until(lambda: sum(one.connection.has_spoken for one in bridge._clients.values()) == 2)
 
 
 def test_a_client_that_does_not_read_costs_no_memory(bridge):
@@ -188,12 +188,12 @@ def test_idle_clients_give_way_and_those_that_speak_stay(bridge):
     with contextlib.ExitStack() as stack:
         speaking = stack.enter_context(connect(bridge))
         speaking.sendall(heartbeat())
-        until(lambda: any(one.party.has_spoken for one in bridge._clients.values()))
+        until(lambda: any(one.connection.has_spoken for one in bridge._clients.values()))
         for _ in range(100):
             stack.enter_context(connect(bridge))
         late = stack.enter_context(connect(bridge))
         late.sendall(heartbeat())
-        until(lambda: sum(one.party.has_spoken for one in bridge._clients.values()) == 2)
+        until(lambda: sum(one.connection.has_spoken for one in bridge._clients.values()) == 2)
         assert len(bridge._clients) <= 40
 
 

@@ -252,7 +252,7 @@ def test_rosbridge(rosbridge, way, monkeypatch):
     until_waiting(rosbridge, 4)
     assert outcomes == []
     assert enter(rosbridge, TOKEN, way, ELSEWHERE)
-    monkeypatch.setattr(rosbridge._guesses, "_penalty_s", 0.001)
+    monkeypatch.setattr(rosbridge._attempts, "_penalty_s", 0.001)
     first.close()  # its turn ends, and with it the wait of the others
     for one in guessers:
         one.join(PATIENCE_S)
@@ -263,17 +263,17 @@ def test_rosbridge(rosbridge, way, monkeypatch):
 def until_waiting(server, count):
     waited = threading.Event()
     for _ in range(int(PATIENCE_S / 0.02)):
-        if server._guesses.num_waiting >= count:
+        if server._attempts.num_waiting >= count:
             return
         waited.wait(0.02)
-    raise AssertionError(f"{server._guesses.num_waiting} wait, not {count}")
+    raise AssertionError(f"{server._attempts.num_waiting} wait, not {count}")
 
 
 def test_the_communication_server():
     async def test():
         server = CommsServer(RouterSettings(token=TOKEN), port=0)
         await server.start()
-        penalize, at_once = server._guesses.penalize, []
+        penalize, at_once = server._attempts.penalize, []
 
         async def counted(gone=None):
             at_once.append(1 + sum(at_once[-1:]) if penalized else 1)
@@ -282,7 +282,7 @@ def test_the_communication_server():
             penalized.pop()
 
         penalized = []
-        server._guesses.penalize = counted
+        server._attempts.penalize = counted
         guessers = [Station(Identity(k, 0), port=server.port, token="guess") for k in range(1, 9)]
         right = Station(Identity(9, 0), port=server.port, token=TOKEN)
         try:

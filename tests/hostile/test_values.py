@@ -153,7 +153,7 @@ def test_worlds_of_absurd_size_are_refused(flat_data, world):
         ("gap_following", "route", lambda x: [[10.0, x]]),
         ("gap_following", "height_m", lambda x: x),
         ("gap_following", "level_mount", lambda x: [x, 0.0, 0.0]),
-        ("coverage", "over_m", lambda x: x),
+        ("coverage", "crossing_height_m", lambda x: x),
         ("coverage", "height_m", lambda x: x),
         ("region_avoidance", "mount", lambda x: [0.0, x, 0.0]),
         ("depth_avoidance", "mount", lambda x: [0.0, x, 0.0]),
@@ -169,9 +169,9 @@ def test_parameters_of_nodes_are_finite(flat_data, node, key, value, number):
 @pytest.mark.parametrize(
     ("key", "value", "words"),
     [
-        ("over_m", -1.0, "over_m must be 0 to 10000 m"),
+        ("crossing_height_m", -1.0, "crossing_height_m must be 0 to 10000 m"),
         ("height_m", 1e5, "height_m must be"),
-        ("layer_m", -5.0, "layer_m must be"),
+        ("layer_spacing_m", -5.0, "layer_spacing_m must be"),
     ],
 )
 def test_coverage_has_heights_at_which_something_flies(flat_data, key, value, words):

@@ -40,7 +40,7 @@ NODES = {
     "coverage": {
         "uavs": ["uav1", "uav2"],
         "height_m": 2.5,
-        "over_m": 10.0,
+        "crossing_height_m": 10.0,
     },
     "depth_avoidance": {},
     "gap_following": {"route": [[15.0, 0.0]]},
@@ -48,13 +48,13 @@ NODES = {
     "map_merging": {"period_s": 0.2},
     "exploration": {},
     "trajectory_follower": {},
-    "global_planner": {"iterations": 50},
+    "global_planner": {"max_iterations": 50},
     "local_planner": {},
     "planar_slam": {},
     "slam": {},
     "target_detection": {"camera": "camera"},
     "task_manager": {"area_m": AREA, "sector_m": 20.0},
-    "radio": {"topics": ["odom nav_msgs/msg/Odometry"], "station": 1},
+    "radio": {"topics": ["odom nav_msgs/msg/Odometry"], "station_id": 1},
     "mavlink_autopilot": {},
 }
 """Nodes and their parameters."""
@@ -100,7 +100,7 @@ def flight(name):
 
 def subscribed(node):
     """Topics that a node subscribes to at present."""
-    held = tuple(node._Node__held)
+    held = tuple(node._Node__handles)
     return sorted({handle.topic for handle in held if isinstance(handle, NodeSubscription)})
 
 

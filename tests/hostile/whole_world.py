@@ -27,7 +27,7 @@ GAP_FOLLOWING = {
 MAVLINK = {"node": "mavlink_autopilot"}
 COVERAGE = {
     "node": "coverage",
-    "parameters": {"uavs": ["uav1", "uav2"], "height_m": 2.5, "over_m": 10.0},
+    "parameters": {"uavs": ["uav1", "uav2"], "height_m": 2.5, "crossing_height_m": 10.0},
 }
 PLANNING = [
     {"node": name, "parameters": {"odometry": "odom"}}

@@ -10,9 +10,9 @@ from volery.bridges.ros1.client import Ros1Client
 def main():
     link = Ros1Client(node_name="localhost_program")
     woken = threading.Event()
-    mailbox = link.subscribe("/to_localhost", wake=woken.set)
+    queue = link.subscribe("/to_localhost", wake=woken.set)
     woken.wait(60.0)
-    sys.stdout.write(json.dumps(mailbox.take()[0].message.data) + "\n")
+    sys.stdout.write(json.dumps(queue.take()[0].message.data) + "\n")
     sys.stdout.flush()
     link.close()
 

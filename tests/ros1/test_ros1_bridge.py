@@ -262,14 +262,18 @@ def test_topics_without_publishers_come_in_as_they_appear(live, bridge):
 
 
 def test_services_of_the_graph(live, registered):
-    live.graph.offer("/trigger", TRIGGER, lambda _request: Triggered(True, f"done, {UNICODE}"))
+    live.graph.create_service(
+        "/trigger", TRIGGER, lambda _request: Triggered(True, f"done, {UNICODE}")
+    )
     bool_response = message_type("std_srvs/srv/SetBool_Response")
-    live.graph.offer("/set", "std_srvs/srv/SetBool", lambda q: bool_response(q.data, f"{q.data}"))
+    live.graph.create_service(
+        "/set", "std_srvs/srv/SetBool", lambda q: bool_response(q.data, f"{q.data}")
+    )
 
     def broken(_request):
         raise GraphError("out of order")
 
-    live.graph.offer("/broken", TRIGGER, broken)
+    live.graph.create_service("/broken", TRIGGER, broken)
     registered("/broken", "lookupService")
     assert "success: True" in tool("rosservice", "call", "/trigger")
     assert "std_srvs/Trigger" in tool("rosservice", "type", "/trigger")
@@ -279,7 +283,7 @@ def test_services_of_the_graph(live, registered):
         assert caller.next() == [True, f"done, {UNICODE}"]
     with peer("call", "/trigger", "--altered") as caller:
         assert "md5sums do not match" in caller.next()
-    live.graph.withdraw("/broken")
+    live.graph.destroy_service("/broken")
     assert wait_until(lambda: "/broken" not in tool("rosservice", "list"))
 
 
@@ -304,7 +308,7 @@ def test_rostopic_and_rosservice_know_our_own_types(live, registered, own_types)
         asked.append(question)
         return response(True, "on the way")
 
-    live.graph.offer("/uav1/go_to", GO_TO, go_to)
+    live.graph.create_service("/uav1/go_to", GO_TO, go_to)
     state = zero_message(FLIGHT_STATE)
     state.mode, state.battery_charge = "HOLD", 0.5
     live.publisher("/uav1/flight_state", FLIGHT_STATE, latched=True)(state)
@@ -395,13 +399,15 @@ def test_one_node_a_process(bridge):
 
 def test_a_program_of_ours(live, registered):
     live.publisher("/latched", STRING, latched=True)
-    live.graph.offer("/trigger_ours", TRIGGER, lambda _: Triggered(True, "yes"))
+    live.graph.create_service("/trigger_ours", TRIGGER, lambda _: Triggered(True, "yes"))
     seen = live.collect("/from_program", STRING)
     headers = live.collect("/headers_in", HEADER)
     registered("/latched")
     del headers
     if not live.graph.has_service("/trigger"):
-        live.graph.offer("/trigger", TRIGGER, lambda _: Triggered(True, f"done, {UNICODE}"))
+        live.graph.create_service(
+            "/trigger", TRIGGER, lambda _: Triggered(True, f"done, {UNICODE}")
+        )
     registered("/trigger", "lookupService")
     with ours("client_program.py") as program:
         text, received = program.next(20.0)

@@ -27,6 +27,18 @@ def banned_words() -> set[str]:
 
 
 BANNED = banned_words()
+BANNED_IN_ALL_NAMES = {
+    *("anew", "carrot", "crew", "door", "doors", "doubt", "farthest", "guess", "guesses", "hear"),
+    *("heard", "hears", "keeper", "lobby", "mailbox", "party", "patience", "picture", "pictures"),
+    *("pilot", "pipe", "seat", "tell", "telling", "tells", "told", "thinker", "watcher"),
+    *("bite", "farewell", "outfit", "said", "say", "stranger", "who"),
+}
+"""Words that names of functions, parameters and attributes do not contain either."""
+UNCHECKED = (
+    *("bench/", "runtime/", "mavlink/autopilot/", "cli/flight.py", "bridges/logs/chunks.py"),
+    "bridges/logs/disk_file.py",  # `tell` of Python's files
+)
+"""Files and folders whose functions, parameters and attributes may still contain them."""
 
 
 def parts_of(name: str) -> list[str]:
@@ -42,6 +54,21 @@ def names() -> Iterator[tuple[str, str]]:
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.ClassDef):
                 yield node.name, f"{where}: class {node.name}"
+
+
+def inner_names() -> Iterator[tuple[str, str]]:
+    """(name, where it is) of functions, methods, their parameters, and attributes that are set."""
+    for path in sorted(_SOURCE.rglob("*.py")):
+        where = path.relative_to(_SOURCE).as_posix()
+        if where.startswith(UNCHECKED):
+            continue
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                yield node.name, f"{where}:{node.lineno} {node.name}"
+            elif isinstance(node, ast.arg):
+                yield node.arg, f"{where}:{node.lineno} {node.arg}"
+            elif isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
+                yield node.attr, f"{where}:{node.lineno} {node.attr}"
 
 
 def options() -> Iterator[tuple[str, str]]:
@@ -67,6 +94,13 @@ def test_modules_and_classes_use_the_words_of_the_glossary() -> None:
     known = dict(names())
     assert {"bridge_host", "BridgeHost", "SlamHealth"} <= set(known)
     found = [where for name, where in names() if BANNED & set(parts_of(name))]
+    assert found == []
+
+
+def test_functions_parameters_and_attributes_use_the_words_of_the_glossary() -> None:
+    known = {name for name, _ in inner_names()}
+    assert {"create_service", "has_subscribers", "queue", "_timeout_policy"} <= known
+    found = [where for name, where in inner_names() if BANNED_IN_ALL_NAMES & set(parts_of(name))]
     assert found == []
 
 

@@ -47,12 +47,12 @@ def steps_a_second_of_copies(threads: int = 2) -> float:
     """Returns the median of all environments' physics steps per second of wall time."""
     rng = np.random.default_rng(1)
     rates = []
-    with VectorizedSimulation(parse_scenario(_LONE), _COPIES, threads=threads) as copies:
-        copies.run(0.1)
+    with VectorizedSimulation(parse_scenario(_LONE), _COPIES, threads=threads) as envs:
+        envs.run(0.1)
         for _ in range(_ROUNDS):
             start = time.perf_counter()
             for _ in range(round(_COPIES_S / 0.1)):
-                copies.command_velocity(rng.uniform(-1.0, 1.0, (_COPIES, 1, 3)))
-                copies.run(0.1)
+                envs.command_velocity(rng.uniform(-1.0, 1.0, (_COPIES, 1, 3)))
+                envs.run(0.1)
             rates.append(_COPIES * _COPIES_S * 1000.0 / (time.perf_counter() - start))
     return statistics.median(rates)

@@ -32,10 +32,10 @@ class RemoteServices(Protocol):
     def call(self, service: str, request: Any | None, reply: ServiceReply) -> None:
         """Calls a service; without a request the server is first asked for its type."""
 
-    def offer(self, service: str, srvtype: str, handler: Handler) -> None:
+    def create_service(self, service: str, srvtype: str, handler: Handler) -> None:
         """Creates a service. Raises `GraphError` for an unknown type or an existing service."""
 
-    def withdraw(self, service: str, who: str) -> None:
+    def destroy_service(self, service: str, client_name: str) -> None:
         """Destroys a service; its open requests fail. Raises `GraphError` if it does not exist."""
 
 
@@ -151,9 +151,9 @@ class RemoteClient(ABC):
                 raise GraphError(f"no topic '{topic}'; give a type to subscribe before it exists")
         return self._topics.subscribe(topic, msgtype, depth, reliable, wake)
 
-    def unsubscribe(self, mailbox: SubscriptionQueue) -> None:
+    def unsubscribe(self, queue: SubscriptionQueue) -> None:
         """Ends a subscription; queued messages remain available."""
-        self._topics.unsubscribe(mailbox)
+        self._topics.unsubscribe(queue)
 
     @abstractmethod
     def _type_of(self, topic: str) -> str | None:
@@ -186,14 +186,14 @@ class RemoteClient(ABC):
         self._check_open()
         self._services.call(service, request, reply)
 
-    def offer(self, service: str, srvtype: str, handler: Handler) -> None:
+    def create_service(self, service: str, srvtype: str, handler: Handler) -> None:
         """Creates a service; `handler(request, reply)` is called in the client's thread."""
         self._check_open()
-        self._services.offer(service, srvtype, handler)
+        self._services.create_service(service, srvtype, handler)
 
-    def withdraw(self, service: str) -> None:
+    def destroy_service(self, service: str) -> None:
         """Destroys a service. Raises `GraphError` if it does not exist."""
-        self._services.withdraw(service, self.name)
+        self._services.destroy_service(service, self.name)
 
     # --------------------------------------------------------------------------------------- end
 

@@ -19,7 +19,7 @@ class Subscription:
     """A topic's subscription, shared by all its queues."""
 
     msgtype: str
-    mailboxes: list[SubscriptionQueue] = field(default_factory=list)
+    queues: list[SubscriptionQueue] = field(default_factory=list)
     depth: int = 1
     """Largest depth of its queues."""
     reliable: bool = False
@@ -50,9 +50,9 @@ class RemoteTopics(ABC):
     def repeat_topics(self) -> None:
         """Repeats all advertisements and subscriptions on a new connection; needs the lock."""
         for topic, (msgtype, latched) in self._announced.items():
-            self._tell_advertised(topic, msgtype, latched)
+            self._send_advertised(topic, msgtype, latched)
         for topic, subscription in self._subscriptions.items():
-            self._tell_subscribed(topic, subscription)
+            self._send_subscribed(topic, subscription)
 
     # ------------------------------------------------------------------------------ publications
 
@@ -62,25 +62,25 @@ class RemoteTopics(ABC):
         with self._lock:
             if self._announced.get(topic) != (msgtype, latched):
                 self._announced[topic] = (msgtype, latched)
-                self._tell_advertised(topic, msgtype, latched)
+                self._send_advertised(topic, msgtype, latched)
 
-    def unadvertise(self, topic: str, who: str) -> None:
+    def unadvertise(self, topic: str, client_name: str) -> None:
         """Ends an advertisement. Raises `GraphError` if there was none."""
         with self._lock:
             if self._announced.pop(topic, None) is None:
-                raise GraphError(f"{who} does not publish '{topic}'")
-            self._tell_unadvertised(topic)
+                raise GraphError(f"{client_name} does not publish '{topic}'")
+            self._send_unadvertised(topic)
 
     def published_type(self, topic: str) -> str | None:
         """Returns the advertised type of a topic."""
         found = self._announced.get(topic)
         return None if found is None else found[0]
 
-    def publish(self, topic: str, message: Any, who: str) -> None:
+    def publish(self, topic: str, message: Any, client_name: str) -> None:
         """Sends a message of the advertised type; drops it without a connection."""
         msgtype = self.published_type(topic)
         if msgtype is None:
-            raise GraphError(f"{who} has not advertised '{topic}'")
+            raise GraphError(f"{client_name} has not advertised '{topic}'")
         name = getattr(message, "__msgtype__", None)
         if name != msgtype:
             raise GraphError(f"topic '{topic}' carries {msgtype}, not {name}")
@@ -100,33 +100,33 @@ class RemoteTopics(ABC):
         """Subscribes to a topic. Raises `GraphError` for an unknown or a second type."""
         self._check_type(msgtype)
         check_depth(depth)
-        mailbox = SubscriptionQueue(topic, depth, wake, reliable=reliable)
+        queue = SubscriptionQueue(topic, depth, wake, reliable=reliable)
         with self._lock:
             found = self._subscriptions.setdefault(topic, Subscription(msgtype))
             if found.msgtype != msgtype:
                 raise GraphError(f"topic '{topic}' carries {found.msgtype}, not {msgtype}")
-            found.mailboxes.append(mailbox)
+            found.queues.append(queue)
             found.depth = max(found.depth, depth)
             found.reliable = found.reliable or reliable
-            self._tell_subscribed(topic, found)
-        return mailbox
+            self._send_subscribed(topic, found)
+        return queue
 
-    def unsubscribe(self, mailbox: SubscriptionQueue) -> None:
+    def unsubscribe(self, queue: SubscriptionQueue) -> None:
         """Ends a queue's subscription; the last one of a topic also ends that of the server."""
         with self._lock:
-            found = self._subscriptions.get(mailbox.topic)
-            if found is None or mailbox not in found.mailboxes:
+            found = self._subscriptions.get(queue.topic)
+            if found is None or queue not in found.queues:
                 return
-            found.mailboxes.remove(mailbox)
-            if not found.mailboxes:
-                del self._subscriptions[mailbox.topic]
-                self._tell_unsubscribed(mailbox.topic)
+            found.queues.remove(queue)
+            if not found.queues:
+                del self._subscriptions[queue.topic]
+                self._send_unsubscribed(queue.topic)
 
     @property
-    def mailboxes(self) -> tuple[SubscriptionQueueInfo, ...]:
+    def queues(self) -> tuple[SubscriptionQueueInfo, ...]:
         """State of the subscriptions."""
         with self._lock:
-            return tuple(m.info for s in self._subscriptions.values() for m in s.mailboxes)
+            return tuple(m.info for s in self._subscriptions.values() for m in s.queues)
 
     def _deliver(self, topic: str, decode: Callable[[str], Any]) -> None:
         """Passes a received message to its queues; `decode` decodes it for a type.
@@ -135,13 +135,13 @@ class RemoteTopics(ABC):
         """
         with self._lock:
             found = self._subscriptions.get(topic)
-            mailboxes = tuple(found.mailboxes) if found else ()
+            queues = tuple(found.queues) if found else ()
         if found is None:
             return
         message = decode(found.msgtype)
         published = Published(topic, found.msgtype, stamp_of(message), message)
-        for mailbox in mailboxes:
-            mailbox.put(published)
+        for queue in queues:
+            queue.put(published)
 
     # ------------------------------------------------------------------------------------- words
 
@@ -150,17 +150,17 @@ class RemoteTopics(ABC):
         """Sends a message of this type; without a connection counts it as dropped."""
 
     @abstractmethod
-    def _tell_advertised(self, topic: str, msgtype: str, latched: bool) -> None:
+    def _send_advertised(self, topic: str, msgtype: str, latched: bool) -> None:
         """Sends an advertisement."""
 
     @abstractmethod
-    def _tell_unadvertised(self, topic: str) -> None:
+    def _send_unadvertised(self, topic: str) -> None:
         """Sends the end of an advertisement."""
 
     @abstractmethod
-    def _tell_subscribed(self, topic: str, subscription: Subscription) -> None:
+    def _send_subscribed(self, topic: str, subscription: Subscription) -> None:
         """Subscribes with the subscription's current options; may repeat an earlier request."""
 
     @abstractmethod
-    def _tell_unsubscribed(self, topic: str) -> None:
+    def _send_unsubscribed(self, topic: str) -> None:
         """Unsubscribes."""

@@ -25,7 +25,7 @@ def measure_and_show(
     for path in (out, markdown):
         if path is not None and not path.parent.is_dir():
             raise VoleryError(f"{path}: folder {path.parent} does not exist")
-    with _progress_told():
+    with _with_progress():
         if name == "all" and quick:
             raise VoleryError("--quick is for one bench: forest_search, load or hostile")
         if name == "all":
@@ -46,7 +46,7 @@ def measure_and_show(
 
 
 @contextmanager
-def _progress_told() -> Iterator[None]:
+def _with_progress() -> Iterator[None]:
     """Makes long benches report their progress on standard error."""
     log, handler = logging.getLogger("volery.bench"), logging.StreamHandler()
     log.setLevel(logging.INFO)

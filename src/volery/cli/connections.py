@@ -21,7 +21,7 @@ DEFAULT_VIA = "rosbridge://127.0.0.1:9090"
 WAYS = "rosbridge://HOST:PORT, ros-tcp://HOST:PORT, ros1, ros2, ros2-zenoh or rclpy"
 ROS2_WAYS = ("ros2", "ros2-zenoh", "rclpy")
 _ROS_TCP_PORT = 10000
-PATIENCE_S = 30.0
+TIMEOUT_S = 30.0
 """Wall time for which a node in its own process waits for its graph; a world may take long to
 build."""
 _AGAIN_S = 0.2
@@ -53,9 +53,9 @@ def open_link(via: str, name: str) -> GraphConnection:
     raise _no_way(via)
 
 
-def await_link(via: str, name: str, patience_s: float = PATIENCE_S) -> GraphConnection:
-    """Joins like `open_link`, but waits up to `patience_s` for a graph that starts later."""
-    until = time.monotonic() + patience_s
+def await_link(via: str, name: str, timeout_s: float = TIMEOUT_S) -> GraphConnection:
+    """Joins like `open_link`, but waits up to `timeout_s` for a graph that starts later."""
+    until = time.monotonic() + timeout_s
     told = False
     while True:
         try:
@@ -65,7 +65,7 @@ def await_link(via: str, name: str, patience_s: float = PATIENCE_S) -> GraphConn
                 raise
             if not told:
                 told = True
-                typer.echo(f"{error}; waiting up to {patience_s:.0f} s", err=True)
+                typer.echo(f"{error}; waiting up to {timeout_s:.0f} s", err=True)
             time.sleep(_AGAIN_S)
 
 

@@ -9,7 +9,7 @@ import typer
 from volery.core.errors import VoleryError
 
 
-def export_and_tell(scenario: str, file: Path, detail: str) -> None:
+def export_and_report(scenario: str, file: Path, detail: str) -> None:
     """Writes the file and prints its size."""
     from volery import load_scenario
     from volery.runtime.build.world_export import export_world

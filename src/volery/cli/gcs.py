@@ -39,7 +39,7 @@ def parse_server(text: str) -> tuple[str, int]:
 
 
 def command_station(
-    server: str, number: int, token: str | None, planes_per_batch: int, log: Path | None
+    server: str, number: int, token: str | None, group_size: int, log: Path | None
 ) -> None:
     """Joins a server, prints received messages and sends the commands of the input lines."""
     host, port = parse_server(server)
@@ -55,9 +55,9 @@ def command_station(
             port=port,
             name="gcs",
             token=token,
-            planes_per_batch=planes_per_batch,
+            group_size=group_size,
         )
-        desk.ground = GroundStation(station.send, planes_per_batch, lambda: station.joined)
+        desk.ground = GroundStation(station.send, group_size, lambda: station.joined)
         asyncio.run(desk.work(station))
 
 
@@ -82,7 +82,9 @@ class _Desk:
         Raises `CommsError` if the server rejects this station.
         """
         await station.start()
-        self._say(f"joined as ground station, address {station.core.address}; help shows commands")
+        self._print(
+            f"joined as ground station, address {station.core.address}; help shows commands"
+        )
         self._has_joined = True
         lines = self._lines
         _read_into(lines, asyncio.get_running_loop())
@@ -97,7 +99,7 @@ class _Desk:
                 with contextlib.suppress(TimeoutError, asyncio.TimeoutError):
                     await asyncio.wait_for(station.until_settled(), _LEAVE_S)
             if still_open := self.ground.open_commands(station.core.is_settled):
-                self._say(f"warning: no acknowledgement of: {', '.join(still_open)}")
+                self._print(f"warning: no acknowledgement of: {', '.join(still_open)}")
         finally:
             await station.stop()
         if station.core.fatal is not None:
@@ -105,9 +107,9 @@ class _Desk:
 
     async def _wait_for_states(self) -> None:
         ends = time.monotonic() + _FIRST_S
-        while not self.ground.has_heard and time.monotonic() < ends:
+        while not self.ground.has_received and time.monotonic() < ends:
             await asyncio.sleep(0.02)
-        if self.ground.has_heard:
+        if self.ground.has_received:
             await asyncio.sleep(_OTHERS_S)
 
     def _do(self, line: str) -> None:
@@ -118,24 +120,24 @@ class _Desk:
             typer.echo(HELP)
         elif word == "list":
             print_table(HEAD, self.ground.rows(self._now_ns()), right=(4, 5, 6))
-            if not self.ground.has_heard:
+            if not self.ground.has_received:
                 typer.echo("no message of a UAV received so far")
             sys.stdout.flush()
         else:
             try:
-                self._say(self.ground.command(word))
+                self._print(self.ground.command(word))
             except CommsError as error:
-                self._say(f"error: {error}")
+                self._print(f"error: {error}")
 
     def on_message(self, frame: StationFrame) -> None:
         """Prints a received message."""
         if line := self.ground.take(frame, self._now_ns()):
-            self._say(line)
+            self._print(line)
 
     def on_refusal(self, refusal: Refusal) -> None:
         """Prints a refusal of the server; ends the command if the server rejects this station."""
         if refusal.sequence or refusal.reason not in FATAL:
-            self._say(self.ground.refused(refusal))
+            self._print(self.ground.refused(refusal))
         else:
             self._is_sent_away = True
             self._lines.put_nowait(None)
@@ -143,15 +145,15 @@ class _Desk:
     def on_joined(self, joined: bool) -> None:
         """Prints that the server connected or disconnected."""
         if joined and self._has_joined:
-            self._say("the server is back")
+            self._print("the server is back")
         elif not joined and not self._is_sent_away:
-            self._say("the connection to the server is lost; trying again")
+            self._print("the connection to the server is lost; trying again")
 
     def _now_ns(self) -> int:
         """Returns a clock that never goes back, set by the time of day at the start."""
         return self._clock_ns + time.monotonic_ns()
 
-    def _say(self, line: str) -> None:
+    def _print(self, line: str) -> None:
         typer.echo(line)
         sys.stdout.flush()
         if self._log is not None:

@@ -16,7 +16,7 @@ from volery.graph.codecs.interface_packages import (
 )
 
 
-def write_and_tell(folder: Path, names: list[str], *, overwrite: bool, ros1: bool) -> None:
+def write_and_report(folder: Path, names: list[str], *, overwrite: bool, ros1: bool) -> None:
     """Writes packages into a folder of a workspace and prints what they need."""
     if not folder.is_dir():
         raise VoleryError(f"{folder}: no such folder; create it with `mkdir -p {folder}`")

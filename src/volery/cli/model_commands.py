@@ -33,9 +33,9 @@ def export(
     ] = "sensing",
 ) -> None:
     """Write the world of a scenario as glTF: ground, trees, buildings."""
-    from volery.cli.export import export_and_tell
+    from volery.cli.export import export_and_report
 
-    export_and_tell(scenario, file, detail)
+    export_and_report(scenario, file, detail)
 
 
 @guarded
@@ -55,6 +55,6 @@ def interfaces(
     ] = False,
 ) -> None:
     """Write Volery's message types as ROS 2 packages or, with --ros1, ROS 1 packages."""
-    from volery.cli.interfaces import write_and_tell
+    from volery.cli.interfaces import write_and_report
 
-    write_and_tell(folder, package or [], overwrite=overwrite, ros1=ros1)
+    write_and_report(folder, package or [], overwrite=overwrite, ros1=ros1)

@@ -19,7 +19,7 @@ class FlightProgress:
         self._duration_s = duration_s
         self._bar: Any = None
         self._task: Any = None
-        self._told_at = time.monotonic()
+        self._shown_at = time.monotonic()
         self._paused = False
 
     def __enter__(self) -> FlightProgress:
@@ -55,8 +55,8 @@ class FlightProgress:
         changed, self._paused = paused != self._paused, paused
         if self._bar is not None:
             self._bar.update(self._task, completed=time_s, state=state)
-        elif changed or time.monotonic() - self._told_at > _PLAIN_PERIOD_S:
-            self._told_at = time.monotonic()
+        elif changed or time.monotonic() - self._shown_at > _PLAIN_PERIOD_S:
+            self._shown_at = time.monotonic()
             typer.echo(f"{self._name}: {state}")
 
     def note(self, text: str) -> None:

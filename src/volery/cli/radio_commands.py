@@ -27,7 +27,7 @@ def comms(
     from volery.cli.comms import serve_stations
     from volery.comms.server.settings import RouterSettings
 
-    settings = RouterSettings(planes_per_batch=group_size, token=token)
+    settings = RouterSettings(group_size=group_size, token=token)
     serve_stations(host, port, settings, anywhere=allow_remote)
 
 
@@ -40,7 +40,9 @@ def gcs(
         int, typer.Option(min=0, max=255, help="Set the number of this ground station.")
     ] = 0,
     group_size: GroupSizeOption = 4,
-    token: TokenOption = None,
+    token: Annotated[
+        str | None, typer.Option(envvar="VOLERY_TOKEN", help="Send this token to the server.")
+    ] = None,
     log: Annotated[Path | None, typer.Option(help="Append all lines to this file.")] = None,
 ) -> None:
     """Monitor and command UAVs over the radio network; type help for the commands."""

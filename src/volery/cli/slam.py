@@ -84,12 +84,12 @@ def map_log(asked: SlamArguments) -> None:
     if others and asked.uav is None and asked.scan is None:
         warn(f"mapping {run.channels.uav}; the log also has {', '.join(others)}: select with --uav")
     try:
-        outcome = run.run(_Progress().tell)
+        outcome = run.run(_Progress().show)
     finally:  # a problem of the log often explains why the SLAM failed
         for problem in filter(None, (source.problem, *source.doubts)):
             warn(f"{asked.log}: {problem}")
     cell_m = _write(asked, outcome)
-    _tell(asked.out, _summary(asked, outcome, source.refused, cell_m, run.start))
+    _print_summary(asked.out, _summary(asked, outcome, source.refused, cell_m, run.start))
     _advise(outcome, source.topics)
     _compare_ways(outcome)
 
@@ -126,13 +126,13 @@ class _Progress:
     """Prints the progress, at long intervals if stderr is no terminal."""
 
     def __init__(self) -> None:
-        self._told = time.monotonic()
+        self._shown_at = time.monotonic()
 
-    def tell(self, scans: int, seconds: float) -> None:
+    def show(self, scans: int, seconds: float) -> None:
         """Prints how much has been read."""
         now = time.monotonic()
-        if sys.stderr.isatty() or now - self._told >= _PLAIN_PERIOD_S:
-            self._told = now
+        if sys.stderr.isatty() or now - self._shown_at >= _PLAIN_PERIOD_S:
+            self._shown_at = now
             typer.echo(f"{counted(scans, 'scan')}, {seconds:.0f} s of the log", err=True)
 
 
@@ -199,7 +199,7 @@ def _write(asked: SlamArguments, outcome: SlamResult) -> float | None:
 
 def _write_map(asked: SlamArguments, outcome: SlamResult) -> float:
     from volery.autonomy.mapping.grid_files import write_grid
-    from volery.runtime.replay.slam.map_image import write_picture
+    from volery.runtime.replay.slam.map_image import write_image
     from volery.runtime.replay.slam.map_rendering import draw_map
 
     grid = draw_map(outcome, asked.resolution, asked.reach)
@@ -212,7 +212,7 @@ def _write_map(asked: SlamArguments, outcome: SlamResult) -> float:
     values = grid.occupancy()
     write_grid(asked.out / "map", values, grid.origin, grid.cell_m)
     way = outcome.trajectory.position[:, :2]
-    write_picture(asked.out / "map.png", values, grid.origin, grid.cell_m, way)
+    write_image(asked.out / "map.png", values, grid.origin, grid.cell_m, way)
     return grid.cell_m
 
 
@@ -224,13 +224,13 @@ def _summary(
     start: Pose | None,
 ) -> dict[str, Any]:
     status = outcome.status
-    told = {
+    results = {
         "log": asked.log.name,
         "uav": outcome.channels.uav,
         "mode": "imu" if outcome.channels.has_imu else "planar",
         "topics": outcome.channels.names,
         "start": _in_degrees(start),
-        "scans": outcome.heard,
+        "scans": outcome.num_scans,
         "lasted_s": round(outcome.lasted_s, 3),
         "way_m": round(outcome.trajectory.length_m, 2),
         "cell_m": cell_m,
@@ -246,33 +246,33 @@ def _summary(
         "cpu_share": round(outcome.cpu_s / outcome.lasted_s, 4) if outcome.lasted_s else None,
     }
     try:
-        text = json.dumps(told, indent=2) + "\n"
+        text = json.dumps(results, indent=2) + "\n"
         (asked.out / "summary.json").write_text(text, encoding="utf-8")
     except OSError as error:
         raise RecordingError(f"{asked.out}: {error.strerror}") from None
-    return told
+    return results
 
 
-def _tell(out: Path, told: dict[str, Any]) -> None:
-    share = told["cpu_share"]
+def _print_summary(out: Path, r: dict[str, Any]) -> None:
+    share = r["cpu_share"]
     typer.echo(
-        f"{counted(told['scans'], 'scan')} over {told['lasted_s']:.1f} s, "
-        f"{told['way_m']:.1f} m path length ({'with' if told['mode'] == 'imu' else 'without'} IMU)"
+        f"{counted(r['scans'], 'scan')} over {r['lasted_s']:.1f} s, "
+        f"{r['way_m']:.1f} m path length ({'with' if r['mode'] == 'imu' else 'without'} IMU)"
     )
     typer.echo(
-        f"{counted(told['keyframes'], 'keyframe')}, {counted(told['closures'], 'closure')}, "
-        f"{counted(told['sessions'], 'session')}, {counted(told['refused'], 'message')} refused"
+        f"{counted(r['keyframes'], 'keyframe')}, {counted(r['closures'], 'closure')}, "
+        f"{counted(r['sessions'], 'session')}, {counted(r['refused'], 'message')} refused"
     )
-    topics = [topic for topic in told["topics"].values() if topic != "/tf_static"]
-    typer.echo(f"input     {told['uav']}: {', '.join(topics)}")
-    states = ", ".join(f"{name} {_lasting(s)}" for name, s in told["states_s"].items())
+    topics = [topic for topic in r["topics"].values() if topic != "/tf_static"]
+    typer.echo(f"input     {r['uav']}: {', '.join(topics)}")
+    states = ", ".join(f"{name} {_lasting(s)}" for name, s in r["states_s"].items())
     typer.echo(f"state     {states or 'none'}")
-    for problem, seconds in told["problems_s"].items():
+    for problem, seconds in r["problems_s"].items():
         typer.echo(f"problem   {problem}: {_lasting(seconds)}")
     if share is not None:
-        typer.echo(f"CPU       {told['cpu_s']:.1f} s, {share:.1%} of the log's time")
+        typer.echo(f"CPU       {r['cpu_s']:.1f} s, {share:.1%} of the log's time")
     for name in _NAMES:
-        if name not in _MAPS or told["cell_m"] is not None:
+        if name not in _MAPS or r["cell_m"] is not None:
             typer.echo(f"written   {out / name}")
 
 

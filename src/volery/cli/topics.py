@@ -142,12 +142,12 @@ def _messages(via: str, topic: str, name: str) -> Iterator[Published | None]:
     """Yields the messages of a topic without end, and None at least five times a second."""
     with closing(open_link(via, name)) as link:
         come, told = threading.Event(), ConnectionOptions(link, via)
-        mailbox = link.subscribe(topic, type_of_topic(link, topic), depth=_DEPTH, wake=come.set)
+        queue = link.subscribe(topic, type_of_topic(link, topic), depth=_DEPTH, wake=come.set)
         while True:
             come.wait(0.2)
             come.clear()
             told()
-            yield from mailbox.take()
+            yield from queue.take()
             yield None
 
 

@@ -4,7 +4,7 @@ An address is a u16:
 
 | address | meaning |
 |---|---|
-| 0 .. 0x7EFF | the station with this linear id, planes_per_batch x batch + plane |
+| 0 .. 0x7EFF | the station with this linear id, group_size x batch + plane |
 | 0x7F00 .. 0x7FFF | ground stations, which belong to no batch |
 | 0x8000 + b | all stations of batch b, b up to 0x3FFF |
 | 0xC000 | all ground stations |
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 from volery.core.errors import CommsError
 
-PLANES_PER_BATCH = 4
+GROUP_SIZE = 4
 """As in the ROSUnitySim article: linear id = 4 x batch + plane."""
 FIRST_GROUND = 0x7F00
 FIRST_BATCH = 0x8000
@@ -43,25 +43,23 @@ class Identity:
         return cls(GROUND_BATCH, number)
 
     @classmethod
-    def of(cls, address: int, planes_per_batch: int = PLANES_PER_BATCH) -> Identity:
+    def of(cls, address: int, group_size: int = GROUP_SIZE) -> Identity:
         """Returns the identity of an address. Raises CommsError if it is not a station's."""
         if not is_station(address):
             raise CommsError(f"{address} is not a station: stations are 0 to {FIRST_BATCH - 1}")
         if address >= FIRST_GROUND:
             return cls.ground(address - FIRST_GROUND)
-        return cls(*divmod(address, planes_per_batch))
+        return cls(*divmod(address, group_size))
 
-    def address(self, planes_per_batch: int = PLANES_PER_BATCH) -> int:
+    def address(self, group_size: int = GROUP_SIZE) -> int:
         """Returns the linear id. Raises CommsError if batch or plane are out of range."""
         if self.batch == GROUND_BATCH:
             if 0 <= self.plane < FIRST_BATCH - FIRST_GROUND:
                 return FIRST_GROUND + self.plane
             raise CommsError(f"ground stations are numbered 0 to 255, not {self.plane}")
-        if not 0 <= self.plane < planes_per_batch:
-            raise CommsError(
-                f"plane {self.plane}: a batch has the planes 0 to {planes_per_batch - 1}"
-            )
-        linear = planes_per_batch * self.batch + self.plane
+        if not 0 <= self.plane < group_size:
+            raise CommsError(f"plane {self.plane}: a batch has the planes 0 to {group_size - 1}")
+        linear = group_size * self.batch + self.plane
         if not (0 <= linear < FIRST_GROUND and self.batch <= LAST_BATCH - FIRST_BATCH):
             raise CommsError(
                 f"there is no batch {self.batch}: batches go to {LAST_BATCH - FIRST_BATCH}, "
@@ -82,10 +80,10 @@ def batch_address(batch: int) -> int:
     return FIRST_BATCH + batch
 
 
-def is_meant(station: int, address: int, planes_per_batch: int = PLANES_PER_BATCH) -> bool:
+def is_meant(station: int, address: int, group_size: int = GROUP_SIZE) -> bool:
     """Returns whether `address` includes a station."""
     if FIRST_BATCH <= address <= LAST_BATCH:
-        return station < FIRST_GROUND and station // planes_per_batch == address - FIRST_BATCH
+        return station < FIRST_GROUND and station // group_size == address - FIRST_BATCH
     if address == ALL_GROUND:
         return FIRST_GROUND <= station < FIRST_BATCH
     return address in (station, ALL)

@@ -2,7 +2,7 @@
 
 Numbers are little-endian and packed; `text` is a u8 length and so many bytes of UTF-8.
 
-HELLO (1), station to server, its first frame: u16 batch · u16 plane · u16 planes_per_batch · text
+HELLO (1), station to server, its first frame: u16 batch · u16 plane · u16 group_size · text
 name · text token. The head's source is the linear id, its session that of all messages to come.
 
 WELCOME (2): u32 boot, drawn by the server when it started · u32 last, the highest sequence that it
@@ -65,7 +65,7 @@ class Hello(NamedTuple):
 
     batch: int
     plane: int
-    planes_per_batch: int
+    group_size: int
     name: str
     token: str
 
@@ -102,7 +102,7 @@ def encode_hello(hello: Hello) -> bytes:
         if len(data) > _LONGEST_TEXT_BYTES:
             raise CommsError(f"'{text[:40]}...' is longer than {_LONGEST_TEXT_BYTES} bytes")
         texts += bytes((len(data),)) + data
-    return _HELLO.pack(hello.batch, hello.plane, hello.planes_per_batch) + texts
+    return _HELLO.pack(hello.batch, hello.plane, hello.group_size) + texts
 
 
 def decode_hello(payload: bytes) -> Hello:

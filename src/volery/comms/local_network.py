@@ -55,7 +55,7 @@ class LocalNetwork:
             identity,
             self._joined + 1,
             token=self._settings.token,
-            planes_per_batch=self._settings.planes_per_batch,
+            group_size=self._settings.group_size,
         )
         connection = self._router.connect(now_ns)
         if connection is None:

@@ -17,7 +17,13 @@ from volery.control import impulses
 from volery.control.commands import FleetCommands
 from volery.control.estimator.errors import EstimationError
 from volery.control.fleet_events import FleetEvent, event_of
-from volery.control.fleet_rows import begun_anew, checked_modes, checked_plants, new_uavs, one_each
+from volery.control.fleet_rows import (
+    checked_modes,
+    checked_plants,
+    new_uavs,
+    one_each,
+    restarted_rows,
+)
 from volery.control.flight_modes import FlightMode
 from volery.control.fused_step import EVENT, EVENTS_A_STEP, advance_fleet
 from volery.control.gains import STANDARD_RATES, ControlRates
@@ -284,7 +290,7 @@ class Fleet(FleetCommands):
         self._bodies["attitude"][i] = self.history.attitude[:, i] = attitude
         self._bodies["contact_budget"][i] = 0.0
         self._bodies["separation_budget"][i] = 0.0
-        self._begin_anew(i, in_air)
+        self._restart(i, in_air)
         if in_air:
             self._bodies["on_ground"][i] = False
 
@@ -297,7 +303,7 @@ class Fleet(FleetCommands):
         omega_body = checked("rates", omega_body, (3,), 100.0)
         self._bodies["velocity_map"][i] = velocity
         self._bodies["omega_body"][i] = omega_body
-        self._begin_anew(i, in_air=False)
+        self._restart(i, in_air=False)
 
     # ------------------------------------------------------------------------------ contacts
 
@@ -389,7 +395,7 @@ class Fleet(FleetCommands):
         """
         start_rows = rows if start_rows is None else start_rows
         air_tick = self.step // self._periods[2]
-        fresh = begun_anew(start["uavs"][start_rows], self.step, air_tick)
+        fresh = restarted_rows(start["uavs"][start_rows], self.step, air_tick)
         fresh["model"] = self._uavs["model"][rows]
         fresh["turbulence"]["key"] = self._uavs["turbulence"]["key"][rows]
         self._uavs[rows] = fresh
@@ -398,16 +404,16 @@ class Fleet(FleetCommands):
         if len(self._references) == len(self):
             self._references[rows, :] = start["references"][start_rows, :1]
 
-    def continue_from(self, other: Fleet, kept: Sequence[tuple[int, int]]) -> None:
+    def continue_from(self, other: Fleet, pairs: Sequence[tuple[int, int]]) -> None:
         """Continues from another fleet, with UAVs of it and new ones.
 
-        This fleet must not have advanced yet. kept: own row and the other's of each UAV that
+        This fleet must not have advanced yet. pairs: own row and the other's of each UAV that
         continues; all others start now.
         """
         start = self.get_state()
         self.step = other.step
         self.set_weather(other.weather)
-        own, theirs = np.array(kept, np.int64).reshape(-1, 2).T
+        own, theirs = np.array(pairs, np.int64).reshape(-1, 2).T
         self.restart(start, np.setdiff1d(np.arange(len(self)), own))
         going_on = other._uavs[theirs].copy()
         going_on["model"] = self._uavs["model"][own]
@@ -415,7 +421,7 @@ class Fleet(FleetCommands):
         self._bodies["downwash_budget"] = 0.0  # downwash pairs are searched again
         self.history.position[:, own] = other.history.position[:, theirs]
         self.history.attitude[:, own] = other.history.attitude[:, theirs]
-        self._paths.continue_from(other._paths, kept)
+        self._paths.continue_from(other._paths, pairs)
         if len(self._references) == len(self) and len(other._references) == len(other):
             copy_references(other._references[theirs], self._references, own, self.step)
 
@@ -441,7 +447,7 @@ class Fleet(FleetCommands):
         for i in np.flatnonzero(flying):
             self._start_in_air(int(i))
 
-    def _begin_anew(self, i: int, in_air: bool) -> None:
+    def _restart(self, i: int, in_air: bool) -> None:
         """Restarts the controllers of UAV `i` from its present motion."""
         self._wake(i)
         if self._bodies["crashed"][i]:

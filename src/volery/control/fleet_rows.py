@@ -65,7 +65,7 @@ def new_uavs(
     return uavs
 
 
-def begun_anew(start: NDArray[np.void], step: int, air_tick: int) -> NDArray[np.void]:
+def restarted_rows(start: NDArray[np.void], step: int, air_tick: int) -> NDArray[np.void]:
     """Returns the rows `start` (K,) of step 0, with times shifted to `step`.
 
     air_tick: number of the air update at which their turbulence begins.

@@ -41,14 +41,14 @@ class SegmentStore:
         control_state["path_first"] = control_state["path_row"] = first
         control_state["path_last"] = self._used - 1
 
-    def continue_from(self, other: SegmentStore, kept: Sequence[tuple[int, int]]) -> None:
+    def continue_from(self, other: SegmentStore, pairs: Sequence[tuple[int, int]]) -> None:
         """Copies active trajectories of another store: own row and the other's for each pair.
 
         The control_states' records have been copied already.
         """
-        for own, _ in kept:
+        for own, _ in pairs:
             self._control_states["path_last"][own] = -1
-        for own, row in kept:
+        for own, row in pairs:
             control_state: Any = other._control_states[row]
             if control_state["mode"] == FlightMode.TRAJECTORY and control_state["path_last"] >= 0:
                 self.put(

@@ -48,7 +48,7 @@ class Opening(NamedTuple):
 
     look: Callable[[bytes], Look]
     """Examines their first bytes."""
-    patience_s: float | None = None
+    timeout_s: float | None = None
     """Maximum waiting time; None: as long as there is room."""
     greeting: bytes = b""
     """Bytes sent to each connection at once."""
@@ -92,7 +92,7 @@ class Listener(socket.socket):
         self._room: PendingConnections | None = None
         if opening is not None and PendingConnections.is_available:
             number = super().fileno()
-            self._room = PendingConnections(number, opening.look, opening.patience_s, self._expire)
+            self._room = PendingConnections(number, opening.look, opening.timeout_s, self._expire)
 
     def add_port(self) -> None:
         """Adds the port to the name in logs."""
@@ -125,7 +125,7 @@ class Listener(socket.socket):
         """
         return self._evict("as many connections as may be", _descriptor_of(connection))
 
-    def note_stranger(self, protocol: str) -> None:
+    def note_foreign_protocol(self, protocol: str) -> None:
         """Counts a connection that is ended because it speaks `protocol`, see `Preamble`."""
         self._note(f"ends connections that speak {protocol}: a web page, or a wrong port")
 
@@ -167,9 +167,9 @@ class Listener(socket.socket):
         if look is not None and look.is_ready:
             waiting = room.release(event.descriptor)
             return waiting.sock, waiting.address
-        if look is not None and look.stranger is not None:
-            self.note_stranger(look.stranger)
-        if look is None or look.stranger is not None:
+        if look is not None and look.foreign_protocol is not None:
+            self.note_foreign_protocol(look.foreign_protocol)
+        if look is None or look.foreign_protocol is not None:
             room.release(event.descriptor).sock.close()
         return None
 

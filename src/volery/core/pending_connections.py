@@ -27,7 +27,7 @@ class Look(NamedTuple):
 
     is_ready: bool
     """Whether the server can process them."""
-    stranger: str | None = None
+    foreign_protocol: str | None = None
     """Their forbidden protocol, see `Preamble`."""
 
 
@@ -70,7 +70,7 @@ class PendingConnections:
     All methods are called in the thread of the server's asyncio loop. On a system without epoll
     (`is_available`), servers get connections at once.
 
-    look: examines the first bytes of a connection. patience_s: maximum waiting time, after which a
+    look: examines the first bytes of a connection. timeout_s: maximum waiting time, after which a
     connection is passed to `expire`; None: unlimited.
     """
 
@@ -80,12 +80,12 @@ class PendingConnections:
         self,
         listening: int,
         look: Callable[[bytes], Look],
-        patience_s: float | None,
+        timeout_s: float | None,
         expire: Callable[[PendingConnection], None],
     ) -> None:
         self._listening = listening
         self._look = look
-        self._patience_s = patience_s
+        self._timeout_s = timeout_s
         self._expire = expire
         self._waiting: dict[int, PendingConnection] = {}
         """By file descriptor, oldest first."""
@@ -113,8 +113,8 @@ class PendingConnections:
         self._waiting[sock.fileno()] = PendingConnection(sock, address, loop.time())
         flags = select.EPOLLIN | select.EPOLLRDHUP | select.EPOLLET  # once per piece
         self._epoll.register(sock.fileno(), flags)
-        if self._timer is None and self._patience_s is not None:
-            self._timer = loop.call_later(self._patience_s, self._end_patience)
+        if self._timer is None and self._timeout_s is not None:
+            self._timer = loop.call_later(self._timeout_s, self._on_timeout)
 
     def look(self, event: Event) -> Look | None:
         """Examines a waiting connection; None if incomplete although the client has finished."""
@@ -144,13 +144,13 @@ class PendingConnections:
         look = self._look(first)
         return look._replace(is_ready=True) if len(first) >= LOOK_BYTES else look
 
-    def _end_patience(self) -> None:
-        assert self._patience_s is not None
+    def _on_timeout(self) -> None:
+        assert self._timeout_s is not None
         loop = asyncio.get_running_loop()
-        latest_s = loop.time() - self._patience_s
+        latest_s = loop.time() - self._timeout_s
         for waiting in tuple(self._waiting.values()):
             if waiting.since_s > latest_s:
-                self._timer = loop.call_at(waiting.since_s + self._patience_s, self._end_patience)
+                self._timer = loop.call_at(waiting.since_s + self._timeout_s, self._on_timeout)
                 return
             self.release(waiting.sock.fileno())
             self._expire(waiting)

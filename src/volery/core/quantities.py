@@ -34,7 +34,7 @@ _QUANTITIES: dict[str, Quantity] = {
     # space
     "m": Quantity("m", 1e6, 1e-9, _MM),
     "cm": Quantity("cm", 1e5, 1e-3, {"mm": 0.1}),
-    **dict.fromkeys(("radius_m", "reach_m", "arrival_m"), Quantity("m", 1e6, 1e-9, _MM, 0.0)),
+    **dict.fromkeys(("radius_m", "range_m"), Quantity("m", 1e6, 1e-9, _MM, 0.0)),
     "m2": Quantity("m2", 1e10, 1e-9, {"mm2": 1e-6}),
     "drag_area_m2": Quantity("m2", 100.0, 1e-9, {"mm2": 1e-6, "cm2": 1e-4}),
     "per_m": Quantity("1/m", 100.0),

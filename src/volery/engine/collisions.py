@@ -62,7 +62,7 @@ class Collisions:
         response: Bounce,
         emit: Callable[[Event], None],
         *,
-        copies: int = 1,
+        num_envs: int = 1,
         looks: ActorShapes | None = None,
     ) -> None:
         self._fleet = fleet
@@ -72,8 +72,8 @@ class Collisions:
         self._emit = emit
         self._radius = np.array([a.body.collision_radius_m for a in fleet.airframes])
         self._touched_solid = np.full(len(names), -1)
-        self._crew = len(names) // copies
-        self._touching_uav = np.zeros((len(names), self._crew), dtype=bool)
+        self._uavs_per_env = len(names) // num_envs
+        self._touching_uav = np.zeros((len(names), self._uavs_per_env), dtype=bool)
         """Pairs in contact: row, index of the other UAV in the environment."""
         self._actors = None if looks is None else ActorContacts(fleet, looks, self._touch_actor)
         """Contacts with actors; None without actors."""
@@ -114,8 +114,8 @@ class Collisions:
         self._touched_solid[rows] = -1
         self._touching_uav[rows] = False
         for row in rows.tolist():
-            crew = self._crew_of(row)
-            self._touching_uav[crew, row - crew.start] = False
+            env = self._rows_of_env(row)
+            self._touching_uav[env, row - env.start] = False
         if self._actors is not None:
             self._actors.forget(rows)
         self._fleet.state.contact_budget[rows] = 0.0
@@ -131,12 +131,12 @@ class Collisions:
         if self._actors is not None:
             self._actors.look_again()
 
-    def continue_from(self, other: Collisions, kept: Sequence[tuple[int, int]]) -> None:
+    def continue_from(self, other: Collisions, pairs: Sequence[tuple[int, int]]) -> None:
         """Copies the contacts of another fleet's UAVs; pairs of own row and the other's.
 
         Both fleets are single environments of a scenario.
         """
-        own, theirs = np.array(kept, np.int64).reshape(-1, 2).T
+        own, theirs = np.array(pairs, np.int64).reshape(-1, 2).T
         self._touched_solid[own] = other._touched_solid[theirs]
         self._touching_uav[np.ix_(own, own)] = other._touching_uav[np.ix_(theirs, theirs)]
         if self._actors is not None and other._actors is not None:
@@ -180,20 +180,20 @@ class Collisions:
 
     def _resolve_others(self, i: int, time_ns: int) -> None:
         """Shares the distance to each other UAV of the environment between the two."""
-        crew = self._crew_of(i)
-        own = i - crew.start
+        env = self._rows_of_env(i)
+        own = i - env.start
         state = self._fleet.state
-        apart = state.position_map[i] - state.position_map[crew]
-        gaps = np.sqrt((apart * apart).sum(axis=1)) - self._radius[crew] - self._radius[i]
+        apart = state.position_map[i] - state.position_map[env]
+        gaps = np.sqrt((apart * apart).sum(axis=1)) - self._radius[env] - self._radius[i]
         gaps[own] = np.inf
         for j in np.flatnonzero(gaps <= 0.0):
-            self._touch_uav(i, crew.start + int(j), apart[j], time_ns)
+            self._touch_uav(i, env.start + int(j), apart[j], time_ns)
         released = gaps > _RELEASE_M
-        touching = self._touching_uav[crew]
+        touching = self._touching_uav[env]
         touching[own, released] = False
         touching[released, own] = False
         half = np.maximum(0.5 * gaps, 0.5 * _LEAST_BUDGET_M)
-        budget = state.separation_budget[crew]
+        budget = state.separation_budget[env]
         others = np.arange(len(gaps)) != own
         budget[others] = np.minimum(budget[others], half[others])
         budget[own] = half.min()
@@ -202,7 +202,7 @@ class Collisions:
         state = self._fleet.state
         normal = _unit(apart)
         approach = -float(normal @ (state.velocity_map[i] - state.velocity_map[j]))
-        first = self._crew_of(i).start
+        first = self._rows_of_env(i).start
         if not self._touching_uav[i, j - first]:
             self._touching_uav[i, j - first] = self._touching_uav[j, i - first] = True
             self._report(i, approach, self._names[j], time_ns)
@@ -225,10 +225,10 @@ class Collisions:
             self._fleet.strike(i, normal, self._response.restitution, _FRICTION)
             state.velocity_map[i] += velocity
 
-    def _crew_of(self, i: int) -> slice:
+    def _rows_of_env(self, i: int) -> slice:
         """Returns the rows of UAV `i`'s environment."""
-        first = i - i % self._crew
-        return slice(first, first + self._crew)
+        first = i - i % self._uavs_per_env
+        return slice(first, first + self._uavs_per_env)
 
     def _report(self, i: int, speed: float, partner: str, time_ns: int) -> None:
         x, y, z = self._fleet.state.position_map[i].tolist()

@@ -84,7 +84,7 @@ class Engine:
         sink: Sink,
         *,
         crash_on_contact: bool,
-        copies: int = 1,
+        num_envs: int = 1,
         estimation: Estimation | None = None,
         on_post: Callable[[], None] | None = None,
     ) -> None:
@@ -114,7 +114,7 @@ class Engine:
         self.actors = scene.actors
         """Actors of the world; None without any."""
         self._looks = None if self.actors is None else ActorShapes(self.actors)
-        self.collisions = self._new_collisions(copies)
+        self.collisions = self._new_collisions(num_envs)
         self.state_check = StateCheck(fleet)
         self.banks = tuple(banks)
         self.estimation = estimation
@@ -270,7 +270,7 @@ class Engine:
         """
         if self.actors is None:
             raise CommandError("this world has no actors")
-        self.actors.say(row, self.time_ns, pose, velocity)
+        self.actors.set_pose(row, self.time_ns, pose, velocity)
         self.collisions.look_at_actors()
 
     def collect_events(self) -> list[Event]:
@@ -307,21 +307,21 @@ class Engine:
         sensors and estimates; the others start now.
         """
         self._new_events += event_collection.drain(self.fleet, self.names)
-        kept = common_rows(names, self.names, going_on)
-        fleet.continue_from(self.fleet, kept)
+        pairs = common_rows(names, self.names, going_on)
+        fleet.continue_from(self.fleet, pairs)
         collisions, old_banks = self.collisions, self.banks
         step = self.fleet.step
         measured = (self.sensor_agenda.next_step() or step) > step if step else False
         self.fleet, self.names = fleet, names
         self.state_check = StateCheck(fleet)
-        self.collisions = self._new_collisions(copies=1)
-        self.collisions.continue_from(collisions, kept)
+        self.collisions = self._new_collisions(num_envs=1)
+        self.collisions.continue_from(collisions, pairs)
         self.banks = tuple(banks)
         self.sensor_agenda = self._new_agenda(after_step=step if measured else step - 1)
         for bank in banks:
             continue_bank(bank, old_banks, going_on)
         if estimation is not None and self.estimation is not None:
-            estimation.continue_from(self.estimation, kept)
+            estimation.continue_from(self.estimation, pairs)
         self.estimation = estimation
 
     # ------------------------------------------------------------------------------ snapshot
@@ -362,7 +362,7 @@ class Engine:
     def _from_now(self, period_s: float) -> Schedule:
         return Schedule(Fraction(NS_PER_S, ns_from_s(period_s)), self.time_ns)
 
-    def _new_collisions(self, copies: int) -> Collisions:
+    def _new_collisions(self, num_envs: int) -> Collisions:
         emit = self._new_events.append
         return Collisions(
             self.fleet,
@@ -370,7 +370,7 @@ class Engine:
             self.names,
             self._response,
             emit,
-            copies=copies,
+            num_envs=num_envs,
             looks=self._looks,
         )
 

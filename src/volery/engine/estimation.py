@@ -93,31 +93,31 @@ class Estimation:
 
     def take(self, samples: Samples) -> None:
         """Passes a bank's samples to the estimators that use them."""
-        heard, rows = self._listeners(samples.sensors)
+        selection, rows = self._listeners(samples.sensors)
         if isinstance(samples, ImuSamples):
             if len(rows):
                 self.estimator.predict(
                     rows,
                     samples.stamp_ns,
-                    _heard(samples.angular_velocity, heard),
-                    _heard(samples.specific_force, heard),
+                    _selected(samples.angular_velocity, selection),
+                    _selected(samples.specific_force, selection),
                 )
-            self._tell_fleet()
+            self._update_fleet()
         elif not len(rows):
             return
         elif isinstance(samples, GnssSamples):
-            self._take_fixes(samples, heard, rows)
+            self._take_fixes(samples, selection, rows)
         elif isinstance(samples, PressureSamples):
-            self._take_pressures(samples, heard, rows)
+            self._take_pressures(samples, selection, rows)
         elif isinstance(samples, MagneticSamples):
             self.estimator.fuse_magnetic(
-                rows, samples.stamp_ns, _heard(samples.field, heard), samples.field_variance
+                rows, samples.stamp_ns, _selected(samples.field, selection), samples.field_variance
             )
         elif isinstance(samples, RangeSamples) and self.setup.ground_height_m is not None:
             self.estimator.fuse_range(
                 rows,
                 samples.stamp_ns,
-                _heard(samples.ranges, heard),
+                _selected(samples.ranges, selection),
                 samples.variance,
                 self.setup.ground_height_m,
             )
@@ -169,19 +169,19 @@ class Estimation:
             stamp_ns=before_the_first_reading,
         )
         self._pose_ns[rows] = _NEVER_NS
-        self._tell_fleet(rows)
+        self._update_fleet(rows)
 
-    def continue_from(self, other: Estimation, kept: Sequence[tuple[int, int]]) -> None:
+    def continue_from(self, other: Estimation, pairs: Sequence[tuple[int, int]]) -> None:
         """Copies another's estimates; pairs of own row of the fleet and the other's."""
         theirs = {int(uav): e for e, uav in enumerate(other.setup.uavs)}
-        was = dict(kept)
-        pairs = [
+        was = dict(pairs)
+        filters = [
             (e, theirs[was[int(uav)]])
             for e, uav in enumerate(self.setup.uavs)
             if was.get(int(uav)) in theirs
         ]
-        self.estimator.continue_from(other.estimator, pairs)
-        for own, row in pairs:
+        self.estimator.continue_from(other.estimator, filters)
+        for own, row in filters:
             self._pose_ns[own] = other._pose_ns[row]
 
     def get_state(self) -> dict[str, Any]:
@@ -193,28 +193,33 @@ class Estimation:
         self.estimator.set_state(state)
         self._pose_ns[:] = state["pose_ns"]
 
-    def _take_fixes(self, samples: GnssSamples, heard: Rows | slice, rows: Rows) -> None:
+    def _take_fixes(self, samples: GnssSamples, selection: Rows | slice, rows: Rows) -> None:
         drift = self.setup.gnss_drift_variance[rows]
-        noise = np.maximum(_heard(samples.position_variance, heard) - drift, _LEAST_VARIANCE)
+        noise = np.maximum(_selected(samples.position_variance, selection) - drift, _LEAST_VARIANCE)
         self.estimator.fuse_gnss(
             rows,
             samples.stamp_ns,
-            _heard(samples.position_map, heard),
-            _heard(samples.velocity_map, heard),
+            _selected(samples.position_map, selection),
+            _selected(samples.velocity_map, selection),
             np.hstack(
-                [noise, np.maximum(_heard(samples.velocity_variance, heard), _LEAST_VARIANCE)]
+                [
+                    noise,
+                    np.maximum(_selected(samples.velocity_variance, selection), _LEAST_VARIANCE),
+                ]
             ),
-            _heard(samples.has_fix, heard),
+            _selected(samples.has_fix, selection),
         )
 
-    def _take_pressures(self, samples: PressureSamples, heard: Rows | slice, rows: Rows) -> None:
-        pressure = _heard(samples.pressure, heard)
+    def _take_pressures(
+        self, samples: PressureSamples, selection: Rows | slice, rows: Rows
+    ) -> None:
+        pressure = _selected(samples.pressure, selection)
         height = atmosphere.altitude(pressure) - self.setup.origin_altitude_m
         slope = atmosphere.altitude(pressure + 1.0) - atmosphere.altitude(pressure)
         variance = np.maximum(slope**2 * samples.pressure_variance, _LEAST_VARIANCE)
         self.estimator.fuse_pressure_height(rows, samples.stamp_ns, height, variance)
 
-    def _tell_fleet(self, rows: Rows | None = None) -> None:
+    def _update_fleet(self, rows: Rows | None = None) -> None:
         """Sets the estimation errors that the fleet's controllers use; `rows` (E,), or all."""
         if not self._is_used_for_control:
             return
@@ -259,9 +264,9 @@ class _Motions:
     omega_body: Array
 
 
-def _heard(values: NDArray[T], heard: Rows | slice) -> NDArray[T]:
+def _selected(values: NDArray[T], selection: Rows | slice) -> NDArray[T]:
     """Returns the used rows, as a writable array: kernels are compiled for those."""
-    return np.array(values[heard])
+    return np.array(values[selection])
 
 
 def _rows_of(states: Any, rows: Rows | slice) -> _Motions:

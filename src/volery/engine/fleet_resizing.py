@@ -24,20 +24,20 @@ def continue_bank(bank: Bank, others: Sequence[Bank], going_on: Collection[str])
     paths = [sensor.path for sensor in bank.sensors]
     sensors = {sensor.path for sensor in bank.sensors if sensor.uav_name in going_on}
     for other in others:
-        kept = common_rows(paths, [sensor.path for sensor in other.sensors], sensors)
-        if kept and other.name == bank.name:
+        pairs = common_rows(paths, [sensor.path for sensor in other.sensors], sensors)
+        if pairs and other.name == bank.name:
             sizes = len(paths), len(other.sensors)
-            bank.set_state(_mixed(bank.get_state(), other.get_state(), kept, sizes))
+            bank.set_state(_mixed(bank.get_state(), other.get_state(), pairs, sizes))
 
 
-def _mixed(fresh: Any, past: Any, kept: Pairs, sizes: tuple[int, int]) -> Any:
-    """Returns state `fresh` with the rows `kept` of every array from `past`; rows are sensors."""
+def _mixed(fresh: Any, past: Any, pairs: Pairs, sizes: tuple[int, int]) -> Any:
+    """Returns state `fresh` with the rows `pairs` of every array from `past`; rows are sensors."""
     if isinstance(past, Mapping):
         fresh = fresh or {}
-        return {key: _mixed(fresh.get(key), past[key], kept, sizes) for key in past}
+        return {key: _mixed(fresh.get(key), past[key], pairs, sizes) for key in past}
     if not isinstance(past, np.ndarray):
         return past
     mixed = np.zeros((sizes[0], *past.shape[1:]), past.dtype) if fresh is None else fresh.copy()
-    for own, theirs in kept:
+    for own, theirs in pairs:
         mixed[own] = past[theirs]
     return mixed

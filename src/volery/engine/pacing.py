@@ -102,7 +102,7 @@ class Pacer:
         with self._changed:
             dropped = self._steps.drop(reason, only)
         for request in dropped:
-            request.tell()
+            request.notify()
 
     def use_low_latency(self) -> None:
         """Reduces slices to `_PROMPT_SLICE_S`, which limits the wall time until commands act."""
@@ -145,7 +145,7 @@ class Pacer:
             request, self._in_hand = self._in_hand, None
             told = request is not None and self._steps.count(request, steps)
         if request is not None and told:
-            request.tell()
+            request.notify()
 
     def wait(self, time_ns: int) -> bool:
         """Waits at simulated `time_ns`, at most a moment; returns whether to wait further.

@@ -29,7 +29,7 @@ class StepRequest:
         """Whether the request has ended."""
         return self.left == 0 or bool(self.reason)
 
-    def tell(self) -> None:
+    def notify(self) -> None:
         """Calls the request's callback; called without locks held."""
         if self._on_steps is not None:
             self._on_steps(self)

@@ -1,10 +1,11 @@
 """Provides actions: long-running goals with feedback, which clients may cancel.
 
-An action server offers an action; bridges that support actions send goals for their clients:
+Bridges that support actions send goals for their clients:
 
-    actions.offer("/simulate_steps", "simulation_interfaces/action/SimulateSteps", take_goal)
+    kind = "simulation_interfaces/action/SimulateSteps"
+    actions.create_server("/simulate_steps", kind, start_goal)
     ...
-    goal = actions.send("/simulate_steps", request, on_feedback, on_result)
+    goal = actions.send_goal("/simulate_steps", request, on_feedback, on_result)
     goal.cancel()
 
 Everything happens in the simulation's thread; a bridge gets there through `Gateway.post` and calls
@@ -89,58 +90,62 @@ class Goal:
 
 
 @dataclass(frozen=True)
-class ActionOffer:
-    """An action server: `take(goal)` starts a goal, and ends it at once or later."""
+class ActionServer:
+    """An action server: `start(goal)` starts a goal, and ends it at once or later."""
 
     name: str
     action_type: str
     """Name of the type, such as `simulation_interfaces/action/SimulateSteps`."""
-    take: Callable[[Goal], None]
+    start: Callable[[Goal], None]
 
 
 class Actions:
     """Holds all actions of one graph."""
 
     def __init__(self) -> None:
-        self._offers: dict[str, ActionOffer] = {}
+        self._servers: dict[str, ActionServer] = {}
         self._lock = threading.Lock()
 
-    def offer(self, name: str, action_type: str, take: Callable[[Goal], None]) -> ActionOffer:
+    def create_server(
+        self, name: str, action_type: str, start: Callable[[Goal], None]
+    ) -> ActionServer:
         """Creates an action server. Raises `GraphError` for an unknown type or a name in use."""
         try:
             message_type(f"{action_type}_Goal")
         except KeyError:
             raise GraphError(f"action '{name}': unknown type '{action_type}'") from None
-        offer = ActionOffer(name, action_type, take)
+        server = ActionServer(name, action_type, start)
         with self._lock:
-            if name in self._offers:
+            if name in self._servers:
                 raise GraphError(f"action '{name}' already has a server")
-            self._offers[name] = offer
-        return offer
+            self._servers[name] = server
+        return server
 
-    def withdraw(self, name: str) -> None:
+    def destroy_server(self, name: str) -> None:
         """Removes an action server; active goals continue."""
         with self._lock:
-            self._offers.pop(name, None)
+            self._servers.pop(name, None)
 
     def types(self) -> dict[str, str]:
         """Returns the names of all actions and their types."""
         with self._lock:
-            return {name: offer.action_type for name, offer in sorted(self._offers.items())}
+            return {name: server.action_type for name, server in sorted(self._servers.items())}
 
-    def send(self, name: str, request: Any, on_feedback: OnFeedback, on_result: OnResult) -> Goal:
+    def send_goal(
+        self, name: str, request: Any, on_feedback: OnFeedback, on_result: OnResult
+    ) -> Goal:
         """Sends a goal, a `_Goal` message.
 
         on_feedback: receives `_Feedback` messages. on_result: receives the status and a `_Result`
         message. Raises `GraphError` if the action has no server or the message another type.
         """
         with self._lock:
-            offer = self._offers.get(name)
-        if offer is None:
+            server = self._servers.get(name)
+        if server is None:
             raise GraphError(f"action '{name}' has no server")
-        wanted = f"{offer.action_type}_Goal"
-        if getattr(request, "__msgtype__", None) != wanted:
-            raise GraphError(f"action '{name}' requires a message of type {wanted}")
+        goal_type = f"{server.action_type}_Goal"
+        if getattr(request, "__msgtype__", None) != goal_type:
+            raise GraphError(f"action '{name}' requires a message of type {goal_type}")
         goal = Goal(request, on_feedback, on_result)
-        offer.take(goal)
+        server.start(goal)
         return goal

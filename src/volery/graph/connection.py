@@ -19,7 +19,7 @@ class GraphConnection(Protocol):
 
     This protocol is the contract; implementations document only what they add. Any thread may call
     any method; replies and wakes come from a thread of the connection. `advertise`, `subscribe` and
-    `offer` raise `GraphError` for a wrong type, and after the connection is closed.
+    `create_service` raise `GraphError` for a wrong type, and after the connection is closed.
     """
 
     name: str
@@ -59,7 +59,7 @@ class GraphConnection(Protocol):
 
         """
 
-    def unsubscribe(self, mailbox: SubscriptionQueue) -> None:
+    def unsubscribe(self, queue: SubscriptionQueue) -> None:
         """Ends a subscription; messages in its queue can still be taken."""
 
     def call(self, service: str, request: Any | None, reply: ServiceReply) -> None:
@@ -68,7 +68,7 @@ class GraphConnection(Protocol):
         Without a request, the service receives an empty one.
         """
 
-    def offer(self, service: str, srvtype: str, handler: Handler) -> None:
+    def create_service(self, service: str, srvtype: str, handler: Handler) -> None:
         """Creates `service`: `handler(request, reply)` is called in a thread of the connection."""
 
     def close(self) -> None:

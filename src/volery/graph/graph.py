@@ -66,14 +66,16 @@ class _Topic:
         self.name = name
         self.msgtype = msgtype
         self.callbacks: list[Callback] = []
-        self.outside: list[Callback] = []  # the callbacks that other threads have attached
-        self.attached = 0  # number of external subscriptions so far
+        self.external: list[Callback] = []  # the callbacks that other threads have attached
+        self.num_attached = 0  # number of external subscriptions so far
         self.publishers = 0
         self.messages = 0
         self.answer_ns = -1  # time of the last message published in response to another one ...
         self.answers = 0  # ... and the number of such messages at that instant
         self.latched = False
-        self.kept: dict[Publisher, Published] = {}  # last message of each latched publisher
+        self.last_messages: dict[
+            Publisher, Published
+        ] = {}  # last message of each latched publisher
 
     @property
     def used(self) -> bool:
@@ -109,7 +111,7 @@ class Publisher:
         return self._topic.name
 
     @property
-    def wanted(self) -> bool:
+    def has_subscribers(self) -> bool:
         """Whether a message would be delivered or latched; otherwise it need not be built."""
         return bool(
             self.latched or self._topic.callbacks or self._graph.is_recorded(self._topic.name)
@@ -136,31 +138,31 @@ class Publisher:
         return len(self._topic.callbacks)
 
     @property
-    def heard(self) -> bool:
+    def has_internal_subscribers(self) -> bool:
         """Whether a node of the simulation subscribes to this topic by name."""
-        return len(self._topic.callbacks) > len(self._topic.outside)
+        return len(self._topic.callbacks) > len(self._topic.external)
 
     @property
-    def watched(self) -> bool:
+    def has_external_subscribers(self) -> bool:
         """Whether an external client receives the topic."""
-        return bool(self._topic.outside)
+        return bool(self._topic.external)
 
     @property
-    def watchers_so_far(self) -> int:
+    def num_external_subscriptions(self) -> int:
         """Number of external subscriptions so far; a greater number means a new subscriber."""
-        return self._topic.attached
+        return self._topic.num_attached
 
-    def show(self, message: Any) -> None:
+    def publish_external(self, message: Any) -> None:
         """Passes a message to the external clients, at once; the simulation does not receive it.
 
         This is for messages that depend on wall time or on the connected clients: nodes, digests
         and recorders must not depend on them.
         """
         if not self.cancelled:
-            self._graph.show(self, self._topic, message)
+            self._graph.publish_external(self, self._topic, message)
 
     @property
-    def keeps(self) -> bool:
+    def is_latching(self) -> bool:
         """Whether later subscribers receive its last message."""
         return self.latched and not self.cancelled
 
@@ -168,7 +170,7 @@ class Publisher:
         """Stops publishing and discards the latched message."""
         if not self.cancelled:
             self.cancelled = True
-            self._graph.dismiss(self, self._topic)
+            self._graph.remove_publisher(self, self._topic)
 
 
 class Subscription:
@@ -206,7 +208,7 @@ def _match_all(_topic: str) -> bool:
     return True
 
 
-class _Letter(NamedTuple):
+class _QueuedMessage(NamedTuple):
     """A queued message; `only` is the late subscriber that a latched message is for."""
 
     topic: _Topic
@@ -221,11 +223,11 @@ class _Letter(NamedTuple):
 
 @dataclass(frozen=True)
 class _Service:
-    """A service: `handler` responds at once, `ask` at once or later."""
+    """A service: `handler` responds at once, `async_handler` at once or later."""
 
     srvtype: str
     handler: Callable[[Any], Any] | None
-    ask: AsyncHandler
+    async_handler: AsyncHandler
 
 
 class Graph:
@@ -250,7 +252,7 @@ class Graph:
         self.parameters = Parameters()
         """Parameters that the nodes have declared."""
         self._to_all: list[_Listener] = []
-        self._queue: deque[_Letter] = deque()
+        self._queue: deque[_QueuedMessage] = deque()
         self._answers = 0  # length of the chain that a message published now extends
         self._endless: set[tuple[str, str]] = set()
         self.acting_client = ""
@@ -292,11 +294,11 @@ class Graph:
             found.latched = found.latched or latched
         return Publisher(self, found, latched=latched)
 
-    def dismiss(self, publisher: Publisher, topic: _Topic) -> None:
+    def remove_publisher(self, publisher: Publisher, topic: _Topic) -> None:
         """Removes a publisher; used by `Publisher`."""
         with self._members:
             topic.publishers -= 1
-            topic.kept.pop(publisher, None)
+            topic.last_messages.pop(publisher, None)
             self._drop_unused(topic)
 
     def subscribe(
@@ -318,29 +320,29 @@ class Graph:
         with self._members:
             found = self._known_topic(topic, msgtype)
             found.callbacks.append(callback)
-        self._send_kept([found], callback)
+        self._send_latched([found], callback)
         return Subscription(found.callbacks, callback, lambda: self._drop_unused(found))
 
     def attach(
-        self, topic: str, put: Callback, msgtype: str | type[Any] | None = None
+        self, topic: str, callback: Callback, msgtype: str | type[Any] | None = None
     ) -> Subscription:
-        """Like `subscribe`, for a `put` that any thread may call; passes latched messages at once.
+        """Like `subscribe`, for a callback of any thread; passes latched messages at once.
 
-        The order of `put` among the subscribers does not affect the simulation.
+        The order of the callback among the subscribers does not affect the simulation.
         """
         with self._members:
             found = self._known_topic(topic, msgtype)
-            for kept in tuple(found.kept.values()):
-                put(kept)
-            found.callbacks.append(put)
-            found.outside.append(put)
-            found.attached += 1
+            for published in tuple(found.last_messages.values()):
+                callback(published)
+            found.callbacks.append(callback)
+            found.external.append(callback)
+            found.num_attached += 1
 
         def leave() -> None:
-            found.outside.remove(put)
+            found.external.remove(callback)
             self._drop_unused(found)
 
-        return Subscription(found.callbacks, put, leave)
+        return Subscription(found.callbacks, callback, leave)
 
     def subscribe_all(
         self, callback: Callback, matches: Callable[[str], bool] | None = None
@@ -355,7 +357,7 @@ class Graph:
         listener = _Listener(callback, matches or _match_all)
         self._to_all.append(listener)
         meant = [topic for topic in self._topics.values() if listener.matches(topic.name)]
-        self._send_kept(meant, listener)
+        self._send_latched(meant, listener)
         return Subscription(self._to_all, listener)
 
     def topics(self) -> list[TopicInfo]:
@@ -385,12 +387,12 @@ class Graph:
         """Queues a message; used by `Publisher`."""
         sender.check(message)
         topic.messages += 1
-        if sender.wanted:
+        if sender.has_subscribers:
             published = Published(topic.name, topic.msgtype, self._now_ns(), message)
             client, answers = self.acting_client, self._answers
             if answers and self._is_endless(sender, topic, published, answers):
                 return
-            self._queue.append(_Letter(topic, published, sender, None, client, answers))
+            self._queue.append(_QueuedMessage(topic, published, sender, None, client, answers))
 
     def _is_endless(
         self, sender: Publisher, topic: _Topic, published: Published, answers: int
@@ -417,31 +419,33 @@ class Graph:
         )
         return True
 
-    def show(self, sender: Publisher, topic: _Topic, message: Any) -> None:
+    def publish_external(self, sender: Publisher, topic: _Topic, message: Any) -> None:
         """Passes a message to external clients only; used by `Publisher`."""
         sender.check(message)
         topic.messages += 1
         published = Published(topic.name, topic.msgtype, self._now_ns(), message)
-        for put in tuple(topic.outside):
-            put(published)
+        for callback in tuple(topic.external):
+            callback(published)
 
-    def show_to_all(self, sender: Publisher, message: Any) -> None:
+    def publish_at_end(self, sender: Publisher, message: Any) -> None:
         """Passes a message to recorders and external clients at once, at the end of a run."""
         published = Published(sender.topic, sender.msgtype, self._now_ns(), message)
         with self._members:
             topic = self._topics.get(sender.topic)
-            puts = (*self._to_all, *(topic.outside if topic is not None else ()))
-        for put in puts:
-            put(published)
+            callbacks = (*self._to_all, *(topic.external if topic is not None else ()))
+        for callback in callbacks:
+            callback(published)
 
-    def show_kept(self) -> None:
+    def republish_latched(self) -> None:
         """Sends all latched messages to the external clients again, after the state has jumped."""
         with self._members:
-            topics = [(tuple(t.kept.values()), tuple(t.outside)) for t in self._topics.values()]
-        for kept, outside in topics:
-            for put in outside:
-                for published in kept:
-                    put(published)
+            topics = [
+                (tuple(t.external), tuple(t.last_messages.values())) for t in self._topics.values()
+            ]
+        for callbacks, messages in topics:
+            for callback in callbacks:
+                for published in messages:
+                    callback(published)
 
     def deliver(self) -> None:
         """Delivers all queued messages, including those published meanwhile."""
@@ -460,19 +464,19 @@ class Graph:
                     only(published)
                 continue
             with self._members:  # a client that attaches meanwhile receives the message once
-                if sender.keeps:
-                    topic.kept[sender] = published
-                watching = [c for c in self._to_all if c.matches(topic.name)]
+                if sender.is_latching:
+                    topic.last_messages[sender] = published
+                recorders = [c for c in self._to_all if c.matches(topic.name)]
                 callbacks = tuple(topic.callbacks)
-            for listener in watching:
+            for listener in recorders:
                 listener(published)
             if client:
-                self._hand_on_for(client, callbacks, published)
+                self._deliver_for_client(client, callbacks, published)
                 continue
             for callback in callbacks:
                 callback(published)
 
-    def _hand_on_for(
+    def _deliver_for_client(
         self, client: str, callbacks: Iterable[Callback], published: Published
     ) -> None:
         """Delivers a message that a client caused; a failing callback does not end the run."""
@@ -501,8 +505,8 @@ class Graph:
     def get_state(self) -> dict[str, Any]:
         """Returns the state for a snapshot: queued and latched messages, message counts."""
         with self._members:
-            topics = {name: (t.messages, dict(t.kept)) for name, t in self._topics.items()}
-        queue = [letter for letter in self._queue if not letter.sender.lasting]
+            topics = {name: (t.messages, dict(t.last_messages)) for name, t in self._topics.items()}
+        queue = [message for message in self._queue if not message.sender.lasting]
         return {"queue": queue, "topics": topics}
 
     def set_state(self, state: dict[str, Any]) -> None:
@@ -510,21 +514,23 @@ class Graph:
 
         Messages of nodes that have been destroyed since then are left out.
         """
-        lasting = [letter for letter in self._queue if letter.sender.lasting]
-        kept = [letter for letter in state["queue"] if not _has_gone(letter.sender)]
-        self._queue = deque([*lasting, *kept])
+        lasting = [message for message in self._queue if message.sender.lasting]
+        restored = [message for message in state["queue"] if not _has_gone(message.sender)]
+        self._queue = deque([*lasting, *restored])
         with self._members:
             for name, topic in self._topics.items():
                 messages, latched = state["topics"].get(name, (0, {}))
                 topic.messages = messages
-                topic.kept = {p: m for p, m in latched.items() if not _has_gone(p)}
+                topic.last_messages = {p: m for p, m in latched.items() if not _has_gone(p)}
 
     @contextmanager
     def in_place_of(self, state: dict[str, Any]) -> Iterator[None]:
         """Queues new messages at the position of the destroyed nodes' messages in `state`."""
         queue = state["queue"]
-        first = next((k for k, letter in enumerate(queue) if _has_gone(letter.sender)), len(queue))
-        behind = sum(not _has_gone(letter.sender) for letter in queue[first:])
+        first = next(
+            (k for k, message in enumerate(queue) if _has_gone(message.sender)), len(queue)
+        )
+        behind = sum(not _has_gone(message.sender) for message in queue[first:])
         after = [self._queue.pop() for _ in range(behind)]
         try:
             yield
@@ -541,15 +547,15 @@ class Graph:
                 if not oldest.used:
                     del self._topics[oldest.name]
 
-    def _send_kept(self, topics: list[_Topic], callback: Callback) -> None:
+    def _send_latched(self, topics: list[_Topic], callback: Callback) -> None:
         """Queues latched messages before all others, which are newer."""
         now_ns = self._now_ns()
-        letters = [
-            _Letter(topic, replace(published, time_ns=now_ns), sender, callback)
+        queued = [
+            _QueuedMessage(topic, replace(published, time_ns=now_ns), sender, callback)
             for topic in topics
-            for sender, published in topic.kept.items()
+            for sender, published in topic.last_messages.items()
         ]
-        self._queue.extendleft(reversed(letters))
+        self._queue.extendleft(reversed(queued))
 
     def _known_topic(self, name: str, msgtype: str | type[Any] | None) -> _Topic:
         if msgtype is not None:
@@ -559,34 +565,34 @@ class Graph:
         return self._topics[name]
 
     def _topic(self, name: str, msgtype: str | type[Any]) -> _Topic:
-        wanted = msgtype if isinstance(msgtype, str) else type_name(msgtype)
+        kind = msgtype if isinstance(msgtype, str) else type_name(msgtype)
         _check_name(name)
         topic = self._topics.get(name)
         if topic is None:
             try:
-                message_type(wanted)
+                message_type(kind)
             except KeyError:
-                raise GraphError(f"topic '{name}': unknown message type '{wanted}'") from None
-            topic = self._topics[name] = _Topic(name, wanted)
-        if topic.msgtype != wanted:
-            raise GraphError(f"topic '{name}' carries {topic.msgtype}, not {wanted}")
+                raise GraphError(f"topic '{name}': unknown message type '{kind}'") from None
+            topic = self._topics[name] = _Topic(name, kind)
+        if topic.msgtype != kind:
+            raise GraphError(f"topic '{name}' carries {topic.msgtype}, not {kind}")
         return topic
 
     # -------------------------------------------------------------------------------- services
 
-    def offer(self, service: str, srvtype: str, handler: Callable[[Any], Any]) -> None:
+    def create_service(self, service: str, srvtype: str, handler: Callable[[Any], Any]) -> None:
         """Creates a service: `handler(request)` returns the response message."""
 
-        def ask(request: Any, reply: ServiceReply) -> None:
+        def handle(request: Any, reply: ServiceReply) -> None:
             reply.answer(handler(request))
 
-        self._add_service(service, _Service(srvtype, handler, ask))
+        self._add_service(service, _Service(srvtype, handler, handle))
 
-    def offer_async(self, service: str, srvtype: str, ask: AsyncHandler) -> None:
+    def create_async_service(self, service: str, srvtype: str, handler: AsyncHandler) -> None:
         """Creates a service that may respond later; only `call_async` can call it."""
-        self._add_service(service, _Service(srvtype, None, ask))
+        self._add_service(service, _Service(srvtype, None, handler))
 
-    def withdraw(self, service: str) -> None:
+    def destroy_service(self, service: str) -> None:
         """Destroys a service."""
         with self._members:
             self._services.pop(service, None)
@@ -601,7 +607,7 @@ class Graph:
     def call_async(self, service: str, request: Any | None, reply: ServiceReply) -> None:
         """Calls a service that may respond later. Raises `GraphError` if it has no server."""
         found = self._service(service)
-        found.ask(_request(found, request), reply)
+        found.async_handler(_request(found, request), reply)
 
     def has_service(self, service: str) -> bool:
         """Returns whether the service has a server."""

@@ -6,9 +6,9 @@ ticks, in the order of arrival; messages for the client wait in a bounded `Subsc
 newest. A client that does not read loses its own messages and delays no other client.
 
     session = gateway.open("rosbridge 127.0.0.1:51234")
-    mailbox = session.subscribe("/uav1/odom", "nav_msgs/msg/Odometry", wake=loop_wakes_up)
+    queue = session.subscribe("/uav1/odom", "nav_msgs/msg/Odometry", wake=loop_wakes_up)
     ...
-    for published in mailbox.take():
+    for published in queue.take():
         send(published.cdr)
 """
 
@@ -80,7 +80,7 @@ class SessionInfo:
 
     name: str
     publishes: tuple[str, ...]
-    mailboxes: tuple[SubscriptionQueueInfo, ...]
+    queues: tuple[SubscriptionQueueInfo, ...]
     offers: tuple[str, ...]
 
 
@@ -140,7 +140,7 @@ class Gateway:
     @property
     def dropped(self) -> int:
         """Number of messages dropped because clients were too slow, closed sessions included."""
-        present = (box.dropped for session in self.sessions() for box in session.mailboxes)
+        present = (box.dropped for session in self.sessions() for box in session.queues)
         return self._lost + sum(present)
 
     def post(self, action: Callable[[], Any]) -> Future[Any]:
@@ -193,7 +193,7 @@ class Session:
         self._graph = gateway.graph
         self._lock = threading.RLock()
         self._publishers: dict[str, Publisher] = {}
-        self._mailboxes: dict[SubscriptionQueue, Subscription] = {}
+        self._queues: dict[SubscriptionQueue, Subscription] = {}
         self._offers: dict[str, set[ServiceReply]] = {}
         self._closed = False
         self._failed: set[str] = set()
@@ -244,7 +244,7 @@ class Session:
             self._publishers[topic] = self._graph.advertise(topic, msgtype, latched=latched)
             if old is not None:
                 old.cancel()
-        self.tell("advertise", topic, msgtype, latched=latched)
+        self.record_command("advertise", topic, msgtype, latched=latched)
 
     def unadvertise(self, topic: str) -> None:
         """Stops publishing on `topic`. Raises `GraphError` if the client has not advertised it."""
@@ -253,7 +253,7 @@ class Session:
             self._latched_bytes.pop(topic, None)
         if publisher is None:
             raise GraphError(f"{self.name} does not publish '{topic}'")
-        self.tell("unadvertise", topic, publisher.msgtype)
+        self.record_command("unadvertise", topic, publisher.msgtype)
         publisher.cancel()
 
     def published_type(self, topic: str) -> str | None:
@@ -313,19 +313,19 @@ class Session:
     ) -> SubscriptionQueue:
         """Like `GraphConnection.subscribe`; `wake` is called from the simulation's thread."""
         check_depth(depth)
-        mailbox = SubscriptionQueue(topic, depth, wake, reliable=reliable)
+        queue = SubscriptionQueue(topic, depth, wake, reliable=reliable)
         with self._lock:
             self._check_open()
-            self._mailboxes[mailbox] = self._graph.attach(topic, mailbox.put, msgtype)
-        return mailbox
+            self._queues[queue] = self._graph.attach(topic, queue.put, msgtype)
+        return queue
 
-    def unsubscribe(self, mailbox: SubscriptionQueue) -> None:
+    def unsubscribe(self, queue: SubscriptionQueue) -> None:
         """Ends a subscription; messages in its queue can still be taken."""
         with self._lock:
-            subscription = self._mailboxes.pop(mailbox, None)
+            subscription = self._queues.pop(queue, None)
         if subscription is not None:
             subscription.cancel()
-            self._gateway.note_lost(mailbox.info.dropped)
+            self._gateway.note_lost(queue.info.dropped)
 
     # ---------------------------------------------------------------------------------- services
 
@@ -345,10 +345,10 @@ class Session:
                 raise
 
         self.post(ask).add_done_callback(
-            lambda asked: _tell_failure(asked, reply, service, self.name)
+            lambda asked: _pass_failure(asked, reply, service, self.name)
         )
 
-    def offer(self, service: str, srvtype: str, handler: Handler) -> None:
+    def create_service(self, service: str, srvtype: str, handler: Handler) -> None:
         """Creates a service. Raises `GraphError` if the service already has a server.
 
         `handler(request, reply)` is called in the simulation's thread and must not block. Requests
@@ -368,21 +368,21 @@ class Session:
                 relayed.when_done(lambda: pending.discard(relayed))
                 handler(request, relayed)
 
-            self._graph.offer_async(service, srvtype, handle)
+            self._graph.create_async_service(service, srvtype, handle)
             self._offers[service] = pending
-        self.tell("offer", service, srvtype)
+        self.record_command("offer", service, srvtype)
 
-    def withdraw(self, service: str) -> None:
+    def destroy_service(self, service: str) -> None:
         """Destroys a service; pending requests fail. Raises `GraphError` if it does not exist."""
         with self._lock:
             pending = self._offers.pop(service, None)
         if pending is None:
             raise GraphError(f"{self.name} does not serve '{service}'")
         srvtype = self._graph.services().get(service, "")
-        self._graph.withdraw(service)
+        self._graph.destroy_service(service)
         for reply in tuple(pending):
             reply.fail(GraphError(f"service '{service}': {self.name} has left"))
-        self.tell("withdraw", service, srvtype)
+        self.record_command("withdraw", service, srvtype)
 
     def _relay(self, service: str, srvtype: str, reply: ServiceReply, request: int) -> ServiceReply:
         """Returns a reply that passes the response to `reply` between two ticks.
@@ -410,7 +410,7 @@ class Session:
 
     # --------------------------------------------------------------------------------------- end
 
-    def tell(
+    def record_command(
         self, kind: str, name: str, msgtype: str, content: Any = None, *, latched: bool = False
     ) -> None:
         """Passes a command to the watch, where the command itself is not posted."""
@@ -422,30 +422,30 @@ class Session:
         """Ends all publishers, subscriptions and services; a second call has no effect."""
         with self._lock:
             self._closed = True
-            topics, mailboxes = tuple(self._publishers), tuple(self._mailboxes)
+            topics, queues = tuple(self._publishers), tuple(self._queues)
             services = tuple(self._offers)
         for topic in topics:
             self.unadvertise(topic)
-        for mailbox in mailboxes:
-            self.unsubscribe(mailbox)
+        for queue in queues:
+            self.unsubscribe(queue)
         for service in services:
-            self.withdraw(service)
+            self.destroy_service(service)
         self.reading.close()
         self.writing.close()
         self._gateway.forget(self)
 
     @property
-    def mailboxes(self) -> tuple[SubscriptionQueueInfo, ...]:
+    def queues(self) -> tuple[SubscriptionQueueInfo, ...]:
         """Counts of the client's subscription queues."""
         with self._lock:
-            return tuple(mailbox.info for mailbox in self._mailboxes)
+            return tuple(queue.info for queue in self._queues)
 
     @property
     def info(self) -> SessionInfo:
         """The client's current publishers, subscriptions and services."""
         with self._lock:
             publishes, offers = tuple(self._publishers), tuple(self._offers)
-            return SessionInfo(self.name, publishes, self.mailboxes, offers)
+            return SessionInfo(self.name, publishes, self.queues, offers)
 
     def _log_failure(self, done: Future[Any], name: str) -> None:
         """Logs the failure of a publication or response that nothing waits for."""
@@ -466,7 +466,7 @@ def _look_away(_what: object) -> None:
     """Ignores its argument."""
 
 
-def _tell_failure(asked: Future[Any], reply: ServiceReply, service: str, client: str) -> None:
+def _pass_failure(asked: Future[Any], reply: ServiceReply, service: str, client: str) -> None:
     """Fails the reply of a call that was never made, or that failed."""
     if asked.cancelled():
         reply.fail(GraphError("the simulation has ended"))

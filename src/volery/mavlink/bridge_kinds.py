@@ -33,7 +33,7 @@ def _px4(address: Address, options: BridgeOptions) -> Bridge:
 
     return Px4Bridge(
         *address,
-        patience=_patience_of(options),
+        timeout_policy=_timeout_policy_of(options),
         anywhere=options.allow_remote,
         notice_s=_notice_of(options),
     )
@@ -42,7 +42,9 @@ def _px4(address: Address, options: BridgeOptions) -> Bridge:
 def _px4_serial(address: Address, options: BridgeOptions) -> Bridge:
     from volery.mavlink.hil.px4_serial_bridge import Px4SerialBridge
 
-    return Px4SerialBridge(*address, patience=_patience_of(options), notice_s=_notice_of(options))
+    return Px4SerialBridge(
+        *address, timeout_policy=_timeout_policy_of(options), notice_s=_notice_of(options)
+    )
 
 
 def _ardupilot(address: Address, options: BridgeOptions) -> Bridge:
@@ -50,13 +52,13 @@ def _ardupilot(address: Address, options: BridgeOptions) -> Bridge:
 
     return ArdupilotBridge(
         *address,
-        patience=_patience_of(options),
+        timeout_policy=_timeout_policy_of(options),
         anywhere=options.allow_remote,
         notice_s=_notice_of(options),
     )
 
 
-def _patience_of(options: BridgeOptions) -> TimeoutPolicy:
+def _timeout_policy_of(options: BridgeOptions) -> TimeoutPolicy:
     from volery.mavlink.hil.lock_step import TimeoutPolicy
 
     return TimeoutPolicy(options.autopilot_timeout_s, options.drop_on_timeout)

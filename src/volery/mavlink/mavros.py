@@ -62,7 +62,7 @@ class Mavros:
     def __init__(self, node: Node, context: AutopilotContext, prefix: str) -> None:
         self._context = context
         self._prefix = prefix if prefix.startswith("/") else f"{node.get_namespace()}/{prefix}"
-        self._told: dict[str, int] = {}
+        self._published_ns: dict[str, int] = {}
         self._last_state: tuple[Any, ...] = ()
 
         def publisher(name: str, kind: type[Any]) -> Any:
@@ -83,7 +83,7 @@ class Mavros:
             "setpoint_raw/attitude": (message_type(_ATTITUDE), _attitude),
         }
         for name, (kind, read) in subscriptions.items():
-            node.create_subscription(kind, f"{prefix}/{name}", self._heard(read))
+            node.create_subscription(kind, f"{prefix}/{name}", self._receiver(read))
         node.create_service(_BOOL, f"{prefix}/cmd/arming", self._arm)
         node.create_service(_MODE, f"{prefix}/set_mode", self._set_mode)
         node.create_service(_TOL, f"{prefix}/cmd/takeoff", self._take_off)
@@ -92,7 +92,7 @@ class Mavros:
 
     # --------------------------------------------------------------------------------------- out
 
-    def tell(self) -> None:
+    def publish(self) -> None:
         """Publishes what is due."""
         context, memory = self._context, self._context.memory
         state = (memory.armed, memory.mode)
@@ -103,7 +103,7 @@ class Mavros:
                 (self._extended, self._extended_message),
                 (self._battery, self._battery_message),
             ):
-                if publisher.wanted:
+                if publisher.has_subscribers:
                     publisher.publish(build(context))
         if self._is_due("fast", _FAST_NS):
             for publisher, build in (
@@ -112,15 +112,15 @@ class Mavros:
                 (self._odom, self._odom_message),
                 (self._global, self._global_message),
             ):
-                if publisher.wanted:
+                if publisher.has_subscribers:
                     publisher.publish(build(context))
 
     def _is_due(self, what: str, period_ns: int) -> bool:
         now_ns = self._context.memory.now_ns
-        last_ns = self._told.get(what, -period_ns)
+        last_ns = self._published_ns.get(what, -period_ns)
         if 0 <= now_ns - last_ns < period_ns:
             return False
-        self._told[what] = now_ns
+        self._published_ns[what] = now_ns
         return True
 
     def _header(self, frame: str = "map") -> Any:
@@ -187,7 +187,7 @@ class Mavros:
 
     # ---------------------------------------------------------------------------------------- in
 
-    def _heard(self, read: Callable[[Any], OffboardSetpoint]) -> Callable[[Any], None]:
+    def _receiver(self, read: Callable[[Any], OffboardSetpoint]) -> Callable[[Any], None]:
         def take(message: Any) -> None:
             try:
                 setpoint = read(message)

@@ -92,7 +92,7 @@ class AutopilotNode(Node):
     def _fly(self, message: Any) -> None:
         self.core.update(state_of(message))
         for mavros in self._mavros:
-            mavros.tell()
+            mavros.publish()
         self._flush()
 
     def _take_fix(self, fix: Any) -> None:

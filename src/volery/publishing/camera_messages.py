@@ -61,9 +61,9 @@ def colour(frames: CameraFrames, row: int, camera: Camera) -> Image:
 
 def compressed(frames: CameraFrames, row: int, camera: Camera) -> CompressedImage:
     """Returns JPEG or PNG; `format` gives encoding, codec, and OpenCV's decoded encoding."""
-    codec, picture = camera.settings.compressed, frames.colour[row]
+    codec, image = camera.settings.compressed, frames.colour[row]
     quality = camera.settings.jpeg_quality
-    data = codecs.jpeg(picture, quality) if codec == "jpeg" else codecs.png(picture)
+    data = codecs.jpeg(image, quality) if codec == "jpeg" else codecs.png(image)
     text = f"rgb8; {codec} compressed bgr8"
     return CompressedImage(_pair_header(frames, camera), text, _read_only(data))
 
@@ -71,8 +71,8 @@ def compressed(frames: CameraFrames, row: int, camera: Camera) -> CompressedImag
 def depth(frames: CameraFrames, row: int, camera: Camera) -> Image:
     """Returns the depth image, `32FC1` or `16UC1`."""
     encoding, seen = camera.settings.depth_encoding, frames.depth[row]
-    picture = seen if encoding == "32FC1" else codecs.millimetres(seen)
-    return _image(_header(frames, camera), picture, encoding)
+    image = seen if encoding == "32FC1" else codecs.millimetres(seen)
+    return _image(_header(frames, camera), image, encoding)
 
 
 def compressed_depth(frames: CameraFrames, row: int, camera: Camera) -> CompressedImage:
@@ -135,9 +135,9 @@ def camera_info(frames: CameraFrames, row: int, camera: Camera) -> CameraInfo:  
     )
 
 
-def _image(stamped: Header, picture: NDArray[Any], encoding: str) -> Image:
-    height, width = picture.shape[:2]
-    data = _bytes(picture)
+def _image(stamped: Header, image: NDArray[Any], encoding: str) -> Image:
+    height, width = image.shape[:2]
+    data = _bytes(image)
     return Image(stamped, height, width, encoding, 0, len(data) // height, data)
 
 

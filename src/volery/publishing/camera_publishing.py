@@ -112,13 +112,13 @@ class CameraPublisher:
             for outlet in self._outlets.pop(path):
                 outlet.publisher.cancel()
 
-    def wanted_parts(self, cameras: Sequence[SensorId]) -> set[Part]:
+    def subscribed_parts(self, cameras: Sequence[SensorId]) -> set[Part]:
         """Returns the parts of these cameras' images that have subscribers."""
         return {
             part
             for sensor in cameras
             for outlet in self._outlets[sensor.path]
-            if outlet.publisher.wanted
+            if outlet.publisher.has_subscribers
             for part in outlet.parts
         }
 
@@ -135,5 +135,5 @@ class CameraPublisher:
         for row, sensor in enumerate(frames.sensors):
             camera = self._cameras[sensor.path]
             for outlet in self._outlets[sensor.path]:
-                if outlet.publisher.wanted and all(made[part] for part in outlet.parts):
+                if outlet.publisher.has_subscribers and all(made[part] for part in outlet.parts):
                     outlet.publisher.publish(outlet.message(frames, row, camera))

@@ -178,17 +178,17 @@ class GraphPublisher:
 
     def publish_event(self, event: Event) -> None:
         """Queues an event as JSON text on `/events`."""
-        if self._events.wanted:
+        if self._events.has_subscribers:
             self._events.publish(String(json.dumps(asdict(event))))
 
     @property
     def clock_wanted(self) -> bool:
         """Whether `/clock` has subscribers."""
-        return self._clock.wanted
+        return self._clock.has_subscribers
 
     def publish_clock(self, time_ns: int) -> None:
         """Queues a message on `/clock`."""
-        if self._clock.wanted:
+        if self._clock.has_subscribers:
             self._clock.publish(Clock(time_from_ns(time_ns)))
 
     def _publish_static(self) -> None:
@@ -203,7 +203,7 @@ class GraphPublisher:
         force_covariance = _diagonal(readings.specific_force_variance)
         for i, sensor in enumerate(readings.sensors):
             publisher = self._publishers[f"/{sensor.uav_name}/{sensor.name}"]
-            if not publisher.wanted:
+            if not publisher.has_subscribers:
                 continue
             publisher.publish(
                 Imu(
@@ -220,7 +220,7 @@ class GraphPublisher:
     def _ranges(self, readings: RangeSamples) -> None:
         for i, sensor in enumerate(readings.sensors):
             publisher = self._publishers[f"/{sensor.uav_name}/{sensor.name}"]
-            if not publisher.wanted:
+            if not publisher.has_subscribers:
                 continue
             publisher.publish(
                 Range(
@@ -241,7 +241,7 @@ class GraphPublisher:
             attitude = Quaternion(*readings.attitude[i].tolist())
             base = f"{sensor.uav_name}/base_link"
             frame = "map" if readings.is_ground_truth else f"{sensor.uav_name}/odom"
-            if not readings.is_ground_truth and self._tf.wanted:
+            if not readings.is_ground_truth and self._tf.has_subscribers:
                 transforms.append(
                     TransformStamped(
                         header(readings.stamp_ns, frame),
@@ -250,7 +250,7 @@ class GraphPublisher:
                     )
                 )
             publisher = self._publishers[_odometry_topic(sensor)]
-            if not publisher.wanted:
+            if not publisher.has_subscribers:
                 continue
             twist = Twist(
                 Vector3(*readings.velocity_body[i].tolist()),
@@ -275,7 +275,7 @@ class GraphPublisher:
             mount = self._mounts[sensor.path]
             base = f"{sensor.uav_name}/base_link"
             angle = float(joints.angle[i])
-            if self._tf.wanted:
+            if self._tf.has_subscribers:
                 q = rotations.multiply(mount.attitude_body, rotations.from_rpy(0.0, angle, 0.0))
                 transforms.append(
                     TransformStamped(
@@ -285,7 +285,7 @@ class GraphPublisher:
                     )
                 )
             publisher = self._publishers[f"/{sensor.uav_name}/joint_states"]
-            if publisher.wanted:
+            if publisher.has_subscribers:
                 publisher.publish(
                     JointState(
                         header(joints.stamp_ns, ""),
@@ -302,7 +302,7 @@ class GraphPublisher:
         for topic in SENSOR_TOPICS[type(samples)]:
             for row, sensor in enumerate(samples.sensors):
                 publisher = self._publishers[topic.name_of(sensor)]
-                if publisher.wanted:
+                if publisher.has_subscribers:
                     message = topic.message(samples, row)
                     if message is not None:
                         publisher.publish(message)
@@ -310,7 +310,7 @@ class GraphPublisher:
     def _batteries(self, readings: BatterySamples) -> None:
         for i, sensor in enumerate(readings.sensors):
             publisher = self._publishers[f"/{sensor.uav_name}/{sensor.name}"]
-            if publisher.wanted:
+            if publisher.has_subscribers:
                 publisher.publish(_battery_state(readings, i))
 
     def _advertise(self, topic: str, message_class: type[Any]) -> None:

@@ -23,14 +23,14 @@ _HEADER = struct.Struct("<i2f")
 _MOST = 65535
 
 
-def jpeg(picture: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
+def jpeg(image: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
     """Encodes (height, width, 3) sRGB as JPEG; quality 1 to 100 on libjpeg's scale."""
-    return _encoded(picture, format="JPEG", quality=quality)
+    return _encoded(image, format="JPEG", quality=quality)
 
 
-def png(picture: NDArray[Any]) -> NDArray[np.uint8]:
+def png(image: NDArray[Any]) -> NDArray[np.uint8]:
     """Encodes (height, width, 3) sRGB, or (height, width) 16-bit grey, as PNG."""
-    return _encoded(picture, format="PNG", compress_level=_PNG_LEVEL)
+    return _encoded(image, format="PNG", compress_level=_PNG_LEVEL)
 
 
 def millimetres(depth: NDArray[np.float32]) -> NDArray[np.uint16]:
@@ -65,9 +65,9 @@ def _with_header(a: float, b: float, depth: NDArray[np.uint16]) -> NDArray[np.ui
     return np.concatenate([header, png(depth)])
 
 
-def _encoded(picture: NDArray[Any], **options: Any) -> NDArray[np.uint8]:
+def _encoded(image: NDArray[Any], **options: Any) -> NDArray[np.uint8]:
     from PIL import Image
 
     file = BytesIO()
-    Image.fromarray(np.ascontiguousarray(picture)).save(file, **options)
+    Image.fromarray(np.ascontiguousarray(image)).save(file, **options)
     return np.frombuffer(file.getbuffer(), np.uint8)

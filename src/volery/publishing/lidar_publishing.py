@@ -93,17 +93,17 @@ class LidarPublisher:
             return
         for row, sensor in enumerate(scans.sensors):
             publisher = self._scans[sensor.path]
-            if publisher.wanted:
+            if publisher.has_subscribers:
                 publisher.publish(_scan_message(scans, scans.model.scan, row))
             several = self._echoes.get(sensor.path)
-            if several is not None and several.wanted:
+            if several is not None and several.has_subscribers:
                 several.publish(_echo_message(scans, scans.model.scan, row))
 
     def _publish_clouds(self, scans: LidarScans) -> None:
         maker: PointMaker | None = None
         for row, sensor in enumerate(scans.sensors):
             publisher = self._clouds[sensor.path]
-            if not publisher.wanted:
+            if not publisher.has_subscribers:
                 continue
             maker = maker or PointMaker(scans)
             stamped = header(scans.stamp_ns, laser_frame(sensor))

@@ -54,8 +54,8 @@ class ReturnsPublisher:
         """Publishes one sweep of a bank."""
         for row, sensor in enumerate(scans.sensors):
             publisher, mount = self._lidars.get(sensor.path, (None, None))
-            if publisher is not None and mount is not None and publisher.watched:
-                publisher.show(returns_message(scans, row, mount))
+            if publisher is not None and mount is not None and publisher.has_external_subscribers:
+                publisher.publish_external(returns_message(scans, row, mount))
 
 
 def returns_topic(sensor: SensorId) -> str:

@@ -174,7 +174,7 @@ def read_way(path: Path, topic: str | None = None) -> LoggedTrajectory:
     Raises VoleryError, which lists the topics, if that is not possible.
     """
     log = _read(path)
-    known = [name for name, rows in log.ways.items() if rows.poses and _tells_a_way(name)]
+    known = [name for name, rows in log.ways.items() if rows.poses and _is_trajectory(name)]
     if topic is None and len(known) == 1:
         return LoggedTrajectory(log.ways[known[0]].way(), log.problem)
     if topic is None or topic not in log.ways:
@@ -185,7 +185,7 @@ def read_way(path: Path, topic: str | None = None) -> LoggedTrajectory:
     return LoggedTrajectory(log.ways[topic].way(), log.problem)
 
 
-def _tells_a_way(topic: str) -> bool:
+def _is_trajectory(topic: str) -> bool:
     words = topic.lower()
     return not topic.endswith(TRUTH) and not any(wish in words for wish in _WISHES)
 

@@ -110,7 +110,7 @@ def _figures(flight: FlightData) -> list[str]:
         number += 1
         return f"<figcaption><b>Figure {number}.</b> {text}</figcaption>"
 
-    def picture(data: bytes, alternative: str, text: str) -> str:
+    def figure(data: bytes, alternative: str, text: str) -> str:
         source = base64.b64encode(data).decode()
         image = f'<img alt="{escape(alternative)}" src="data:image/png;base64,{source}">'
         return f'<figure class="map">{image}{caption(text)}</figure>'
@@ -122,7 +122,7 @@ def _figures(flight: FlightData) -> list[str]:
     crosses = "Red crosses mark contacts. " if flight.contacts else ""
     found.append("<h2>The flight</h2>")
     found.append(
-        picture(
+        figure(
             maps.top_view(flight),
             "Map of the world with the paths flown",
             f"The flight from above. {trees}A ring is where a UAV started, a disc where it was "
@@ -137,7 +137,7 @@ def _figures(flight: FlightData) -> list[str]:
             f"{flight.lidar.voxel_m:g} m, from {counted(flight.lidar.scans, 'scan')}"
         )
         found.append(
-            picture(
+            figure(
                 aslant,
                 "LIDAR points seen aslant",
                 f"The LIDAR map seen from the south, {numbers}. Each beam is placed by the true "
@@ -145,7 +145,7 @@ def _figures(flight: FlightData) -> list[str]:
             )
         )
         found.append(
-            picture(
+            figure(
                 above,
                 "LIDAR points from above",
                 "The same map from above, coloured by height above the ground; the ground itself "

@@ -126,22 +126,22 @@ def _estimate_section(uav: LoggedUav, trunks: TrueTrunks) -> list[str]:
         lines.append(ChartLine("simulated", uav.truth.time_s, uav.truth.position))
     if uav.estimate is not None:
         lines.append(ChartLine("estimated", uav.estimate.time_s, uav.estimate.position))
-    told = "Trajectory and trunk map."
+    caption = "Trajectory and trunk map."
     if len(uav.trunks):
-        told = (
+        caption = (
             f"Trajectory and {counted(len(uav.trunks), 'trunk')} detected by the level LIDAR three "
             "times or more, where the estimate puts them."
         )
         if not uav.is_founded:
-            told += (
+            caption += (
                 " Without a nodding LIDAR shapes alone count: crowns and rises of the "
                 "ground may be among them."
             )
     near = trunks.near(np.concatenate([line.position for line in lines]))
-    told += _trunks_text(uav.trunks, near)
+    caption += _trunks_text(uav.trunks, near)
     if uav.truth is not None and uav.estimate is not None:
-        told += _error_text(uav.estimate, uav.truth)
-    return [f"<h2>{escape(uav.name)}</h2>", *_figures(lines, uav.trunks, near, told)]
+        caption += _error_text(uav.estimate, uav.truth)
+    return [f"<h2>{escape(uav.name)}</h2>", *_figures(lines, uav.trunks, near, caption)]
 
 
 def _trunks_text(found: Array, near: TrueTrunks) -> str:
@@ -150,17 +150,17 @@ def _trunks_text(found: Array, near: TrueTrunks) -> str:
         return f" {escape(near.why_none)}"
     if not len(near.places):
         return " No tree of the scenario is within 15 m of the trajectory."
-    told = (
+    caption = (
         f" Rings: {counted(len(near.places), 'tree')} of the scenario within 15 m of it, by "
         "the width of trunks (thin ones enlarged)."
     )
     away = near.distances_m(found)
     if len(away):
-        told += (
+        caption += (
             f" {(away <= _TRUE_M).mean():.0%} of the mapped trunks are within {_TRUE_M} m of "
             "one, by the estimated poses."
         )
-    return told
+    return caption
 
 
 def _error_text(estimate: RecordedTrajectory, truth: RecordedTrajectory) -> str:
@@ -254,7 +254,7 @@ def _shift_text(laid: _Laid) -> str:
 
 def _comparison_section(uav: LoggedUav, laid: _Laid, log: Path, trunks: TrueTrunks) -> list[str]:
     """Draws a real flight over the simulated one."""
-    told = (
+    caption = (
         f"The flight of {escape(log.name)} over that of {escape(uav.name)}: {_shift_text(laid)} "
         f"(where their speeds are most alike, with a correlation of "
         f"{laid.shift.alike:.2f}), turned and moved onto it. Root mean square distance "
@@ -262,7 +262,7 @@ def _comparison_section(uav: LoggedUav, laid: _Laid, log: Path, trunks: TrueTrun
     )
     notes = [f'<p class="note">{escape(doubt)}.</p>' for doubt in laid.doubts(Path(log.name))]
     near = trunks.near(laid.lines[0].position)
-    figures = _figures(laid.lines, uav.trunks, near, told)
+    figures = _figures(laid.lines, uav.trunks, near, caption)
     return ["<h2>Real against simulated</h2>", *notes, *figures]
 
 
@@ -275,12 +275,14 @@ def _lead(flight: LoggedFlight) -> list[str]:
     return [f'<p class="lead">{escape(text)}</p>' for text in texts if text]
 
 
-def _figures(lines: Sequence[ChartLine], trunks: Array, true: TrueTrunks, told: str) -> list[str]:
+def _figures(
+    lines: Sequence[ChartLine], trunks: Array, true: TrueTrunks, caption: str
+) -> list[str]:
     def figure(svg: str, text: str) -> str:
         return f'<figure class="chart">{svg}<figcaption>{text}</figcaption></figure>'
 
     return [
-        figure(ways_from_above(lines, trunks, true), told),
+        figure(ways_from_above(lines, trunks, true), caption),
         '<div class="pair">',
         figure(over_time(lines, 0), "x over time."),
         figure(over_time(lines, 1), "y over time."),

@@ -27,14 +27,14 @@ from volery.sensors.samples import Samples
 from volery.world.scene import Scene
 from volery.world.terrain import Terrain
 
-Reading: TypeAlias = dict[str, NDArray[Any]]
+SampleArrays: TypeAlias = dict[str, NDArray[Any]]
 
 
 @dataclass(frozen=True)
 class EnvironmentEvent:
-    """Describes an event of one environment (`copy`)."""
+    """Describes an event of one environment (`env`)."""
 
-    copy: int
+    env: int
     event: Event
 
 
@@ -54,14 +54,14 @@ class EnvironmentBlock:
         self._scenario = scenario
         self._starts = tuple(starts)
         self._first = first
-        copies = len(self.seeds)
-        everyone = self._starts * copies
-        names = tuple(f"{k}/{start.name}" for k in range(copies) for start in self._starts)
-        self.fleet = build_fleet(scenario, everyone, names, copies=copies)
+        num_envs = len(self.seeds)
+        everyone = self._starts * num_envs
+        names = tuple(f"{k}/{start.name}" for k in range(num_envs) for start in self._starts)
+        self.fleet = build_fleet(scenario, everyone, names, num_envs=num_envs)
         self._scene = scene.twin()
-        add_bodies(self._scene, everyone, copies=copies)
+        add_bodies(self._scene, everyone, num_envs=num_envs)
         self._fitted = fit_sensors(scenario, self._starts)
-        fitted = [f for k in range(copies) for f in self._fit(k)]
+        fitted = [f for k in range(num_envs) for f in self._fit(k)]
         estimation = build_estimation(scenario, fitted, self.fleet)
         self._engine = Engine(
             self.fleet,
@@ -72,15 +72,15 @@ class EnvironmentBlock:
             self,
             crash_on_contact=scenario.physics.on_contact == "crash",
             estimation=estimation,
-            copies=copies,
+            num_envs=num_envs,
         )
         banks = self._engine.banks
         self._bank_of = {id(bank.sensors): k for k, bank in enumerate(banks)}
         self._places = _places(banks)
         self._latest: list[Samples | None] = [None] * len(banks)
         self._events: list[EnvironmentEvent] = []
-        self._began_ns = np.zeros(copies, np.int64)
-        self._stir_air(np.arange(copies))
+        self._began_ns = np.zeros(num_envs, np.int64)
+        self._stir_air(np.arange(num_envs))
         self._start_state = self.fleet.get_state()
         self._take_off(np.arange(len(everyone)))
 
@@ -110,7 +110,7 @@ class EnvironmentBlock:
         return math.lcm(*(int(p * down) for p in periods)) / down
 
     def age_s(self) -> NDArray[np.float64]:
-        """Returns the simulated time (copies,), s, since the last reset of each environment."""
+        """Returns the simulated time (num_envs,), s, since the last reset of each environment."""
         return (self.time_ns - self._began_ns) / NS_PER_S
 
     def advance_to(self, step: int) -> None:
@@ -121,18 +121,18 @@ class EnvironmentBlock:
         except DivergenceError as error:
             raise self._of_copy(error) from None
 
-    def reset(self, copies: NDArray[np.int64], seeds: Sequence[int] | None) -> None:
-        """Resets the environments `copies`, numbered within the block."""
+    def reset(self, envs: NDArray[np.int64], seeds: Sequence[int] | None) -> None:
+        """Resets the environments `envs`, numbered within the block."""
         if seeds is not None:
-            for k, seed in zip(copies, seeds, strict=True):
+            for k, seed in zip(envs, seeds, strict=True):
                 self.seeds[k] = seed
-        crew = len(self._starts)
-        rows = (copies[:, None] * crew + np.arange(crew)).ravel()
+        num_uavs = len(self._starts)
+        rows = (envs[:, None] * num_uavs + np.arange(num_uavs)).ravel()
         self.fleet.restart(self._start_state, rows)
-        self._stir_air(copies)
+        self._stir_air(envs)
         self._engine.collisions.forget(rows)
-        self._began_ns[copies] = self.time_ns
-        keys = self._keys_of(copies)
+        self._began_ns[envs] = self.time_ns
+        keys = self._keys_of(envs)
         for samples, fresh in self._engine.restart_sensors(rows, keys):
             self._renew(samples, fresh)
         self._take_off(rows)
@@ -161,15 +161,15 @@ class EnvironmentBlock:
 
     # -------------------------------------------------------------------------------- observations
 
-    def uav(self, copy: int, name: str) -> Uav:
+    def uav(self, env: int, name: str) -> Uav:
         """Returns the handle on one UAV."""
         place = [start.name for start in self._starts].index(name)
-        row = copy * len(self._starts) + place
+        row = env * len(self._starts) + place
         flight = self._scenario.types[self._starts[place].type_name].flight
         return Uav(self.fleet, row, name, flight)
 
-    def reading(self, uav: str, sensor: str) -> Reading | None:
-        """Returns the last sample of one sensor of each environment; arrays are (copies, ...).
+    def sample(self, uav: str, sensor: str) -> SampleArrays | None:
+        """Returns the last sample of one sensor of each environment; arrays are (num_envs, ...).
 
         Raises `CommandError` if there is no such sensor.
         """
@@ -199,10 +199,10 @@ class EnvironmentBlock:
 
     def happened(self, event: Event) -> None:
         """Stores an event under its environment."""
-        copy, name = event.uav.split("/")
+        env, name = event.uav.split("/")
         partner = event.partner.split("/")[-1]
         own = replace(event, uav=name, partner=partner)
-        self._events.append(EnvironmentEvent(self._first + int(copy), own))
+        self._events.append(EnvironmentEvent(self._first + int(env), own))
 
     def deliver(self) -> None:
         """Does nothing: there is no message queue."""
@@ -212,9 +212,9 @@ class EnvironmentBlock:
     def _of_copy(self, error: DivergenceError) -> DivergenceError:
         """Returns the error with the environment's number among all, not in this block."""
         number, name = error.uav.split("/")
-        copy = self._first + int(number)
-        text = str(error).replace(error.uav, f"{name} of environment {copy}", 1)
-        return DivergenceError(f"{copy}/{name}", error.time_s, text)
+        env = self._first + int(number)
+        text = str(error).replace(error.uav, f"{name} of environment {env}", 1)
+        return DivergenceError(f"{env}/{name}", error.time_s, text)
 
     def _renew(self, samples: Samples, rows: NDArray[np.int64]) -> None:
         """Replaces the samples of restarted sensors."""
@@ -227,8 +227,8 @@ class EnvironmentBlock:
                 changed[name][rows] = _arrays(samples)[name][rows]
             self._latest[bank] = replace(last, **changed)
 
-    def _fit(self, copy: int) -> list[SensorInstance]:
-        return refit(self._fitted, self.seeds[copy], copy * len(self._starts))
+    def _fit(self, env: int) -> list[SensorInstance]:
+        return refit(self._fitted, self.seeds[env], env * len(self._starts))
 
     def _take_off(self, rows: NDArray[np.int64]) -> None:
         """Takes off with those of the UAVs `rows` that start with a take-off."""
@@ -238,16 +238,16 @@ class EnvironmentBlock:
                 flight = self._scenario.types[start.type_name].flight
                 self.fleet.take_off(row, flight.take_off_altitude_m)
 
-    def _stir_air(self, copies: NDArray[np.int64]) -> None:
+    def _stir_air(self, envs: NDArray[np.int64]) -> None:
         """Seeds the turbulence of each environment."""
-        crew = len(self._starts)
+        num_uavs = len(self._starts)
         names = [start.name for start in self._starts]
-        for k in copies:
-            self.fleet.seed_turbulence(self.seeds[k], k * crew + np.arange(crew), names)
+        for k in envs:
+            self.fleet.seed_turbulence(self.seeds[k], k * num_uavs + np.arange(num_uavs), names)
 
-    def _keys_of(self, copies: NDArray[np.int64]) -> dict[tuple[int, str], np.uint64]:
+    def _keys_of(self, envs: NDArray[np.int64]) -> dict[tuple[int, str], np.uint64]:
         """Returns the noise streams by UAV row and sensor name."""
-        return {(f.id.uav, f.id.name): f.key for k in copies for f in self._fit(int(k))}
+        return {(f.id.uav, f.id.name): f.key for k in envs for f in self._fit(int(k))}
 
 
 def _arrays(samples: Samples) -> dict[str, NDArray[Any]]:

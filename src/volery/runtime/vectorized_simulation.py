@@ -4,11 +4,11 @@ All environments share the world and one clock. Each has its own UAVs, noise and
 own seed, and resets independently. Environments do not sense or touch one another. Each thread runs
 one block of environments; the UAVs of a block are rows of one fleet, which one kernel call moves.
 
-    with VectorizedSimulation(load_scenario("hover"), 1024) as copies:
-        copies.command_velocity(np.tile([1.0, 0.0, 0.0], (1024, 1, 1)))
-        copies.run(0.1)
-        height = copies.state().position_map[:, 0, 2]
-        copies.reset(np.flatnonzero(height < 0.5))
+    with VectorizedSimulation(load_scenario("hover"), 1024) as envs:
+        envs.command_velocity(np.tile([1.0, 0.0, 0.0], (1024, 1, 1)))
+        envs.run(0.1)
+        height = envs.state().position_map[:, 0, 2]
+        envs.reset(np.flatnonzero(height < 0.5))
 
 There is no graph: commands and samples are arrays. The scenario's nodes do not run.
 """
@@ -30,7 +30,7 @@ from volery.core.plurals import counted
 from volery.runtime.build.fleet import place
 from volery.runtime.build.worlds import build_city, build_forest, build_scene, build_terrain
 from volery.runtime.checks import check_reset_seed, check_seconds, check_steps
-from volery.runtime.environment_block import EnvironmentBlock, EnvironmentEvent, Reading
+from volery.runtime.environment_block import EnvironmentBlock, EnvironmentEvent, SampleArrays
 from volery.runtime.vehicles.uav import Uav
 from volery.runtime.warmup.parallel_compilation import compiled
 from volery.runtime.warmup.requirements import needs_of
@@ -41,31 +41,31 @@ Array = NDArray[np.float64]
 
 
 class VectorizedSimulation:
-    """Holds `count` environments (copies) of `scenario`, each with `n` UAVs.
+    """Holds `num_envs` environments of `scenario`, each with `n` UAVs.
 
     `seeds` has one seed per environment; the default is the scenario's seed and those after it.
     Results do not depend on the number of `threads`. All environments share the world that the
     scenario's seed generates: the attribute `scenario` has that world fixed (`world.seed`), and an
-    environment with seed s equals `Simulation(copies.scenario.with_(seed=s))`. Raises
+    environment with seed s equals `Simulation(envs.scenario.with_(seed=s))`. Raises
     `ScenarioError` if the scenario cannot be built.
     """
 
     def __init__(
         self,
         scenario: Scenario,
-        count: int,
+        num_envs: int,
         *,
         seeds: Sequence[int] | None = None,
         threads: int = 2,
     ) -> None:
-        if count < 1 or threads < 1:
+        if num_envs < 1 or threads < 1:
             raise ScenarioError(
-                f"at least 1 environment and 1 thread (found {count} and {threads})"
+                f"at least 1 environment and 1 thread (found {num_envs} and {threads})"
             )
         if seeds is None:
-            seeds = range(scenario.seed, scenario.seed + count)
-        if len(seeds) != count:
-            raise ScenarioError(_without_seeds(count, len(seeds)))
+            seeds = range(scenario.seed, scenario.seed + num_envs)
+        if len(seeds) != num_envs:
+            raise ScenarioError(_without_seeds(num_envs, len(seeds)))
         scenario = scenario.with_(world={"seed": scenario.world_seed})
         self.scenario = scenario
         with compiled(needs_of(scenario, nodes=False)):
@@ -74,7 +74,7 @@ class VectorizedSimulation:
             self.forest = build_forest(scenario, self.terrain, self.city)
             self.scene = build_scene(scenario, self.terrain, self.forest, self.city)
         self._starts = place(scenario, self.scene, self.terrain)
-        ends = np.linspace(0, count, min(threads, count) + 1).round().astype(int).tolist()
+        ends = np.linspace(0, num_envs, min(threads, num_envs) + 1).round().astype(int).tolist()
         self._blocks = [
             EnvironmentBlock(scenario, self._starts, self.terrain, self.scene, seeds[a:b], a)
             for a, b in itertools.pairwise(ends)
@@ -82,12 +82,12 @@ class VectorizedSimulation:
         self._first: list[int] = ends[:-1]
         self._owed_ns = 0
         self._closed = False
-        self._pool = ThreadPoolExecutor(len(self._blocks), thread_name_prefix="volery-copies")
+        self._pool = ThreadPoolExecutor(len(self._blocks), thread_name_prefix="volery-envs")
 
     # -------------------------------------------------------------------------------------- time
 
     @property
-    def count(self) -> int:
+    def num_envs(self) -> int:
         """Number of environments, K."""
         return sum(len(block.seeds) for block in self._blocks)
 
@@ -138,9 +138,9 @@ class VectorizedSimulation:
         steps, self._owed_ns = divmod(self._owed_ns + ns_from_s(seconds), dt_ns)
         self.step(steps)
 
-    def reset(self, copies: ArrayLike | None = None, seeds: Sequence[int] | None = None) -> None:
-        """Resets `copies` (default: all), by numbers or mask (K,), optionally with new `seeds`."""
-        chosen = self._chosen(copies)
+    def reset(self, envs: ArrayLike | None = None, seeds: Sequence[int] | None = None) -> None:
+        """Resets `envs` (default: all), by numbers or mask (K,), optionally with new `seeds`."""
+        chosen = self._chosen(envs)
         for seed in seeds or ():
             check_reset_seed(self.scenario, seed)
         if seeds is not None and len(seeds) != len(chosen):
@@ -179,7 +179,7 @@ class VectorizedSimulation:
     def state(self) -> FleetState:
         """Returns copies of the present states of all UAVs; each array is (K, n, ...)."""
         parts = [block.fleet.state for block in self._blocks]
-        shape = (self.count, len(self._starts))
+        shape = (self.num_envs, len(self._starts))
         return FleetState(
             *(
                 np.concatenate(arrays).reshape(*shape, *arrays[0].shape[1:])
@@ -187,13 +187,13 @@ class VectorizedSimulation:
             )
         )
 
-    def reading(self, uav: str, sensor: str) -> Reading | None:
+    def sample(self, uav: str, sensor: str) -> SampleArrays | None:
         """Returns the last sample of one sensor of each environment, None before the first.
 
-        Arrays are (K, ...), with the field names of `sensors.samples`: `reading["ranges"]`. Raises
+        Arrays are (K, ...), with the field names of `sensors.samples`: `sample["ranges"]`. Raises
         `CommandError` if there is no such sensor.
         """
-        parts = [block.reading(uav, sensor) for block in self._blocks]
+        parts = [block.sample(uav, sensor) for block in self._blocks]
         found = [part for part in parts if part is not None]
         if not found:
             return None
@@ -202,13 +202,13 @@ class VectorizedSimulation:
     def drain_events(self) -> list[EnvironmentEvent]:
         """Returns and clears the events since the last call, sorted by time and environment."""
         events = [event for block in self._blocks for event in block.drain_events()]
-        return sorted(events, key=lambda e: (e.event.time_ns, e.copy))
+        return sorted(events, key=lambda e: (e.event.time_ns, e.env))
 
-    def uav(self, copy: int, name: str) -> Uav:
-        """Returns the handle on one UAV of environment number `copy`."""
-        self._chosen([copy])
-        k = bisect.bisect_right(self._first, copy) - 1
-        return self._blocks[k].uav(copy - self._first[k], name)
+    def uav(self, env: int, name: str) -> Uav:
+        """Returns the handle on one UAV of environment number `env`."""
+        self._chosen([env])
+        k = bisect.bisect_right(self._first, env) - 1
+        return self._blocks[k].uav(env - self._first[k], name)
 
     # --------------------------------------------------------------------------------- commands
 
@@ -218,7 +218,7 @@ class VectorizedSimulation:
         They turn at `yaw_rate` (K, n), rad/s. UAVs that are landed, crashed or taking off ignore
         the command. Raises `CommandError` if values are not finite or do not broadcast.
         """
-        shape = (self.count, len(self._starts))
+        shape = (self.num_envs, len(self._starts))
         velocity = _spread("velocity", velocity, (*shape, 3))
         yaw_rate = _spread("yaw_rate", yaw_rate, shape)
         for block, first in zip(self._blocks, self._first, strict=True):
@@ -231,18 +231,18 @@ class VectorizedSimulation:
         if self._closed:
             raise CommandError("the environments are closed; make a new VectorizedSimulation")
 
-    def _chosen(self, copies: ArrayLike | None) -> NDArray[np.int64]:
-        chosen = np.arange(self.count) if copies is None else np.atleast_1d(np.asarray(copies))
+    def _chosen(self, envs: ArrayLike | None) -> NDArray[np.int64]:
+        chosen = np.arange(self.num_envs) if envs is None else np.atleast_1d(np.asarray(envs))
         if chosen.dtype == bool:
-            if chosen.shape != (self.count,):
+            if chosen.shape != (self.num_envs,):
                 raise CommandError(
-                    f"a mask of environments has shape ({self.count},), not {chosen.shape}"
+                    f"a mask of environments has shape ({self.num_envs},), not {chosen.shape}"
                 )
             chosen = np.flatnonzero(chosen)
         if len(chosen) and (chosen.ndim != 1 or not np.issubdtype(chosen.dtype, np.integer)):
-            raise CommandError(f"environments are given by whole numbers or a mask, not {copies!r}")
-        if len(chosen) and not 0 <= chosen.min() <= chosen.max() < self.count:
-            raise CommandError(f"environments are numbered 0 to {self.count - 1}")
+            raise CommandError(f"environments are given by whole numbers or a mask, not {envs!r}")
+        if len(chosen) and not 0 <= chosen.min() <= chosen.max() < self.num_envs:
+            raise CommandError(f"environments are numbered 0 to {self.num_envs - 1}")
         return chosen.astype(np.int64)
 
 
@@ -257,8 +257,8 @@ def _spread(what: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
     return spread
 
 
-def _without_seeds(copies: int, seeds: int) -> str:
+def _without_seeds(num_envs: int, seeds: int) -> str:
     return (
-        f"{counted(copies, 'environment', 'environments')} with "
+        f"{counted(num_envs, 'environment', 'environments')} with "
         f"{counted(seeds, 'seed')}: each needs one"
     )

@@ -106,16 +106,21 @@ class Data(Bounded):
     @model_validator(mode="before")
     @classmethod
     def _rename_former_keys(cls, data: Any) -> Any:
-        if not isinstance(data, Mapping):
-            return data
-        former = {key: cls.former_keys[key] for key in data if key in cls.former_keys}
-        if not former:
-            return data
-        for old, new in former.items():
-            warn_of_former_word(f"key '{old}'", new)
-            if new in data:
-                raise ValueError(f"keys '{old}' and '{new}' are the same; use only '{new}'")
-        return {former.get(key, key): value for key, value in data.items()}
+        return renamed(data, cls.former_keys, "key") if isinstance(data, Mapping) else data
+
+
+def renamed(data: Mapping[str, Any], former: Mapping[str, str], what: str) -> dict[str, Any]:
+    """Returns `data` with present names for former ones, and warns of each.
+
+    Raises `ValueError` if the data contain both.
+    """
+    for old, new in former.items():
+        if old not in data:
+            continue
+        warn_of_former_word(f"{what} '{old}'", new)
+        if new in data:
+            raise ValueError(f"{what}s '{old}' and '{new}' are the same; use only '{new}'")
+    return {former.get(key, key): value for key, value in data.items()}
 
 
 def warn_of_former_word(what: str, new: str) -> None:

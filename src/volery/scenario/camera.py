@@ -57,7 +57,7 @@ class Daylight(Data):
     """Meteorological optical range: distance at which contrast has faded to a twentieth."""
 
     @model_validator(mode="after")
-    def _sun_is_told_once(self) -> Self:
+    def _sun_has_one_source(self) -> Self:
         usual = type(self).model_fields
         angles = ("sun_elevation_deg", "sun_azimuth_deg")
         told = any(getattr(self, name) != usual[name].default for name in angles)

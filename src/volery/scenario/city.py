@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Self
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Self
 
 from pydantic import Field, model_validator
 
@@ -15,7 +16,7 @@ Length = Annotated[float, Field(ge=0.5, le=1000.0)]
 class Streets(Data):
     """Streets in the gaps between buildings, and their furniture."""
 
-    widest_m: Annotated[float, Field(ge=4.0, le=200.0)] = 32.0
+    max_width_m: Annotated[float, Field(ge=4.0, le=200.0)] = 32.0
     """Wider gaps are not streets: they have the ground's own material."""
     pavement_m: Annotated[float, Field(ge=0.5, le=20.0)] = 3.0
     """Width from the walls to the kerb."""
@@ -23,9 +24,14 @@ class Streets(Data):
     """Spacing along the kerb; 0: no lamps."""
     tree_spacing_m: NonNegative = 11.0
     """Spacing along the kerb of streets with room for trees; 0: none."""
-    tree_share: Share = 0.6
+    tree_fraction: Share = 0.6
     """Fraction of the tree positions that have a tree."""
     tree_species: str = "broadleaf"
+
+    former_keys: ClassVar[Mapping[str, str]] = {
+        "widest_m": "max_width_m",
+        "tree_share": "tree_fraction",
+    }
 
 
 class City(Data):

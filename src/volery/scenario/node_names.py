@@ -64,6 +64,11 @@ def node_path(node: str) -> str:
     return path
 
 
+def name_of_former_path(path: str) -> str:
+    """Returns the registered name of a node's former path; other names are returned as they are."""
+    return _FORMER_PATHS.get(path, path)
+
+
 def _moved(node: str) -> str:
     """Returns the present path of a node with this former path."""
     name = _FORMER_PATHS[node]

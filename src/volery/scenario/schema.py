@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 
 from volery.scenario.access import ScenarioAccess
 from volery.scenario.actors import Actors, check_actors
@@ -24,10 +24,12 @@ from volery.scenario.base import (
     Topic,
     Vector2,
     check_rectangle,
+    renamed,
 )
 from volery.scenario.camera import CameraSensor, Daylight
 from volery.scenario.city import City
 from volery.scenario.faults import Fault
+from volery.scenario.former_parameters import former_parameters
 from volery.scenario.grid_map import GridMapWorld
 from volery.scenario.merging import merged
 from volery.scenario.navigation import DeniedArea, MagneticField, NavigationSensor, Origin
@@ -284,6 +286,14 @@ class NodeEntry(Data):
     parameters: dict[str, Any] = Field(default_factory=dict)
     latency_s: Annotated[float, Field(ge=0.0, le=60.0)] = 0.0
     """Simulated time from a callback's input to its output; above 0 the node runs on a worker."""
+
+    @field_validator("parameters")
+    @classmethod
+    def _rename_former_parameters(
+        cls, parameters: dict[str, Any], info: ValidationInfo
+    ) -> dict[str, Any]:
+        node = info.data.get("node", "")
+        return renamed(parameters, former_parameters(node), f"{node}: parameter")
 
 
 class RotorWear(Data):

@@ -79,7 +79,7 @@ class Wind(Data):
         return self
 
     @model_validator(mode="after")
-    def _is_told_once(self) -> Self:
+    def _has_one_source(self) -> Self:
         if self.field is not None and (self.profile is not None or any(self.velocity_m_s)):
             raise ValueError("a field replaces velocity_m_s and profile; leave them out")
         if self.w20_m_s is not None and self.turbulence != "none":

@@ -95,10 +95,10 @@ class NoisyBank:
 
     `keys` (S,) are the streams, or None for sensors without noise; `NoiseStreams` explains
     `at_start` and `per_measurement`. State is held in arrays (S, ...), attributes that a subclass
-    names in `_KEPT` and resets in `_switch_on`; saving, restoring and resetting follow from these.
+    names in `_SAVED` and resets in `_switch_on`; saving, restoring and resetting follow from these.
     """
 
-    _KEPT: ClassVar[tuple[str, ...]] = ()
+    _SAVED: ClassVar[tuple[str, ...]] = ()
 
     def __init__(
         self,
@@ -121,13 +121,13 @@ class NoisyBank:
 
     def get_state(self) -> dict[str, Any]:
         """Returns the noise streams and copies of the sensors' state."""
-        kept = {name.lstrip("_"): getattr(self, name).copy() for name in self._KEPT}
+        kept = {name.lstrip("_"): getattr(self, name).copy() for name in self._SAVED}
         return {"noise": self._noise.get_state(), **kept}
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Restores a state of `get_state`."""
         self._noise.set_state(state["noise"])
-        for name in self._KEPT:
+        for name in self._SAVED:
             setattr(self, name, np.array(state[name.lstrip("_")]))
 
     def reset(

@@ -48,7 +48,7 @@ class BarometerBank(NoisyBank):
 
     name = "barometer"
     lag_ns = 0
-    _KEPT = ("_drift",)
+    _SAVED = ("_drift",)
 
     def __init__(
         self,

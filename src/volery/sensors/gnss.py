@@ -65,7 +65,7 @@ class GnssBank(NoisyBank):
     """
 
     name = "gnss"
-    _KEPT = ("_drift", "_fix_from_ns", "_denied_from_ns", "_denied_until_ns")
+    _SAVED = ("_drift", "_fix_from_ns", "_denied_from_ns", "_denied_until_ns")
 
     def __init__(
         self,

@@ -57,7 +57,7 @@ class ImuBank(NoisyBank):
 
     name = "imu"
     lag_ns = 0
-    _KEPT = ("_bias", "_turn_on_bias", "_warm_up_bias", "_start_ns")
+    _SAVED = ("_bias", "_turn_on_bias", "_warm_up_bias", "_start_ns")
 
     def __init__(
         self,

@@ -49,7 +49,7 @@ class MagnetometerBank(NoisyBank):
 
     name = "magnetometer"
     lag_ns = 0
-    _KEPT = ("_bias",)
+    _SAVED = ("_bias",)
 
     def __init__(
         self,

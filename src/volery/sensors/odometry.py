@@ -48,7 +48,7 @@ class OdometryBank(NoisyBank):
 
     name = "odometry"
     lag_ns = 0
-    _KEPT = ("_position_odom", "_yaw_error", "_flown", "_last_position")
+    _SAVED = ("_position_odom", "_yaw_error", "_flown", "_last_position")
 
     def __init__(
         self,

@@ -22,9 +22,9 @@ from volery.server.read_only import READ_ONLY_SERVICES
 
 _LOOKING = {"subscribe", "unsubscribe", "set_level", "status", "auth"}
 """Operations without effect on other clients."""
-_TOLD_AGAIN_S = 1.0
+_WARN_AGAIN_S = 1.0
 """Min period of refusals for a stream of commands."""
-_MOST_TOLD = 1000
+_MAX_WARNED = 1000
 
 
 class ViewerPolicy:
@@ -43,22 +43,22 @@ class ViewerPolicy:
 class OperatorPolicy:
     """Allows a client to command the UAVs that no other operator controls.
 
-    `name` is the operator's name; `crew` the names of all operators on this server. Requests to the
+    `name` is the operator's name, one of the `operator_names` of this server. Requests to the
     control services are signed with the operator's own name.
     """
 
     def __init__(
         self,
         name: str,
-        crew: OperatorNames,
+        operator_names: OperatorNames,
         operators: ControlAuthority,
         now_s: Callable[[], float] = time.monotonic,
     ) -> None:
         self.name = name
-        self._crew = crew
+        self._operator_names = operator_names
         self._operators = operators
         self._now_s = now_s
-        self._told_s: dict[str, float] = {}
+        self._warned_s: dict[str, float] = {}
 
     def check(self, operation: Operation) -> bool:
         """Raises BridgeError for a command to a UAV that another operator controls."""
@@ -82,11 +82,11 @@ class OperatorPolicy:
             self._check_free(topic, {})
         except BridgeError:
             now_s = self._now_s()
-            if now_s - self._told_s.get(topic, -_TOLD_AGAIN_S) < _TOLD_AGAIN_S:
+            if now_s - self._warned_s.get(topic, -_WARN_AGAIN_S) < _WARN_AGAIN_S:
                 return False
-            if len(self._told_s) >= _MOST_TOLD:
-                self._told_s.clear()
-            self._told_s[topic] = now_s
+            if len(self._warned_s) >= _MAX_WARNED:
+                self._warned_s.clear()
+            self._warned_s[topic] = now_s
             raise
         return True
 
@@ -116,10 +116,10 @@ class OperatorPolicy:
                 raise BridgeError(f"an operator's name has 1 to {MOST_CHARACTERS} characters")
             if service != TAKE or self._operators.held_by(self.name):
                 raise BridgeError(f"you are {self.name}, not {called[:MOST_CHARACTERS]}")
-            self._crew.rename(self.name, called)
+            self._operator_names.rename(self.name, called)
             self.name = called
         to = args.get("to")
-        if service == HAND_OVER and to not in self._crew:
+        if service == HAND_OVER and to not in self._operator_names:
             raise BridgeError(f"no operator is called {str(to)[:MOST_CHARACTERS]!r} here")
         operation["args"] = {**args, "operator": self.name}
 

@@ -18,7 +18,7 @@ from volery.server.page import PageFiles, index
 from volery.server.recordings import bring_recording, recording, recordings
 from volery.server.replies import RefusedError, refused
 from volery.server.rosbridge_route import serve_rosbridge
-from volery.server.scenarios import picture, scenarios
+from volery.server.scenarios import card_image, scenarios
 from volery.server.server_state import ServerState
 from volery.server.status import status
 from volery.server.uploads.route import upload
@@ -40,7 +40,7 @@ def make_app(
             Route("/api/status", status),
             Route("/api/world.glb", world_glb),
             Route("/api/scenarios", scenarios),
-            Route("/api/scenarios/{name}.jpg", picture),
+            Route("/api/scenarios/{name}.jpg", card_image),
             Route("/api/uploads", upload, methods=["POST"]),
             Route("/api/recordings", recordings, methods=["GET"]),
             Route("/api/recordings", bring_recording, methods=["POST"]),
@@ -49,7 +49,7 @@ def make_app(
             Mount("/", PageFiles()),
         ],
         middleware=[guard],
-        exception_handlers={RefusedError: _tell_refusal, HTTPException: _tell_problem},
+        exception_handlers={RefusedError: _respond_refusal, HTTPException: _respond_problem},
     )
     app.state.site = site
     app.state.world_files = WorldFiles()
@@ -57,12 +57,12 @@ def make_app(
     return app
 
 
-async def _tell_refusal(_request: Request, error: Exception) -> Response:
+async def _respond_refusal(_request: Request, error: Exception) -> Response:
     assert isinstance(error, RefusedError)
     return refused(error.status, str(error))
 
 
-async def _tell_problem(request: Request, error: Exception) -> Response:
+async def _respond_problem(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     known = {404: f"nothing exists at {request.url.path[:200]}"}
     return refused(error.status_code, known.get(error.status_code, error.detail))

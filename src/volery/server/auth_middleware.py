@@ -81,7 +81,7 @@ class AuthMiddleware:
         self._cookie = cookie
         self._only_loopback = only_loopback
         self._sessions = Sessions()
-        self._guesses = TokenAttempts()
+        self._attempts = TokenAttempts()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Passes a request on, or refuses it."""
@@ -150,12 +150,12 @@ class AuthMiddleware:
     async def _role_of(self, given: str, scope: Scope, receive: Receive) -> Role | None:
         """Returns the role of a token, after other attempts of the same address."""
         client: tuple[str, int] | None = scope.get("client")
-        async with self._guesses.turn(client[0] if client else "?"):
+        async with self._attempts.turn(client[0] if client else "?"):
             role = self._tokens.role_of(given)
             if role is None:
                 # a WebSocket cannot be read before it is accepted
                 gone = partial(_wait_for_end, receive) if scope["type"] == "http" else None
-                await self._guesses.penalize(gone)
+                await self._attempts.penalize(gone)
         return role
 
     def _polite(self, send: Send, ticket: str | None) -> Send:

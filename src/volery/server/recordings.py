@@ -87,10 +87,10 @@ def _listed(folder: Path) -> list[dict[str, Any]]:
     files.sort(key=lambda path: path.stat().st_mtime_ns, reverse=True)
     files = [path for path in files if not path.is_symlink()]
     _durations.learn(files)
-    return [_told(path) for path in files]
+    return [_describe(path) for path in files]
 
 
-def _told(path: Path) -> dict[str, Any]:
+def _describe(path: Path) -> dict[str, Any]:
     size, seconds = path.stat().st_size, _durations.of(path)
     return {"name": path.name, "bytes": size, "seconds": seconds, "kind": path.suffix[1:]}
 

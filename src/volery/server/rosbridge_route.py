@@ -80,12 +80,14 @@ def _gate_of(
         yield None
         return
     gate = OperatorPolicy(
-        site.crew.sign_in(websocket.query_params.get("operator", "")), site.crew, operators
+        site.operator_names.sign_in(websocket.query_params.get("operator", "")),
+        site.operator_names,
+        operators,
     )
     try:
         yield gate
     finally:
-        site.crew.sign_out(gate.name)
+        site.operator_names.sign_out(gate.name)
         world.gateway.post(lambda: operators.leave(gate.name))
 
 

@@ -30,7 +30,7 @@ async def scenarios(request: Request) -> Response:
     return JSONResponse(told, headers={"Cache-Control": "no-store"})
 
 
-async def picture(request: Request) -> Response:
+async def card_image(request: Request) -> Response:
     """Returns `./api/scenarios/NAME.jpg`: the image of a card."""
     name: str = request.path_params["name"]
     if name not in library.names() or not (CARDS / f"{name}.jpg").is_file():

@@ -129,7 +129,7 @@ class ServerState:
     situation: ServerSituation = field(default_factory=ServerSituation)
     world: JoinedWorld | None = None
     clients: set[Client] = field(default_factory=set)
-    crew: OperatorNames = field(default_factory=OperatorNames)
+    operator_names: OperatorNames = field(default_factory=OperatorNames)
 
     async def join(self, world: World, situation: ServerSituation) -> None:
         """Connects clients to a world."""

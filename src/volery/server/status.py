@@ -16,10 +16,10 @@ async def status(request: Request) -> Response:
     """Returns state, scenario and world; to a client without a token only that it needs one."""
     site: ServerState = request.app.state.site
     role: Role | None = request.state.role
-    return JSONResponse(_told(site, role), headers={"Cache-Control": "no-store"})
+    return JSONResponse(_status(site, role), headers={"Cache-Control": "no-store"})
 
 
-def _told(site: ServerState, role: Role | None) -> dict[str, Any]:
+def _status(site: ServerState, role: Role | None) -> dict[str, Any]:
     told: dict[str, Any] = {"version": __version__, "role": role, "token_needed": role is None}
     if role is None:
         nothing = {"state": None, "scenario": None, "description": "", "message": "", "world": None}

@@ -11,7 +11,7 @@ from volery.runtime.build.world_asset import asset_of
 from volery.scenario.schema import Scenario
 from volery.world.trees.model import DetailLevel
 
-_KEPT = 6
+_MAX_CACHED = 6
 """Max number of cached files."""
 _EFFORT = 6
 """Level of gzip; 9 takes three times as long for one per cent."""
@@ -29,17 +29,17 @@ class WorldFiles:
     """Exports and caches the files. Its methods belong to one event loop."""
 
     def __init__(self) -> None:
-        self._kept: dict[tuple[str, DetailLevel], asyncio.Task[WorldFile]] = {}
+        self._cache: dict[tuple[str, DetailLevel], asyncio.Task[WorldFile]] = {}
 
     async def get(self, scenario: Scenario, geometry: Geometry, detail: DetailLevel) -> WorldFile:
         """Returns the file of a geometry; concurrent requests share one export."""
         key = geometry.id, detail
-        task = self._kept.get(key)
+        task = self._cache.get(key)
         if task is None or (task.done() and (task.cancelled() or task.exception())):
             making = asyncio.to_thread(_made, scenario, geometry, detail)
-            task = self._kept[key] = asyncio.create_task(making)
-            while len(self._kept) > _KEPT:
-                del self._kept[next(iter(self._kept))]
+            task = self._cache[key] = asyncio.create_task(making)
+            while len(self._cache) > _MAX_CACHED:
+                del self._cache[next(iter(self._cache))]
         return await asyncio.shield(task)
 
 

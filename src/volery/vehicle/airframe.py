@@ -148,7 +148,7 @@ class Airframe(Table):
 
     @model_validator(mode="after")
     def _can_fly(self) -> Self:
-        farthest = _farthest(self)
+        farthest = _max_distance(self)
         if self.body.collision_radius_m < farthest - 1e-6:
             raise ValueError(
                 f"body.collision_radius_m = {self.body.collision_radius_m} excludes feet or "
@@ -205,7 +205,7 @@ def hover_thrusts(airframe: Airframe) -> Array:
     return allocation_matrix(airframe)[:, 0] * airframe.weight
 
 
-def _farthest(airframe: Airframe) -> float:
+def _max_distance(airframe: Airframe) -> float:
     points = [math.hypot(*foot) for foot in airframe.ground.feet_m]
     for place in airframe.rotors.places:
         x, y, z = place.position_m

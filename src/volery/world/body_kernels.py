@@ -89,10 +89,10 @@ def near_bodies(
     """
     count = 0
     uavs = bodies.scene.shape[0] - bodies.actors
-    first = 0 if uav < 0 else uav - uav % bodies.crew
-    crew = uavs if uav < 0 else bodies.crew
-    for n in range(crew + bodies.actors):
-        i = first + n if n < crew else uavs + n - crew
+    first = 0 if uav < 0 else uav - uav % bodies.uavs_per_env
+    uavs_per_env = uavs if uav < 0 else bodies.uavs_per_env
+    for n in range(uavs_per_env + bodies.actors):
+        i = first + n if n < uavs_per_env else uavs + n - uavs_per_env
         if i == uav:
             continue
         squared = 0.0
@@ -136,7 +136,7 @@ def _may_touch(
 def _sees(bodies: BodyTable, uav: int, row: int) -> bool:
     """Returns whether rays of `uav` (-1: of none) may hit body `row`."""
     is_actor = row >= bodies.scene.shape[0] - bodies.actors
-    own_copy = uav // bodies.crew == row // bodies.crew
+    own_copy = uav // bodies.uavs_per_env == row // bodies.uavs_per_env
     return bool(uav < 0 or is_actor or (uav != row and own_copy))
 
 

@@ -46,8 +46,8 @@ def body_rows(
     return BodyRows(scenes[index], radius[index], materials[index], rotors[index])
 
 
-def body_table(uavs: BodyRows, actors: BodyRows, crew: int) -> BodyTable:
-    """Returns the table of UAVs, `crew` per copy, then actors, all of them not yet placed."""
+def body_table(uavs: BodyRows, actors: BodyRows, uavs_per_env: int) -> BodyTable:
+    """Returns the table of UAVs, then actors, all of them not yet placed."""
     both = uavs, actors
     widest = max(rows.material.shape[1] for rows in both)
     count = sum(len(rows.scene) for rows in both)
@@ -63,7 +63,7 @@ def body_table(uavs: BodyRows, actors: BodyRows, crew: int) -> BodyTable:
         material=material,
         start=start,
         end=start.copy(),
-        crew=crew,
+        uavs_per_env=uavs_per_env,
         actors=len(actors.scene),
         rotors=np.zeros((count, 0, 10)),
         turn=np.zeros((count, 0, 2)),

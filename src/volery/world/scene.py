@@ -78,7 +78,7 @@ class Scene:
         self.backend = EmbreeBackend(self._content)
         self.actors: MovingActors | None = None
         """Actors, which all rays see."""
-        self._uav_rows, self._actor_rows, self._crew = NO_ROWS, NO_ROWS, 1
+        self._uav_rows, self._actor_rows, self._uavs_per_env = NO_ROWS, NO_ROWS, 1
         self._bodies = body_table(NO_ROWS, NO_ROWS, 1)
         self._is_twin = False
 
@@ -152,11 +152,11 @@ class Scene:
         return f"uav{row + 1}"
 
     def set_bodies(
-        self, shapes: Sequence[BodyShape], shape_index: ArrayLike, *, copies: int = 1
+        self, shapes: Sequence[BodyShape], shape_index: ArrayLike, *, num_envs: int = 1
     ) -> None:
         """Creates a UAV body for each entry of `shape_index` (N,); `move_bodies` places them.
 
-        Until then they are far below the map. `copies`: number of independent copies of a scenario,
+        Until then they are far below the map. `num_envs`: number of independent environments,
         one copy after the other; a UAV's rays see its own copy alone. Raises `ValueError` if an
         index is out of range.
         """
@@ -164,15 +164,15 @@ class Scene:
         if index.size and (index.min() < 0 or index.max() >= len(shapes)):
             raise ValueError(f"shape_index must be in 0..{len(shapes) - 1}")
         self._uav_rows = body_rows(shapes, index, self.backend.shape_scenes(shapes))
-        self._crew = max(len(index) // copies, 1)
-        self._bodies = body_table(self._uav_rows, self._actor_rows, self._crew)
+        self._uavs_per_env = max(len(index) // num_envs, 1)
+        self._bodies = body_table(self._uav_rows, self._actor_rows, self._uavs_per_env)
 
     def set_actors(self, actors: MovingActors) -> None:
         """Adds `actors`, which all rays see; `move_actors` places them."""
         scenes = self.backend.shape_scenes(actors.shapes)
         self.actors = actors
         self._actor_rows = body_rows(actors.shapes, np.arange(len(scenes)), scenes)
-        self._bodies = body_table(self._uav_rows, self._actor_rows, self._crew)
+        self._bodies = body_table(self._uav_rows, self._actor_rows, self._uavs_per_env)
 
     def move_bodies(
         self,

@@ -30,7 +30,7 @@ class BodyTable(NamedTuple):
     """(N, 7) x y z (m) qx qy qz qw, map from body, at fraction 0 of the interval."""
     end: NDArray[np.float64]
     """(N, 7) the same at fraction 1: the newest pose."""
-    crew: int
+    uavs_per_env: int
     """Number of UAVs in one copy of a scenario: a UAV's rays see those of its own copy alone."""
     rotors: NDArray[np.float64]
     """(N, R, 10) `BodyShape.rotors`, for rays that distinguish blades from gaps; (N, 0, 10) for

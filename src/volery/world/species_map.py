@@ -41,7 +41,7 @@ def shipped_species(
         name.strip() for name, key in zip(names, keys, strict=True) if key and key not in chosen
     )
     if unknown:
-        _warn(f"{where}: {_told(unknown)} become {fallback}; map them in {_TABLE}")
+        _warn(f"{where}: {_listed(unknown)} become {fallback}; map them in {_TABLE}")
     present = set(keys)
     unused = sorted(name for name in species_map if _key(name) not in present)
     if unused:
@@ -70,7 +70,7 @@ def _key(name: str) -> str:
     return "_".join(name.casefold().split())
 
 
-def _told(unknown: Counter[str]) -> str:
+def _listed(unknown: Counter[str]) -> str:
     most = [f"{_plain(name)} {count}" for name, count in unknown.most_common(_MAX_SHOWN)]
     rest = ", ..." if len(unknown) > _MAX_SHOWN else ""
     trees = counted(sum(unknown.values()), "tree")

@@ -85,7 +85,7 @@ class Client:
         """Answer of a Trigger; raises `Refused`."""
         raise NotImplementedError
 
-    def offer(self, service):
+    def create_service(self, service):
         """Offer a Trigger."""
         raise NotImplementedError
 
@@ -148,9 +148,9 @@ class Ours:
         )
         return seen
 
-    def offer(self, service, text):
+    def create_service(self, service, text):
         """A Trigger that answers with a text."""
-        self.live.graph.offer(service, TRIGGER, lambda _request: Triggered(True, text))
+        self.live.graph.create_service(service, TRIGGER, lambda _request: Triggered(True, text))
 
     def call(self, service):
         """Begin to call a service; a queue that gets the response or an error."""

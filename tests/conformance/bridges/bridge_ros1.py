@@ -71,9 +71,9 @@ class NodeClient(Client):
             raise Refused(str(error)) from None
         return self._form.answer(body)
 
-    def offer(self, service):
+    def create_service(self, service):
         answer = None if self.their_answer is None else self._form.triggered(self.their_answer)
-        self.node.offer(service, TRIGGER.replace("/srv", ""), answer)
+        self.node.create_service(service, TRIGGER.replace("/srv", ""), answer)
 
     def settle(self):
         """Nothing is answered; connections are waited for when they are made."""

@@ -85,10 +85,10 @@ class PeerClient(Client):
             raise Refused(text)
         return text
 
-    def offer(self, service):
+    def create_service(self, service):
         answer = None if self.their_answer is None else self._form.triggered(self.their_answer)
         data = None if answer is None else base64.b64encode(answer).decode()
-        self._do("offer", service=service, answer=data)
+        self._do("create_service", service=service, answer=data)
         until(lambda: self._bench.is_offered(service))
 
     def settle(self):

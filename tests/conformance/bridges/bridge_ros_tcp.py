@@ -194,7 +194,7 @@ class PlainConnector(RosTcpPartner):
         self._kinds[topic] = "std_msgs/msg/String"
         self.command("subscribe", topic=topic, message_name="std_msgs/String", queue_size=0)
 
-    def offer(self, service):
+    def create_service(self, service):
         self._offered.add(service)
         self.command("unity_service", topic=service, message_name="std_srvs/Trigger")
 

@@ -154,7 +154,7 @@ class PlainClient(RosbridgePartner):
         fields = {"topic": topic, "type": STRING, "compression": self._compression}
         self.send("subscribe", **fields, qos=qos)
 
-    def offer(self, service):
+    def create_service(self, service):
         self._offered.add(service)
         self.send("advertise_service", service=service, type=TRIGGER)
 
@@ -212,8 +212,10 @@ class Program:
         holder.append(self.link.subscribe(topic, msgtype, wake=wake))
         return seen
 
-    def offer(self, service, text):
-        self.link.offer(service, TRIGGER, lambda _, reply: reply.answer(Triggered(True, text)))
+    def create_service(self, service, text):
+        self.link.create_service(
+            service, TRIGGER, lambda _, reply: reply.answer(Triggered(True, text))
+        )
 
     def call(self, service):
         come = queue.Queue()
@@ -246,7 +248,7 @@ class PlainServer(RosbridgePartner):
         self._kinds[topic] = msgtype
         until(lambda: ("advertise", topic) in self._orders)
 
-    def offer(self, service):
+    def create_service(self, service):
         self._offered.add(service)
 
     def call(self, service):

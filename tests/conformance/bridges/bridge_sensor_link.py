@@ -154,7 +154,7 @@ class SensorLinkBench(Bench):
         client = LinkClient(self.bridge.port, self.bridge.image_port, reading)
         places = {f"127.0.0.1:{s.getsockname()[1]}" for s in (client.sock, client.images)}
         until(lambda: places <= {info.name.split()[-1] for info in self.bridge.clients})
-        until(lambda: self._ranges.wanted and self._images.wanted)
+        until(lambda: self._ranges.has_subscribers and self._images.has_subscribers)
         return client
 
     def open_where_taken(self, port):

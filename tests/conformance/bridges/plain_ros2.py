@@ -243,7 +243,7 @@ class Peer:
         self.hearers = [known for known in self.hearers if known[0] is not reader]
         return base64.b64encode(found[0]).decode() if found else None
 
-    def offer(self, service, answer):
+    def create_service(self, service, answer):
         quality = qos(user_data=b"serviceid=1.2.3;")
         writer = self.speak(f"rr{service}Reply", Response_, quality)
 

@@ -104,7 +104,7 @@ class PlainNode:
                 raise ConnectionError(body.decode(errors="replace"))
             return body
 
-    def offer(self, service, kind, answer):
+    def create_service(self, service, kind, answer):
         """Offer a service that always answers the same bytes, or never if they are None."""
         self._services[service] = (kind, answer)
         address = f"rosrpc://127.0.0.1:{self._port}"

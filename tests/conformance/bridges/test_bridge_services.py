@@ -10,23 +10,23 @@ from volery.core.errors import GraphError
 
 @pytest.mark.needs("services")
 def test_a_service_of_ours(bench, client):
-    bench.ours.offer("/ours", "here, größer")
+    bench.ours.create_service("/ours", "here, größer")
     assert client.call("/ours") == "here, größer"
     assert client.call("/ours") == "here, größer"
 
 
 @pytest.mark.needs("services", "advertising")
 def test_a_service_that_nobody_offers_is_told(bench, client):
-    bench.ours.offer("/ours", "x")
+    bench.ours.create_service("/ours", "x")
     client.call("/ours")
-    bench.ours.live.graph.withdraw("/ours")
+    bench.ours.live.graph.destroy_service("/ours")
     with pytest.raises((Refused, AssertionError)):
         client.call("/ours")
 
 
 @pytest.mark.needs("services of clients")
 def test_a_service_of_the_client(bench, client):
-    client.offer(bench.remote_service)
+    client.create_service(bench.remote_service)
     bench.ours.wait_for_service(bench.remote_service)
     for _ in range(2):
         answer = bench.ours.call(bench.remote_service).get(timeout=60.0)
@@ -37,7 +37,7 @@ def test_a_service_of_the_client(bench, client):
 @pytest.mark.parametrize("how", ["reset", "close"])
 def test_a_service_whose_client_left_fails_at_once(bench, client, how):
     client.their_answer = None
-    client.offer(bench.remote_service)
+    client.create_service(bench.remote_service)
     bench.ours.wait_for_service(bench.remote_service)
     come = bench.ours.call(bench.remote_service)
     getattr(client, how)()

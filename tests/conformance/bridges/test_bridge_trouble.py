@@ -69,7 +69,7 @@ def test_who_leaves_takes_everything_back(bench):
     client.advertise(bench.topic_in)
     client.subscribe(bench.topic_out)
     if "services of clients" not in bench.cannot:
-        client.offer("/mine")
+        client.create_service("/mine")
     client.settle()
     assert bench.ours.counts() != before
     client.close()
@@ -233,7 +233,7 @@ def test_wrong_sums_are_told(bench, client, others):
     publish = bench.ours.publisher("/sum")
     client.subscribe("/sum", md5=wrong)
     assert "md5" in client.error()
-    bench.ours.offer("/summed", "x")
+    bench.ours.create_service("/summed", "x")
     with pytest.raises(Refused, match="md5"):
         client.call("/summed", md5=wrong)
     client.advertise("/sum_in", STRING, md5=wrong)

@@ -108,9 +108,9 @@ class FakeUav:
             self.flies, self.place[2] = False, 0.0
             return trigger(True, "")
 
-        graph.offer(f"/{name}/take_off_to", "volery_interfaces/srv/TakeOffTo", take_off)
-        graph.offer(f"/{name}/land", "std_srvs/srv/Trigger", land)
-        graph.offer(f"/{name}/hold", "std_srvs/srv/Trigger", hold)
+        graph.create_service(f"/{name}/take_off_to", "volery_interfaces/srv/TakeOffTo", take_off)
+        graph.create_service(f"/{name}/land", "std_srvs/srv/Trigger", land)
+        graph.create_service(f"/{name}/hold", "std_srvs/srv/Trigger", hold)
         self.sonar = graph.advertise(f"/{name}/range", Range)
         graph.subscribe(f"/{name}/cmd_vel", self._climb, "geometry_msgs/msg/Twist")
         graph.subscribe(f"/{name}/planning/pause", self._pause, "std_msgs/msg/Bool")

@@ -73,7 +73,7 @@ class Bodies:
             "area_m": AREA,
             "altitude_m": 6.0,
             "gather_s": 3.0,
-            "patience_s": 1.0,
+            "timeout_s": 1.0,
             "hold_s": 1.0,
             **parameters,
         }
@@ -104,7 +104,7 @@ class Bodies:
             action(name, request)
             return message_type(f"{srvtype}_Response")(True, "")
 
-        self.graph.offer(f"/{name}/{service}", srvtype, handle)
+        self.graph.create_service(f"/{name}/{service}", srvtype, handle)
 
     def start(self, name):
         context = Context(self.graph, Timers(self.timers), lambda: self.now_ns)
@@ -336,8 +336,10 @@ def test_a_service_that_never_answers_is_called_again_and_given_up():
     bodies = searching()
     bodies.sees = {"uav1"}
     asked = []
-    bodies.graph.withdraw("/uav3/search/join")
-    bodies.graph.offer_async("/uav3/search/join", JOIN, lambda q, _: asked.append(q.finder))
+    bodies.graph.destroy_service("/uav3/search/join")
+    bodies.graph.create_async_service(
+        "/uav3/search/join", JOIN, lambda q, _: asked.append(q.finder)
+    )
     bodies.run_until(lambda: bodies.nodes["uav1"].phase is SearchPhase.HOME)
     assert asked == ["uav1"] * 20
     assert bodies.nodes["uav2"].phase is SearchPhase.HOME
@@ -371,7 +373,7 @@ def test_who_cannot_be_told_sees_the_others_go_home():
     bodies = searching()
     bodies.sees.clear()
     for name in ("uav1", "uav3"):
-        bodies.graph.withdraw(f"/{name}/search/finish")
+        bodies.graph.destroy_service(f"/{name}/search/finish")
     bodies.graph.call("/uav2/search/finish")
     bodies.run_until(bodies.all_in(SearchPhase.DONE), 60.0)
 
@@ -399,7 +401,7 @@ def test_finish_while_they_climb_brings_them_down_again():
 
 
 def test_a_vain_search_ends_in_time():
-    bodies = Bodies(search_s=5.0)
+    bodies = Bodies(max_search_s=5.0)
     bodies.sees.clear()
     bodies.run_until(bodies.all_in(SearchPhase.DONE), 90.0)
 
@@ -443,7 +445,7 @@ def test_a_kept_state_is_gone_back_to():
         ({"area_m": [0.0, 0.0, 8.0, 30.0]}, "12 m a side"),
         ({"area_m": [0.0, 0.0, 1.0, 30.0]}, "wider than its borders"),
         ({"area_m": [0.0, 0.0, 1.0]}, "area_m must be 4 numbers"),
-        ({"layer_m": 0.1}, "layer_m must be a number of at least 0.5"),
+        ({"layer_spacing_m": 0.1}, "layer_spacing_m must be a number of at least 0.5"),
     ],
 )
 def test_parameters_that_make_no_sense(parameters, reason):

@@ -57,7 +57,9 @@ def fly(bench, seconds, make=room_scan, begin_ns=0, height=3.0):
 
 
 def mapping(bench, **parameters):
-    return bench.start(Mapping, odometry="odom", corrected=False, voxels_period_s=1.0, **parameters)
+    return bench.start(
+        Mapping, odometry="odom", use_map_tf=False, voxels_period_s=1.0, **parameters
+    )
 
 
 def status(heard):

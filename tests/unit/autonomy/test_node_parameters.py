@@ -30,9 +30,9 @@ def test_a_mount_is_three_finite_numbers(node, name, value):
 @pytest.mark.parametrize(
     ("node", "name", "value"),
     [
-        (Slam, "start", [0.0, 0.0, INF, 0.0]),
+        (Slam, "initial_pose", [0.0, 0.0, INF, 0.0]),
         (Slam, "imu_noise", [0.1] * 5 + [NAN]),
-        (PlanarSlam, "start", [NAN] * 4),
+        (PlanarSlam, "initial_pose", [NAN] * 4),
         (PlanarSlam, "mount", [0.0] * 5 + [INF]),
         (GlobalPlanner, "heights_m", [2.0]),
         (GlobalPlanner, "heights_m", [4.0, 2.0]),
@@ -46,17 +46,21 @@ def test_lists_of_another_length_or_not_finite_are_refused(node, name, value):
 @pytest.mark.parametrize(
     ("node", "names"),
     [
-        (LocalPlanner, "radius_m speed_m_s acceleration_m_s2 height_m cell_m ahead_s arrival_m"),
+        (LocalPlanner, "safe_radius_m speed_m_s acceleration_m_s2 height_m"),
+        (LocalPlanner, "resolution_m start_delay_s acceptance_radius_m"),
         (LocalPlanner, "scan_rate_hz separation_m period_s"),
         (GapFollowing, "height_m speed_m_s safe_radius_m deceleration_m_s2"),
-        (GlobalPlanner, "height_m radius_m iterations cell_m"),
-        (Exploration, "view_m cell_m"),
-        (TrajectoryFollower, "gain lead_s"),
-        (Mapping, "resolution_m reach_m every scan_rate_hz extent_m max_nodes half_height_m"),
-        (Mapping, "grid_cell_m voxels_period_s grid_period_s"),
+        (GlobalPlanner, "height_m safe_radius_m max_iterations resolution_m"),
+        (Exploration, "view_radius_m resolution_m"),
+        (TrajectoryFollower, "gain lookahead_s"),
+        (
+            Mapping,
+            "resolution_m max_range_m beam_step scan_rate_hz extent_m max_nodes half_height_m",
+        ),
+        (Mapping, "grid_resolution_m voxels_period_s grid_period_s"),
         (MapMerging, "resolution_m max_cells period_s"),
-        (Slam, "reach_m standing_height_m scan_rate_hz odom_rate_hz pose_rate_hz"),
-        (PlanarSlam, "nearest_m reach_m"),
+        (Slam, "max_range_m landed_height_m scan_rate_hz odom_rate_hz pose_rate_hz"),
+        (PlanarSlam, "min_range_m max_range_m"),
     ],
 )
 def test_numbers_below_what_makes_sense_are_refused(node, names):

@@ -256,8 +256,8 @@ def test_a_kept_state_goes_on_as_before(short):
 
 
 def test_parameters_of_the_wrong_length_are_refused():
-    with pytest.raises(NodeError, match="start must be"):
-        Listening(start=[1.0])
+    with pytest.raises(NodeError, match="initial_pose must be"):
+        Listening(initial_pose=[1.0])
     with pytest.raises(NodeError, match="mount must be"):
         Listening(mount=[1.0])
 

@@ -59,7 +59,7 @@ class Glade:
 
     def __init__(self, **parameters):
         self.bench = NodeBench()
-        self.node = self.bench.start(LocalPlanner, odometry="odom", corrected=False, **parameters)
+        self.node = self.bench.start(LocalPlanner, odometry="odom", use_map_tf=False, **parameters)
         self.plans = self.bench.listen("/uav1/planning/trajectory")
         self.status = self.bench.listen("/uav1/planning/status")
         self.now = 0
@@ -178,15 +178,15 @@ def test_it_gives_way_to_a_teammate_that_comes_towards_it():
 
 def test_reports_that_are_late_repeated_or_no_numbers_move_no_teammate():
     near, frame = Neighbours(), MapFrame()
-    near.hear(report("uav2", 5 * S, (5.0, 0.0, HEIGHT), (1.0, 0.0, 0.0)), 6 * S)
-    near.hear(report("uav2", 4 * S, (9.0, 0.0, HEIGHT)), 7 * S)
-    near.hear(report("uav2", 5 * S, (9.0, 0.0, HEIGHT)), 7 * S)
-    near.hear(report("uav2", 7 * S, (math.nan, 0.0, HEIGHT)), 7 * S)
-    near.hear(report("uav3", 7 * S, (0.0, 0.0, HEIGHT), (math.inf, 0.0, 0.0)), 7 * S)
+    near.on_report(report("uav2", 5 * S, (5.0, 0.0, HEIGHT), (1.0, 0.0, 0.0)), 6 * S)
+    near.on_report(report("uav2", 4 * S, (9.0, 0.0, HEIGHT)), 7 * S)
+    near.on_report(report("uav2", 5 * S, (9.0, 0.0, HEIGHT)), 7 * S)
+    near.on_report(report("uav2", 7 * S, (math.nan, 0.0, HEIGHT)), 7 * S)
+    near.on_report(report("uav3", 7 * S, (0.0, 0.0, HEIGHT), (math.inf, 0.0, 0.0)), 7 * S)
     (other,) = near.in_odom(frame)
     assert other.position.tolist() == [5.0, 0.0, HEIGHT]
     assert other.time_ns == 6 * S  # by the hearer's clock
-    near.hear(report("uav2", S, (2.0, 0.0, HEIGHT)), 30 * S)  # its clock began anew
+    near.on_report(report("uav2", S, (2.0, 0.0, HEIGHT)), 30 * S)  # its clock began anew
     assert near.in_odom(frame)[0].position.tolist() == [2.0, 0.0, HEIGHT]
 
 
@@ -277,7 +277,7 @@ def ground_map(*blocks):
 
 def global_planner():
     bench = NodeBench()
-    bench.start(GlobalPlanner, odometry="odom", corrected=False)
+    bench.start(GlobalPlanner, odometry="odom", use_map_tf=False)
     bench.send("/uav1/odom", odometry(0, (-8.0, 0.0, HEIGHT)))
     return bench, bench.listen("/uav1/planning/path"), bench.listen("/uav1/planning/goal_status")
 
@@ -336,7 +336,7 @@ def polygon(*corners, frame="map"):
 
 def exploring():
     bench = NodeBench()
-    bench.start(Exploration, odometry="odom", corrected=False, view_m=8.0)
+    bench.start(Exploration, odometry="odom", use_map_tf=False, view_radius_m=8.0)
     goals, status = bench.listen("/uav1/planning/goal"), bench.listen("/uav1/exploration/status")
     grid = grid_values_message(np.zeros((100, 150), np.int8), 0.4, (-5.0, -5.0, 0.0), "map", 0)
     bench.send("/uav1/projected_map", grid)

@@ -259,7 +259,7 @@ def test_it_stops_before_what_is_not_known():
     _, track = fly(world, (10.0, 0.0), 6.0)
     assert 2.0 < track[-1].position[0] < 4.0
     assert np.linalg.norm(track[-1].velocity) < 0.3
-    bold = RecedingHorizonPlanner(PlannerSettings(LIMITS, unknown_stops=False))
+    bold = RecedingHorizonPlanner(PlannerSettings(LIMITS, avoid_unknown=False))
     _, track = fly(world, (10.0, 0.0), 4.0, bold)
     assert track[-1].position[0] > 4.0
 
@@ -318,13 +318,17 @@ def test_state_goes_back():
         np.testing.assert_array_equal(a, b)
 
 
-def test_the_carrot_goes_ahead_along_the_way_and_not_back():
+def test_the_lookahead_point_goes_ahead_along_the_way_and_not_back():
     way = PathLookahead(np.array([[0.0, 0, 0], [10.0, 0, 0], [10.0, 10, 0]]))
-    np.testing.assert_allclose(way.carrot(np.array([2.0, 1.0]), 9.0), [10.0, 1.0], atol=0.3)
+    np.testing.assert_allclose(
+        way.lookahead_point(np.array([2.0, 1.0]), 9.0), [10.0, 1.0], atol=0.3
+    )
     assert way.left_m(np.array([2.0, 0.0])) == pytest.approx(18.0, abs=0.3)
-    way.carrot(np.array([9.0, 6.0]), 3.0)
-    np.testing.assert_allclose(way.carrot(np.array([9.0, 6.0]), 9.0), [10.0, 10.0], atol=0.3)
-    np.testing.assert_allclose(way.carrot(np.array([2.0, 0.0]), 0.0)[0], 10.0)
+    way.lookahead_point(np.array([9.0, 6.0]), 3.0)
+    np.testing.assert_allclose(
+        way.lookahead_point(np.array([9.0, 6.0]), 9.0), [10.0, 10.0], atol=0.3
+    )
+    np.testing.assert_allclose(way.lookahead_point(np.array([2.0, 0.0]), 0.0)[0], 10.0)
     one = PathLookahead(np.array([[3.0, 4.0, 0.0]]))
-    np.testing.assert_allclose(one.carrot(np.zeros(2), 9.0), [3.0, 4.0])
+    np.testing.assert_allclose(one.lookahead_point(np.zeros(2), 9.0), [3.0, 4.0])
     assert one.left_m(np.zeros(2)) == pytest.approx(5.0)

@@ -65,7 +65,7 @@ def lost_after(count, **how):
     """A way that was lost after so many keyframes, 7 m apart, and has three since."""
     way, closer = flown(count)
     way.poses = [np.array([7.0 * k, 0.0, 0.0, 0.0]) for k in range(count)]
-    way.begin_anew(**how)
+    way.restart(**how)
     way.frames += [keyframe(count + k, session=1) for k in range(3)]
     way.poses += [np.zeros(4) for _ in range(3)]
     return way, closer
@@ -88,7 +88,7 @@ def test_keyframes_since_it_may_have_been_elsewhere_are_not_tried():
 
 def test_keyframes_of_a_session_that_was_never_placed_are_not_tried():
     way, closer = lost_after(9)
-    way.begin_anew()
+    way.restart()
     way.frames += [keyframe(12 + k, session=2) for k in range(3)]
     way.poses += [np.zeros(4) for _ in range(3)]
     assert not find(way, 9)

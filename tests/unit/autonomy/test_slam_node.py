@@ -42,7 +42,7 @@ class Listening:
 
     def __init__(self, **parameters):
         self.bench = NodeBench()
-        settings = {"start": START, **MOUNTS, **parameters}
+        settings = {"initial_pose": START, **MOUNTS, **parameters}
         self.node = self.bench.start(Slam, **settings)
         self.odom, self.pose, self.tf, self.path, self.status = (
             self.bench.listen(topic)
@@ -125,7 +125,7 @@ def test_frames_are_tied_together_and_the_path_is_told(heard):
 
 
 def test_without_a_start_the_map_begins_where_it_begins(flown):
-    first = Listening(start=[]).hear(flown[: len(flown) // 4]).pose[0].pose.pose
+    first = Listening(initial_pose=[]).hear(flown[: len(flown) // 4]).pose[0].pose.pose
     place = [first.position.x, first.position.y, first.position.z]
     assert place == pytest.approx([0.0] * 3, abs=0.05)
 
@@ -358,5 +358,5 @@ def test_a_turn_while_it_settles_is_known(flown):
 
 
 def test_wrong_parameters_are_refused():
-    with pytest.raises(NodeError, match="start must be"):
-        NodeBench().start(Slam, start=[1.0, 2.0])
+    with pytest.raises(NodeError, match="initial_pose must be"):
+        NodeBench().start(Slam, initial_pose=[1.0, 2.0])

@@ -107,14 +107,14 @@ def test_finds_of_one_thing_are_one_target() -> None:
     assert first.covariance[0] == pytest.approx(0.505)
     assert (first.finder, first.sightings, first.stamp_ns) == ("uav1", 10, 2)
     assert second.place[0] == 40.0
-    told = [Detection.from_message(message) for message in found.to_tell(0)]
+    told = [Detection.from_message(message) for message in found.changed(0)]
     assert sorted(told) == sorted(found.finds.values())
 
 
 def test_many_finds_are_told_in_turns_and_broken_ones_not_at_all() -> None:
     found = TargetList(4.0)
     found.take(find("uav1", k, 10.0 * k, stamp=100 - k) for k in range(7))
-    turns = [[message.number for message in found.to_tell(turn)] for turn in range(4)]
+    turns = [[message.number for message in found.changed(turn)] for turn in range(4)]
     assert turns == [[0, 1, 2, 3], [0, 1, 4, 5], [0, 1, 6, 2], [0, 1, 3, 4]]
     broken = find("uav2", 1, math.nan), find("uav2", 2, 5.0, variance=-1.0)
     assert not found.take(broken)
@@ -396,7 +396,7 @@ def test_it_holds_while_it_does_not_know_where_it_is() -> None:
 
 def test_it_waits_and_in_the_end_lands_where_its_place_in_the_map_is_lost() -> None:
     bench = TeamBench({})
-    bench.add("uav1", (10.0, 0.0), corrected=True)
+    bench.add("uav1", (10.0, 0.0), use_map_tf=True)
     tf, told = (
         zero_message("geometry_msgs/msg/TransformStamped"),
         bench.graph.advertise("/tf", TFMessage),
@@ -477,7 +477,7 @@ def test_an_explorer_says_when_it_is_through() -> None:
 
 def test_a_corrected_pose_is_one_in_the_map() -> None:
     bench = TeamBench({})
-    bench.add("uav1", (10.0, 0.0), corrected=True)
+    bench.add("uav1", (10.0, 0.0), use_map_tf=True)
     tf = zero_message("geometry_msgs/msg/TransformStamped")
     tf.header.frame_id, tf.child_frame_id = "map", "map/odom"
     tf.transform.translation.x = 5.0
@@ -502,5 +502,5 @@ def test_another_area_is_no_part_of_this_search() -> None:
 def test_parameters_that_make_no_sense() -> None:
     with pytest.raises(GraphError, match="area_m must be"):
         TeamBench({}).add("uav1", (0.0, 0.0), area_m=[0.0, 0.0, 0.0, 5.0])
-    with pytest.raises(GraphError, match="enough must be 0 to 1, not 2"):
-        TeamBench({}).add("uav1", (0.0, 0.0), enough=2.0)
+    with pytest.raises(GraphError, match="2 is beyond 0 to 1"):
+        TeamBench({}).add("uav1", (0.0, 0.0), coverage_fraction=2.0)

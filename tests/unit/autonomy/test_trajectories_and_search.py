@@ -6,7 +6,7 @@ import threading
 import numpy as np
 import pytest
 
-from volery.autonomy.planning.global_path import PathSearch, plan_way
+from volery.autonomy.planning.global_path import PathSearch, plan_path
 from volery.autonomy.planning.search_area import SearchArea
 from volery.autonomy.planning.viewpoints import next_viewpoint
 from volery.autonomy.planning.voxel_space import SolidVoxels, VoxelSpace
@@ -53,7 +53,7 @@ def test_the_ground_and_distances_are_those_of_the_world(walled):
 
 
 def test_a_way_leads_around_the_wall_over_the_sloping_ground(walled):
-    way = plan_way(walled, START, GOAL, 3.0, SEARCH, 1)
+    way = plan_path(walled, START, GOAL, 3.0, SEARCH, 1)
     np.testing.assert_allclose(way[0, :2], START[:2])
     np.testing.assert_allclose(way[-1, :2], GOAL[:2])
     length = np.linalg.norm(np.diff(way[:, :2], axis=0), axis=1).sum()
@@ -71,13 +71,13 @@ def test_a_way_leads_around_the_wall_over_the_sloping_ground(walled):
 
 
 def test_a_way_follows_from_its_seed_alone_whatever_other_threads_plan(walled):
-    alone = {seed: plan_way(walled, START, GOAL, 3.0, SEARCH, seed) for seed in range(4)}
+    alone = {seed: plan_path(walled, START, GOAL, 3.0, SEARCH, seed) for seed in range(4)}
     assert any(not np.array_equal(alone[0], alone[k]) for k in (1, 2, 3))
     found = {}
 
     def plan(seeds):
         for seed in seeds:
-            found[seed] = plan_way(walled, START, GOAL, 3.0, SEARCH, seed)
+            found[seed] = plan_path(walled, START, GOAL, 3.0, SEARCH, seed)
 
     threads = [threading.Thread(target=plan, args=(seeds,)) for seeds in ((3, 0), (1, 2))]
     for thread in threads:
@@ -92,8 +92,8 @@ def test_a_goal_beside_a_wall_is_moved_and_one_deep_inside_is_refused():
     block = ((5.0, -6.0, 0.0), (16.0, 6.0, 7.0))
     space = VoxelSpace(solid([block]), 0.4, np.stack([START, GOAL]), 15.0)
     with pytest.raises(PlanError, match=r"the goal \(10.0, 0.0\)"):
-        plan_way(space, START, GOAL, 3.0, SEARCH, 1)
-    way = plan_way(space, START, np.array([5.5, 0.0, 3.0]), 3.0, SEARCH, 1)
+        plan_path(space, START, GOAL, 3.0, SEARCH, 1)
+    way = plan_path(space, START, np.array([5.5, 0.0, 3.0]), 3.0, SEARCH, 1)
     assert way[-1, 0] < 4.4
 
 
@@ -106,7 +106,7 @@ def test_no_way_is_said_after_a_bounded_search():
     ]
     space = VoxelSpace(solid(ring), 0.4, np.stack([START, GOAL]), 10.0)
     with pytest.raises(PlanError, match="no path was found in 300 iterations"):
-        plan_way(space, START, GOAL, 3.0, SEARCH._replace(iterations=300), 1)
+        plan_path(space, START, GOAL, 3.0, SEARCH._replace(iterations=300), 1)
 
 
 def test_a_space_that_would_be_too_large_is_refused():

@@ -100,7 +100,7 @@ def test_options_reach_the_bridges_of_autopilots(name):
         autopilot_timeout_s=3.0, drop_on_timeout=True, reports_missing_autopilots=False
     )
     bridge = make_bridge(text_of(name), options)
-    assert (bridge._patience, bridge._notice_s) == ((3.0, True), None)
+    assert (bridge._timeout_policy, bridge._notice_s) == ((3.0, True), None)
 
 
 @pytest.mark.parametrize("name", ["mavlink", "mavlink-tcp", "mavlink-serial"])

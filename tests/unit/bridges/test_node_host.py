@@ -77,7 +77,9 @@ def test_topics_and_services_both_ways(world):
     node = Parrot(context=host.context(), namespace="/uav1", parameter_overrides={"word": "hi"})
     said, answers = [], []
     world.do(lambda: world.graph.subscribe("/uav1/said", said.append, String))
-    world.do(lambda: world.graph.offer("/there/do", TRIGGER, lambda _r: Response(True, "there")))
+    world.do(
+        lambda: world.graph.create_service("/there/do", TRIGGER, lambda _r: Response(True, "there"))
+    )
     heard = world.graph.advertise("/uav1/heard", String)
     world.do(lambda: heard.publish(String("you")))
     spin_until(host, lambda: said)
@@ -110,7 +112,9 @@ def test_nodes_that_are_there_before_their_graph(world):
     said, early, answers = [], [], []
     world.do(lambda: world.graph.subscribe("/uav1/said", said.append, String))
     world.do(lambda: world.graph.subscribe("/uav1/lost", early.append, String))
-    world.do(lambda: world.graph.offer("/there/do", TRIGGER, lambda _r: Response(True, "there")))
+    world.do(
+        lambda: world.graph.create_service("/there/do", TRIGGER, lambda _r: Response(True, "there"))
+    )
     late.join()
     late.join()
     assert len(opened) == 1
@@ -132,7 +136,9 @@ def test_nodes_that_are_there_before_their_graph(world):
 
 
 def test_who_calls_a_service_at_its_start_has_the_graph_joined(world):
-    world.do(lambda: world.graph.offer("/there/do", TRIGGER, lambda _r: Response(True, "there")))
+    world.do(
+        lambda: world.graph.create_service("/there/do", TRIGGER, lambda _r: Response(True, "there"))
+    )
 
     class Asking(Parrot):
         def __init__(self, **options):

@@ -66,7 +66,7 @@ def test_what_matches_while_it_runs(bench, tmp_path, suffix):
 def camera(bench, base, *ends):
     """Publishes one message on each topic of a camera; those that are wanted are returned."""
     publishers = {f"{base}{end}": bench.graph.advertise(f"{base}{end}", String) for end in ends}
-    wanted = {topic for topic, publisher in publishers.items() if publisher.wanted}
+    wanted = {topic for topic, publisher in publishers.items() if publisher.has_subscribers}
     for publisher in publishers.values():
         publisher.publish(String("x"))
     bench.graph.deliver()

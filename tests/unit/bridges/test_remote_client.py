@@ -95,7 +95,7 @@ def test_who_closes_it_in_its_own_thread_does_not_wait_for_itself(loop, client, 
         client.advertise("/in", STRING)
 
 
-def test_several_mailboxes_are_one_subscription_of_the_server(loop, client):
+def test_several_queues_are_one_subscription_of_the_server(loop, client):
     publisher = loop.graph.advertise("/out", STRING)
     boxes = [client.subscribe("/out", STRING, depth=d, wake=lambda: None) for d in (1, 5)]
     until(lambda: topics(loop)["/out"].subscribers)
@@ -108,12 +108,12 @@ def test_several_mailboxes_are_one_subscription_of_the_server(loop, client):
     assert not boxes[0].take()
     client.unsubscribe(boxes[1])
     until(lambda: not topics(loop)["/out"].subscribers)
-    assert client.info.mailboxes == ()
+    assert client.info.queues == ()
 
 
 def test_calls_that_are_open_when_it_leaves_fail(loop, client):
     asked, outcome = threading.Event(), queue.Queue()
-    loop.graph.offer_async("/waits", TRIGGER, lambda _request, _reply: asked.set())
+    loop.graph.create_async_service("/waits", TRIGGER, lambda _request, _reply: asked.set())
     client.call("/waits", Request(), ServiceReply(outcome.put, outcome.put))
     assert asked.wait(60.0)
     client.close()

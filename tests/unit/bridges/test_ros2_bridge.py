@@ -63,8 +63,8 @@ class World(LiveGraph):
         self.graph.parameters.declare(NODE, Parameter("height_m", 3.0, like=3.0, read_only=False))
         self.graph.parameters.declare(NODE, Parameter("name", "x", like="x"))
         self.graph.parameters.enter("/uav1/quiet")
-        self.graph.actions.offer("/simulate_steps", STEPS, self.goals.append)
-        self.graph.offer("/broken", TRIGGER, self.break_down)
+        self.graph.actions.create_server("/simulate_steps", STEPS, self.goals.append)
+        self.graph.create_service("/broken", TRIGGER, self.break_down)
         self.do(lambda: self.graph.subscribe("/uav1/cmd_vel", self.commands.append, Twist))
         self.bridges = BridgeHost(self.gateway)
         self.bridge = Ros2Bridge(Ros2Environment(domain_id=DOMAIN))
@@ -470,7 +470,7 @@ def test_clients_and_servers_of_another_kind_are_told_and_not_misread(world, oth
     """Those without the user data of rmw_cyclonedds, whatever DDS they are of."""
     inner = other.participant._participant
     asked = []
-    world.graph.offer("/strange", TRIGGER, asked.append)
+    world.graph.create_service("/strange", TRIGGER, asked.append)
     request, response = (request_struct(f"{TRIGGER}_{part}") for part in ("Request", "Response"))
     quality = qos_of(Profile())  # without the user data of rmw_cyclonedds
     writer = DataWriter(inner, Topic(inner, "rq/strangeRequest", request), qos=quality)

@@ -52,7 +52,7 @@ class Simulated(LiveGraph):
         self.heard = self.graph.advertise("/uav1/heard", STRING)
         self.said = []
         self.do(lambda: self.graph.subscribe("/uav1/said", self.said.append, STRING))
-        self.graph.offer("/ours", TRIGGER, lambda _q: Triggered(True, "ours"))
+        self.graph.create_service("/ours", TRIGGER, lambda _q: Triggered(True, "ours"))
         self.bridges = BridgeHost(self.gateway)
         self.bridges.open(Ros2Bridge(TERMS))
 
@@ -195,9 +195,9 @@ def test_a_latched_message_awaits_late_links(link):
     link.publish("/kept", String("kept"))
     late = Ros2Client(TERMS, "/late")
     woken = threading.Event()
-    mailbox = late.subscribe("/kept", STRING, wake=woken.set)
+    queue = late.subscribe("/kept", STRING, wake=woken.set)
     assert woken.wait(60.0)
-    assert [p.message.data for p in mailbox.take()] == ["kept"]
+    assert [p.message.data for p in queue.take()] == ["kept"]
     late.close()
     link.unadvertise("/kept")
     assert link.published_type("/kept") is None
@@ -205,10 +205,10 @@ def test_a_latched_message_awaits_late_links(link):
 
 def test_who_has_left_does_nothing(simulated):
     link = Ros2Client(TERMS, "/leaver")
-    link.offer("/mine", TRIGGER, lambda _q, reply: reply.answer(Triggered(True, "")))
+    link.create_service("/mine", TRIGGER, lambda _q, reply: reply.answer(Triggered(True, "")))
     with pytest.raises(GraphError, match="already"):
-        link.offer("/mine", TRIGGER, lambda _q, _r: None)
-    link.withdraw("/mine")
+        link.create_service("/mine", TRIGGER, lambda _q, _r: None)
+    link.destroy_service("/mine")
     link.close()
     link.close()
     with pytest.raises(GraphError, match="is closed"):

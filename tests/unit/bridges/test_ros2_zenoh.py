@@ -187,7 +187,7 @@ def test_what_is_latched_awaits_late_subscribers(world, other):
 
 
 def test_services_go_both_ways(world, other):
-    world.graph.offer("/ours", TRIGGER, lambda _q: Triggered(True, "ours"))
+    world.graph.create_service("/ours", TRIGGER, lambda _q: Triggered(True, "ours"))
     assert other.call("/ours", TRIGGER).message == "ours"
     spec = ServiceSpec(other.node, "/theirs", TRIGGER)
     answer = b"\0\1\0\0\1\0\0\0" + struct.pack("<I7s", 7, b"theirs\0")
@@ -210,7 +210,7 @@ def call(world, service):
 def test_strangers_do_no_harm(world, other, router):
     """Queries without attachment, bytes that are no message, another hash."""
     stranger, _ = zenoh_session.open_session(router)
-    world.graph.offer("/asked", TRIGGER, lambda _q: Triggered(True, "asked"))
+    world.graph.create_service("/asked", TRIGGER, lambda _q: Triggered(True, "asked"))
     until(lambda: "/asked" in other.participant.service_types())
     replies = list(stranger.get(service_key(DOMAIN, "/asked", TRIGGER), payload=b"x", timeout=2.0))
     assert [reply for reply in replies if reply.ok is not None] == []

@@ -88,11 +88,11 @@ def test_messages_go_both_ways(loop, client):
     until(lambda: seen)
     assert seen[0].message == String("grüße ✓")
     woken = threading.Event()
-    mailbox = client.subscribe("/out", STRING, wake=woken.set)
+    messages = client.subscribe("/out", STRING, wake=woken.set)
     until(lambda: "/out" in topics(loop))
     loop.publish(loop.graph.advertise("/out", STRING), String("zurück ✓"))
     assert woken.wait(60.0)
-    (published,) = mailbox.take()
+    (published,) = messages.take()
     assert (published.topic, published.msgtype) == ("/out", STRING)
     assert published.message == String("zurück ✓")
 
@@ -113,8 +113,8 @@ def test_what_is_latched_comes_to_who_is_late(loop, client, connect, endpoint):
     client.advertise("/map", STRING, latched=True)
     client.publish("/map", String("here"))
     until(lambda: "/map" in topics(loop) and topics(loop)["/map"].messages)
-    mailbox = connect(endpoint.port).subscribe("/map", wake=lambda: None)
-    assert until(mailbox.take)[0].message == String("here")
+    messages = connect(endpoint.port).subscribe("/map", wake=lambda: None)
+    assert until(messages.take)[0].message == String("here")
 
 
 def test_publications_of_several_topics_keep_their_order(loop, client):
@@ -145,17 +145,17 @@ def test_topics_are_told_with_the_graphs_own_types(loop, client):
 
 def test_what_ended_is_taken_back(loop, client):
     client.advertise("/in", STRING)
-    mailbox = client.subscribe("/out", STRING, wake=lambda: None)
-    client.offer("/do", TRIGGER, lambda _q, reply: reply.answer(Response(True, "")))
+    messages = client.subscribe("/out", STRING, wake=lambda: None)
+    client.create_service("/do", TRIGGER, lambda _q, reply: reply.answer(Response(True, "")))
     until(lambda: topics(loop).get("/out") and "/do" in loop.graph.services())
     assert client.info.publishes == ("/in",)
     assert client.info.offers == ("/do",)
     client.unadvertise("/in")
-    client.unsubscribe(mailbox)
-    client.withdraw("/do")
+    client.unsubscribe(messages)
+    client.destroy_service("/do")
     until(lambda: "/do" not in loop.graph.services())
     assert topics(loop)["/in"].publishers == topics(loop)["/out"].subscribers == 0
-    assert client.info.publishes == client.info.mailboxes == client.info.offers == ()
+    assert client.info.publishes == client.info.queues == client.info.offers == ()
 
 
 def test_slips_are_told_to_who_makes_them(client):
@@ -184,8 +184,8 @@ def test_the_endpoints_complaints_are_kept(loop, client):
 
 
 def test_services_are_called(loop, client):
-    loop.graph.offer("/do", TRIGGER, lambda _q: Response(True, "done"))
-    loop.graph.offer("/nothing", EMPTY, lambda _q: message_type(f"{EMPTY}_Response")())
+    loop.graph.create_service("/do", TRIGGER, lambda _q: Response(True, "done"))
+    loop.graph.create_service("/nothing", EMPTY, lambda _q: message_type(f"{EMPTY}_Response")())
     for _ in range(2):
         assert call(client, "/do", Request()) == Response(True, "done")
     assert call(client, "/nothing", EmptyRequest()) is not None
@@ -198,7 +198,7 @@ def test_who_calls_is_told_why_it_failed(loop, client, srvtype, service):
     def ask(_request, reply):
         reply.fail(GraphError("the rotor is lost"))
 
-    loop.graph.offer_async(service, srvtype, ask)
+    loop.graph.create_async_service(service, srvtype, ask)
     with pytest.raises(GraphError, match=f"'{service}'.*the rotor is lost"):
         call(client, service, request())
     with pytest.raises(GraphError, match="it has no server"):
@@ -211,7 +211,7 @@ def test_without_a_request_rosapi_tells_the_type(loop, connect):
     bridge = RosApiBridge(RosTcpEndpoint(port=0))
     loop.bridges.open(bridge)
     client = connect(bridge.bridge.port)
-    loop.graph.offer("/do", TRIGGER, lambda _q: Response(True, "done"))
+    loop.graph.create_service("/do", TRIGGER, lambda _q: Response(True, "done"))
     assert call(client, "/do") == Response(True, "done")
     with pytest.raises(GraphError, match="service '/none' has no server"):
         call(client, "/none")
@@ -231,13 +231,13 @@ def test_services_are_offered(loop, client):
         reply.answer(message_type("std_srvs/srv/SetBool_Response")(True, "off"))
 
     set_bool = message_type("std_srvs/srv/SetBool_Request")
-    client.offer("/switch", "std_srvs/srv/SetBool", handle)
+    client.create_service("/switch", "std_srvs/srv/SetBool", handle)
     until(lambda: "/switch" in loop.graph.services())
     assert ask_graph(loop, "/switch", set_bool(False)).message == "off"
     with pytest.raises(GraphError, match="ValueError: not now"):
         ask_graph(loop, "/switch", set_bool(True))
     with pytest.raises(GraphError, match="already"):
-        client.offer("/switch", "std_srvs/srv/SetBool", handle)
+        client.create_service("/switch", "std_srvs/srv/SetBool", handle)
 
 
 # ------------------------------------------------------------------------------------- connections
@@ -248,9 +248,9 @@ def test_it_comes_back_and_asks_for_everything_again(loop, connect):
     loop.bridges.open(first)
     client = connect(first.port)
     client.advertise("/in", STRING)
-    mailbox = client.subscribe("/out", STRING, wake=lambda: None)
-    client.offer("/do", TRIGGER, lambda _q, reply: reply.answer(Response(True, "again")))
-    loop.graph.offer_async("/waits", TRIGGER, lambda _q, _reply: None)
+    messages = client.subscribe("/out", STRING, wake=lambda: None)
+    client.create_service("/do", TRIGGER, lambda _q, reply: reply.answer(Response(True, "again")))
+    loop.graph.create_async_service("/waits", TRIGGER, lambda _q, _reply: None)
     outcome = queue.Queue()
     client.call("/waits", Request(), ServiceReply(outcome.put, outcome.put))
     until(lambda: "/do" in loop.graph.services())
@@ -269,7 +269,7 @@ def test_it_comes_back_and_asks_for_everything_again(loop, connect):
     until(lambda: seen)
     until(lambda: topics(loop)["/out"].subscribers == 1 and "/do" in loop.graph.services())
     loop.publish(loop.graph.advertise("/out", STRING), String("again"))
-    assert until(mailbox.take)[0].message == String("again")
+    assert until(messages.take)[0].message == String("again")
     assert ask_graph(loop, "/do", Request()).message == "again"
 
 
@@ -359,12 +359,12 @@ def test_unitys_endpoint_hears_only_what_it_knows(unity):
     """An unknown command, or key of a command, makes it close the connection."""
     other, client = unity
     client.advertise("/in", STRING, latched=True)
-    mailbox = client.subscribe("/out", STRING, depth=50, wake=lambda: None)
-    client.unsubscribe(mailbox)
+    messages = client.subscribe("/out", STRING, depth=50, wake=lambda: None)
+    client.unsubscribe(messages)
     client.unadvertise("/in")
-    client.offer("/do", TRIGGER, lambda _q, reply: reply.fail(GraphError("no")))
-    client.withdraw("/do")
-    client.offer("/do2", TRIGGER, lambda _q, reply: reply.fail(GraphError("no")))
+    client.create_service("/do", TRIGGER, lambda _q, reply: reply.fail(GraphError("no")))
+    client.destroy_service("/do")
+    client.create_service("/do2", TRIGGER, lambda _q, reply: reply.fail(GraphError("no")))
     assert other.next() == (
         "__publish",
         {"topic": "/in", "message_name": "std_msgs/String", "queue_size": 100, "latch": True},
@@ -384,8 +384,8 @@ def test_unitys_endpoint_hears_only_what_it_knows(unity):
 def test_ours_hears_more(connect):
     other = Other(wire.handshake("ros1", ("queue_size", "remove", "response_error")))
     client = connect(other.port)
-    mailbox = client.subscribe("/out", STRING, depth=500, wake=lambda: None)
-    client.unsubscribe(mailbox)
+    messages = client.subscribe("/out", STRING, depth=500, wake=lambda: None)
+    client.unsubscribe(messages)
     fields = {"topic": "/out", "message_name": "std_msgs/String", "queue_size": 500}
     assert other.next() == ("__subscribe", fields)
     assert other.next() == ("__remove_subscriber", {"topic": "/out"})

@@ -113,7 +113,7 @@ def test_nothing_comes_back(here, there):
 def test_only_what_is_selected_crosses(here, there):
     for topic in ("/uav1/odom", "/uav1/camera/image", "/clock"):
         here.graph.advertise(topic, STRING)
-    here.graph.offer("/uav1/land", TRIGGER, lambda _request: Response(True, ""))
+    here.graph.create_service("/uav1/land", TRIGGER, lambda _request: Response(True, ""))
     join(here, there, publish=["/uav1/*"], services=[])
     until(lambda: "/uav1/camera/image" in topics(there))
     assert set(topics(there)) == {"/uav1/odom", "/uav1/camera/image"}
@@ -122,7 +122,7 @@ def test_only_what_is_selected_crosses(here, there):
 
 @pytest.mark.parametrize("generation", ["ros1", "ros2"])
 def test_services_can_be_called_from_there(here, there, generation):
-    here.graph.offer("/uav1/land", TRIGGER, lambda _request: Response(True, "down"))
+    here.graph.create_service("/uav1/land", TRIGGER, lambda _request: Response(True, "down"))
     join(here, there, generation)
     until(lambda: there.graph.has_service("/uav1/land"))
     answers, failures = [], []
@@ -136,7 +136,7 @@ def test_a_call_that_fails_here_fails_there(here, there):
     def broken(_request):
         raise ZeroDivisionError("oh")
 
-    here.graph.offer("/do", TRIGGER, broken)
+    here.graph.create_service("/do", TRIGGER, broken)
     _, connector = join(here, there)
     until(lambda: there.graph.has_service("/do"))
     failures = []
@@ -289,7 +289,7 @@ def meet(here):
 def test_it_speaks_as_unity_does(here, meet, generation, ending):
     here.graph.advertise("/out", STRING, latched=True)
     collect(here, "/uav1/cmd_vel", TWIST)
-    here.graph.offer("/do", TRIGGER, lambda _request: Response(True, ""))
+    here.graph.create_service("/do", TRIGGER, lambda _request: Response(True, ""))
     endpoint, _ = meet(handshake(json.dumps({"protocol": generation})))
     until(lambda: endpoint.commands("unity_service"))
     assert endpoint.frames[0] == ("", b"")
@@ -322,7 +322,7 @@ def test_what_the_endpoint_cannot_take_is_sent_once(here, meet):
     until(lambda: ("/out", ros1_string("x")) in endpoint.frames)
     text = "Not registered to publish topic '/out'! Valid publish topics are: dict_keys([]) "
     endpoint.sock.sendall(frame("__error", json.dumps({"text": text}).encode()))
-    until(lambda: not here.gateway.sessions()[0].mailboxes)
+    until(lambda: not here.gateway.sessions()[0].queues)
 
 
 def test_types_that_the_endpoint_does_not_know_are_named_once(here, meet):
@@ -340,7 +340,7 @@ def test_types_that_the_endpoint_does_not_know_are_named_once(here, meet):
         ": the endpoint lacks octomap_msgs/Octomap, which /maps/one, /maps/two need: not "
         "shared; install the package octomap_msgs where the endpoint runs"
     )
-    assert {m.topic for m in here.gateway.sessions()[0].mailboxes} == {"/out"}
+    assert {m.topic for m in here.gateway.sessions()[0].queues} == {"/out"}
     here.graph.advertise("/maps/three", "octomap_msgs/msg/Octomap")
     until(lambda: len(reports) == 3)
     assert "'/maps/three' is not shared" in reports[2]

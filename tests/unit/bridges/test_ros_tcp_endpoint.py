@@ -163,7 +163,7 @@ def test_what_was_registered_can_be_removed(loop, client):
     client.command("ros_service", topic="/d", message_name="std_srvs/Trigger")
     client.synchronize()
     (info,) = loop.gateway.sessions()
-    assert (info.publishes, [m.topic for m in info.mailboxes], info.offers) == (
+    assert (info.publishes, [m.topic for m in info.queues], info.offers) == (
         ("/b",),
         ["/a"],
         ("/c",),
@@ -178,7 +178,7 @@ def test_what_was_registered_can_be_removed(loop, client):
         client.command(f"remove_{what}", topic=topic)
     client.synchronize()
     (info,) = loop.gateway.sessions()
-    assert (info.publishes, info.mailboxes, info.offers) == ((), (), ())
+    assert (info.publishes, info.queues, info.offers) == ((), (), ())
     for what, topic in pairs:
         client.command(f"remove_{what}", topic=topic)
         assert topic in client.next_error()
@@ -195,7 +195,7 @@ def call(client, service, number=101, body=b""):
 @pytest.mark.parametrize("generation", ["ros1", "ros2"])
 def test_a_service_of_the_simulation(loop, serve, connect, generation):
     client = connect(serve(generation=generation).port)
-    loop.graph.offer("/do", TRIGGER, lambda _request: Response(True, "done"))
+    loop.graph.create_service("/do", TRIGGER, lambda _request: Response(True, "done"))
     client.command("ros_service", topic="/do", message_name="std_srvs/Trigger")
     empty = b"" if generation == "ros1" else b"\0\1\0\0"  # as Unity writes a type without fields
     call(client, "/do", body=empty)
@@ -207,7 +207,7 @@ def test_a_service_of_the_simulation(loop, serve, connect, generation):
 
 
 def test_a_keepalive_between_request_and_body_is_none(loop, client):
-    loop.graph.offer("/do", TRIGGER, lambda _request: Response(True, ""))
+    loop.graph.create_service("/do", TRIGGER, lambda _request: Response(True, ""))
     client.command("request", srv_id=7)
     client.sock.sendall(bytes(8))
     client.send("/do", b"")
@@ -227,8 +227,8 @@ def broken(_request):
     ],
 )
 def test_a_call_that_fails_ends_too(loop, client, service, body, words):
-    loop.graph.offer("/broken", TRIGGER, broken)
-    loop.graph.offer("/do", TRIGGER, lambda _request: Response(True, "done"))
+    loop.graph.create_service("/broken", TRIGGER, broken)
+    loop.graph.create_service("/do", TRIGGER, lambda _request: Response(True, "done"))
     call(client, service, body=body)
     assert words in client.next_error()
     assert client.next() == ("__response", {"srv_id": 101})
@@ -236,7 +236,7 @@ def test_a_call_that_fails_ends_too(loop, client, service, body, words):
 
 
 def test_a_request_without_body_ends_and_the_next_works(loop, client):
-    loop.graph.offer("/do", TRIGGER, lambda _request: Response(True, ""))
+    loop.graph.create_service("/do", TRIGGER, lambda _request: Response(True, ""))
     client.command("request", srv_id=1)
     call(client, "/do", 2)
     assert "without its body" in client.next_error()
@@ -340,7 +340,7 @@ def test_one_clients_service_for_another(loop, serve, connect):
 )
 def test_mistakes_are_told_and_forgiven(loop, client, destination, payload, words):
     loop.graph.advertise("/taken", STRING)
-    loop.graph.offer("/do", TRIGGER, lambda _request: Response(True, ""))
+    loop.graph.create_service("/do", TRIGGER, lambda _request: Response(True, ""))
     client.command("publish", topic="/in", message_name="std_msgs/String")
     client.send(destination, payload)
     assert words in client.next_error()
@@ -407,14 +407,14 @@ def test_who_does_not_read_loses_and_others_do_not(loop, serve, connect):
     for one in (slow, quick):
         one.command("subscribe", topic="/out", message_name="sensor_msgs/Image")
     quick.synchronize()
-    until(lambda: len(loop.gateway.sessions()[0].mailboxes) == 1)
+    until(lambda: len(loop.gateway.sessions()[0].queues) == 1)
     publisher = loop.graph.advertise("/out", "sensor_msgs/msg/Image")
     for k in range(40):
         message = image(1 << 20)
         message.width = k
         loop.publish(publisher, message)
         quick.next()
-    (info,) = loop.gateway.sessions()[0].mailboxes
+    (info,) = loop.gateway.sessions()[0].queues
     assert (info.received, info.waiting) == (40, 3)
     assert info.dropped > 20
     slow.read()
@@ -524,7 +524,7 @@ def test_thousands_of_topics(loop, client):
         client.command("subscribe", topic=f"/t{k}", message_name="std_msgs/String")
     client.synchronize()
     (info,) = loop.gateway.sessions()
-    assert len(info.mailboxes) == 3000
+    assert len(info.queues) == 3000
 
 
 def test_too_many_clients_are_told(serve, connect):
@@ -568,7 +568,7 @@ def test_closing_lets_everybody_go(loop):
 
 
 def test_offers_elsewhere_stay_unharmed(loop, client):
-    loop.graph.offer("/do", TRIGGER, lambda _request: Response(True, "inside"))
+    loop.graph.create_service("/do", TRIGGER, lambda _request: Response(True, "inside"))
     client.command("unity_service", topic="/do", message_name="std_srvs/Trigger")
     assert "already" in client.next_error()
     client.close()

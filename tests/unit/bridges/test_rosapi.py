@@ -19,8 +19,8 @@ class Asked:
         graph = self.bench.graph
         graph.advertise("/odom", "nav_msgs/msg/Odometry")
         graph.subscribe("/cmd", print, STRING)
-        graph.offer("/arm", SET_BOOL, print)
-        graph.actions.offer("/step", STEPS, print)
+        graph.create_service("/arm", SET_BOOL, print)
+        graph.actions.create_server("/step", STEPS, print)
         self.api = RosApi(self.bench.gateway, generation, lambda: TIME_NS)
         self.api.start()
         self.worker = self.bench.peer("worker 1")

@@ -73,7 +73,7 @@ def test_a_response_of_another_type_is_the_callers_error() -> None:
     state = ClientState(None, lambda: None)
     state.begin(cbor=False)
     asked: list[ServiceReply] = []
-    state.offer("/a", "std_srvs/srv/Trigger", lambda _request, reply: asked.append(reply))
+    state.create_service("/a", "std_srvs/srv/Trigger", lambda _request, reply: asked.append(reply))
     list(state.frames())
     call = {"op": "call_service", "service": "/a", "id": "1", "args": {}}
     state.receive(encode_json(call), 0.0)

@@ -192,7 +192,7 @@ def test_fragments_and_pictures_both_ways(bench, client):
 
 def test_a_service_of_the_simulation(bench, client):
     response = message_type(f"{SET_BOOL}_Response")
-    bench.graph.offer("/arm", SET_BOOL, lambda request: response(request.data, "ok"))
+    bench.graph.create_service("/arm", SET_BOOL, lambda request: response(request.data, "ok"))
     for args in ({"data": True}, [True], [{"data": True}]):
         client.send("call_service", service="/arm", args=args, id="c")
         assert client.read() == [
@@ -216,7 +216,9 @@ def test_a_service_of_the_simulation(bench, client):
 
 def test_calls_that_take_too_long(bench, client):
     replies = []
-    bench.graph.offer_async("/slow", TRIGGER, lambda _request, reply: replies.append(reply))
+    bench.graph.create_async_service(
+        "/slow", TRIGGER, lambda _request, reply: replies.append(reply)
+    )
     client.send("call_service", service="/slow", timeout=2.0, id="t")
     assert client.read() == []
     assert client.peer.due_s(bench.now_s) == pytest.approx(bench.now_s + 2.0)
@@ -294,7 +296,7 @@ def test_goals_whose_server_leaves_are_aborted(bench, client):
 
 def test_goals_for_the_simulation(bench, client):
     goals = []
-    bench.graph.actions.offer("/step", STEPS, goals.append)
+    bench.graph.actions.create_server("/step", STEPS, goals.append)
     client.send("send_action_goal", id="g", action="/step", action_type=STEPS, args={"steps": 2})
     assert goals[0].request.steps == 2
     cancelled = []
@@ -433,7 +435,7 @@ def test_nothing_that_clients_send_does_harm(operations, as_cbor):
     bench = Bench()
     first, second = bench.peer("first"), bench.peer("second")
     goals = []
-    bench.graph.actions.offer("/b", STEPS, goals.append)
+    bench.graph.actions.create_server("/b", STEPS, goals.append)
     for k, operation in enumerate(operations):
         frame = cbor2.dumps(operation) if as_cbor else json.dumps(operation)
         (first, second)[k % 2].send_raw(frame)

@@ -135,7 +135,9 @@ def test_late_joiners_get_what_is_latched(simulation, server):
 
 def test_services_both_ways(simulation, server):
     response = m.message_type(f"{SET_BOOL}_Response")
-    simulation.graph.offer("/arm", SET_BOOL, lambda request: response(request.data, "armed"))
+    simulation.graph.create_service(
+        "/arm", SET_BOOL, lambda request: response(request.data, "armed")
+    )
     with Plain(server) as client, Plain(server) as other:
         client.send("call_service", service="/arm", args={"data": True}, id="1")
         assert client.read()["values"] == {"success": True, "message": "armed"}
@@ -177,8 +179,8 @@ def test_a_client_that_does_not_read_disturbs_nobody(simulation, server):
         for _ in range(500):  # the sleeper's sockets hold some tens of megabytes
             simulation.do(lambda: publisher.publish(message))
             assert reader.read()["op"] == "publish"
-            infos = {s.name: s.mailboxes for s in simulation.gateway.sessions() if s.mailboxes}
-            dropped = sorted(mailboxes[0].dropped for mailboxes in infos.values())
+            infos = {s.name: s.queues for s in simulation.gateway.sessions() if s.queues}
+            dropped = sorted(queues[0].dropped for queues in infos.values())
             if dropped[1] > 20:
                 break
         assert dropped[0] == 0
@@ -331,14 +333,14 @@ def test_a_program_joins(simulation, client):
     client.publish("/in", scan)
     until(lambda: seen)
     assert seen[0].message.ranges.tobytes() == ranges.tobytes()
-    mailbox = client.subscribe("/in", wake=woken.set)
+    queue = client.subscribe("/in", wake=woken.set)
     until(lambda: simulation.graph.topics()[0].subscribers == 2)
     client.publish("/in", scan)
     assert woken.wait(60.0)
-    (published,) = mailbox.take()
+    (published,) = queue.take()
     assert published.time_ns == 5
     assert published.message.ranges.tobytes() == ranges.tobytes()
-    client.unsubscribe(mailbox)
+    client.unsubscribe(queue)
     until(lambda: simulation.graph.topics()[0].subscribers == 1)
     client.unadvertise("/in")
     assert client.info.publishes == ()
@@ -357,18 +359,18 @@ def ask(client, service, request=None):
 
 
 def test_its_services(simulation, client):
-    simulation.graph.offer("/do", TRIGGER, lambda _request: trigger_response(True, "sim"))
+    simulation.graph.create_service("/do", TRIGGER, lambda _request: trigger_response(True, "sim"))
     assert ask(client, "/do").message == "sim"
     assert ask(client, "/do", m.message_type(f"{TRIGGER}_Request")()).message == "sim"
     assert isinstance(ask(client, "/none"), GraphError)
-    client.offer(
+    client.create_service(
         "/mine", TRIGGER, lambda _request, reply: reply.answer(trigger_response(True, "x"))
     )
-    client.offer("/broken", TRIGGER, lambda _request, _reply: 1 / 0)
+    client.create_service("/broken", TRIGGER, lambda _request, _reply: 1 / 0)
     until(lambda: simulation.graph.has_service("/broken"))
     assert ask(client, "/mine").message == "x"
     assert "ZeroDivisionError" in str(ask(client, "/broken"))
-    client.withdraw("/mine")
+    client.destroy_service("/mine")
     until(lambda: not simulation.graph.has_service("/mine"))
 
 
@@ -378,8 +380,10 @@ def test_it_comes_back_and_announces_everything_again(simulation, bridges):
     client = RosbridgeClient(url_of(first), name="node")
     try:
         client.advertise("/in", STRING)
-        mailbox = client.subscribe("/out", STRING, wake=lambda: None)
-        client.offer("/mine", TRIGGER, lambda _r, reply: reply.answer(trigger_response(True, "x")))
+        queue = client.subscribe("/out", STRING, wake=lambda: None)
+        client.create_service(
+            "/mine", TRIGGER, lambda _r, reply: reply.answer(trigger_response(True, "x"))
+        )
         until(lambda: simulation.graph.has_service("/mine"))
         bridges.call(first.stop())
         until(lambda: not client.connected)
@@ -393,8 +397,8 @@ def test_it_comes_back_and_announces_everything_again(simulation, bridges):
         counts = {t.name: (t.publishers, t.subscribers) for t in simulation.graph.topics()}
         assert counts == {"/in": (1, 0), "/out": (0, 1)}
         simulation.publish("/out", m.String("again"))
-        until(lambda: mailbox.info.received)
-        assert mailbox.take()[0].message.data == "again"
+        until(lambda: queue.info.received)
+        assert queue.take()[0].message.data == "again"
     finally:
         client.close()
     with pytest.raises(GraphError, match="is closed"):
@@ -419,7 +423,7 @@ def test_nobody_answers():
         (lambda c: c.subscribe("/x", STRING, depth=0, wake=print), "depth"),
         (lambda c: c.publish("/y", m.String("")), "not advertised"),
         (lambda c: c.unadvertise("/y"), "does not publish"),
-        (lambda c: c.withdraw("/y"), "has no service"),
+        (lambda c: c.destroy_service("/y"), "has no service"),
     ],
 )
 def test_what_a_program_cannot_do(client, attempt, words):
@@ -433,7 +437,9 @@ def test_what_a_program_cannot_do(client, attempt, words):
 def test_roslibpy(simulation, server):
     roslibpy = pytest.importorskip("roslibpy")
     response = m.message_type(f"{SET_BOOL}_Response")
-    simulation.graph.offer("/arm", SET_BOOL, lambda request: response(request.data, "armed"))
+    simulation.graph.create_service(
+        "/arm", SET_BOOL, lambda request: response(request.data, "armed")
+    )
     seen, got = [], []
     simulation.graph.subscribe("/in", seen.append, STRING)
     ros = roslibpy.Ros("127.0.0.1", server.port)
@@ -520,9 +526,11 @@ def test_roslib(simulation, server):
     if node is None or folder is None:
         pytest.skip("needs node, and VOLERY_ROSLIB to name a folder where `npm i roslib` was run")
     response = m.message_type(f"{SET_BOOL}_Response")
-    simulation.graph.offer("/arm", SET_BOOL, lambda request: response(request.data, "armed"))
+    simulation.graph.create_service(
+        "/arm", SET_BOOL, lambda request: response(request.data, "armed")
+    )
     goals = []
-    simulation.graph.actions.offer("/step", STEPS, goals.append)
+    simulation.graph.actions.create_server("/step", STEPS, goals.append)
     simulation.graph.subscribe("/echo", lambda p: echo.publish(p.message), STRING)
     echo = simulation.graph.advertise("/echoed", STRING)
     ranges = np.array([1.5, np.inf, 2.5], np.float32)

@@ -251,7 +251,7 @@ def test_a_message_is_encoded_once_for_all():
     assert forms.frame(published, "cbor", "/scan") is forms.frame(published, "cbor", "/scan")
     for _ in range(200):
         forms.frame(scan(), "cbor", "/scan")
-    assert len(forms._kept) <= 64
+    assert len(forms._cache) <= 64
 
 
 def test_bytes_in_json_are_base64():

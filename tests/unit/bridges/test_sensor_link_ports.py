@@ -110,7 +110,7 @@ def pose(x=1.0, w=1.0, frame="map"):
 
 
 def wanted(loop, publisher):
-    until(lambda: publisher.wanted)
+    until(lambda: publisher.has_subscribers)
 
 
 def collect(loop, topic, msgtype=m.PoseStamped):
@@ -121,7 +121,7 @@ def collect(loop, topic, msgtype=m.PoseStamped):
 
 def test_every_client_gets_what_the_sensors_measure(loop, link, connect):
     publisher = loop.graph.advertise("/uav12/range", m.Range)
-    assert not publisher.wanted  # nobody is there: nothing is asked for
+    assert not publisher.has_subscribers  # nobody is there: nothing is asked for
     clients = [connect(link.port) for _ in range(3)]
     wanted(loop, publisher)
     until(lambda: len(link.clients) == 3)
@@ -138,7 +138,7 @@ def test_every_client_gets_what_the_sensors_measure(loop, link, connect):
             )
     for client in clients:
         client.close()
-    until(lambda: not publisher.wanted)
+    until(lambda: not publisher.has_subscribers)
 
 
 def test_sensors_that_come_later_are_found(loop, link, connect):
@@ -349,7 +349,7 @@ def joined(ros, link):
 
 
 def subscribed(gateway):
-    return {box.topic for session in gateway.sessions() for box in session.mailboxes}
+    return {box.topic for session in gateway.sessions() for box in session.queues}
 
 
 def test_two_graphs_joined(loop, link, ros):
@@ -406,7 +406,7 @@ def test_the_ros_side_joins_again(loop, link, bridges, ros):
     with ros_bridges:
         wanted(loop, publisher)
         bridges.call(link.stop())
-        until(lambda: not publisher.wanted)
+        until(lambda: not publisher.has_subscribers)
         again = SensorLink(port=link.port, image_port=link.image_port)
         bridges.open(again)
         wanted(loop, publisher)

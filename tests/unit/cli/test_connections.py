@@ -21,7 +21,7 @@ def test_nodes_wait_for_their_graph_and_say_so(monkeypatch, capsys) -> None:
     assert capsys.readouterr().err == "nobody at x://y; waiting up to 30 s\n"
     tries.clear()
     with pytest.raises(UnreachableError):
-        connections.await_link("x://y", "node", patience_s=0.0)
+        connections.await_link("x://y", "node", timeout_s=0.0)
     assert tries == ["node"]
 
 

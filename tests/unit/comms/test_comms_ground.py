@@ -190,10 +190,10 @@ def test_known_names_with_other_types_are_told_of(name: str) -> None:
 @pytest.mark.parametrize(
     ("line", "usage"),
     [
-        ("go_to uav1 1", "go_to WHO X Y Z [HEADING]"),
-        ("hold", "hold WHO"),
-        ("return_home uav1", "return WHO"),
-        ("take_off_to 0 3", "take_off WHO [ALTITUDE]"),
+        ("go_to uav1 1", "go_to ADDRESS X Y Z [HEADING]"),
+        ("hold", "hold ADDRESS"),
+        ("return_home uav1", "return ADDRESS"),
+        ("take_off_to 0 3", "take_off ADDRESS [ALTITUDE]"),
     ],
 )
 def test_wrong_usage_is_told_the_right_one(line: str, usage: str) -> None:
@@ -323,7 +323,7 @@ def test_uavs_of_a_graph_are_commanded_by_lines_of_another_process(graph) -> Non
         asked.append("hold")
         return Response(True, "holds")
 
-    graph.do(lambda: graph.graph.offer("/uav2/hold", "std_srvs/srv/Trigger", hold))
+    graph.do(lambda: graph.graph.create_service("/uav2/hold", "std_srvs/srv/Trigger", hold))
 
     def tell():
         message = States(Header(Time(0, 0), "map"), [state("uav1"), state("uav2")])
@@ -377,7 +377,7 @@ def test_a_mission_takes_what_would_go_against_it(graph) -> None:
             asked.append(service)
             return response(True, "")
 
-        graph.do(lambda: graph.graph.offer(service, srvtype, answer))
+        graph.do(lambda: graph.graph.create_service(service, srvtype, answer))
 
     for name in ("hold", "land", "return_home"):
         offer(f"/uav1/{name}")

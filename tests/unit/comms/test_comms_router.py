@@ -214,7 +214,7 @@ def test_measurements_give_way_and_commands_are_refused() -> None:
     assert statistics.refused == {Reason.FULL: 2}
 
 
-def test_a_station_that_never_acknowledges_fills_its_own_mailbox_only() -> None:
+def test_a_station_that_never_acknowledges_fills_its_own_queue_only() -> None:
     bench = Bench(RouterSettings(window=5, lane_depth=10))
     one, _, other = bench.station(0), bench.station(1), bench.station(2)
     for k in range(40):
@@ -232,8 +232,8 @@ def test_a_station_that_never_acknowledges_fills_its_own_mailbox_only() -> None:
     assert bench.got[2] == numbered(40)
 
 
-def test_mailboxes_are_bounded_by_bytes() -> None:
-    bench = Bench(RouterSettings(mailbox_bytes=20_000))
+def test_queues_are_bounded_by_bytes() -> None:
+    bench = Bench(RouterSettings(queue_bytes=20_000))
     bench.station(0), bench.station(1)
     bench.cut(1)
     for _ in range(30):
@@ -244,8 +244,8 @@ def test_mailboxes_are_bounded_by_bytes() -> None:
 
 
 def test_large_messages_take_the_place_of_several_small_ones() -> None:
-    """One for one they would fill a mailbox far beyond its bytes."""
-    bench = Bench(RouterSettings(mailbox_bytes=20_000))
+    """One for one they would fill a queue far beyond its bytes."""
+    bench = Bench(RouterSettings(queue_bytes=20_000))
     bench.station(0), bench.station(1)
     bench.cut(1)
     for size in (100, 1000):
@@ -480,6 +480,6 @@ def test_a_station_holds_only_so_much() -> None:
 
 def test_impossible_settings() -> None:
     with pytest.raises(CommsError, match="planes"):
-        RouterSettings(planes_per_batch=0)
+        RouterSettings(group_size=0)
     with pytest.raises(CommsError, match="lane_depth"):
         RouterSettings(lane_depth=0)

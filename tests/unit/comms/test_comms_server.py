@@ -94,7 +94,7 @@ def test_wrong_tokens_and_full_houses_are_told() -> None:
         with pytest.raises(CommsError, match="token"):
             await joined(server, 0, token="wrong")
         with pytest.raises(CommsError, match="4 planes"):
-            await joined(server, 0, token="open", planes_per_batch=3)
+            await joined(server, 0, token="open", group_size=3)
         station = await joined(server, 0, token="open")
         assert server.statistics.refused == {Reason.TOKEN: 1, Reason.BATCH_SIZE: 1}
         await station.stop()

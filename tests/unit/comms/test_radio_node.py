@@ -105,7 +105,7 @@ def test_who_speaks_before_there_is_a_server_is_heard_later(port: int) -> None:
     early.say("early")
     assert not early.radio.joined
     early.radio.destroy_node()
-    late = Aboard("uav3", port, station=2)
+    late = Aboard("uav3", port, station_id=2)
     until(lambda: late.radio.joined)
     late.radio.destroy_node()
 

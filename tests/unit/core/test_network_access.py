@@ -44,7 +44,7 @@ def test_a_broken_connection_is_written_to_without_warnings(caplog):
 def test_mavlink_clients_over_tcp_are_written_to_so(caplog):
     def write(transport, data):
         client = _TcpClient(None)
-        client.transport, client.party = transport, SimpleNamespace(sign=lambda given: given)
+        client.transport, client.connection = transport, SimpleNamespace(sign=lambda given: given)
         client.send(data)
 
     asyncio.run(_write_after_reset(write))

@@ -134,9 +134,9 @@ def test_new_connections_come_a_few_at_a_turn():
     played(scene)
 
 
-def test_patience_ends():
+def test_the_timeout_ends_a_connection():
     async def scene():
-        async with Server(Opening(look_at_http, patience_s=0.05)) as server:
+        async with Server(Opening(look_at_http, timeout_s=0.05)) as server:
             async with client(server) as (early, _), client(server) as (late, _):
                 assert await early.read() == b""
                 assert await late.read() == b""

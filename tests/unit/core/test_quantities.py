@@ -45,9 +45,9 @@ def test_a_key_without_a_unit_has_none():
         ("gain", 10**400, "bits"),
         ("gain", -math.inf, "-inf is not finite"),
         ("seed", -5, "-5 is beyond 0 to"),
-        ("patience_s", -0.1, "-0.1 s is beyond 0 to"),
+        ("timeout_s", -0.1, "-0.1 s is beyond 0 to"),
         ("safe_radius_m", -1.0, "-1 m is beyond 0 to"),
-        ("share", 1.5, "1.5 is beyond 0 to 1"),
+        ("fraction", 1.5, "1.5 is beyond 0 to 1"),
     ],
 )
 def test_what_is_beyond_is_told(key, value, words):
@@ -62,7 +62,7 @@ def test_what_is_beyond_is_told(key, value, words):
         ("region_m", [-5000.0, -5000.0, 5000.0, 5000.0]),
         ("seed", 2**63 - 1),
         ("team", ["uav1", "uav2"]),
-        ("corrected", True),
+        ("use_map_tf", True),
         ("gain", 0.0),
     ],
 )

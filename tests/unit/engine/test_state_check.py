@@ -82,14 +82,14 @@ def test_a_spawned_uav_is_looked_at(flying):
 
 
 def test_vectorized_simulations_name_the_copy(flat_data):
-    with VectorizedSimulation(parse_scenario(flat_data), 5, threads=2) as copies:
-        copies.run(0.1)
-        copies._blocks[1].fleet.state.velocity_map[1] = math.nan
+    with VectorizedSimulation(parse_scenario(flat_data), 5, threads=2) as envs:
+        envs.run(0.1)
+        envs._blocks[1].fleet.state.velocity_map[1] = math.nan
         with pytest.raises(DivergenceError, match="uav1 of environment 3") as caught:
-            copies.run(0.05)
+            envs.run(0.05)
         assert caught.value.uav == "3/uav1"
         with pytest.raises(DivergenceError, match="uav1 of environment 3"):
-            copies.get_state()
-        copies.reset([3])
-        copies.run(0.1)
-        copies.get_state()
+            envs.get_state()
+        envs.reset([3])
+        envs.run(0.1)
+        envs.get_state()

@@ -30,13 +30,13 @@ def test_delivery_keeps_order_even_when_callbacks_publish(graph):
 
 def test_unwanted_messages_are_not_queued_and_wanted_tells(graph):
     publisher = graph.advertise("/a", String)
-    assert not publisher.wanted
+    assert not publisher.has_subscribers
     subscription = graph.subscribe("/a", lambda _m: None)
-    assert publisher.wanted
+    assert publisher.has_subscribers
     subscription.cancel()
-    assert not publisher.wanted
+    assert not publisher.has_subscribers
     graph.subscribe_all(lambda _m: None)
-    assert publisher.wanted
+    assert publisher.has_subscribers
 
 
 def test_publication_carries_time_type_and_bytes(graph):
@@ -68,7 +68,7 @@ def texts(got):
 def test_a_late_subscriber_gets_the_last_latched_message_once(timed, clock):
     latched = timed.advertise("/map", String, latched=True)
     plain = timed.advertise("/map", String)
-    assert latched.wanted  # though nobody listens yet
+    assert latched.has_subscribers  # though nobody listens yet
     for word in ("old", "new"):
         latched.publish(String(word))
     plain.publish(String("gone"))
@@ -147,13 +147,13 @@ def test_types_are_kept(graph):
 
 def test_services(graph):
     response = message_type("std_srvs/srv/Trigger_Response")
-    graph.offer("/uav1/land", "std_srvs/srv/Trigger", lambda _r: response(True, "landing"))
+    graph.create_service("/uav1/land", "std_srvs/srv/Trigger", lambda _r: response(True, "landing"))
     assert graph.call("/uav1/land").message == "landing"
     assert graph.services() == {"/uav1/land": "std_srvs/srv/Trigger"}
     with pytest.raises(GraphError, match="has no server"):
         graph.call("/uav2/land")
     with pytest.raises(GraphError, match="already has a server"):
-        graph.offer("/uav1/land", "std_srvs/srv/Trigger", lambda _r: None)
+        graph.create_service("/uav1/land", "std_srvs/srv/Trigger", lambda _r: None)
 
 
 def test_laser_scan_bytes_survive_a_round_trip():
@@ -168,7 +168,7 @@ def test_laser_scan_bytes_survive_a_round_trip():
 
 def test_a_call_without_a_request_is_one_of_zeros(graph):
     response = message_type("std_srvs/srv/SetBool_Response")
-    graph.offer("/arm", "std_srvs/srv/SetBool", lambda r: response(r.data, f"{r.data}"))
+    graph.create_service("/arm", "std_srvs/srv/SetBool", lambda r: response(r.data, f"{r.data}"))
     assert graph.call("/arm").message == "False"
 
 
@@ -207,11 +207,11 @@ def test_what_is_shown_reaches_clients_outside_alone(timed):
     inside, everything, outside = [], [], []
     timed.subscribe("/live", inside.append)
     timed.subscribe_all(everything.append)
-    assert not publisher.watched
+    assert not publisher.has_external_subscribers
     subscription = timed.attach("/live", outside.append)
-    assert publisher.watched
-    assert publisher.watchers_so_far == 1
-    publisher.show(String("now"))
+    assert publisher.has_external_subscribers
+    assert publisher.num_external_subscriptions == 1
+    publisher.publish_external(String("now"))
     assert texts(outside) == ["now"]  # at once, without a delivery
     timed.deliver()
     assert inside == everything == []
@@ -223,14 +223,14 @@ def test_what_is_shown_reaches_clients_outside_alone(timed):
         ["now", "to all"],
     ]
     subscription.cancel()
-    assert not publisher.watched
-    publisher.show(String("nobody"))
+    assert not publisher.has_external_subscribers
+    publisher.publish_external(String("nobody"))
     assert len(outside) == 2
     with pytest.raises(GraphError, match="carries"):
-        publisher.show(Twist(None, None))
+        publisher.publish_external(Twist(None, None))
     publisher.cancel()
     timed.attach("/live", outside.append)
-    publisher.show(String("gone"))
+    publisher.publish_external(String("gone"))
     assert len(outside) == 2
 
 
@@ -242,5 +242,5 @@ def test_what_is_kept_is_shown_again(timed):
     timed.subscribe("/map", inside.append)
     timed.attach("/map", outside.append)
     timed.deliver()
-    timed.show_kept()
+    timed.republish_latched()
     assert (texts(inside), texts(outside)) == (["m"], ["m", "m"])

@@ -25,13 +25,13 @@ def quiet():
     """A wake that nobody needs."""
 
 
-def texts(mailbox):
-    return [published.message.data for published in mailbox.take()]
+def texts(queue):
+    return [published.message.data for published in queue.take()]
 
 
 def test_messages_go_both_ways(bench):
     session, wakes = bench.gateway.open("client"), []
-    mailbox = session.subscribe("/out", STRING, wake=lambda: wakes.append(1))
+    queue = session.subscribe("/out", STRING, wake=lambda: wakes.append(1))
     seen = []
     bench.graph.subscribe("/in", seen.append, STRING)
     session.advertise("/in", STRING)
@@ -41,72 +41,72 @@ def test_messages_go_both_ways(bench):
     bench.work_off()
     assert seen[0].message.data == "hello"
     assert wakes == [1]
-    assert texts(mailbox) == ["there"]
+    assert texts(queue) == ["there"]
 
 
-def test_a_mailbox_keeps_the_newest_and_counts_the_rest(bench):
+def test_a_queue_keeps_the_newest_and_counts_the_rest(bench):
     session = bench.gateway.open("slow")
-    mailbox = session.subscribe("/out", STRING, depth=3, wake=quiet)
+    queue = session.subscribe("/out", STRING, depth=3, wake=quiet)
     publisher = bench.graph.advertise("/out", STRING)
     for k in range(10):
         publisher.publish(String(str(k)))
     bench.work_off()
-    assert mailbox.info.received == 10
-    assert mailbox.info.dropped == 7
-    assert mailbox.info.waiting == 3
-    assert texts(mailbox) == ["7", "8", "9"]
+    assert queue.info.received == 10
+    assert queue.info.dropped == 7
+    assert queue.info.waiting == 3
+    assert texts(queue) == ["7", "8", "9"]
 
 
-def test_a_reliable_mailbox_keeps_all(bench):
+def test_a_reliable_queue_keeps_all(bench):
     session = bench.gateway.open("slow")
-    mailbox = session.subscribe("/out", STRING, depth=3, reliable=True, wake=quiet)
+    queue = session.subscribe("/out", STRING, depth=3, reliable=True, wake=quiet)
     publisher = bench.graph.advertise("/out", STRING)
     for k in range(1000):
         publisher.publish(String(str(k)))
     bench.work_off()
-    assert mailbox.info.dropped == 0
-    assert texts(mailbox) == [str(k) for k in range(1000)]
-    assert mailbox.failure is None
+    assert queue.info.dropped == 0
+    assert texts(queue) == [str(k) for k in range(1000)]
+    assert queue.failure is None
 
 
 @pytest.mark.parametrize("limit", ["MOST_DEPTH", "MOST_RELIABLE_BYTES"])
-def test_a_reliable_mailbox_that_overflows_says_so_and_ends(bench, monkeypatch, limit):
+def test_a_reliable_queue_that_overflows_says_so_and_ends(bench, monkeypatch, limit):
     monkeypatch.setattr(
         f"volery.graph.subscription_queue.{limit}", {"MOST_DEPTH": 20}.get(limit, 2000)
     )
     wakes = []
     session = bench.gateway.open("slow")
-    mailbox = session.subscribe("/out", STRING, reliable=True, wake=lambda: wakes.append(1))
+    queue = session.subscribe("/out", STRING, reliable=True, wake=lambda: wakes.append(1))
     publisher = bench.graph.advertise("/out", STRING)
     for _ in range(3):  # as long as somebody takes them, any number may come
         for _ in range(19):
             publisher.publish(String("x" * 100))
         bench.work_off()
-        assert len(mailbox.take()) == 19
+        assert len(queue.take()) == 19
     for _ in range(30):
         publisher.publish(String("x" * 100))
     bench.work_off()
-    assert "reliable subscription of '/out' ended" in mailbox.failure
-    assert mailbox.take() == []
-    assert mailbox.info.dropped == 21
+    assert "reliable subscription of '/out' ended" in queue.failure
+    assert queue.take() == []
+    assert queue.info.dropped == 21
     assert len(wakes) > 3
 
 
 def test_some_may_be_taken_and_the_rest_later(bench):
-    mailbox = bench.gateway.open("c").subscribe("/out", STRING, wake=quiet)
+    queue = bench.gateway.open("c").subscribe("/out", STRING, wake=quiet)
     publisher = bench.graph.advertise("/out", STRING)
     for k in range(4):
         publisher.publish(String(str(k)))
     bench.work_off()
-    assert [p.message.data for p in mailbox.take(3)] == ["0", "1", "2"]
-    assert texts(mailbox) == ["3"]
+    assert [p.message.data for p in queue.take(3)] == ["0", "1", "2"]
+    assert texts(queue) == ["3"]
 
 
 def test_the_late_find_what_was_latched(bench):
     bench.graph.advertise("/map", STRING, latched=True).publish(String("kept"))
     bench.work_off()
-    mailbox = bench.gateway.open("late").subscribe("/map", STRING, wake=quiet)
-    assert texts(mailbox) == ["kept"]
+    queue = bench.gateway.open("late").subscribe("/map", STRING, wake=quiet)
+    assert texts(queue) == ["kept"]
 
 
 def test_what_a_client_latched_goes_with_it(bench):
@@ -119,7 +119,7 @@ def test_what_a_client_latched_goes_with_it(bench):
 
 
 def test_a_service_of_the_simulation(bench):
-    bench.graph.offer("/do", TRIGGER, lambda _request: Response(True, "done"))
+    bench.graph.create_service("/do", TRIGGER, lambda _request: Response(True, "done"))
     answers, failures = [], []
     session = bench.gateway.open("caller")
     session.call("/do", None, ServiceReply(answers.append, failures.append))
@@ -135,7 +135,7 @@ def test_a_service_that_breaks_is_the_callers_business(bench, caplog):
     def broken(_request):
         raise ZeroDivisionError("oh")
 
-    bench.graph.offer("/do", TRIGGER, broken)
+    bench.graph.create_service("/do", TRIGGER, broken)
     failures = []
     bench.gateway.open("caller").call("/do", None, ServiceReply(print, failures.append))
     bench.work_off()
@@ -146,7 +146,7 @@ def test_a_service_that_breaks_is_the_callers_business(bench, caplog):
 def test_a_service_of_one_client_for_another(bench):
     server, caller = bench.gateway.open("server"), bench.gateway.open("caller")
     requests, answers, failures = [], [], []
-    server.offer("/do", TRIGGER, lambda request, reply: requests.append((request, reply)))
+    server.create_service("/do", TRIGGER, lambda request, reply: requests.append((request, reply)))
     caller.call("/do", None, ServiceReply(answers.append, failures.append))
     bench.work_off()
     requests[0][1].answer(Response(True, "from outside"))
@@ -158,7 +158,7 @@ def test_a_service_of_one_client_for_another(bench):
 
 def test_who_leaves_fails_those_who_wait_for_him(bench):
     server, failures, requests = bench.gateway.open("server"), [], []
-    server.offer("/do", TRIGGER, lambda request, reply: requests.append(reply))
+    server.create_service("/do", TRIGGER, lambda request, reply: requests.append(reply))
     bench.gateway.open("caller").call("/do", None, ServiceReply(print, failures.append))
     bench.work_off()
     server.close()
@@ -171,8 +171,8 @@ def test_who_leaves_fails_those_who_wait_for_him(bench):
 def test_closing_takes_everything_back(bench):
     session = bench.gateway.open("visitor")
     session.advertise("/in", STRING)
-    mailbox = session.subscribe("/out", STRING, wake=quiet)
-    session.offer("/do", TRIGGER, lambda request, reply: None)
+    queue = session.subscribe("/out", STRING, wake=quiet)
+    session.create_service("/do", TRIGGER, lambda request, reply: None)
     (info,) = bench.gateway.sessions()
     assert (info.name, info.publishes, info.offers) == ("visitor", ("/in",), ("/do",))
     session.close()
@@ -182,7 +182,7 @@ def test_closing_takes_everything_back(bench):
     assert counts == {"/in": (0, 0), "/out": (0, 0)}
     bench.graph.advertise("/out", STRING).publish(String("nobody"))
     bench.work_off()
-    assert texts(mailbox) == []
+    assert texts(queue) == []
     with pytest.raises(GraphError, match="has left"):
         session.advertise("/in", STRING)
 
@@ -196,7 +196,7 @@ def test_closing_takes_everything_back(bench):
         (lambda s: s.advertise("bad name", STRING), "valid name"),
         (lambda s: s.publish("/y", String("")), "not advertised"),
         (lambda s: s.unadvertise("/y"), "does not publish"),
-        (lambda s: s.withdraw("/y"), "does not serve"),
+        (lambda s: s.destroy_service("/y"), "does not serve"),
     ],
 )
 def test_what_cannot_be_is_refused(bench, attempt, words):
@@ -211,10 +211,10 @@ def test_nothing_is_lost_or_doubled_while_clients_come_and_go(bench):
     def visit():
         while not stop.is_set():
             session = bench.gateway.open("visitor")
-            mailbox = session.subscribe("/out", STRING, depth=most, wake=quiet)
-            numbers = [int(text) for text in texts(mailbox)]
+            queue = session.subscribe("/out", STRING, depth=most, wake=quiet)
+            numbers = [int(text) for text in texts(queue)]
             session.close()
-            numbers += [int(text) for text in texts(mailbox)]
+            numbers += [int(text) for text in texts(queue)]
             if numbers != list(range(numbers[0], numbers[0] + len(numbers))) if numbers else False:
                 problem.append(numbers)
 

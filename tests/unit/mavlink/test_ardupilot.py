@@ -24,7 +24,7 @@ from volery.mavlink.hil.ardupilot_json import (
     shares,
     state_line,
 )
-from volery.mavlink.hil.lock_step import PATIENCE, TimeoutPolicy
+from volery.mavlink.hil.lock_step import DEFAULT_TIMEOUT, TimeoutPolicy
 from volery.mavlink.scenario_setup import with_ardupilot
 from volery.runtime import Simulation
 from volery.scenario.load import parse_scenario
@@ -51,11 +51,11 @@ def opened():
     """A simulation of `count` UAVs and its bridge."""
     closing = []
 
-    def open_one(count=1, patience=PATIENCE):
+    def open_one(count=1, timeout_policy=DEFAULT_TIMEOUT):
         simulation = Simulation(scenario(count), threads=1)
         bridges = BridgeHost(simulation.gateway)
         closing.extend([bridges, simulation])
-        bridge = ArdupilotBridge(port=free_port(socket.SOCK_DGRAM), patience=patience)
+        bridge = ArdupilotBridge(port=free_port(socket.SOCK_DGRAM), timeout_policy=timeout_policy)
         bridges.open(bridge)
         simulation.process_commands()
         return simulation, bridge
@@ -114,7 +114,7 @@ def test_one_that_was_restarted_is_met_anew(opened):
         autopilot = ArdupilotStandIn(bridge._port, 80, first=first)
         autopilot.start()
         end = time.monotonic() + 60.0
-        while bridge._seats[0]._number != first and time.monotonic() < end:
+        while bridge._sessions[0]._number != first and time.monotonic() < end:
             time.sleep(0.01)
         simulation.run(0.1)
         finish(autopilot)
@@ -134,13 +134,13 @@ def test_it_flies_on_after_a_reset(opened):
 
 
 def test_who_is_silent_ends_the_run_or_is_given_up(opened, caplog):
-    simulation, bridge = opened(patience=TimeoutPolicy(0.3))
+    simulation, bridge = opened(timeout_policy=TimeoutPolicy(0.3))
     autopilot = ArdupilotStandIn(bridge._port, 5)
     autopilot.start()
     meet(simulation, bridge, 1)
     with pytest.raises(PartnerError, match=r"'ardupilot_of_uav1' did not answer within 0\.3 s"):
         simulation.run(1.0)
-    simulation, bridge = opened(patience=TimeoutPolicy(0.3, drops=True))
+    simulation, bridge = opened(timeout_policy=TimeoutPolicy(0.3, drops=True))
     autopilot = ArdupilotStandIn(bridge._port, 5, pwm=CLIMB)
     autopilot.start()
     meet(simulation, bridge, 1)

@@ -14,7 +14,7 @@ from px4_stand_in import StandIn, Terminal
 from volery.bridges.bridge_host import BridgeHost
 from volery.core.errors import BridgeError, PartnerError
 from volery.mavlink.codec import Codec, dialect
-from volery.mavlink.hil.lock_step import PATIENCE, TimeoutPolicy
+from volery.mavlink.hil.lock_step import DEFAULT_TIMEOUT, TimeoutPolicy
 from volery.mavlink.hil.protocol import HilLink
 from volery.mavlink.hil.px4_bridge import Px4Bridge, _Connection
 from volery.mavlink.hil.px4_serial_bridge import Px4SerialBridge
@@ -36,11 +36,11 @@ def opened():
     """A simulation of `count` UAVs, its bridge and the first port."""
     closing = []
 
-    def open_one(count=1, patience=PATIENCE):
+    def open_one(count=1, timeout_policy=DEFAULT_TIMEOUT):
         simulation = Simulation(scenario(count), threads=1)
         bridges = BridgeHost(simulation.gateway)
         closing.extend([bridges, simulation])
-        bridge = Px4Bridge(port=free_port(), patience=patience)
+        bridge = Px4Bridge(port=free_port(), timeout_policy=timeout_policy)
         bridges.open(bridge)
         simulation.process_commands()
         return simulation, bridge
@@ -97,7 +97,7 @@ def test_who_speaks_no_mavlink_gives_way_and_who_comes_after_a_px4_is_ended(open
         with socket.create_connection(address) as px4:
             assert is_ended(stranger)
             px4.sendall(HilLink(1).heartbeat())
-            while not bridge._seats[0].has_heard and time.monotonic() < end:
+            while not bridge._sessions[0].has_received and time.monotonic() < end:
                 time.sleep(0.01)
             with socket.create_connection(address) as second:
                 assert is_ended(second)
@@ -122,7 +122,7 @@ def test_several_vehicles_share_one_clock(opened):
 
 
 def test_a_silent_one_ends_the_run_with_an_error(opened):
-    simulation, bridge = opened(patience=TimeoutPolicy(0.5))
+    simulation, bridge = opened(timeout_policy=TimeoutPolicy(0.5))
     autopilot = StandIn(bridge._port, 50, falls_silent=True)
     meet(simulation, bridge, 1)
     autopilot.start()
@@ -136,7 +136,7 @@ def test_a_silent_one_ends_the_run_with_an_error(opened):
 
 
 def test_a_silent_one_is_given_up_where_that_is_wanted_and_may_come_back(opened, caplog):
-    simulation, bridge = opened(patience=TimeoutPolicy(0.5, drops=True))
+    simulation, bridge = opened(timeout_policy=TimeoutPolicy(0.5, drops=True))
     autopilot = StandIn(bridge._port, 50, throttle=CLIMB, falls_silent=True)
     meet(simulation, bridge, 1)
     autopilot.start()
@@ -156,7 +156,7 @@ def test_a_silent_one_is_given_up_where_that_is_wanted_and_may_come_back(opened,
 
 def test_time_goes_on_without_one_that_is_disarmed_and_says_nothing(opened, caplog):
     """As PX4 in Offboard without setpoints: it answers again when time has gone on."""
-    simulation, bridge = opened(patience=TimeoutPolicy(1.0))
+    simulation, bridge = opened(timeout_policy=TimeoutPolicy(1.0))
     autopilot = StandIn(bridge._port, 50, arm_at=1000, dozes=100)
     meet(simulation, bridge, 1)
     autopilot.start()
@@ -170,14 +170,14 @@ def test_time_goes_on_without_one_that_is_disarmed_and_says_nothing(opened, capl
 
 
 def test_one_that_is_disarmed_and_never_answers_again_ends_the_run(opened):
-    simulation, bridge = opened(patience=TimeoutPolicy(0.5))
+    simulation, bridge = opened(timeout_policy=TimeoutPolicy(0.5))
     autopilot = StandIn(bridge._port, 50, arm_at=1000, falls_silent=True)
     meet(simulation, bridge, 1)
     autopilot.start()
     with pytest.raises(PartnerError, match=r"did not answer within 0\.5 s"):
         simulation.run(60.0)
     assert len(autopilot.sensors) == 50
-    assert 1.0 < simulation.time_s < 5.0  # about six times the patience, no faster than real time
+    assert 1.0 < simulation.time_s < 5.0  # about six times the timeout, no faster than real time
     autopilot.close()
 
 
@@ -286,14 +286,14 @@ def test_an_imu_that_nobody_chose_is_a_calibrated_one():
 def test_in_step_the_simulation_tells_and_nobody_is_woken_for_it(opened, monkeypatch):
     simulation, bridge = opened()
     tellers = []
-    tell = HilSession.tell
+    tell = HilSession.send_sensors
 
-    def told(seat, time_ns, news):
-        if seat.taken:
-            tellers.append((threading.get_ident(), seat._link.locked))
-        return tell(seat, time_ns, news)
+    def told(session, time_ns, news):
+        if session.taken:
+            tellers.append((threading.get_ident(), session._link.locked))
+        return tell(session, time_ns, news)
 
-    monkeypatch.setattr(HilSession, "tell", told)
+    monkeypatch.setattr(HilSession, "send_sensors", told)
     autopilot = StandIn(bridge._port, 50)
     meet(simulation, bridge, 1)
     autopilot.start()
@@ -314,7 +314,7 @@ def test_what_cannot_be_said_is_told_of_and_the_run_goes_on(opened, monkeypatch,
 
     autopilot = StandIn(bridge._port, 50)
     meet(simulation, bridge, 1)
-    monkeypatch.setattr(HilLink, "tell", refuse)
+    monkeypatch.setattr(HilLink, "encode_exchange", refuse)
     simulation.run(0.1)
     assert simulation.time_s == pytest.approx(0.1)
     autopilot.close()
@@ -326,17 +326,19 @@ def test_who_was_let_go_is_not_obeyed(opened):
     simulation, bridge = opened()
     autopilot = StandIn(bridge._port, 50)
     meet(simulation, bridge, 1)
-    (seat,) = bridge._seats
+    (session,) = bridge._sessions
     asked = []
-    seat._meetings.turn_rotors = seat._meetings.go_on = lambda shares=None: asked.append(shares)
+    session._lock_step.turn_rotors = session._lock_step.go_on = lambda shares=None: asked.append(
+        shares
+    )
     late = _Way()
-    hear = seat.take(late)
+    hear = session.take(late)
     answer = Codec(1, 1).pack(
         dialect().MAVLink_hil_actuator_controls_message(10**9, [0.7] * 16, 129, 1), 0
     )
     hear(answer)
     assert [len(shares) for shares in asked] == [16]
-    seat.leave("it went")
+    session.leave("it went")
     asked.clear()
     hear(answer)
     assert asked == []

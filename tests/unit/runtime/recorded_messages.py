@@ -1,4 +1,4 @@
-"""Clients that watch a simulation, as bridges let them: a session with mailboxes."""
+"""Clients that watch a simulation, as bridges let them: a session with queues."""
 
 from volery.graph.typestore import typestore
 

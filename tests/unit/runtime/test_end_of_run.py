@@ -84,10 +84,10 @@ def test_what_only_asks_is_answered(ended):
 
 def test_the_status_says_so(ended):
     seen = []
-    mailbox = ended.gateway.open("page").subscribe("/volery/status", wake=lambda: None)
+    queue = ended.gateway.open("page").subscribe("/volery/status", wake=lambda: None)
 
     def look():
-        seen.extend(published.message.ended for published in mailbox.take())
+        seen.extend(published.message.ended for published in queue.take())
         if True in seen:
             raise EndedError
 

@@ -117,9 +117,9 @@ def test_anywhere_what_was_the_case_is_shown(flights, suffix):
                 for r in walked
                 if r.time_ns <= round(second * 1e9)
             }
-            for mailbox in (odom, weather, static):
-                (published,) = mailbox.take()[-1:]
-                again = m.Published("", published.msgtype, 0, last[mailbox.topic])
+            for queue in (odom, weather, static):
+                (published,) = queue.take()[-1:]
+                again = m.Published("", published.msgtype, 0, last[queue.topic])
                 assert published.cdr == again.cdr
             assert player.time_s == second
         late = visitor.listen("/uav1/imu")
@@ -157,9 +157,9 @@ def test_only_what_is_listened_to_is_decoded(flight, monkeypatch):
     monkeypatch.setattr(LogDecoder, "decode", watched)
     with LogPlayer(flight, speed=None) as player:
         visitor = Visitor(player)
-        mailbox = visitor.listen("/uav1/imu")
+        queue = visitor.listen("/uav1/imu")
         play_out(player)
-        assert len(mailbox.take()) > 900
+        assert len(queue.take()) > 900
     assert decoded == {"/uav1/imu", "/tf_static", "/weather", "/volery/scenario"}
 
 

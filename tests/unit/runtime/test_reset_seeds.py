@@ -67,17 +67,17 @@ def test_where_the_seed_grows_the_world_other_seeds_are_refused_with_what_to_do(
 
 
 def test_copies_fix_the_world_that_they_share(forest):
-    with VectorizedSimulation(forest, 2) as copies:
-        assert copies.scenario.world.seed == 1
-        copies.run(copies.common_period_s)
-        copies.reset([1], seeds=[7])
-        copies.run(0.2)
-        with Simulation(copies.scenario.with_(seed=7)) as alone:
+    with VectorizedSimulation(forest, 2) as envs:
+        assert envs.scenario.world.seed == 1
+        envs.run(envs.common_period_s)
+        envs.reset([1], seeds=[7])
+        envs.run(0.2)
+        with Simulation(envs.scenario.with_(seed=7)) as alone:
             alone.run(0.2)
             position = alone.uavs["uav1"].position_map
-        np.testing.assert_array_equal(copies.state().position_map[1, 0], position)
+        np.testing.assert_array_equal(envs.state().position_map[1, 0], position)
         with pytest.raises(CommandError, match="a seed must be a whole number"):
-            copies.reset(seeds=[1, -1])
+            envs.reset(seeds=[1, -1])
 
 
 def test_what_begins_after_a_reset_has_the_random_streams_of_its_seed(open_air):

@@ -164,7 +164,7 @@ def send(simulation, steps):
     told, ended = [], []
     goal = message_type("simulation_interfaces/action/SimulateSteps_Goal")(steps=steps)
     actions = simulation.graph.actions
-    handle = actions.send("/simulate_steps", goal, told.append, lambda *how: ended.append(how))
+    handle = actions.send_goal("/simulate_steps", goal, told.append, lambda *how: ended.append(how))
     return handle, told, ended
 
 
@@ -199,7 +199,7 @@ def test_the_action_can_be_cancelled_and_refused(simulate, flat_data):
         assert simulation.time_ns == 20_000_000
         simulation.quit()
     assert behind.status is GoalStatus.SUCCEEDED
-    simulation.graph.actions.withdraw("/simulate_steps")
+    simulation.graph.actions.destroy_server("/simulate_steps")
     with pytest.raises(GraphError, match="no server"):
         send(simulation, 1)
 

@@ -30,7 +30,7 @@ def test_nobody_waits_for_the_kernels_of_nodes_and_cameras_without_them() -> Non
 
 def test_a_scenario_needs_what_its_nodes_and_sensors_call() -> None:
     found = named(needs_of(load_scenario("forest_search")))
-    assert {"runtime.warmup.core_tasks:pictures", "runtime.warmup.core_tasks:estimates"} <= found
+    assert {"runtime.warmup.core_tasks:images", "runtime.warmup.core_tasks:estimates"} <= found
     assert {
         "autonomy.slam.warmup:motion",
         "autonomy.slam.warmup:known_places",
@@ -47,7 +47,7 @@ def test_a_scenario_needs_what_its_nodes_and_sensors_call() -> None:
         ({"kind": "magnetometer"}, {}, core_tasks.magnetic_fields),
         ({"kind": "lidar", "model": "vlp_16"}, {}, core_tasks.point_clouds),
         ({"kind": "lidar"}, {"weather": {"fog_visibility_m": 50.0}}, core_tasks.falling_drops),
-        ({"kind": "camera"}, {"weather": {"rain_mm_h": 5.0}}, core_tasks.pictures_in_rain),
+        ({"kind": "camera"}, {"weather": {"rain_mm_h": 5.0}}, core_tasks.images_in_rain),
     ],
 )
 def test_rarer_sensors_compile_where_they_are(

@@ -79,7 +79,7 @@ def test_airframes_of_one_name_keep_their_own_bodies(write):
     )
 
     class Scene:
-        def set_bodies(self, shapes, index, *, copies):
+        def set_bodies(self, shapes, index, *, num_envs):
             self.bodies = [shapes[k] for k in index]
 
     scene = Scene()

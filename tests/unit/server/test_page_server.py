@@ -204,7 +204,7 @@ def test_who_stops_reading_loses_messages_of_its_own():
 
 
 def boxes(world):
-    return [box for session in world.gateway.sessions() for box in session.mailboxes]
+    return [box for session in world.gateway.sessions() for box in session.queues]
 
 
 def resident_mb():

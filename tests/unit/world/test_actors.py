@@ -116,13 +116,13 @@ def test_circles_lean_into_the_turn(clockwise):
 
 def test_what_was_said_is_known_of_the_past():
     motion = GivenMotion([1, 2, 3, 0, 0, 0, 1])
-    motion.say(1.0, [5, 0, 0, 0, 0, 0, 1], [2, 0, 0])
-    motion.say(1.1, [9, 0, 0, 0, 0, 0, 1], [0, 0, 0])
+    motion.set_pose(1.0, [5, 0, 0, 0, 0, 0, 1], [2, 0, 0])
+    motion.set_pose(1.1, [9, 0, 0, 0, 0, 0, 1], [0, 0, 0])
     places = [float(motion.pose_at(t)[0]) for t in (0.5, 1.0, 1.05, 1.1, 7.0)]
     assert places == pytest.approx([1.0, 5.0, 5.1, 9.0, 9.0])
     for k in range(1000):
-        motion.say(2.0 + 0.01 * k, [k, 0, 0, 0, 0, 0, 1], [0, 0, 0])
-    assert len(motion._said) < 40
+        motion.set_pose(2.0 + 0.01 * k, [k, 0, 0, 0, 0, 0, 1], [0, 0, 0])
+    assert len(motion._poses) < 40
     assert motion.pose_at(11.9)[0] == 990
 
 
@@ -145,7 +145,7 @@ def test_all_see_actors_and_each_copy_its_own_uavs(scene_class):
     scene = scene_class(None, None)
     actors = two_actors()
     scene.set_actors(actors)
-    scene.set_bodies([body_shape(load_airframe("f450"))], [0, 0, 0, 0], copies=2)
+    scene.set_bodies([body_shape(load_airframe("f450"))], [0, 0, 0, 0], num_envs=2)
     scene.move_bodies([[0, 0, 1.2], [2, 0, 1.2]] * 2, [[0, 0, 0, 1.0]] * 4)
     scene.move_actors(2_000_000_000, 2_000_000_000)  # anna passes y = 0
     o, d = [[0.0, 0.0, 1.2]] * 2, [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]
@@ -181,11 +181,11 @@ def test_all_see_actors_and_each_copy_its_own_uavs(scene_class):
 def test_actors_know_where_they_are_and_who_may_put_them():
     actors = two_actors()
     np.testing.assert_allclose(actors.velocity_at(0, 1_000_000_000), [0.0, 1.5, 0.0], atol=1e-6)
-    actors.say(1, 10, [0, 0, 0, 0, 0, 0, 1], [3, 0, 0])
+    actors.set_pose(1, 10, [0, 0, 0, 0, 0, 0, 1], [3, 0, 0])
     assert actors.speeds_m_s.tolist() == [1.5, 3.0]
     with pytest.raises(CommandError, match="anna has a motion of its own"):
-        actors.say(0, 10, [0, 0, 0, 0, 0, 0, 1])
+        actors.set_pose(0, 10, [0, 0, 0, 0, 0, 0, 1])
     kept = actors.get_state()
-    actors.say(1, 20, [7, 0, 0, 0, 0, 0, 1])
+    actors.set_pose(1, 20, [7, 0, 0, 0, 0, 0, 1])
     actors.set_state(kept)
     np.testing.assert_allclose(actors.poses_at(1_000_000_010)[1, :3], [3.0, 0, 0])

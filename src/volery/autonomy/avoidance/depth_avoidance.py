@@ -37,7 +37,7 @@ class DepthAvoidance(DepthCourse):
     ----------
     safe_radius_m: min distance between the UAV's centre and obstacles.
     deceleration_m_s2: braking that limits the speed.
-    view_deg: usable horizontal field of view.
+    horizontal_fov_deg: usable horizontal field of view.
 
     """
 
@@ -55,7 +55,7 @@ class DepthAvoidance(DepthCourse):
         super().__init__("depth_avoidance", **options)
         radius = float(self.declare_parameter("safe_radius_m", 0.9).value)
         deceleration = float(self.declare_parameter("deceleration_m_s2", 1.5).value)
-        view = math.radians(self.declare_parameter("view_deg", 70.0).value)
+        view = math.radians(self.declare_parameter("horizontal_fov_deg", 70.0).value)
         self._steering = GapSteering(SpeedLimits(radius, deceleration, view / 2.0, _ASIDE_M_S))
         self._obstacles = ObstacleMemory(keep_s=20.0)
         self._projector = DepthProjector(self.mount)

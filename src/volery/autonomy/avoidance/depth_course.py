@@ -158,7 +158,7 @@ class DepthCourse(Node):
                 self.phase = DepthCoursePhase.FLY
         elif self.phase is DepthCoursePhase.FLY:
             self._fly(pose)
-        if self._status.wanted:
+        if self._status.has_subscribers:
             self._status.publish(
                 String(self.doing if self.phase is DepthCoursePhase.FLY else str(self.phase))
             )

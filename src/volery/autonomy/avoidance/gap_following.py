@@ -67,7 +67,7 @@ class GapFollowing(GapFlight):
             GapFollowingPhase.LAND: self._wait,
         }[self._phase]
         step(self._pose)
-        if self._status.wanted:
+        if self._status.has_subscribers:
             self._status.publish(String(str(self._phase)))
 
     def _start(self, pose: OdometrySample) -> None:

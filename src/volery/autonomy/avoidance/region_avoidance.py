@@ -3,7 +3,7 @@
 As described by the ROS + Unity3D platform of 2025: fly FORWARD until the mean depth of the region
 of interest falls below a threshold, be STOPPED, AVOID until the path is free, RETURN to the course.
 Its example threshold, .03, is of normalised depth, without its far plane. Here depth is normalised
-by `far_m`; the defaults are the best of five, see docs/avoidance.md.
+by `max_depth_m`; the defaults are the best of five, see docs/avoidance.md.
 """
 
 from __future__ import annotations
@@ -46,10 +46,10 @@ class RegionAvoidance(DepthCourse):
 
     Parameters
     ----------
-    far_m: depth that counts 1, m; larger depths count 1 too.
-    threshold: mean of the region, as a fraction of `far_m`, below which it is blocked.
+    max_depth_m: depth that counts 1, m; larger depths count 1 too.
+    threshold: mean of the region, as a fraction of `max_depth_m`, below which it is blocked.
     region: [width, height] of the region of interest, fractions of the image, in its centre.
-    sidestep_m_s: lateral speed.
+    lateral_speed_m_s: lateral speed.
     margin_s: time for which the sidestep continues after the path is free.
 
     """
@@ -58,7 +58,9 @@ class RegionAvoidance(DepthCourse):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("region_avoidance", **options)
-        self._far = float(self.declare_parameter("far_m", 10.0, min_value=0.1, max_value=1e4).value)
+        self._far = float(
+            self.declare_parameter("max_depth_m", 10.0, min_value=0.1, max_value=1e4).value
+        )
         self._threshold = float(
             self.declare_parameter("threshold", 0.6, min_value=0.0, max_value=1.0).value
         )
@@ -68,7 +70,7 @@ class RegionAvoidance(DepthCourse):
                 f"region must be [width, height], each above 0 and at most 1, not {self._region}"
             )
         self._sidestep = float(
-            self.declare_parameter("sidestep_m_s", 0.8, min_value=0.0, max_value=100.0).value
+            self.declare_parameter("lateral_speed_m_s", 0.8, min_value=0.0, max_value=100.0).value
         )
         self._margin_ns = round(
             1e9 * self.declare_parameter("margin_s", 1.0, min_value=0.0, max_value=1e4).value

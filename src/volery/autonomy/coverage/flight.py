@@ -41,12 +41,12 @@ class CoverageFlight:
     phase: CoveragePhase = CoveragePhase.GROUND
     position_map: Array | None = None
     climb_m_s: float = 0.0
-    heard_ns: int = 0
+    received_ns: int = 0
     home_map: Array | None = None
     waypoints: WaypointProgress | None = None
     following: int = 0
     """Number of the next waypoint."""
-    told: int = -1
+    published: int = -1
     """Number of the last waypoint sent to it."""
     nearest_m: float = math.inf
     """Min distance to it so far, and since when it has not decreased."""
@@ -54,13 +54,13 @@ class CoverageFlight:
 
     def moved(self, position_map: Array, climb_m_s: float, now_ns: int) -> None:
         """Stores the current position."""
-        self.position_map, self.climb_m_s, self.heard_ns = position_map, climb_m_s, now_ns
+        self.position_map, self.climb_m_s, self.received_ns = position_map, climb_m_s, now_ns
         if self.home_map is None:
             self.home_map = position_map.copy()
 
     def send(self, waypoints: WaypointProgress, now_ns: int) -> None:
         """Sets other waypoints."""
-        self.waypoints, self.following, self.told = waypoints, 0, -1
+        self.waypoints, self.following, self.published = waypoints, 0, -1
         self._begin_leg(now_ns)
 
     @property
@@ -85,14 +85,14 @@ class CoverageFlight:
             and bool(self.waypoints.covering[min(self.following, len(self.waypoints.places) - 1)])
         )
 
-    def goal(self, arrival_m: float, now_ns: int) -> Array | None:
+    def goal(self, acceptance_radius_m: float, now_ns: int) -> Array | None:
         """Returns the current waypoint (3,) m, advancing past reached ones; None at the end."""
         assert self.position_map is not None
         assert self.waypoints is not None
         while self.following < len(self.waypoints.places):
             place: Array = self.waypoints.places[self.following]
             away = norm(place - self.position_map)
-            if away > arrival_m:
+            if away > acceptance_radius_m:
                 if away < self.nearest_m - _PROGRESS_M:
                     self.nearest_m, self.since_ns = away, now_ns
                 return place
@@ -100,9 +100,9 @@ class CoverageFlight:
             self._begin_leg(now_ns)
         return None
 
-    def is_lost(self, patience_s: float, now_ns: int) -> bool:
-        """Returns whether odometry or progress have been missing for `patience_s`."""
-        return now_ns - min(self.heard_ns, self.since_ns) > patience_s * 1e9
+    def is_lost(self, timeout_s: float, now_ns: int) -> bool:
+        """Returns whether odometry or progress have been missing for `timeout_s`."""
+        return now_ns - min(self.received_ns, self.since_ns) > timeout_s * 1e9
 
     def _begin_leg(self, now_ns: int) -> None:
         self.nearest_m, self.since_ns = math.inf, now_ns

@@ -63,7 +63,7 @@ def status_message(
 ) -> String:
     """Returns JSON: state, covered fraction, phase and cells of each UAV, reason of a refusal."""
     shares = [] if plan is None else plan.shares.tolist()
-    told = {
+    status = {
         "state": "refused" if refused else "waiting" if plan is None else "flying",
         "covered": round(share, 4),
         "phases": {flight.name: str(flight.phase) for flight in flights},
@@ -72,7 +72,7 @@ def status_message(
         "unreachable": 0 if plan is None else plan.unreachable,
         "reason": refused,
     }
-    return String(json.dumps(told))
+    return String(json.dumps(status))
 
 
 def _grid(field: CoverageField, values: NDArray[np.generic], now_ns: int) -> OccupancyGrid:

@@ -43,7 +43,7 @@ _REPEAT = 10
 """Periods after which a goal and the progress are published again: a UAV ignores goals during
 take-off.
 """
-_STATE = ("_field", "_flights", "_plan", "_covered", "_refused", "_ticks", "_told_covered")
+_STATE = ("_field", "_flights", "_plan", "_covered", "_refused", "_ticks", "_published_covered")
 """Names of the attributes that a snapshot stores."""
 
 
@@ -54,10 +54,11 @@ class CoveragePlanner(Node):
     ----------
     uavs: names of the UAVs.
     height_m: z of the tours in the map.
-    layer_m: height difference between UAVs in transit.
-    over_m: z at which blocked cells may be crossed to reach parts without a UAV; 0: never.
-    arrival_m: distance at which a waypoint is reached.
-    patience_s: timeout of a UAV's odometry, and of its progress.
+    layer_spacing_m: height difference between UAVs in transit.
+    crossing_height_m: z at which blocked cells may be crossed to reach parts without a UAV;
+        0: never.
+    acceptance_radius_m: distance at which a waypoint is reached.
+    timeout_s: timeout of a UAV's odometry, and of its progress.
     seed: of the division's random numbers.
 
     """
@@ -74,11 +75,11 @@ class CoveragePlanner(Node):
         names = self.declare_parameter("uavs", ["uav1"]).value
         self._heights = HeightProfile(
             float(self.declare_parameter("height_m", 2.5).value),
-            float(self.declare_parameter("layer_m", 1.5).value),
-            float(self.declare_parameter("over_m", 0.0).value),
+            float(self.declare_parameter("layer_spacing_m", 1.5).value),
+            float(self.declare_parameter("crossing_height_m", 0.0).value),
         )
-        self._arrival_m = float(self.declare_parameter("arrival_m", 0.3).value)
-        self._patience_s = float(self.declare_parameter("patience_s", 10.0).value)
+        self._acceptance_radius_m = float(self.declare_parameter("acceptance_radius_m", 0.3).value)
+        self._timeout_s = float(self.declare_parameter("timeout_s", 10.0).value)
         self._seed = int(self.declare_parameter("seed", 1).value)
 
         self._field: CoverageField | None = None
@@ -88,7 +89,7 @@ class CoveragePlanner(Node):
         """Sub-cells (2 * rows, 2 * columns) that a UAV has flown through."""
         self._refused = ""
         self._ticks = 0
-        self._told_covered = -1
+        self._published_covered = -1
 
         self._areas = self.create_publisher(OccupancyGrid, "~/areas", 1, latched=True)
         self._covered_map = self.create_publisher(OccupancyGrid, "~/covered", 1, latched=True)
@@ -209,12 +210,12 @@ class CoveragePlanner(Node):
             assert flight.waypoints is not None
             self._paths[number].publish(messages.path_message(flight.waypoints, now))
         self._areas.publish(messages.areas_message(self._field, owner, now))
-        self._tell_status()
+        self._publish_status()
 
     def _refuse(self, reason: str) -> None:
         if reason != self._refused:
             self._refused = reason
-            self._tell_status()
+            self._publish_status()
 
     # ----------------------------------------------------------------------------------- behaviour
 
@@ -235,7 +236,7 @@ class CoveragePlanner(Node):
         if lost:
             self._plan_again()
         if self._ticks % _REPEAT == 0:
-            self._tell_progress()
+            self._publish_progress()
 
     def _advance(self, number: int, flight: CoverageFlight, now: int) -> None:
         if flight.waypoints is None:
@@ -249,13 +250,13 @@ class CoveragePlanner(Node):
         elif flight.phase is CoveragePhase.TAKE_OFF and self._ticks % _REPEAT == 0:
             self._ask_to_take_off(number, flight)
         elif flight.phase is CoveragePhase.COVER:
-            goal = flight.goal(self._arrival_m, now)
+            goal = flight.goal(self._acceptance_radius_m, now)
             if goal is None:
                 flight.phase = CoveragePhase.DONE
                 self._land[number].call_async()
-                self._tell_status()
-            elif flight.following != flight.told or self._ticks % _REPEAT == 0:
-                flight.told = flight.following
+                self._publish_status()
+            elif flight.following != flight.published or self._ticks % _REPEAT == 0:
+                flight.published = flight.following
                 self._goals[number].publish(messages.goal_message(goal, now))
 
     def _ask_to_take_off(self, number: int, flight: CoverageFlight) -> None:
@@ -273,7 +274,7 @@ class CoveragePlanner(Node):
 
     def _is_lost(self, flight: CoverageFlight, now: int) -> bool:
         flies = flight.phase in (CoveragePhase.TAKE_OFF, CoveragePhase.COVER)
-        return flies and flight.is_lost(self._patience_s, now)
+        return flies and flight.is_lost(self._timeout_s, now)
 
     # ---------------------------------------------------------------------------------- publishers
 
@@ -285,17 +286,17 @@ class CoveragePlanner(Node):
         fine = np.kron(self._field.free, np.ones((2, 2), np.bool_))
         return float(np.count_nonzero(self._covered & fine)) / max(free, 1)
 
-    def _tell_progress(self) -> None:
+    def _publish_progress(self) -> None:
         assert self._field is not None
         self._progress.publish(Float32(float(np.float32(self._share))))
         count = int(np.count_nonzero(self._covered))
-        if count != self._told_covered:
-            self._told_covered = count
+        if count != self._published_covered:
+            self._published_covered = count
             now = self.get_clock().now_ns()
             self._covered_map.publish(messages.covered_message(self._field, self._covered, now))
-            self._tell_status()
+            self._publish_status()
 
-    def _tell_status(self) -> None:
+    def _publish_status(self) -> None:
         share = 0.0 if self._field is None else self._share
         self._status.publish(
             messages.status_message(self._flights, self._plan, share, self._refused)

@@ -32,8 +32,8 @@ class HeightProfile:
 
     def __post_init__(self) -> None:
         """Raises PlanError for heights out of range."""
-        low = {"height_m": (self.cover, -_HIGHEST), "layer_m": (self.layer, 0.0)}
-        for key, (height, least) in {**low, "over_m": (self.over, 0.0)}.items():
+        low = {"height_m": (self.cover, -_HIGHEST), "layer_spacing_m": (self.layer, 0.0)}
+        for key, (height, least) in {**low, "crossing_height_m": (self.over, 0.0)}.items():
             if not least <= height <= _HIGHEST:
                 raise PlanError(f"{key} must be {least:g} to {_HIGHEST:g} m, not {height:g}")
 

@@ -47,7 +47,7 @@ _LEAST_HEIGHT_M = 1.0
 """Min height above ground for the grid; lower it would show the ground."""
 _MOST_FILES = 100
 """Max number of files in a map folder, as clients of the graph name them. Modelling choice."""
-_PLAIN_STATE = ("_motion", "_nod", "_intakes", "_ground", "_range", "_told", "_slab_z")
+_PLAIN_STATE = ("_motion", "_nod", "_intakes", "_ground", "_range", "_last_status", "_slab_z")
 
 
 class Mapping(Node):
@@ -58,11 +58,11 @@ class Mapping(Node):
 
     Parameters
     ----------
-    odometry: topic of the pose; `corrected`: whether `/tf` holds the pose of its frame in the map.
+    odometry: topic of the pose; `use_map_tf`: whether `/tf` holds the pose of its frame in the map.
     level_mount, nodding_mount: [x, y, z] of the LIDARs in the body, m.
-    resolution_m: cell size of the octree; grid_cell_m: of the grid.
-    reach_m: max range; beyond it returns count as free space up to it.
-    scan_rate_hz: scans processed per second and LIDAR; every: step between processed beams.
+    resolution_m: cell size of the octree; grid_resolution_m: of the grid.
+    max_range_m: max range; beyond it returns count as free space up to it.
+    scan_rate_hz: scans processed per second and LIDAR; beam_step: step between processed beams.
     max_nodes: bound of the octree; extent_m: of the grid, and of maps that are loaded.
     half_height_m: half the thickness of the slab that the grid shows.
     voxels_period_s, grid_period_s: periods of publication.
@@ -90,8 +90,8 @@ class Mapping(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("mapping", **options)
         self._resolution = float(self.declare_parameter("resolution_m", 0.2, min_value=0.01).value)
-        self._reach = float(self.declare_parameter("reach_m", 15.0, min_value=0.1).value)
-        every = int(self.declare_parameter("every", 2, min_value=1).value)
+        self._reach = float(self.declare_parameter("max_range_m", 15.0, min_value=0.1).value)
+        beam_step = int(self.declare_parameter("beam_step", 2, min_value=1).value)
         rate = float(
             self.declare_parameter("scan_rate_hz", 5.0, min_value=0.01, max_value=1000.0).value
         )
@@ -100,21 +100,21 @@ class Mapping(Node):
         self._half = float(self.declare_parameter("half_height_m", 0.6, min_value=0.01).value)
         self._folder = self.declare_folder("folder", f"maps{self.get_namespace()}")
         self._limits = MapLimits(self._resolution, extent, nodes)
-        beams = Beams(reach_m=self._reach, every=every)
+        beams = Beams(reach_m=self._reach, every=beam_step)
         self._intakes = {
             name: ScanBuffer(RayMaker(declare_mount(self, name), beams), rate)
             for name in ("level", "nodding")
         }
         self._octree = Octree(self._resolution, nodes)
         self._grid = ProjectedGrid(
-            float(self.declare_parameter("grid_cell_m", 0.4, min_value=0.01).value), extent
+            float(self.declare_parameter("grid_resolution_m", 0.4, min_value=0.01).value), extent
         )
         self._frame = MapFrame()
         self._motion, self._nod = MotionHistory(), NodHistory()
         self._ground = GroundPlane()
         self._range: tuple[int, float] | None = None
         self._slab_z = 0.0
-        self._told = ""
+        self._last_status = ""
         self._open()
         map_file = str(self.declare_parameter("map_file", "").value)
         if map_file:
@@ -135,9 +135,9 @@ class Mapping(Node):
         self.create_service("octomap_msgs/srv/GetOctomap", "~/octomap", self._on_get)
         self.create_service("volery_interfaces/srv/ByName", "~/save", self._on_save)
         self.create_service("volery_interfaces/srv/ByName", "~/load", self._on_load)
-        self.create_timer(voxels_s, self._tell_voxels)
-        self.create_timer(grid_s, self._tell_grid)
-        self.create_timer(1.0, self._tell_status)
+        self.create_timer(voxels_s, self._publish_voxels)
+        self.create_timer(grid_s, self._publish_grid)
+        self.create_timer(1.0, self._publish_status)
 
     def get_state(self) -> dict[str, Any]:
         """Returns the state for a snapshot."""
@@ -153,7 +153,7 @@ class Mapping(Node):
     # ------------------------------------------------------------------------------ subscriptions
 
     def _on_odometry(self, message: Odometry) -> None:
-        self._frame.hear(message)
+        self._frame.on_odometry(message)
         if not self._motion.add(OdometrySample.from_odometry(message)):
             return
         for name, intake in self._intakes.items():
@@ -193,29 +193,29 @@ class Mapping(Node):
     def _ground_below(self, z: float) -> float | None:
         if self._range is None:
             return None
-        heard_ns, distance = self._range
-        fresh = 0 <= self.get_clock().now_ns() - heard_ns <= _SONAR_MEMORY_S * NS_PER_S
+        received_ns, distance = self._range
+        fresh = 0 <= self.get_clock().now_ns() - received_ns <= _SONAR_MEMORY_S * NS_PER_S
         return z - distance if fresh else None
 
     # ---------------------------------------------------------------------------------- publishers
 
-    def _tell_voxels(self) -> None:
-        if self._voxels.wanted and self._octree.nodes:
+    def _publish_voxels(self) -> None:
+        if self._voxels.has_subscribers and self._octree.nodes:
             self._voxels.publish(self._message())
 
     def _message(self) -> Any:
         data, now = self._octree.binary(), self.get_clock().now_ns()
         return messages.octomap_message(data, self._resolution, MAP, now)
 
-    def _tell_grid(self) -> None:
-        if self._level.wanted and self._grid.origin is not None:
+    def _publish_grid(self) -> None:
+        if self._level.has_subscribers and self._grid.origin is not None:
             now = self.get_clock().now_ns()
             self._level.publish(messages.grid_message(self._grid, self._slab_z, MAP, now))
 
-    def _tell_status(self) -> None:
+    def _publish_status(self) -> None:
         problems = self._problems()
         counts = {name: dict(sorted(i.counts.items())) for name, i in self._intakes.items()}
-        told = {
+        status = {
             "state": "degraded" if problems else "mapping",
             "problems": problems,
             "scans": counts,
@@ -223,7 +223,7 @@ class Mapping(Node):
             "trimmed": self._octree.forgotten,
             "outside": self._grid.outside,
         }
-        self._told = publish_status(self._status, told, self._told)
+        self._last_status = publish_status(self._status, status, self._last_status)
 
     def _problems(self) -> list[str]:
         """Returns the problems that keep the map from growing, as text."""
@@ -234,7 +234,7 @@ class Mapping(Node):
         if self._frame.is_lost:
             found.append(UNKNOWN_PLACE)
         for name, intake in self._intakes.items():
-            heard, seen = intake.heard_ns, intake.seen_ns
+            heard, seen = intake.received_ns, intake.seen_ns
             if heard is None or now - heard > _SILENT_S * NS_PER_S:
                 found.append(f"the {name} LIDAR is silent")
             elif intake.stuck:

@@ -18,7 +18,7 @@ from volery.core.vectors import norm
 from volery.graph.messages import String, TFMessage
 from volery.graph.nodes.node import Node
 
-_STATE = ("_maps", "_placements", "_changed", "_told", "_reasons")
+_STATE = ("_maps", "_placements", "_changed", "_last_status", "_reasons")
 
 
 class MapMerging(Node):
@@ -51,7 +51,7 @@ class MapMerging(Node):
         self._maps: dict[str, Any] = {}
         self._placements: dict[str, Pose] = {}
         self._changed = False
-        self._told = ""
+        self._last_status = ""
         self._reasons: dict[str, str] = {}
         self._merged = self.create_publisher(OCTOMAP, "~/octomap_binary", 1, latched=True)
         self._status = self.create_publisher(String, "~/status", 1, latched=True)
@@ -114,7 +114,7 @@ class MapMerging(Node):
         else:
             now = self.get_clock().now_ns()
             self._merged.publish(octomap_message(data, self._resolution, MAP, now))
-        self._tell(len(placed), reason)
+        self._publish_status(len(placed), reason)
         return reason
 
     def _placed(self, topic: str) -> PlacedMap | None:
@@ -132,6 +132,10 @@ class MapMerging(Node):
         self._reasons.pop(topic, None)
         return PlacedMap(voxels, placement if frame not in ("", MAP) else None)
 
-    def _tell(self, count: int, reason: str) -> None:
-        told = {"merged": count, "reason": reason, "left_out": dict(sorted(self._reasons.items()))}
-        self._told = publish_status(self._status, told, self._told)
+    def _publish_status(self, count: int, reason: str) -> None:
+        status = {
+            "merged": count,
+            "reason": reason,
+            "left_out": dict(sorted(self._reasons.items())),
+        }
+        self._last_status = publish_status(self._status, status, self._last_status)

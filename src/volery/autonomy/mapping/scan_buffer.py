@@ -36,7 +36,7 @@ class ScanBuffer:
         """Stamp of the newest scan with a return, ns."""
         self.stuck = False
         """Whether the LIDAR repeats its scans."""
-        self.heard_ns: int | None = None
+        self.received_ns: int | None = None
         """Stamp of the newest scan, ns."""
 
     def add(self, scan: LaserScan) -> None:
@@ -48,7 +48,7 @@ class ScanBuffer:
         if self._last_ns is not None and stamp <= self._last_ns:
             self.counts["repeated"] += 1
             return
-        self._last_ns = self.heard_ns = stamp
+        self._last_ns = self.received_ns = stamp
         due = self._last_taken_ns
         if due is not None and stamp < due + self._period_ns - _EARLY_NS:
             return
@@ -58,7 +58,7 @@ class ScanBuffer:
         if has_return(scan):
             self.seen_ns = stamp
         self._last_taken_ns = stamp
-        self.stuck = self._repeats.are_told_by(scan)
+        self.stuck = self._repeats.are_reported_by(scan)
         if self.stuck:
             self.counts["stuck"] += 1
             return

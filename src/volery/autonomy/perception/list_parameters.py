@@ -18,27 +18,27 @@ def declare_numbers(
 
     It may be empty if `or_empty` is true. Raises NodeError for other values.
     """
-    told = node.declare_parameter(name, default).value
-    if (or_empty and not len(told)) or (
-        len(told) == form.count(",") + 1 and all(map(_is_number, told))
+    value = node.declare_parameter(name, default).value
+    if (or_empty and not len(value)) or (
+        len(value) == form.count(",") + 1 and all(map(_is_number, value))
     ):
-        return [float(number) for number in told]
+        return [float(number) for number in value]
     raise NodeError(
-        f"{name} must be {form}, finite numbers{', or empty' if or_empty else ''}, not {told!r}"
+        f"{name} must be {form}, finite numbers{', or empty' if or_empty else ''}, not {value!r}"
     )
 
 
 def declare_points(node: Node, name: str, default: list[list[float]]) -> list[list[float]]:
     """Declares a parameter of points [x, y] in the map, m. Raises NodeError for other values."""
-    told = node.declare_parameter(name, default).value
+    value = node.declare_parameter(name, default).value
     if all(
         isinstance(point, list | tuple)
         and len(point) == len("xy")
         and all(_is_number(x) and abs(x) <= _FARTHEST_M for x in point)
-        for point in told
+        for point in value
     ):
-        return [[float(x) for x in point] for point in told]
-    raise NodeError(f"{name} must be a list of [x, y], m, within +-{_FARTHEST_M:g}, not {told!r}")
+        return [[float(x) for x in point] for point in value]
+    raise NodeError(f"{name} must be a list of [x, y], m, within +-{_FARTHEST_M:g}, not {value!r}")
 
 
 def declare_mount(node: Node, lidar: str) -> list[float]:

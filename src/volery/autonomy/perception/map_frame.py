@@ -35,9 +35,9 @@ class MapFrame:
         """Name of the odometry frame; empty before it is known."""
         self._odom_ns = 0
         self._known: dict[str, Pose] = {}
-        self._told_ns: dict[str, int] = {}
+        self._tf_ns: dict[str, int] = {}
 
-    def hear(self, message: Odometry) -> None:
+    def on_odometry(self, message: Odometry) -> None:
         """Selects the frame of this odometry."""
         self.odom_frame, self._odom_ns = message.header.frame_id, stamp_of(message)
 
@@ -51,7 +51,7 @@ class MapFrame:
             length = norm(attitude)
             if np.isfinite(position).all() and 0.9 < length < 1.1:
                 self._known[stamped.child_frame_id] = Pose(position, attitude / length)
-                self._told_ns[stamped.child_frame_id] = stamp_of(stamped)
+                self._tf_ns[stamped.child_frame_id] = stamp_of(stamped)
 
     @property
     def map_from_odom(self) -> Pose | None:
@@ -61,8 +61,8 @@ class MapFrame:
     @property
     def is_lost(self) -> bool:
         """Whether the transform has timed out while the odometry continues."""
-        told = self._told_ns.get(self.odom_frame)
-        return told is not None and self._odom_ns - told > _SILENT_NS
+        last_ns = self._tf_ns.get(self.odom_frame)
+        return last_ns is not None and self._odom_ns - last_ns > _SILENT_NS
 
     def to_map(self, points_odom: Array) -> Array:
         """Transforms points (..., 3) from the odometry frame to the map."""
@@ -81,7 +81,7 @@ class MapFrame:
 
     def pose_in_map(self, message: Odometry) -> OdometrySample:
         """Returns the pose of odometry in the map, and selects its frame."""
-        self.hear(message)
+        self.on_odometry(message)
         pose, at = OdometrySample.from_odometry(message), self.map_from_odom
         if at is None:
             return pose
@@ -95,10 +95,10 @@ class MapFrame:
 
     def get_state(self) -> dict[str, Any]:
         """Returns the state for a snapshot."""
-        times = {"odom_ns": self._odom_ns, "told_ns": dict(self._told_ns)}
+        times = {"odom_ns": self._odom_ns, "tf_ns": dict(self._tf_ns)}
         return {"odom_frame": self.odom_frame, "known": dict(self._known), **times}
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Restores a saved state."""
         self.odom_frame, self._known = state["odom_frame"], dict(state["known"])
-        self._odom_ns, self._told_ns = state["odom_ns"], dict(state["told_ns"])
+        self._odom_ns, self._tf_ns = state["odom_ns"], dict(state["tf_ns"])

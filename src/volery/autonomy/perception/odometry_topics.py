@@ -15,10 +15,10 @@ def subscribe_odometry(
 ) -> None:
     """Subscribes `node` to its odometry, and `frame` to `/tf`.
 
-    Declares the parameters `odometry`, the topic, and `corrected`: false if the odometry frame is
+    Declares the parameters `odometry`, the topic, and `use_map_tf`: false if the odometry frame is
     the map's, so that `/tf` is not used.
     """
     topic = str(node.declare_parameter("odometry", "odom").value)
     node.create_subscription(Odometry, topic, on_odometry, depth)
-    if node.declare_parameter("corrected", True).value:
+    if node.declare_parameter("use_map_tf", True).value:
         node.create_subscription(TFMessage, "/tf", frame.on_tf, 50)

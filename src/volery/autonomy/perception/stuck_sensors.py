@@ -29,7 +29,7 @@ class ScanRepeats:
     def __init__(self) -> None:
         self._ranges: Ranges = np.zeros(0, np.float32)
 
-    def are_told_by(self, scan: LaserScan) -> bool:
+    def are_reported_by(self, scan: LaserScan) -> bool:
         """Returns whether a scan with returns repeats the ranges of the previous one."""
         ranges = np.asarray(scan.ranges, np.float32)
         before, self._ranges = self._ranges, ranges
@@ -43,7 +43,7 @@ class RangeRepeats:
         self._last = -1.0
         self._count = 0
 
-    def are_told_by(self, distance: float) -> bool:
+    def are_reported_by(self, distance: float) -> bool:
         """Returns whether a range (m, finite) is the last of many equal ones."""
         self._count = self._count + 1 if distance == self._last else 1
         self._last = distance

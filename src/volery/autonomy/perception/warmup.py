@@ -33,7 +33,7 @@ def scan_repeats() -> None:
     """Compiles the kernel that detects repeated scans."""
     repeats = ScanRepeats()
     for _ in range(2):
-        repeats.are_told_by(a_scan())
+        repeats.are_reported_by(a_scan())
 
 
 def scan_rays() -> None:

@@ -62,7 +62,7 @@ _STATE = (
     "_visited",
     "_state",
     "_reason",
-    "_told",
+    "_last_status",
     "_sent",
 )
 
@@ -86,9 +86,9 @@ class Exploration(Node):
 
     Parameters
     ----------
-    odometry: topic of the pose; `corrected`: whether `/tf` holds the pose of its frame in the map.
-    view_m: radius around the vehicle that counts as observed.
-    cell_m: cell size of the area.
+    odometry: topic of the pose; `use_map_tf`: whether `/tf` holds the pose of its frame in the map.
+    view_radius_m: radius around the vehicle that counts as observed.
+    resolution_m: cell size of the area.
 
     """
 
@@ -101,8 +101,8 @@ class Exploration(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("exploration", **options)
-        self._view = float(self.declare_parameter("view_m", 10.0, min_value=0.1).value)
-        self._cell = float(self.declare_parameter("cell_m", 1.0, min_value=0.05).value)
+        self._view = float(self.declare_parameter("view_radius_m", 10.0, min_value=0.1).value)
+        self._cell = float(self.declare_parameter("resolution_m", 1.0, min_value=0.05).value)
         self._frame = MapFrame()
         self._motion: OdometrySample | None = None
         self._area: SearchArea | None = None
@@ -117,7 +117,7 @@ class Exploration(Node):
         map.
         """
         self._state, self._reason = ExplorationState.WAITING, "no area"
-        self._told = ""
+        self._last_status = ""
         self._sent = 0
         self._open()
 
@@ -133,7 +133,7 @@ class Exploration(Node):
         self.create_subscription(OccupancyGrid, "projected_map", self._on_grid, 1)
         self.create_subscription(String, "planning/goal_status", self._on_goal_status, 5)
         self.create_timer(_PERIOD_S, self._on_timer)
-        self.create_timer(2.0, self._tell_searched)
+        self.create_timer(2.0, self._publish_searched)
 
     def get_state(self) -> dict[str, Any]:
         """Returns the state for a snapshot."""
@@ -147,7 +147,7 @@ class Exploration(Node):
     # ------------------------------------------------------------------------------ subscriptions
 
     def _on_odometry(self, message: Odometry) -> None:
-        self._frame.hear(message)
+        self._frame.on_odometry(message)
         motion = OdometrySample.from_odometry(message)
         if np.isfinite(motion.position).all() and np.isfinite(motion.velocity).all():
             self._motion = motion
@@ -186,8 +186,8 @@ class Exploration(Node):
     def _on_goal_status(self, message: String) -> None:
         """Gives up the goal if the planner cannot reach it."""
         try:
-            told = json.loads(message.data)
-            state, goal = told["state"], told["goal"]
+            status = json.loads(message.data)
+            state, goal = status["state"], status["goal"]
         except (ValueError, TypeError, KeyError):
             return
         if self._goal is None or state not in ("refused", "unreachable"):
@@ -199,7 +199,7 @@ class Exploration(Node):
 
     def _on_timer(self) -> None:
         if self._area is None or self._motion is None or self._grid is None:
-            self._tell()
+            self._publish_status()
             return
         if self._frame.is_lost:
             self._since_ns = self.get_clock().now_ns()  # a goal is not blocked by lost tracking
@@ -209,7 +209,7 @@ class Exploration(Node):
         if self._state is ExplorationState.SEARCHING:
             self._search(self._area, place)
         self._covered.publish(Float32(single(self._area.share)))
-        self._tell()
+        self._publish_status()
 
     def _search(self, area: SearchArea, place: Array) -> None:
         now = self.get_clock().now_ns()
@@ -263,9 +263,9 @@ class Exploration(Node):
     def _become(self, state: ExplorationState, reason: str) -> None:
         self._state, self._reason = state, reason
 
-    def _tell(self) -> None:
+    def _publish_status(self) -> None:
         area, goal = self._area, self._goal
-        told = {
+        status = {
             "state": str(self._state),
             "reason": self._reason,
             "covered": 0.0 if area is None else round(area.share, 3),
@@ -274,10 +274,10 @@ class Exploration(Node):
             "goal": None if goal is None else [round(v, 2) for v in goal.place.tolist()],
             "given_up": len(self._refused),
         }
-        self._told = publish_status(self._status, told, self._told)
+        self._last_status = publish_status(self._status, status, self._last_status)
 
-    def _tell_searched(self) -> None:
-        if self._area is None or not self._searched.wanted:
+    def _publish_searched(self) -> None:
+        if self._area is None or not self._searched.has_subscribers:
             return
         area = self._area
         values = np.where(area.inside, np.where(area.seen, 100, 0), -1).astype(np.int8).T

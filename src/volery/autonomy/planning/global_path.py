@@ -40,7 +40,7 @@ class PathSearch(NamedTuple):
     """Attempts to shorten the path."""
 
 
-def plan_way(
+def plan_path(
     space: VoxelSpace, start: Array, goal: Array, height_m: float, search: PathSearch, seed: int
 ) -> Array:
     """Returns positions (K, 3) m from `start` to `goal` (3,), `height_m` above ground at the goal.

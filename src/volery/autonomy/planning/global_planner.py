@@ -14,7 +14,7 @@ from volery.autonomy.perception.list_parameters import declare_numbers
 from volery.autonomy.perception.map_frame import MAP, MapFrame
 from volery.autonomy.perception.odometry_topics import subscribe_odometry
 from volery.autonomy.perception.scan_points import OdometrySample
-from volery.autonomy.planning.global_path import PathSearch, plan_way
+from volery.autonomy.planning.global_path import PathSearch, plan_path
 from volery.autonomy.planning.voxel_space import SolidVoxels, VoxelSpace
 from volery.autonomy.status import publish_status
 from volery.core.clock import NS_PER_S
@@ -43,7 +43,17 @@ _STUCK_M = 1.0
 _MARGIN_M = 25.0
 _TRIES = 3
 """Attempts after which the goal is given up."""
-_STATE = ("_goal", "_way", "_place", "_since_ns", "_best_m", "_tries", "_plans", "_told", "_map")
+_STATE = (
+    "_goal",
+    "_waypoints",
+    "_position",
+    "_since_ns",
+    "_best_m",
+    "_tries",
+    "_plans",
+    "_last_status",
+    "_map",
+)
 
 
 class GlobalPlanner(Node):
@@ -55,10 +65,10 @@ class GlobalPlanner(Node):
 
     Parameters
     ----------
-    odometry: topic of the pose; `corrected`: whether `/tf` holds the pose of its frame in the map.
+    odometry: topic of the pose; `use_map_tf`: whether `/tf` holds the pose of its frame in the map.
     height_m: height above ground of the goal; heights_m: [min, max] along the path.
-    radius_m: min distance to obstacles. cell_m: cell size of the planning space.
-    iterations: bound of the search. seed: of its random numbers.
+    safe_radius_m: min distance to obstacles. resolution_m: cell size of the planning space.
+    max_iterations: bound of the search. seed: of its random numbers.
 
     """
 
@@ -77,25 +87,25 @@ class GlobalPlanner(Node):
         if not low < high:
             raise NodeError(f"heights_m must be [min, max] with min < max, not {[low, high]}")
         self._search = PathSearch(
-            radius_m=float(self.declare_parameter("radius_m", 0.8, min_value=0.05).value),
+            radius_m=float(self.declare_parameter("safe_radius_m", 0.8, min_value=0.05).value),
             heights_m=(low, high),
-            iterations=int(self.declare_parameter("iterations", 4000, min_value=1).value),
+            iterations=int(self.declare_parameter("max_iterations", 4000, min_value=1).value),
         )
-        self._cell = float(self.declare_parameter("cell_m", 0.4, min_value=0.05).value)
+        self._cell = float(self.declare_parameter("resolution_m", 0.4, min_value=0.05).value)
         self._seed = int(self.declare_parameter("seed", 1).value)
         self._frame = MapFrame()
         self._map: SolidVoxels | None = None
         """Occupied voxels of the newest map."""
         self._goal: Array | None = None
-        self._way: Array | None = None
-        self._place: Array | None = None
+        self._waypoints: Array | None = None
+        self._position: Array | None = None
         """Position of the vehicle, (3,) m in the map."""
         self._since_ns = 0
         self._best_m = math.inf
         """Smallest distance to the goal so far, and since when it has not decreased."""
         self._tries = 0
         self._plans = 0
-        self._told = ""
+        self._last_status = ""
         self._open()
 
     def _open(self) -> None:
@@ -120,10 +130,10 @@ class GlobalPlanner(Node):
     # ------------------------------------------------------------------------------ subscriptions
 
     def _on_odometry(self, message: Odometry) -> None:
-        self._frame.hear(message)
+        self._frame.on_odometry(message)
         place = OdometrySample.from_odometry(message).position
         if np.isfinite(place).all():
-            self._place = self._frame.to_map(place)
+            self._position = self._frame.to_map(place)
 
     def _on_goal(self, message: PoseStamped) -> None:
         p = message.pose.position
@@ -132,7 +142,7 @@ class GlobalPlanner(Node):
             self._give_up("refused", f"goals are in 'map', not in '{message.header.frame_id}'")
         elif not np.isfinite(goal).all():
             self._give_up("refused", "the goal's position is not finite")
-        elif self._goal is None or not np.array_equal(goal, self._goal) or self._way is None:
+        elif self._goal is None or not np.array_equal(goal, self._goal) or self._waypoints is None:
             self._goal, self._tries = goal, 0
             self._plan()
 
@@ -141,16 +151,18 @@ class GlobalPlanner(Node):
         try:
             self._map = SolidVoxels.of(voxels_of(message), float(message.resolution))
         except DataFileError as error:
-            self._tell("waiting" if self._way is None else "planned", str(error), 0.0)
+            self._publish_status(
+                "waiting" if self._waypoints is None else "planned", str(error), 0.0
+            )
             return
-        if self._goal is None or self._way is None or self._place is None:
+        if self._goal is None or self._waypoints is None or self._position is None:
             return
         try:
-            space = self._space(self._place)
+            space = self._space(self._position)
         except PlanError as error:
             self._give_up("refused", str(error))
             return
-        if space is not None and not self._is_clear(space, self._way, self._place):
+        if space is not None and not self._is_clear(space, self._waypoints, self._position):
             self._plan()
 
     def _on_pause(self, message: Bool) -> None:
@@ -169,14 +181,14 @@ class GlobalPlanner(Node):
 
     def _on_timer(self) -> None:
         """Plans again if the vehicle comes no nearer to the goal."""
-        if self._goal is None or self._place is None:
+        if self._goal is None or self._position is None:
             return
         now = self.get_clock().now_ns()
-        if self._way is None:
+        if self._waypoints is None:
             if self._tries == 0:
                 self._plan()
             return
-        left = float(np.hypot(*(self._goal[:2] - self._place[:2])))
+        left = float(np.hypot(*(self._goal[:2] - self._position[:2])))
         if left < self._best_m - _STUCK_M or left < 2.0:
             self._best_m, self._since_ns, self._tries = left, now, 0
         elif now - self._since_ns > _STUCK_S * NS_PER_S:
@@ -187,26 +199,28 @@ class GlobalPlanner(Node):
                 self._plan()
 
     def _plan(self) -> None:
-        goal, place = self._goal, self._place
+        goal, place = self._goal, self._position
         if goal is None or place is None:
             return
         self._plans += 1
         try:
             space = self._space(place)
             if space is None:
-                way = np.stack([place, goal])
+                waypoints = np.stack([place, goal])
             else:
                 seed = self._seed * 1_000_003 + self._plans
-                way = plan_way(space, place, goal, self._height, self._search, seed)
+                waypoints = plan_path(space, place, goal, self._height, self._search, seed)
         except PlanError as error:
             self._give_up("refused", str(error))
             return
-        self._way = way
+        self._waypoints = waypoints
         self._since_ns = self.get_clock().now_ns()
         self._best_m = float(np.hypot(*(goal[:2] - place[:2])))
-        self._send(way)
-        length = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
-        self._tell("planned", "" if space is not None else "no map there: straight path", length)
+        self._send(waypoints)
+        length = float(np.linalg.norm(np.diff(waypoints, axis=0), axis=1).sum())
+        self._publish_status(
+            "planned", "" if space is not None else "no map there: straight path", length
+        )
 
     def _space(self, place: Array) -> VoxelSpace | None:
         """Returns the space of the map around vehicle and goal; None where the map holds nothing.
@@ -221,12 +235,12 @@ class GlobalPlanner(Node):
             return None
         return VoxelSpace(self._map, self._cell, around, margin)
 
-    def _is_clear(self, space: VoxelSpace, way: Array, place: Array) -> bool:
+    def _is_clear(self, space: VoxelSpace, waypoints: Array, place: Array) -> bool:
         """Returns whether the rest of a path is free."""
-        heights = np.array([space.ground_at(p[:2]) for p in way])
-        states = way.copy()
+        heights = np.array([space.ground_at(p[:2]) for p in waypoints])
+        states = waypoints.copy()
         states[:, 2] -= heights
-        nearest = int(np.argmin(np.hypot(*(way[:, :2] - place[:2]).T)))
+        nearest = int(np.argmin(np.hypot(*(waypoints[:, :2] - place[:2]).T)))
         radius = 0.75 * self._search.radius_m
         legs = zip(states[nearest:-1], states[nearest + 1 :], strict=True)
         return all(space.is_free_between(a, b, radius) for a, b in legs)
@@ -235,17 +249,17 @@ class GlobalPlanner(Node):
 
     def _give_up(self, state: str, reason: str) -> None:
         """Publishes the reason and an empty path, so that the vehicle stops."""
-        self._tries, self._way = max(self._tries, 1), None
+        self._tries, self._waypoints = max(self._tries, 1), None
         self._send(np.zeros((0, 3)))
-        self._tell(state, reason, 0.0)
+        self._publish_status(state, reason, 0.0)
 
-    def _send(self, way: Array) -> None:
+    def _send(self, waypoints: Array) -> None:
         stamp = header(self.get_clock().now_ns(), MAP)
-        poses = [PoseStamped(stamp, Pose(Point(*place), _LEVEL)) for place in way.tolist()]
+        poses = [PoseStamped(stamp, Pose(Point(*place), _LEVEL)) for place in waypoints.tolist()]
         self._path.publish(PathMessage(stamp, poses))
 
-    def _tell(self, state: str, reason: str, length_m: float) -> None:
+    def _publish_status(self, state: str, reason: str, length_m: float) -> None:
         goal = None if self._goal is None else [round(v, 2) for v in self._goal.tolist()]
-        told = {"state": state, "reason": reason, "goal": goal, "length_m": round(length_m, 1)}
-        told = {**told, "plans": self._plans}
-        self._told = publish_status(self._status, told, self._told)
+        status = {"state": state, "reason": reason, "goal": goal, "length_m": round(length_m, 1)}
+        status = {**status, "plans": self._plans}
+        self._last_status = publish_status(self._status, status, self._last_status)

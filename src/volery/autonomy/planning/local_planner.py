@@ -42,13 +42,22 @@ from volery.graph.nodes.node import Node
 
 Array = NDArray[np.float64]
 
-_CARROT_M = 9.0
+_LOOKAHEAD_M = 9.0
 """Distance of the lookahead point along the path; the planning window extends to 12 m."""
 _LEAST_HEIGHT_M = 1.0
 """Height above ground below which the planner is inactive: the vehicle takes off or lands."""
 _TELL_S = 1.0
 """Period of the status; changes of state or problems are published at once."""
-_STATE = ("_way", "_way_map", "_neighbours", "_told", "_told_ns", "_plans", "_frame_was", "_paused")
+_STATE = (
+    "_lookahead",
+    "_path_map",
+    "_neighbours",
+    "_last_status",
+    "_last_status_ns",
+    "_plans",
+    "_frame_was",
+    "_paused",
+)
 
 
 class LocalPlanner(Node):
@@ -60,18 +69,18 @@ class LocalPlanner(Node):
 
     Parameters
     ----------
-    odometry: topic of the pose; `corrected`: whether `/tf` holds the pose of its frame in the map.
+    odometry: topic of the pose; `use_map_tf`: whether `/tf` holds the pose of its frame in the map.
     level_mount, nodding_mount: [x, y, z] of the LIDARs in the body, m.
     height_m: height above ground to fly at; speed_m_s: max speed. Both may be set in flight.
     acceleration_m_s2: max horizontal acceleration.
-    radius_m: min distance of the UAV's centre to obstacles, at rest; 0.1 m more for each m/s.
-    unknown_stops: whether plans avoid unknown space.
-    period_s: time between plans. ahead_s: time from a plan's input to its start; not less than the
-        node's latency.
-    arrival_m: distance to the end at which the path is done.
+    safe_radius_m: min distance of the UAV's centre to obstacles, at rest; 0.1 m more for each m/s.
+    avoid_unknown: whether plans avoid unknown space.
+    period_s: time between plans. start_delay_s: time from a plan's input to its start; not less
+        than the node's latency.
+    acceptance_radius_m: distance to the end at which the path is done.
     scan_rate_hz: scans processed per second and LIDAR. It should be no multiple of a nodding
         mount's rate, else all scans show the same angles. All scans of a nodding LIDAR add hits.
-    cell_m: cell size of the local grid.
+    resolution_m: cell size of the local grid.
     separation_m: horizontal distance to keep from the UAVs that report on `radio/team`.
 
     """
@@ -87,7 +96,9 @@ class LocalPlanner(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("local_planner", **options)
         mounts = {name: declare_mount(self, name) for name in ("level", "nodding")}
-        cell = float(self.declare_parameter("cell_m", 0.25, min_value=0.05, max_value=5.0).value)
+        cell = float(
+            self.declare_parameter("resolution_m", 0.25, min_value=0.05, max_value=5.0).value
+        )
         scan_rate = float(
             self.declare_parameter("scan_rate_hz", 13.3, min_value=0.1, max_value=1000.0).value
         )
@@ -97,23 +108,25 @@ class LocalPlanner(Node):
         self._acceleration = float(
             self.declare_parameter("acceleration_m_s2", 2.5, min_value=0.1).value
         )
-        self._radius = float(self.declare_parameter("radius_m", 0.6, min_value=0.05).value)
-        self._unknown_stops = bool(self.declare_parameter("unknown_stops", True).value)
-        self._ahead_ns = ns_from_s(
-            float(self.declare_parameter("ahead_s", 0.1, min_value=0.0, max_value=10.0).value)
+        self._radius = float(self.declare_parameter("safe_radius_m", 0.6, min_value=0.05).value)
+        self._avoid_unknown = bool(self.declare_parameter("avoid_unknown", True).value)
+        self._start_delay_ns = ns_from_s(
+            float(self.declare_parameter("start_delay_s", 0.1, min_value=0.0, max_value=10.0).value)
         )
-        self._arrival_m = float(self.declare_parameter("arrival_m", 1.0, min_value=0.01).value)
+        self._acceptance_radius_m = float(
+            self.declare_parameter("acceptance_radius_m", 1.0, min_value=0.01).value
+        )
         radius = float(self.declare_parameter("separation_m", 2.0, min_value=0.0).value)
         self._separation = Separation(radius_m=radius)
         self._planning = RecedingHorizonPlanner(self._policy())
         self._frame = MapFrame()
         self._frame_was: Any = None
-        self._way: PathLookahead | None = None
-        self._way_map: Array | None = None
-        """Positions of the path in the map, (K, 3) m; `_way` is computed from them."""
+        self._lookahead: PathLookahead | None = None
+        self._path_map: Array | None = None
+        """Positions of the path in the map, (K, 3) m; `_lookahead` is computed from them."""
         self._neighbours = Neighbours()
-        self._told = ""
-        self._told_ns = 0
+        self._last_status = ""
+        self._last_status_ns = 0
         self._plans = 0
         self._paused = False
         self._open()
@@ -152,7 +165,7 @@ class LocalPlanner(Node):
     # ------------------------------------------------------------------------------ subscriptions
 
     def _on_odometry(self, message: Odometry) -> None:
-        self._frame.hear(message)
+        self._frame.on_odometry(message)
         self._sight.motion.add(OdometrySample.from_odometry(message))
 
     def _scan_listener(self, name: str) -> Callable[[LaserScan], None]:
@@ -165,20 +178,20 @@ class LocalPlanner(Node):
         places = [[p.pose.position.x, p.pose.position.y, p.pose.position.z] for p in message.poses]
         found = np.array(places, dtype=np.float64).reshape(-1, 3)
         if message.header.frame_id not in ("", MAP) or not np.isfinite(found).all():
-            self._tell(
+            self._publish_status(
                 "refused",
                 ["a path whose frame is not 'map', or with positions that are not finite"],
             )
             return
-        self._way_map = found if len(found) else None
-        self._way = None
+        self._path_map = found if len(found) else None
+        self._lookahead = None
 
     def _on_pause(self, message: Bool) -> None:
         self._paused = bool(message.data)
-        self._way_map = self._way = None
+        self._path_map = self._lookahead = None
 
     def _on_report(self, report: Any) -> None:
-        self._neighbours.hear(report, self.get_clock().now_ns())
+        self._neighbours.on_report(report, self.get_clock().now_ns())
 
     # ----------------------------------------------------------------------------------- planning
 
@@ -188,37 +201,37 @@ class LocalPlanner(Node):
         if self._frame.is_lost:
             problems.append(UNKNOWN_PLACE)
         if pose is None:
-            self._tell("waiting", problems)
+            self._publish_status("waiting", problems)
             return
         height = self._sight.height_above_ground(pose, now)
         present = PrimitiveState(pose.position, pose.velocity, np.zeros(3))
         self._planning.policy = self._policy()
-        then = now + self._ahead_ns
+        then = now + self._start_delay_ns
         if self._paused:
             self._planning.forget()
-            self._tell("paused", problems)
+            self._publish_status("paused", problems)
             return
         if height < _LEAST_HEIGHT_M:
             self._planning.forget()
-            self._tell("waiting", ["too low above ground to plan", *problems])
+            self._publish_status("waiting", ["too low above ground to plan", *problems])
             return
-        if self._way_map is None and not self._plans:
-            self._tell("waiting", ["no path", *problems])
+        if self._path_map is None and not self._plans:
+            self._publish_status("waiting", ["no path", *problems])
             return
         start = self._planning.start(present, pose.yaw, now, then)
-        if problems or self._way_here() is None:
+        if problems or self._lookahead_here() is None:
             self._publish(self._planning.hold(start, then), then)
-            self._tell("holding", problems)
+            self._publish_status("holding", problems)
             return
         self._plan(pose, start, now, then)
 
     def _plan(self, pose: OdometrySample, start: PrimitiveState, now: int, then: int) -> None:
-        way = self._way_here()
-        assert way is not None
-        carrot = way.carrot(pose.position, _CARROT_M)
-        if way.left_m(pose.position) < self._arrival_m:
+        lookahead = self._lookahead_here()
+        assert lookahead is not None
+        lookahead_point = lookahead.lookahead_point(pose.position, _LOOKAHEAD_M)
+        if lookahead.left_m(pose.position) < self._acceptance_radius_m:
             self._publish(self._planning.hold(start, then), then)
-            self._tell("arrived", [])
+            self._publish_status("arrived", [])
             return
         others = self._neighbours.in_odom(self._frame)
         sight = Observations(
@@ -226,25 +239,25 @@ class LocalPlanner(Node):
             self._sight.surface(float(self._height.value)),
             half_planes(start.position, start.velocity, others, self._separation, now),
         )
-        path = self._planning.plan(start, carrot, sight, then)
+        path = self._planning.plan(start, lookahead_point, sight, then)
         self._plans += 1
         self._publish(path, self._planning.began_ns)
-        self._tell(str(self._planning.doing), self._sight.warnings())
+        self._publish_status(str(self._planning.doing), self._sight.warnings())
 
-    def _way_here(self) -> PathLookahead | None:
+    def _lookahead_here(self) -> PathLookahead | None:
         """Returns the path in the odometry frame; recomputes it if that frame has moved."""
-        if self._way_map is None:
+        if self._path_map is None:
             return None
         at = self._frame.map_from_odom
-        if self._way is None or at is not self._frame_was:
-            passed = 0.0 if self._way is None else self._way.passed_m
-            self._way = PathLookahead(self._frame.to_odom(self._way_map), passed)
+        if self._lookahead is None or at is not self._frame_was:
+            passed = 0.0 if self._lookahead is None else self._lookahead.passed_m
+            self._lookahead = PathLookahead(self._frame.to_odom(self._path_map), passed)
             self._frame_was = at
-        return self._way
+        return self._lookahead
 
     def _policy(self) -> PlannerSettings:
         limits = MotionLimits(float(self._speed.value), self._acceleration, 1.5, 1.5, 1.4)
-        return PlannerSettings(limits, radius_m=self._radius, unknown_stops=self._unknown_stops)
+        return PlannerSettings(limits, radius_m=self._radius, avoid_unknown=self._avoid_unknown)
 
     # ---------------------------------------------------------------------------------- publishers
 
@@ -252,15 +265,17 @@ class LocalPlanner(Node):
         frame = self._frame.odom_frame
         self._trajectory.publish(trajectory_message(path, self._planning.yaw, frame, begins_ns))
 
-    def _tell(self, state: str, problems: list[str]) -> None:
-        way, pose = self._way, self._sight.motion.newest
-        left = None if way is None or pose is None else round(way.left_m(pose.position), 1)
+    def _publish_status(self, state: str, problems: list[str]) -> None:
+        lookahead, pose = self._lookahead, self._sight.motion.newest
+        left = (
+            None if lookahead is None or pose is None else round(lookahead.left_m(pose.position), 1)
+        )
         clearance = self._planning.least_m if state == PlannerState.FLYING else None
-        told = {"state": state, "problems": problems, "left_m": left, "plans": self._plans}
+        status = {"state": state, "problems": problems, "left_m": left, "plans": self._plans}
         if clearance is not None:
-            told["clearance_m"] = round(clearance, 2)
+            status["clearance_m"] = round(clearance, 2)
         now = self.get_clock().now_ns()
         news = f"{state} {problems}"
-        if news != self._told or not 0 <= now - self._told_ns < _TELL_S * NS_PER_S:
-            self._told, self._told_ns = news, now
-            self._status.publish(String(json.dumps(told)))
+        if news != self._last_status or not 0 <= now - self._last_status_ns < _TELL_S * NS_PER_S:
+            self._last_status, self._last_status_ns = news, now
+            self._status.publish(String(json.dumps(status)))

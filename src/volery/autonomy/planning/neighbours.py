@@ -19,26 +19,26 @@ class Neighbours:
     """Stores the last report of each UAV, in the map; its age is by the receiver's clock."""
 
     def __init__(self) -> None:
-        self._heard: dict[str, Neighbour] = {}
+        self._reports: dict[str, Neighbour] = {}
         self._sent_ns: dict[str, int] = {}
 
-    def hear(self, report: Any, now_ns: int) -> None:
+    def on_report(self, report: Any, now_ns: int) -> None:
         """Adds a `TeamReport`; ignores one that is not finite, repeated or out of order."""
         p, v = report.position, report.velocity
         if not np.isfinite([p.x, p.y, p.z, v.x, v.y, v.z]).all():
             return
-        sent_ns, known = stamp_of(report), self._heard.get(report.name)
+        sent_ns, known = stamp_of(report), self._reports.get(report.name)
         fresh = known is not None and now_ns - known.time_ns <= _RESTART_NS
         if fresh and sent_ns <= self._sent_ns[report.name]:
             return
         place, velocity = np.array([p.x, p.y, p.z]), np.array([v.x, v.y, v.z])
-        self._heard[report.name] = Neighbour(place, velocity, now_ns)
+        self._reports[report.name] = Neighbour(place, velocity, now_ns)
         self._sent_ns[report.name] = sent_ns
 
     def in_odom(self, frame: MapFrame) -> list[Neighbour]:
         """Returns all neighbours, sorted by name, in the odometry frame."""
         moved = []
-        for _, other in sorted(self._heard.items()):
+        for _, other in sorted(self._reports.items()):
             place = frame.to_odom(other.position)
             velocity = frame.to_odom(other.position + other.velocity) - place
             moved.append(Neighbour(place, velocity, other.time_ns))

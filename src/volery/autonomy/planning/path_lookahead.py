@@ -29,7 +29,7 @@ class PathLookahead:
             self._along[-1] - self.passed_m + np.hypot(*(self._at(self.passed_m) - place[:2]))
         )
 
-    def carrot(self, place: Array, ahead_m: float, search_m: float = 15.0) -> Array:
+    def lookahead_point(self, place: Array, ahead_m: float, search_m: float = 15.0) -> Array:
         """Updates the progress and returns the point (2,) m `ahead_m` further along the path.
 
         Progress becomes the point nearest to `place` within the next `search_m`.

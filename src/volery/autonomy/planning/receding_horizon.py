@@ -83,7 +83,7 @@ class PlannerSettings:
     """Distance up to which obstacles add cost."""
     near: float = 3.0
     """Cost of closeness to obstacles, for each metre."""
-    unknown_stops: bool = True
+    avoid_unknown: bool = True
     """Whether plans avoid unknown space."""
     unknown_cost: float = 0.6
     """Cost of a metre of unknown space in the guidance, which may lead through it."""
@@ -211,7 +211,7 @@ class RecedingHorizonPlanner:
         here = float(clearance.at(start.position[None])[0])
         safe = verdicts.nearest_m >= np.minimum(wanted, here)
         safe &= verdicts.most_m_s2 <= _PEAK * policy.limits.acceleration
-        if policy.unknown_stops:
+        if policy.avoid_unknown:
             safe &= ~verdicts.unknown
         return safe
 

@@ -43,7 +43,7 @@ class Surroundings:
         self._repeats = {name: ScanRepeats() for name in mounts}
         self._stuck: set[str] = set()
         """Names of LIDARs that repeat their scans."""
-        self._heard_ns: dict[str, int] = {}
+        self._received_ns: dict[str, int] = {}
         """Stamp of the newest new scan of each LIDAR, ns."""
         self._taken_ns: dict[str, int] = {}
         self._seen_ns: dict[str, int] = {}
@@ -58,7 +58,7 @@ class Surroundings:
         "_nod",
         "_repeats",
         "_stuck",
-        "_heard_ns",
+        "_received_ns",
         "_taken_ns",
         "_seen_ns",
         "_ground",
@@ -86,20 +86,20 @@ class Surroundings:
         """Stores the range to the ground below."""
         if not math.isfinite(message.range):
             return
-        self._is_sonar_stuck = self._range_repeats.are_told_by(float(message.range))
+        self._is_sonar_stuck = self._range_repeats.are_reported_by(float(message.range))
         self._range = None if self._is_sonar_stuck else (now_ns, float(message.range))
 
     def on_scan(self, name: str, scan: LaserScan, now_ns: int) -> None:
         """Adds a scan of LIDAR `name`."""
         stamp = stamp_of(scan)
-        heard = self._heard_ns.get(name)
+        heard = self._received_ns.get(name)
         if heard is not None and heard - _JUMP_BACK_NS <= stamp <= heard:
             return  # repeated message
-        if self._repeats[name].are_told_by(scan):
+        if self._repeats[name].are_reported_by(scan):
             self._stuck.add(name)
             return
         self._stuck.discard(name)
-        self._heard_ns[name] = stamp
+        self._received_ns[name] = stamp
         taken = self._taken_ns.get(name)
         due = 0 if taken is None else taken + self._period_ns - NS_PER_S // 200
         is_due = taken is None or not taken <= stamp < due
@@ -127,7 +127,7 @@ class Surroundings:
         if newest is None or not self._is_fresh(newest.time_ns, now_ns):
             found.append("no odometry")
         for name in self._makers:
-            if not self._is_fresh(self._heard_ns.get(name), now_ns):
+            if not self._is_fresh(self._received_ns.get(name), now_ns):
                 what = "repeats itself" if name in self._stuck else "is silent"
                 found.append(f"the {name} LIDAR {what}")
         if not any(self._is_fresh(self._seen_ns.get(name), now_ns) for name in self._makers):

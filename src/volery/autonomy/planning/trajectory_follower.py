@@ -35,7 +35,7 @@ _CARRIED_S = 0.1
 _TURN_GAIN, _TURN_RAD_S = 1.8, 1.2
 _OFF_M = 2.0
 """Distance from the plan beyond which the follower stops and waits for another plan."""
-_STATE = ("_pose", "_heard_ns", "_frame", "_plan", "_next", "_told", "_paused")
+_STATE = ("_pose", "_received_ns", "_frame", "_plan", "_next", "_last_status", "_paused")
 
 
 class TrajectoryFollower(Node):
@@ -50,7 +50,7 @@ class TrajectoryFollower(Node):
     ----------
     odometry: topic of the pose; plans are in its frame.
     gain: m/s for each m off the plan.
-    lead_s: time by which the commanded velocity is ahead, to compensate for the vehicle's lag.
+    lookahead_s: time by which the commanded velocity is ahead, to compensate for the vehicle's lag.
 
     """
 
@@ -58,15 +58,15 @@ class TrajectoryFollower(Node):
         super().__init__("follower", **options)
         odometry = str(self.declare_parameter("odometry", "odom").value)
         self._gain = float(self.declare_parameter("gain", 1.2, min_value=0.0).value)
-        self._lead_ns = ns_from_s(
-            float(self.declare_parameter("lead_s", 0.25, min_value=0.0, max_value=10.0).value)
+        self._lookahead_ns = ns_from_s(
+            float(self.declare_parameter("lookahead_s", 0.25, min_value=0.0, max_value=10.0).value)
         )
         self._pose: OdometrySample | None = None
-        self._heard_ns = 0
+        self._received_ns = 0
         self._frame = ""
         self._plan: TrajectorySamples | None = None
         self._next: TrajectorySamples | None = None
-        self._told = ""
+        self._last_status = ""
         self._paused = False
         self._command = self.create_publisher(Twist, "cmd_vel", 1)
         self._status = self.create_publisher(String, "~/status", 1, latched=True)
@@ -90,15 +90,19 @@ class TrajectoryFollower(Node):
         values = (pose.position, pose.attitude, pose.velocity)
         if all(np.isfinite(v).all() for v in values) and not is_stuck(pose, self._pose):
             self._pose, self._frame = pose, message.header.frame_id
-            self._heard_ns = self.get_clock().now_ns()
+            self._received_ns = self.get_clock().now_ns()
 
     def _on_trajectory(self, message: MultiDOFJointTrajectory) -> None:
         if message.header.frame_id != self._frame:
-            self._tell("refused", f"plans are in '{self._frame}', not '{message.header.frame_id}'")
+            self._publish_status(
+                "refused", f"plans are in '{self._frame}', not '{message.header.frame_id}'"
+            )
             return
         samples = samples_of(message)
         if samples is None:
-            self._tell("refused", "a plan without points, or with values that are not finite")
+            self._publish_status(
+                "refused", "a plan without points, or with values that are not finite"
+            )
             return
         self._next = samples
 
@@ -106,7 +110,7 @@ class TrajectoryFollower(Node):
         self._paused = bool(message.data)
         self._plan = self._next = None
         if self._paused:
-            self._tell("paused", "")
+            self._publish_status("paused", "")
 
     def _on_timer(self) -> None:
         if self._paused:
@@ -116,8 +120,8 @@ class TrajectoryFollower(Node):
             self._plan, self._next = self._next, None
         if self._plan is None or self._pose is None:
             return
-        if not 0 <= now - self._heard_ns <= _STALE_S * NS_PER_S:
-            self._tell("stopped", "no odometry")
+        if not 0 <= now - self._received_ns <= _STALE_S * NS_PER_S:
+            self._publish_status("stopped", "no odometry")
             self._command.publish(Twist(Vector3(0.0, 0.0, 0.0), Vector3(0.0, 0.0, 0.0)))
             return
         self._fly(self._plan, self._pose, now)
@@ -126,13 +130,13 @@ class TrajectoryFollower(Node):
         age_s = min(max((now - pose.time_ns) / NS_PER_S, 0.0), _CARRIED_S)
         here = pose.position + pose.velocity * age_s
         place, _ = plan.at(now)
-        _, velocity = plan.at(now + self._lead_ns)
+        _, velocity = plan.at(now + self._lookahead_ns)
         off = place - here
         if norm(off) > _OFF_M:
-            self._tell("stopped", "too far from the plan")
+            self._publish_status("stopped", "too far from the plan")
             velocity, off = np.zeros(3), np.zeros(3)
         else:
-            self._tell("flying", "")
+            self._publish_status("flying", "")
         x, y, z = (velocity + self._gain * off).tolist()
         c, s = math.cos(pose.yaw), math.sin(pose.yaw)
         turn = math.remainder(plan.yaw - pose.yaw, 2.0 * math.pi)
@@ -141,6 +145,6 @@ class TrajectoryFollower(Node):
             Twist(Vector3(c * x + s * y, c * y - s * x, z), Vector3(0.0, 0.0, rate))
         )
 
-    def _tell(self, state: str, reason: str) -> None:
-        told = {"state": state, "reason": reason}
-        self._told = publish_status(self._status, told, self._told)
+    def _publish_status(self, state: str, reason: str) -> None:
+        status = {"state": state, "reason": reason}
+        self._last_status = publish_status(self._status, status, self._last_status)

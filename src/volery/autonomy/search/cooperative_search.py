@@ -53,18 +53,18 @@ class CooperativeSearch(TeamFlight):
     team: names of all UAVs of the search, this one included. The order counts: each flies a layer
         higher than the previous one.
     area_m: [x_min, y_min, x_max, y_max] in the map; limits the flight and the detections.
-    altitude_m, layer_m: z of the lowest UAV, and the height difference between UAVs.
+    altitude_m, layer_spacing_m: z of the lowest UAV, and the height difference between UAVs.
     speed_m_s: horizontal speed.
-    apart_m: min horizontal distance between UAVs at the object, and to it.
+    separation_m: min horizontal distance between UAVs at the object, and to it.
     camera: its topics are `CAMERA/image_raw` and `CAMERA/camera_info`.
     mount_m, mount_rpy_deg: of the camera in the body, as in a scenario.
-    object_m: z of the object's centre.
-    hue_deg: [first, last]; saturation, value: minimums; see `search.colour_blob`.
-    share: min fraction of the image.
+    object_height_m: z of the object's centre.
+    hue_deg: [first, last]; min_saturation, min_value: minimums; see `search.colour_blob`.
+    min_fraction: min fraction of the image.
     gather_s: time to wait on the ground for teammates that have not reported yet.
-    patience_s: timeout of a teammate's reports.
+    timeout_s: timeout of a teammate's reports.
     hold_s: time that all stay at the object.
-    search_s: time limit of the search; 0: none.
+    max_search_s: time limit of the search; 0: none.
     seed: of the waypoints; each UAV has a stream of its own.
 
     """
@@ -82,7 +82,7 @@ class CooperativeSearch(TeamFlight):
         "_looks",
         "_waiting_ns",
         "_finishing",
-        "_to_tell",
+        "_pending_calls",
     )
 
     @classmethod
@@ -114,7 +114,7 @@ class CooperativeSearch(TeamFlight):
         self._waiting_ns: int | None = None
         """Time since which all called teammates have arrived, ns."""
         self._finishing = False
-        self._to_tell: list[str] = []
+        self._pending_calls: list[str] = []
         """Teammates that have not been notified yet of the end of the search."""
 
         self._found = self.create_publisher(PointStamped, "~/found", 1, latched=True)
@@ -192,9 +192,9 @@ class CooperativeSearch(TeamFlight):
             self._call_teammates()
             if self.phase is SearchPhase.HOLD:
                 self._hold()
-        for name in self._to_tell:
+        for name in self._pending_calls:
             self.ask(self._finish_clients[name])
-        self._to_tell = []
+        self._pending_calls = []
 
     def _search(self, pose: OdometrySample) -> None:
         if self.claim is not None:  # called during the climb
@@ -202,7 +202,7 @@ class CooperativeSearch(TeamFlight):
             return
         if self._began_ns is None:
             self._began_ns = self.now_ns
-        if 0.0 < self.settings.search_s * NS_PER_S < self.now_ns - self._began_ns:
+        if 0.0 < self.settings.max_search_s * NS_PER_S < self.now_ns - self._began_ns:
             self._finish()
             return
         if not 0 <= self.now_ns - self._image_ns <= _BLIND_S * NS_PER_S:
@@ -233,7 +233,7 @@ class CooperativeSearch(TeamFlight):
 
     @property
     def _spread(self) -> tuple[int, float, Any]:
-        return len(self.settings.team), self.settings.apart_m, self._inner
+        return len(self.settings.team), self.settings.separation_m, self._inner
 
     def _own_place(self) -> Array:
         assert self.claim is not None
@@ -247,8 +247,8 @@ class CooperativeSearch(TeamFlight):
         """
         assert self.claim is not None
         finder = self.teammates.get(self.claim.finder)
-        patience = self.settings.patience_s
-        if finder is not None and finder.is_heard(self.now_ns, patience):
+        timeout_s = self.settings.timeout_s
+        if finder is not None and finder.is_recent(self.now_ns, timeout_s):
             waits = finder.phase in CAN_COME
         else:
             waits = self.team_in(ON_THE_WAY) or not self.calls.are_settled(self.now_ns)
@@ -301,7 +301,7 @@ class CooperativeSearch(TeamFlight):
     def _finish(self) -> None:
         """Flies home, or stays on the ground, and notifies the teammates once."""
         if not self._finishing:
-            self._finishing, self._to_tell = True, list(self.mates)
+            self._finishing, self._pending_calls = True, list(self.mates)
             if self.phase is SearchPhase.READY:
                 self.enter(SearchPhase.DONE)
 

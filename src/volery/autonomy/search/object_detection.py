@@ -37,7 +37,7 @@ def place_seen(
     hidden = [disc for disc in discs if disc is not None]
     mask = colour_mask(pixels_of(image), settings.colours, np.array(hidden) if hidden else NO_DISCS)
     blob = largest_blob(mask)
-    if blob is None or blob.share < settings.least_share:
+    if blob is None or blob.share < settings.min_fraction:
         return None
-    place = view.place_of(blob.u, blob.v, pose, settings.object_m)
+    place = view.place_of(blob.u, blob.v, pose, settings.object_height_m)
     return place if place is not None and settings.area.holds(place[0], place[1]) else None

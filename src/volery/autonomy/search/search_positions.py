@@ -50,8 +50,8 @@ def random_waypoint(area: Area, key: np.uint64, number: int) -> Array:
     )
 
 
-def places_around(place: Array, count: int, apart_m: float, area: Area) -> Array:
-    """Returns positions (count, 2) in the area, at least `apart_m` from each other and `place`.
+def places_around(place: Array, count: int, separation_m: float, area: Area) -> Array:
+    """Returns positions (count, 2) in the area, `separation_m` or more from each other and `place`.
 
     They lie on rings around `place` (2,), the nearest ones first, and depend on the arguments only.
     A `place` outside of the area is moved to its border. Raises GraphError if there is no room;
@@ -60,19 +60,19 @@ def places_around(place: Array, count: int, apart_m: float, area: Area) -> Array
     middle = np.clip(place[:2], area[:2], area[2:])
     found: list[Array] = []
     widest = math.hypot(area.x_max - area.x_min, area.y_max - area.y_min)
-    for ring in range(1, math.ceil(widest / apart_m) + 1):
+    for ring in range(1, math.ceil(widest / separation_m) + 1):
         # six points on a circle are its radius apart, 6 k on a k times wider one slightly more
         steps = min(count, 6) if ring == 1 else 6 * ring
-        found += _on_ring(middle, apart_m * ring, steps, area)
+        found += _on_ring(middle, separation_m * ring, steps, area)
         if len(found) >= count:
             return np.array(found[:count])
     raise GraphError(
         f"search: area {list(area)} m has no room for {counted(count, 'position')} "
-        f"{apart_m} m apart"
+        f"{separation_m} m apart"
     )
 
 
-def check_room(count: int, apart_m: float, area: Area) -> None:
+def check_room(count: int, separation_m: float, area: Area) -> None:
     """Raises GraphError unless `places_around` finds room around every position of the area.
 
     Each position has a quarter circle with a radius of half the shorter side in the area; on it
@@ -82,11 +82,11 @@ def check_room(count: int, apart_m: float, area: Area) -> None:
     while sure < count:
         rings += 1
         sure += 3 * rings // 2
-    least = 2.0 * rings * apart_m
+    least = 2.0 * rings * separation_m
     if min(area.x_max - area.x_min, area.y_max - area.y_min) < least:
         raise GraphError(
-            f"search: {counted(count, 'UAV')} {apart_m} m apart need an area of {least:g} m a side "
-            f"at least, without its borders, not {list(area)} m"
+            f"search: {counted(count, 'UAV')} {separation_m} m apart need an area of "
+            f"{least:g} m a side at least, without its borders, not {list(area)} m"
         )
 
 

@@ -21,19 +21,19 @@ class SearchSettings:
     team: tuple[str, ...]
     area: Area
     altitude_m: float
-    layer_m: float
+    layer_spacing_m: float
     speed_m_s: float
-    apart_m: float
+    separation_m: float
     camera: str
     mount_m: tuple[float, ...]
     mount_rpy_deg: tuple[float, ...]
-    object_m: float
+    object_height_m: float
     colours: ColourRange
-    least_share: float
+    min_fraction: float
     gather_s: float
-    patience_s: float
+    timeout_s: float
     hold_s: float
-    search_s: float
+    max_search_s: float
     seed: int
 
     @property
@@ -49,7 +49,7 @@ class SearchSettings:
     @property
     def layer_z(self) -> float:
         """Height in the map at which this UAV flies, m."""
-        return self.altitude_m + self.rank * self.layer_m
+        return self.altitude_m + self.rank * self.layer_spacing_m
 
     @classmethod
     def declare(cls, node: Node) -> SearchSettings:
@@ -74,24 +74,24 @@ class SearchSettings:
         if name not in team or len(set(team)) != len(team):
             raise GraphError(f"search: team must contain '{name}', and each UAV once, not {team}")
         first_hue, last_hue = numbers("hue_deg", ColourRange()[:2])
-        least = number("saturation", 0.5, 0.0), number("value", 0.2, 0.0)
+        least = number("min_saturation", 0.5, 0.0), number("min_value", 0.2, 0.0)
         return cls(
             name=name,
             team=team,
             area=Area(*numbers("area_m", (0.0, 0.0, 50.0, 50.0))),
             altitude_m=number("altitude_m", 8.0, 0.3),
-            layer_m=number("layer_m", 2.0, 0.5),
+            layer_spacing_m=number("layer_spacing_m", 2.0, 0.5),
             speed_m_s=number("speed_m_s", 3.0, 0.1),
-            apart_m=number("apart_m", 3.0, 0.5),
+            separation_m=number("separation_m", 3.0, 0.5),
             camera=str(node.declare_parameter("camera", "down").value),
             mount_m=numbers("mount_m", (0.0, 0.0, 0.0)),
             mount_rpy_deg=numbers("mount_rpy_deg", (0.0, 90.0, 0.0)),
-            object_m=number("object_m", 0.5, 0.01),
+            object_height_m=number("object_height_m", 0.5, 0.01),
             colours=ColourRange(first_hue, last_hue, *least),
-            least_share=number("share", 0.001, 0.0),
+            min_fraction=number("min_fraction", 0.001, 0.0),
             gather_s=number("gather_s", 20.0, 0.0),
-            patience_s=number("patience_s", 5.0, 0.0),
+            timeout_s=number("timeout_s", 5.0, 0.0),
             hold_s=number("hold_s", 5.0, 0.0),
-            search_s=number("search_s", 0.0, 0.0),
+            max_search_s=number("max_search_s", 0.0, 0.0),
             seed=int(node.declare_parameter("seed", 1).value),
         )

@@ -121,7 +121,7 @@ class TeamFlight(Node):
     def enter(self, phase: SearchPhase) -> None:
         """Enters another phase and publishes it."""
         self.phase, self._since_ns = phase, self.now_ns
-        self._tell()
+        self._publish_state()
 
     def in_layer(self, place: Array) -> Array:
         """Returns the position (3,) over or under `place`, at this UAV's own height."""
@@ -135,8 +135,10 @@ class TeamFlight(Node):
 
     def team_in(self, phases: frozenset[SearchPhase]) -> bool:
         """Returns whether a teammate with recent messages is in one of these phases."""
-        now, patience = self.now_ns, self.settings.patience_s
-        return any(m.phase in phases and m.is_heard(now, patience) for m in self.teammates.values())
+        now, timeout_s = self.now_ns, self.settings.timeout_s
+        return any(
+            m.phase in phases and m.is_recent(now, timeout_s) for m in self.teammates.values()
+        )
 
     def ask(self, client: Client, request: Any | None = None, then: Any = None) -> None:
         """Calls a service; `then(response)` is called when the response arrives."""
@@ -166,11 +168,11 @@ class TeamFlight(Node):
                 return  # a phase of a newer version
             mate.phase = SearchPhase(message.phase)
             p = message.position
-            mate.position, mate.heard_ns = np.array([p.x, p.y, p.z]), self.now_ns
+            mate.position, mate.received_ns = np.array([p.x, p.y, p.z]), self.now_ns
 
         return on_state
 
-    def _tell(self) -> None:
+    def _publish_state(self) -> None:
         place = np.zeros(3) if self.pose is None else self.pose.position
         self._state.publish(
             self._state_type(header(self.now_ns, "map"), str(self.phase), Point(*place.tolist()))
@@ -193,7 +195,7 @@ class TeamFlight(Node):
         if on_a_leg is not None:
             on_a_leg(pose)
         self.act(pose)
-        self._tell()
+        self._publish_state()
 
     def _go_home(self, _pose: OdometrySample) -> None:
         if self.fly_to(self.in_layer(self._home)):
@@ -210,8 +212,10 @@ class TeamFlight(Node):
         if any(m.phase in UNDER_WAY | GOING_HOME for m in self.teammates.values()):
             self.enter(SearchPhase.LATE)
             return
-        heard = all(m.phase is not None for m in self.teammates.values())
-        if self.phase_s >= _SETTLE_S and (heard or self.phase_s >= self.settings.gather_s):
+        is_team_complete = all(m.phase is not None for m in self.teammates.values())
+        if self.phase_s >= _SETTLE_S and (
+            is_team_complete or self.phase_s >= self.settings.gather_s
+        ):
             self.enter(SearchPhase.CLIMB)
 
     def _climb(self, pose: OdometrySample) -> None:

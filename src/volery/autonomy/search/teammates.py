@@ -67,8 +67,8 @@ class Teammate:
     phase: SearchPhase | None = None
     """None: no message yet."""
     position: Array = field(default_factory=lambda: np.zeros(3))
-    heard_ns: int = 0
+    received_ns: int = 0
 
-    def is_heard(self, now_ns: int, patience_s: float) -> bool:
+    def is_recent(self, now_ns: int, timeout_s: float) -> bool:
         """Returns whether the last message is recent."""
-        return self.phase is not None and 0 <= now_ns - self.heard_ns <= patience_s * 1e9
+        return self.phase is not None and 0 <= now_ns - self.received_ns <= timeout_s * 1e9

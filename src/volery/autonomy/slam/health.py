@@ -20,12 +20,12 @@ _UNSURE_M = 1.0
 class SlamHealth:
     """Monitors a tracker; `state` is starting, tracking, degraded or lost."""
 
-    _STATE = ("state", "problems", "heard", "_misfit_ns", "_scarce_ns")
+    _STATE = ("state", "problems", "received_ns", "_misfit_ns", "_scarce_ns")
 
     def __init__(self, names: tuple[str, ...], now_ns: int) -> None:
         self.state = "starting"
         self.problems: list[str] = []
-        self.heard: dict[str, int] = dict.fromkeys(names, now_ns)
+        self.received_ns: dict[str, int] = dict.fromkeys(names, now_ns)
         """Times of the last data of each sensor, by name, ns."""
         self._misfit_ns: int | None = None
         self._scarce_ns: int | None = None
@@ -34,8 +34,8 @@ class SlamHealth:
         """Updates state and problems; returns whether tracking has just been lost."""
         self.problems = [
             f"the {name} is silent"
-            for name, heard in self.heard.items()
-            if now_ns - heard > _SILENT_NS
+            for name, last_ns in self.received_ns.items()
+            if now_ns - last_ns > _SILENT_NS
         ]
         if not tracker.is_ready:
             self.state = "starting"
@@ -70,7 +70,7 @@ class SlamHealth:
         long = self._misfit_ns is not None and now - self._misfit_ns > _LOST_NS
         return long or tracker.sight.is_broken or tracker.sigma_m > _UNSURE_M
 
-    def begin_anew(self) -> None:
+    def restart(self) -> None:
         """Resets the misfit times after the tracker has begun a new map."""
         self._misfit_ns = self._scarce_ns = None
 

@@ -98,7 +98,7 @@ class KeyframeGraph:
         self._correct(place[2])
         return True
 
-    def begin_anew(self, doubted_since_ns: int | None = None, moved: Array | None = None) -> None:
+    def restart(self, doubted_since_ns: int | None = None, moved: Array | None = None) -> None:
         """Begins a new session after tracking was lost; its pose in the map is unknown.
 
         Keyframes since `doubted_since_ns` may already have wrong poses, and so may all those of a

@@ -63,7 +63,7 @@ class _View(NamedTuple):
 
     places: Array
     """(K, 2): returns of the level LIDAR in its newest instant."""
-    picture: NDArray[np.uint8]
+    image: NDArray[np.uint8]
     """Occupancy by all LIDARs' returns of the whole period."""
 
 
@@ -95,7 +95,7 @@ class KidnappingDetector:
         new, old = _level(now, here), _level(last, here)
         if len(new) < _ENOUGH or len(old) < _ENOUGH:
             return
-        views = _View(new, _picture(now, here)), _View(old, _picture(before, here))
+        views = _View(new, _image(now, here)), _View(old, _image(before, here))
         shares = _shares(*views)
         if max(shares) < _MOST:
             self.moved = _only_other_place(*views, 0.5 * sum(shares))
@@ -104,15 +104,15 @@ class KidnappingDetector:
 
 def _shares(now: _View, before: _View) -> tuple[float, float]:
     """Returns the fraction of new returns seen before, and of old returns still seen."""
-    onwards = count_drawn(now.places, _CELL_M, before.picture) / len(now.places)
-    back = count_drawn(before.places, _CELL_M, now.picture) / len(before.places)
+    onwards = count_drawn(now.places, _CELL_M, before.image) / len(now.places)
+    back = count_drawn(before.places, _CELL_M, now.image) / len(before.places)
     return onwards, back
 
 
 def _only_other_place(now: _View, before: _View, here: float) -> Array | None:
     """Returns the step (2,) m to the only position that fits far better than `here`, if any."""
     shares = np.empty(len(_STEPS))
-    shares_around(now.places, before.picture, before.places, now.picture, _CELL_M, _STEPS, shares)
+    shares_around(now.places, before.image, before.places, now.image, _CELL_M, _STEPS, shares)
     best = int(np.argmax(shares))
     away = np.hypot(*(_STEPS - _STEPS[best]).T)
     third = max(here, float(shares[away > _NEAREST_M].max()))
@@ -128,7 +128,7 @@ def _all(glances: list[_Glance], here: Array) -> Array:
     return np.concatenate([np.zeros((0, 2)), *(glance.places for glance in glances)]) - here
 
 
-def _picture(glances: list[_Glance], here: Array) -> NDArray[np.uint8]:
-    picture = np.zeros((_PICTURE, _PICTURE), np.uint8)
-    draw(_all(glances, here), _CELL_M, picture)
-    return picture
+def _image(glances: list[_Glance], here: Array) -> NDArray[np.uint8]:
+    image = np.zeros((_PICTURE, _PICTURE), np.uint8)
+    draw(_all(glances, here), _CELL_M, image)
+    return image

@@ -81,7 +81,7 @@ class LoopCloser:
     def __init__(self, matching: ScanMatching) -> None:
         self._matching = matching
         self._maps = Submaps()
-        self._picture = np.zeros((_PICTURE, _PICTURE), np.uint8)
+        self._image = np.zeros((_PICTURE, _PICTURE), np.uint8)
 
     def match(
         self,
@@ -142,13 +142,11 @@ class LoopCloser:
         """Returns the best pose (3,) x, y, yaw, and its margin over any other position."""
         standing = pair.query[pair.query_kinds == UPRIGHT]
         known = pair.known[pair.known_kinds == UPRIGHT]
-        draw(np.ascontiguousarray(known[:, :2]), trial.cell_m, self._picture)
+        draw(np.ascontiguousarray(known[:, :2]), trial.cell_m, self._image)
         thin = np.ascontiguousarray(standing[:: max(len(standing) // trial.returns, 1), :2])
         side = 2 * math.ceil(span[0] / trial.cell_m) + 1
         found, shares = np.zeros(3), np.empty((side, side))
-        best = search(
-            thin, self._picture, trial.cell_m, middle, span, trial.step_rad, found, shares
-        )
+        best = search(thin, self._image, trial.cell_m, middle, span, trial.step_rad, found, shares)
         rows, columns = np.indices(shares.shape)
         row, column = np.unravel_index(int(np.argmax(shares)), shares.shape)
         away = trial.cell_m * np.hypot(rows - row, columns - column) > _APART_M
@@ -162,22 +160,22 @@ class LoopCloser:
             np.ascontiguousarray(pair.known), pair.known_kinds, maps.upright_keys, maps.cells,
             maps.ground_keys, maps.sums,
         )  # fmt: skip
-        information, told = np.zeros((4, 4)), np.zeros(4)
+        information, sums = np.zeros((4, 4)), np.zeros(4)
         done = refine(
             pose, np.ascontiguousarray(pair.query), pair.query_kinds, maps.upright_keys,
             maps.cells, maps.ground_keys, maps.sums, m.upright_sigma_m**2, m.ground_sigma_m**2,
-            _ROUNDS, information, told,
+            _ROUNDS, information, sums,
         )  # fmt: skip
         weakest = float(np.linalg.eigvalsh(information[:2, :2])[0])
         if not done or weakest < _LEAST_INFORMATION:
             return None
         spread = np.linalg.inv(m.trust * information + 1e-3 * np.eye(4))
         sigmas = np.hypot(np.sqrt(np.maximum(np.diag(spread), 0.0)), _FLOOR)
-        if told[2] < 20.0:
+        if sums[2] < 20.0:
             sigmas[2] = 10.0  # no common ground: the height stays open
         pose[3] = math.remainder(pose[3], math.tau)
         edge = PoseGraphEdge(rows[0], rows[1], pose.copy(), sigmas, True)
-        return LoopClosure(edge, float(told[0] / max(told[1], 1.0)), float(told[0]), margin)
+        return LoopClosure(edge, float(sums[0] / max(sums[1], 1.0)), float(sums[0]), margin)
 
 
 def _pair(

@@ -40,12 +40,12 @@ class Match:
         return self.seen < MANY or self.met >= MISFIT * self.usual * self.seen
 
 
-def judged(told: Array, before: Match | None, time_ns: int) -> Match:
+def judged(sums: Array, before: Match | None, time_ns: int) -> Match:
     """Returns the result of a sweep, after the previous one.
 
-    `told`: see `matching_kernels.gather`.
+    `sums`: see `matching_kernels.gather`.
     """
-    found = Match(time_ns, float(told[0]), float(told[1]), float(told[2]))
+    found = Match(time_ns, float(sums[0]), float(sums[1]), float(sums[2]))
     if before is not None:
         found.usual = before.usual
         if found.seen >= MANY and found.fits:

@@ -125,14 +125,14 @@ def gather(
     ground_variance: float,
     information: Array,
     gradient: Array,
-    told: Array,
+    sums: Array,
 ) -> None:
-    """Sums up all returns; `told` (4,): matched uprights, of how many, ground, cost."""
+    """Sums up all returns; `sums` (4,): matched uprights, of how many, ground, cost."""
     turn, row, found = np.empty((3, 3)), np.empty(6), np.empty(5)
     rotation_matrix(state, turn)
     information[:] = 0.0
     gradient[:] = 0.0
-    told[:] = 0.0
+    sums[:] = 0.0
     for n in range(points.shape[0]):
         kind = kinds[n]
         if kind in (LEFT_OUT, NEW_GROUND):
@@ -145,9 +145,9 @@ def gather(
             weight = 1.0 / (ground_variance * (1.0 + off * off / (4.0 * ground_variance)))
             _fill_row(row, -sx, -sy, 1.0, ax, ay, az)
             _add_row(information, gradient, row, weight, off)
-            told[2] += 1.0
+            sums[2] += 1.0
             continue
-        told[1] += 1.0
+        sums[1] += 1.0
         if not nearest_upright(upright_keys, cells, x, y, z, _GATE_M, found):
             continue
         dx, dy = x - found[0], y - found[1]
@@ -156,8 +156,8 @@ def gather(
         wxx, wxy, wyy = cyy / under, -cxy / under, cxx / under
         square = dx * (wxx * dx + wxy * dy) + dy * (wxy * dx + wyy * dy)
         robust = 1.0 / (1.0 + square / (_ROBUST * _ROBUST))
-        told[0] += robust
-        told[3] += square * robust
+        sums[0] += robust
+        sums[3] += square * robust
         # W = L L': two independent rows.
         l11 = math.sqrt(wxx)
         l21 = wxy / l11
@@ -197,11 +197,11 @@ def update(
     trust: float,
     rounds: int,
     information: Array,
-    told: Array,
+    sums: Array,
 ) -> bool:
     """Corrects state (19,) and covariance (17, 17) by classified returns; False: unsolvable.
 
-    `information` (6, 6) and `told` (4,) are those of the last round; see `gather`.
+    `information` (6, 6) and `sums` (4,) are those of the last round; see `gather`.
     """
     prior, error = state.copy(), np.zeros(STATES)
     gradient, right, left = np.empty(6), np.empty((6, 1)), np.empty((6, 6))
@@ -217,7 +217,7 @@ def update(
             ground_variance,
             information,
             gradient,
-            told,
+            sums,
         )
         for i in range(6):
             right[i, 0] = -trust * gradient[i]

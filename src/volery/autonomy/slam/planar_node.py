@@ -48,12 +48,12 @@ class PlanarSlam(Node):
 
     Parameters
     ----------
-    start: [x, y, z, yaw] of the start pose in the map, m and rad; empty: the map begins there.
+    initial_pose: [x, y, z, yaw] in the map, m and rad; empty: the map begins there.
     mount: [x, y, z, roll, pitch, yaw] of the LIDAR in the body, m and rad; empty: as in
         `/tf_static`, else at the body's origin.
-    odometry: whether to subscribe to `odom`.
-    reach_m: max range of returns.
-    nearest_m: min range of returns.
+    use_odometry: whether to subscribe to `odom`.
+    max_range_m: max range of returns.
+    min_range_m: min range of returns.
     loop_closures: whether loop closures correct the map (needs gtsam).
 
     """
@@ -63,8 +63,8 @@ class PlanarSlam(Node):
         "_before",
         "_refused",
         "_resets",
-        "_told",
-        "_heard",
+        "_last_status",
+        "_received_ns",
         "_path_ns",
         "_path_of",
     )
@@ -74,24 +74,24 @@ class PlanarSlam(Node):
         """Returns the tasks that compile the kernels of this node."""
         from volery.autonomy.slam.planar import warmup
 
-        return warmup.walls, warmup.told_places
+        return warmup.walls, warmup.place_recognition
 
     def __init__(self, **options: Any) -> None:
         super().__init__("slam", **options)
-        start = declare_numbers(self, "start", [], "[x, y, z, yaw]", or_empty=True)
+        start = declare_numbers(self, "initial_pose", [], "[x, y, z, yaw]", or_empty=True)
         mount = declare_numbers(self, "mount", [], "[x, y, z, roll, pitch, yaw]", or_empty=True)
         self._start = np.array(start or [0.0] * 4)
         self._mount = LEVEL
-        self._is_mount_told = len(mount) == 6
-        if self._is_mount_told:
+        self._has_mount_parameter = len(mount) == 6
+        if self._has_mount_parameter:
             turn = rotations.from_rpy(*mount[3:])
             self._mount = Mount(np.array(mount[:3]), turn)
         kept = ReturnSettings(
-            nearest_m=float(self.declare_parameter("nearest_m", 0.05, min_value=0.0).value),
-            reach_m=float(self.declare_parameter("reach_m", 30.0, min_value=0.1).value),
+            nearest_m=float(self.declare_parameter("min_range_m", 0.05, min_value=0.0).value),
+            reach_m=float(self.declare_parameter("max_range_m", 30.0, min_value=0.1).value),
         )
         self._settings = PlanarSettings(returns=kept)
-        self._hears_odometry = bool(self.declare_parameter("odometry", True).value)
+        self._uses_odometry = bool(self.declare_parameter("use_odometry", True).value)
         self._has_loops = bool(self.declare_parameter("loop_closures", True).value)
         self._uav = self.get_namespace().strip("/") or "uav"
         self._begin()
@@ -100,15 +100,15 @@ class PlanarSlam(Node):
     def _begin(self) -> None:
         self._follower = PlanarTracker(self._settings)
         first = self._start[[0, 1, 3]]
-        self._way = PlanarKeyframeGraph(self._settings, first, has_loops=self._has_loops)
+        self._keyframe_graph = PlanarKeyframeGraph(self._settings, first, has_loops=self._has_loops)
         self._odometry = WheelOdometry()
         self._before: Array | None = None
         """Pose of the odometry at the newest scan."""
         self._waiting: list[LaserScan] = []
         self._taken_ns: int | None = None
-        self._heard = self.get_clock().now_ns()
+        self._received_ns = self.get_clock().now_ns()
         self._refused = self._resets = 0
-        self._told = ""
+        self._last_status = ""
         self._path_ns = self._path_of = self._period_ns = 0
         self._joints = StaticTransforms()
 
@@ -118,16 +118,18 @@ class PlanarSlam(Node):
         self._path = self.create_publisher(PathMessage, "slam/path", 1, latched=True)
         self._status = self.create_publisher(String, "slam/status", 1, latched=True)
         self._tf = self.create_publisher(TFMessage, "/tf", 10)
-        if self._hears_odometry:
+        if self._uses_odometry:
             self.create_subscription(Odometry, "odom", self._on_odometry, 50)
-        if not self._is_mount_told:
+        if not self._has_mount_parameter:
             self.create_subscription(TFMessage, "/tf_static", self._on_joints, 10)
         self.create_subscription(LaserScan, "laser/horizontal/scan", self._on_scan, 10)
-        self.create_timer(0.5, self._tell_status)
+        self.create_timer(0.5, self._publish_status)
 
     def get_state(self) -> dict[str, Any]:
         """Returns the state for a snapshot."""
-        parts = {n: getattr(self, n).get_state() for n in ("_follower", "_way", "_odometry")}
+        parts = {
+            n: getattr(self, n).get_state() for n in ("_follower", "_keyframe_graph", "_odometry")
+        }
         more = {"waiting": list(self._waiting), "joints": dict(self._joints.joints)}
         return {"parts": parts, **more, **save_attributes(self, self._PLAIN)}
 
@@ -149,7 +151,7 @@ class PlanarSlam(Node):
         self._take_waiting()
 
     def _on_scan(self, scan: LaserScan) -> None:
-        self._heard = self.get_clock().now_ns()
+        self._received_ns = self.get_clock().now_ns()
         time_ns, newest = stamp_of(scan), self._taken_ns
         if self._waiting:
             newest = stamp_of(self._waiting[-1])
@@ -191,15 +193,15 @@ class PlanarSlam(Node):
         seen = returns(scan, mount, follower.motion.velocity, self._settings.returns)
         frame = follower.follow(time_ns, seen, step)
         if frame is not None:
-            self._way.add(frame)
+            self._keyframe_graph.add(frame)
         if follower.is_lost:
-            follower.begin_anew()
-        if self._way.frames:
-            self._tell_place(time_ns)
+            follower.restart()
+        if self._keyframe_graph.frames:
+            self._publish_place(time_ns)
 
     # ---------------------------------------------------------------------------------- publishers
 
-    def _tell_place(self, time_ns: int) -> None:
+    def _publish_place(self, time_ns: int) -> None:
         motion = self._follower.motion
         pose, velocity = motion.pose, motion.velocity
         state = (
@@ -214,56 +216,56 @@ class PlanarSlam(Node):
         rows = [0, 1, 8, 3, 4]
         covariance[np.ix_(rows, rows)] = motion.covariance[:5, :5]
         self._odom.publish(messages.odometry(time_ns, self._uav, state, covariance))
-        x, y, yaw = self._way.pose(pose)
+        x, y, yaw = self._keyframe_graph.pose(pose)
         z = float(self._start[2])
-        spread = self._way.covariance + motion.covariance[:3, :3]
+        spread = self._keyframe_graph.covariance + motion.covariance[:3, :3]
         known = np.sqrt(np.maximum(np.diag(spread), 0.0))
         sigmas = np.array([known[0], known[1], 0.0, 0.0, 0.0, known[2]])
         turn = rotations.from_rpy(0.0, 0.0, float(yaw))
         self._pose.publish(messages.pose_in_map(time_ns, np.array([x, y, z]), turn, sigmas))
-        at = self._way.correction
+        at = self._keyframe_graph.correction
         turn = rotations.from_rpy(0.0, 0.0, float(at[2]))
         place = np.array([at[0], at[1], z])
         self._tf.publish(messages.map_from_odom(time_ns, self._uav, place, turn))
 
-    def _tell_status(self) -> None:
-        follower, way = self._follower, self._way
+    def _publish_status(self) -> None:
+        follower, graph = self._follower, self._keyframe_graph
         state, problems = judged(
             PlanarHealth(
-                self.get_clock().now_ns(), self._heard, self._period_ns, self._odometry_heard_ns(),
-                bool(way.frames), follower.misfits, follower.is_blind, follower.is_open,
-                way.is_placed,
+                self.get_clock().now_ns(), self._received_ns, self._period_ns,
+                self._odometry_received_ns(), bool(graph.frames), follower.misfits,
+                follower.is_blind, follower.is_open, graph.is_placed,
             )
         )  # fmt: skip
-        sigma = math.sqrt(max(float(way.covariance[0, 0]), float(way.covariance[1, 1])))
-        told = {
+        sigma = math.sqrt(max(float(graph.covariance[0, 0]), float(graph.covariance[1, 1])))
+        status = {
             "state": state,
             "problems": problems,
             "share": round(follower.share, 2),
             "sigma_m": round(sigma, 3),
-            "keyframes": len(way.frames),
-            "closures": way.closures,
-            "sessions": way.session + 1,
+            "keyframes": len(graph.frames),
+            "closures": graph.closures,
+            "sessions": graph.session + 1,
             "refused": self._refused + self._odometry.refused,
             "clock_set": self._resets,
         }
-        self._told = publish_status(self._status, told, self._told)
-        self._tell_path()
+        self._last_status = publish_status(self._status, status, self._last_status)
+        self._publish_path()
 
-    def _tell_path(self) -> None:
+    def _publish_path(self) -> None:
         """Publishes changed keyframes; the longer the path, the less often."""
-        way, now = self._way, self.get_clock().now_ns()
-        is_due = now < self._path_ns or now - self._path_ns >= len(way.frames) * _PATH_NS
-        if way.changes == self._path_of or not is_due:
+        graph, now = self._keyframe_graph, self.get_clock().now_ns()
+        is_due = now < self._path_ns or now - self._path_ns >= len(graph.frames) * _PATH_NS
+        if graph.changes == self._path_of or not is_due:
             return
-        way.finish()
-        self._path_ns, self._path_of = now, way.changes
+        graph.finish()
+        self._path_ns, self._path_of = now, graph.changes
         z = float(self._start[2])
-        poses = [np.array([x, y, z, yaw]) for x, y, yaw in way.poses]
-        times = [frame.time_ns for frame in way.frames]
+        poses = [np.array([x, y, z, yaw]) for x, y, yaw in graph.poses]
+        times = [frame.time_ns for frame in graph.frames]
         self._path.publish(messages.path(self._taken_ns or times[-1], times, poses))
 
-    def _odometry_heard_ns(self) -> int | None:
+    def _odometry_received_ns(self) -> int | None:
         """Returns the time of the last odometry, by the node's clock as far as stamps follow it."""
         newest = self._odometry.newest_ns
         if newest is None or self._taken_ns is None:

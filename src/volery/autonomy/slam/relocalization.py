@@ -53,7 +53,7 @@ class Relocalization:
         self.doubted: set[int] = set()
         """Keyframes with uncertain poses."""
         self._cursor = 0
-        self._guesses: list[PoseHypothesis] = []
+        self._hypotheses: list[PoseHypothesis] = []
         self._hint: Array | None = None
 
     def begin(self, doubted: set[int], hint: Array | None = None) -> None:
@@ -63,7 +63,7 @@ class Relocalization:
         """
         self.doubted |= doubted
         self._cursor = 0
-        self._guesses = []
+        self._hypotheses = []
         self._hint = hint
 
     def find(
@@ -87,43 +87,45 @@ class Relocalization:
             if found is not None:
                 place = compose(poses[row], found.edge.measured)
                 moved = compose(place, between(poses[newest], np.zeros(4)))
-                self._guesses.append(PoseHypothesis(found.edge, found.margin, moved))
-        return chosen(self._guesses, newest, poses[newest], self._hint)
+                self._hypotheses.append(PoseHypothesis(found.edge, found.margin, moved))
+        return chosen(self._hypotheses, newest, poses[newest], self._hint)
 
 
 def chosen(
-    guesses: Sequence[PoseHypothesis], newest: int, pose: Array, hint: Array | None = None
+    hypotheses: Sequence[PoseHypothesis], newest: int, pose: Array, hint: Array | None = None
 ) -> PoseGraphEdge | None:
     """Returns the best hypothesis of the newest keyframe, at `pose` (4,), if it is certain.
 
     `hint`: see `Relocalization.begin`.
     """
-    if not guesses:
+    if not hypotheses:
         return None
-    places = np.array([compose(guess.moved, pose) for guess in guesses])
+    places = np.array([compose(guess.moved, pose) for guess in hypotheses])
     same = _within(places[:, None], places, _SAME)
     weights = np.array(
-        [_weight([guesses[k] for k in np.flatnonzero(row).tolist()]) for row in same]
+        [_weight([hypotheses[k] for k in np.flatnonzero(row).tolist()]) for row in same]
     )
     if hint is not None:
         weights += _HINTED * _within(places, pose + np.append(hint, [0.0, 0.0]), _HINT)
     best = int(np.argmax(weights))
     others = weights[~_within(places, places[best], _OTHER)]
     fresh = [
-        guesses[k] for k in np.flatnonzero(same[best]).tolist() if guesses[k].edge.to == newest
+        hypotheses[k]
+        for k in np.flatnonzero(same[best]).tolist()
+        if hypotheses[k].edge.to == newest
     ]
     if not fresh or weights[best] < max(_SURE, _CLEARLY * others.max(initial=0.0)):
         return None
-    return max(fresh, key=lambda guess: guess.margin).edge
+    return max(fresh, key=lambda hypothesis: hypothesis.margin).edge
 
 
-def _weight(guesses: Sequence[PoseHypothesis]) -> float:
+def _weight(hypotheses: Sequence[PoseHypothesis]) -> float:
     """Returns the sum of margins of the hypotheses whose older keyframes share no returns."""
     counted: list[PoseHypothesis] = []
-    for guess in sorted(guesses, key=lambda guess: -guess.margin):
-        if all(abs(guess.edge.origin - other.edge.origin) > 2 * AROUND for other in counted):
-            counted.append(guess)
-    return sum(guess.margin for guess in counted)
+    for hypothesis in sorted(hypotheses, key=lambda hypothesis: -hypothesis.margin):
+        if all(abs(hypothesis.edge.origin - other.edge.origin) > 2 * AROUND for other in counted):
+            counted.append(hypothesis)
+    return sum(hypothesis.margin for hypothesis in counted)
 
 
 def _within(one: Array, other: Array, limits: Array) -> NDArray[np.bool_]:

@@ -22,10 +22,10 @@ _FOUR = (0, 1, 2, 5)
 
 
 @kernel
-def draw(points: Array, cell: float, picture: Picture) -> None:
-    """Marks the cells of points (K, 2), and their neighbours, in `picture` (n, n) at the origin."""
-    n = picture.shape[0]
-    picture[:] = 0
+def draw(points: Array, cell: float, image: Picture) -> None:
+    """Marks the cells of points (K, 2), and their neighbours, in `image` (n, n) at the origin."""
+    n = image.shape[0]
+    image[:] = 0
     for k in range(points.shape[0]):
         i = math.floor(points[k, 0] / cell) + n // 2
         j = math.floor(points[k, 1] / cell) + n // 2
@@ -34,52 +34,52 @@ def draw(points: Array, cell: float, picture: Picture) -> None:
         for di in range(-1, 2):
             for dj in range(-1, 2):
                 worth = 4 if di == 0 and dj == 0 else (2 if di * dj == 0 else 1)
-                picture[i + di, j + dj] = max(picture[i + di, j + dj], worth)
+                image[i + di, j + dj] = max(image[i + di, j + dj], worth)
 
 
 @inner_kernel
-def _count_at(points: Array, x: float, y: float, cell: float, picture: Picture) -> int:
-    n, count = picture.shape[0], 0
+def _count_at(points: Array, x: float, y: float, cell: float, image: Picture) -> int:
+    n, count = image.shape[0], 0
     for k in range(points.shape[0]):
         i = math.floor((points[k, 0] + x) / cell) + n // 2
         j = math.floor((points[k, 1] + y) / cell) + n // 2
-        if 0 <= i < n and 0 <= j < n and picture[i, j] > 0:
+        if 0 <= i < n and 0 <= j < n and image[i, j] > 0:
             count += 1
     return count
 
 
 @kernel
-def count_drawn(points: Array, cell: float, picture: Picture) -> int:
-    """Returns how many of points (K, 2) lie in marked cells of a `picture` around the origin."""
-    return _count_at(points, 0.0, 0.0, cell, picture)
+def count_drawn(points: Array, cell: float, image: Picture) -> int:
+    """Returns how many of points (K, 2) lie in marked cells of a `image` around the origin."""
+    return _count_at(points, 0.0, 0.0, cell, image)
 
 
 @kernel
 def shares_around(
     one: Array,
-    picture: Picture,
+    image: Picture,
     other: Array,
-    other_picture: Picture,
+    other_image: Picture,
     cell: float,
     steps: Array,
     shares: Array,
 ) -> None:
     """Fills `shares` (K,): matched fraction after `one` (M, 2) moved by each of `steps` (K, 2).
 
-    It is the mean of two: of points `one` in `picture`, and of points `other` (N, 2), moved the
-    opposite direction, in `other_picture`, which shows `one`.
+    It is the mean of two: of points `one` in `image`, and of points `other` (N, 2), moved the
+    opposite direction, in `other_image`, which shows `one`.
     """
     for k in range(steps.shape[0]):
         x, y = steps[k, 0], steps[k, 1]
-        onwards = _count_at(one, x, y, cell, picture) / one.shape[0]
-        back = _count_at(other, -x, -y, cell, other_picture) / other.shape[0]
+        onwards = _count_at(one, x, y, cell, image) / one.shape[0]
+        back = _count_at(other, -x, -y, cell, other_image) / other.shape[0]
         shares[k] = 0.5 * (onwards + back)
 
 
 @kernel
 def search(
     points: Array,
-    picture: Picture,
+    image: Picture,
     cell: float,
     middle: Array,
     reach: Array,
@@ -87,12 +87,12 @@ def search(
     best: Array,
     shares: Array,
 ) -> float:
-    """Finds the pose (3,) x, y, yaw of points (K, 2) in `picture` with the best score.
+    """Finds the pose (3,) x, y, yaw of points (K, 2) in `image` with the best score.
 
     It tries `middle` (3,) +- `reach` (3,), in steps of a cell and of `step_rad`; `shares` gets the
     scores of all positions, each at its best heading. Returns the best score, 0 to 1.
     """
-    n, count = picture.shape[0], points.shape[0]
+    n, count = image.shape[0], points.shape[0]
     wide, high = math.ceil(reach[0] / cell), math.ceil(reach[1] / cell)
     turns = math.ceil(reach[2] / step_rad)
     shares[:] = 0.0
@@ -109,7 +109,7 @@ def search(
                     a = math.floor((x + c * points[k, 0] - s * points[k, 1]) / cell) + n // 2
                     b = math.floor((y + s * points[k, 0] + c * points[k, 1]) / cell) + n // 2
                     if 0 <= a < n and 0 <= b < n:
-                        total += picture[a, b]
+                        total += image[a, b]
                 share = total / (4.0 * max(count, 1))
                 shares[i + wide, j + high] = max(shares[i + wide, j + high], share)
                 if total > most:
@@ -150,11 +150,11 @@ def refine(
     ground_variance: float,
     rounds: int,
     information: Array,
-    told: Array,
+    fit: Array,
 ) -> bool:
     """Moves the pose (4,) x, y, z, yaw of points (K, 3) to the best fit with the maps.
 
-    `information` (4, 4) and `told` (4,) are those of the last round. Returns False if the fit is
+    `information` (4, 4) and `fit` (4,) are those of the last round. Returns False if the fit is
     singular.
     """
     state, planes = np.zeros(STATE_NUMBERS), np.zeros((points.shape[0], 3))
@@ -186,7 +186,7 @@ def refine(
             ground_variance,
             all_six,
             gradient,
-            told,
+            fit,
         )
         for i in range(4):
             right[i, 0] = -gradient[_FOUR[i]]

@@ -61,19 +61,28 @@ class Slam(Node):
 
     Parameters
     ----------
-    start: [x, y, z, yaw] of the start pose in the map, m and rad; empty: the map begins there.
+    initial_pose: [x, y, z, yaw] in the map, m and rad; empty: the map begins there.
     level_mount, nodding_mount: [x, y, z] of the LIDARs in the body, m.
     imu_noise: densities of gyroscope and accelerometer, of their biases' random walks, and
         turn-on biases, in SI units; empty: the ADIS16448's.
-    standing_height_m: height of the body over the ground when landed.
+    landed_height_m: height of the body over the ground when landed.
     odom_rate_hz, pose_rate_hz: rates at which they are published.
     scan_rate_hz: sweeps processed per second and LIDAR.
-    reach_m: max range of returns.
+    max_range_m: max range of returns.
     loop_closures: whether loop closures correct the map (needs gtsam).
 
     """
 
-    _PLAIN = ("_nod", "_omega", "_told", "_taken_ns", "_odom_ns", "_refused", "_resets", "_shown")
+    _PLAIN = (
+        "_nod",
+        "_omega",
+        "_last_status",
+        "_taken_ns",
+        "_odom_ns",
+        "_refused",
+        "_resets",
+        "_shown",
+    )
 
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
@@ -91,17 +100,15 @@ class Slam(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("slam", **options)
-        start = declare_numbers(self, "start", [], "[x, y, z, yaw]", or_empty=True)
+        start = declare_numbers(self, "initial_pose", [], "[x, y, z, yaw]", or_empty=True)
         noise = declare_numbers(self, "imu_noise", [], _NOISE, or_empty=True)
         self._start = np.array(start or [0.0] * 4)
         self._mounts = {name: np.array(declare_mount(self, name)) for name in ("level", "nodding")}
         self._imu_noise = ImuNoise(*noise) if noise else ImuNoise()
         self._matching = ScanMatching(
-            reach_m=float(self.declare_parameter("reach_m", 30.0, min_value=0.1).value)
+            reach_m=float(self.declare_parameter("max_range_m", 30.0, min_value=0.1).value)
         )
-        self._standing = float(
-            self.declare_parameter("standing_height_m", 0.2, min_value=0.0).value
-        )
+        self._standing = float(self.declare_parameter("landed_height_m", 0.2, min_value=0.0).value)
         self._has_loops = bool(self.declare_parameter("loop_closures", True).value)
         period = NS_PER_S / float(
             self.declare_parameter("scan_rate_hz", 20.0, min_value=0.1, max_value=1000.0).value
@@ -124,7 +131,7 @@ class Slam(Node):
         self._tracker = Tracker(self._start, self._imu_noise, self._matching)
         self._tracker.standing_height = self._standing
         self._level = LevelOdometry()
-        self._way = KeyframeGraph(self._matching, self._start, self._has_loops)
+        self._keyframe_graph = KeyframeGraph(self._matching, self._start, self._has_loops)
         self._health = SlamHealth(
             ("IMU", "level LIDAR", "nodding LIDAR"), self.get_clock().now_ns()
         )
@@ -133,7 +140,7 @@ class Slam(Node):
         self._taken_ns: dict[str, int] = {}
         self._odom_ns = 0
         self._refused = self._resets = 0
-        self._told = ""
+        self._last_status = ""
         self._shown = (0, 0)
         """Numbers of keyframes and closures of the last published path."""
 
@@ -152,12 +159,15 @@ class Slam(Node):
         self.create_subscription(
             LaserScan, "laser/nodding/scan", lambda m: self._on_scan("nodding", m), 5
         )
-        self.create_timer(pose_period_s, self._tell_pose)
-        self.create_timer(0.5, self._tell_status)
+        self.create_timer(pose_period_s, self._publish_pose)
+        self.create_timer(0.5, self._publish_status)
 
     def get_state(self) -> dict[str, Any]:
         """Returns the state for a snapshot."""
-        parts = {n: getattr(self, n).get_state() for n in ("_tracker", "_level", "_way", "_health")}
+        parts = {
+            n: getattr(self, n).get_state()
+            for n in ("_tracker", "_level", "_keyframe_graph", "_health")
+        }
         return {"parts": parts, **save_attributes(self, self._PLAIN)}
 
     def set_state(self, state: dict[str, Any]) -> None:
@@ -177,17 +187,17 @@ class Slam(Node):
             return
         if newest and (time_ns < newest - _JUMP_NS or time_ns > newest + _LONGEST_GAP_NS):
             self._set_clock(time_ns)
-        self._health.heard["IMU"] = self.get_clock().now_ns()
+        self._health.received_ns["IMU"] = self.get_clock().now_ns()
         gyro = np.array([w.x, w.y, w.z])
         seen = self._tracker.add_imu(time_ns, gyro, np.array([a.x, a.y, a.z]))
         for returns in seen:
-            self._way.add(returns, self._tracker)
+            self._keyframe_graph.add(returns, self._tracker)
         if self._tracker.sight.is_broken:
-            self._tell_status()  # each further sweep would increase the error
+            self._publish_status()  # each further sweep would increase the error
         self._omega = gyro - self._tracker.state[BG : BG + 3]
         if self._tracker.is_ready and time_ns - self._odom_ns >= self._odom_period_ns:
             self._odom_ns = time_ns
-            self._tell_odometry(time_ns)
+            self._publish_odometry(time_ns)
 
     def _set_clock(self, time_ns: int) -> None:
         """Resets after a clock jump or an IMU timeout: continues with unknown motion."""
@@ -213,7 +223,7 @@ class Slam(Node):
             self._refused += 1
             return
         if has_return(scan):
-            self._health.heard[f"{name} LIDAR"] = self.get_clock().now_ns()
+            self._health.received_ns[f"{name} LIDAR"] = self.get_clock().now_ns()
         if first - self._taken_ns.get(name, -(1 << 60)) < self._sweep_ns:
             return
         nods = (0.0, 0.0) if name == "level" else (self._nod.at(first), self._nod.at(last))
@@ -231,19 +241,24 @@ class Slam(Node):
 
     # ---------------------------------------------------------------------------------- publishers
 
-    def _tell_odometry(self, time_ns: int) -> None:
+    def _publish_odometry(self, time_ns: int) -> None:
         t = self._tracker
         position, attitude = self._level.follow(t.state)
         velocity = rotations.rotate(levelling(t.state[G : G + 3]), t.state[V : V + 3])
         parts = (position, attitude, velocity, self._omega)
         self._odom.publish(messages.odometry(time_ns, self._uav, parts, t.covariance[:9, :9]))
 
-    def _tell_pose(self) -> None:
+    def _publish_pose(self) -> None:
         t = self._tracker
-        if not t.is_ready or t.is_astray or not self._way.frames or not self._way.is_placed:
+        if (
+            not t.is_ready
+            or t.is_astray
+            or not self._keyframe_graph.frames
+            or not self._keyframe_graph.is_placed
+        ):
             return
-        position, attitude = self._way.pose(t)
-        four, tilt = self._way.sigmas(t), np.sqrt(np.diag(t.covariance)[15:17])
+        position, attitude = self._keyframe_graph.pose(t)
+        four, tilt = self._keyframe_graph.sigmas(t), np.sqrt(np.diag(t.covariance)[15:17])
         own = np.sqrt(np.diag(t.covariance)[[0, 1, 2, 8]])
         x, y, z, yaw = np.hypot(four, own)
         sigmas = np.array([x, y, z, tilt[0], tilt[1], yaw])
@@ -253,35 +268,35 @@ class Slam(Node):
         place = position - rotations.rotate(turn, here)
         self._tf.publish(messages.map_from_odom(t.time_ns, self._uav, place, turn))
 
-    def _tell_status(self) -> None:
-        t, way, now = self._tracker, self._way, self.get_clock().now_ns()
+    def _publish_status(self) -> None:
+        t, graph, now = self._tracker, self._keyframe_graph, self.get_clock().now_ns()
         noticed_ns = _SEEN_NS if t.sight.is_broken else _NOTICED_NS
-        if self._health.look(t, now, way.is_placed):
+        if self._health.look(t, now, graph.is_placed):
             self._lose(*_DOUBTED, t.time_ns - noticed_ns)
-        told = {
+        status = {
             "state": self._health.state,
             "problems": self._health.problems,
             "uprights": {name: round(m.met, 1) for name, m in sorted(t.match.items())},
             "sigma_m": round(t.sigma_m, 3),
-            "keyframes": len(way.frames),
-            "closures": way.closures,
-            "sessions": way.session + 1,
+            "keyframes": len(graph.frames),
+            "closures": graph.closures,
+            "sessions": graph.session + 1,
             "refused": self._refused + t.refused,
             "clock_set": self._resets,
         }
-        self._told = publish_status(self._status, told, self._told)
-        shown = (len(way.frames), way.closures)
-        if shown != self._shown and way.frames:
+        self._last_status = publish_status(self._status, status, self._last_status)
+        shown = (len(graph.frames), graph.closures)
+        if shown != self._shown and graph.frames:
             self._shown = shown
-            times = [frame.time_ns for frame in way.frames]
-            self._path.publish(messages.path(t.time_ns, times, way.poses))
+            times = [frame.time_ns for frame in graph.frames]
+            self._path.publish(messages.path(t.time_ns, times, graph.poses))
 
     def _lose(
         self, speed_sigma: float, turn_sigma: float, wrong_since_ns: int | None = None
     ) -> None:
         """Begins new maps, whose pose in the old one must be found by relocalization."""
         moved = self._tracker.sight.moved
-        self._tracker.begin_anew(speed_sigma, turn_sigma)
-        self._health.begin_anew()
-        if self._way.frames:
-            self._way.begin_anew(wrong_since_ns, moved)
+        self._tracker.restart(speed_sigma, turn_sigma)
+        self._health.restart()
+        if self._keyframe_graph.frames:
+            self._keyframe_graph.restart(wrong_since_ns, moved)

@@ -247,14 +247,14 @@ class Tracker:
         known = broad_plane(self.state, maps.ground_keys, maps.sums, 6, slope, self._broad)
         kinds, planes = np.empty(len(points), np.int8), np.zeros((len(points), 3))
         self._classify(points, kinds, planes, known)
-        told, information = np.zeros(4), np.zeros((6, 6))
+        sums, information = np.zeros(4), np.zeros((6, 6))
         before = self.state.copy()
         update(
             self.state, self.covariance, points, kinds, planes, maps.upright_keys, maps.cells,
-            m.upright_sigma_m**2, m.ground_sigma_m**2, m.trust, m.rounds, information, told,
+            m.upright_sigma_m**2, m.ground_sigma_m**2, m.trust, m.rounds, information, sums,
         )  # fmt: skip
         carry_along(self._states, before, self.state)
-        self.match[sweep.name] = judged(told, self.match.get(sweep.name), self.time_ns)
+        self.match[sweep.name] = judged(sums, self.match.get(sweep.name), self.time_ns)
         is_drawn = self._draw(sweep, points, kinds)
         turned = moved_points(points, self.state[Q : Q + 4], self.state[:3])
         if self.has_flown:
@@ -304,7 +304,7 @@ class Tracker:
         self.recovery = Recovery()
         self._stay(time_ns)
 
-    def begin_anew(self, speed_sigma: float, turn_sigma: float) -> None:
+    def restart(self, speed_sigma: float, turn_sigma: float) -> None:
         """Clears the maps and continues in new ones.
 
         `speed_sigma`, m/s, and `turn_sigma`, rad about each axis, are the standard deviations of

@@ -51,7 +51,7 @@ _STATE = (
     "pose",
     "pose_ns",
     "battery",
-    "heard_ns",
+    "received_ns",
     "_frame",
     "_num_reports",
 )
@@ -87,7 +87,7 @@ class TeamMember:
         self.pose_ns = 0
         self.battery = math.nan
         """Charge, 0 to 1; NaN: unknown."""
-        self.heard_ns = 0
+        self.received_ns = 0
         """Time of the last report of another UAV."""
         self._frame = MapFrame()
         self._num_reports = 0
@@ -104,7 +104,7 @@ class TeamMember:
         node.create_subscription(
             self._targets_type, "target_detection/targets", self._on_detections, 5
         )
-        if settings.corrected:
+        if settings.use_map_tf:
             node.create_subscription(TFMessage, "/tf", self._on_tf, 50)
 
     def get_state(self) -> dict[str, Any]:
@@ -116,7 +116,7 @@ class TeamMember:
         restore_attributes(self, state)
 
     def workers(self) -> dict[str, Worker]:
-        """Returns the UAVs that share the search, by name: the heard ones and this one."""
+        """Returns the UAVs that share the search, by name: itself and those with recent reports."""
         assert self.pose is not None
         workers = self.other_workers()
         workers[self._settings.name] = Worker(
@@ -126,7 +126,7 @@ class TeamMember:
 
     def other_workers(self) -> dict[str, Worker]:
         """Returns the other UAVs that share the search, by name."""
-        return self.team.workers(self._now_ns, self._settings.patience_s)
+        return self.team.workers(self._now_ns, self._settings.timeout_s)
 
     def take_sector(self, sector: int, coverage: Coverage) -> None:
         """Claims a sector from now on."""
@@ -145,15 +145,15 @@ class TeamMember:
         silent = sorted(
             name
             for name, mate in self.team.mates.items()
-            if now - mate.heard_ns > self._settings.patience_s * NS_PER_S
+            if now - mate.received_ns > self._settings.timeout_s * NS_PER_S
             and mate.phase not in (MissionPhase.DONE, MissionPhase.DOWN)
         )
         if silent:
             found.append(f"silent: {', '.join(silent)}")
-        if self.battery < self._settings.low_battery:
+        if self.battery < self._settings.low_battery_fraction:
             found.append("low battery")
-        if self.team.strangers:
-            found.append(f"another search: {', '.join(sorted(self.team.strangers))}")
+        if self.team.foreign_uavs:
+            found.append(f"another search: {', '.join(sorted(self.team.foreign_uavs))}")
         return "; ".join(found)
 
     def publish_report(self) -> None:
@@ -175,14 +175,14 @@ class TeamMember:
                 time_from_ns(self.since_ns),
                 to_bits(self.searched),
                 to_bits(self.given_up),
-                self.targets.to_tell(self._num_reports),
+                self.targets.changed(self._num_reports),
             )
         )
 
     def publish_status(self, problem: str) -> None:
         """Publishes the state of the search for operators."""
         now = self._now_ns
-        heard = [name for name, _ in self.team.heard(now, self._settings.patience_s)]
+        heard = [name for name, _ in self.team.recent(now, self._settings.timeout_s)]
         self._status.publish(
             self._status_type(
                 header(now, "map"),
@@ -208,7 +208,7 @@ class TeamMember:
             return
         self.pose, self.pose_ns = pose, self._now_ns
         coverage = self.coverage
-        if coverage is not None and coverage.look(pose.position[:2], self._settings.sight_m):
+        if coverage is not None and coverage.look(pose.position[:2], self._settings.view_radius_m):
             self.progress_ns = self.pose_ns
 
     def _on_tf(self, message: TFMessage) -> None:
@@ -219,9 +219,9 @@ class TeamMember:
 
     def _on_report(self, report: Any) -> None:
         now = self._now_ns
-        if report.name == self._settings.name or not self.team.hear(report, now):
+        if report.name == self._settings.name or not self.team.on_report(report, now):
             return
-        self.heard_ns = now
+        self.received_ns = now
         self.searched |= from_bits(report.searched, len(self.searched))
         if self.targets.take(map(Detection.from_message, report.targets)):
             self._publish_targets()

@@ -55,15 +55,17 @@ class Observation(NamedTuple):
     """(2, 2) of x and y, m^2."""
 
 
-def sighting_of(time_ns: int, eye: Array, place: Array, doubt: PositionUncertainty) -> Observation:
+def sighting_of(
+    time_ns: int, eye: Array, place: Array, uncertainty: PositionUncertainty
+) -> Observation:
     """Returns the observation of an object: a ray from `eye` (3,) to `place` (3,) below it."""
     offset = place[:2] - eye[:2]
     r, h = max(float(np.hypot(*offset)), 1e-3), float(eye[2] - place[2])
-    along = math.hypot((r * r + h * h) / h * doubt.angle_rad, doubt.slope * r * r / h)
-    across = r * doubt.angle_rad
+    along = math.hypot((r * r + h * h) / h * uncertainty.angle_rad, uncertainty.slope * r * r / h)
+    across = r * uncertainty.angle_rad
     c, s = offset / r
     turn = np.array([[c, -s], [s, c]])
-    own = doubt.place_m**2 * np.eye(2)
+    own = uncertainty.place_m**2 * np.eye(2)
     return Observation(time_ns, place, turn @ np.diag([along**2, across**2]) @ turn.T + own)
 
 

@@ -19,17 +19,17 @@ class TeamSettings:
     """Name of this UAV, from the node's namespace."""
     sectors: Sectors
     altitude_m: float
-    cell_m: float
-    sight_m: float
-    enough: float
+    resolution_m: float
+    view_radius_m: float
+    coverage_fraction: float
     gather_s: float
-    patience_s: float
-    stuck_s: float
-    low_battery: float
-    search_s: float
-    alone_s: float
+    timeout_s: float
+    stuck_timeout_s: float
+    low_battery_fraction: float
+    max_search_s: float
+    team_timeout_s: float
     gate_m: float
-    corrected: bool
+    use_map_tf: bool
     odometry: str
     goal_topic: str
 
@@ -57,17 +57,17 @@ class TeamSettings:
             name=name,
             sectors=Sectors(Area(*area), number("sector_m", 40.0, 1.0)),
             altitude_m=number("altitude_m", 3.0, 0.3),
-            cell_m=number("cell_m", 2.0, 0.1),
-            sight_m=number("sight_m", 6.0, 0.1),
-            enough=number("enough", 0.9, 0.0, 1.0),
+            resolution_m=number("resolution_m", 2.0, 0.1),
+            view_radius_m=number("view_radius_m", 6.0, 0.1),
+            coverage_fraction=number("coverage_fraction", 0.9, 0.0, 1.0),
             gather_s=number("gather_s", 3.0, 0.0),
-            patience_s=number("patience_s", 5.0, 0.1),
-            stuck_s=number("stuck_s", 30.0, 1.0),
-            low_battery=number("low_battery", 0.3, 0.0, 1.0),
-            search_s=number("search_s", 0.0, 0.0),
-            alone_s=number("alone_s", 0.0, 0.0),
+            timeout_s=number("timeout_s", 5.0, 0.1),
+            stuck_timeout_s=number("stuck_timeout_s", 30.0, 1.0),
+            low_battery_fraction=number("low_battery_fraction", 0.3, 0.0, 1.0),
+            max_search_s=number("max_search_s", 0.0, 0.0),
+            team_timeout_s=number("team_timeout_s", 0.0, 0.0),
             gate_m=number("gate_m", 4.0, 0.0),
-            corrected=bool(node.declare_parameter("corrected", False).value),
+            use_map_tf=bool(node.declare_parameter("use_map_tf", False).value),
             odometry=str(node.declare_parameter("odometry", "odom").value),
             goal_topic=str(node.declare_parameter("goal_topic", "planning/goal").value),
         )

@@ -50,12 +50,13 @@ class TargetDetection(Node):
     ----------
     camera: name of the camera.
     mount_m, mount_rpy_deg: of the camera in the body, as in a scenario.
-    odometry: topic of the pose; corrected: whether `/tf` holds the pose of its frame in the map.
-    hue_deg: [first, last]; saturation, value: minimums; see `search.colour_blob`.
-    share: min fraction of the image.
-    object_m: height of the targets' centre above the ground.
-    reach_m: max horizontal distance of a target.
-    sightings, spread_m: number of observations and standard deviation that confirm a target.
+    odometry: topic of the pose; use_map_tf: whether `/tf` holds the pose of its frame in the map.
+    hue_deg: [first, last]; min_saturation, min_value: minimums; see `search.colour_blob`.
+    min_fraction: min fraction of the image.
+    object_height_m: height of the targets' centre above the ground.
+    max_range_m: max horizontal distance of a target.
+    min_observations, max_sigma_m: number of observations and standard deviation that confirm a
+        target.
 
     """
 
@@ -76,19 +77,23 @@ class TargetDetection(Node):
         self._mount = np.array(declare("mount_m", [0.0, 0.0, 0.0]).value, dtype=np.float64)
         self._turn = [float(a) for a in declare("mount_rpy_deg", [0.0, 0.0, 0.0]).value]
         odometry = str(declare("odometry", "odom").value)
-        if declare("corrected", False).value:
+        if declare("use_map_tf", False).value:
             self.create_subscription(TFMessage, "/tf", self._on_tf, 50)
         first, last = (float(hue) for hue in declare("hue_deg", list(ColourRange()[:2])).value)
         self._colours = ColourRange(
-            first, last, float(declare("saturation", 0.5).value), float(declare("value", 0.2).value)
+            first,
+            last,
+            float(declare("min_saturation", 0.5).value),
+            float(declare("min_value", 0.2).value),
         )
-        self._share = float(declare("share", 0.0005).value)
-        self._object_m = float(declare("object_m", 0.5).value)
-        self._reach_m = float(declare("reach_m", 20.0).value)
+        self._min_fraction = float(declare("min_fraction", 0.0005).value)
+        self._object_height_m = float(declare("object_height_m", 0.5).value)
+        self._max_range_m = float(declare("max_range_m", 20.0).value)
         self._tracks = Tracks(
-            int(declare("sightings", 4).value), spread_m=float(declare("spread_m", 2.0).value)
+            int(declare("min_observations", 4).value),
+            spread_m=float(declare("max_sigma_m", 2.0).value),
         )
-        self._doubt = PositionUncertainty()
+        self._uncertainty = PositionUncertainty()
         self._frame = MapFrame()
         self._mates: dict[str, tuple[int, Array]] = {}
         """Receive time, ns, and position of each teammate's last report."""
@@ -142,20 +147,20 @@ class TargetDetection(Node):
         view = GroundView(self._intrinsics, self._mount.tolist(), self._turn)
         hidden = self._teammates_in(view, pose)
         blob = largest_blob(colour_mask(pixels_of(image), self._colours, hidden))
-        if blob is None or blob.share < self._share:
+        if blob is None or blob.share < self._min_fraction:
             return
-        place = view.place_of(blob.u, blob.v, pose, ground + self._object_m)
-        if place is None or np.hypot(*(place - pose.position)[:2]) > self._reach_m:
+        place = view.place_of(blob.u, blob.v, pose, ground + self._object_height_m)
+        if place is None or np.hypot(*(place - pose.position)[:2]) > self._max_range_m:
             return
         eye = pose.position + rotations.rotate(pose.attitude, self._mount)
-        track = self._tracks.add(sighting_of(taken, eye, place, self._doubt))
+        track = self._tracks.add(sighting_of(taken, eye, place, self._uncertainty))
         if track.number:
-            self._tell(taken)
+            self._publish_targets(taken)
 
     def _teammates_in(self, view: GroundView, pose: OdometrySample) -> Array:
         """Returns the image discs (K, 3) of teammates, which may have the colour."""
         since = pose.time_ns - round(_MATE_S * NS_PER_S)
-        near = [place for heard_ns, place in self._mates.values() if heard_ns >= since]
+        near = [place for received_ns, place in self._mates.values() if received_ns >= since]
         discs = [view.disc_of(place, _MATE_M, pose) for place in near]
         return np.array([disc for disc in discs if disc is not None]).reshape(-1, 3)
 
@@ -170,7 +175,7 @@ class TargetDetection(Node):
         down = -rotations.rotate(self._pose.attitude, np.array([0.0, 0.0, -1.0]))[2]
         return float(self._pose.position[2] - distance * down)
 
-    def _tell(self, time_ns: int) -> None:
+    def _publish_targets(self, time_ns: int) -> None:
         finder = self.get_namespace().strip("/")
         finds = [find.message() for find in self._tracks.finds(finder)]
         self._targets.publish(self._type(header(time_ns, "map"), finds))

@@ -86,7 +86,7 @@ class TargetList:
                 self.finds[key], changed = find, True
         return changed
 
-    def to_tell(self, turn: int) -> list[Any]:
+    def changed(self, turn: int) -> list[Any]:
         """Returns some detections as messages: the newest ones, and others in turn.
 
         A report with all of them would fill the radio's channel; after some turns all have been

@@ -96,15 +96,16 @@ class TaskManager(Node):
     area_m: [x_min, y_min, x_max, y_max] in the map, the same for the whole team.
     sector_m: approximate side of a sector.
     altitude_m: height to which the UAV takes off.
-    cell_m, sight_m, enough: a sector is searched when this fraction of its cells has been in sight.
+    resolution_m, view_radius_m, coverage_fraction: a sector is searched when this fraction of its
+        cells has been in sight.
     gather_s: duration of listening for the team before the take-off.
-    patience_s: silence after which a UAV counts as lost, and its sector is taken over.
-    stuck_s: duration without new cells in sight after which a sector is given up.
-    low_battery: charge, 0 to 1, at which the UAV returns home.
-    search_s: maximum duration of the search; 0: none.
-    alone_s: silence of all others after which the UAV returns home; 0: it goes on.
+    timeout_s: silence after which a UAV counts as lost, and its sector is taken over.
+    stuck_timeout_s: duration without new cells in sight after which a sector is given up.
+    low_battery_fraction: charge, 0 to 1, at which the UAV returns home.
+    max_search_s: maximum duration of the search; 0: none.
+    team_timeout_s: silence of all others after which the UAV returns home; 0: it goes on.
     gate_m: detections closer to each other than this are one target.
-    odometry: topic of the pose; corrected: whether `/tf` transforms its frame into the map.
+    odometry: topic of the pose; use_map_tf: whether `/tf` transforms its frame into the map.
     goal_topic: topic of goals. Not `goal_pose`, to which flight modes fly straight.
 
     """
@@ -289,7 +290,7 @@ class TaskManager(Node):
         member.publish_status(self.problem)
 
     def _begin(self, pose: OdometrySample, now: int) -> None:
-        self._began_ns = self.member.heard_ns = now
+        self._began_ns = self.member.received_ns = now
         self._home = pose.position.copy()
         self.ground.stand_m = float(self._home[2])
         self._enter(MissionPhase.WAIT)
@@ -343,7 +344,7 @@ class TaskManager(Node):
     def _begin_sector(self, sector: int, now: int) -> None:
         self._explores = False
         area = self.settings.sectors.of(sector)
-        self.member.take_sector(sector, Coverage(area, self.settings.cell_m))
+        self.member.take_sector(sector, Coverage(area, self.settings.resolution_m))
         self._enter(MissionPhase.SEARCH)
         self._area.publish(polygon_of(area, float(self._home[2]), now))
 
@@ -351,7 +352,7 @@ class TaskManager(Node):
         member = self.member
         assert member.coverage is not None
         claim = SectorClaim(member.since_ns, self.settings.name)
-        if member.coverage.share >= self.settings.enough:
+        if member.coverage.share >= self.settings.coverage_fraction:
             member.searched[member.sector] = True
             self._drop(now)
         elif member.searched[member.sector] or must_yield(
@@ -367,10 +368,10 @@ class TaskManager(Node):
         member = self.member
         assert member.coverage is not None
         if member.coverage.seen.any() or member.pose is None:
-            return round(self.settings.stuck_s * NS_PER_S)
+            return round(self.settings.stuck_timeout_s * NS_PER_S)
         centre = self.settings.sectors.centres()[member.sector]
         distance = norm(centre - member.pose.position[:2])
-        return round((self.settings.stuck_s + 2.0 * distance) * NS_PER_S)
+        return round((self.settings.stuck_timeout_s + 2.0 * distance) * NS_PER_S)
 
     def _drop(self, now: int) -> None:
         """Leaves this sector and takes the next one."""
@@ -385,16 +386,16 @@ class TaskManager(Node):
     def _turns_home(self, now: int) -> bool:
         """Whether the UAV returns home now; while it is held, only for its battery."""
         if self.phase is MissionPhase.HOLD:
-            return self.member.battery < self.settings.low_battery
+            return self.member.battery < self.settings.low_battery_fraction
         return self.phase in (MissionPhase.SEARCH, MissionPhase.IDLE) and self._must_go_home(now)
 
     def _must_go_home(self, now: int) -> bool:
         assert self._began_ns is not None
         settings, member = self.settings, self.member
-        over = 0.0 < settings.search_s * NS_PER_S < now - self._began_ns
-        silence_ns = now - member.heard_ns
-        alone = bool(member.team.mates) and (0.0 < settings.alone_s * NS_PER_S < silence_ns)
-        return self._ordered_home or over or alone or member.battery < settings.low_battery
+        over = 0.0 < settings.max_search_s * NS_PER_S < now - self._began_ns
+        silence_ns = now - member.received_ns
+        alone = bool(member.team.mates) and (0.0 < settings.team_timeout_s * NS_PER_S < silence_ns)
+        return self._ordered_home or over or alone or member.battery < settings.low_battery_fraction
 
     def _go_home(self, now: int) -> None:
         self._nearest_m, self.member.progress_ns = math.inf, now

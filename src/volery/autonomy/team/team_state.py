@@ -51,7 +51,7 @@ class TeamMate:
 
     phase: MissionPhase
     sent_ns: int
-    heard_ns: int
+    received_ns: int
     worker: Worker
     position: Array
     """(3,) m, map."""
@@ -63,17 +63,17 @@ class TeamState:
 
     sectors: int
     mates: dict[str, TeamMate] = field(default_factory=dict)
-    strangers: set[str] = field(default_factory=set)
+    foreign_uavs: set[str] = field(default_factory=set)
     """Names of UAVs that search another area, or report unknown phases."""
 
-    def hear(self, report: Any, now_ns: int) -> bool:
+    def on_report(self, report: Any, now_ns: int) -> bool:
         """Adds a report; returns False if it is old, repeated or of another search."""
         known = self.mates.get(report.name)
         sent_ns = stamp_of(report)
         if report.sectors != self.sectors or report.phase not in set(MissionPhase):
-            self.strangers.add(report.name)
+            self.foreign_uavs.add(report.name)
             return False
-        restarted = known is not None and now_ns - known.heard_ns > 10 * NS_PER_S
+        restarted = known is not None and now_ns - known.received_ns > 10 * NS_PER_S
         if known is not None and sent_ns <= known.sent_ns and not restarted:
             return False
         p = report.position
@@ -92,12 +92,12 @@ class TeamState:
         )
         return True
 
-    def heard(self, now_ns: int, patience_s: float) -> Iterator[tuple[str, TeamMate]]:
+    def recent(self, now_ns: int, timeout_s: float) -> Iterator[tuple[str, TeamMate]]:
         """Yields the UAVs with recent reports, by name."""
         for name, mate in sorted(self.mates.items()):
-            if 0 <= now_ns - mate.heard_ns <= patience_s * NS_PER_S:
+            if 0 <= now_ns - mate.received_ns <= timeout_s * NS_PER_S:
                 yield name, mate
 
-    def workers(self, now_ns: int, patience_s: float) -> dict[str, Worker]:
+    def workers(self, now_ns: int, timeout_s: float) -> dict[str, Worker]:
         """Returns the UAVs with recent reports that search, or will."""
-        return {n: m.worker for n, m in self.heard(now_ns, patience_s) if m.phase in AT_WORK}
+        return {n: m.worker for n, m in self.recent(now_ns, timeout_s) if m.phase in AT_WORK}

@@ -215,7 +215,9 @@ def stop_latencies(world: World) -> list[float]:
         uav.go_to([0.0, 0.0, _SAFE_HEIGHT_M])
         return response(success=True, message="")
 
-    simulation.post(lambda: simulation.graph.offer("/bench/recover", _TRIGGER, recover)).result()
+    simulation.post(
+        lambda: simulation.graph.create_service("/bench/recover", _TRIGGER, recover)
+    ).result()
     simulation.outlet.watch = look
     sent = world.ros_tcp("stops", "uav1", _STOPS)["sent_ns"]
     return [1e-9 * (stop - send) for send, stop in zip(sent, stopped_ns, strict=True)]

@@ -136,7 +136,7 @@ class Playback:
     # ------------------------------------------------------------------------------------ inside
 
     def _wanted(self) -> Set[int]:
-        return {c for c, publisher in self._publishers.items() if publisher.wanted}
+        return {c for c, publisher in self._publishers.items() if publisher.has_subscribers}
 
     def _show(self, channels: Set[int]) -> None:
         """Publishes the last messages of `channels` before the current position."""

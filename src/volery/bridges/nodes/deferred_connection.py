@@ -85,20 +85,20 @@ class DeferredConnection:
 
         The queue is empty until the graph is connected.
         """
-        mailbox = _DeferredQueue(topic, depth, wake, reliable=reliable)
+        queue = _DeferredQueue(topic, depth, wake, reliable=reliable)
 
         def fill(link: GraphConnection) -> None:
-            mailbox.real = link.subscribe(topic, msgtype, depth=depth, reliable=reliable, wake=wake)
+            queue.real = link.subscribe(topic, msgtype, depth=depth, reliable=reliable, wake=wake)
 
         self._announce(fill)
-        return mailbox
+        return queue
 
-    def unsubscribe(self, mailbox: SubscriptionQueue) -> None:
+    def unsubscribe(self, queue: SubscriptionQueue) -> None:
         """Implements `GraphConnection.unsubscribe`."""
 
         def empty(link: GraphConnection) -> None:
-            if isinstance(mailbox, _DeferredQueue) and mailbox.real is not None:
-                link.unsubscribe(mailbox.real)
+            if isinstance(queue, _DeferredQueue) and queue.real is not None:
+                link.unsubscribe(queue.real)
 
         self._announce(empty)
 
@@ -106,9 +106,9 @@ class DeferredConnection:
         """Implements `GraphConnection.call`."""
         self.join().call(service, request, reply)
 
-    def offer(self, service: str, srvtype: str, handler: Handler) -> None:
-        """Implements `GraphConnection.offer`."""
-        self._announce(lambda link: link.offer(service, srvtype, handler))
+    def create_service(self, service: str, srvtype: str, handler: Handler) -> None:
+        """Implements `GraphConnection.create_service`."""
+        self._announce(lambda link: link.create_service(service, srvtype, handler))
 
     def host_node(self, name: str, parameters: Parameters, post: Callable[[Any], Any]) -> None:
         """Implements `HostsNodes.host_node`, if the connection to the graph does."""

@@ -30,7 +30,7 @@ class MirroredGraph(Graph):
         super().__init__(now_ns, self._keep)
         self._link = link
         self._wake = wake
-        self._mailboxes: dict[str, SubscriptionQueue] = {}
+        self._queues: dict[str, SubscriptionQueue] = {}
         self._readers: dict[str, list[Callback]] = {}
         self._held: list[tuple[str, Published]] = []
         self._barrier: tuple[str, Callable[[Published], None]] | None = None
@@ -64,8 +64,8 @@ class MirroredGraph(Graph):
         The first subscriber of a topic determines the queue's options.
         """
         name = type_name(msgtype) if isinstance(msgtype, type) else msgtype
-        if topic not in self._mailboxes:
-            self._mailboxes[topic] = self._link.subscribe(
+        if topic not in self._queues:
+            self._queues[topic] = self._link.subscribe(
                 topic, name, depth=qos.depth, reliable=qos.reliable, wake=self._wake
             )
         readers = self._readers.setdefault(topic, [])
@@ -74,8 +74,8 @@ class MirroredGraph(Graph):
 
     def _leave(self, topic: str) -> None:
         """Ends a remote subscription without local subscribers."""
-        if topic in self._mailboxes and not self._readers[topic]:
-            self._link.unsubscribe(self._mailboxes.pop(topic))
+        if topic in self._queues and not self._readers[topic]:
+            self._link.unsubscribe(self._queues.pop(topic))
 
     def hold_back(self, barrier: str, begin: Callable[[Published], None]) -> None:
         """Delivers messages only after a later message on `barrier`.
@@ -90,13 +90,13 @@ class MirroredGraph(Graph):
         Messages that arrive meanwhile wait for the next call. Raises `GraphError` if a reliable
         subscription has lost messages: this process is too slow for it.
         """
-        for mailbox in self._mailboxes.values():
-            if mailbox.failure is not None:
-                raise GraphError(mailbox.failure)
+        for queue in self._queues.values():
+            if queue.failure is not None:
+                raise GraphError(queue.failure)
         come = [
             (number, topic, published)
-            for topic, mailbox in self._mailboxes.items()
-            for number, published in mailbox.take_numbered()
+            for topic, queue in self._queues.items()
+            for number, published in queue.take_numbered()
         ]
         self._held += [(topic, published) for _, topic, published in sorted(come, key=_number)]
         for topic, published in self._freed():
@@ -120,23 +120,25 @@ class MirroredGraph(Graph):
             begin(freed[-1][1])
             yield from freed
 
-    def show_to_all(self, sender: Publisher, message: Any) -> None:
+    def publish_at_end(self, sender: Publisher, message: Any) -> None:
         """Publishes a message."""
         sender.publish(message)
 
     # ---------------------------------------------------------------------------------- services
 
-    def offer(self, service: str, srvtype: str, handler: Callable[[Any], Any]) -> None:
+    def create_service(self, service: str, srvtype: str, handler: Callable[[Any], Any]) -> None:
         """Creates a remote service; its handler runs here, in `hand_out`."""
 
         def ask(request: Any, reply: ServiceReply) -> None:
             self.post(lambda: _answer(handler, request, reply))
 
-        self._link.offer(service, srvtype, ask)
+        self._link.create_service(service, srvtype, ask)
 
-    def offer_async(self, service: str, srvtype: str, ask: AsyncHandler) -> None:
-        """Creates a service like `offer`, for answers that come later."""
-        self._link.offer(service, srvtype, lambda q, reply: self.post(lambda: ask(q, reply)))
+    def create_async_service(self, service: str, srvtype: str, ask: AsyncHandler) -> None:
+        """Creates a service like `create_service`, for answers that come later."""
+        self._link.create_service(
+            service, srvtype, lambda q, reply: self.post(lambda: ask(q, reply))
+        )
 
     def has_service(self, service: str) -> bool:  # noqa: ARG002
         """Returns True: only a call shows whether a remote server exists."""
@@ -189,7 +191,7 @@ class _RemotePublisher(Publisher):
         return self._local.msgtype
 
     @property
-    def wanted(self) -> bool:
+    def has_subscribers(self) -> bool:
         """True, because remote subscribers are unknown."""
         return True
 

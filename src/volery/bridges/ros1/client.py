@@ -3,7 +3,7 @@
 Its methods:
 
     link = Ros1Client(node_name="gap_following")
-    mailbox = link.subscribe("/uav1/laser/horizontal/scan", wake=woken.set)
+    queue = link.subscribe("/uav1/laser/horizontal/scan", wake=woken.set)
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Ros1Client:
         self._codec = ros1_codec()
         self._lock = threading.RLock()
         self._publishers: dict[str, _Publisher] = {}
-        self._mailboxes: dict[SubscriptionQueue, Any] = {}
+        self._queues: dict[SubscriptionQueue, Any] = {}
         self._offers: dict[str, Any] = {}
         self._closed = threading.Event()
         threading.Thread(target=self._watch, name="volery-ros1-master", daemon=True).start()
@@ -111,28 +111,28 @@ class Ros1Client:
         if found is None:
             raise GraphError(f"no topic '{topic}'; give a type to subscribe before it exists")
         self._codec.learn(found)
-        mailbox = SubscriptionQueue(topic, depth, wake, reliable=reliable)
+        queue = SubscriptionQueue(topic, depth, wake, reliable=reliable)
         with self._lock:
             self._check_open()
-            receive = self._receiver(topic, found, mailbox)
-            self._mailboxes[mailbox] = self._node.subscriber(topic, found, receive)
-        return mailbox
+            receive = self._receiver(topic, found, queue)
+            self._queues[queue] = self._node.subscriber(topic, found, receive)
+        return queue
 
-    def unsubscribe(self, mailbox: SubscriptionQueue) -> None:
+    def unsubscribe(self, queue: SubscriptionQueue) -> None:
         """Ends a subscription; queued messages remain available."""
         with self._lock:
-            subscriber = self._mailboxes.pop(mailbox, None)
+            subscriber = self._queues.pop(queue, None)
         if subscriber is not None:
             subscriber.unregister()
 
-    def _receiver(self, topic: str, msgtype: str, mailbox: SubscriptionQueue) -> Receive:
+    def _receiver(self, topic: str, msgtype: str, queue: SubscriptionQueue) -> Receive:
         def receive(data: bytes, sender: str, _latched: bool) -> None:
             try:
                 message = self._codec.decode(data, msgtype)
             except GraphError as error:
                 _log.warning("ROS 1 topic %s, from %s: %s", topic, sender, error)
                 return
-            mailbox.put(Published(topic, msgtype, time.time_ns(), message))
+            queue.put(Published(topic, msgtype, time.time_ns(), message))
 
         return receive
 
@@ -156,7 +156,7 @@ class Ros1Client:
 
         threading.Thread(target=ask, name=f"volery-ros1 {service}", daemon=True).start()
 
-    def offer(self, service: str, srvtype: str, handler: Handler) -> None:
+    def create_service(self, service: str, srvtype: str, handler: Handler) -> None:
         """Creates a service; `handler(request, reply)` is called in the request's own thread."""
 
         def handle(request: Any) -> Any:
@@ -173,7 +173,7 @@ class Ros1Client:
                 raise GraphError(f"{self.name} has a service '{service}' already")
             self._offers[service] = self._node.service(service, srvtype, handle)
 
-    def withdraw(self, service: str) -> None:
+    def destroy_service(self, service: str) -> None:
         """Destroys a service. Raises `GraphError` if it does not exist."""
         with self._lock:
             offered = self._offers.pop(service, None)
@@ -187,14 +187,14 @@ class Ros1Client:
         """Unregisters all topics and services; the node itself ends with the process."""
         self._closed.set()
         with self._lock:
-            topics, mailboxes = tuple(self._publishers), tuple(self._mailboxes)
+            topics, queues = tuple(self._publishers), tuple(self._queues)
             services = tuple(self._offers)
         for topic in topics:
             self.unadvertise(topic)
-        for mailbox in mailboxes:
-            self.unsubscribe(mailbox)
+        for queue in queues:
+            self.unsubscribe(queue)
         for service in services:
-            self.withdraw(service)
+            self.destroy_service(service)
 
     @property
     def info(self) -> SessionInfo:
@@ -203,7 +203,7 @@ class Ros1Client:
             return SessionInfo(
                 self.name,
                 tuple(self._publishers),
-                tuple(mailbox.info for mailbox in self._mailboxes),
+                tuple(queue.info for queue in self._queues),
                 tuple(self._offers),
             )
 

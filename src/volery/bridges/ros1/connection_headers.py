@@ -52,7 +52,7 @@ class HeaderServer:
             selector.register(self._wake_up, selectors.EVENT_READ)
             selector.register(self._listener, selectors.EVENT_READ)
             while True:
-                ready = [key.fileobj for key, _ in selector.select(self._patience_s())]
+                ready = [key.fileobj for key, _ in selector.select(self._timeout_s())]
                 if self._is_stopping:
                     break
                 for connection in ready:
@@ -72,7 +72,7 @@ class HeaderServer:
 
     # ---------------------------------------------------------------------------------- internal
 
-    def _patience_s(self) -> float | None:
+    def _timeout_s(self) -> float | None:
         for waiting in self._waiting.values():
             return max(0.0, waiting.deadline_s - time.monotonic())
         return None
@@ -105,7 +105,7 @@ class HeaderServer:
                 waiting.wanted = _LENGTH.size + length
                 _wake_at(connection, waiting.wanted)
             else:
-                self._listener.note_stranger("anything but TCPROS")
+                self._listener.note_foreign_protocol("anything but TCPROS")
                 self._drop(connection, selector)
         else:
             _wake_at(connection, 1)

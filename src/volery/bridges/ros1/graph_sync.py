@@ -78,7 +78,7 @@ class GraphSync:
     def _update_outlet(self, topic: TopicInfo, publishers: int) -> None:
         outlet = self._outlets.get(topic.name)
         if outlet is None:
-            if publishers and self._speaks(topic):
+            if publishers and self._is_publisher(topic):
                 names = topic.name, topic.msgtype
                 self._outlets[topic.name] = Ros1OutgoingTopic(
                     self.node, self._session, self._pump, names, latched=topic.latched
@@ -89,7 +89,7 @@ class GraphSync:
     def _update_inlet(self, topic: TopicInfo, publishers: int, subscribers: int) -> None:
         name = topic.name
         takes = self._sharing.takes(name, publishers, subscribers)
-        if takes and name not in self._inlets and self._speaks(topic):
+        if takes and name not in self._inlets and self._is_publisher(topic):
             self._inlets[name] = self.node.subscriber(name, topic.msgtype, self._receive(topic))
         elif not takes and name in self._inlets:
             self._inlets.pop(name).unregister()
@@ -118,7 +118,7 @@ class GraphSync:
 
         return receive
 
-    def _speaks(self, topic: TopicInfo) -> bool:
+    def _is_publisher(self, topic: TopicInfo) -> bool:
         """Returns whether ROS 1 has a form of the topic's type."""
         if topic.name in self._refused:
             return False
@@ -144,7 +144,7 @@ class GraphSync:
         Raises `GraphError` for a wrong type or a taken name.
         """
         for name, srvtype in services.items():
-            self._session.offer(name, srvtype, self._caller(name, srvtype))
+            self._session.create_service(name, srvtype, self._caller(name, srvtype))
             self._remote.add(name)
 
     def _caller(self, name: str, srvtype: str) -> Any:

@@ -43,13 +43,13 @@ class Ros1OutgoingTopic:
         self._session = session
         self._pump = pump
         self._encode = ros1_codec().encode
-        self._mailbox: SubscriptionQueue | None = None
+        self._queue: SubscriptionQueue | None = None
         self._connections: list[Any] = []
         self._readers: dict[Any, Reader] = {}
         self._own: OrderedDict[int, Any] = OrderedDict()
         self._sequence = 0
         self._dropped = 0
-        self._complained = False
+        self._has_warned = False
         self._publisher = node.outlet(self.topic, self.msgtype, self.wake, latched=latched)
         self.wake()
 
@@ -61,7 +61,7 @@ class Ros1OutgoingTopic:
     @property
     def holds(self) -> bool:
         """Whether it subscribes to the graph."""
-        return self._mailbox is not None
+        return self._queue is not None
 
     @property
     def dropped(self) -> int:
@@ -70,7 +70,7 @@ class Ros1OutgoingTopic:
 
     def leave_out(self, message: Any) -> None:
         """Skips a message that came from ROS 1 itself."""
-        if self._mailbox is not None:
+        if self._queue is not None:
             self._own[id(message)] = message
             if len(self._own) > _OWN_KEPT:
                 self._own.popitem(last=False)
@@ -84,13 +84,13 @@ class Ros1OutgoingTopic:
         if not self._readers:
             self._let_go()
             return
-        if self._mailbox is None:  # a new queue has the latched messages, for all readers
-            self._mailbox = self._session.subscribe(
+        if self._queue is None:  # a new queue has the latched messages, for all readers
+            self._queue = self._session.subscribe(
                 self.topic, self.msgtype, depth=_DEPTH, wake=self.wake
             )
             newcomers = []
-        kept = self._kept() if self.latched and newcomers else []
-        fresh = self._mailbox.take()
+        kept = self._latched_messages() if self.latched and newcomers else []
+        fresh = self._queue.take()
         known = {id(published) for published in fresh}
         for published in kept:
             if id(published) not in known:
@@ -127,7 +127,7 @@ class Ros1OutgoingTopic:
                 newcomers.append(reader)
         return newcomers
 
-    def _kept(self) -> list[Published]:
+    def _latched_messages(self) -> list[Published]:
         """Returns the last messages of latched publishers of the graph."""
         glance = self._session.subscribe(self.topic, self.msgtype, depth=_DEPTH, wake=_nothing)
         self._session.unsubscribe(glance)
@@ -137,8 +137,8 @@ class Ros1OutgoingTopic:
         try:
             data = self._encode(published.message, self.msgtype, self._sequence)
         except GraphError as error:
-            if not self._complained:
-                self._complained = True
+            if not self._has_warned:
+                self._has_warned = True
                 _log.warning("ROS 1 topic %s: %s", self.topic, error)
             return
         self._sequence += 1
@@ -146,9 +146,9 @@ class Ros1OutgoingTopic:
             reader.send(data)
 
     def _let_go(self) -> None:
-        if self._mailbox is not None:
-            self._session.unsubscribe(self._mailbox)
-            self._mailbox = None
+        if self._queue is not None:
+            self._session.unsubscribe(self._queue)
+            self._queue = None
             self._own.clear()
 
 

@@ -69,7 +69,7 @@ class ActionServer:
         self._worker = worker
         self._name, self._type = action
         self._asked: OrderedDict[bytes, _Asked] = OrderedDict()
-        self._complaints = WarningFilter()
+        self._warnings = WarningFilter()
         self._feedback_type = f"{self._type}_FeedbackMessage"
         prefix = f"{self._name}/_action"
         feedback = TopicSpec(node, f"{prefix}/feedback", self._feedback_type)
@@ -83,7 +83,7 @@ class ActionServer:
             ("get_result", f"{self._type}_GetResult", self._on_result),
         ):
             spec = ServiceSpec(node, f"{prefix}/{word}", srvtype)
-            serve = answerer(worker, srvtype, self._in_simulation(take), self._complaints)
+            serve = answerer(worker, srvtype, self._in_simulation(take), self._warnings)
             self._handles.append(participant.server(spec, serve))
 
     def close(self) -> None:
@@ -114,7 +114,7 @@ class ActionServer:
             accepted = self._begin(asked, request.goal)
         response = message_type(f"{self._type}_SendGoal_Response")
         reply.answer(response(accepted, time_from_ns(now_ns)))
-        self._tell_status()
+        self._publish_status()
 
     def _make_room(self) -> bool:
         if len(self._asked) >= MOST_GOALS:
@@ -125,12 +125,12 @@ class ActionServer:
         return True
 
     def _begin(self, asked: _Asked, request: Any) -> bool:
-        self._session.tell("goal", self._name, self._type, request)
+        self._session.record_command("goal", self._name, self._type, request)
         try:
-            asked.goal = self._graph.actions.send(
+            asked.goal = self._graph.actions.send_goal(
                 self._name,
                 request,
-                lambda message: self._tell_feedback(asked, message),
+                lambda message: self._publish_feedback(asked, message),
                 lambda status, result: self._end(asked, status, result),
             )
         except GraphError as error:
@@ -139,7 +139,7 @@ class ActionServer:
             return False
         return True
 
-    def _tell_feedback(self, asked: _Asked, message: Any) -> None:
+    def _publish_feedback(self, asked: _Asked, message: Any) -> None:
         told = message_type(self._feedback_type)(_uuid(asked.goal_id), message)
         self._worker.post(lambda: self._feedback.write(encode_cdr(told, self._feedback_type)))
 
@@ -149,7 +149,7 @@ class ActionServer:
         waiting, asked.waiting = asked.waiting, []
         for reply in waiting:
             reply.answer(self._response(asked))
-        self._tell_status()
+        self._publish_status()
 
     def _response(self, asked: _Asked) -> Any:
         return message_type(f"{self._type}_GetResult_Response")(asked.status, asked.result)
@@ -189,19 +189,19 @@ class ActionServer:
                 _UNKNOWN_GOAL if known is None else _TERMINATED if ended else _REJECTED
             )
         reply.answer(response)
-        self._tell_status()
+        self._publish_status()
 
     def _cancel(self, asked: _Asked) -> bool:
         if asked.ended or asked.goal is None:
             return False
-        self._session.tell("cancel", self._name, self._type)
+        self._session.record_command("cancel", self._name, self._type)
         if not asked.goal.cancel():
             return False
         if not asked.ended:
             asked.status = _CANCELING
         return True
 
-    def _tell_status(self) -> None:
+    def _publish_status(self) -> None:
         entry = message_type("action_msgs/msg/GoalStatus")
         found = [entry(_info(asked), asked.status) for asked in self._asked.values()]
         told = message_type("action_msgs/msg/GoalStatusArray")(found)
@@ -217,7 +217,7 @@ class ActionServers:
         self._parts = participant, session, worker, node
         self._session = session
         self._servers: dict[str, ActionServer] = {}
-        self._complaints = WarningFilter()
+        self._warnings = WarningFilter()
 
     def survey(self) -> None:
         """Creates servers of new actions and destroys those of removed ones."""
@@ -226,7 +226,7 @@ class ActionServers:
             self._servers.pop(name).close()
         for name, action_type in types.items():
             if name not in self._servers:
-                self._complaints.tried(name, lambda n=name, t=action_type: self._offer(n, t))  # type: ignore[misc]
+                self._warnings.tried(name, lambda n=name, t=action_type: self._offer(n, t))  # type: ignore[misc]
 
     def _offer(self, name: str, action_type: str) -> None:
         check_name(name)

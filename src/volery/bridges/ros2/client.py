@@ -1,7 +1,7 @@
 """Connects a program to a ROS 2 graph, with the methods of `graph.session.Session`.
 
     link = Ros2Client(Ros2Environment(domain_id=7), "/uav1/gap_following")
-    mailbox = link.subscribe("/uav1/laser/horizontal/scan", wake=woken.set)
+    queue = link.subscribe("/uav1/laser/horizontal/scan", wake=woken.set)
 
 A node that runs on it (`volery node ... --via ros2`) is a ROS 2 node of its own name, with its
 parameters.
@@ -64,7 +64,7 @@ class Ros2Client:
         self._participant.add_node(self._node)
         self._participant.announce()
         self._worker = Ros2WriterThread()
-        self._complaints = WarningFilter()
+        self._warnings = WarningFilter()
         self._lock = threading.RLock()
         self._publishers: dict[str, _Publisher] = {}
         self._subscriptions = Subscriptions(self._participant, self._node)
@@ -172,16 +172,16 @@ class Ros2Client:
         check_name(topic)
         found = msgtype or self._type_of(topic)
         _known(found)
-        mailbox = SubscriptionQueue(topic, depth, wake, reliable=reliable)
+        queue = SubscriptionQueue(topic, depth, wake, reliable=reliable)
         with self._lock:
             self._check_open()
-            self._subscriptions.open(mailbox, found, depth)
+            self._subscriptions.open(queue, found, depth)
         self._participant.announce()
-        return mailbox
+        return queue
 
-    def unsubscribe(self, mailbox: SubscriptionQueue) -> None:
+    def unsubscribe(self, queue: SubscriptionQueue) -> None:
         """Ends a subscription; queued messages remain available."""
-        self._subscriptions.close(mailbox)
+        self._subscriptions.close(queue)
         self._participant.announce()
 
     def _type_of(self, topic: str) -> str:
@@ -239,7 +239,7 @@ class Ros2Client:
                 self._callers[service] = spec, self._participant.caller(spec)
             return self._callers[service]
 
-    def offer(self, service: str, srvtype: str, handler: Handler) -> None:
+    def create_service(self, service: str, srvtype: str, handler: Handler) -> None:
         """Creates a service; `handler(request, reply)` is called in a thread of the connection."""
         check_name(service)
         _known(f"{srvtype}_Request")
@@ -247,12 +247,12 @@ class Ros2Client:
             self._check_open()
             if service in self._servers:
                 raise GraphError(f"{self.name} has a service '{service}' already")
-            take = answerer(self._worker, srvtype, handler, self._complaints)
+            take = answerer(self._worker, srvtype, handler, self._warnings)
             spec = ServiceSpec(self._node, service, srvtype)
             self._servers[service] = self._participant.server(spec, take)
         self._participant.announce()
 
-    def withdraw(self, service: str) -> None:
+    def destroy_service(self, service: str) -> None:
         """Destroys a service. Raises `GraphError` if it does not exist."""
         with self._lock:
             server = self._servers.pop(service, None)

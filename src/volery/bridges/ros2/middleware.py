@@ -129,8 +129,8 @@ class Participant(Protocol):
     def service_types(self) -> Mapping[str, str]:
         """Returns services of others, and their types."""
 
-    def when_changed(self, tell: Callable[[], None]) -> None:
-        """Calls `tell` when others appear or leave."""
+    def when_changed(self, callback: Callable[[], None]) -> None:
+        """Calls `callback` when others appear or leave."""
 
     def close(self) -> None:
         """Leaves the graph."""

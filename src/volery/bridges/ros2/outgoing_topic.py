@@ -32,24 +32,24 @@ class Ros2OutgoingTopic:
         self.spec = spec
         self._session = session
         self._worker = worker
-        self._mailbox: SubscriptionQueue | None = None
+        self._queue: SubscriptionQueue | None = None
         self._own: OrderedDict[int, Any] = OrderedDict()
-        self._complained = False
+        self._has_warned = False
         self._closed = False
         self._writer = participant.writer(spec)
 
     @property
-    def holds(self) -> bool:
+    def is_subscribed(self) -> bool:
         """Whether it subscribes to the graph."""
-        return self._mailbox is not None
+        return self._queue is not None
 
     @property
     def dropped(self) -> int:
         """Number of messages that were not sent in time."""
-        return 0 if self._mailbox is None else self._mailbox.info.dropped
+        return 0 if self._queue is None else self._queue.info.dropped
 
     @property
-    def wanted(self) -> bool:
+    def should_subscribe(self) -> bool:
         """Whether it should subscribe to the graph."""
         return self.spec.profile.latched or self._writer.matched
 
@@ -59,31 +59,31 @@ class Ros2OutgoingTopic:
 
     def adapt(self) -> None:
         """Subscribes to or unsubscribes from the graph with the subscribers."""
-        if self.wanted != self.holds:
+        if self.should_subscribe != self.is_subscribed:
             self._worker.post(self._adapt)
 
     def _adapt(self) -> None:
-        if self._closed or self.wanted == self.holds:
+        if self._closed or self.should_subscribe == self.is_subscribed:
             return
-        if self.holds:
+        if self.is_subscribed:
             self._let_go()
         else:
-            self._mailbox = self._session.subscribe(
+            self._queue = self._session.subscribe(
                 self.spec.topic, self.spec.msgtype, depth=_DEPTH, wake=self.wake
             )
 
     def leave_out(self, message: Any) -> None:
         """Skips a message that came from ROS 2 itself."""
-        if self._mailbox is not None:
+        if self._queue is not None:
             self._own[id(message)] = message
             if len(self._own) > _OWN_KEPT:
                 self._own.popitem(last=False)
 
     def serve(self) -> None:
         """Sends queued messages."""
-        if self._mailbox is None:  # unsubscribed, or closed
+        if self._queue is None:  # unsubscribed, or closed
             return
-        for published in self._mailbox.take():
+        for published in self._queue.take():
             if not self._own or self._own.pop(id(published.message), None) is None:
                 self._send(published)
 
@@ -97,14 +97,14 @@ class Ros2OutgoingTopic:
         try:
             cdr = published.cdr
         except (*CODING_ERRORS, AssertionError) as error:
-            if not self._complained:
-                self._complained = True
+            if not self._has_warned:
+                self._has_warned = True
                 _log.warning("ROS 2 topic %s: %s", self.spec.topic, error)
             return
         self._writer.write(cdr)
 
     def _let_go(self) -> None:
-        if self._mailbox is not None:
-            self._session.unsubscribe(self._mailbox)
-            self._mailbox = None
+        if self._queue is not None:
+            self._session.unsubscribe(self._queue)
+            self._queue = None
             self._own.clear()

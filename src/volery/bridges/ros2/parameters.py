@@ -66,7 +66,7 @@ class ParameterServices:
         self._worker = worker
         self._now_ns = now_ns
         self._nodes: dict[NodeName, list[Handle]] = {}
-        self._complaints = WarningFilter()
+        self._warnings = WarningFilter()
         spec = TopicSpec(owner, _EVENTS, _EVENT_TYPE, profile_of(_EVENTS, "", latched=False))
         self._events = participant.writer(spec)
 
@@ -76,7 +76,7 @@ class ParameterServices:
         for node in [node for node in self._nodes if node not in wanted]:
             self._leave(node)
         for node in wanted - self._nodes.keys():
-            self._complaints.tried(node.full, lambda n=node: self._enter(n))  # type: ignore[misc]
+            self._warnings.tried(node.full, lambda n=node: self._enter(n))  # type: ignore[misc]
 
     def _enter(self, node: NodeName) -> None:
         check_name(node.full)
@@ -109,7 +109,7 @@ class ParameterServices:
             self._worker,
             srvtype,
             lambda request, reply: answers[base](node, request, reply),
-            self._complaints,
+            self._warnings,
         )
         return self._participant.server(ServiceSpec(node, f"{node.full}/{word}", srvtype), take)
 
@@ -204,7 +204,7 @@ class ParameterServices:
 
         def finish(reason: str) -> None:
             if not reason and not self._is_clock(node, wanted[len(results)].name):
-                self._tell_event(node, wanted[len(results)])
+                self._publish_event(node, wanted[len(results)])
             results.append(_result(reason))
             go_on()
 
@@ -214,7 +214,7 @@ class ParameterServices:
         """Returns whether it is the parameter that every node has without declaring it."""
         return name == _SIM_TIME and (node.full, name) not in self._declared.names()
 
-    def _tell_event(self, node: NodeName, parameter: Any) -> None:
+    def _publish_event(self, node: NodeName, parameter: Any) -> None:
         event = zero_message(_EVENT_TYPE)
         event.stamp = time_from_ns(self._now_ns())
         event.node, event.changed_parameters = node.full, [parameter]

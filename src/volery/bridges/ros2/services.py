@@ -41,7 +41,7 @@ class Ros2Services:
         self._worker = worker
         self._servers: dict[str, Handle] = {}
         self._callers: dict[str, Caller] = {}
-        self._complaints = WarningFilter()
+        self._warnings = WarningFilter()
 
     def survey(self) -> None:
         """Creates ROS 2 servers of new services and destroys those of removed ones."""
@@ -54,11 +54,11 @@ class Ros2Services:
             self._servers.pop(name).close()
         for name, srvtype in offered.items():
             if name not in self._servers:
-                self._complaints.tried(name, lambda n=name, t=srvtype: self._offer(n, t))  # type: ignore[misc]
+                self._warnings.tried(name, lambda n=name, t=srvtype: self._offer(n, t))  # type: ignore[misc]
 
     def _offer(self, name: str, srvtype: str) -> None:
         check_name(name)
-        take = answerer(self._worker, srvtype, self._asker(name), self._complaints)
+        take = answerer(self._worker, srvtype, self._asker(name), self._warnings)
         spec = ServiceSpec(self._node, name, srvtype)
         self._servers[name] = self._participant.server(spec, take)
 
@@ -71,7 +71,7 @@ class Ros2Services:
             check_name(name)
             spec = ServiceSpec(self._node, name, srvtype)
             caller = self._participant.caller(spec)
-            self._session.offer(name, srvtype, _forwarder(caller, spec))
+            self._session.create_service(name, srvtype, _forwarder(caller, spec))
             self._callers[name] = caller
 
     def close(self) -> None:
@@ -94,7 +94,7 @@ def answerer(
     worker: Ros2WriterThread,
     srvtype: str,
     ask: Callable[[Any, ServiceReply], None],
-    complaints: WarningFilter,
+    warnings: WarningFilter,
 ) -> Callable[[bytes, Answer], None]:
     """Returns a `TakeRequest` that decodes requests for `ask` and encodes its responses.
 
@@ -108,7 +108,7 @@ def answerer(
             worker.post(lambda: answer(encode_cdr(response, response_type)))
 
         def fail(error: GraphError) -> None:
-            complaints.tell(srvtype, str(error))
+            warnings.warn(srvtype, str(error))
             refusal = _refusal(response_type, str(error))
             if refusal is not None:
                 respond(refusal)
@@ -116,7 +116,7 @@ def answerer(
         try:
             request = decode_cdr(data, f"{srvtype}_Request")
         except GraphError as error:
-            complaints.tell(srvtype, str(error))
+            warnings.warn(srvtype, str(error))
             return
         ask(request, ServiceReply(respond, fail))
 

@@ -22,7 +22,7 @@ class Subscriptions:
         self._participant = participant
         self._node = node
         self._inlets: dict[SubscriptionQueue, _Inlet] = {}
-        self._complaints = WarningFilter()
+        self._warnings = WarningFilter()
         self._lock = threading.RLock()
         self._closed = False
 
@@ -30,20 +30,20 @@ class Subscriptions:
     def infos(self) -> tuple[SubscriptionQueueInfo, ...]:
         """State of the subscriptions."""
         with self._lock:
-            return tuple(mailbox.info for mailbox in self._inlets)
+            return tuple(queue.info for queue in self._inlets)
 
-    def open(self, mailbox: SubscriptionQueue, msgtype: str, depth: int) -> None:
+    def open(self, queue: SubscriptionQueue, msgtype: str, depth: int) -> None:
         """Subscribes for a queue."""
-        receive = self._receiver(mailbox, msgtype)
+        receive = self._receiver(queue, msgtype)
         with self._lock:
-            inlet = _Inlet(mailbox.topic, msgtype, max(depth, DEFAULT_DEPTH), receive)
-            self._inlets[mailbox] = inlet
+            inlet = _Inlet(queue.topic, msgtype, max(depth, DEFAULT_DEPTH), receive)
+            self._inlets[queue] = inlet
             self._subscribe(inlet)
 
-    def close(self, mailbox: SubscriptionQueue) -> None:
+    def close(self, queue: SubscriptionQueue) -> None:
         """Ends a queue's subscription; further calls do nothing."""
         with self._lock:
-            inlet = self._inlets.pop(mailbox, None)
+            inlet = self._inlets.pop(queue, None)
             if inlet is not None and inlet.handle is not None:
                 inlet.handle.close()
 
@@ -51,8 +51,8 @@ class Subscriptions:
         """Ends all subscriptions."""
         with self._lock:
             self._closed = True
-            for mailbox in tuple(self._inlets):
-                self.close(mailbox)
+            for queue in tuple(self._inlets):
+                self.close(queue)
 
     def adapt(self) -> None:
         """Adapts to the current publishers' profiles."""
@@ -69,14 +69,14 @@ class Subscriptions:
                 inlet.profile = None
                 self._subscribe(inlet)
 
-    def _receiver(self, mailbox: SubscriptionQueue, msgtype: str) -> Callable[[bytes], None]:
+    def _receiver(self, queue: SubscriptionQueue, msgtype: str) -> Callable[[bytes], None]:
         def receive(data: bytes) -> None:
             try:
                 message = decode_cdr(data, msgtype)
             except GraphError as error:
-                self._complaints.tell(mailbox.topic, str(error))
+                self._warnings.warn(queue.topic, str(error))
                 return
-            mailbox.put(Published(mailbox.topic, msgtype, time.time_ns(), message))
+            queue.put(Published(queue.topic, msgtype, time.time_ns(), message))
 
         return receive
 

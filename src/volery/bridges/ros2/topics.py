@@ -39,7 +39,7 @@ class Ros2Topics:
         self._worker = worker
         self._outlets: dict[str, Ros2OutgoingTopic] = {}
         self._inlets: dict[str, tuple[Profile, Handle]] = {}
-        self._complaints = WarningFilter()
+        self._warnings = WarningFilter()
 
     @property
     def dropped(self) -> dict[str, int]:
@@ -55,7 +55,7 @@ class Ros2Topics:
         for topic in self._session.graph.topics():
             if self._sharing.has(topic.name):
                 known = remote.get(topic.name, [])
-                self._complaints.tried(topic.name, lambda t=topic, k=known: self._update(t, k))  # type: ignore[misc]
+                self._warnings.tried(topic.name, lambda t=topic, k=known: self._update(t, k))  # type: ignore[misc]
 
     def _update(self, topic: TopicInfo, remote: list[RemotePublisher]) -> None:
         check_name(topic.name)
@@ -97,7 +97,7 @@ class Ros2Topics:
         self, topic: TopicInfo, publishers: int, remote: list[RemotePublisher]
     ) -> None:
         name, outlet = topic.name, self._outlets.get(topic.name)
-        subscribers = topic.subscribers - (outlet is not None and outlet.holds)
+        subscribers = topic.subscribers - (outlet is not None and outlet.is_subscribed)
         known = self._inlets.get(name)
         if not self._sharing.takes(name, publishers, subscribers):
             if known is not None:
@@ -120,10 +120,10 @@ class Ros2Topics:
         for publisher in remote:
             if publisher.msgtype != topic.msgtype:
                 text = f"carries {topic.msgtype}; a publisher of {publisher.msgtype} is ignored"
-                self._complaints.tell(topic.name, text)
+                self._warnings.warn(topic.name, text)
             elif publisher.type_hash not in (None, message_hash(topic.msgtype)):
                 text = f"a publisher has another definition of {topic.msgtype}"
-                self._complaints.tell(topic.name, f"{text} ({publisher.type_hash})")
+                self._warnings.warn(topic.name, f"{text} ({publisher.type_hash})")
 
     def _receive(self, topic: TopicInfo, profile: Profile) -> Any:
         name, msgtype = topic.name, topic.msgtype
@@ -137,6 +137,6 @@ class Ros2Topics:
                 self._session.advertise(name, msgtype, latched=profile.latched)
                 self._session.publish(name, message)
             except GraphError as error:
-                self._complaints.tell(name, str(error))
+                self._warnings.warn(name, str(error))
 
         return receive

@@ -16,7 +16,7 @@ class WarningFilter:
     """Warnings by name."""
 
     def __init__(self) -> None:
-        self._told: set[tuple[str, str]] = set()
+        self._logged: set[tuple[str, str]] = set()
         self._refused: set[str] = set()
 
     def tried(self, name: str, action: Callable[[], object]) -> None:
@@ -27,11 +27,11 @@ class WarningFilter:
             action()
         except Exception as error:  # an error of one name must not end the others
             self._refused.add(name)
-            told = str(error) if isinstance(error, GraphError) else repr(error)
-            self.tell(name, f"is not shared: {told}")
+            reason = str(error) if isinstance(error, GraphError) else repr(error)
+            self.warn(name, f"is not shared: {reason}")
 
-    def tell(self, name: str, text: str) -> None:
+    def warn(self, name: str, text: str) -> None:
         """Logs a warning, the first time."""
-        if (name, text) not in self._told and len(self._told) < _MOST:
-            self._told.add((name, text))
+        if (name, text) not in self._logged and len(self._logged) < _MOST:
+            self._logged.add((name, text))
             _log.warning("ROS 2: %s: %s", name, text)

@@ -1,7 +1,7 @@
 """Connects a program to the graph of a ROS-TCP endpoint: Volery's, or Unity's ROS-TCP-Endpoint.
 
     client = RosTcpClient("127.0.0.1", 10000, name="planner")
-    mailbox = client.subscribe("/uav1/odom", "nav_msgs/msg/Odometry", wake=wake)
+    queue = client.subscribe("/uav1/odom", "nav_msgs/msg/Odometry", wake=wake)
     client.advertise("/uav1/cmd_vel", "geometry_msgs/msg/Twist")
     client.publish("/uav1/cmd_vel", Twist(...))
 
@@ -30,7 +30,7 @@ from volery.core.errors import BridgeError, GraphError, reason_of
 from volery.graph.service_reply import ServiceReply
 from volery.graph.session import SessionInfo
 
-MOST_COMPLAINTS = 100
+MOST_PROBLEMS = 100
 
 
 class RosTcpClient(RemoteClient):
@@ -85,14 +85,14 @@ class RosTcpClient(RemoteClient):
         self._topics = ClientTopics(self._line)
         self._services = ClientServices(self._line)
         self._body: tuple[str, int] | None = None
-        self._pipe: RosTcpConnection | None = None
-        self._complaints: deque[str] = deque(maxlen=MOST_COMPLAINTS)
+        self._stream: RosTcpConnection | None = None
+        self._problems: deque[str] = deque(maxlen=MOST_PROBLEMS)
         self._start(connect_timeout_s)
 
     @property
     def problem(self) -> tuple[str, ...]:
         """Newest error reports of the endpoint, and errors of the connection."""
-        return tuple(self._complaints)
+        return tuple(self._problems)
 
     @property
     def dropped(self) -> int:
@@ -103,8 +103,8 @@ class RosTcpClient(RemoteClient):
     def info(self) -> SessionInfo:
         """Current state of the client."""
         with self._line.lock:
-            publishes, mailboxes = self._topics.announced, self._topics.mailboxes
-        return SessionInfo(self.name, publishes, mailboxes, self._services.offered)
+            publishes, queues = self._topics.announced, self._topics.queues
+        return SessionInfo(self.name, publishes, queues, self._services.offered)
 
     def topic_types(self) -> dict[str, str]:
         """Returns topics of the graph and their types, by name.
@@ -124,14 +124,14 @@ class RosTcpClient(RemoteClient):
     # ------------------------------------------------------------------------------- its thread
 
     def _leave(self) -> None:
-        if self._pipe is None:
+        if self._stream is None:
             super()._leave()
         else:
-            self._pipe.finish()
+            self._stream.finish()
 
     def _flush(self) -> None:
-        if self._pipe is not None:
-            self._pipe.flush()
+        if self._stream is not None:
+            self._stream.flush()
 
     async def _keep_connected(self) -> None:
         pause_s = FIRST_PAUSE_S
@@ -154,32 +154,32 @@ class RosTcpClient(RemoteClient):
         reasons: list[str] = []
 
         def closed(reason: str) -> None:
-            self._pipe = None
+            self._stream = None
             reasons.append(reason)
             if not ended.done():
                 ended.set_result(None)
 
         def broken(reason: str) -> None:
             reasons.append(reason)
-            self._complaints.append(reason)
+            self._problems.append(reason)
 
         self._body = None
         try:
-            pipe = RosTcpConnection(
+            stream = RosTcpConnection(
                 sock, RosTcpFrameParser(), self._line, self._take, broken, closed
             )
         except OSError:
             sock.close()
             raise
-        self._pipe = pipe
+        self._stream = stream
         try:
             self._line.keep_alive()
-            await self._attend(pipe, ended)
+            await self._attend(stream, ended)
         finally:
-            pipe.close(f"{self.name} is closed")
+            stream.close(f"{self.name} is closed")
         self._why = reasons[0]
 
-    async def _attend(self, pipe: RosTcpConnection, ended: asyncio.Future[None]) -> None:
+    async def _attend(self, stream: RosTcpConnection, ended: asyncio.Future[None]) -> None:
         """Sends keepalives until the connection ends."""
         latest_s = self._loop.time() + self._handshake_s
         while not ended.done():
@@ -187,7 +187,7 @@ class RosTcpClient(RemoteClient):
             now_s = self._loop.time()
             if not self._line.open and now_s >= latest_s and not ended.done():
                 self._begin(self._generation, frozenset())
-            if now_s >= pipe.last_sent_s + KEEPALIVE_S and not self._line.crowded:
+            if now_s >= stream.last_sent_s + KEEPALIVE_S and not self._line.crowded:
                 self._line.keep_alive()
 
     def _begin(self, generation: Generation, features: frozenset[str]) -> None:
@@ -224,7 +224,7 @@ class RosTcpClient(RemoteClient):
             else:
                 self._services.take_response(body[1], frame)
         except (BridgeError, GraphError) as error:
-            self._complaints.append(f"{frame.destination[:200]}: {error}")
+            self._problems.append(f"{frame.destination[:200]}: {error}")
 
     def _command(self, name: str, fields: dict[str, Any]) -> None:
         if name in ("__request", "__response"):
@@ -233,6 +233,6 @@ class RosTcpClient(RemoteClient):
             self._topics.take_list(fields)
         elif name in ("__error", "__warn", "__log"):
             text = str(fields.get("text", ""))[:1000]
-            self._complaints.append(text)
+            self._problems.append(text)
             if name == "__error":
-                self._services.hear_error(text)
+                self._services.on_error(text)

@@ -131,7 +131,7 @@ class ClientServices:
             return
         call.reply.answer(response)
 
-    def hear_error(self, text: str) -> None:
+    def on_error(self, text: str) -> None:
         """Passes the endpoint's error about a service to its callers.
 
         An endpoint that reports a reason in this way, without an empty response, will not respond.
@@ -149,7 +149,7 @@ class ClientServices:
 
     # ------------------------------------------------------------------------------------ offers
 
-    def offer(self, service: str, srvtype: str, handler: Handler) -> None:
+    def create_service(self, service: str, srvtype: str, handler: Handler) -> None:
         """Creates a service. Raises `GraphError` for an unknown type or an existing service."""
         known(f"{srvtype}_Request")
         with self._line.lock:
@@ -158,16 +158,16 @@ class ClientServices:
             self._offers[service] = _Offer(srvtype, handler)
             self._announce(service, srvtype)
 
-    def withdraw(self, service: str, who: str) -> None:
+    def destroy_service(self, service: str, client_name: str) -> None:
         """Destroys a service; its open requests fail."""
         with self._line.lock:
             offer = self._offers.pop(service, None)
             if offer is None:
-                raise GraphError(f"{who} has no service '{service}'")
+                raise GraphError(f"{client_name} has no service '{service}'")
             if ros_tcp.REMOVE in self._line.features:
                 self._line.command("remove_unity_service", topic=service)
         for reply in tuple(offer.pending):
-            reply.fail(GraphError(f"service '{service}': {who} is closed"))
+            reply.fail(GraphError(f"service '{service}': {client_name} is closed"))
 
     @property
     def offered(self) -> tuple[str, ...]:

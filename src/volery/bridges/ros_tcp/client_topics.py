@@ -75,7 +75,7 @@ class ClientTopics(RemoteTopics):
             return
         self._line.message(topic, self._line.payloads.encode(message, msgtype))
 
-    def _tell_advertised(self, topic: str, msgtype: str, latched: bool) -> None:
+    def _send_advertised(self, topic: str, msgtype: str, latched: bool) -> None:
         self._line.command(
             "publish",
             topic=topic,
@@ -84,16 +84,16 @@ class ClientTopics(RemoteTopics):
             latch=latched,
         )
 
-    def _tell_unadvertised(self, topic: str) -> None:
+    def _send_unadvertised(self, topic: str) -> None:
         self._remove("publisher", topic)
 
-    def _tell_subscribed(self, topic: str, subscription: Subscription) -> None:
+    def _send_subscribed(self, topic: str, subscription: Subscription) -> None:
         fields: dict[str, Any] = {"message_name": self._line.payloads.short(subscription.msgtype)}
         if ros_tcp.QUEUE_SIZE in self._line.features:
             fields["queue_size"] = 0 if subscription.reliable else subscription.depth
         self._line.command("subscribe", topic=topic, **fields)
 
-    def _tell_unsubscribed(self, topic: str) -> None:
+    def _send_unsubscribed(self, topic: str) -> None:
         self._remove("subscriber", topic)
 
     def _remove(self, what: str, topic: str) -> None:

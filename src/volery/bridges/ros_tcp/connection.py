@@ -21,8 +21,8 @@ _BATCHES_A_TURN = 16
 """Batches after which others have their turn."""
 _FRAMES_A_TURN = 32
 """Frames beyond which a peer is read in small parts, so that a flood does not delay others."""
-_BITE_BYTES = 2048
-_LARGEST_BITE_BYTES = 256 << 10
+_CHUNK_BYTES = 2048
+_MAX_CHUNK_BYTES = 256 << 10
 """Limit of one read, which copies as long as the peer refills the socket: a read of 16 MB took a
 tenth of a second."""
 _PREAMBLE_BYTES = 16
@@ -46,7 +46,7 @@ class ServerEnd(NamedTuple):
     preamble: Preamble
     prove: Callable[[], None]
     """Called when a valid frame has arrived."""
-    note_stranger: Callable[[str], None]
+    note_foreign_protocol: Callable[[str], None]
     """Called with the protocol of a client that uses another one."""
 
 
@@ -94,7 +94,7 @@ class RosTcpConnection:
         self._paused: asyncio.TimerHandle | None = None
         self._unsent: list[Bytes] = []
         self._blocked = False
-        self._bite = _BITE_BYTES
+        self._chunk_bytes = _CHUNK_BYTES
         self._reading = True
         self._ending = False
         self._open = True
@@ -133,7 +133,7 @@ class RosTcpConnection:
     def _readable(self) -> None:
         space = self.parser.space()
         try:
-            count = self._sock.recv_into(space[: self._bite])
+            count = self._sock.recv_into(space[: self._chunk_bytes])
         except (BlockingIOError, InterruptedError):
             return
         except OSError as error:
@@ -145,13 +145,15 @@ class RosTcpConnection:
         self.last_received_s = self._loop.time()
         if self._ending:  # unread bytes would make the system discard our last frames
             return
-        if self._is_stranger(space[:count]):
+        if self._is_foreign(space[:count]):
             return
         try:
             frames = self.parser.written(count)
             self._prove(bool(frames))
             flood = len(frames) > _FRAMES_A_TURN
-            self._bite = _BITE_BYTES if flood else min(2 * self._bite, _LARGEST_BITE_BYTES)
+            self._chunk_bytes = (
+                _CHUNK_BYTES if flood else min(2 * self._chunk_bytes, _MAX_CHUNK_BYTES)
+            )
             self._take_all(frames, count)
         except BridgeError as error:
             self._broken(str(error))
@@ -160,7 +162,7 @@ class RosTcpConnection:
             self._reading = False
             self._loop.remove_reader(self._sock)
 
-    def _is_stranger(self, data: memoryview) -> bool:
+    def _is_foreign(self, data: memoryview) -> bool:
         """Ends a connection with another protocol; returns whether it did.
 
         Nothing need be held back: no frame is whole before its first bytes show the protocol.
@@ -171,7 +173,7 @@ class RosTcpConnection:
         preamble.feed(bytes(data[:_PREAMBLE_BYTES]))
         if preamble.refused is None:
             return False
-        self._unproven.note_stranger(preamble.refused)
+        self._unproven.note_foreign_protocol(preamble.refused)
         self.close(f"it uses {preamble.refused}")
         return True
 

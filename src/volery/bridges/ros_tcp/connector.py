@@ -162,7 +162,7 @@ class RosTcpConnector:
             await connection.attend(self._handshake_s)
         finally:
             self._session = None
-            connection.pipe.close("the bridge was closed")
+            connection.stream.close("the bridge was closed")
         note(f"the connection has ended: {connection.ended.result()}")
         self._was_lost = True
         return connection.session.generation is not None
@@ -198,7 +198,7 @@ class _Connection:
         """Holds the reason, once there is one."""
         self.session = session = open_session(wake_of(self._loop, self._flush))
         try:
-            self.pipe = RosTcpConnection(
+            self.stream = RosTcpConnection(
                 sock, RosTcpFrameParser(), session.outbox, session.take, note, self._closed
             )
         except OSError:
@@ -209,7 +209,7 @@ class _Connection:
     async def attend(self, handshake_s: float) -> None:
         """Registers new names and sends keepalives, until the connection ends."""
         latest_s = self._loop.time() + handshake_s
-        self.pipe.flush()
+        self.stream.flush()
         while not self.ended.done():
             await asyncio.wait([self.ended], timeout=min(_REFRESH_S, handshake_s))
             now_s = self._loop.time()
@@ -218,11 +218,11 @@ class _Connection:
             elif now_s >= latest_s:
                 self._note("no handshake: assuming an endpoint of ROS 1 before version 0.7")
                 self.session.begin("ros1")
-            if now_s >= self.pipe.last_sent_s + KEEPALIVE_S and not self.session.outbox.crowded:
+            if now_s >= self.stream.last_sent_s + KEEPALIVE_S and not self.session.outbox.crowded:
                 self.session.outbox.put(ros_tcp.KEEPALIVE)
 
     def _flush(self) -> None:
-        self.pipe.flush()
+        self.stream.flush()
 
     def _closed(self, reason: str) -> None:
         self.session.close()

@@ -112,7 +112,7 @@ class RosTcpEndpoint:
             self._listener.close()
             self._listener = None
         for client in tuple(self._clients):
-            client.pipe.close("the bridge was closed")
+            client.stream.close("the bridge was closed")
 
     async def _accept(self, gateway: Gateway, listener: Listener) -> None:
         loop = asyncio.get_running_loop()
@@ -139,8 +139,8 @@ class RosTcpEndpoint:
             await asyncio.sleep(self._silence_s / _CHECKS_A_SILENCE)
             latest = loop.time() - self._silence_s
             for client in tuple(self._clients):
-                if client.pipe.parser.keepalives and client.pipe.last_received_s < latest:
-                    client.pipe.close("it timed out")
+                if client.stream.parser.keepalives and client.stream.last_received_s < latest:
+                    client.stream.close("it timed out")
 
 
 class _Client:
@@ -157,14 +157,16 @@ class _Client:
         self._everyone = everyone
         self._session = session = open_session(wake_of(asyncio.get_running_loop(), self._flush))
         try:
-            self.pipe = RosTcpConnection(
+            self.stream = RosTcpConnection(
                 sock,
                 parser,
                 session.outbox,
                 session.take,
                 session.complain,
                 self._closed,
-                ServerEnd(Preamble(), partial(listener.prove, sock), listener.note_stranger),
+                ServerEnd(
+                    Preamble(), partial(listener.prove, sock), listener.note_foreign_protocol
+                ),
                 session.reading,
             )
         except OSError:
@@ -174,7 +176,7 @@ class _Client:
         everyone.add(self)
 
     def _flush(self) -> None:
-        self.pipe.flush()
+        self.stream.flush()
 
     def _closed(self, _reason: str) -> None:
         self._everyone.discard(self)

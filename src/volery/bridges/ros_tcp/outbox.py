@@ -31,14 +31,14 @@ class _Stream:
 
     def __init__(self, destination: str) -> None:
         self.destination = destination
-        self.mailbox: SubscriptionQueue | None = None
+        self.queue: SubscriptionQueue | None = None
         self.queued = False
         """Whether its turn is scheduled."""
 
     @property
     def next_number(self) -> int | None:
         """Number of its next message in the order of arrival; None if none waits."""
-        return None if self.mailbox is None else self.mailbox.next_number
+        return None if self.queue is None else self.queue.next_number
 
 
 class RosTcpOutbox:
@@ -101,19 +101,19 @@ class RosTcpOutbox:
             self._stir()
 
         self.payloads.learn(msgtype)
-        mailbox = self._session.subscribe(topic, msgtype, depth=depth, reliable=reliable, wake=stir)
+        queue = self._session.subscribe(topic, msgtype, depth=depth, reliable=reliable, wake=stir)
         self.end_stream(destination)
-        stream.mailbox = mailbox
+        stream.queue = queue
         self._streams[destination] = stream
         stir()  # latched messages arrived before the queue was known
 
     def end_stream(self, destination: str) -> bool:
         """Ends a stream; returns whether there was one."""
         stream = self._streams.pop(destination, None)
-        if stream is None or stream.mailbox is None:
+        if stream is None or stream.queue is None:
             return False
-        self._session.unsubscribe(stream.mailbox)
-        stream.mailbox = None
+        self._session.unsubscribe(stream.queue)
+        stream.queue = None
         return True
 
     @property
@@ -162,8 +162,8 @@ class RosTcpOutbox:
 
     def _plan(self, stream: _Stream) -> None:
         """Schedules a topic, or ends it if it has lost messages of a reliable subscription."""
-        if stream.mailbox is not None and stream.mailbox.failure is not None:
-            failure = stream.mailbox.failure
+        if stream.queue is not None and stream.queue.failure is not None:
+            failure = stream.queue.failure
             self.end_stream(stream.destination)
             self._on_error(failure)
             return
@@ -174,7 +174,7 @@ class RosTcpOutbox:
 
     def _add_message(self, stream: _Stream, parts: list[Bytes]) -> int:
         """Adds a topic's next message; returns its bytes."""
-        taken = [] if stream.mailbox is None else stream.mailbox.take(1)
+        taken = [] if stream.queue is None else stream.queue.take(1)
         self._plan(stream)
         if not taken:
             return 0

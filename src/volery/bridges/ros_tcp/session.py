@@ -182,7 +182,7 @@ class EndpointSession:
         service = absolute(name)
         if name in self._offered:
             self._offered.discard(name)
-            self._session.withdraw(service)
+            self._session.destroy_service(service)
 
         def ask(request: Any, reply: ServiceReply) -> None:
             if self.outbox.crowded:
@@ -193,7 +193,7 @@ class EndpointSession:
             header = ros_tcp.command("request", srv_id=number)
             self.outbox.put(header + ros_tcp.frame(name, body))
 
-        self._session.offer(service, srvtype, ask)
+        self._session.create_service(service, srvtype, ask)
         self._offered.add(name)
 
     def _remove_unity_service(self, fields: Fields) -> None:
@@ -201,7 +201,7 @@ class EndpointSession:
         if name not in self._offered:
             raise BridgeError(f"service '{name}' does not exist")
         self._offered.discard(name)
-        self._session.withdraw(absolute(name))
+        self._session.destroy_service(absolute(name))
 
     def _response(self, fields: Fields) -> None:
         number, error = number_field(fields, "srv_id"), fields.get("error")

@@ -146,7 +146,7 @@ class UnitySession:
             if frame.destination == "__request":
                 self._request = number_field(ros_tcp.read_fields(frame.payload), "srv_id")
             elif frame.destination in _NOTES:
-                self._hear(str(ros_tcp.read_fields(frame.payload).get("text", "")))
+                self._on_problem(str(ros_tcp.read_fields(frame.payload).get("text", "")))
             elif frame.destination.startswith("__"):
                 return  # an answer to no request
             elif number is not None:
@@ -160,7 +160,7 @@ class UnitySession:
         """Leaves the graph."""
         self._session.close()
 
-    def _hear(self, text: str) -> None:
+    def _on_problem(self, text: str) -> None:
         """Stores the endpoint's message, and stops sending what the endpoint refuses."""
         unknown, refused = _UNKNOWN.search(text), _REFUSED.search(text)
         if unknown is not None and unknown[1] in self._registered:

@@ -44,7 +44,7 @@ class _Asked:
     action: str
     """Name used by the client."""
     action_type: str
-    tell: Callable[[str, dict[str, Any]], None]
+    reply: Callable[[str, dict[str, Any]], None]
     feedback: bool
     goal: Goal | None = None
     """Known once the simulation's thread has started it."""
@@ -82,7 +82,7 @@ class RosbridgeActions:
         size = int(read_number(operation, "fragment_size", 0, 0, 1e9)) or None
         compression = read_choice(operation, "compression", ("none", "png", "cbor"))
 
-        def tell(op: str, more: dict[str, Any]) -> None:
+        def reply(op: str, more: dict[str, Any]) -> None:
             self._send(with_id({"op": op, "action": action, **more}, key), size, compression)
 
         try:
@@ -90,9 +90,9 @@ class RosbridgeActions:
             args = operation.get("args")
             request = decode_plain(args or {}, f"{action_type}_Goal")
         except (GraphError, BridgeError) as error:
-            tell("action_result", {"values": str(error), "status": _UNKNOWN, "result": False})
+            reply("action_result", {"values": str(error), "status": _UNKNOWN, "result": False})
             return
-        asked = _Asked(action, action_type, tell, operation.get("feedback") is True)
+        asked = _Asked(action, action_type, reply, operation.get("feedback") is True)
         self._asked[key] = asked
         self._session.post(lambda: self._begin(key, asked, request))
 
@@ -115,39 +115,39 @@ class RosbridgeActions:
 
         def on_feedback(message: Any) -> None:
             if asked.feedback:
-                self._post(lambda: self._tell_feedback(asked, message))
+                self._post(lambda: self._send_feedback(asked, message))
 
         def on_result(status: GoalStatus, result: Any) -> None:
-            self._post(lambda: self._tell_result(key, asked, status, result))
+            self._post(lambda: self._send_result(key, asked, status, result))
 
         name = absolute(asked.action)
-        self._session.tell("goal", name, asked.action_type, request)
+        self._session.record_command("goal", name, asked.action_type, request)
         try:
-            asked.goal = self._graph.actions.send(name, request, on_feedback, on_result)
+            asked.goal = self._graph.actions.send_goal(name, request, on_feedback, on_result)
         except Exception as error:  # report any error of the action's server to this client
             text = str(error)
-            self._post(lambda: self._tell_failure(key, asked, text))
+            self._post(lambda: self._send_failure(key, asked, text))
 
-    def _tell_feedback(self, asked: _Asked, message: Any) -> None:
+    def _send_feedback(self, asked: _Asked, message: Any) -> None:
         plain = self._forms.plain(message, f"{asked.action_type}_Feedback")
-        asked.tell("action_feedback", {"values": plain})
+        asked.reply("action_feedback", {"values": plain})
 
-    def _tell_result(self, key: Id, asked: _Asked, status: GoalStatus, result: Any) -> None:
+    def _send_result(self, key: Id, asked: _Asked, status: GoalStatus, result: Any) -> None:
         self._asked.pop(key, None)
         plain = {} if result is None else self._forms.plain(result, f"{asked.action_type}_Result")
         # in rosbridge "result" means that there is a result; its outcome is the status
-        asked.tell("action_result", {"values": plain, "status": int(status), "result": True})
+        asked.reply("action_result", {"values": plain, "status": int(status), "result": True})
 
-    def _tell_failure(self, key: Id, asked: _Asked, text: str) -> None:
+    def _send_failure(self, key: Id, asked: _Asked, text: str) -> None:
         self._asked.pop(key, None)
-        asked.tell("action_result", {"values": text, "status": _UNKNOWN, "result": False})
+        asked.reply("action_result", {"values": text, "status": _UNKNOWN, "result": False})
 
     def cancel_goal(self, operation: Operation) -> None:
         """Requests the cancellation of a goal."""
         asked = self._asked.get(read_id(operation))
         if asked is None:
             raise BridgeError("cancel_action_goal: no open goal has this 'id'")
-        self._session.tell("cancel", absolute(asked.action), asked.action_type)
+        self._session.record_command("cancel", absolute(asked.action), asked.action_type)
         self._session.post(lambda: _cancel(asked))
 
     # --------------------------------------------------------------------------- received goals
@@ -161,7 +161,7 @@ class RosbridgeActions:
         def take(goal: Goal) -> None:
             self._post(lambda: self._take(action, action_type, goal))
 
-        self._graph.actions.offer(name, action_type, take)
+        self._graph.actions.create_server(name, action_type, take)
         self._offers[name] = (action, action_type)
 
     def unadvertise(self, operation: Operation) -> None:
@@ -169,7 +169,7 @@ class RosbridgeActions:
         name = absolute(read_text(operation, "action"))
         if self._offers.pop(name, None) is None:
             raise BridgeError(f"unadvertise_action: '{name}' is not offered by this client")
-        self._graph.actions.withdraw(name)
+        self._graph.actions.destroy_server(name)
         for number in [n for n, a in self._acting.items() if absolute(a.action) == name]:
             _abort(self._acting.pop(number))
 
@@ -229,7 +229,7 @@ class RosbridgeActions:
         """Cancels the client's goals and aborts the goals that it executes."""
         self._closed = True
         for name in self._offers:
-            self._graph.actions.withdraw(name)
+            self._graph.actions.destroy_server(name)
         for acting in tuple(self._acting.values()):
             _abort(acting)
         for asked in tuple(self._asked.values()):

@@ -1,7 +1,7 @@
 """Connects a program to the graph of a rosbridge server: Volery's, or a real robot's.
 
     client = RosbridgeClient("ws://127.0.0.1:9090", name="planner")
-    mailbox = client.subscribe("/uav1/odom", "nav_msgs/msg/Odometry", wake=wake)
+    queue = client.subscribe("/uav1/odom", "nav_msgs/msg/Odometry", wake=wake)
     client.advertise("/uav1/cmd_vel", "geometry_msgs/msg/Twist")
     client.publish("/uav1/cmd_vel", Twist(...))
 
@@ -85,7 +85,7 @@ class RosbridgeClient(RemoteClient):
     @property
     def problem(self) -> tuple[str, ...]:
         """Newest error reports of the server."""
-        return tuple(self._state.complaints)
+        return tuple(self._state.problems)
 
     @property
     def dropped(self) -> int:

@@ -38,7 +38,7 @@ from volery.graph.typestore import typestore
 MOST_WAITING = 1000
 """Publications that may wait for the network."""
 MOST_WAITING_BYTES = 64 * 1024 * 1024
-MOST_COMPLAINTS = 100
+MOST_PROBLEMS = 100
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class ClientState(RemoteTopics):
 
     def __init__(self, token: str | None, wake: Wake, generation: Generation = "ros2") -> None:
         super().__init__(threading.RLock(), _check_type)
-        self.complaints: deque[str] = deque(maxlen=MOST_COMPLAINTS)
+        self.problems: deque[str] = deque(maxlen=MOST_PROBLEMS)
         self.dropped = 0
         self._token = token
         self._wake = wake
@@ -130,7 +130,7 @@ class ClientState(RemoteTopics):
     def info(self, name: str) -> SessionInfo:
         """Returns the current state of the client."""
         with self._lock:
-            return SessionInfo(name, self.announced, self.mailboxes, tuple(self._offers))
+            return SessionInfo(name, self.announced, self.queues, tuple(self._offers))
 
     def _order(self, operation: Operation) -> None:
         """Queues an operation if there is a connection; `begin` repeats lasting ones."""
@@ -179,7 +179,7 @@ class ClientState(RemoteTopics):
         with self._lock:
             self._calls.pop(number, None)
 
-    def offer(self, service: str, srvtype: str, handler: Handler) -> None:
+    def create_service(self, service: str, srvtype: str, handler: Handler) -> None:
         """Creates a service."""
         _check_type(f"{srvtype}_Request")
         with self._lock:
@@ -188,15 +188,15 @@ class ClientState(RemoteTopics):
             self._offers[service] = _Offer(srvtype, handler)
             self._order(self._offering(service, srvtype))
 
-    def withdraw(self, service: str, who: str) -> None:
+    def destroy_service(self, service: str, client_name: str) -> None:
         """Destroys a service; its open requests fail."""
         with self._lock:
             offer = self._offers.pop(service, None)
             if offer is None:
-                raise GraphError(f"{who} has no service '{service}'")
+                raise GraphError(f"{client_name} has no service '{service}'")
             self._order({"op": "unadvertise_service", "service": service})
         for reply in tuple(offer.pending):
-            reply.fail(GraphError(f"service '{service}': {who} is closed"))
+            reply.fail(GraphError(f"service '{service}': {client_name} is closed"))
 
     # ------------------------------------------------------------------------------------- words
 
@@ -206,14 +206,14 @@ class ClientState(RemoteTopics):
     def _offering(self, service: str, srvtype: str) -> Operation:
         return {"op": "advertise_service", "service": service, "type": self._spelled(srvtype)}
 
-    def _tell_advertised(self, topic: str, msgtype: str, latched: bool) -> None:
+    def _send_advertised(self, topic: str, msgtype: str, latched: bool) -> None:
         spelled = self._spelled(msgtype)
         self._order({"op": "advertise", "topic": topic, "type": spelled, "latch": latched})
 
-    def _tell_unadvertised(self, topic: str) -> None:
+    def _send_unadvertised(self, topic: str) -> None:
         self._order({"op": "unadvertise", "topic": topic})
 
-    def _tell_subscribed(self, topic: str, subscription: Subscription) -> None:
+    def _send_subscribed(self, topic: str, subscription: Subscription) -> None:
         operation: Operation = {
             "op": "subscribe",
             "topic": topic,
@@ -225,7 +225,7 @@ class ClientState(RemoteTopics):
             operation["qos"] = {"reliability": "reliable"}
         self._order(operation)
 
-    def _tell_unsubscribed(self, topic: str) -> None:
+    def _send_unsubscribed(self, topic: str) -> None:
         self._order({"op": "unsubscribe", "topic": topic})
 
     def _send(self, topic: str, message: Any, msgtype: str) -> None:
@@ -249,11 +249,11 @@ class ClientState(RemoteTopics):
     # ------------------------------------------------------------------------------------- input
 
     def receive(self, frame: Frame, now_s: float) -> None:
-        """Handles a frame from the server, in the client's thread; stores errors as complaints."""
+        """Handles a frame from the server, in the client's thread; stores errors as problems."""
         try:
             self._handle(decode_frame(frame), now_s)
         except VoleryError as error:
-            self.complaints.append(str(error))
+            self.problems.append(str(error))
 
     def _handle(self, operation: Operation, now_s: float) -> None:
         op = operation["op"]
@@ -271,7 +271,7 @@ class ClientState(RemoteTopics):
         elif op == "png":
             self._handle(decode_png(operation, MOST_MESSAGE_BYTES), now_s)
         elif op == "status":
-            self.complaints.append(str(operation.get("msg")))
+            self.problems.append(str(operation.get("msg")))
 
     def _take_response(self, operation: Operation) -> None:
         with self._lock:

@@ -22,9 +22,9 @@ Generation = Literal["ros1", "ros2"]
 """Generation whose field names (`secs` or `sec`), type names and serialization clients receive."""
 COMPRESSIONS = ("none", "png", "cbor", "cbor-raw")
 
-MOST_KEPT = 64
+MAX_CACHED = 64
 """Messages stored for further clients, which usually read them in the same turn of the loop."""
-MOST_KEPT_BYTES = 32 * 1024 * 1024
+MAX_CACHED_BYTES = 32 * 1024 * 1024
 
 _BYTES = {"uint8", "char", "byte"}
 
@@ -44,8 +44,8 @@ class MessageEncoder:
             non_finite_as_null=False,
             arrays=lambda values, _type: values,
         )
-        self._kept: OrderedDict[tuple[int, str, str], tuple[Published, Frame]] = OrderedDict()
-        self._kept_bytes = 0
+        self._cache: OrderedDict[tuple[int, str, str], tuple[Published, Frame]] = OrderedDict()
+        self._cache_bytes = 0
         self._makers: dict[str, Callable[[Published, str], Frame]] = {
             "none": self._json_frame,
             "png": lambda published, topic: encode_png(str(self.frame(published, "none", topic))),
@@ -69,16 +69,16 @@ class MessageEncoder:
 
         """
         key = (id(published), compression, topic)
-        kept = self._kept.get(key)
+        kept = self._cache.get(key)
         if kept is not None:
             return kept[1]
         frame = self._makers[compression](published, topic)
         # the message is stored with its form, so that no other message can have its id meanwhile
-        self._kept[key] = (published, frame)
-        self._kept_bytes += len(frame)
-        while len(self._kept) > MOST_KEPT or self._kept_bytes > MOST_KEPT_BYTES:
-            _, (_, old) = self._kept.popitem(last=False)
-            self._kept_bytes -= len(old)
+        self._cache[key] = (published, frame)
+        self._cache_bytes += len(frame)
+        while len(self._cache) > MAX_CACHED or self._cache_bytes > MAX_CACHED_BYTES:
+            _, (_, old) = self._cache.popitem(last=False)
+            self._cache_bytes -= len(old)
         return frame
 
     def _json_frame(self, published: Published, topic: str) -> Frame:

@@ -111,7 +111,7 @@ class RosbridgePeer:
         self._outbox: deque[tuple[int, Iterator[Frame]]] = deque()
         self._waiting_bytes = 0
         self._assembly = Assembly(min(shared.most_bytes, MAX_TEXT_BYTES))
-        self._most_picture_bytes = min(shared.most_bytes, MAX_PICTURE_BYTES)
+        self._max_image_bytes = min(shared.most_bytes, MAX_PICTURE_BYTES)
         self._numbers = itertools.count()
         self._closed = False
         self._now_s = 0.0
@@ -185,7 +185,7 @@ class RosbridgePeer:
             if whole is not None:
                 self._handle_inner(decode_frame(whole, limited=True), now_s, depth)
         elif op == "png":
-            picture = decode_png(operation, self._most_picture_bytes, limited=True)
+            picture = decode_png(operation, self._max_image_bytes, limited=True)
             self._handle_inner(picture, now_s, depth)
         else:
             handler = self._handlers.get(op)

@@ -71,7 +71,7 @@ class RosApi:
         session = self._session = self._gateway.open("rosapi", inside=True)
         for name, (base, answer) in missing:
             srvtype = f"rosapi_msgs/srv/{base}"
-            session.offer(PREFIX + name, srvtype, self._handler(srvtype, answer))
+            session.create_service(PREFIX + name, srvtype, self._handler(srvtype, answer))
 
     def stop(self) -> None:
         """Destroys the services."""
@@ -301,4 +301,4 @@ class RosApi:
 
 
 def _topics_of(info: SessionInfo) -> set[str]:
-    return {mailbox.topic for mailbox in info.mailboxes}
+    return {queue.topic for queue in info.queues}

@@ -112,7 +112,7 @@ class RosbridgeServer:
         self._parameters = parameters
         self._server: Server | None = None
         self._listener: Listener | None = None
-        self._guesses = TokenAttempts()
+        self._attempts = TokenAttempts()
         self._rosapi: RosApi | None = None
         self._transforms: TfRepublisher | None = None
         self._clients: set[ServerConnection] = set()
@@ -225,10 +225,10 @@ class RosbridgeServer:
 
     async def _is_token(self, given: str, connection: ServerConnection) -> bool:
         """Returns whether this is the token; attempts of one address are checked in turn."""
-        async with self._guesses.turn(_address_of(connection)):
+        async with self._attempts.turn(_address_of(connection)):
             is_right = shows_token(given, self._token)
             if not is_right:
-                await self._guesses.penalize(connection.wait_closed)
+                await self._attempts.penalize(connection.wait_closed)
         return is_right
 
     def _prove(self, connection: ServerConnection) -> None:
@@ -257,7 +257,7 @@ class RosbridgeServer:
         self._clients.add(connection)
         prove = partial(self._prove, connection)
         checkpoint = TokenCheck(
-            self._guesses, _address_of(connection), connection.wait_closed, prove
+            self._attempts, _address_of(connection), connection.wait_closed, prove
         )
         if peer.authorized:
             prove()

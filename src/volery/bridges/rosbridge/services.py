@@ -135,19 +135,19 @@ class RosbridgeServices:
         if service in self._offers:
             if self._offers[service] == (name, srvtype):
                 return
-            self._session.withdraw(service)
+            self._session.destroy_service(service)
 
         def handle(request: Any, reply: ServiceReply) -> None:
             self._post(lambda: self._request(name, srvtype, request, reply))
 
         self._offers.pop(service, None)
-        self._session.offer(service, srvtype, handle)
+        self._session.create_service(service, srvtype, handle)
         self._offers[service] = (name, srvtype)
 
     def unadvertise(self, operation: Operation) -> None:
         """Destroys a service; open requests fail."""
         service = absolute(read_text(operation, "service"))
-        self._session.withdraw(service)
+        self._session.destroy_service(service)
         self._offers.pop(service, None)
 
     def _request(self, name: str, srvtype: str, request: Any, reply: ServiceReply) -> None:

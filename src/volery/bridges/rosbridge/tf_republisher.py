@@ -65,7 +65,7 @@ class TfRepublisher:
         self._frames = Frames()
         self._topics: dict[_Wish, _Topic] = {}
         self._numbers = itertools.count(1)
-        self._mailboxes: list[SubscriptionQueue] = []
+        self._queues: list[SubscriptionQueue] = []
         self._thread: threading.Thread | None = None
         self._lock = threading.Lock()
         self._ended = threading.Event()
@@ -73,13 +73,13 @@ class TfRepublisher:
     def start(self) -> None:
         """Creates the service unless it exists already."""
         if not self._gateway.graph.has_service(SERVICE):
-            self._gateway.graph.offer_async(SERVICE, _SRVTYPE, self._ask)
+            self._gateway.graph.create_async_service(SERVICE, _SRVTYPE, self._ask)
             self._is_offered = True
 
     def stop(self) -> None:
         """Destroys the service and its topics."""
         if self._is_offered:
-            self._gateway.graph.withdraw(SERVICE)
+            self._gateway.graph.destroy_service(SERVICE)
         self._ended.set()
         if self._thread is not None:
             self._thread.join()
@@ -119,7 +119,7 @@ class TfRepublisher:
             if self._thread is None:
                 for source in ("/tf_static", "/tf"):
                     box = session.subscribe(source, _TF, depth=_DEPTH, wake=lambda: None)
-                    self._mailboxes.append(box)
+                    self._queues.append(box)
                 self._thread = threading.Thread(
                     target=self._work, name="volery-tf-republisher", daemon=True
                 )
@@ -128,8 +128,8 @@ class TfRepublisher:
 
     def _work(self) -> None:
         while not self._ended.wait(1.0 / _MOST_HZ):
-            for mailbox in self._mailboxes:
-                for published in mailbox.take(_DEPTH):
+            for queue in self._queues:
+                for published in queue.take(_DEPTH):
                     message: TFMessage = published.message
                     self._frames.learn(message.transforms)
             with self._lock:

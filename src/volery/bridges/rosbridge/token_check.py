@@ -15,7 +15,7 @@ from volery.core.token_attempts import TokenAttempts
 class TokenCheck:
     """Checks the frames of one client until it is authorized."""
 
-    guesses: TokenAttempts
+    attempts: TokenAttempts
     address: str
     wait_closed: Callable[[], Awaitable[None]]
     """Waits for the end of the connection."""
@@ -24,9 +24,9 @@ class TokenCheck:
 
     async def receive(self, peer: RosbridgePeer, frame: Frame) -> None:
         """Passes a frame to the peer, in turn with other clients of the same address."""
-        async with self.guesses.turn(self.address):
+        async with self.attempts.turn(self.address):
             peer.receive(frame, time.monotonic())
             if peer.refused is not None:
-                await self.guesses.penalize(self.wait_closed)
+                await self.attempts.penalize(self.wait_closed)
         if peer.authorized:
             self.prove()

@@ -97,42 +97,42 @@ class TopicStream:
         self.msgtype = msgtype
         self.requests: dict[Id, SubscriptionOptions] = {}
         self.wishes = SubscriptionOptions()
-        self.mailbox: SubscriptionQueue | None = None
+        self.queue: SubscriptionQueue | None = None
         self._tuned = (0, False)
         self._left: deque[Published] = deque()
         """Messages of a queue that another one has replaced."""
         self._next_s = float("-inf")
 
-    def tune(self, session: Session, wake: Callable[[], None], *, anew: bool) -> None:
+    def tune(self, session: Session, wake: Callable[[], None], *, is_new: bool) -> None:
         """Adapts the queue to the requests.
 
-        anew: a new subscription needs latched messages even if they were sent before.
+        is_new: a new subscription needs latched messages even if they were sent before.
         """
         self.wishes = combine(list(self.requests.values()))
         depth, reliable = tuned = self.wishes.depth, self.wishes.reliable
-        latched = anew and self.mailbox is not None and bool(_latched(session, self.name))
+        latched = is_new and self.queue is not None and bool(_latched(session, self.name))
         if tuned == self._tuned and not latched:
             return
         topic = absolute(self.name)
-        mailbox = session.subscribe(topic, self.msgtype, depth=depth, reliable=reliable, wake=wake)
+        queue = session.subscribe(topic, self.msgtype, depth=depth, reliable=reliable, wake=wake)
         waiting: list[Published] = []
-        if self.mailbox is not None:
-            session.unsubscribe(self.mailbox)
-            waiting = self.mailbox.take()
+        if self.queue is not None:
+            session.unsubscribe(self.queue)
+            waiting = self.queue.take()
         # both queues were open for a moment and may have the same messages
         seen = {id(published) for published in (*self._left, *waiting)}
-        new = [published for published in mailbox.take() if id(published) not in seen]
+        new = [published for published in queue.take() if id(published) not in seen]
         self._left = deque((*self._left, *waiting, *new), maxlen=None if reliable else depth)
-        self.mailbox, self._tuned = mailbox, tuned
+        self.queue, self._tuned = queue, tuned
 
     def take(self, now_s: float) -> Published | None:
         """Returns the next message, if one is due."""
-        if now_s < self._next_s or self.mailbox is None:
+        if now_s < self._next_s or self.queue is None:
             return None
         if self._left:
             found = self._left.popleft()
         else:
-            taken = self.mailbox.take(1)
+            taken = self.queue.take(1)
             if not taken:
                 return None
             found = taken[0]
@@ -143,11 +143,11 @@ class TopicStream:
     @property
     def failure(self) -> str | None:
         """Why no more messages will arrive, if so."""
-        return None if self.mailbox is None else self.mailbox.failure
+        return None if self.queue is None else self.queue.failure
 
     def due_s(self, now_s: float) -> float | None:
         """Returns when to check again; None until the queue wakes."""
-        if self.mailbox is None or not (self._left or self.mailbox.info.waiting):
+        if self.queue is None or not (self._left or self.queue.info.waiting):
             return None
         return max(now_s, self._next_s)
 
@@ -239,7 +239,7 @@ class RosbridgeTopics:
         before = stream.requests.get(key)
         stream.requests[key] = wishes
         try:
-            self._tune(stream, anew=True)
+            self._tune(stream, is_new=True)
         except GraphError:
             if before is None:
                 del stream.requests[key]
@@ -257,7 +257,7 @@ class RosbridgeTopics:
         else:
             del stream.requests[key]
         if stream.requests:
-            self._tune(stream, anew=False)
+            self._tune(stream, is_new=False)
             return
         self._end(stream)
 
@@ -265,8 +265,8 @@ class RosbridgeTopics:
         """Ends a stream."""
         stream.requests.clear()
         self._streams.pop(stream.name, None)
-        if stream.mailbox is not None:
-            self._session.unsubscribe(stream.mailbox)
+        if stream.queue is not None:
+            self._session.unsubscribe(stream.queue)
 
     def take(self, now_s: float) -> Iterator[tuple[TopicStream, Published]]:
         """Yields due messages, one of every stream in turn."""
@@ -294,10 +294,10 @@ class RosbridgeTopics:
         times = [stream.due_s(now_s) for stream in self._held if stream.requests]
         return min((time for time in times if time is not None), default=None)
 
-    def _tune(self, stream: TopicStream, *, anew: bool) -> None:
+    def _tune(self, stream: TopicStream, *, is_new: bool) -> None:
         def wake() -> None:
             self._ready.append(stream)
             self._wake()
 
-        stream.tune(self._session, wake, anew=anew)
+        stream.tune(self._session, wake, is_new=is_new)
         wake()  # latched messages, and those of the previous queue, are available already

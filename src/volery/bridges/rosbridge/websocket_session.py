@@ -46,8 +46,8 @@ class Bell:
     """
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
-        self.heard = asyncio.Event()
-        self._wake = wake_of(loop, self.heard.set)
+        self.received = asyncio.Event()
+        self._wake = wake_of(loop, self.received.set)
         self._rung = False
 
     def ring(self) -> None:
@@ -58,7 +58,7 @@ class Bell:
 
     def silence(self) -> None:
         """Resets the bell, before the writer checks for frames; later calls wake it again."""
-        self.heard.clear()
+        self.received.clear()
         self._rung = False
 
 
@@ -159,7 +159,7 @@ async def _write(
         due_s = peer.due_s(now_s)
         with suppress(TimeoutError):
             async with asyncio.timeout(None if due_s is None else due_s - now_s):
-                await bell.heard.wait()
+                await bell.received.wait()
 
 
 def _next(peer: RosbridgePeer, frames: Iterator[Frame]) -> tuple[Frame | None, float]:

@@ -180,8 +180,8 @@ class SensorLinkClient:
             )
 
     def _send_commands(self) -> None:
-        for (kind, uav), mailbox in self._commands.items():
-            for published in mailbox.take():
+        for (kind, uav), queue in self._commands.items():
+            for published in queue.take():
                 try:
                     payload = encode_payload(kind, published.message)
                     stamp_ns = stamp_of(published.message)

@@ -201,10 +201,10 @@ class _Port:
         if self._listener is not None:
             self._listener.prove(client.transport)
 
-    def note_stranger(self, protocol: str) -> None:
+    def note_foreign_protocol(self, protocol: str) -> None:
         """Counts a client with another protocol."""
         if self._listener is not None:
-            self._listener.note_stranger(protocol)
+            self._listener.note_foreign_protocol(protocol)
 
     def forget(self, client: _Client) -> None:
         self._clients.discard(client)
@@ -231,7 +231,7 @@ class _Client(asyncio.Protocol):
         self._preamble = Preamble()
         self._paused = False
         self._notices = 0
-        self._told_version = self._told_length = False
+        self._announced_version = self._announced_length = False
         self.transport: asyncio.Transport
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -257,7 +257,7 @@ class _Client(asyncio.Protocol):
     def data_received(self, data: bytes) -> None:
         data = self._preamble.feed(data)
         if self._preamble.refused is not None:
-            self._port.note_stranger(self._preamble.refused)
+            self._port.note_foreign_protocol(self._preamble.refused)
             self.transport.abort()
             return
         if self._port.takes_commands and not self.transport.is_closing():
@@ -270,13 +270,13 @@ class _Client(asyncio.Protocol):
             self._read_on()
             if self._parser.frames:
                 self._port.prove(self)
-            if self._parser.other_version is not None and not self._told_version:
-                self._told_version = True
+            if self._parser.other_version is not None and not self._announced_version:
+                self._announced_version = True
                 self._notify(
                     f"this server uses version {VERSION}, not {self._parser.other_version}"
                 )
-            if self._parser.too_long is not None and not self._told_length:
-                self._told_length = True
+            if self._parser.too_long is not None and not self._announced_length:
+                self._announced_length = True
                 self._notify(self._parser.too_long)
 
     def _read_on(self) -> None:

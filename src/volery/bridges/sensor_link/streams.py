@@ -43,7 +43,7 @@ class SensorStream:
         self.kind = kind
         self.uav = uav
         self.name = name
-        self.mailbox: SubscriptionQueue | None = None
+        self.queue: SubscriptionQueue | None = None
         self.sequence = 0
         self.last_ns = 0
         self.next_ns = 0
@@ -106,7 +106,7 @@ class SensorStreams:
             self._session.close()
             self._session = None
             for stream in self._streams.values():
-                stream.mailbox = None
+                stream.queue = None
             self._ready.clear()
 
     async def _watch_topics(self) -> None:
@@ -118,7 +118,7 @@ class SensorStreams:
                     if stream is None:
                         stream = SensorStream(kind, int(found[1]), found[2])
                         self._streams[topic.name] = stream
-                    if stream.mailbox is None:
+                    if stream.queue is None:
                         self._subscribe(topic.name, topic.msgtype, stream)
             await asyncio.sleep(_NEW_TOPICS_PERIOD_S)
 
@@ -132,7 +132,7 @@ class SensorStreams:
                 self._wake()
 
         try:
-            stream.mailbox = self._session.subscribe(topic, msgtype, depth=self._depth, wake=stir)
+            stream.queue = self._session.subscribe(topic, msgtype, depth=self._depth, wake=stir)
         except GraphError:  # the topic's type has just changed
             return
         stir()
@@ -147,7 +147,7 @@ class SensorStreams:
                     await self._send_one(due)
 
     def _take(self, stream: SensorStream) -> list[Due]:
-        taken = [] if stream.mailbox is None else stream.mailbox.take()
+        taken = [] if stream.queue is None else stream.queue.take()
         due = []
         for published in taken:
             if self._is_due(stream, published.time_ns):

@@ -53,8 +53,8 @@ class _Member:
     """A UAV on the network: its relayed subscriptions, and publishers for the others' messages."""
 
     address: int
-    said: list[Subscription] = field(default_factory=list)
-    heard: dict[str, Publisher] = field(default_factory=dict)
+    sent: list[Subscription] = field(default_factory=list)
+    incoming: dict[str, Publisher] = field(default_factory=dict)
 
 
 class RadioNetwork:
@@ -104,12 +104,12 @@ class RadioNetwork:
         self._exchange.join(Identity.of(address), self._graph.now_ns())
         member = self._members[name] = _Member(address)
         for topic in self._topics:
-            member.heard[topic.name] = self._graph.advertise(
+            member.incoming[topic.name] = self._graph.advertise(
                 f"/{name}/radio/{topic.name}", topic.type
             )
-            said = f"/{name}/{topic.name}"
+            sent = f"/{name}/{topic.name}"
             send = self._sender(name, topic)
-            member.said.append(self._graph.subscribe(said, send, topic.type))
+            member.sent.append(self._graph.subscribe(sent, send, topic.type))
         return lambda: self._leave(name)
 
     def silence(self, name: str, by: int) -> None:
@@ -171,7 +171,7 @@ class RadioNetwork:
         """Delivers what is due, and schedules the next delivery."""
         now_ns = self._graph.now_ns()
         for address, frame in self._exchange.advance(now_ns):
-            self._hear(address, frame)
+            self._receive(address, frame)
         due_ns = self._exchange.next_due_ns
         if self._due_ns is not None and self._due_ns <= now_ns:
             self._due_ns = None
@@ -179,11 +179,11 @@ class RadioNetwork:
             self._due_ns = due_ns
             self._timers.at(due_ns, self._advance)
 
-    def _hear(self, address: int, frame: StationFrame) -> None:
+    def _receive(self, address: int, frame: StationFrame) -> None:
         named = decode_named(frame.payload)
         for member in self._members.values():
-            if member.address == address and named.name in member.heard:
-                member.heard[named.name].publish(named.message)
+            if member.address == address and named.name in member.incoming:
+                member.incoming[named.name].publish(named.message)
 
     def _decide(self, time_ns: int, source: int, destination: int, frame: StationFrame) -> Delivery:
         if self._silent[source] > 0 or self._silent[destination] > 0:
@@ -194,9 +194,9 @@ class RadioNetwork:
         member = self._members.pop(name)
         self._silent.pop(member.address, None)
         self._exchange.leave(member.address, self._graph.now_ns())
-        for subscription in member.said:
+        for subscription in member.sent:
             subscription.cancel()
-        for publisher in member.heard.values():
+        for publisher in member.incoming.values():
             publisher.cancel()
 
     def _address_of(self, name: str) -> int:

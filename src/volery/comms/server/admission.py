@@ -14,9 +14,9 @@ def admit(hello: Hello, source: int, settings: RouterSettings) -> Refusal | None
     """Returns None for a station that may join; else the refusal."""
     if not shows_token(hello.token, settings.token):
         return Refusal(Reason.TOKEN, 0, "the token is wrong, or there is none")
-    planes = settings.planes_per_batch
-    if hello.planes_per_batch != planes:
-        text = f"here a batch has {counted(planes, 'plane')}, not {hello.planes_per_batch}"
+    planes = settings.group_size
+    if hello.group_size != planes:
+        text = f"here a batch has {counted(planes, 'plane')}, not {hello.group_size}"
         return Refusal(Reason.BATCH_SIZE, 0, text)
     try:
         address = Identity(hello.batch, hello.plane).address(planes)

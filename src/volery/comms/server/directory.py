@@ -50,7 +50,7 @@ class Directory:
 
     def remove(self, address: int) -> list[StationFrame]:
         """Removes a station; returns the messages that waited for it."""
-        return self._stations.pop(address).mailbox.clear()
+        return self._stations.pop(address).queue.clear()
 
     def expects(self, now_ns: int) -> bool:
         """Returns whether stations that have never connected count as known."""
@@ -74,7 +74,7 @@ class Directory:
         too_many = max(len(self._to_many) - self._settings.grace_messages, 0)
         return [self._to_many.popleft() for _ in range(too_many)]
 
-    def kept_for(self, address: int) -> list[StationFrame]:
+    def stored_for(self, address: int) -> list[StationFrame]:
         """Returns the stored messages for a station that joins now."""
         return [frame for frame in self._to_many if self._is_meant(address, frame)]
 
@@ -97,10 +97,10 @@ class Directory:
                     yield frame, Reason.EXPIRED if station.appeared else never
             else:
                 before_ns = now_ns - round(self._settings.keep_s * NS_PER_S)
-                yield from ((f, Reason.EXPIRED) for f in station.mailbox.expire(before_ns))
+                yield from ((f, Reason.EXPIRED) for f in station.queue.expire(before_ns))
                 if self._becomes_gone(station, now_ns):
                     station.is_gone = True
-                    yield from ((f, Reason.EXPIRED) for f in station.mailbox.expire_many())
+                    yield from ((f, Reason.EXPIRED) for f in station.queue.expire_many())
 
     def _is_forgotten(self, station: StationRecord, now_ns: int) -> bool:
         if station.connection is not None:
@@ -115,5 +115,5 @@ class Directory:
         return not waits and away_ns > self._settings.keep_many_s * NS_PER_S
 
     def _is_meant(self, address: int, frame: StationFrame) -> bool:
-        planes = self._settings.planes_per_batch
+        planes = self._settings.group_size
         return address != frame.source and is_meant(address, frame.destination, planes)

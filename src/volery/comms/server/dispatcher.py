@@ -1,6 +1,6 @@
 """Dispatches the messages of the communication server.
 
-Each message is accepted once, put into the mailboxes of its receivers, and settled when all of them
+Each message is accepted once, put into the queues of its receivers, and settled when all of them
 have it or a rule has dropped it.
 """
 
@@ -85,7 +85,7 @@ class Dispatcher:
         """Processes the acknowledgements of a station."""
         try:
             for entry in decode_received(frame.payload):
-                for came in station.mailbox.received(entry):
+                for came in station.queue.received(entry):
                     self.tally.counts["delivered"] += 1
                     self._settle(came)
         except CommsError:
@@ -114,7 +114,7 @@ class Dispatcher:
     def expect(self, address: int, now_ns: int) -> StationRecord:
         """Adds a new station, with the stored messages to many."""
         station = self.directory.add(address, now_ns)
-        for frame in self.directory.kept_for(address):
+        for frame in self.directory.stored_for(address):
             source = self.directory.find(frame.source)
             same = source is not None and source.session == frame.session
             if source is not None and same and frame.sequence in source.unsettled:
@@ -128,13 +128,13 @@ class Dispatcher:
             self._settle(frame)
 
     def _post(self, station: StationRecord, frame: StationFrame, now_ns: int) -> None:
-        """Puts one message into one mailbox."""
+        """Puts one message into one queue."""
         delivery = self._link(now_ns, frame.source, station.address, frame)
         if delivery.lost:
             self.tally.counts["lost_on_link"] += 1
             self._settle(frame)
             return
-        posted, due_ns = station.mailbox.put(frame, now_ns, delivery.delay_ns)
+        posted, due_ns = station.queue.put(frame, now_ns, delivery.delay_ns)
         for dropped in posted.dropped:
             self._dispose(dropped, Reason.FULL, station.address)
         if not posted.kept:
@@ -151,7 +151,7 @@ class Dispatcher:
         """Drops a message: commands are refused, sensing is counted."""
         if frame.kind == StationFrameKind.COMMAND or reason is Reason.UNKNOWN:
             self.tally.refused[reason] += 1
-            self._tell_refused(frame, reason, frame.destination if at is None else at)
+            self._send_refused(frame, reason, frame.destination if at is None else at)
         elif reason is Reason.FULL:
             self.tally.counts["dropped_sensing"] += 1
         elif reason is Reason.RATE:
@@ -160,7 +160,7 @@ class Dispatcher:
             self.tally.counts["expired"] += 1
         self._settle(frame)
 
-    def _tell_refused(self, frame: StationFrame, reason: Reason, at: int) -> None:
+    def _send_refused(self, frame: StationFrame, reason: Reason, at: int) -> None:
         source = self.directory.find(frame.source)
         if source is None or source.session != frame.session:
             return

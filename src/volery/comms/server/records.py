@@ -15,7 +15,7 @@ class StationRecord:
     """A station that has connected, or is expected."""
 
     address: int
-    mailbox: StationQueue
+    queue: StationQueue
     rate: RateLimit
     name: str = ""
     connection: int | None = None
@@ -40,7 +40,7 @@ class StationConnection:
     """A connection, identified or not."""
 
     opened_ns: int
-    heard_ns: int
+    received_ns: int
     station: StationRecord | None = None
     parser: StationFrameParser = field(default_factory=StationFrameParser)
     control: list[bytes] = field(default_factory=list)

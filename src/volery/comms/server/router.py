@@ -99,7 +99,7 @@ class Router:
         if station is not None and station.connection == connection:
             station.connection = None
             station.left_ns = now_ns
-            station.mailbox.rewind()
+            station.queue.rewind()
 
     def forget(self, connection: int, now_ns: int) -> None:
         """Ends a connection whose station will not return, and drops its messages."""
@@ -140,7 +140,7 @@ class Router:
             frames.append(self._settled_frame(station))
         size = 0
         while size < most_bytes:
-            frame = station.mailbox.take(now_ns)
+            frame = station.queue.take(now_ns)
             if frame is None:
                 break
             frames.append(frame.data)
@@ -168,7 +168,7 @@ class Router:
         """Statistics so far."""
         stations = self._directory.stations()
         present = sum(station.connection is not None for station in stations)
-        waiting = sum(len(station.mailbox) for station in stations)
+        waiting = sum(len(station.queue) for station in stations)
         parsers = [connection.parser for connection in self._connections.values()]
         return self._tally.statistics(parsers, present, len(stations) - present, waiting)
 
@@ -185,7 +185,7 @@ class Router:
         if station is None:
             self._greet(number, connection, frame, now_ns)
             return
-        connection.heard_ns = now_ns
+        connection.received_ns = now_ns
         if frame.source != station.address or frame.session != station.session:
             self._refuse_connection(
                 number, Reason.PROTOCOL, "the frame's source is another station"
@@ -218,7 +218,7 @@ class Router:
             self._replace(station)
         station.name = decode_hello(frame.payload).name
         station.connection, connection.station = number, station
-        connection.heard_ns = now_ns
+        connection.received_ns = now_ns
         if station.session != frame.session:
             station.session, station.last = frame.session, 0
             station.unsettled.clear()
@@ -241,7 +241,7 @@ class Router:
                 old, Reason.REPLACED, "this station has opened a new connection"
             )
             self._connections[old].station = None
-        station.mailbox.rewind()
+        station.queue.rewind()
 
     # ---------------------------------------------------------------------------------- internals
 
@@ -254,7 +254,7 @@ class Router:
 
     def _end_silent(self, number: int, connection: StationConnection, now_ns: int) -> None:
         greeted = connection.station is not None
-        since = connection.heard_ns if greeted else connection.opened_ns
+        since = connection.received_ns if greeted else connection.opened_ns
         allowed_s = self._settings.silence_s if greeted else self._settings.hello_s
         if connection.is_held or connection.closing:
             return

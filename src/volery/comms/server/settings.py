@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from volery.comms.addresses import FIRST_GROUND, PLANES_PER_BATCH
+from volery.comms.addresses import FIRST_GROUND, GROUP_SIZE
 from volery.core.errors import CommsError
 
 
@@ -12,14 +12,14 @@ from volery.core.errors import CommsError
 class RouterSettings:
     """Limits and timeouts of the server."""
 
-    planes_per_batch: int = PLANES_PER_BATCH
+    group_size: int = GROUP_SIZE
     token: str | None = None
     """Token that stations must send; None: no token."""
     lane_depth: int = 1024
     """Max waiting messages of each kind from one source for one station: a station's send
     buffer.
     """
-    mailbox_bytes: int = 8 << 20
+    queue_bytes: int = 8 << 20
     """Max waiting bytes for one station."""
     window: int = 256
     """Max messages in transit to one station without acknowledgement."""
@@ -54,8 +54,8 @@ class RouterSettings:
 
     def __post_init__(self) -> None:
         """Raises CommsError for invalid values."""
-        if not 1 <= self.planes_per_batch <= FIRST_GROUND:
-            raise CommsError(f"a batch has 1 to {FIRST_GROUND} planes, not {self.planes_per_batch}")
-        for name in ("lane_depth", "mailbox_bytes", "window", "burst_messages"):
+        if not 1 <= self.group_size <= FIRST_GROUND:
+            raise CommsError(f"a batch has 1 to {FIRST_GROUND} planes, not {self.group_size}")
+        for name in ("lane_depth", "queue_bytes", "window", "burst_messages"):
             if getattr(self, name) < 1:
                 raise CommsError(f"{name} must be at least 1, not {getattr(self, name)}")

@@ -194,7 +194,7 @@ class StationQueue:
 
     def _is_full(self, queue: deque[QueuedMessage], size: int) -> bool:
         rules = self._settings
-        return len(queue) >= rules.lane_depth or self._bytes + size > rules.mailbox_bytes
+        return len(queue) >= rules.lane_depth or self._bytes + size > rules.queue_bytes
 
     def _forget_empty(self, source: int, lane: _Lane) -> None:
         """Deletes an empty lane, so that sources that have left use no memory."""

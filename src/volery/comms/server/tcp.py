@@ -64,7 +64,7 @@ class CommsServer:
         self._server: asyncio.Server | None = None
         self._ticks: asyncio.TimerHandle | None = None
         self._listener: Listener | None = None
-        self._guesses: TokenAttempts | None = None
+        self._attempts: TokenAttempts | None = None
         self._checks: set[asyncio.Task[None]] = set()
         self._links: dict[int, _StationLink] = {}
         self._sends = False
@@ -104,7 +104,7 @@ class CommsServer:
             why = "the port is taken" if taken else str(error)
             raise CommsError(f"cannot listen on {self.host}:{self.port}: {why}") from None
         self.port = self._server.sockets[0].getsockname()[1]
-        self._guesses = None if self._settings.token is None else TokenAttempts()
+        self._attempts = None if self._settings.token is None else TokenAttempts()
         self._tick()
 
     async def stop(self) -> None:
@@ -135,7 +135,7 @@ class CommsServer:
         self._links[number] = link
 
     def _came(self, link: _StationLink, data: bytes) -> None:
-        if self._guesses is None or link.proven:
+        if self._attempts is None or link.proven:
             self._receive(link, data)
             return
         link.early += data
@@ -144,13 +144,13 @@ class CommsServer:
         if not link.waits:
             link.waits = True
             self.router.hold(link.number, is_held=True)
-            check = self._loop.create_task(self._check(link, self._guesses))
+            check = self._loop.create_task(self._check(link, self._attempts))
             self._checks.add(check)
             check.add_done_callback(self._checks.discard)
 
-    async def _check(self, link: _StationLink, guesses: TokenAttempts) -> None:
+    async def _check(self, link: _StationLink, attempts: TokenAttempts) -> None:
         """Passes a station's early data to the router, one token check at a time."""
-        async with guesses.turn(link.address):
+        async with attempts.turn(link.address):
             self.router.hold(link.number, is_held=False)
             data, link.early, link.waits = link.early, b"", False
             if link.transport.is_closing():
@@ -158,7 +158,7 @@ class CommsServer:
             self._receive(link, data)
             link.transport.resume_reading()
             if self.router.closing(link.number):
-                await guesses.penalize()
+                await attempts.penalize()
 
     def _receive(self, link: _StationLink, data: bytes) -> None:
         self.router.receive(link.number, data, time.monotonic_ns())
@@ -170,9 +170,9 @@ class CommsServer:
             self._sends = True
             self._loop.call_soon(self._send_woken)
 
-    def _end_stranger(self, link: _StationLink, protocol: str) -> None:
+    def _end_foreign(self, link: _StationLink, protocol: str) -> None:
         if self._listener is not None:
-            self._listener.note_stranger(protocol)
+            self._listener.note_foreign_protocol(protocol)
         link.transport.abort()
 
     def _closed(self, link: _StationLink) -> None:
@@ -226,7 +226,7 @@ class _StationLink(asyncio.Protocol):
         """Implements asyncio.Protocol."""
         data = self._preamble.feed(data)
         if self._preamble.refused is not None:
-            self._server._end_stranger(self, self._preamble.refused)
+            self._server._end_foreign(self, self._preamble.refused)
         elif data:
             self._server._came(self, data)
 

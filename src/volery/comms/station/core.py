@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from volery.comms.addresses import PLANES_PER_BATCH, SERVER, Identity
+from volery.comms.addresses import GROUP_SIZE, SERVER, Identity
 from volery.comms.control_payloads import (
     Hello,
     Reason,
@@ -63,11 +63,11 @@ class StationCore:
         *,
         name: str = "",
         token: str | None = None,
-        planes_per_batch: int = PLANES_PER_BATCH,
+        group_size: int = GROUP_SIZE,
     ) -> None:
-        self.address = identity.address(planes_per_batch)
+        self.address = identity.address(group_size)
         self._session = session
-        hello = Hello(identity.batch, identity.plane, planes_per_batch, name, token or "")
+        hello = Hello(identity.batch, identity.plane, group_size, name, token or "")
         self._hello = encode_hello(hello)
         self._parser = StationFrameParser()
         self._held = SendBuffer()
@@ -75,7 +75,7 @@ class StationCore:
         self._out: list[bytes] = []
         self._sequence = 0
         self._spoke_ns = 0
-        self._heard_ns = 0
+        self._received_ns = 0
         self.joined = False
         """Whether the server has welcomed this connection."""
         self.fatal: Refusal | None = None
@@ -109,10 +109,10 @@ class StationCore:
     def connected(self, now_ns: int) -> None:
         """Begins a new connection with HELLO."""
         self._parser = StationFrameParser()
-        self._heard_ns = now_ns
+        self._received_ns = now_ns
         self.joined = False
         self._out = []
-        self._say(StationFrameKind.HELLO, self._hello, now_ns)
+        self._send_control(StationFrameKind.HELLO, self._hello, now_ns)
 
     def disconnected(self) -> None:
         """Processes the end of the connection."""
@@ -163,7 +163,7 @@ class StationCore:
         """Returns the new messages in these bytes."""
         messages = []
         for frame in self._parser.feed(data):
-            self._heard_ns = now_ns
+            self._received_ns = now_ns
             if frame.kind in MESSAGES:
                 if self._inbox.is_new(frame):
                     messages.append(frame)
@@ -180,7 +180,7 @@ class StationCore:
         told = self._inbox.take()
         for start in range(0, len(told), _MOST_RECEIVED):
             part = told[start : start + _MOST_RECEIVED]
-            self._say(StationFrameKind.RECEIVED, encode_received(part), now_ns)
+            self._send_control(StationFrameKind.RECEIVED, encode_received(part), now_ns)
 
     @property
     def has_to_acknowledge(self) -> bool:
@@ -191,11 +191,11 @@ class StationCore:
         """Acknowledges, and pings the server; call it every second or more often."""
         self.acknowledge(now_ns)
         if self.joined and now_ns - self._spoke_ns >= _PING_NS * 9 // 10:
-            self._say(StationFrameKind.PING, b"", now_ns)
+            self._send_control(StationFrameKind.PING, b"", now_ns)
 
     def is_deaf(self, now_ns: int) -> bool:
         """Returns whether the server has sent nothing for so long that it must be dead."""
-        return now_ns - self._heard_ns > _SILENCE_NS
+        return now_ns - self._received_ns > _SILENCE_NS
 
     def take(self) -> bytes:
         """Returns the bytes to send now."""
@@ -228,7 +228,7 @@ class StationCore:
         elif refusal.reason in FATAL:
             self.fatal = refusal
 
-    def _say(self, kind: StationFrameKind, payload: bytes, now_ns: int) -> None:
+    def _send_control(self, kind: StationFrameKind, payload: bytes, now_ns: int) -> None:
         self._out.append(
             encode_frame(kind, self.address, SERVER, self._session, 0, now_ns, payload)
         )

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from volery.comms.addresses import PLANES_PER_BATCH, Identity, is_meant, is_station
+from volery.comms.addresses import GROUP_SIZE, Identity, is_meant, is_station
 from volery.comms.control_payloads import Refusal
 from volery.comms.payloads import (
     COMMANDS,
@@ -32,17 +32,17 @@ from volery.graph.messages import Point, message_type
 Send = Callable[[StationFrameKind, int, bytes], int]
 
 HELP = """\
-list                        state of each UAV, with mission and SLAM if reported
-take_off WHO [ALTITUDE]     take off; altitude in m above its position
-land WHO                    land at its position
-hold WHO                    hold its position; a mission waits until resume
-resume WHO                  continue the mission
-return WHO                  return home and land; through its mission, else straight
-go_to WHO X Y Z [HEADING]   m in the map; degrees counterclockwise from its x axis
-help                        show this help
-quit                        leave the station
+list                            state of each UAV, with mission and SLAM if reported
+take_off ADDRESS [ALTITUDE]     take off; altitude in m above its position
+land ADDRESS                    land at its position
+hold ADDRESS                    hold its position; a mission waits until resume
+resume ADDRESS                  continue the mission
+return ADDRESS                  return home and land; through its mission, else straight
+go_to ADDRESS X Y Z [HEADING]   m in the map; degrees counterclockwise from its x axis
+help                            show this help
+quit                            leave the station
 
-WHO: a linear id such as 3, batch.plane such as 0.3, a name such as uav4, batch1, or all."""
+ADDRESS: a linear id such as 3, batch.plane such as 0.3, a name such as uav4, batch1, or all."""
 
 _USAGE = {
     line.split()[0]: line.partition("  ")[0] for line in HELP.partition("\n\n")[0].splitlines()
@@ -85,19 +85,19 @@ HEAD = (
 class GroundStation:
     """Stores the states of UAVs, and turns lines into commands.
 
-    send: sends a message, as `Station.send`. planes_per_batch: as of the server. is_joined: whether
+    send: sends a message, as `Station.send`. group_size: as of the server. is_joined: whether
     a server is connected.
     """
 
     def __init__(
         self,
         send: Send,
-        planes_per_batch: int = PLANES_PER_BATCH,
+        group_size: int = GROUP_SIZE,
         is_joined: Callable[[], bool] = lambda: True,
     ) -> None:
         self._send = send
         self._is_joined = is_joined
-        self._planes = planes_per_batch
+        self._planes = group_size
         self._states: dict[int, tuple[Any, int]] = {}
         self._fresh: dict[int, ClockOffset] = {}
         self._missions: dict[int, Any] = {}
@@ -126,21 +126,21 @@ class GroundStation:
         if named[:2] == (SLAM, SLAM_TYPE):
             return self._take_slam(frame.source, slam_gist(named.message.data))
         if named[:2] == (REPLY, REPLY_TYPE):
-            name, colon, said = named.message.data.partition(": ")
-            return f"{self._name(frame.source)}: {_TYPED.get(name, name)}{colon}{said}"
+            name, colon, text = named.message.data.partition(": ")
+            return f"{self._name(frame.source)}: {_TYPED.get(name, name)}{colon}{text}"
         return f"{self._name(frame.source)}: {named.name} ({named.msgtype})"
 
     def _take_mission(self, source: int, status: Any) -> str | None:
         """Returns a line if phase, sector or problem have changed."""
         before, self._missions[source] = self._missions.get(source), status
-        said = mission_gist(status.phase, status.sector), status.problem
-        if before and said == (mission_gist(before.phase, before.sector), before.problem):
+        gist = mission_gist(status.phase, status.sector), status.problem
+        if before and gist == (mission_gist(before.phase, before.sector), before.problem):
             return None
-        return f"{self._name(source)}: mission {said[0]}{', ' + said[1] if said[1] else ''}"
+        return f"{self._name(source)}: mission {gist[0]}{', ' + gist[1] if gist[1] else ''}"
 
-    def _take_slam(self, source: int, said: str) -> str | None:
-        before, self._slams[source] = self._slams.get(source), said
-        return None if said == before else f"{self._name(source)}: SLAM {said}"
+    def _take_slam(self, source: int, status: str) -> str | None:
+        before, self._slams[source] = self._slams.get(source), status
+        return None if status == before else f"{self._name(source)}: SLAM {status}"
 
     def refused(self, refusal: Refusal) -> str:
         """Returns a line about a refusal by the server."""
@@ -177,22 +177,22 @@ class GroundStation:
         sequence = self._send(
             StationFrameKind.COMMAND, address, encode_named(name, request, message)
         )
-        said = f"{word} to {rest[0]}"
-        self._asked[sequence] = said
+        text = f"{word} to {rest[0]}"
+        self._asked[sequence] = text
         anybody = is_station(address) or any(
             is_meant(each, address, self._planes) for each in self._states
         )
         note = "" if anybody else " (no state of such a UAV received so far)"
         if self._is_joined():
-            return f"sent: {said}{note}"
-        return f"queued: {said}{note}; sent when the server is back"
+            return f"sent: {text}{note}"
+        return f"queued: {text}{note}; sent when the server is back"
 
     def open_commands(self, is_settled: Callable[[int], bool]) -> list[str]:
         """Returns the commands that are not settled yet, oldest first."""
-        return [said for sequence, said in self._asked.items() if not is_settled(sequence)]
+        return [text for sequence, text in self._asked.items() if not is_settled(sequence)]
 
     @property
-    def has_heard(self) -> bool:
+    def has_received(self) -> bool:
         """Whether a UAV's state has been received."""
         return bool(self._states)
 

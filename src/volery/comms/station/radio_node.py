@@ -16,7 +16,7 @@ import threading
 from typing import Any
 
 from volery.comms.address_assignment import free_address
-from volery.comms.addresses import ALL, PLANES_PER_BATCH, Identity
+from volery.comms.addresses import ALL, GROUP_SIZE, Identity
 from volery.comms.payloads import decode_named, encode_named
 from volery.comms.protocol import StationFrame, StationFrameKind
 from volery.comms.server.tcp import PORT
@@ -27,7 +27,7 @@ from volery.graph.nodes.node import Node
 
 _PERIOD_S = 0.02
 """Period at which received messages are published: they arrive in another thread."""
-_HEARD_MOST = 1000
+_MAX_INCOMING = 1000
 _END_S = 2.0
 
 
@@ -41,8 +41,8 @@ class RadioNode(Node):
     ----------
     topics: "NAME TYPE" each, NAME below the UAV's namespace.
     server: HOST:PORT of `volery comms`.
-    station: linear id; -1: that of the namespace, uavN is N - 1.
-    planes_per_batch, token: as the server requires.
+    station_id: linear id; -1: that of the namespace, uavN is N - 1.
+    group_size, token: as the server requires.
 
     """
 
@@ -50,13 +50,13 @@ class RadioNode(Node):
         super().__init__("radio", **options)
         topics = self.declare_parameter("topics", [""]).value
         host, port = _server_of(str(self.declare_parameter("server", f"127.0.0.1:{PORT}").value))
-        number = int(self.declare_parameter("station", -1).value)
-        planes = int(self.declare_parameter("planes_per_batch", PLANES_PER_BATCH).value)
+        number = int(self.declare_parameter("station_id", -1).value)
+        planes = int(self.declare_parameter("group_size", GROUP_SIZE).value)
         token = str(self.declare_parameter("token", "").value) or None
         name = self.get_namespace().strip("/")
         identity = Identity.of(free_address(name, ()) if number < 0 else number, planes)
 
-        self._heard: queue.Queue[StationFrame] = queue.Queue(_HEARD_MOST)
+        self._incoming: queue.Queue[StationFrame] = queue.Queue(_MAX_INCOMING)
         self._publishers = {}
         for text in topics:
             topic, msgtype = _topic_of(text)
@@ -75,13 +75,13 @@ class RadioNode(Node):
                 port=port,
                 name=name,
                 token=token,
-                planes_per_batch=planes,
+                group_size=planes,
             )
             await station.start(timeout_s=None)
             return station
 
         self._station = asyncio.run_coroutine_threadsafe(make(), self._loop).result()
-        self.create_timer(_PERIOD_S, self._publish_heard)
+        self.create_timer(_PERIOD_S, self._publish_incoming)
 
     @property
     def joined(self) -> bool:
@@ -113,15 +113,15 @@ class RadioNode(Node):
         """Queues a frame for the node's thread; drops the oldest if the queue is full."""
         while True:
             with contextlib.suppress(queue.Full):
-                self._heard.put_nowait(frame)
+                self._incoming.put_nowait(frame)
                 return
             with contextlib.suppress(queue.Empty):
-                self._heard.get_nowait()
+                self._incoming.get_nowait()
 
-    def _publish_heard(self) -> None:
+    def _publish_incoming(self) -> None:
         with contextlib.suppress(queue.Empty):
             while True:
-                frame = self._heard.get_nowait()
+                frame = self._incoming.get_nowait()
                 with contextlib.suppress(CommsError):  # other content by another program
                     named = decode_named(frame.payload)
                     publisher = self._publishers.get(named.name)

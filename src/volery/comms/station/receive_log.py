@@ -14,7 +14,7 @@ class ReceiveLog:
 
     def __init__(self) -> None:
         self._last: dict[int, dict[int, int]] = {}
-        self._told: dict[tuple[int, int], int] = {}
+        self._logged: dict[tuple[int, int], int] = {}
         self._unacknowledged = 0
         self.duplicates = 0
         """Number of repeated messages."""
@@ -31,7 +31,7 @@ class ReceiveLog:
         sessions[frame.session] = newest
         if len(sessions) > _SESSIONS_KEPT:
             del sessions[next(iter(sessions))]
-        self._told[frame.source, frame.session] = frame.sequence
+        self._logged[frame.source, frame.session] = frame.sequence
         self._unacknowledged += 1
         new = frame.sequence > last
         self.duplicates += not new
@@ -39,7 +39,7 @@ class ReceiveLog:
 
     def take(self) -> list[Received]:
         """Returns the pending acknowledgements and clears them."""
-        told = [Received(source, session, last) for (source, session), last in self._told.items()]
-        self._told.clear()
+        told = [Received(source, session, last) for (source, session), last in self._logged.items()]
+        self._logged.clear()
         self._unacknowledged = 0
         return told

@@ -17,7 +17,7 @@ from functools import partial
 from typing import Any
 
 from volery.comms.address_assignment import free_address
-from volery.comms.addresses import ALL_GROUND, PLANES_PER_BATCH, Identity
+from volery.comms.addresses import ALL_GROUND, GROUP_SIZE, Identity
 from volery.comms.payloads import (
     COMMANDS,
     MISSION,
@@ -47,7 +47,7 @@ _VEHICLES_TYPE = "volery_interfaces/msg/VehicleStates"
 _PERIOD_S = 0.2
 """Period at which the simulation publishes its vehicles."""
 _MISSION = "task_manager"
-_TOLD = ((MISSION, "mission", MISSION_TYPE), (SLAM, "slam/status", SLAM_TYPE))
+_ANNOUNCED = ((MISSION, "mission", MISSION_TYPE), (SLAM, "slam/status", SLAM_TYPE))
 """Optional topics of a UAV that are sent: name, topic below its own name, type."""
 _REPEAT_S = 2.0
 """Period at which unchanged messages are repeated."""
@@ -56,22 +56,22 @@ _REPEAT_S = 2.0
 class _Announced:
     """One topic of a UAV, sent to ground stations on change and periodically."""
 
-    def __init__(self, name: str, msgtype: str, mailbox: SubscriptionQueue) -> None:
-        self.mailbox = mailbox
+    def __init__(self, name: str, msgtype: str, queue: SubscriptionQueue) -> None:
+        self.queue = queue
         self._name, self._type = name, msgtype
-        self._said: object = None
-        self._said_at = -math.inf
+        self._sent: object = None
+        self._sent_at = -math.inf
 
     def payload(self, now: float) -> bytes | None:
         """Returns the payload to send at `now` s; None: nothing to send."""
-        published = self.mailbox.take()
+        published = self.queue.take()
         if not published:
             return None
         message = published[-1].message
         gist = _gist(message)
-        if gist == self._said and now - self._said_at < _REPEAT_S:
+        if gist == self._sent and now - self._sent_at < _REPEAT_S:
             return None
-        self._said, self._said_at = gist, now
+        self._sent, self._sent_at = gist, now
         return encode_named(self._name, self._type, message)
 
 
@@ -85,7 +85,7 @@ def _gist(message: Any) -> object:
 class StationBridge:
     """Runs one station for each UAV.
 
-    host, port, token, planes_per_batch: of the communication server, as for `Station`.
+    host, port, token, group_size: of the communication server, as for `Station`.
     """
 
     def __init__(
@@ -94,14 +94,14 @@ class StationBridge:
         port: int = PORT,
         *,
         token: str | None = None,
-        planes_per_batch: int = PLANES_PER_BATCH,
+        group_size: int = GROUP_SIZE,
     ) -> None:
         self._host = host
         self._port = port
         self._token = token
-        self._planes = planes_per_batch
+        self._planes = group_size
         self._stations: dict[str, Station] = {}
-        self._told: dict[tuple[str, str], _Announced] = {}
+        self._announced: dict[tuple[str, str], _Announced] = {}
         self._task: asyncio.Task[None] | None = None
         self._session: Session | None = None
 
@@ -125,7 +125,7 @@ class StationBridge:
         for station in self._stations.values():
             await station.stop()
         self._stations.clear()
-        self._told.clear()
+        self._announced.clear()
         if self._session is not None:
             self._session.close()
 
@@ -136,25 +136,25 @@ class StationBridge:
                 states = {state.name: state for state in published[-1].message.vehicles}
                 for gone in self._stations.keys() - states.keys():
                     await self._stations.pop(gone).stop()
-                    for name, _, _ in _TOLD:
-                        if told := self._told.pop((gone, name), None):
-                            session.unsubscribe(told.mailbox)
+                    for name, _, _ in _ANNOUNCED:
+                        if announced := self._announced.pop((gone, name), None):
+                            session.unsubscribe(announced.queue)
                 for name, state in states.items():
                     station = self._stations.get(name) or await self._join(session, name)
                     if station.joined:
                         _send(station, ALL_GROUND, encode_named(STATE, STATE_TYPE, state))
-                        self._tell_more(session, name, station)
+                        self._send_topics(session, name, station)
             await asyncio.sleep(_PERIOD_S)
 
-    def _tell_more(self, session: Session, uav: str, station: Station) -> None:
-        for name, below, msgtype in _TOLD:
+    def _send_topics(self, session: Session, uav: str, station: Station) -> None:
+        for name, below, msgtype in _ANNOUNCED:
             topic, key = f"/{uav}/{below}", (uav, name)
-            if key not in self._told:
+            if key not in self._announced:
                 if session.graph.topic_type(topic) != msgtype:
                     continue  # no such topic so far
-                mailbox = session.subscribe(topic, msgtype, depth=1, wake=lambda: None)
-                self._told[key] = _Announced(name, msgtype, mailbox)
-            payload = self._told[key].payload(self._loop.time())
+                queue = session.subscribe(topic, msgtype, depth=1, wake=lambda: None)
+                self._announced[key] = _Announced(name, msgtype, queue)
+            payload = self._announced[key].payload(self._loop.time())
             if payload is not None:
                 _send(station, ALL_GROUND, payload)
 
@@ -167,7 +167,7 @@ class StationBridge:
             port=self._port,
             name=uav,
             token=self._token,
-            planes_per_batch=self._planes,
+            group_size=self._planes,
         )
         self._stations[uav] = station
         await station.start(timeout_s=None)
@@ -176,27 +176,27 @@ class StationBridge:
     def _take(self, session: Session, uav: str, frame: StationFrame) -> None:
         if frame.kind != StationFrameKind.COMMAND:
             return
-        tell = partial(self._tell, uav, frame.source)
+        respond = partial(self._respond, uav, frame.source)
         try:
             command = decode_named(frame.payload)
         except CommsError as error:
-            tell(str(error))
+            respond(str(error))
             return
         srvtype = COMMANDS.get(command.name)
         if srvtype is None or command.msgtype != f"{srvtype}_Request":
-            tell(
+            respond(
                 f"unknown command {command.name} ({command.msgtype}); known: {', '.join(COMMANDS)}"
             )
             return
 
         def answered(response: Any) -> None:
-            said = response.message or ("done" if response.success else "refused")
-            self._tell_soon(tell, f"{command.name}: {said}")
+            text = response.message or ("done" if response.success else "refused")
+            self._respond_soon(respond, f"{command.name}: {text}")
 
         def failed(error: GraphError) -> None:
-            self._tell_soon(tell, f"{command.name}: {error}")
+            self._respond_soon(respond, f"{command.name}: {error}")
 
-        def ask(_response: Any = None) -> None:
+        def call(_response: Any = None) -> None:
             session.call(service, command.message, ServiceReply(answered, failed))
 
         service = f"/{uav}/{command.name}"
@@ -209,16 +209,16 @@ class StationBridge:
             return
         if command.name == "go_to" and missioned:
             trigger = message_type(f"{COMMANDS['hold']}_Request")()
-            session.call(f"{mission}/hold", trigger, ServiceReply(ask, failed))
+            session.call(f"{mission}/hold", trigger, ServiceReply(call, failed))
         else:
-            ask()
+            call()
 
-    def _tell_soon(self, tell: Any, text: str) -> None:
+    def _respond_soon(self, respond: Any, text: str) -> None:
         """Passes a response from any thread to the loop, unless the loop has ended."""
         with contextlib.suppress(RuntimeError):
-            self._loop.call_soon_threadsafe(tell, text)
+            self._loop.call_soon_threadsafe(respond, text)
 
-    def _tell(self, uav: str, to: int, text: str) -> None:
+    def _respond(self, uav: str, to: int, text: str) -> None:
         station = self._stations.get(uav)
         if station is not None:
             message = message_type(REPLY_TYPE)(text)

@@ -14,7 +14,7 @@ import secrets
 import time
 from collections.abc import Callable
 
-from volery.comms.addresses import PLANES_PER_BATCH, Identity
+from volery.comms.addresses import GROUP_SIZE, Identity
 from volery.comms.control_payloads import Refusal
 from volery.comms.protocol import StationFrame, StationFrameKind
 from volery.comms.server.tcp import PORT
@@ -46,7 +46,7 @@ class Station:
         is lost; not by `stop`.
     host, port
         Of the communication server.
-    name, token, planes_per_batch
+    name, token, group_size
         Sent to the server.
 
     """
@@ -62,20 +62,20 @@ class Station:
         port: int = PORT,
         name: str = "",
         token: str | None = None,
-        planes_per_batch: int = PLANES_PER_BATCH,
+        group_size: int = GROUP_SIZE,
     ) -> None:
         self.core = StationCore(
             identity,
             secrets.randbits(32),
             name=name,
             token=token,
-            planes_per_batch=planes_per_batch,
+            group_size=group_size,
         )
         self._on_message = on_message
         self._on_refusal = on_refusal
         self._on_joined = on_joined
         self._address = (host, port)
-        self._pipe: _ServerConnection | None = None
+        self._connection: _ServerConnection | None = None
         self._task: asyncio.Task[None] | None = None
         self._acknowledges: asyncio.TimerHandle | None = None
         self._changed = asyncio.Event()
@@ -119,10 +119,10 @@ class Station:
             self._task.cancel()
             await asyncio.gather(self._task, return_exceptions=True)
             self._task = None
-        if self._pipe is not None:
+        if self._connection is not None:
             self._on_joined = _ignore
-            self._pipe.transport.abort()
-            self._lost(self._pipe)
+            self._connection.transport.abort()
+            self._lost(self._connection)
 
     def send(self, kind: StationFrameKind, destination: int, payload: bytes) -> int:
         """Sends a message, now or once a server is connected; raises like `StationCore.send`."""
@@ -152,9 +152,9 @@ class Station:
 
     async def _keep_joined(self) -> None:
         while self.core.fatal is None:
-            if self._pipe is None:
+            if self._connection is None:
                 await self._connect()
-                await asyncio.sleep(0 if self._pipe is not None else _AGAIN_S)
+                await asyncio.sleep(0 if self._connection is not None else _AGAIN_S)
                 continue
             await asyncio.sleep(_TICK_S if self.joined else _AGAIN_S)
             self._tick()
@@ -168,17 +168,17 @@ class Station:
             return
 
     def _tick(self) -> None:
-        pipe, now_ns = self._pipe, time.monotonic_ns()
-        if pipe is None:
+        connection, now_ns = self._connection, time.monotonic_ns()
+        if connection is None:
             return
         if self.core.is_deaf(now_ns):
-            pipe.transport.abort()
+            connection.transport.abort()
             return
         self.core.tick(now_ns)
         self._flush()
 
-    def _opened(self, pipe: _ServerConnection) -> None:
-        self._pipe = pipe
+    def _opened(self, connection: _ServerConnection) -> None:
+        self._connection = connection
         self.core.connected(time.monotonic_ns())
         self._flush()
 
@@ -200,9 +200,9 @@ class Station:
         self.core.acknowledge(time.monotonic_ns())
         self._flush()
 
-    def _lost(self, pipe: _ServerConnection) -> None:
-        if self._pipe is pipe:
-            self._pipe, before = None, self.joined
+    def _lost(self, connection: _ServerConnection) -> None:
+        if self._connection is connection:
+            self._connection, before = None, self.joined
             self.core.disconnected()
             if before:
                 self._on_joined(False)
@@ -210,9 +210,9 @@ class Station:
 
     def _flush(self) -> None:
         self._sends = False
-        pipe = self._pipe
-        if pipe is not None and not pipe.paused and (data := self.core.take()):
-            write_while_open(pipe.transport, data)
+        connection = self._connection
+        if connection is not None and not connection.paused and (data := self.core.take()):
+            write_while_open(connection.transport, data)
 
 
 class _ServerConnection(asyncio.Protocol):

@@ -282,9 +282,9 @@ class Estimator:
         """(N,) number of measurements dropped because they were late or the queue was full."""
         return np.asarray(self._filters["dropped"])
 
-    def continue_from(self, other: Estimator, kept: Sequence[tuple[int, int]]) -> None:
+    def continue_from(self, other: Estimator, pairs: Sequence[tuple[int, int]]) -> None:
         """Copies filters of another estimator: (own row, other's row) for each pair."""
-        for own, row in kept:
+        for own, row in pairs:
             self._filters[own] = other._filters[row]
             self._queues[own] = other._queues[row]
             self._copy_readings(own, other._rings[row])

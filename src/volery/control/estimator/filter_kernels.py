@@ -192,14 +192,14 @@ def fuse(state: Any, tuning: Any, measured: Any, work: Any) -> None:
 
 
 @inner_kernel
-def _is_lost(state: Any, patience_ns: int, measured: Any) -> bool:
+def _is_lost(state: Any, timeout_ns: int, measured: Any) -> bool:
     """Returns whether positions were rejected for long enough to restart from this one."""
     if state.rejected_since_ns < 0:
         state.rejected_since_ns = measured.stamp_ns
     complete = True
     for k in range(6):
         complete = complete and (measured.kind == POSE or measured.variance[k] < np.inf)
-    lost: bool = measured.stamp_ns - state.rejected_since_ns > patience_ns
+    lost: bool = measured.stamp_ns - state.rejected_since_ns > timeout_ns
     return lost and complete
 
 

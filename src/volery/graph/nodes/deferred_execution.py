@@ -30,7 +30,7 @@ class Deferred(Protocol):
 
 
 @dataclass
-class _Thought:
+class _CallbackGroup:
     """The callbacks of one instant: time of their input, their work and their delayed output."""
 
     time_ns: int
@@ -44,12 +44,12 @@ class _Thought:
 class _Batch:
     """Callbacks that the worker receives together."""
 
-    def __init__(self, thoughts: list[_Thought]) -> None:
-        self.thoughts = thoughts
+    def __init__(self, groups: list[_CallbackGroup]) -> None:
+        self.groups = groups
         self._busy = threading.Lock()
         self._busy.acquire()
-        for thought in thoughts:
-            thought.batch = self
+        for group in groups:
+            group.batch = self
 
     def finish(self) -> None:
         """Wakes the threads that wait for the batch."""
@@ -62,7 +62,7 @@ class _Batch:
 
 
 class DeferredExecutor:
-    """The worker of one node. All methods but `now_ns` and `hold_back` are called by the engine.
+    """The worker of one node. All methods but `now_ns` and `defer` are called by the engine.
 
     Waking a thread takes longer than most callbacks, so callbacks are handed over in batches: when
     the oldest has waited a third of the latency, or with a callback marked as heavy.
@@ -74,10 +74,10 @@ class DeferredExecutor:
         self._latency_ns = latency_ns
         self._deferring = deferring
         self._engine_now_ns = now_ns
-        self._waiting: list[_Thought] = []
+        self._waiting: list[_CallbackGroup] = []
         """Not yet handed over, in order of time."""
         self._inbox: SimpleQueue[_Batch | None] = SimpleQueue()
-        self._here: _Thought | None = None
+        self._running: _CallbackGroup | None = None
         """Callbacks that the worker is running."""
         self._last: _Batch | None = None
         self._closed = False
@@ -86,47 +86,47 @@ class DeferredExecutor:
         self._thread = threading.Thread(target=self._run, name=f"volery-{name}", daemon=True)
         self._thread.start()
 
-    def think(self, work: Action, *, heavy: bool = False) -> None:
+    def submit(self, work: Action, *, heavy: bool = False) -> None:
         """Runs `work()` on the worker; its output is released after the latency."""
         if self._closed:
             return
         now = self._engine_now_ns()
         if not self._waiting or self._waiting[-1].time_ns != now:
-            thought = _Thought(now)
-            self._waiting.append(thought)
-            self._deferring.at(now + self._latency_ns, partial(self._release, thought))
+            group = _CallbackGroup(now)
+            self._waiting.append(group)
+            self._deferring.at(now + self._latency_ns, partial(self._release, group))
         self._waiting[-1].work.append(work)
         if heavy or 3 * (now - self._waiting[0].time_ns) >= self._latency_ns:
             self._hand_over()
 
-    def answer(self, work: Action) -> Any:
+    def call(self, work: Action) -> Any:
         """Runs `work()` after all earlier work, waits for it and returns its result."""
         result: list[Any] = []
-        self.think(lambda: result.append(work()), heavy=True)
+        self.submit(lambda: result.append(work()), heavy=True)
         batch = self._last
         if batch is None or self._closed:
             raise GraphError("the node has been destroyed")
         batch.wait()
         if not result:
-            raise batch.thoughts[-1].error or GraphError("the node has been destroyed")
+            raise batch.groups[-1].error or GraphError("the node has been destroyed")
         return result[0]
 
     def now_ns(self) -> int:
         """Returns the input's time on the worker, the engine's time on other threads, ns."""
-        thought = self._thought()
-        return self._engine_now_ns() if thought is None else thought.time_ns
+        group = self._current_group()
+        return self._engine_now_ns() if group is None else group.time_ns
 
-    def hold_back(self, action: Action) -> bool:
+    def defer(self, action: Action) -> bool:
         """Delays `action` to the release of the running callback; returns False without one."""
-        thought = self._thought()
-        if thought is None:
+        group = self._current_group()
+        if group is None:
             return False
-        thought.output.append(action)
+        group.output.append(action)
         return True
 
     def join(self) -> None:
         """Hands over all work and waits for it; has no effect on the worker itself."""
-        if self._thought() is not None:
+        if self._current_group() is not None:
             return
         self._hand_over()
         if self._last is not None:
@@ -145,38 +145,38 @@ class DeferredExecutor:
             self._waiting = []
             self._inbox.put(self._last)
 
-    def _release(self, thought: _Thought) -> None:
+    def _release(self, group: _CallbackGroup) -> None:
         """Releases the output of the callbacks whose latency has passed; waits for them."""
         if self._closed:
             return
-        if thought.batch is None:
+        if group.batch is None:
             self._hand_over()
-        assert thought.batch is not None
-        thought.batch.wait()
-        if thought.error is not None:
-            raise thought.error
-        for action in thought.output:
+        assert group.batch is not None
+        group.batch.wait()
+        if group.error is not None:
+            raise group.error
+        for action in group.output:
             action()
 
-    def _thought(self) -> _Thought | None:
-        return self._here if threading.get_ident() == self._thread.ident else None
+    def _current_group(self) -> _CallbackGroup | None:
+        return self._running if threading.get_ident() == self._thread.ident else None
 
     def _run(self) -> None:
         while (batch := self._inbox.get()) is not None:
-            for thought in batch.thoughts:
-                self._here = thought
+            for group in batch.groups:
+                self._running = group
                 try:
-                    self._work(thought)
+                    self._work(group)
                 finally:
-                    self._here = None
+                    self._running = None
             batch.finish()
 
-    def _work(self, thought: _Thought) -> None:
+    def _work(self, group: _CallbackGroup) -> None:
         before = time.thread_time()
         try:
-            while thought.work and not self._closed:
-                thought.work.pop(0)()
+            while group.work and not self._closed:
+                group.work.pop(0)()
         except BaseException as error:  # raised by the engine at the release
-            thought.error = error
+            group.error = error
         finally:
             self.busy_s += time.thread_time() - before

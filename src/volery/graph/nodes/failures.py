@@ -90,7 +90,7 @@ def report_failure(graph: Graph, error: NodeError, *, is_raised: bool = True) ->
     )
     time_ns = error.time_ns
     message: Any = log_message(name, time_ns, LoggingSeverity.FATAL, text, place)
-    graph.show_to_all(graph.advertise(ROSOUT, LOG_TYPE), message)
+    graph.publish_at_end(graph.advertise(ROSOUT, LOG_TYPE), message)
     if not is_raised:
         logger = logging.getLogger(f"{PYTHON_LOGGER}.{name}")
         python_log(logger, name, time_ns, LoggingSeverity.FATAL, text)

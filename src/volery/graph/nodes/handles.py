@@ -16,9 +16,9 @@ class NodePublisher(Publisher):
     Messages that a node with a latency publishes in a callback leave when the latency has passed.
     """
 
-    def __init__(self, publisher: Publisher, thinker: DeferredExecutor | None) -> None:
+    def __init__(self, publisher: Publisher, executor: DeferredExecutor | None) -> None:
         self._publisher = publisher
-        self._thinker = thinker
+        self._executor = executor
         self._copy = message_copier(publisher.msgtype)
         self.latched = publisher.latched
 
@@ -38,9 +38,9 @@ class NodePublisher(Publisher):
         return self._publisher.msgtype
 
     @property
-    def wanted(self) -> bool:
+    def has_subscribers(self) -> bool:
         """Whether a message would be delivered or latched; otherwise it need not be built."""
-        return self._publisher.wanted
+        return self._publisher.has_subscribers
 
     def get_subscription_count(self) -> int:
         """Returns the number of subscribers to the topic."""
@@ -49,10 +49,10 @@ class NodePublisher(Publisher):
     def publish(self, message: Any) -> None:
         """Publishes a message. Raises `GraphError` if its type is not the topic's."""
         publisher = self._publisher
-        if publisher.wanted:
+        if publisher.has_subscribers:
             publisher.check(message)
             message = self._copy(message)
-        if self._thinker is None or not self._thinker.hold_back(lambda: publisher.publish(message)):
+        if self._executor is None or not self._executor.defer(lambda: publisher.publish(message)):
             publisher.publish(message)
 
     def cancel(self) -> None:

@@ -78,14 +78,14 @@ class Node(ParameterMethods):
         self._context = context
         self.__name = node_name
         self.__namespace = ("/" + namespace.strip("/")).rstrip("/") if namespace else ""
-        self.__held: dict[Any, Callable[[], None]] = {}
+        self.__handles: dict[Any, Callable[[], None]] = {}
         """Handles that the node has created, and the functions that release them."""
         self.__timers: list[Timer] = []
         self.__destroyed = False
         self.__busy_s = 0.0
         self.__last_client = ""
         """External client and topic of the last message that a client caused."""
-        self.__thinker = (
+        self.__executor = (
             DeferredExecutor(node_name, context.latency_ns, context.timers, context.now_ns)
             if context.latency_ns
             else None
@@ -162,8 +162,8 @@ class Node(ParameterMethods):
         latched = profile_of(qos_profile).latched or latched
         publisher = self._context.graph.advertise(self.resolve(topic), msg_type, latched=latched)
         publisher.owner = self.full_name
-        handle = NodePublisher(publisher, self.__thinker)
-        self.__held[handle] = handle.cancel
+        handle = NodePublisher(publisher, self.__executor)
+        self.__handles[handle] = handle.cancel
         return handle
 
     def create_subscription(
@@ -193,7 +193,7 @@ class Node(ParameterMethods):
             name, receive, msg_type, qos=profile_of(qos_profile)
         )
         handle = NodeSubscription(subscription, name, callback)
-        self.__held[handle] = handle.cancel
+        self.__handles[handle] = handle.cancel
         return handle
 
     def create_timer(
@@ -216,7 +216,7 @@ class Node(ParameterMethods):
             self.__defer,
             autostart=autostart,
         )
-        self.__held[timer] = timer.destroy
+        self.__handles[timer] = timer.destroy
         self.__timers.append(timer)
         return timer
 
@@ -242,13 +242,13 @@ class Node(ParameterMethods):
             return copy_message(response)
 
         def handle(request: Any) -> Any:
-            if self.__thinker is None:
+            if self.__executor is None:
                 return respond(request)
-            return self.__thinker.answer(lambda: respond(request))
+            return self.__executor.call(lambda: respond(request))
 
-        graph.offer(name, kind, handle)
-        service = NodeService(name, kind, lambda: graph.withdraw(name))
-        self.__held[service] = service.destroy
+        graph.create_service(name, kind, handle)
+        service = NodeService(name, kind, lambda: graph.destroy_service(name))
+        self.__handles[service] = service.destroy
         return service
 
     def create_client(self, srv_type: str | type[Any], srv_name: str, **_options: Any) -> Client:
@@ -259,18 +259,18 @@ class Node(ParameterMethods):
             self._context.graph,
             self.resolve(srv_name),
             kind,
-            self.__thinker,
+            self.__executor,
             later=self.__later,
             run=self.__run,
         )
 
     def destroy_publisher(self, publisher: NodePublisher) -> bool:
         """Destroys a publisher; returns whether it belonged to the node."""
-        return self.__give_back(publisher)
+        return self.__release(publisher)
 
     def destroy_subscription(self, subscription: NodeSubscription) -> bool:
         """Destroys a subscription; returns whether it belonged to the node."""
-        return self.__give_back(subscription)
+        return self.__release(subscription)
 
     def declare_folder(self, name: str, default: str) -> str:
         """Declares a read-only parameter that names a folder; returns its value.
@@ -290,11 +290,11 @@ class Node(ParameterMethods):
         """Destroys a timer; returns whether it belonged to the node."""
         if timer in self.__timers:
             self.__timers.remove(timer)
-        return self.__give_back(timer)
+        return self.__release(timer)
 
     def destroy_service(self, service: NodeService) -> bool:
         """Destroys a service; returns whether it belonged to the node."""
-        return self.__give_back(service)
+        return self.__release(service)
 
     def destroy_client(self, client: Client) -> bool:
         """Destroys a client; returns True."""
@@ -304,25 +304,25 @@ class Node(ParameterMethods):
     def destroy_node(self) -> None:
         """Destroys the node's publishers, subscriptions, timers, services and parameters."""
         self._context.graph.parameters.forget(self.full_name)
-        if self.__thinker is not None:
-            self.__thinker.close()
+        if self.__executor is not None:
+            self.__executor.close()
         self.__destroyed = True
-        while self.__held:
-            self.__held.popitem()[1]()
+        while self.__handles:
+            self.__handles.popitem()[1]()
 
     # ----------------------------------------------------------------------------------- helpers
 
     def join(self) -> None:
         """Waits until no callback of the node is running."""
-        if self.__thinker is not None:
-            self.__thinker.join()
+        if self.__executor is not None:
+            self.__executor.join()
 
     def __now_ns(self) -> int:
-        return self._context.now_ns() if self.__thinker is None else self.__thinker.now_ns()
+        return self._context.now_ns() if self.__executor is None else self.__executor.now_ns()
 
     def __defer(self, action: Callable[[], Any]) -> None:
         """Runs `action` at once, or when the output of the current callback is released."""
-        if self.__thinker is None or not self.__thinker.hold_back(action):
+        if self.__executor is None or not self.__executor.defer(action):
             action()
 
     def __later(self) -> Callable[[Callable[[], None]], None] | None:
@@ -332,16 +332,16 @@ class Node(ParameterMethods):
         timers, now_ns = self._context.timers, self._context.now_ns
         return lambda action: timers.at(now_ns(), lambda: self.__run(action, "first call"))
 
-    def __give_back(self, handle: Any) -> bool:
-        give_back = self.__held.pop(handle, None)
-        if give_back is not None:
-            self.__defer(give_back)
-        return give_back is not None
+    def __release(self, handle: Any) -> bool:
+        release = self.__handles.pop(handle, None)
+        if release is not None:
+            self.__defer(release)
+        return release is not None
 
     def __run(self, callback: Callable[[], Any], occasion: str, *, heavy: bool = False) -> None:
         if self.__destroyed:
             return
-        if self.__thinker is None:
+        if self.__executor is None:
             before = time.thread_time()
             try:
                 self.__guarded(callback, occasion)
@@ -350,7 +350,7 @@ class Node(ParameterMethods):
         else:
             client = self._context.graph.acting_client
             work = partial(self.__guarded, callback, occasion, client)
-            self.__thinker.think(work, heavy=heavy)
+            self.__executor.submit(work, heavy=heavy)
 
     def __guarded(self, callback: Callable[[], Any], occasion: str, client: str = "") -> None:
         """Runs a callback; a failure becomes a `NodeError` with node, callback, time and line.
@@ -415,12 +415,12 @@ class Node(ParameterMethods):
     @property
     def busy_s(self) -> float:
         """CPU time that the node's callbacks have used so far, s."""
-        return self.__busy_s if self.__thinker is None else self.__thinker.busy_s
+        return self.__busy_s if self.__executor is None else self.__executor.busy_s
 
     @property
     def has_worker(self) -> bool:
         """Whether the node's callbacks run on a thread of their own."""
-        return self.__thinker is not None
+        return self.__executor is not None
 
     def save_base_state(self) -> Any:
         """Returns the state that every node saves in a snapshot: parameters, timers, logger."""
@@ -430,7 +430,7 @@ class Node(ParameterMethods):
     def restore_base_state(self, state: Any) -> None:
         """Restores what `save_base_state` returned."""
         values, timers, logger = state
-        self.put_back_parameters(values)
+        self.restore_parameters(values)
         for timer, kept in zip(self.__timers, timers, strict=False):
             timer.set_state(kept)
         self.__logger.set_state(logger)

@@ -49,7 +49,7 @@ class ParameterMethods:
         self.__on_set: list[OnSet] = []
         self.__before_set = before_set
         self.__allow_undeclared = allow_undeclared
-        self.__asks = True
+        self.__calls_callbacks = True
         """Whether to call the callbacks for one parameter; False while several are set together."""
 
     # ---------------------------------------------------------------------------------- declaring
@@ -90,10 +90,10 @@ class ParameterMethods:
                 within=None if start is None else within,
                 read_only=read_only,
                 before_set=self.__before_set,
-                agrees=self.__ask,
+                agrees=self.__call_callbacks,
                 description="" if descriptor is None else descriptor.description,
             )
-            self.__ask(parameter, start)
+            self.__call_callbacks(parameter, start)
         except GraphError as error:
             raise type(error)(f"node {self.__name}: {error}") from None
         self.__declared.declare(self.__full_name, parameter)
@@ -203,7 +203,7 @@ class ParameterMethods:
                 if known:
                     self.__parameters[setting.name].check(setting.value)
             self.__consult(settings)
-            self.__asks = False
+            self.__calls_callbacks = False
             for setting in settings:
                 if setting.name in self.__parameters:
                     self.__parameters[setting.name].set(setting.value)
@@ -214,11 +214,11 @@ class ParameterMethods:
         except GraphError as error:
             return result(successful=False, reason=str(error))
         finally:
-            self.__asks = True
+            self.__calls_callbacks = True
         return result(successful=True)
 
-    def __ask(self, parameter: Parameter, value: Any) -> None:
-        if self.__asks:
+    def __call_callbacks(self, parameter: Parameter, value: Any) -> None:
+        if self.__calls_callbacks:
             self.__consult([ParameterSetting(parameter.name, value=value)])
 
     def __consult(self, settings: Sequence[ParameterSetting]) -> None:
@@ -242,7 +242,7 @@ class ParameterMethods:
         """Returns the values of the settable parameters, by name."""
         return {k: p.value for k, p in self.__parameters.items() if not p.read_only}
 
-    def put_back_parameters(self, values: Mapping[str, Any]) -> None:
+    def restore_parameters(self, values: Mapping[str, Any]) -> None:
         """Restores what `parameter_values` returned."""
         for name, value in values.items():
             if name in self.__parameters:

@@ -91,13 +91,13 @@ class Client:
         graph: Graph,
         service: str,
         srvtype: str,
-        thinker: DeferredExecutor | None,
+        executor: DeferredExecutor | None,
         *,
         later: Callable[[], Later | None],
         run: Callable[[Callable[[], None], str], None],
     ) -> None:
         self._graph = graph
-        self._thinker = thinker
+        self._executor = executor
         self._later = later
         self._run = run
         self._request_type = f"{srvtype}_Request"
@@ -135,7 +135,7 @@ class Client:
 
     def call(self, request: Any | None = None, timeout_sec: float | None = None) -> Any:  # noqa: ARG002
         """Calls and returns the response; raises `GraphError` for a node with a latency."""
-        if self._thinker is not None:
+        if self._executor is not None:
             raise GraphError(
                 f"a node with a latency cannot wait for service '{self.service}': use call_async"
             )
@@ -150,9 +150,9 @@ class Client:
         filled = self._filled(request)
         later = self._later()
         if later is not None and not self.service_is_ready():
-            later(lambda: self._ask(filled, future))
+            later(lambda: self._send(filled, future))
         else:
-            self._ask(filled, future)
+            self._send(filled, future)
         return future
 
     def remove_pending_request(self, future: Future) -> None:
@@ -162,18 +162,18 @@ class Client:
     def destroy(self) -> None:
         """Does nothing: a client holds no resources."""
 
-    def _ask(self, request: Any, future: Future) -> None:
+    def _send(self, request: Any, future: Future) -> None:
         occasion = f"response of {self.service}"
 
-        def settle(how: Callable[[], None], asker: int) -> None:
-            if threading.get_ident() != asker:
+        def settle(how: Callable[[], None], caller: int) -> None:
+            if threading.get_ident() != caller:
                 self._graph.post(lambda: self._run(how, occasion))
-            elif self._thinker is not None:
+            elif self._executor is not None:
                 self._run(how, occasion)
             else:
                 how()  # in the callback that called
 
-        def ask() -> None:
+        def call() -> None:
             here = threading.get_ident()
             reply = ServiceReply(
                 lambda response: settle(lambda: future.set_result(response), here),
@@ -181,8 +181,8 @@ class Client:
             )
             self._graph.call_async(self.service, request, reply)
 
-        if self._thinker is None or not self._thinker.hold_back(ask):
-            ask()
+        if self._executor is None or not self._executor.defer(call):
+            call()
 
     def _filled(self, request: Any | None) -> Any:
         if request is None:

@@ -56,7 +56,7 @@ class Timer:
         self._is_armed = False
         """Whether the next call after a restart is scheduled."""
         self._started_ns = self._last_ns = now_ns()
-        timers.every(period_s, self._on_period, wanted=self._keeps_first_phase)
+        timers.every(period_s, self._on_period, wanted=self._has_initial_phase)
 
     # -------------------------------------------------------------------------------------- rclpy's
 
@@ -99,7 +99,7 @@ class Timer:
 
     # ------------------------------------------------------------------------------------ internal
 
-    def _keeps_first_phase(self) -> bool:
+    def _has_initial_phase(self) -> bool:
         return self._due_ns is None and not self._cancelled and not self._destroyed
 
     def _set_cancelled(self, *, now: bool) -> None:

@@ -33,7 +33,13 @@ from volery.mavlink.hil.ardupilot_json import (
     state_line,
 )
 from volery.mavlink.hil.connection_notice import NOTICE_S, ConnectionNotice
-from volery.mavlink.hil.lock_step import PATIENCE, LockStepSession, News, TimeoutPolicy, uavs_with
+from volery.mavlink.hil.lock_step import (
+    DEFAULT_TIMEOUT,
+    LockStepSession,
+    News,
+    TimeoutPolicy,
+    uavs_with,
+)
 from volery.mavlink.hil.sensor_samples import inertial_of, parts
 from volery.mavlink.links.connection import why_not
 
@@ -71,16 +77,16 @@ class ArdupilotBridge:
         host: str = "127.0.0.1",
         port: int = PORT,
         *,
-        patience: TimeoutPolicy = PATIENCE,
+        timeout_policy: TimeoutPolicy = DEFAULT_TIMEOUT,
         anywhere: bool = False,
         notice_s: float | None = NOTICE_S,
     ) -> None:
         self._notice_s = notice_s
         self._absence: ConnectionNotice | None = None
         self._host, self._port = host, port
-        self._patience = patience
+        self._timeout_policy = timeout_policy
         self._anywhere = anywhere
-        self._seats: list[_Session] = []
+        self._sessions: list[_Session] = []
 
     @property
     def name(self) -> str:
@@ -90,7 +96,7 @@ class ArdupilotBridge:
     @property
     def connected(self) -> tuple[str, ...]:
         """UAVs whose ArduPilot has connected."""
-        return tuple(seat.uav for seat in self._seats if seat.peer is not None)
+        return tuple(session.uav for session in self._sessions if session.peer is not None)
 
     async def start(self, gateway: Gateway) -> None:
         """Starts listening.
@@ -107,9 +113,9 @@ class ArdupilotBridge:
                 motors = motors_of(rotors[uav])
             except BridgeError as error:
                 raise BridgeError(f"{uav}: {error}") from None
-            seat = _Session(gateway, uav, motors, self._patience)
-            self._seats.append(seat)
-            await self._listen(seat, self._port + PORT_STEP * k)
+            session = _Session(gateway, uav, motors, self._timeout_policy)
+            self._sessions.append(session)
+            await self._listen(session, self._port + PORT_STEP * k)
         self._absence = ConnectionNotice(
             "ArduPilot", self._missing, self._how_to_start, self._notice_s
         )
@@ -118,32 +124,32 @@ class ArdupilotBridge:
         """Disconnects all ArduPilots."""
         if self._absence is not None:
             self._absence.cancel()
-        for seat in self._seats:
-            seat.close()
-        self._seats.clear()
+        for session in self._sessions:
+            session.close()
+        self._sessions.clear()
         await asyncio.sleep(0)
 
     def _missing(self) -> dict[str, str]:
         """Returns the addresses of the missing ArduPilots, by UAV."""
         return {
-            seat.uav: f"UDP {self._host}:{self._port + PORT_STEP * number}"
-            for number, seat in enumerate(self._seats)
-            if seat.peer is None
+            session.uav: f"UDP {self._host}:{self._port + PORT_STEP * number}"
+            for number, session in enumerate(self._sessions)
+            if session.peer is None
         }
 
     def _how_to_start(self) -> str:
-        absent = next((k for k, seat in enumerate(self._seats) if seat.peer is None), 0)
+        absent = next((k for k, session in enumerate(self._sessions) if session.peer is None), 0)
         instance, odd = divmod(self._port + PORT_STEP * absent - PORT, PORT_STEP)
         chosen = f" -I {instance}" if instance >= 0 and not odd else ""
         return f"start with: arducopter --model JSON{chosen} ... (docs/mavlink.md)"
 
-    async def _listen(self, seat: _Session, port: int) -> None:
+    async def _listen(self, session: _Session, port: int) -> None:
         loop = asyncio.get_running_loop()
         try:
-            await loop.create_datagram_endpoint(lambda: seat, local_addr=(self._host, port))
+            await loop.create_datagram_endpoint(lambda: session, local_addr=(self._host, port))
         except (OSError, OverflowError) as error:
             raise BridgeError(
-                f"{seat.uav}: cannot listen on UDP {self._host}:{port}: {why_not(error)}"
+                f"{session.uav}: cannot listen on UDP {self._host}:{port}: {why_not(error)}"
             ) from None
 
 
@@ -151,30 +157,36 @@ class _Session(asyncio.DatagramProtocol):
     """Endpoint of the ArduPilot of one UAV."""
 
     def __init__(
-        self, gateway: Gateway, uav: str, motors: tuple[int, ...], patience: TimeoutPolicy
+        self, gateway: Gateway, uav: str, motors: tuple[int, ...], timeout_policy: TimeoutPolicy
     ) -> None:
         self.uav = uav
         self.peer: Address | None = None
         self._motors = motors
         self._transport: asyncio.DatagramTransport | None = None
         self._number = -1
-        self._heard_s = 0.0
+        self._received_s = 0.0
         """Wall time of its last frame."""
-        self._told: set[str] = set()
+        self._logged: set[str] = set()
         """Warnings that were logged."""
         self._line = b""
         self._slow: dict[str, Any] = {}
         """Newest messages of topics that are not published at every exchange."""
         self._begin_ns: int | None = None
-        self._meetings = LockStepSession(
-            gateway, uav, "ardupilot", self, period_ns=PERIOD_NS, topics=_TOPICS, patience=patience
+        self._lock_step = LockStepSession(
+            gateway,
+            uav,
+            "ardupilot",
+            self,
+            period_ns=PERIOD_NS,
+            topics=_TOPICS,
+            timeout_policy=timeout_policy,
         )
 
     def close(self) -> None:
         """Closes the endpoint; further calls do nothing."""
         if self.peer is not None:
-            self._meetings.turn_rotors([0.0] * len(self._motors))
-        self._meetings.close()
+            self._lock_step.turn_rotors([0.0] * len(self._motors))
+        self._lock_step.close()
         if self._transport is not None:
             self._transport.close()
 
@@ -185,8 +197,8 @@ class _Session(asyncio.DatagramProtocol):
     may_sleep = False
     """As in `ExternalAutopilot`: ArduPilot answers each state, and asks again after a lost one."""
 
-    def tell(self, time_ns: int, news: News) -> bool:
-        """Implements `ExternalAutopilot.tell`."""
+    def send_sensors(self, time_ns: int, news: News) -> bool:
+        """Implements `ExternalAutopilot.send_sensors`."""
         self._slow.update({name: news[name] for name in _SLOW if name in news})
         state = _state_of({**self._slow, **news})
         if self.peer is None or self._transport is None or state is None:
@@ -197,8 +209,8 @@ class _Session(asyncio.DatagramProtocol):
         self._transport.sendto(self._line, self.peer)
         return True
 
-    def begin_anew(self) -> None:
-        """Implements `ExternalAutopilot.begin_anew`.
+    def on_reset(self) -> None:
+        """Implements `ExternalAutopilot.on_reset`.
 
         ArduPilot flies on if its simulator's clock goes back.
         """
@@ -207,7 +219,7 @@ class _Session(asyncio.DatagramProtocol):
     def drop(self) -> None:
         """Implements `ExternalAutopilot.drop`; a live ArduPilot sends again every second."""
         self.peer, self._begin_ns = None, None
-        self._meetings.turn_rotors([0.0] * len(self._motors))
+        self._lock_step.turn_rotors([0.0] * len(self._motors))
 
     # ----------------------------------------------------------------------------------- asyncio
 
@@ -227,7 +239,7 @@ class _Session(asyncio.DatagramProtocol):
         if addr != self.peer:
             self._warn("its ArduPilot is connected already; another one is ignored")
             return
-        self._heard_s = now_s
+        self._received_s = now_s
         if servos.number == self._number:
             self._repeat()
         elif servos.number > self._number:
@@ -236,14 +248,14 @@ class _Session(asyncio.DatagramProtocol):
     def _is_new(self, servos: Servos, addr: Address, now_s: float) -> bool:
         """Returns whether a frame starts a session: the ArduPilot has left, or it has restarted."""
         if addr != self.peer:
-            return now_s - self._heard_s > _GONE_S
+            return now_s - self._received_s > _GONE_S
         back = self._number - servos.number
         return back > _LATE_FRAMES or (back > 0 and servos.number == 0)
 
     def _warn(self, text: str) -> None:
         """Logs a warning once per text, as datagrams arrive by the hundred."""
-        if text not in self._told:
-            self._told.add(text)
+        if text not in self._logged:
+            self._logged.add(text)
             _log.warning("%s: %s", self.uav, text)
 
     def error_received(self, exc: Exception) -> None:
@@ -256,12 +268,12 @@ class _Session(asyncio.DatagramProtocol):
 
     def _repeat(self) -> None:
         """Sends the last state again."""
-        if self._meetings.waits and self._transport is not None:
+        if self._lock_step.waits and self._transport is not None:
             self._transport.sendto(self._line, self.peer)
 
     def _obey(self, servos: Servos) -> None:
         self._number = servos.number
-        self._meetings.go_on(shares(servos.pwm, self._motors))
+        self._lock_step.go_on(shares(servos.pwm, self._motors))
 
 
 def _state_of(news: News) -> State | None:

@@ -56,7 +56,7 @@ class TimeoutPolicy(NamedTuple):
     """
 
 
-PATIENCE = TimeoutPolicy()
+DEFAULT_TIMEOUT = TimeoutPolicy()
 
 
 class ExternalAutopilot(Protocol):
@@ -64,16 +64,16 @@ class ExternalAutopilot(Protocol):
 
     @property
     def is_in_step(self) -> bool:
-        """Whether the autopilot answers each exchange and any thread may call `tell`."""
+        """Whether the autopilot answers each exchange and any thread may call `send_sensors`."""
 
     @property
     def may_sleep(self) -> bool:
         """Whether silence may be normal, because the autopilot controls nothing."""
 
-    def tell(self, time_ns: int, news: News) -> bool:
+    def send_sensors(self, time_ns: int, news: News) -> bool:
         """Sends new messages to the autopilot; returns whether it will answer and call `go_on`."""
 
-    def begin_anew(self) -> None:
+    def on_reset(self) -> None:
         """Handles a reset of the simulation: times are earlier than before."""
 
     def drop(self) -> None:
@@ -84,10 +84,10 @@ class LockStepSession:
     """Joins the lock step for `uav` at once; `close` leaves it.
 
     kind: `px4` or another word for names. topics: message types by topic below the UAV's name.
-    `ExternalAutopilot.tell` is called in the loop's thread, or, once `is_in_step`, in the
-    simulation's thread, which avoids a wake-up. Both hold `lock` during `tell` and `begin_anew`,
-    and so must code that reads or changes what these do. All other calls belong to the loop's
-    thread.
+    `ExternalAutopilot.send_sensors` is called in the loop's thread, or, once `is_in_step`, in the
+    simulation's thread, which avoids a wake-up. Both hold `lock` during `send_sensors` and
+    `on_reset`, and so must code that reads or changes what these do. All other calls belong to the
+    loop's thread.
     """
 
     def __init__(
@@ -99,10 +99,10 @@ class LockStepSession:
         *,
         period_ns: int,
         topics: Mapping[str, str],
-        patience: TimeoutPolicy,
+        timeout_policy: TimeoutPolicy,
     ) -> None:
         self.lock = threading.RLock()
-        self._uav, self._autopilot, self._patience = uav, autopilot, patience
+        self._uav, self._autopilot, self._timeout_policy = uav, autopilot, timeout_policy
         self._loop = asyncio.get_running_loop()
         self._session: Session = gateway.open(f"{kind} of {uav}")
         self._rotors = f"/{uav}/rotor_speeds"
@@ -112,7 +112,7 @@ class LockStepSession:
         self._since_s = 0.0
         """Wall time at which the current exchange began."""
         self._is_unsayable = False
-        """Whether a failed `tell` has been logged."""
+        """Whether a failed `send_sensors` has been logged."""
         self._asleep_since_s: float | None = None
         """Wall time since which time goes on without the autopilot's answers."""
         self._period_s = period_ns / NS_PER_S
@@ -168,8 +168,8 @@ class LockStepSession:
         request = zero_message(f"{_JOIN}_Request")
         request.name = name
         request.period_s = period_ns / NS_PER_S
-        drops = self._patience.drops
-        request.timeout_s = self._patience.timeout_s + (_MARGIN_S if drops else 0.0)
+        drops = self._timeout_policy.drops
+        request.timeout_s = self._timeout_policy.timeout_s + (_MARGIN_S if drops else 0.0)
         request.stop_on_timeout = not drops
         request.supports_reset = True
         self._session.call("/volery/join_lock_step", request, ServiceReply(_answered, _answered))
@@ -189,14 +189,14 @@ class LockStepSession:
 
     def _meet_at(self, time_ns: int) -> None:
         if time_ns <= self._time_ns:
-            self._autopilot.begin_anew()
+            self._autopilot.on_reset()
         self._time_ns, self._since_s, self._pending = time_ns, time.monotonic(), True
-        if not self._tell(time_ns):
+        if not self._send_sensors(time_ns):
             self.go_on()
 
-    def _tell(self, time_ns: int) -> bool:
+    def _send_sensors(self, time_ns: int) -> bool:
         try:
-            return self._autopilot.tell(time_ns, self._news())
+            return self._autopilot.send_sensors(time_ns, self._news())
         except (ArithmeticError, ValueError, struct.error) as error:  # such as an infinite fix
             if not self._is_unsayable:
                 self._is_unsayable = True
@@ -219,18 +219,18 @@ class LockStepSession:
     def _glance_s(self) -> float:
         if self._asleep_since_s is not None:
             return self._period_s
-        return min(_GLANCE_S, 0.1 * self._patience.timeout_s)
+        return min(_GLANCE_S, 0.1 * self._timeout_policy.timeout_s)
 
     def _judge(self, silent_s: float) -> None:
         """Handles an exchange that has lasted `silent_s`."""
-        timeout_s, since_s = self._patience.timeout_s, self._asleep_since_s
+        timeout_s, since_s = self._timeout_policy.timeout_s, self._asleep_since_s
         if since_s is None:
             sleeps = silent_s >= min(_SLEEP_S, 0.2 * timeout_s)
         else:
             sleeps = time.monotonic() - since_s < _LONGEST_SLEEP * timeout_s
         if sleeps and self._autopilot.may_sleep:
             self._go_on_without()
-        elif self._patience.drops and silent_s >= timeout_s:
+        elif self._timeout_policy.drops and silent_s >= timeout_s:
             self._give_up()
 
     def _go_on_without(self) -> None:
@@ -246,7 +246,7 @@ class LockStepSession:
         _log.warning(
             "%s: its autopilot has been silent for %g s; the simulation goes on without it",
             self._uav,
-            self._patience.timeout_s,
+            self._timeout_policy.timeout_s,
         )
         self._autopilot.drop()
         self.go_on()

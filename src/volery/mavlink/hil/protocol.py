@@ -86,7 +86,7 @@ class HilLink:
         self.locked = False
         """Whether PX4 answers in lock step, so that the simulation waits for it."""
 
-    def tell(self, time_ns: int, sensed: SensorValues) -> bytes:
+    def encode_exchange(self, time_ns: int, sensed: SensorValues) -> bytes:
         """Returns the frames of an exchange at a simulated time."""
         frames = self._sensor(time_ns // 1000, sensed)
         if sensed.fix is not None:

@@ -25,7 +25,7 @@ from volery.core.preamble import Preamble
 from volery.graph.session import Gateway
 from volery.mavlink.codec import dialect
 from volery.mavlink.hil.connection_notice import NOTICE_S, ConnectionNotice
-from volery.mavlink.hil.lock_step import PATIENCE, TimeoutPolicy, uavs_with
+from volery.mavlink.hil.lock_step import DEFAULT_TIMEOUT, TimeoutPolicy, uavs_with
 from volery.mavlink.hil.px4_processes import MOST_INSTANCES
 from volery.mavlink.hil.session import HilSession
 from volery.mavlink.links.connection import why_not
@@ -49,17 +49,17 @@ class Px4Bridge:
         host: str = "127.0.0.1",
         port: int = PORT,
         *,
-        patience: TimeoutPolicy = PATIENCE,
+        timeout_policy: TimeoutPolicy = DEFAULT_TIMEOUT,
         anywhere: bool = False,
         notice_s: float | None = NOTICE_S,
     ) -> None:
         self._host, self._port = host, port
         self._notice_s = notice_s
         self._absence: ConnectionNotice | None = None
-        self._patience = patience
+        self._timeout_policy = timeout_policy
         self._anywhere = anywhere
         self._servers: list[asyncio.Server] = []
-        self._seats: list[HilSession] = []
+        self._sessions: list[HilSession] = []
 
     @property
     def name(self) -> str:
@@ -69,7 +69,7 @@ class Px4Bridge:
     @property
     def connected(self) -> tuple[str, ...]:
         """UAVs whose PX4 is connected."""
-        return tuple(seat.uav for seat in self._seats if seat.taken)
+        return tuple(session.uav for session in self._sessions if session.taken)
 
     def address(self, number: int) -> str:
         """Returns the address to which instance `number` connects."""
@@ -83,9 +83,9 @@ class Px4Bridge:
         if not uavs:
             raise BridgeError("no UAV has the IMU that a PX4 needs")
         for k, uav in enumerate(uavs):
-            seat = HilSession(gateway, uav, k + 1, self._patience)
-            self._seats.append(seat)
-            await self._listen(seat, self._port + k)
+            session = HilSession(gateway, uav, k + 1, self._timeout_policy)
+            self._sessions.append(session)
+            await self._listen(session, self._port + k)
         if self._notice_s is not None:
             self._absence = ConnectionNotice(
                 "PX4", self._missing, lambda: how_to_start(len(uavs), self._port), self._notice_s
@@ -97,31 +97,31 @@ class Px4Bridge:
             self._absence.cancel()
         for server in self._servers:
             server.close()
-        for seat in self._seats:
-            seat.close()
+        for session in self._sessions:
+            session.close()
         self._servers.clear()
-        self._seats.clear()
+        self._sessions.clear()
         for _ in range(2):  # for connections to be aborted, and their callbacks to run
             await asyncio.sleep(0)
 
     def _missing(self) -> dict[str, str]:
         """Returns the addresses of the missing PX4s, by UAV."""
         return {
-            seat.uav: self.address(number)
-            for number, seat in enumerate(self._seats)
-            if not seat.taken
+            session.uav: self.address(number)
+            for number, session in enumerate(self._sessions)
+            if not session.taken
         }
 
-    async def _listen(self, seat: HilSession, port: int) -> None:
+    async def _listen(self, session: HilSession, port: int) -> None:
         loop = asyncio.get_running_loop()
         try:
             listener = open_listener(
-                self._host, port, f"{seat.uav}: PX4", max_connections=_MOST_CONNECTIONS
+                self._host, port, f"{session.uav}: PX4", max_connections=_MOST_CONNECTIONS
             )
-            server = await loop.create_server(lambda: _Connection(seat, listener), sock=listener)
+            server = await loop.create_server(lambda: _Connection(session, listener), sock=listener)
         except (OSError, OverflowError) as error:
             raise BridgeError(
-                f"{seat.uav}: cannot listen on {self._host}:{port}: {why_not(error)}"
+                f"{session.uav}: cannot listen on {self._host}:{port}: {why_not(error)}"
             ) from None
         self._servers.append(server)
 
@@ -137,13 +137,13 @@ class _Connection(asyncio.Protocol):
     _transport: asyncio.Transport
     _out: socket.socket | None = None
 
-    def __init__(self, seat: HilSession, listener: Listener) -> None:
-        self._seat = seat
+    def __init__(self, session: HilSession, listener: Listener) -> None:
+        self._session = session
         self._listener = listener
         self._preamble = Preamble()
         self._loop = asyncio.get_running_loop()
         self._unsent = bytearray()
-        self._hear: Callable[[bytes], None] = _ignore
+        self._receive: Callable[[bytes], None] = _ignore
 
     def send(self, data: bytes) -> bool:
         """Implements `HilConnection.send`; drops whole frames for a PX4 that does not read."""
@@ -163,7 +163,7 @@ class _Connection(asyncio.Protocol):
 
     def end(self) -> None:
         """Implements `HilConnection.end`."""
-        self._hear = _ignore
+        self._receive = _ignore
         with contextlib.suppress(RuntimeError):  # the loop has ended
             self._loop.call_soon_threadsafe(self._transport.abort)
 
@@ -171,32 +171,32 @@ class _Connection(asyncio.Protocol):
         """Implements asyncio's method."""
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
-        if self._seat.taken and not self._seat.has_heard:
-            self._seat.give_way()
-        if self._seat.taken:
-            uav = self._seat.uav
+        if self._session.taken and not self._session.has_received:
+            self._session.give_way()
+        if self._session.taken:
+            uav = self._session.uav
             _log.warning("%s: its PX4 is connected already; another connection is closed", uav)
             transport.abort()
             return
         tend(transport.get_extra_info("socket"))
         self._out = transport.get_extra_info("socket").dup()
-        self._hear = self._seat.take(self)
+        self._receive = self._session.take(self)
 
     def data_received(self, data: bytes) -> None:
         """Implements asyncio's method."""
         data = self._preamble.feed(data)
         if self._preamble.refused is not None:
-            self._listener.note_stranger(self._preamble.refused)
+            self._listener.note_foreign_protocol(self._preamble.refused)
             self._transport.abort()
             return
-        self._hear(data)
-        if self._seat.has_heard:
+        self._receive(data)
+        if self._session.has_received:
             self._listener.prove(self._transport)
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
         """Implements asyncio's method."""
-        if self._hear is not _ignore:
-            self._seat.leave("its PX4 has disconnected")
+        if self._receive is not _ignore:
+            self._session.leave("its PX4 has disconnected")
         if self._out is not None:
             self._out.close()
 

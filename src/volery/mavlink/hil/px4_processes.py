@@ -101,17 +101,17 @@ class Px4Instances:
         self._numbers = range(first, first + count)
         self._environment = _environment(host, speed)
         self._parameters = tuple(parameters) or ({},) * count
-        self._kept = folder
+        self._work_dir = folder
         self._folder = Path()
         self._instances: list[_Instance] = []
         self._ended = threading.Event()
-        self._watcher = threading.Thread(target=self._watch, name="volery-px4", daemon=True)
+        self._monitor = threading.Thread(target=self._watch, name="volery-px4", daemon=True)
         self.failure: str | None = None
         """Why an instance exited by itself; None without a failure."""
 
     def start(self) -> None:
         """Starts all instances. Raises `BridgeError` if that fails."""
-        self._folder = self._kept or Path(tempfile.mkdtemp(prefix="volery-px4-"))
+        self._folder = self._work_dir or Path(tempfile.mkdtemp(prefix="volery-px4-"))
         try:
             for number, own in zip(self._numbers, self._parameters, strict=True):
                 environment = {**_parameter_variables(own), **self._environment}
@@ -121,19 +121,19 @@ class Px4Instances:
         except OSError as error:
             self.stop()
             raise BridgeError(f"{self._build.binary}: {error.strerror or error}") from None
-        self._watcher.start()
+        self._monitor.start()
 
     def stop(self) -> None:
         """Ends all instances; further calls do nothing."""
         self._ended.set()
-        if self._watcher.is_alive():
-            self._watcher.join()
+        if self._monitor.is_alive():
+            self._monitor.join()
         for instance in self._instances:
             instance.ask_to_end()
         for instance in self._instances:
             instance.end()
         self._instances.clear()
-        if self._kept is None and self._folder.name:
+        if self._work_dir is None and self._folder.name:
             shutil.rmtree(self._folder, ignore_errors=True)
 
     def words_of(self, number: int) -> str:

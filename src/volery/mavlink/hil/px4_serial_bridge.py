@@ -15,7 +15,7 @@ from volery.core.errors import BridgeError
 from volery.graph.session import Gateway
 from volery.mavlink.codec import dialect
 from volery.mavlink.hil.connection_notice import NOTICE_S, ConnectionNotice
-from volery.mavlink.hil.lock_step import PATIENCE, TimeoutPolicy, uavs_with
+from volery.mavlink.hil.lock_step import DEFAULT_TIMEOUT, TimeoutPolicy, uavs_with
 from volery.mavlink.hil.session import HilSession
 from volery.mavlink.links.serial_line import SerialLine
 
@@ -39,15 +39,15 @@ class Px4SerialBridge:
         path: str,
         baud: int = BAUD,
         *,
-        patience: TimeoutPolicy = PATIENCE,
+        timeout_policy: TimeoutPolicy = DEFAULT_TIMEOUT,
         notice_s: float | None = NOTICE_S,
     ) -> None:
         self._path, self._baud = path, baud
-        self._patience = patience
+        self._timeout_policy = timeout_policy
         self._notice_s = notice_s
         self._absence: ConnectionNotice | None = None
         self._line: SerialLine | None = None
-        self._seat: HilSession | None = None
+        self._session: HilSession | None = None
         self._beats: asyncio.Task[None] | None = None
 
     @property
@@ -58,7 +58,7 @@ class Px4SerialBridge:
     @property
     def uav(self) -> str | None:
         """The UAV that it serves; None while the bridge is closed."""
-        return None if self._seat is None else self._seat.uav
+        return None if self._session is None else self._session.uav
 
     async def start(self, gateway: Gateway) -> None:
         """Opens the line. Raises `BridgeError` if that fails or no UAV is left."""
@@ -73,8 +73,8 @@ class Px4SerialBridge:
         if not free:
             raise BridgeError(f"{self._path}: no UAV with an IMU is left for a PX4 there")
         self._line = SerialLine(self._path, self._baud, self._take)
-        self._seat = HilSession(gateway, free[0], uavs.index(free[0]) + 1, self._patience)
-        self._hear = self._seat.take(self)
+        self._session = HilSession(gateway, free[0], uavs.index(free[0]) + 1, self._timeout_policy)
+        self._receive = self._session.take(self)
         self._beats = asyncio.create_task(self._beat())
         self._absence = ConnectionNotice("PX4", self._missing, _how_to_start, self._notice_s)
 
@@ -85,9 +85,9 @@ class Px4SerialBridge:
         if self._beats is not None:
             self._beats.cancel()
             await asyncio.gather(self._beats, return_exceptions=True)
-        if self._seat is not None:
-            self._seat.close()
-            self._seat = None
+        if self._session is not None:
+            self._session.close()
+            self._session = None
         self.end()
 
     def send(self, data: bytes) -> bool:
@@ -103,20 +103,20 @@ class Px4SerialBridge:
             self._line = None
 
     def _take(self, data: bytes) -> None:
-        if self._seat is not None:
-            self._hear(data)
+        if self._session is not None:
+            self._receive(data)
 
     def _missing(self) -> dict[str, str]:
         """Returns the lines without frames, by UAV."""
-        seat = self._seat
-        if seat is None or seat.has_heard:
+        session = self._session
+        if session is None or session.has_received:
             return {}
-        return {seat.uav: f"{self._path} at {self._baud} baud"}
+        return {session.uav: f"{self._path} at {self._baud} baud"}
 
     async def _beat(self) -> None:
         """Sends heartbeats, because PX4 opens its side only after the simulator's first frame."""
-        while self._seat is not None:
-            self.send(self._seat.heartbeat())
+        while self._session is not None:
+            self.send(self._session.heartbeat())
             await asyncio.sleep(_BEAT_S)
 
 

@@ -38,36 +38,44 @@ class HilSession:
     An answer ends the exchange only if it was made after it, according to its time.
     """
 
-    def __init__(self, gateway: Gateway, uav: str, system: int, patience: TimeoutPolicy) -> None:
+    def __init__(
+        self, gateway: Gateway, uav: str, system: int, timeout_policy: TimeoutPolicy
+    ) -> None:
         self.uav = uav
         self._system = system
-        self._way: HilConnection | None = None
+        self._connection: HilConnection | None = None
         self._link = HilLink(system)
-        self._noise, self._told = 0, False
+        self._noise, self._has_warned = 0, False
         self._is_armed = False
         self._sensing = SensorSamples()
-        self._meetings = LockStepSession(
-            gateway, uav, "px4", self, period_ns=PERIOD_NS, topics=TOPICS, patience=patience
+        self._lock_step = LockStepSession(
+            gateway,
+            uav,
+            "px4",
+            self,
+            period_ns=PERIOD_NS,
+            topics=TOPICS,
+            timeout_policy=timeout_policy,
         )
 
     @property
     def taken(self) -> bool:
         """Whether a PX4 is connected."""
-        return self._way is not None
+        return self._connection is not None
 
     @property
-    def has_heard(self) -> bool:
+    def has_received(self) -> bool:
         """Whether a MAVLink frame has arrived over the current connection."""
         return self.taken and self._link.spoken
 
-    def take(self, way: HilConnection) -> Callable[[bytes], None]:
+    def take(self, connection: HilConnection) -> Callable[[bytes], None]:
         """Attaches a new PX4; returns the function that takes the bytes it sends."""
-        with self._meetings.lock:
-            self._way = way
+        with self._lock_step.lock:
+            self._connection = connection
             self._link = HilLink(self._system)
-            self._noise, self._told = 0, False
+            self._noise, self._has_warned = 0, False
             self._is_armed = False
-        return partial(self._hear, way)
+        return partial(self._receive, connection)
 
     def heartbeat(self) -> bytes:
         """Returns a heartbeat of the simulator."""
@@ -75,45 +83,45 @@ class HilSession:
 
     def leave(self, why: str) -> None:
         """Handles the end of the connection; the rotors stop."""
-        with self._meetings.lock:
-            if self._way is None:
+        with self._lock_step.lock:
+            if self._connection is None:
                 return
-            self._way = None
+            self._connection = None
             _log.warning("%s: %s", self.uav, why)
-            self._meetings.go_on(_STILL)
+            self._lock_step.go_on(_STILL)
 
     def close(self) -> None:
         """Closes the session; further calls do nothing."""
-        with self._meetings.lock:
-            way, self._way = self._way, None
-        if way is not None:
-            self._meetings.turn_rotors(_STILL)
-            way.end()
-        self._meetings.close()
+        with self._lock_step.lock:
+            connection, self._connection = self._connection, None
+        if connection is not None:
+            self._lock_step.turn_rotors(_STILL)
+            connection.end()
+        self._lock_step.close()
 
     # ---------------------------------------------------------------------------------- lock step
 
     @property
     def is_in_step(self) -> bool:
         """Implements `ExternalAutopilot.is_in_step`."""
-        way = self._way
-        return way is not None and way.is_for_any_thread and self._link.locked
+        connection = self._connection
+        return connection is not None and connection.is_for_any_thread and self._link.locked
 
-    def tell(self, time_ns: int, news: News) -> bool:
-        """Implements `ExternalAutopilot.tell`."""
+    def send_sensors(self, time_ns: int, news: News) -> bool:
+        """Implements `ExternalAutopilot.send_sensors`."""
         sensed = self._sensing.read(news)
-        if self._way is None or sensed is None:
+        if self._connection is None or sensed is None:
             return False
-        self._way.send(self._link.tell(time_ns, sensed))
+        self._connection.send(self._link.encode_exchange(time_ns, sensed))
         return self._link.locked and self.taken
 
     @property
     def may_sleep(self) -> bool:
         """Implements `ExternalAutopilot.may_sleep`: a disarmed PX4 in Offboard is silent."""
-        return self._way is not None and not self._is_armed
+        return self._connection is not None and not self._is_armed
 
-    def begin_anew(self) -> None:
-        """Implements `ExternalAutopilot.begin_anew`: a PX4 cannot go back in time."""
+    def on_reset(self) -> None:
+        """Implements `ExternalAutopilot.on_reset`: a PX4 cannot go back in time."""
         self._end("the simulation was reset and its PX4 must restart")
 
     def give_way(self) -> None:
@@ -125,31 +133,31 @@ class HilSession:
         self._end("the connection to its PX4 was closed")
 
     def _end(self, why: str) -> None:
-        way = self._way
-        if way is not None:
-            way.end()
+        connection = self._connection
+        if connection is not None:
+            connection.end()
             self.leave(why)
 
-    def _hear(self, way: HilConnection, data: bytes) -> None:
-        with self._meetings.lock:
-            if way is self._way:  # still the current connection
+    def _receive(self, connection: HilConnection, data: bytes) -> None:
+        with self._lock_step.lock:
+            if connection is self._connection:  # still the current connection
                 self._take_in(data)
 
     def _take_in(self, data: bytes) -> None:
         answers = self._link.feed(data)
         if not self._link.spoken:
             self._noise += len(data)
-            if self._noise > _NOISE_BYTES and not self._told:
-                self._told = True
+            if self._noise > _NOISE_BYTES and not self._has_warned:
+                self._has_warned = True
                 _log.warning(
                     "%s: the connected client does not send MAVLink; connect a PX4", self.uav
                 )
         for actuators in answers:
             self._is_armed = actuators.armed
-            if actuators.time_ns >= self._meetings.time_ns:
-                self._meetings.go_on(_shares(actuators))
+            if actuators.time_ns >= self._lock_step.time_ns:
+                self._lock_step.go_on(_shares(actuators))
             else:
-                self._meetings.turn_rotors(_shares(actuators))
+                self._lock_step.turn_rotors(_shares(actuators))
 
 
 def _shares(actuators: Actuators) -> Sequence[float]:

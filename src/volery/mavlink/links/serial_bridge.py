@@ -24,7 +24,7 @@ class MavlinkSerial:
         self._fleet: VehicleRegistry | None = None
         self._looks: asyncio.Task[None] | None = None
         self._line: SerialLine | None = None
-        self._party: MavlinkConnection | None = None
+        self._connection: MavlinkConnection | None = None
 
     @property
     def name(self) -> str:
@@ -36,7 +36,7 @@ class MavlinkSerial:
         dialect()
         self._line = SerialLine(self._path, self._baud, self._take)
         self._fleet = VehicleRegistry(gateway, self.name, self._join, lambda _system: None)
-        self._party = MavlinkConnection(self._fleet, self._line.number, GROUND, self._key)
+        self._connection = MavlinkConnection(self._fleet, self._line.number, GROUND, self._key)
         self._fleet.look()
         self._looks = asyncio.create_task(self._fleet.keep_looking())
 
@@ -45,25 +45,25 @@ class MavlinkSerial:
         if self._looks is not None:
             self._looks.cancel()
             await asyncio.gather(self._looks, return_exceptions=True)
-        if self._party is not None:
-            self._party.leave()
+        if self._connection is not None:
+            self._connection.leave()
         if self._fleet is not None:
             self._fleet.close()
         if self._line is not None:
             self._line.close()
 
     def _join(self, _name: str, system: int) -> Sink:
-        assert self._party is not None
+        assert self._connection is not None
         assert self._line is not None
-        self._party.greet(system)
-        line, party = self._line, self._party
+        self._connection.greet(system)
+        line, connection = self._line, self._connection
 
         def sink(number: int, data: bytes) -> None:
-            if number in (-1, party.number):
-                line.send(party.sign(data))
+            if number in (-1, connection.number):
+                line.send(connection.sign(data))
 
         return sink
 
     def _take(self, data: bytes) -> None:
-        if self._party is not None:
-            self._party.take(data)
+        if self._connection is not None:
+            self._connection.take(data)

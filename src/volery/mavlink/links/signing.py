@@ -61,7 +61,7 @@ class Signing:
         self._clock = clock
         self._stamp = 0
         self._newest: dict[tuple[int, int, int], int] = {}
-        self._told: set[tuple[int, int, str]] = set()
+        self._logged: set[tuple[int, int, str]] = set()
 
     @property
     def has_key(self) -> bool:
@@ -101,8 +101,8 @@ class Signing:
     def _refuse(self, frame: MavlinkFrame, why: str) -> bool:
         """Logs why frames of a sender are ignored, once per reason; returns False."""
         source = (frame.system, frame.component, why)
-        if source not in self._told:
-            self._told.add(source)
+        if source not in self._logged:
+            self._logged.add(source)
             _log.warning("MAVLink: system %d, component %d is ignored: %s", *source)
         return False
 

@@ -20,7 +20,7 @@ _UNSENT_BYTES = 1 << 18
 """Largest number of unsent bytes for a TCP client that does not read; later frames are dropped."""
 _MOST_CLIENTS = 32
 """Clients of the TCP server (modelling choice). Beyond, the oldest without a valid frame ends."""
-_BITE_BYTES = 2048
+_BUFFER_BYTES = 2048
 """Bytes read at once, so that no client delays others or the simulation for long."""
 
 
@@ -95,12 +95,12 @@ class MavlinkTcp:
         if self._fleet is not None:
             self._intake.fit(len(self._fleet.systems))
         for client in self._clients.values():
-            client.party.greet(system)
+            client.connection.greet(system)
         return self._send
 
     def _send(self, number: int, data: bytes) -> None:
         for client in self._clients.values():
-            if number in (-1, client.party.number):
+            if number in (-1, client.connection.number):
                 client.send(data)
 
     def _opened(self, client: _TcpClient) -> None:
@@ -109,39 +109,39 @@ class MavlinkTcp:
             return
         self._numbers += 1
         number = (self.port + self._numbers) % 65535
-        client.party = MavlinkConnection(
+        client.connection = MavlinkConnection(
             self._fleet, number, GROUND, self._key, self._intake.account()
         )
         self._clients[number] = client
         for system in self._fleet.systems:
-            client.party.greet(system)
+            client.connection.greet(system)
 
     def _prove(self, client: _TcpClient) -> None:
         if self._listener is not None:
             self._listener.prove(client.transport)
 
-    def _end_stranger(self, client: _TcpClient) -> None:
+    def _end_foreign(self, client: _TcpClient) -> None:
         if self._listener is not None:
-            self._listener.note_stranger(client.preamble.refused or "")
+            self._listener.note_foreign_protocol(client.preamble.refused or "")
         client.transport.abort()
 
     def _closed(self, client: _TcpClient) -> None:
         for number, one in tuple(self._clients.items()):
             if one is client:
                 del self._clients[number]
-                client.party.leave()
+                client.connection.leave()
 
 
 class _TcpClient(asyncio.BufferedProtocol):
     """One TCP client."""
 
     transport: asyncio.Transport
-    party: MavlinkConnection
+    connection: MavlinkConnection
 
     def __init__(self, bridge: MavlinkTcp) -> None:
         self._bridge = bridge
         self._full = False
-        self._bite = bytearray(_BITE_BYTES)
+        self._buffer = bytearray(_BUFFER_BYTES)
         self.preamble = Preamble()
         self._proven = False
         self._pause: asyncio.TimerHandle | None = None
@@ -149,7 +149,7 @@ class _TcpClient(asyncio.BufferedProtocol):
     def send(self, data: bytes) -> None:
         """Sends frames, whole or not at all."""
         if not self._full:
-            write_while_open(self.transport, self.party.sign(data))
+            write_while_open(self.transport, self.connection.sign(data))
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Implements asyncio's method."""
@@ -161,16 +161,16 @@ class _TcpClient(asyncio.BufferedProtocol):
 
     def get_buffer(self, sizehint: int) -> bytearray:  # noqa: ARG002
         """Implements asyncio's method."""
-        return self._bite
+        return self._buffer
 
     def buffer_updated(self, nbytes: int) -> None:
         """Implements asyncio's method."""
-        data = self.preamble.feed(bytes(self._bite[:nbytes]))
+        data = self.preamble.feed(bytes(self._buffer[:nbytes]))
         if self.preamble.refused is not None:
-            self._bridge._end_stranger(self)
+            self._bridge._end_foreign(self)
             return
-        pause_s = self.party.take(data)
-        if not self._proven and self.party.has_spoken:
+        pause_s = self.connection.take(data)
+        if not self._proven and self.connection.has_spoken:
             self._proven = True
             self._bridge._prove(self)
         if pause_s > 0.0 and not self.transport.is_closing():
@@ -181,7 +181,7 @@ class _TcpClient(asyncio.BufferedProtocol):
         self._pause = asyncio.get_running_loop().call_later(pause_s, self._read_again)
 
     def _read_again(self) -> None:
-        pause_s = self.party.may_read()
+        pause_s = self.connection.may_read()
         if pause_s > 0.0:
             self._read_after(pause_s)
         elif not self.transport.is_closing():

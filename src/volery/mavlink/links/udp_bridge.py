@@ -19,7 +19,7 @@ from volery.mavlink.links import ports
 from volery.mavlink.links.connection import why_not
 from volery.mavlink.links.rate_limits import RateAccount, RateLimits
 from volery.mavlink.links.signing import Signing
-from volery.mavlink.links.udp_reader import UdpReader, connected_beside
+from volery.mavlink.links.udp_reader import UdpReader, connected_socket
 from volery.mavlink.links.vehicle_registry import Sink, VehicleRegistry
 
 _MOST_WITH_PEERS = 64
@@ -153,7 +153,7 @@ class _UdpLink:
         except (OSError, OverflowError) as error:
             self._socket.close()
             raise BridgeError(f"cannot listen on UDP port {own}: {why_not(error)}") from None
-        beside = connected_beside(self._socket, to) if for_peer else None
+        beside = connected_socket(self._socket, to) if for_peer else None
         self._inlets = [self._read_from(sock) for sock in (self._socket, beside) if sock]
         fleet.send(system, own, profile, b"")
 

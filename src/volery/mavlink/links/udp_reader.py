@@ -88,7 +88,7 @@ class UdpReader:
             self._loop.add_reader(self.socket, self._read)
 
 
-def connected_beside(bound: socket.socket, peer: tuple[str, int]) -> socket.socket | None:
+def connected_socket(bound: socket.socket, peer: tuple[str, int]) -> socket.socket | None:
     """Returns a socket of the same port that is connected to a peer; None if that is impossible.
 
     Both sockets share the port for a moment only; afterwards it is taken for all others, as before.

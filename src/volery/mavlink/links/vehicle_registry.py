@@ -40,10 +40,10 @@ class RegisteredVehicle:
 
     name: str
     system: int
-    mailbox: SubscriptionQueue
+    queue: SubscriptionQueue
     sink: Sink
     heartbeat: bytes = b""
-    heard_s: float = 0.0
+    received_s: float = 0.0
 
 
 class VehicleRegistry:
@@ -92,8 +92,8 @@ class VehicleRegistry:
             self._meet(name)
         now_s = self._loop.time()
         for craft in self._craft.values():
-            if craft.heartbeat and now_s - craft.heard_s > _BEAT_S:
-                craft.heard_s = now_s
+            if craft.heartbeat and now_s - craft.received_s > _BEAT_S:
+                craft.received_s = now_s
                 craft.sink(-1, craft.heartbeat)
 
     async def keep_looking(self) -> None:
@@ -135,8 +135,8 @@ class VehicleRegistry:
             with contextlib.suppress(RuntimeError):  # the loop has ended
                 self._loop.call_soon_threadsafe(self._drain, system)
 
-        mailbox = self._session.subscribe(f"/{name}{_OUT}", PACKETS, depth=_DEPTH, wake=wake)
-        craft = RegisteredVehicle(name, system, mailbox, _nowhere)
+        queue = self._session.subscribe(f"/{name}{_OUT}", PACKETS, depth=_DEPTH, wake=wake)
+        craft = RegisteredVehicle(name, system, queue, _nowhere)
         self._craft[system] = craft
         craft.sink = self._joined(name, system)
 
@@ -151,17 +151,17 @@ class VehicleRegistry:
         craft = self._craft.get(system)
         if craft is None:
             return
-        for published in craft.mailbox.take():
+        for published in craft.queue.take():
             message = published.message
             data = np.asarray(message.data, np.uint8).tobytes()
-            craft.heard_s = self._loop.time()
+            craft.received_s = self._loop.time()
             if data[7:10] == b"\0\0\0" and data[0] == _MAGIC:
                 craft.heartbeat = data[: _HEAD + data[1] + 2]
             craft.sink(message.link, data)
 
     def _forget(self, craft: RegisteredVehicle) -> None:
         del self._craft[craft.system]
-        self._session.unsubscribe(craft.mailbox)
+        self._session.unsubscribe(craft.queue)
         with contextlib.suppress(GraphError):
             self._session.unadvertise(f"/{craft.name}{_IN}")
         self._left(craft.system)

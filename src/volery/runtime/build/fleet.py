@@ -57,11 +57,11 @@ def airframes_of(scenario: Scenario) -> dict[str, Airframe]:
 
 
 def build_fleet(
-    scenario: Scenario, starts: Sequence[StartPose], names: Sequence[str], *, copies: int = 1
+    scenario: Scenario, starts: Sequence[StartPose], names: Sequence[str], *, num_envs: int = 1
 ) -> Fleet:
     """Returns the fleet at its start in the scenario's weather, with `names` in messages.
 
-    `copies` is the number of environments in `starts`, one after the other.
+    `num_envs` is the number of environments in `starts`, one after the other.
     """
     physics = scenario.physics
     fleet = Fleet(
@@ -78,7 +78,7 @@ def build_fleet(
         battery_charge=[scenario.types[start.type_name].battery_charge for start in starts],
         weather=build_weather(scenario),
         seed=scenario.seed,
-        copies=np.repeat(np.arange(copies), len(starts) // copies),
+        copies=np.repeat(np.arange(num_envs), len(starts) // num_envs),
     )
     for row, start in enumerate(starts):
         flight = scenario.types[start.type_name].flight
@@ -98,7 +98,7 @@ def check_free(fleet: Fleet, row: int, position_map: NDArray[np.float64]) -> Non
         )
 
 
-def add_bodies(scene: Scene, starts: Sequence[StartPose], *, copies: int = 1) -> None:
+def add_bodies(scene: Scene, starts: Sequence[StartPose], *, num_envs: int = 1) -> None:
     """Makes the UAVs' bodies visible to the sensors of their own environment."""
     kinds: list[Airframe] = []
     for start in starts:
@@ -107,5 +107,5 @@ def add_bodies(scene: Scene, starts: Sequence[StartPose], *, copies: int = 1) ->
     scene.set_bodies(
         [body_shape(airframe) for airframe in kinds],
         [kinds.index(start.airframe) for start in starts],
-        copies=copies,
+        num_envs=num_envs,
     )

@@ -70,9 +70,9 @@ def build_city(scenario: Scenario, terrain: Terrain) -> City | None:
             seed=scenario.world_seed,
             region=city.region_m,
             heights=HeightRule(city.storey_m, city.default_height_m),
-            streets=StreetRule(streets.widest_m, streets.pavement_m),
+            streets=StreetRule(streets.max_width_m, streets.pavement_m),
             furniture=FurnitureRule(
-                streets.lamp_spacing_m, streets.tree_spacing_m, streets.tree_share
+                streets.lamp_spacing_m, streets.tree_spacing_m, streets.tree_fraction
             ),
         )
     except DataFileError as error:

@@ -32,7 +32,7 @@ _LEAST_S = 0.05
 """Min wall time between two external messages, s: smooth at a twentieth of real time."""
 
 
-def tell_poses(graph: Graph, engine: Engine) -> LiveTopic:
+def ground_truth_topic(graph: Graph, engine: Engine) -> LiveTopic:
     """Publishes `map -> uavN/base_link` of every UAV in order, then `map -> NAME` of actors."""
     publisher = graph.advertise(TOPIC, TFMessage)
     return LiveTopic(

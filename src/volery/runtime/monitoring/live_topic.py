@@ -14,7 +14,7 @@ from typing import Any
 from volery.graph.graph import Publisher
 
 Timers = Callable[..., None]
-"""`every(period_s, callback, wanted=...)` schedules a callback in simulated time."""
+"""`every(period_s, callback, has_subscribers=...)` schedules a callback in simulated time."""
 
 
 @dataclass
@@ -30,29 +30,32 @@ class LiveTopic:
     content: Callable[[], Any]
     period_s: float
     least_s: float
-    _told: Any = None
-    _told_at_s: float = 0.0
+    _last_content: Any = None
+    _published_at_s: float = 0.0
     _watchers: int = 0
     _now_s: float = 0.0
 
     def begin(self, every: Timers) -> None:
         """Starts publishing."""
-        every(self.period_s, self._tell, wanted=lambda: self.publisher.wanted)
+        every(self.period_s, self._publish, wanted=lambda: self.publisher.has_subscribers)
 
     def look(self, now_s: float) -> None:
         """Publishes changes to external clients at wall time `now_s`; call it between ticks."""
         self._now_s = now_s
-        if not self.publisher.watched:
+        if not self.publisher.has_external_subscribers:
             return
-        watchers = self.publisher.watchers_so_far
-        if watchers == self._watchers and now_s - self._told_at_s < self.least_s:
+        watchers = self.publisher.num_external_subscriptions
+        if watchers == self._watchers and now_s - self._published_at_s < self.least_s:
             return
         content = self.content()
-        if watchers != self._watchers or content != self._told:
-            self._watchers, self._told, self._told_at_s = watchers, content, now_s
-            self.publisher.show(self.message())
+        if watchers != self._watchers or content != self._last_content:
+            self._watchers, self._last_content, self._published_at_s = watchers, content, now_s
+            self.publisher.publish_external(self.message())
 
-    def _tell(self) -> None:
-        self._told_at_s, self._watchers = self._now_s, self.publisher.watchers_so_far
-        self._told = self.content() if self.publisher.watched else None
+    def _publish(self) -> None:
+        self._published_at_s, self._watchers = (
+            self._now_s,
+            self.publisher.num_external_subscriptions,
+        )
+        self._last_content = self.content() if self.publisher.has_external_subscribers else None
         self.publisher.publish(self.message())

@@ -6,7 +6,7 @@ import time
 from typing import TYPE_CHECKING
 
 from volery.engine.engine import Engine
-from volery.runtime.monitoring.ground_truth_tf import tell_poses
+from volery.runtime.monitoring.ground_truth_tf import ground_truth_topic
 from volery.runtime.monitoring.status import Status, StatusSources
 from volery.runtime.monitoring.vehicles import VehicleTopic
 
@@ -22,7 +22,7 @@ class Monitor:
         vehicles = VehicleTopic(
             engine, simulation.uavs, simulation.gateway, simulation.operators.holder_of
         )
-        self._present = (tell_poses(simulation.graph, engine), vehicles.present)
+        self._present = (ground_truth_topic(simulation.graph, engine), vehicles.present)
         self._status = Status(simulation, told)
         for present in self._present:
             present.begin(engine.every)
@@ -36,6 +36,6 @@ class Monitor:
 
     def jumped(self) -> None:
         """Publishes everything again after another state, or the start, was restored."""
-        self._graph.show_kept()
+        self._graph.republish_latched()
         self._status.jumped()
         self.look()

@@ -1,6 +1,7 @@
 """Publishes `/volery/status`: the state of the simulation and its speed in wall time.
 
-Only external clients receive it, from the thread that runs the simulation; see `Publisher.show`.
+Only external clients receive it, from the thread that runs the simulation; see
+`Publisher.publish_external`.
 """
 
 from __future__ import annotations
@@ -95,8 +96,8 @@ class Status:
         simulation = self._simulation
         stages = simulation.stage_seconds
         pace = self._speedometer.read(now_s, simulation.time_ns, stages)
-        if self._publisher.watched:
-            self._publisher.show(self._message(pace, list(stages)))
+        if self._publisher.has_external_subscribers:
+            self._publisher.publish_external(self._message(pace, list(stages)))
 
     def jumped(self) -> None:
         """Discards rates after a jump of simulated time."""

@@ -69,7 +69,7 @@ class CommandLog:
         moment = self._engine.moment
         kept = _StoredCommand(self._next_number, self._engine.time_ns, moment, taken, cdr)
         self._next_number += 1
-        if self._publisher.wanted:
+        if self._publisher.has_subscribers:
             self._publisher.publish(_message(kept))
         self._keep(kept)
         if weight is CommandEffect.CHANGES:

@@ -140,7 +140,7 @@ class _Clients:
 
     def _call(self, taken: ClientCommand) -> None:
         self._graph.call_async(
-            taken.name, taken.content, ServiceReply(_nobody_hears, _nobody_hears)
+            taken.name, taken.content, ServiceReply(_has_no_subscribers, _has_no_subscribers)
         )
 
     def _publish(self, taken: ClientCommand) -> None:
@@ -167,14 +167,14 @@ class _Clients:
         def ask(_request: Any, reply: ServiceReply) -> None:
             requests.append(reply)
 
-        self._graph.offer_async(taken.name, taken.type, ask)
+        self._graph.create_async_service(taken.name, taken.type, ask)
 
     def _withdraw(self, taken: ClientCommand) -> None:
-        self._graph.withdraw(taken.name)
+        self._graph.destroy_service(taken.name)
 
     def _request(self, taken: ClientCommand) -> ServiceReply:
         return self._requests[taken.name][taken.request]
 
 
-def _nobody_hears(_answer: object) -> None:
+def _has_no_subscribers(_answer: object) -> None:
     """Discards the response: the client is not connected."""

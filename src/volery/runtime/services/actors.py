@@ -49,7 +49,7 @@ def offer_actors(simulation: Simulation, actors: MovingActors, every: Callable[.
             )
         )
 
-    every(_PERIOD_S, tell, wanted=lambda: transforms.wanted)
+    every(_PERIOD_S, tell, wanted=lambda: transforms.has_subscribers)
     for actor in actors.actors:
         if isinstance(actor.motion, GivenMotion):
             topic = f"/actors/{actor.name}/pose"

@@ -81,4 +81,4 @@ def offer_features(
         },
     )
     response = message_type(f"{_SRV}_Response")
-    graph.offer("/get_simulator_features", _SRV, lambda _request: response(features=told))
+    graph.create_service("/get_simulator_features", _SRV, lambda _request: response(features=told))

@@ -33,7 +33,7 @@ def open_lock_step(simulation: Any) -> None:
             return response(success=False, message=str(error), now=time_from_ns(0))
         return response(success=True, message="", now=time_from_ns(simulation.time_ns))
 
-    simulation.graph.offer(SERVICE, TYPE, join)
+    simulation.graph.create_service(SERVICE, TYPE, join)
 
 
 class _LockStepTopics:

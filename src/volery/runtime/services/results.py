@@ -80,7 +80,7 @@ def offer_result(graph: Graph, name: str, srvtype: str, handler: Handler) -> Non
             return filled(f"{srvtype}_Response", {"result": failed(error)})
         return filled(f"{srvtype}_Response", {"result": result(), **(fields or {})})
 
-    graph.offer(name, srvtype, handle)
+    graph.create_service(name, srvtype, handle)
 
 
 def offer_result_later(
@@ -98,7 +98,7 @@ def offer_result_later(
         except (RefusedError, VoleryError) as error:
             settle(error)
 
-    graph.offer_async(name, srvtype, handle)
+    graph.create_async_service(name, srvtype, handle)
 
 
 def offer_command(graph: Graph, name: str, srvtype: str, handler: Handler) -> Close:
@@ -114,5 +114,5 @@ def offer_command(graph: Graph, name: str, srvtype: str, handler: Handler) -> Cl
             return filled(f"{srvtype}_Response", {"success": False, "message": reason_of(error)})
         return filled(f"{srvtype}_Response", {"success": True, **(fields or {})})
 
-    graph.offer(name, srvtype, handle)
-    return lambda: graph.withdraw(name)
+    graph.create_service(name, srvtype, handle)
+    return lambda: graph.destroy_service(name)

@@ -41,7 +41,9 @@ def offer_steps(simulation: Simulation) -> None:
         _begin(simulation, int(request.steps), tell)
 
     offer_result_later(simulation.graph, "/step_simulation", _SERVICE, step)
-    simulation.graph.actions.offer("/simulate_steps", _ACTION, lambda goal: _take(simulation, goal))
+    simulation.graph.actions.create_server(
+        "/simulate_steps", _ACTION, lambda goal: _take(simulation, goal)
+    )
 
 
 def _begin(simulation: Simulation, steps: int, tell: Any) -> StepRequest:

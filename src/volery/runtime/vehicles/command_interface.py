@@ -56,7 +56,7 @@ def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> list[Clo
     def on_twist(twist: Any) -> None:
         linear, angular = twist.linear, twist.angular
         uav.command_velocity([linear.x, linear.y, linear.z], angular.z)
-        if applied.wanted:
+        if applied.has_subscribers:
             stamp = header(now_ns(), f"{uav.name}/base_link")
             applied.publish(TwistStamped(header=stamp, twist=twist))
 

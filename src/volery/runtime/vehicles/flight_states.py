@@ -41,7 +41,7 @@ class FlightStates:
 
     def start(self, every: Callable[..., None]) -> None:
         """Publishes each `PERIOD_S` of simulated time from now on."""
-        every(PERIOD_S, self._tell, wanted=lambda: bool(self._wanted()))
+        every(PERIOD_S, self._publish, wanted=lambda: bool(self._wanted()))
 
     def open(self, uav: Uav) -> list[Close]:
         """Adds a UAV; the returned functions remove it."""
@@ -60,15 +60,15 @@ class FlightStates:
     def _wanted(self) -> list[tuple[int, Publisher]]:
         """Returns the rows and publishers of UAVs whose topic has subscribers."""
         told = [(k, self._publishers[name]) for k, name in enumerate(self._engine.names)]
-        return [(k, publisher) for k, publisher in told if publisher.heard or publisher.watched]
+        return [(k, publisher) for k, publisher in told if publisher.subscriptions]
 
-    def _tell(self) -> None:
+    def _publish(self) -> None:
         wanted = self._wanted()
         for (_, publisher), message in zip(wanted, self._messages(wanted), strict=True):
-            if publisher.heard:
+            if publisher.has_internal_subscribers:
                 publisher.publish(message)
             else:
-                publisher.show(message)
+                publisher.publish_external(message)
 
     def _messages(self, wanted: list[tuple[int, Publisher]]) -> Iterator[Any]:
         engine = self._engine

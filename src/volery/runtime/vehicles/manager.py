@@ -152,7 +152,9 @@ class VehicleManager:
         for bank in parts.banks:
             if bank.name == "camera":
                 cameras: Any = bank
-                cameras.bank.wants = partial(self.publisher.cameras.wanted_parts, bank.sensors)
+                cameras.bank.requested_parts = partial(
+                    self.publisher.cameras.subscribed_parts, bank.sensors
+                )
                 self.publisher.cameras.set_size(bank.sensors, cameras.bank.pixels)
         for row, start in enumerate(self.starts):
             if start.name in fresh:

@@ -81,20 +81,20 @@ def falling_drops() -> None:
     scene.close()
 
 
-def pictures() -> None:
+def images() -> None:
     """Compiles cameras, and the points of their images."""
-    _take_pictures(Weather())
+    _render_images(Weather())
 
 
-def pictures_in_rain() -> None:
+def images_in_rain() -> None:
     """Compiles drops and flakes in images."""
-    _take_pictures(_RAIN)
+    _render_images(_RAIN)
 
 
 _RAIN = Weather(particles=Particles(rain_mm_h=1.0))
 
 
-def _take_pictures(weather: Weather) -> None:
+def _render_images(weather: Weather) -> None:
     from volery.sensors.cameras.bank import CameraBank
     from volery.sensors.cameras.cloud import organised_points
     from volery.sensors.cameras.model import load_camera
@@ -175,11 +175,11 @@ def _fleet(count: int = 2, plant: Plant | None = None) -> Fleet:
 ALWAYS = dynamics, sensing
 """Tasks of every scenario; they take longest, so they come first."""
 SOMETIMES = (
-    pictures,
+    images,
     estimates,
     point_clouds,
     falling_drops,
-    pictures_in_rain,
+    images_in_rain,
     other_plants,
     fixes,
     magnetic_fields,

@@ -16,7 +16,7 @@ from volery.sensors.lidar_model import load_lidar
 from volery.sensors.scan_patterns import PlanarScan
 
 _BY_SENSOR: dict[str, Task] = {
-    "camera": core_tasks.pictures,
+    "camera": core_tasks.images,
     "estimate": core_tasks.estimates,
     "gnss": core_tasks.fixes,
     "magnetometer": core_tasks.magnetic_fields,
@@ -66,7 +66,7 @@ def _of_type(kind: UavType, scenario: Scenario) -> Iterator[Task]:
             if not is_clear:
                 yield core_tasks.falling_drops
         if sensor.kind == "camera" and not is_clear:
-            yield core_tasks.pictures_in_rain
+            yield core_tasks.images_in_rain
     if kind.plant != "rigid_body":
         yield core_tasks.other_plants
 

@@ -30,8 +30,8 @@ class CameraBank(NoisyBank):
     """Renders the images of all cameras of one model and phase together.
 
     `keys` (S,) are the noise streams, or None for cameras without noise. An image is available when
-    its last row has been read out. Only the parts that `wants()` returns are rendered; the choice
-    does not affect later images. `light_in` returns the light in a weather.
+    its last row has been read out. Only the parts that `requested_parts()` returns are rendered;
+    the choice does not affect later images. `light_in` returns the light in a weather.
 
     Raises `DataFileError` if the model's readout takes longer than the pose history reaches.
     """
@@ -55,7 +55,7 @@ class CameraBank(NoisyBank):
             )
         super().__init__(schedule, sensors, keys)
         self.lag_ns = model.readout_ns
-        self.wants: Callable[[], Collection[Part]] = lambda: EVERY_PART
+        self.requested_parts: Callable[[], Collection[Part]] = lambda: EVERY_PART
         """Returns the parts of the images that have receivers now."""
         self._model = model if keys is not None else model.without_noise()
         self._scene = scene
@@ -69,7 +69,7 @@ class CameraBank(NoisyBank):
 
     def is_wanted(self) -> bool:
         """Returns whether any part of the images has a receiver."""
-        return bool(self.wants())
+        return bool(self.requested_parts())
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> CameraFrames:
         """Returns image number `k` of all cameras; `time_ns` is the exposure of the first row.
@@ -85,9 +85,9 @@ class CameraBank(NoisyBank):
             k - self._noise.first_k,
             self._mounts,
         )
-        parts = self.wants() or EVERY_PART
+        parts = self.requested_parts() or EVERY_PART
         light = self._light_in(fleet.weather)
-        pictures = take(
+        images = take(
             self._scene,
             self._model,
             light,
@@ -97,15 +97,15 @@ class CameraBank(NoisyBank):
             parts=parts,
             falling=falling_in(fleet.weather, light),
         )
-        return CameraFrames(self.sensors, time_ns, self._model, **_arrays(pictures))
+        return CameraFrames(self.sensors, time_ns, self._model, **_arrays(images))
 
 
-def _arrays(pictures: Images) -> dict[str, Any]:
+def _arrays(images: Images) -> dict[str, Any]:
     """Returns the arrays of all parts; a part that was not rendered has no pixels."""
-    count = next(len(part) for part in pictures if part is not None)
+    count = next(len(part) for part in images if part is not None)
     return {
         name: owned(np.zeros((count, 0, 0), _KINDS[name]) if part is None else part)
-        for name, part in pictures._asdict().items()
+        for name, part in images._asdict().items()
     }
 
 

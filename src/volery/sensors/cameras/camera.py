@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from volery.core.workers import Workers, new_counter
 from volery.sensors.aim_kernels import RayBatch
-from volery.sensors.cameras.camera_kernels import NORMALS, Frames, Optics, take_pictures
+from volery.sensors.cameras.camera_kernels import NORMALS, Frames, Optics, render_images
 from volery.sensors.cameras.light import Light
 from volery.sensors.cameras.model import CameraModel
 from volery.sensors.cameras.pixel_table import PIECE
@@ -98,7 +98,7 @@ def take(
 
         def expose() -> None:
             block = thread_block(PIECE * LANES, bodies)
-            take_pictures(
+            render_images(
                 handle, table, optics, light, batch, history, start, end, counter, block, frames
             )
 

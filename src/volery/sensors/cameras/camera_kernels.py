@@ -235,7 +235,7 @@ def _write_colour(
 
 
 @kernel
-def take_pictures(
+def render_images(
     scene: SceneHandle,
     table: PixelTable,
     optics: Optics,

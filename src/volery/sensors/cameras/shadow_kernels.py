@@ -34,17 +34,17 @@ def shading_bodies(
     Each body is a sphere swept away from the sun, the hits are a ball.
     """
     bodies = scene.bodies
-    if bodies.crew + bodies.actors <= 1:  # only the camera's own UAV
+    if bodies.uavs_per_env + bodies.actors <= 1:  # only the camera's own UAV
         return 0
     low, high = _box(scratch, count)
     if low[0] > high[0]:
         return 0
     cx, cy, cz = 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2])
     ball = np.sqrt((high[0] - cx) ** 2 + (high[1] - cy) ** 2 + (high[2] - cz) ** 2)
-    first, uavs = uav - uav % bodies.crew, bodies.scene.shape[0] - bodies.actors
+    first, uavs = uav - uav % bodies.uavs_per_env, bodies.scene.shape[0] - bodies.actors
     found = 0
-    for n in range(bodies.crew + bodies.actors):
-        row = first + n if n < bodies.crew else uavs + n - bodies.crew
+    for n in range(bodies.uavs_per_env + bodies.actors):
+        row = first + n if n < bodies.uavs_per_env else uavs + n - bodies.uavs_per_env
         x, y, z, radius = body_sphere(bodies, row)
         dx, dy, dz = x - cx, y - cy, z - cz
         along = dx * light.sun[0] + dy * light.sun[1] + dz * light.sun[2]

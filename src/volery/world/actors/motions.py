@@ -138,7 +138,7 @@ class GivenMotion:
     _REMEMBERED_S = 0.25
 
     def __init__(self, pose: ArrayLike) -> None:
-        self._said: tuple[tuple[float, Array, Array], ...] = (
+        self._poses: tuple[tuple[float, Array, Array], ...] = (
             (0.0, np.array(pose, dtype=np.float64), np.zeros(3)),
         )
         """Time, pose (7,) and velocity (3,) m/s of each setting; oldest first."""
@@ -146,20 +146,20 @@ class GivenMotion:
     @property
     def speed_m_s(self) -> float:
         """Speed since the latest setting, m/s."""
-        return float(np.linalg.norm(self._said[-1][2]))
+        return float(np.linalg.norm(self._poses[-1][2]))
 
-    def say(self, time_s: float, pose: ArrayLike, velocity: ArrayLike) -> None:
+    def set_pose(self, time_s: float, pose: ArrayLike, velocity: ArrayLike) -> None:
         """Sets `pose` (7,) at `time_s`, and the velocity (3,) m/s from there on."""
-        kept = [said for said in self._said if said[0] < time_s]
-        recent = [said for said in kept if said[0] > time_s - self._REMEMBERED_S]
+        kept = [entry for entry in self._poses if entry[0] < time_s]
+        recent = [entry for entry in kept if entry[0] > time_s - self._REMEMBERED_S]
         older = kept[: len(kept) - len(recent)][-1:]
         word = time_s, np.array(pose, dtype=np.float64), np.array(velocity, dtype=np.float64)
-        self._said = (*older, *recent, word)
+        self._poses = (*older, *recent, word)
 
     def pose_at(self, time_s: float) -> Array:
         """Returns the pose (7,) at a time; see `ActorMotion`."""
         since, pose, velocity = next(
-            (said for said in reversed(self._said) if said[0] <= time_s), self._said[0]
+            (entry for entry in reversed(self._poses) if entry[0] <= time_s), self._poses[0]
         )
         pose = pose.copy()
         pose[:3] += velocity * max(time_s - since, 0.0)
@@ -167,9 +167,9 @@ class GivenMotion:
 
     def get_state(self) -> object:
         """Returns the stored settings."""
-        return self._said
+        return self._poses
 
     def set_state(self, state: object) -> None:
         """Restores a state of `get_state`."""
         assert isinstance(state, tuple)
-        self._said = state
+        self._poses = state

@@ -68,7 +68,9 @@ class MovingActors:
         step = motion.pose_at(time_s + _VELOCITY_STEP_S) - motion.pose_at(time_s)
         return np.asarray(step[:3] / _VELOCITY_STEP_S)
 
-    def say(self, row: int, time_ns: int, pose: ArrayLike, velocity: ArrayLike = (0, 0, 0)) -> None:
+    def set_pose(
+        self, row: int, time_ns: int, pose: ArrayLike, velocity: ArrayLike = (0, 0, 0)
+    ) -> None:
         """Sets the `pose` (7,) of an actor from now on, and its velocity (3,) m/s, map.
 
         Raises `CommandError` if the actor's motion is not external.
@@ -79,7 +81,7 @@ class MovingActors:
                 f"{actor.name} has a motion of its own; only actors with a motion of kind "
                 '"external" can be moved'
             )
-        actor.motion.say(s_from_ns(time_ns), pose, velocity)
+        actor.motion.set_pose(s_from_ns(time_ns), pose, velocity)
 
     def get_state(self) -> list[object]:
         """Returns the state of externally set actors; None for others."""

@@ -35,12 +35,12 @@ _TREE_DBH_M = (0.10, 0.24)
 class FurnitureRule:
     """Spacing of objects along a street; modelling choices, as all sizes here.
 
-    0 omits them. tree_share: fraction of the tree positions that have a tree.
+    0 omits them. tree_fraction: fraction of the tree positions that have a tree.
     """
 
     lamp_spacing_m: float = 28.0
     tree_spacing_m: float = 11.0
-    tree_share: float = 0.6
+    tree_fraction: float = 0.6
 
 
 def place_lamps(streets: Streets, rule: FurnitureRule, seed: int) -> Array:
@@ -62,7 +62,7 @@ def place_trees(streets: Streets, rule: FurnitureRule, seed: int, lamps: Array) 
         places = _along(lines, rule.tree_spacing_m, seed, "city/trees")
     kept = _apart(np.concatenate([lamps, places]), 0.35 * rule.tree_spacing_m)[len(lamps) :]
     random = generator(seed, "city/tree").random((len(places), 2))
-    chosen = kept & (random[:, 0] < rule.tree_share)
+    chosen = kept & (random[:, 0] < rule.tree_fraction)
     low, high = _TREE_DBH_M
     dbh = low + (high - low) * random[chosen, 1]
     count = len(dbh)

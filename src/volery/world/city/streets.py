@@ -1,8 +1,8 @@
 """Streets between buildings, derived from the buildings alone.
 
-A gap between blocks narrower than `widest_m` counts as a street: pavement along the walls, asphalt
-between the kerbs if it leaves room for a car. Courtyards and alleys are paved. Areas farther from
-any wall are not streets: they have the ground's own material.
+A gap between blocks narrower than `max_width_m` counts as a street: pavement along the walls,
+asphalt between the kerbs if it leaves room for a car. Courtyards and alleys are paved. Areas
+farther from any wall are not streets: they have the ground's own material.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _ROUND = 4
 class StreetRule:
     """Geometry of streets; modelling choices."""
 
-    widest_m: float = 32.0
+    max_width_m: float = 32.0
     pavement_m: float = 3.0
 
 
@@ -60,7 +60,7 @@ def find_streets(footprints: Sequence[Any], rule: StreetRule) -> Streets:
     walls = shapely.union_all(list(footprints))
     filled = [shapely.Polygon(part.exterior) for part in shapely.get_parts(walls)]
     blocks = shapely.union_all(filled)
-    reach = rule.widest_m / 2.0
+    reach = rule.max_width_m / 2.0
     fabric = blocks.buffer(reach, quad_segs=_ROUND).buffer(-reach, quad_segs=_ROUND)
     road = fabric.difference(blocks.buffer(rule.pavement_m, quad_segs=_ROUND))
     half = _ROADWAY_M / 2.0

@@ -19,7 +19,7 @@ _LUMA = (0.299, 0.587, 0.114)
 """Weights of red, green and blue: ITU-R BT.601."""
 
 
-def parse_picture(data: bytes, where: str, threshold: float = 0.5) -> NDArray[np.bool_]:
+def parse_image(data: bytes, where: str, threshold: float = 0.5) -> NDArray[np.bool_]:
     """Returns blocked cells (rows, columns), row 0: the top.
 
     A pixel is blocked if darker than `threshold`, from 0 (white) to 1 (black); grey, colours, a

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from volery.core.errors import DataFileError
 from volery.world.grid_maps.grid_map import MOST_CELLS
-from volery.world.grid_maps.image_files import parse_picture
+from volery.world.grid_maps.image_files import parse_image
 from volery.world.grid_maps.matrix import parse_matrix
 from volery.world.grid_maps.moving_ai import parse_moving_ai
 
@@ -45,7 +45,7 @@ def read_cells(path: Path, threshold: float = 0.5) -> NDArray[np.bool_]:
 def parse_cells(data: bytes, suffix: str, where: str, threshold: float = 0.5) -> NDArray[np.bool_]:
     """Returns the same from the content of a file; errors begin with `where`."""
     if suffix == ".png":
-        from_top = parse_picture(data, where, threshold)
+        from_top = parse_image(data, where, threshold)
     elif suffix == ".map":
         from_top = parse_moving_ai(data, where)
     else:

@@ -201,7 +201,7 @@ def test_raster_of_an_area_against_shapely():
 
 def test_a_street_between_two_walls():
     """Two long houses 12 m apart: 3 m pavement on each side of 6 m asphalt; too far: no street."""
-    rule = StreetRule(widest_m=20.0, pavement_m=3.0)
+    rule = StreetRule(max_width_m=20.0, pavement_m=3.0)
     near = find_streets([shapely.box(0, 0, 100, 10), shapely.box(0, 22, 100, 40)], rule)
     assert near.roadway.buffer(0.2).contains(shapely.box(5, 13, 95, 19))
     assert near.roadway.bounds[1] == pytest.approx(13.0)

@@ -112,7 +112,7 @@ def _gather(
 
 
 @inner_kernel
-def _doubt(h: Array, g: Array, unclear: float) -> None:
+def _uncertainty(h: Array, g: Array, unclear: float) -> None:
     """Removes the information along the weaker axis that comes from rough walls alone."""
     a, b, d = h[0, 0], h[0, 1], h[1, 1]
     middle, half = 0.5 * (a + d), math.hypot(0.5 * (a - d), b)
@@ -167,7 +167,7 @@ def fit(
     met, wide = 0.0, gate
     for turn in range(rounds):
         met = _gather(pose, points, grid, sums, shapes, corner, wide, sigma * sigma, h, g)
-        _doubt(h, g, unclear)
+        _uncertainty(h, g, unclear)
         for i in range(3):
             g[i] *= pull
             for j in range(3):

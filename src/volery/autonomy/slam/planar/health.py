@@ -18,7 +18,7 @@ class PlanarHealth(NamedTuple):
     """Inputs of the check."""
 
     now_ns: int
-    heard_ns: int
+    received_ns: int
     """Time of the last scan."""
     period_ns: int
     """Usual time between two scans."""
@@ -36,7 +36,7 @@ def judged(it: PlanarHealth) -> tuple[str, list[str]]:
     """Returns the state (starting, tracking, degraded, lost) and the problems."""
     problems = []
     long = max(_SILENT_NS, 4 * it.period_ns)
-    if it.now_ns - it.heard_ns > long:
+    if it.now_ns - it.received_ns > long:
         problems.append("the LIDAR is silent")
     if it.odometry_ns is not None and it.now_ns - it.odometry_ns > long:
         problems.append("the odometry is silent")

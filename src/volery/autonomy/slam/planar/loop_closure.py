@@ -74,31 +74,31 @@ class PlanarLoopCloser:
         drawn = np.concatenate([placed(frames[k].points, between(at, poses[k])) for k in known])
         self._map.draw(drawn, np.zeros(3))
         lost = reach[2] >= _ANY_RAD
-        guess = np.zeros(3) if lost else between(at, poses[newest])
+        hypothesis = np.zeros(3) if lost else between(at, poses[newest])
         is_narrow = reach[0] < 0.35 and reach[2] < 0.1
-        start = guess if is_narrow else self._found(query, guess, reach)
+        start = hypothesis if is_narrow else self._found(query, hypothesis, reach)
         if start is None:
             return None
         fine = np.ascontiguousarray(query[:: max(len(query) // _FINE, 1)])
         found = self._map.fit(fine, start)
-        away = between(guess, found.pose)
+        away = between(hypothesis, found.pose)
         if not self._is_believed(found, away, reach, frames[newest].usual):
             return None
         information = self._information(found.information, float(found.pose[2]))
         edge = PlanarEdge(older, newest, found.pose, information, is_closure=True)
         return PlanarLoopClosure(edge, found, away)
 
-    def _found(self, query: Array, guess: Array, reach: Array) -> Array | None:
+    def _found(self, query: Array, hypothesis: Array, reach: Array) -> Array | None:
         """Returns the best pose in the window; None if no pose fits, or two do."""
         thin = np.ascontiguousarray(query[:: max(len(query) // _THIN, 1)])
         slope = np.zeros(3) if reach[2] >= _ANY_RAD else 0.04 / reach**2
         least = 0.45
-        pose, score = self._map.search(thin, guess, reach, slope=slope, least=least)
+        pose, score = self._map.search(thin, hypothesis, reach, slope=slope, least=least)
         if score <= 0.0:
             return None
         shut = np.array([pose[0], pose[1], _OTHER_M])
         other, second = self._map.search(
-            thin, guess, reach, slope=slope, least=_ALIKE * score, shut=shut
+            thin, hypothesis, reach, slope=slope, least=_ALIKE * score, shut=shut
         )
         if second > 0.0 and not self._is_along(thin, pose, other):
             return None
@@ -125,11 +125,11 @@ class PlanarLoopCloser:
             return False  # any corridor would match
         return bool((np.abs(away) <= reach + _MARGIN).all())
 
-    def _information(self, told: Array, yaw: float) -> Array:
+    def _information(self, information: Array, yaw: float) -> Array:
         """Returns a closure's information, in the axes of its measurement."""
         c, s = math.cos(yaw), math.sin(yaw)
         axes = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-        own = axes @ told @ axes.T
+        own = axes @ information @ axes.T
         return np.asarray(np.linalg.inv(np.linalg.inv(own + 1e-3 * np.eye(3)) + _FLOOR))
 
     def _around(

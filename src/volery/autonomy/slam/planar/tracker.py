@@ -112,7 +112,7 @@ class PlanarTracker:
             return False
         return self.time_ns - self._misfit_ns >= _LOST_NS
 
-    def begin_anew(self) -> bool:
+    def restart(self) -> bool:
         """Begins a new map with the next scan, as scans no longer fit.
 
         Returns whether the session continues, by odometry, though roughly.

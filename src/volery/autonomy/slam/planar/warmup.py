@@ -28,7 +28,7 @@ def walls() -> None:
     known.search(points, np.zeros(3), np.full(3, 0.1))
 
 
-def told_places() -> None:
+def place_recognition() -> None:
     """Compiles the kernel that selects the covariance of a message."""
     nowhere = np.zeros(3), rotations.IDENTITY, np.zeros(3), np.zeros(3)
     messages.odometry(0, "uav1", nowhere, np.zeros((9, 9)))

@@ -41,7 +41,7 @@ class Discovery:
         self._lock = threading.Lock()
         self._writers: dict[bytes, DdsEndpoint] = {}
         self._readers: dict[bytes, DdsEndpoint] = {}
-        self._told: list[Callable[[], None]] = []
+        self._listeners: list[Callable[[], None]] = []
         self._sources = []
         for topic, known in (
             (BuiltinTopicDcpsPublication, self._writers),
@@ -51,9 +51,9 @@ class Discovery:
             self._sources.append(source)
             ear.listen(source, self._taker(known))
 
-    def when_changed(self, tell: Callable[[], None]) -> None:
-        """Calls `tell` when others appear or leave."""
-        self._told.append(tell)
+    def when_changed(self, callback: Callable[[], None]) -> None:
+        """Calls `callback` when others appear or leave."""
+        self._listeners.append(callback)
 
     def publishers(self) -> list[RemotePublisher]:
         """Returns publishers of others on topics of ROS 2."""
@@ -114,8 +114,8 @@ class Discovery:
                     with self._lock:
                         changed |= known.pop(sample.key, None) is not None
             if changed:
-                for tell in tuple(self._told):
-                    tell()
+                for callback in tuple(self._listeners):
+                    callback()
 
         return take
 

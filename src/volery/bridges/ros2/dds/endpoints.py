@@ -103,7 +103,7 @@ class DdsServer:
         self._name, self._srvtype = spec.service, spec.srvtype
         self._take = take
         self._missed = (0, 0)
-        self._complaints = WarningFilter()
+        self._warnings = WarningFilter()
         self._reader = self._half.reader(requests, qos, self._on_request)
         self._clients = ServicePeers(CLIENT, partial(matched_writer, self._reader))
 
@@ -118,14 +118,14 @@ class DdsServer:
         """
         why = foreign.get(self._name)
         if why:
-            self._complaints.tell(self._name, f"a client is not answered: it {why}")
+            self._warnings.warn(self._name, f"a client is not answered: it {why}")
 
     def look_at_types(self, asked: set[tuple[str, str]]) -> None:
         """Warns of clients that expect a service of another type and will not be answered."""
         for name, srvtype in asked:
             if name == self._name and srvtype != self._srvtype:
                 text = f"is a {self._srvtype}; a client of {srvtype} is not answered"
-                self._complaints.tell(name, text)
+                self._warnings.warn(name, text)
 
     def _on_request(self, data: bytes, client: int) -> None:
         problem = self._clients.problem(client)

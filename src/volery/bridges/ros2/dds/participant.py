@@ -102,9 +102,9 @@ class DdsParticipant:
         """Returns services of others, and their types."""
         return self._discovery.service_types()
 
-    def when_changed(self, tell: Callable[[], None]) -> None:
-        """Calls `tell` when others appear or leave."""
-        self._discovery.when_changed(tell)
+    def when_changed(self, callback: Callable[[], None]) -> None:
+        """Calls `callback` when others appear or leave."""
+        self._discovery.when_changed(callback)
 
     def close(self) -> None:
         """Leaves the graph; further calls do nothing."""

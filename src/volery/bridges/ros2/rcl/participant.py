@@ -50,7 +50,7 @@ class RclParticipant:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._nodes: dict[NodeName, Any] = {}
         self._callers: weakref.WeakSet[RclCaller] = weakref.WeakSet()
-        self._told: list[Callable[[], None]] = []
+        self._listeners: list[Callable[[], None]] = []
         self._known: list[RemotePublisher] = []
         self._lock = threading.RLock()
         self._closing = False
@@ -119,9 +119,9 @@ class RclParticipant:
         found = [] if eye is None else eye.get_service_names_and_types()
         return {name: types[0] for name, types in found if types}
 
-    def when_changed(self, tell: Callable[[], None]) -> None:
-        """Calls `tell` when others appear or leave."""
-        self._told.append(tell)
+    def when_changed(self, callback: Callable[[], None]) -> None:
+        """Calls `callback` when others appear or leave."""
+        self._listeners.append(callback)
 
     def close(self) -> None:
         """Leaves the graph; further calls do nothing."""
@@ -170,5 +170,5 @@ class RclParticipant:
         known = self.publishers()
         if known != self._known:
             self._known = known
-            for tell in tuple(self._told):
-                tell()
+            for callback in tuple(self._listeners):
+                callback()

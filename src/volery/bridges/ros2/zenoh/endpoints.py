@@ -95,7 +95,7 @@ class ZenohReader:
     def __init__(self, place: ZenohTopicName, spec: TopicSpec, take: TakeMessage) -> None:
         key = topic_key(place.domain_id, spec.topic, spec.msgtype)
 
-        def hear(sample: Any) -> None:
+        def receive(sample: Any) -> None:
             take(sample.payload.to_bytes())
 
         history = None
@@ -104,7 +104,7 @@ class ZenohReader:
                 detect_late_publishers=True, max_samples=spec.profile.depth
             )
         self._subscriber = zenoh.ext.declare_advanced_subscriber(
-            place.session, key, hear, allowed_origin=zenoh.Locality.REMOTE, history=history
+            place.session, key, receive, allowed_origin=zenoh.Locality.REMOTE, history=history
         )
         ids = place.ids(spec.node)
         self._token = place.declare(
@@ -178,7 +178,7 @@ class ZenohCaller:
         with self._lock:
             self._waiting.add(question)
 
-        def hear(reply: Any) -> None:
+        def receive(reply: Any) -> None:
             with self._lock:
                 self._waiting.discard(question)
             if reply.ok is None:
@@ -189,7 +189,7 @@ class ZenohCaller:
         attachment = Attachment(next(self._numbers), time.time_ns(), self._gid)
         self._place.session.get(
             self._key,
-            hear,
+            receive,
             target=zenoh.QueryTarget.ALL_COMPLETE,
             consolidation=zenoh.ConsolidationMode.NONE,
             timeout=_LONGEST_CALL_S,

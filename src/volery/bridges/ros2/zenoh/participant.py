@@ -59,7 +59,7 @@ class ZenohParticipant:
         self._lock = threading.RLock()
         self._nodes: dict[NodeName, tuple[int, Any]] = {}
         self._others: dict[str, ZenohEndpoint] = {}
-        self._told: list[Callable[[], None]] = []
+        self._listeners: list[Callable[[], None]] = []
         self._callers: weakref.WeakSet[ZenohCaller] = weakref.WeakSet()
         self._closed = False
         self._watch = self._session.liveliness().declare_subscriber(
@@ -119,9 +119,9 @@ class ZenohParticipant:
         """Returns services of others, and their types."""
         return {e.name: e.msgtype for e in self._of_kind(SERVER)}
 
-    def when_changed(self, tell: Callable[[], None]) -> None:
-        """Calls `tell` when others appear or leave."""
-        self._told.append(tell)
+    def when_changed(self, callback: Callable[[], None]) -> None:
+        """Calls `callback` when others appear or leave."""
+        self._listeners.append(callback)
 
     def close(self) -> None:
         """Leaves the graph; further calls do nothing."""
@@ -155,5 +155,5 @@ class ZenohParticipant:
             callers = tuple(self._callers)
         for caller in callers:
             caller.give_up()
-        for tell in tuple(self._told):
-            tell()
+        for callback in tuple(self._listeners):
+            callback()

@@ -67,7 +67,7 @@ class LogHost:
 
         self.graph.subscribe(topic, take)
 
-    def hear(self, topic: str, time_ns: int, message: Any) -> None:
+    def publish(self, topic: str, time_ns: int, message: Any) -> None:
         """Publishes a message to nodes at a time; fires the timers that are due before."""
         self._run_to(time_ns)
         publisher = self._publishers.get(topic)

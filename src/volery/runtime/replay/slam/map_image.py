@@ -17,7 +17,7 @@ _LEAST_SIDE = 900
 """Min side length, pixels; smaller maps are enlarged."""
 
 
-def write_picture(
+def write_image(
     path: Path, values: NDArray[np.int8], origin: Array, cell_m: float, way: Array
 ) -> None:
     """Writes a PNG of an occupancy grid (rows, columns) and a path (N, 2), m, map, y up.

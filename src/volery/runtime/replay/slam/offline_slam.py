@@ -66,7 +66,7 @@ class SlamResult:
     """Row in the trajectory, and the scan at that time."""
     mount: Callable[[str], Mount]
     """Returns the mount of a LIDAR frame."""
-    heard: int
+    num_scans: int
     """Number of scans."""
     lasted_s: float
     """Duration of the log, s."""
@@ -115,20 +115,20 @@ class OfflineSlam:
         self._problems: dict[str, float] = defaultdict(float)
         self._status_ns = 0
 
-    def run(self, tell: Callable[[int, float], None] | None = None) -> SlamResult:
-        """Processes the whole log; `tell` receives the scans and seconds of the log so far."""
+    def run(self, on_progress: Callable[[int, float], None] | None = None) -> SlamResult:
+        """Processes the whole log; `on_progress` receives scans and seconds of the log so far."""
         uav, host = self.channels.uav, self._host
         self._start_node()
         host.listen(f"/{uav}/slam/odom", self._on_odometry)
         host.listen(f"/{uav}/slam/status", self._on_status)
         host.listen("/tf", self._on_tf)
         names = {theirs: ours for ours, theirs in self.channels.names.items()}
-        heard, cpu, first, before, lasted = 0, 0.0, None, 0, 0
+        num_scans, cpu, first, before, lasted = 0, 0.0, None, 0, 0
         told = time.monotonic()
         for topic, time_ns, message in self._source.messages(set(names)):
             ours = names[topic]
             if ours == f"/{uav}/{LEVEL}":
-                heard, self._newest = heard + 1, message
+                num_scans, self._newest = num_scans + 1, message
             if topic == "/tf_static":
                 self._joints.add(message)
             if ours == f"/{uav}/odom":
@@ -139,13 +139,13 @@ class OfflineSlam:
                 lasted += max(time_ns - before, 0)
             first, before = first or time_ns, time_ns
             began = time.thread_time()
-            host.hear(ours, time_ns, message)
+            host.publish(ours, time_ns, message)
             cpu += time.thread_time() - began
-            if tell is not None and time.monotonic() - told > _PROGRESS_S:
+            if on_progress is not None and time.monotonic() - told > _PROGRESS_S:
                 told = time.monotonic()
-                tell(heard, lasted / NS_PER_S)
+                on_progress(num_scans, lasted / NS_PER_S)
         self._end()
-        return self._outcome(heard, lasted / NS_PER_S, cpu)
+        return self._outcome(num_scans, lasted / NS_PER_S, cpu)
 
     def _keep_nodding(self, topic: str, time_ns: int, message: Any) -> None:
         uav = self.channels.uav
@@ -158,9 +158,9 @@ class OfflineSlam:
 
     def _start_node(self) -> None:
         o, uav = self._options, self.channels.uav
-        parameters: dict[str, Any] = {"reach_m": o.reach_m, "loop_closures": o.loop_closures}
+        parameters: dict[str, Any] = {"max_range_m": o.reach_m, "loop_closures": o.loop_closures}
         if self.start is not None:
-            parameters["start"] = list(self.start)
+            parameters["initial_pose"] = list(self.start)
         level = None if o.level_mount is None else list(o.level_mount)
         options = {"context": self._host.context(), "namespace": f"/{uav}"}
         if not self.channels.has_imu:
@@ -248,7 +248,7 @@ class OfflineSlam:
         """Returns the counts that changed after the log's end."""
         return {k: v for k, v in self._status.items() if k in ("closures", "keyframes")}
 
-    def _outcome(self, heard: int, lasted_s: float, cpu_s: float) -> SlamResult:
+    def _outcome(self, num_scans: int, lasted_s: float, cpu_s: float) -> SlamResult:
         if not self._times:
             reason = ", ".join(self._status.get("problems", ())) or "no scan was usable"
             raise RecordingError(f"{self._source.path}: the SLAM did not start ({reason})")
@@ -261,7 +261,7 @@ class OfflineSlam:
             self._tilt,
         )  # fmt: skip
         return SlamResult(
-            self.channels, trajectory, self._scans, self._mount, heard, lasted_s, cpu_s,
+            self.channels, trajectory, self._scans, self._mount, num_scans, lasted_s, cpu_s,
             self._status, self._states, self._problems, self._nodding,
             np.array(sorted(self._nods)).reshape(-1, 2),
             way_m(np.array(self._wheels)) if self._wheels else None,

@@ -12,12 +12,12 @@ SCENARIO = {
     "uavs": [{"type": "iris", "position_m": [0.0, 0.0, 20.0]}],
 }
 
-with VectorizedSimulation(parse_scenario(SCENARIO), 256) as copies:
-    copies.run(10.0)
-    away = np.linalg.norm(copies.state().position_map[:, 0] - [0.0, 0.0, 20.0], axis=1)
+with VectorizedSimulation(parse_scenario(SCENARIO), 256) as envs:
+    envs.run(10.0)
+    away = np.linalg.norm(envs.state().position_map[:, 0] - [0.0, 0.0, 20.0], axis=1)
     print(
-        f"{copies.count} environments: {np.median(away):.2f} m median drift, {away.max():.2f} m max"
+        f"{envs.num_envs} environments: {np.median(away):.2f} m median drift, {away.max():.2f} m max"
     )
 
-    copies.reset(away > 0.3)
-    print(f"{(copies.age_s == 0.0).sum()} environments reset")
+    envs.reset(away > 0.3)
+    print(f"{(envs.age_s == 0.0).sum()} environments reset")

@@ -1,7 +1,7 @@
 """Flies a UAV from an external program with roslibpy over rosbridge, like any ROS robot.
 
 volery run hover --seconds 60 --bridge rosbridge
-python examples/06_fly_from_outside.py            # pip install roslibpy
+python examples/06_fly_over_rosbridge.py            # pip install roslibpy
 """
 
 import sys
@@ -17,13 +17,13 @@ ros.run()
 roslibpy.Service(ros, "/uav1/take_off", "std_srvs/srv/Trigger").call(roslibpy.ServiceRequest())
 time.sleep(4.0)
 
-places = []
+positions = []
 odometry = roslibpy.Topic(ros, "/uav1/odom", "nav_msgs/msg/Odometry")
-odometry.subscribe(lambda message: places.append(message["pose"]["pose"]["position"]))
+odometry.subscribe(lambda message: positions.append(message["pose"]["pose"]["position"]))
 command = roslibpy.Topic(ros, "/uav1/cmd_vel", "geometry_msgs/msg/Twist")
 for x, y in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)):
     for _ in range(round(10 * side_s)):  # without commands the UAV holds
         command.publish(roslibpy.Message({"linear": {"x": x, "y": y}}))
         time.sleep(0.1)
-print(f"flew a square, {max(p['x'] for p in places) - min(p['x'] for p in places):.1f} m wide")
+print(f"flew a square, {max(p['x'] for p in positions) - min(p['x'] for p in places):.1f} m wide")
 ros.terminate()
