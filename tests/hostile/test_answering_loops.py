@@ -108,7 +108,7 @@ class PressedError(Exception):
 @pytest.mark.timeout(240, func_only=True)
 def test_ctrl_c_is_heard_while_a_partner_is_silent(simulate, flat_data):
     simulation = simulate(flat_data)
-    simulation.add_partner("silent", period_s=0.02, timeout_s=1e6)
+    simulation.clock.add_partner("silent", period_s=0.02, timeout_s=1e6)
 
     def look(_progress):
         if simulation.time_ns:
@@ -121,20 +121,20 @@ def test_ctrl_c_is_heard_while_a_partner_is_silent(simulate, flat_data):
 @pytest.mark.timeout(240, func_only=True)
 def test_quit_is_heard_while_a_partner_is_silent(simulate, flat_data):
     simulation = simulate(flat_data)
-    simulation.add_partner("silent", period_s=0.02, timeout_s=1e6)
-    simulation.post(simulation.quit)
+    simulation.clock.add_partner("silent", period_s=0.02, timeout_s=1e6)
+    simulation.post(simulation.clock.quit)
     simulation.run(1.0)
-    assert simulation.quitting
+    assert simulation.clock.quitting
 
 
 @pytest.mark.timeout(240, func_only=True)
 def test_quit_in_a_meeting_ends_the_run(simulate, flat_data):
     simulation = simulate(flat_data)
-    simulation.add_partner("silent", period_s=0.02, timeout_s=1e6)
+    simulation.clock.add_partner("silent", period_s=0.02, timeout_s=1e6)
 
     def look(_progress):
         if simulation.time_ns:
-            simulation.quit()
+            simulation.clock.quit()
 
     simulation.run(1.0, on_progress=look)
     assert simulation.time_ns == 20_000_000

@@ -44,7 +44,7 @@ def play(
         interrupts.be_gentle()
         _introduce(player)
         with (
-            open_bridges(player, replace(options, bridges=options.bridges or _BRIDGES)),
+            open_bridges(player.gateway, replace(options, bridges=options.bridges or _BRIDGES)),
             Keys() as keys,
         ):
 
