@@ -68,7 +68,7 @@ def test_a_client_that_starts_such_a_loop_does_not_end_the_run(start, caplog):
 
 @pytest.mark.timeout(240, func_only=True)
 def test_a_loop_that_multiplies_ends_too(monkeypatch):
-    monkeypatch.setattr("volery.graph.graph._MAX_ANSWERS_AT_ONCE", 5_000)
+    monkeypatch.setattr("volery.graph.response_chains._MAX_RESPONSES_AT_ONCE", 5_000)
     graph = Graph(lambda: 0)
     publisher = graph.advertise("/a", String)
 

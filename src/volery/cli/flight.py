@@ -22,7 +22,7 @@ from volery.core.plurals import counted
 
 if TYPE_CHECKING:
     from volery.bridges.logs.log_writer import LogWriter
-    from volery.graph.graph import Subscription
+    from volery.graph.topics import Subscription
     from volery.report.collect import FlightCollector
     from volery.runtime.simulation import Simulation
     from volery.scenario.changes import Changes

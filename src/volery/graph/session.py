@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from volery.core.errors import GraphError, NodeError, VoleryError
-from volery.graph.graph import Graph, Publisher, Subscription
+from volery.graph.graph import Graph
 from volery.graph.messages import message_type
 from volery.graph.nodes.failures import report_failure
 from volery.graph.qos import DEFAULT_DEPTH, check_depth
@@ -36,6 +36,7 @@ from volery.graph.subscription_queue import (
     Wake,
     message_bytes,
 )
+from volery.graph.topics import Publisher, Subscription
 
 Post = Callable[[Callable[[], Any]], "Future[Any]"]
 """Runs a function in the simulation's thread; the future holds its result or error."""

@@ -30,8 +30,8 @@ from volery.report.structures import seen_from_above
 from volery.report.voxels import VoxelSet
 
 if TYPE_CHECKING:
-    from volery.graph.graph import Subscription
     from volery.graph.messages import Published
+    from volery.graph.topics import Subscription
     from volery.runtime.simulation import Simulation
 
 Array = NDArray[np.float64]

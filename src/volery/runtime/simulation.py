@@ -104,7 +104,7 @@ class Simulation:
         self._closed = False
         self._partners: list[Partner] = []
         self._replays: list[Replay] = []
-        self._repetition: CommandReplay | None = None
+        self._command_replay: CommandReplay | None = None
         self._geometry: Geometry | None = None
         learn_messages(scenario)  # modules of nodes may import them
         with compiled(needs_of(scenario)):
@@ -251,7 +251,7 @@ class Simulation:
         self._check_open()
         if self._engine.moment > (0, 0):
             raise CommandError("a flight is repeated from its start; make a new simulation")
-        self._repetition = self._engine.repeats = CommandReplay(
+        self._command_replay = self._engine.repeats = CommandReplay(
             flight, self.gateway, self._engine, self._pacer, self.commands
         )
         self.commands.repeats = self._loop.replays = True
@@ -330,7 +330,7 @@ class Simulation:
 
     def _has_ended(self) -> bool:
         """Whether all UAVs have landed, where the scenario ends with that, or a replay is over."""
-        if self._repetition is not None and self._repetition.over:
+        if self._command_replay is not None and self._command_replay.over:
             return True
         events = self._manager.outlet.events
         return self.scenario.ends_when == "all_landed" and all_down(self.uavs, events)

@@ -12,7 +12,7 @@ import pytest
 from volery.core import rotations
 from volery.engine.events import Event, EventKind
 from volery.graph import messages as m
-from volery.graph.graph import Subscription
+from volery.graph.topics import Subscription
 from volery.report.collect import FlightCollector
 from volery.report.scan_placing import scan_points
 from volery.sensors.mount import make_mount

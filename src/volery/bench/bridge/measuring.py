@@ -27,8 +27,8 @@ from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.core.errors import VoleryError
-from volery.graph.graph import Publisher
 from volery.graph.messages import Header, Time, message_type
+from volery.graph.topics import Publisher
 from volery.runtime import Simulation
 from volery.scenario.load import load_scenario, parse_scenario
 from volery.scenario.schema import Scenario
