@@ -14,7 +14,7 @@ def test_under_the_ground(simulate, flat_data):
 
 def test_inside_a_tree(simulate, wood_data):
     free = simulate(wood_data)
-    x, y, _ = free.forest.position_map[0]
+    x, y, _ = free.world.forest.position_map[0]
     wood_data["uavs"] = [{"type": "surveyor", "position_m": [float(x), float(y)]}]
     with pytest.raises(PlacementError, match=r"lies in tree \d+.*nearest_free"):
         simulate(wood_data)
