@@ -36,9 +36,6 @@ class RunClock(Protocol):
     def single_step(self, steps: int = 1) -> object:
         """Runs physics steps of a paused run. Raises `CommandError` if it is not paused."""
 
-    def quit(self) -> None:
-        """Ends the run."""
-
 
 class SimulationClock:
     """Controls the runs of a simulation.
