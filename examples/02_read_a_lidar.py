@@ -13,7 +13,7 @@ def on_scan(published):
 
 
 with Simulation(load_scenario("longleaf")) as simulation:
-    for topic in simulation.mounts:
+    for topic in simulation.vehicles.lidar_mounts:
         simulation.graph.subscribe(topic, on_scan)
     for _ in range(5):
         simulation.run(1.0)

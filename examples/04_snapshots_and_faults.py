@@ -11,6 +11,6 @@ with Simulation(load_scenario("hover")) as simulation:
     print(f"whole:  {uav.position_map[2]:.2f} m high, {uav.mode.name}")
 
     simulation.restore(snapshot)
-    simulation.inject_fault({"kind": "motor", "uav": "uav1", "rotor": 0, "at_s": 5.5})
+    simulation.faults.inject({"kind": "motor", "uav": "uav1", "rotor": 0, "at_s": 5.5})
     simulation.run(4.0)
     print(f"broken: {uav.position_map[2]:.2f} m high, {uav.mode.name}")

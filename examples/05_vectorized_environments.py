@@ -15,9 +15,7 @@ SCENARIO = {
 with VectorizedSimulation(parse_scenario(SCENARIO), 256) as envs:
     envs.run(10.0)
     away = np.linalg.norm(envs.state().position_map[:, 0] - [0.0, 0.0, 20.0], axis=1)
-    print(
-        f"{envs.num_envs} environments: {np.median(away):.2f} m median drift, {away.max():.2f} m max"
-    )
+    print(f"{envs.num_envs} environments drift {np.median(away):.2f} m, {away.max():.2f} m at most")
 
     envs.reset(away > 0.3)
     print(f"{(envs.age_s == 0.0).sum()} environments reset")

@@ -25,5 +25,6 @@ for x, y in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)):
     for _ in range(round(10 * side_s)):  # without commands the UAV holds
         command.publish(roslibpy.Message({"linear": {"x": x, "y": y}}))
         time.sleep(0.1)
-print(f"flew a square, {max(p['x'] for p in positions) - min(p['x'] for p in places):.1f} m wide")
+xs = [position["x"] for position in positions]
+print(f"flew a square, {max(xs) - min(xs):.1f} m wide")
 ros.terminate()

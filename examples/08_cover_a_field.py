@@ -40,7 +40,7 @@ with tempfile.TemporaryDirectory() as name, Simulation(scenario_of(Path(name))) 
     simulation.graph.subscribe(
         "/coverage/status", lambda published: told.update(json.loads(published.message.data))
     )
-    while not simulation.finished:
+    while not simulation.clock.finished:
         simulation.run(20.0)
         print(f"{simulation.time_s:5.1f} s  {told['covered']:4.0%} covered")
     print("cells of each UAV:", told["cells"])

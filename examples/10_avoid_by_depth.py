@@ -16,9 +16,9 @@ data["types"]["scout"]["nodes"][0]["node"] = nodes[way]
 
 with Simulation(Scenario.model_validate(data)) as simulation:
     uav = simulation.uavs["uav1"]
-    while not simulation.finished and not uav.crashed:
+    while not simulation.clock.finished and not uav.crashed:
         simulation.run(10.0)
         x, y, z = uav.position_map
         print(f"{simulation.time_s:5.1f} s  x {x:5.1f}  y {y:5.1f}  z {z:4.1f}  {uav.mode.name}")
-    for event in simulation.events:
+    for event in simulation.diagnostics.events:
         print(event.describe())

@@ -19,5 +19,5 @@ with Simulation(load_scenario("cooperative_search")) as simulation:
     for uav in simulation.uavs:
         simulation.graph.subscribe(f"/{uav}/search/state", hear)
         simulation.graph.subscribe(f"/{uav}/search/found", on_found)
-    while not simulation.finished:
+    while not simulation.clock.finished:
         simulation.run(10.0)

@@ -19,6 +19,9 @@ class LiveGraph:
     While `held` is set, that thread stands still.
     """
 
+    scenario = geometry = operators = None
+    waits_at_end = False
+
     def __init__(self, now_ns=lambda: NOW_NS):
         self.graph = Graph(now_ns, self.post)
         self.gateway = Gateway(self.graph, self.post)

@@ -70,13 +70,13 @@ class TopicDigests:
 def fly(name: str, threads: int, seconds: float) -> Flight:
     """Flies a shipped scenario and returns its digests."""
     with Simulation(load_scenario(name), threads=threads) as simulation:
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         topics = TopicDigests()
         simulation.graph.subscribe_all(topics.add, is_of_the_world)
         simulation.run(seconds)
         return {
-            "digest": simulation.digest(),
-            "by_topic": simulation.digest(by_topic=True),
+            "digest": simulation.diagnostics.digest(),
+            "by_topic": simulation.diagnostics.digest(by_topic=True),
             "topics": topics.hexdigests(),
         }
 

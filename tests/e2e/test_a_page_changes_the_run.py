@@ -111,7 +111,7 @@ def opened(simulate):
     server = RosbridgeServer("127.0.0.1", 0)
     with BridgeHost(simulation.gateway) as bridges:
         bridges.open(server)
-        simulation.use_low_latency()
+        simulation.gateway.use_low_latency()
         thread = threading.Thread(target=lambda: simulation.run(600.0, speed=1.0))
         thread.start()
         page = Page(server.port)
@@ -120,7 +120,7 @@ def opened(simulate):
         page.watch("/volery/status", "volery_interfaces/SimulationStatus")
         yield simulation, page
         page.ros.close()
-        simulation.quit()
+        simulation.clock.quit()
         thread.join()
 
 
@@ -134,8 +134,8 @@ def test_the_air_changes(opened, state):
     for name, value in WEATHER.items():
         assert page.volery("set_weather", "SetWeather", only=[name], **{name: value})["success"]
         until(lambda name=name, value=value: page.heard["/weather"][name] == value)
-    assert simulation.weather.velocity_map == (3.0, -1.0, 0.0)
-    assert simulation.weather.particles.rain_mm_h == 12.0
+    assert simulation.world.weather.velocity_map == (3.0, -1.0, 0.0)
+    assert simulation.world.weather.particles.rain_mm_h == 12.0
     gust = {"amplitude": {"x": 2.0, "y": 0.0, "z": 0.0}, "rise": 0.5, "duration": 5.0}
     assert page.volery("gust", "Gust", **gust)["success"]
     until(lambda: len(page.heard["/weather"]["gusts"]) == 1)
@@ -159,7 +159,7 @@ def test_blocks_change(opened, state):
     until(lambda: page.heard["/map"]["info"]["resolution"] == 3.0)
     told = page.volery("get_grid_map", "GetGridMap")
     assert (told["block_height"], told["cell_size"], told["columns"]) == (9.0, 3.0, 2)
-    assert simulation.scene.clearance([[41.0, 41.0, 8.0]], 5.0).distance[0] <= 0.5
+    assert simulation.world.scene.clearance([[41.0, 41.0, 8.0]], 5.0).distance[0] <= 0.5
 
 
 @pytest.mark.parametrize("state", [PLAYING, PAUSED])

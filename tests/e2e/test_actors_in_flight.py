@@ -74,7 +74,7 @@ def test_lidars_cameras_and_sonars_see_them(simulate, actors_data):
     materials = np.frombuffer(labels[-1].data, np.uint8).reshape(48, 64)
     assert {Material.CAR_PAINT, Material.RUBBER} <= set(materials.ravel().tolist())
     on_ground = ranges[-1].range
-    simulation.set_actor_pose("van", [0.0, 0.0, -1.2])  # its roof is below the UAV now
+    simulation.world.set_actor_pose("van", [0.0, 0.0, -1.2])  # its roof is below the UAV now
     simulation.run(0.3)
     assert on_ground == pytest.approx(0.65, abs=0.05)
     assert ranges[-1].range == pytest.approx(0.65 - 0.25, abs=0.05)
@@ -113,7 +113,7 @@ def meet(simulate, data, **change):
     data.update(change)
     simulation = simulate(data)
     simulation.run(3.0)
-    return simulation, [e for e in simulation.events if e.kind is EventKind.COLLISION]
+    return simulation, [e for e in simulation.diagnostics.events if e.kind is EventKind.COLLISION]
 
 
 def test_what_drives_into_a_hovering_uav_hits_it(simulate, actors_data):
@@ -141,7 +141,7 @@ def test_who_flies_into_a_actor_crashes(simulate, actors_data):
     uav = simulation.uavs["uav1"]
     uav.go_to([12.0, 0.0, 0.8])
     simulation.run(6.0)
-    hit = next(e for e in simulation.events if e.kind is EventKind.COLLISION)
+    hit = next(e for e in simulation.diagnostics.events if e.kind is EventKind.COLLISION)
     assert hit.partner == "van"
     assert uav.crashed
     assert hit.position_map[0] == pytest.approx(
@@ -186,13 +186,15 @@ def busy(data):
 def test_digests_do_not_depend_on_slices_or_threads(simulate, actors_data):
     def fly(step, **options):
         simulation = simulate(busy(actors_data), **options)
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         while simulation.time_ns < 4_000_000_000:
             if simulation.time_ns == 2_000_000_000:
-                simulation.set_actor_pose("van", [1.0, 2.0, 0.0], None, [-0.5, 0.0, 0.0])
+                simulation.world.set_actor_pose("van", [1.0, 2.0, 0.0], None, [-0.5, 0.0, 0.0])
             simulation.step(step)
-        partners = {e.partner for e in simulation.events if e.kind is EventKind.COLLISION}
-        return simulation.digest(), partners
+        partners = {
+            e.partner for e in simulation.diagnostics.events if e.kind is EventKind.COLLISION
+        }
+        return simulation.diagnostics.digest(), partners
 
     digest, partners = fly(1000)
     assert fly(8) == (digest, partners)
@@ -202,34 +204,34 @@ def test_digests_do_not_depend_on_slices_or_threads(simulate, actors_data):
 
 def test_snapshots_keep_actors_and_contacts(simulate, actors_data):
     simulation = simulate(busy(actors_data))
-    simulation.enable_digest()
-    simulation.set_actor_pose("van", [1.0, 2.0, 0.0], None, [-0.5, 0.0, 0.0])
+    simulation.diagnostics.enable_digest()
+    simulation.world.set_actor_pose("van", [1.0, 2.0, 0.0], None, [-0.5, 0.0, 0.0])
     simulation.run(1.0)
     kept = simulation.snapshot()
     simulation.run(1.5)
-    want = simulation.digest()
-    simulation.set_actor_pose("van", [50.0, 0.0, 0.0])
+    want = simulation.diagnostics.digest()
+    simulation.world.set_actor_pose("van", [50.0, 0.0, 0.0])
     simulation.run(0.5)
     simulation.restore(kept)
     simulation.run(1.5)
-    assert simulation.digest() == want
+    assert simulation.diagnostics.digest() == want
     simulation.reset()
-    assert simulation.actors.poses_at(0)[2, :3].tolist() == [3.0, 0.0, 0.0]
+    assert simulation.world.actors.poses_at(0)[2, :3].tolist() == [3.0, 0.0, 0.0]
 
 
 def test_uavs_come_and_go_among_actors(simulate, actors_data):
     simulation = simulate(actors_data)
     scans = listen(simulation, SCAN)
     simulation.run(0.2)
-    simulation.spawn_uav("scout", "crazyflie", [2.0, 0.0, 0.7])
+    simulation.vehicles.spawn("scout", "crazyflie", [2.0, 0.0, 0.7])
     simulation.run(0.2)
     assert ahead(scans[-1]) < 2.0  # the newcomer
-    simulation.delete_uav("scout")
+    simulation.vehicles.delete("scout")
     simulation.run(0.2)
     assert ahead(scans[-1]) == pytest.approx(3.8, abs=0.05)
-    assert simulation.scene.instance_name(simulation.scene.moving_offset + 1) == "van"
+    assert simulation.world.scene.instance_name(simulation.world.scene.moving_offset + 1) == "van"
     with pytest.raises(SpawnError, match="there is an actor 'van'"):
-        simulation.spawn_uav("van", "crazyflie", [2.0, 0.0, 0.7])
+        simulation.vehicles.spawn("van", "crazyflie", [2.0, 0.0, 0.7])
 
 
 def test_copies_see_them_too(actors_data):
@@ -283,7 +285,9 @@ def test_they_are_put_by_the_standard(simulate, actors_data):
     assert call(simulation, "/set_entity_state", **both).result.result == 1
     simulation.run(0.5)
     np.testing.assert_allclose(
-        simulation.actors.poses_at(simulation.time_ns)[0], [5.0, 1.0, 0, 0, 0, 1, 0], atol=1e-9
+        simulation.world.actors.poses_at(simulation.time_ns)[0],
+        [5.0, 1.0, 0, 0, 0, 1, 0],
+        atol=1e-9,
     )
     state.twist.angular.z = 1.0
     refused = call(simulation, "/set_entity_state", **both).result
@@ -301,7 +305,7 @@ def test_they_are_put_by_a_topic_and_told_on_tf(simulate, actors_data):
         pose = Pose(Point(x, 0.0, 0.0), Quaternion(*turn))
         sender.publish(PoseStamped(Header(time_from_ns(0), frame), pose))
         simulation.run(0.1)
-        return simulation.actors.poses_at(simulation.time_ns)[0].tolist()
+        return simulation.world.actors.poses_at(simulation.time_ns)[0].tolist()
 
     assert send(9.0)[0] == 9.0
     assert send(10.0, (0.0, 0.0, 1.0, 0.0)) == [10.0, 0, 0, 0, 0, 1, 0]
@@ -347,6 +351,6 @@ def test_scenarios_that_cannot_be_are_refused(actors_data, actors, words):
 
 def test_unknown_actors_cannot_be_put(simulate, actors_data, flat_data):
     with pytest.raises(CommandError, match="known: van"):
-        simulate(actors_data).set_actor_pose("x", [0, 0, 0])
+        simulate(actors_data).world.set_actor_pose("x", [0, 0, 0])
     with pytest.raises(CommandError, match="known: none"):
-        simulate(flat_data).set_actor_pose("x", [0, 0, 0])
+        simulate(flat_data).world.set_actor_pose("x", [0, 0, 0])

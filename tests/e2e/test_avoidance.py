@@ -46,7 +46,9 @@ def fly(simulate, scenario):
             topic, lambda p: phases.append(p.message.data), "std_msgs/msg/String"
         )
     simulation.run()
-    assert [e for e in simulation.events if str(e.kind) in ("impact", "collision")] == []
+    assert [
+        e for e in simulation.diagnostics.events if str(e.kind) in ("impact", "collision")
+    ] == []
     uav = simulation.uavs["uav1"]
     assert uav.mode is FlightMode.LANDED
     assert uav.position_map[0] > COURSE_M - 1.0

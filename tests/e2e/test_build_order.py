@@ -23,9 +23,9 @@ _FLY = """
 from volery import Simulation, load_scenario
 
 with Simulation(load_scenario("forest_survey"), threads=1) as simulation:
-    simulation.enable_digest()
+    simulation.diagnostics.enable_digest()
     simulation.run(2.0)
-    print(simulation.digest())
+    print(simulation.diagnostics.digest())
 """
 
 

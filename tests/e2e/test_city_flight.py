@@ -15,7 +15,10 @@ def test_three_uavs_set_out_through_the_streets():
     with Simulation(load_scenario("city_flight")) as simulation:
         start = {name: uav.position_map for name, uav in simulation.uavs.items()}
         simulation.run(24.0)
-        names = {simulation.scene.instance_name(1 + len(simulation.forest) + k) for k in (0, 480)}
+        names = {
+            simulation.world.scene.instance_name(1 + len(simulation.world.forest) + k)
+            for k in (0, 480)
+        }
         assert names == {"building 4253124", "lamp 1"}
         for uav in simulation.uavs.values():
             assert not uav.crashed
@@ -24,7 +27,10 @@ def test_three_uavs_set_out_through_the_streets():
         flown = np.linalg.norm(places - np.array(list(start.values())), axis=1)
         assert flown.min() > 5.0
         assert flown.max() < 60.0
-        assert simulation.scene.clearance(places, 50.0, include_terrain=False).distance.min() > 0.8
+        assert (
+            simulation.world.scene.clearance(places, 50.0, include_terrain=False).distance.min()
+            > 0.8
+        )
 
 
 def town(flat_data, tmp_path, **city):

@@ -20,7 +20,7 @@ from volery.graph.messages import String
 watch, told = CompileWatch(), {}
 with Simulation(load_scenario(sys.argv[1])) as simulation:
     before = len(watch.compiled)
-    for uav in simulation.uav_names:
+    for uav in simulation.vehicles.names:
         for name in ("slam/status", "planning/goal_status"):
             note = lambda p: told.update({p.topic: p.message.data})
             simulation.graph.subscribe(f"/{uav}/{name}", note, String)

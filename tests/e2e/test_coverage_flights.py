@@ -37,7 +37,7 @@ class Watch:
         self.paths[published.topic.split("/")[1]] = published.message.poses
 
     def fly(self, until_s):
-        while self.simulation.time_s < until_s and not self.simulation.finished:
+        while self.simulation.time_s < until_s and not self.simulation.clock.finished:
             self.simulation.run(0.2)
             for name, uav in self.simulation.uavs.items():
                 self.tracks[name].append(uav.position_map)
@@ -78,7 +78,7 @@ def test_three_uavs_cover_every_free_cell_and_land(tmp_path, simulate):
     watch = Watch(simulate(field_data(tmp_path)))
     watch.fly(400.0)
     free = np.array([[c == "0" for c in row] for row in FIELD[::-1]])
-    assert watch.simulation.finished
+    assert watch.simulation.clock.finished
     assert all(uav.mode.name == "LANDED" for uav in watch.simulation.uavs.values())
     np.testing.assert_array_equal(watch.covered == 100, free)
     assert watch.flown_cells(free.shape)[np.kron(free, np.ones((2, 2), bool))].all()
@@ -95,7 +95,7 @@ def test_the_others_share_what_a_lost_uav_leaves(tmp_path, simulate):
     watch = Watch(simulate(field_data(tmp_path, timeout_s=4.0)))
     watch.fly(20.0)
     for rotor in range(4):
-        watch.simulation.inject_fault({"kind": "motor", "uav": "uav2", "rotor": rotor})
+        watch.simulation.faults.inject({"kind": "motor", "uav": "uav2", "rotor": rotor})
     watch.fly(400.0)
     free = np.array([[c == "0" for c in row] for row in FIELD[::-1]])
     assert watch.status["phases"] == {"uav1": "done", "uav2": "failed", "uav3": "done"}
@@ -120,7 +120,7 @@ def test_cells_beyond_blocks_are_flown_to_or_told_of(tmp_path, simulate):
         watch.fly(400.0)
         assert watch.status["unreachable"] == missing
         assert np.count_nonzero(watch.covered == 100) == 12 - missing
-        assert watch.simulation.finished
+        assert watch.simulation.clock.finished
 
 
 def test_a_map_that_changes_is_planned_anew(tmp_path, simulate):

@@ -9,11 +9,11 @@ SECONDS = 6.0
 
 def digest_of(simulate, data, *, threads=1, fly=None):
     simulation = simulate(data, threads=threads)
-    simulation.enable_digest()
+    simulation.diagnostics.enable_digest()
     (fly or (lambda s: s.run(SECONDS)))(simulation)
     assert simulation.time_s == pytest.approx(SECONDS)
-    assert any(name.endswith("scan") for name in simulation.mounts)
-    return simulation.digest()
+    assert any(name.endswith("scan") for name in simulation.vehicles.lidar_mounts)
+    return simulation.diagnostics.digest()
 
 
 def slices(simulation):
@@ -36,9 +36,9 @@ def test_another_seed_gives_another_run(simulate, flat_data):
     digests = []
     for seed in (1, 2):
         simulation = simulate({**flat_data, "seed": seed})
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         simulation.run(1.0)
-        digests.append(simulation.digest())
+        digests.append(simulation.diagnostics.digest())
     assert digests[0] != digests[1]
 
 
@@ -57,7 +57,7 @@ def test_an_added_uav_changes_nobody_elses_noise(simulate, flat_data):
 
 def test_digest_must_be_asked_for(simulate, flat_data):
     with pytest.raises(CommandError, match="enable_digest"):
-        simulate(flat_data).digest()
+        simulate(flat_data).diagnostics.digest()
 
 
 BARE = {
@@ -84,15 +84,15 @@ def test_events_without_sensors_do_not_depend_on_slices(simulate, piece):
 
     def fly(size):
         simulation = simulate(BARE)
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         simulation.uavs["uav3"].command_rotor_speeds([0.0] * 4)
         while simulation.time_ns < 4_000_000_000:
             simulation.run(size)
         land_all(simulation)
         while simulation.time_ns < 9_000_000_000:
             simulation.run(size)
-        assert len(simulation.events) >= 6
-        return simulation.digest()
+        assert len(simulation.diagnostics.events) >= 6
+        return simulation.diagnostics.digest()
 
     assert fly(piece) == fly(0.5)
 
@@ -100,14 +100,14 @@ def test_events_without_sensors_do_not_depend_on_slices(simulate, piece):
 def test_the_end_of_a_run_does_not_depend_on_speed(simulate):
     def end(speed, first=0.0):
         simulation = simulate(BARE)
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         simulation.uavs["uav3"].command_rotor_speeds([0.0] * 4)
         simulation.run(first)
         simulation.run(3.0 - first)
         land_all(simulation)
         simulation.run(speed=speed)
-        assert simulation.finished
-        return simulation.time_ns, simulation.digest()
+        assert simulation.clock.finished
+        return simulation.time_ns, simulation.diagnostics.digest()
 
     assert end(None) == end(7.0) == end(31.0, first=0.03)
 

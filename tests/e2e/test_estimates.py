@@ -50,7 +50,7 @@ def test_flies_on_estimates_through_an_outage_and_lands(simulate, estimating_dat
     uav.go_to([15.0, 5.0, 6.0])
     simulation.run(10.0)
     np.testing.assert_allclose(uav.position_map, [15.0, 5.0, 6.0], atol=2.5)
-    simulation.inject_fault({"kind": "gnss_loss", "uav": "uav1", "at_s": 18.0, "until_s": 38.0})
+    simulation.faults.inject({"kind": "gnss_loss", "uav": "uav1", "at_s": 18.0, "until_s": 38.0})
     simulation.run(21.0)
     simulation.run(6.0)
     uav.land()
@@ -58,7 +58,7 @@ def test_flies_on_estimates_through_an_outage_and_lands(simulate, estimating_dat
     assert uav.mode.name == "LANDED"
     assert not uav.crashed
 
-    down = next(e.time_ns for e in simulation.events if e.kind == "touch_down") / 1e9
+    down = next(e.time_ns for e in simulation.diagnostics.events if e.kind == "touch_down") / 1e9
     t, *columns = np.array([row for row in rows if row[0] < down]).T
     error, sigma = np.abs(columns[:3]), np.array(columns[3:])
     inside = (error < 3.0 * sigma).mean(axis=1)
@@ -86,22 +86,22 @@ def test_flights_on_estimates_are_repeated_restored_and_reset(simulate, estimati
     digests = []
     for slices in ([4.0], [0.0073] * 400 + [1.08]):
         simulation = simulate(estimating_data)
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         simulation.uavs["uav1"].take_off(3.0)
         for seconds in slices:
             simulation.run(seconds)
-        digests.append(simulation.digest())
+        digests.append(simulation.diagnostics.digest())
     assert digests[0] == digests[1]
     kept = simulation.snapshot()
     simulation.run(2.0)
-    later = simulation.digest()
+    later = simulation.diagnostics.digest()
     simulation.restore(kept)
     simulation.run(2.0)
-    assert simulation.digest() == later
+    assert simulation.diagnostics.digest() == later
     simulation.reset()
     simulation.uavs["uav1"].take_off(3.0)
     simulation.run(4.0)
-    assert simulation.digest() == digests[0]
+    assert simulation.diagnostics.digest() == digests[0]
 
 
 def test_other_seeds_begin_elsewhere_near_the_truth(simulate, estimating_data):
@@ -130,9 +130,9 @@ def test_reset_with_another_seed_is_a_fresh_start(simulate, estimating_data):
     used.run(1.3)
     used.reset(7)
     for simulation in (used, fresh):
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         simulation.run(3.0)
-    assert used.digest() == fresh.digest()
+    assert used.diagnostics.digest() == fresh.diagnostics.digest()
 
 
 SLIP_M = 3.0
@@ -254,7 +254,11 @@ def test_it_stays_while_it_stands_and_tells_that_no_poses_come(simulate, slam_da
     simulation.run(45.0)
     at_start, at_end = np.array(rows[0][1:4]), np.array(rows[-1][1:4])
     assert np.linalg.norm(at_end - at_start) < 0.5
-    told = [event.describe() for event in simulation.events if "receives no poses" in event.detail]
+    told = [
+        event.describe()
+        for event in simulation.diagnostics.events
+        if "receives no poses" in event.detail
+    ]
     assert len(told) == 1
     assert told[0].startswith("5.0")
     assert "slam/odom" in told[0]

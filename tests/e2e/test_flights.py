@@ -20,7 +20,7 @@ def test_take_off_go_land(simulate, flat_data):
     uav.land()
     simulation.run(10.0)
     assert uav.mode is FlightMode.LANDED
-    kinds = [event.kind for event in simulation.events]
+    kinds = [event.kind for event in simulation.diagnostics.events]
     assert EventKind.TOUCH_DOWN in kinds
     assert EventKind.IMPACT not in kinds
     assert not uav.crashed
@@ -57,8 +57,8 @@ def test_gap_following_crosses_a_wood_and_lands(simulate, wood_data, weather):
     wood_data["ends_when"] = "all_landed"
     simulation = simulate(wood_data, threads=2)
     simulation.run()
-    assert simulation.finished
-    for event in simulation.events:
+    assert simulation.clock.finished
+    for event in simulation.diagnostics.events:
         assert event.kind not in {EventKind.COLLISION, EventKind.IMPACT}, event.describe()
     for uav in simulation.uavs.values():
         assert uav.mode is FlightMode.LANDED
@@ -73,14 +73,18 @@ def test_flying_into_a_tree_at_speed(simulate, wood_data, on_contact):
     uav = simulation.uavs["uav1"]
     state = simulation._engine.fleet.state
     # Straight at the thickest trunk, 25 m/s, from 10 m away.
-    forest = simulation.forest
+    forest = simulation.world.forest
     trunk = forest.position_map[np.argmax(forest.dbh_m)]
     state.position_map[0] = trunk + np.array([-10.0, 0.0, 1.2])
     state.velocity_map[0] = [25.0, 0.0, 0.0]
     state.contact_budget[0] = 0.0
     uav.command_rotor_speeds(np.full(4, 770.0))
     simulation.run(0.6)
-    hit = next(e for e in simulation.events if e.kind is EventKind.COLLISION and e.uav == "uav1")
+    hit = next(
+        e
+        for e in simulation.diagnostics.events
+        if e.kind is EventKind.COLLISION and e.uav == "uav1"
+    )
     assert hit.partner.startswith("tree")
     assert hit.speed_m_s > 5.0
     assert uav.position_map[0] < trunk[0] + 1.0 or abs(uav.position_map[1] - trunk[1]) > 0.3
@@ -88,7 +92,7 @@ def test_flying_into_a_tree_at_speed(simulate, wood_data, on_contact):
     simulation.run(8.0)
     if on_contact == "crash":
         assert np.linalg.norm(uav.velocity_map) < 0.1
-        ground = float(simulation.terrain.height(*uav.position_map[:2]))
+        ground = float(simulation.world.terrain.height(*uav.position_map[:2]))
         assert ground - 0.05 < uav.position_map[2] < ground + 6.0
 
 
@@ -104,7 +108,7 @@ def test_two_uavs_that_meet_crash_into_each_other(simulate, flat_data):
     for uav in simulation.uavs.values():
         uav.command_rotor_speeds(np.full(4, 770.0))
     simulation.run(0.5)
-    hits = [e for e in simulation.events if e.kind is EventKind.COLLISION]
+    hits = [e for e in simulation.diagnostics.events if e.kind is EventKind.COLLISION]
     assert {(e.uav, e.partner) for e in hits[:2]} == {("uav1", "uav2"), ("uav2", "uav1")}
     assert hits[0].speed_m_s == pytest.approx(50.0, abs=10.0)
     assert all(uav.crashed for uav in simulation.uavs.values())

@@ -31,7 +31,7 @@ def test_lost_motor_at_its_time_brings_a_quadrotor_down(simulate, airborne):
 
 def test_weak_motor_for_a_while(simulate, airborne):
     simulation = simulate(airborne)
-    simulation.inject_fault(
+    simulation.faults.inject(
         {"kind": "motor", "uav": "uav1", "rotor": 2, "thrust_factor": 0.7, "until_s": 1.0}
     )
     simulation.run(0.5)
@@ -71,7 +71,7 @@ def test_gust_pushes_and_displacement_moves(simulate, airborne):
     assert pushed > 0.1
     simulation.run(6.0)
     assert abs(uav.position_map[0]) < 0.1
-    simulation.inject_fault({"kind": "displacement", "uav": "uav1", "offset_m": [0.0, 3.0, 1.0]})
+    simulation.faults.inject({"kind": "displacement", "uav": "uav1", "offset_m": [0.0, 3.0, 1.0]})
     simulation.step(1)
     np.testing.assert_allclose(uav.position_map[1:], [3.0, 21.0], atol=0.05)
     simulation.run(8.0)
@@ -96,17 +96,17 @@ def test_faults_are_part_of_what_is_kept(simulate, airborne):
         {"kind": "motor", "uav": "uav1", "rotor": 1, "thrust_factor": 0.8, "at_s": 0.5}
     ]
     simulation = simulate(airborne)
-    simulation.enable_digest()
+    simulation.diagnostics.enable_digest()
     simulation.run(0.3)
     kept = simulation.snapshot()
     simulation.run(1.0)
-    first = simulation.digest()
+    first = simulation.diagnostics.digest()
     simulation.restore(kept)
     simulation.run(1.0)
-    assert simulation.digest() == first
+    assert simulation.diagnostics.digest() == first
     simulation.reset()
     simulation.run(1.3)
-    assert simulation.digest() == first
+    assert simulation.diagnostics.digest() == first
 
 
 @pytest.mark.parametrize(
@@ -123,7 +123,7 @@ def test_faults_are_part_of_what_is_kept(simulate, airborne):
 def test_faults_that_cannot_be_are_refused(simulate, airborne, fault, words):
     simulation = simulate(airborne)
     with pytest.raises(CommandError, match=words):
-        simulation.inject_fault(fault)
+        simulation.faults.inject(fault)
     airborne["faults"] = [fault]
     with pytest.raises(ScenarioError, match=rf"faults\[0\]: .*{words}"):
         simulate(airborne)
@@ -140,7 +140,7 @@ def test_faults_that_cannot_be_are_refused(simulate, airborne, fault, words):
 )
 def test_impossible_data_is_refused(simulate, airborne, fault):
     with pytest.raises(CommandError, match="fault"):
-        simulate(airborne).inject_fault(fault)
+        simulate(airborne).faults.inject(fault)
 
 
 def test_the_worst_of_overlapping_faults_decides(simulate, airborne):
@@ -156,7 +156,7 @@ def test_the_worst_of_overlapping_faults_decides(simulate, airborne):
         simulation.step(1)
         found.append(float(health[0, 0]))
     assert found == [0.9, 0.8, 0.8, 1.0, 1.0]
-    told = [e.detail for e in simulation.events if e.kind == "fault"]
+    told = [e.detail for e in simulation.diagnostics.events if e.kind == "fault"]
     assert told == ["fault: motor"] * 2 + ["fault over: motor"] * 2
 
 
@@ -164,5 +164,5 @@ def test_the_worst_of_overlapping_faults_decides(simulate, airborne):
 def test_nobody_is_displaced_out_of_the_world(simulate, airborne, offset):
     simulation = simulate(airborne)
     with pytest.raises(CommandError, match="would be displaced"):
-        simulation.inject_fault({"kind": "displacement", "uav": "uav1", "offset_m": offset})
+        simulation.faults.inject({"kind": "displacement", "uav": "uav1", "offset_m": offset})
     simulation.run(0.1)

@@ -45,26 +45,29 @@ def test_no_node_hears_the_truth_nor_another_uav_but_by_radio(
 def test_two_share_the_forest_and_repeat_themselves() -> None:
     scenario = overrides.apply(load_scenario("forest_search"), uavs=2)
     with Simulation(scenario) as simulation:
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         simulation.run(11.0)
         kept = simulation.snapshot()
         began = [uav.position_map for uav in simulation.uavs.values()]
         simulation.run(4.0)
-        places, digest = [uav.position_map for uav in simulation.uavs.values()], simulation.digest()
+        places, digest = (
+            [uav.position_map for uav in simulation.uavs.values()],
+            simulation.diagnostics.digest(),
+        )
 
-        managers = [node for node in simulation.nodes if isinstance(node, TaskManager)]
+        managers = [node for node in simulation.vehicles.nodes if isinstance(node, TaskManager)]
         assert [str(manager.phase) for manager in managers] == ["search", "search"]
         assert len({manager.member.sector for manager in managers}) == 2
         assert [set(manager.member.team.mates) for manager in managers] == [{"uav2"}, {"uav1"}]
         for start, end in zip(began, places, strict=True):
             assert np.hypot(*(end - start)[:2]) > 1.5
         contacts = {EventKind.COLLISION, EventKind.IMPACT}
-        assert not [event for event in simulation.events if event.kind in contacts]
+        assert not [event for event in simulation.diagnostics.events if event.kind in contacts]
 
         simulation.restore(kept)
         for _ in range(2):
             simulation.run(2.0)
-        assert simulation.digest() == digest
+        assert simulation.diagnostics.digest() == digest
         again = [uav.position_map for uav in simulation.uavs.values()]
         np.testing.assert_array_equal(again, places)
 
@@ -78,7 +81,7 @@ def test_an_operators_hold_holds_until_resume() -> None:
         uav, graph = simulation.uavs["uav2"], simulation.graph
         (manager,) = (
             node
-            for node in simulation.nodes
+            for node in simulation.vehicles.nodes
             if isinstance(node, TaskManager) and node.settings.name == "uav2"
         )
         assert str(manager.phase) == "search"

@@ -53,7 +53,7 @@ def running(simulate):
     server = RosbridgeServer("127.0.0.1", 0)
     with BridgeHost(simulation.gateway) as bridges:
         bridges.open(server)
-        simulation.use_low_latency()
+        simulation.gateway.use_low_latency()
         thread = threading.Thread(target=run)
         thread.start()
         yield simulation, server.port
@@ -89,7 +89,7 @@ def test_a_web_client_builds_the_world(running):
         )
     finally:
         ros.close()
-    assert [event.kind.value for event in simulation.events] == ["world"] * 2
+    assert [event.kind.value for event in simulation.diagnostics.events] == ["world"] * 2
 
 
 def ahead(scan):

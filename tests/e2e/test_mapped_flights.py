@@ -109,7 +109,7 @@ def test_a_uav_explores_the_forest_and_its_map_is_that_of_the_trees(simulate):
         )
     }
     simulation.run(24.0)
-    assert [e for e in simulation.events if e.kind is EventKind.IMPACT] == []
+    assert [e for e in simulation.diagnostics.events if e.kind is EventKind.IMPACT] == []
     track = np.array([[m.pose.pose.position.x, m.pose.pose.position.y] for m in told["odom"]])
     way = np.hypot(*np.diff(track, axis=0).T).sum()
     assert way > 45.0

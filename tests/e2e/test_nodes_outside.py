@@ -220,7 +220,7 @@ def test_who_does_not_answer_is_left_behind(gone):
         assert waited_s < 60.0
         if gone == "is silent":
             assert waited_s >= 0.3
-        simulation.add_partner("lost", period_s=1.0)  # the name is free again
+        simulation.clock.add_partner("lost", period_s=1.0)  # the name is free again
         if gone == "closes":
             topics = {t.name: t for t in simulation.graph.topics()}
             assert topics["/volery/lock_step/lost/go"].publishers == 0

@@ -44,7 +44,7 @@ def test_each_picture_is_recorded_once_and_cheaply(tmp_path, monkeypatch):
         simulation.run(1.0)
         total_s = time.process_time() - begun_s
         log.close()
-        rates = simulation.picture_rates
+        rates = simulation.diagnostics.image_rates
     assert timer.spent_s < SHARE * total_s
     front = {
         topic.topic.removeprefix("/uav1/front/")

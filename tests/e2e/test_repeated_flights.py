@@ -209,12 +209,12 @@ def recorded(path, speed, seed):
     """Digest of a flight disturbed at moments that `seed` chooses."""
     log = open_log(path)
     with Simulation(parse_scenario(DATA), threads=1) as simulation:
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         simulation.graph.subscribe_all(log.write)
         server = RosbridgeServer("127.0.0.1", 0)
         with BridgeHost(simulation.gateway) as bridges:
             bridges.open(server)
-            simulation.use_low_latency()
+            simulation.gateway.use_low_latency()
             operator = Operator(server.port)
             chance = random.Random(seed)
             errors = []
@@ -231,7 +231,7 @@ def recorded(path, speed, seed):
                     chance_to_end.set()
                 except BaseException as error:
                     errors.append(error)
-                simulation.quit()
+                simulation.clock.quit()
 
             chance_to_end = threading.Event()
             thread = threading.Thread(target=work)
@@ -243,14 +243,14 @@ def recorded(path, speed, seed):
         assert chance_to_end.is_set()
         simulation.commands.end()
         log.close()
-        return simulation.digest()
+        return simulation.diagnostics.digest()
 
 
 def repeated(path, again=None, **options):
     """Digest of the flight of a log flown again, and recorded into `again`."""
     flight = read_flight(path)
     with Simulation(parse_scenario(flight.origin.content), threads=1) as simulation:
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         simulation.replay_commands(flight)
         log = None if again is None else open_log(again)
         if log is not None:
@@ -259,7 +259,7 @@ def repeated(path, again=None, **options):
         if log is not None:
             simulation.commands.end()
             log.close()
-        return simulation.digest()
+        return simulation.diagnostics.digest()
 
 
 def flown(path):
@@ -306,12 +306,12 @@ def test_without_its_commands_the_flight_is_another_one(tmp_path):
     digest = recorded(path, 3.0, 3)
     flight = read_flight(path)
     with Simulation(parse_scenario(flight.origin.content), threads=1) as simulation:
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         less = [c for c in flight.commands if c.taken.name != "/reset_simulation"]
         simulation.replay_commands(replace(flight, commands=tuple(less)))
         with pytest.raises(CommandError, match="is not the recorded one"):
             simulation.run()
-        assert simulation.digest() != digest
+        assert simulation.diagnostics.digest() != digest
 
 
 def test_a_flight_of_the_command_line_is_repeated(tmp_path):
@@ -413,7 +413,7 @@ def finish(simulation, log):
     """End a flight and its log; its digest."""
     simulation.commands.end()
     log.close()
-    return simulation.digest()
+    return simulation.diagnostics.digest()
 
 
 def test_a_lock_step_partner_is_met_again(tmp_path):
@@ -423,7 +423,7 @@ def test_a_lock_step_partner_is_met_again(tmp_path):
     data = {**DATA, "duration_s": 1.0}
     clock = "rosgraph_msgs/msg/Clock"
     with Simulation(parse_scenario(data), threads=1) as simulation:
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         simulation.graph.subscribe_all(log.write)
         session = simulation.gateway.open("partner")
         session.advertise("/uav1/cmd_vel", "geometry_msgs/msg/Twist")
@@ -489,7 +489,7 @@ def test_what_a_service_outside_answered_is_answered_again(tmp_path):
     data = {**DATA, "duration_s": 1.5, "types": {"f450": kind}}
     response = message_type("std_srvs/srv/Trigger_Response")
     with Simulation(parse_scenario(data), threads=1) as simulation:
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         simulation.graph.subscribe_all(log.write)
         session = simulation.gateway.open("oracle")
         timers = []
@@ -520,7 +520,7 @@ def test_a_flight_past_its_scenarios_end_is_repeated(tmp_path):
     path = tmp_path / "flight.mcap"
     log = open_log(path)
     with Simulation(parse_scenario({**DATA, "duration_s": 0.2}), threads=1) as simulation:
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         simulation.graph.subscribe_all(log.write)
         session = simulation.gateway.open("client")
         simulation.run()
@@ -541,7 +541,7 @@ def test_a_flight_past_its_scenarios_end_is_repeated(tmp_path):
         simulation.run(0.15)
         simulation.commands.end()
         log.close()
-        digest = simulation.digest()
+        digest = simulation.diagnostics.digest()
     assert repeated(path) == digest
 
 

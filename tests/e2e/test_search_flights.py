@@ -97,15 +97,15 @@ class Watch:
 
     def fly(self, seconds):
         end = self.simulation.time_s + seconds
-        while self.simulation.time_s < end and not self.simulation.finished:
+        while self.simulation.time_s < end and not self.simulation.clock.finished:
             self.simulation.run(0.2)
             self.look()
 
     def check(self):
-        assert self.simulation.finished
+        assert self.simulation.clock.finished
         assert all(uav.mode.name == "LANDED" for uav in self.simulation.uavs.values())
         touched = {EventKind.COLLISION, EventKind.IMPACT}
-        assert not [event for event in self.simulation.events if event.kind in touched]
+        assert not [event for event in self.simulation.diagnostics.events if event.kind in touched]
         for point in self.found:
             assert np.hypot(point.x - OBJECT[0], point.y - OBJECT[1]) < 0.5
         assert self.found
@@ -122,11 +122,11 @@ def test_three_search_find_meet_and_land_the_same_each_time(tmp_path, simulate):
     digests = []
     for threads in (1, 2):
         simulation = simulate(meadow(tmp_path, 3, with_nodes=True), threads=threads)
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         watch = Watch(simulation)
         watch.fly(200.0)
         watch.check()
-        digests.append(simulation.digest())
+        digests.append(simulation.diagnostics.digest())
     assert digests[0] == digests[1]
 
 
@@ -177,7 +177,7 @@ def test_each_node_in_a_process_of_its_own(open_bridge, tmp_path, simulate):
         nodes = [start_node(via, name) for name in simulation.uavs]
         try:
             end = time.monotonic() + 180.0
-            while not simulation.finished and time.monotonic() < end:
+            while not simulation.clock.finished and time.monotonic() < end:
                 simulation.run(0.2, speed=2.0)
                 watch.look()
         finally:

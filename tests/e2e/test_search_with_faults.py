@@ -103,7 +103,7 @@ class Flight:
         assert self.way_m(5.0) > 1.5
         assert self.status[-1]["state"] in ("flying", "turning")
         assert self.status[-1]["problems"] == []
-        assert not [e for e in self.simulation.events if e.kind in CONTACTS]
+        assert not [e for e in self.simulation.diagnostics.events if e.kind in CONTACTS]
 
 
 @pytest.fixture(name="folder", scope="module")
@@ -139,7 +139,7 @@ def test_it_stops_while_a_sensor_fails(
 ) -> None:
     now = flight.simulation.time_s
     fault = {"kind": "sensor", "uav": "uav1", "sensor": sensor, "effect": effect}
-    flight.simulation.inject_fault({**fault, "at_s": now, "until_s": now + FAULT_S})
+    flight.simulation.faults.inject({**fault, "at_s": now, "until_s": now + FAULT_S})
     flight.simulation.run(FAULT_S - 0.5)
     assert flight.status[-1]["state"] == "holding"
     assert problem in flight.status[-1]["problems"]
@@ -170,12 +170,12 @@ def test_it_stops_while_its_odometry_is_wrong(flight: Flight, spoil: str) -> Non
 def test_without_its_sonar_it_says_so_and_keeps_its_height(flight: Flight) -> None:
     now = flight.simulation.time_s
     fault = {"kind": "sensor", "uav": "uav1", "sensor": "range", "effect": "stuck"}
-    flight.simulation.inject_fault({**fault, "at_s": now, "until_s": now + 12.0})
+    flight.simulation.faults.inject({**fault, "at_s": now, "until_s": now + 12.0})
     heights = []
     for _ in range(10):
         assert flight.way_m(1.0) > 0.1
         x, y, z = flight.simulation.uavs["uav1"].position_map
-        heights.append(z - float(flight.simulation.terrain.height(x, y)))
+        heights.append(z - float(flight.simulation.world.terrain.height(x, y)))
     assert flight.status[-1]["problems"] == ["the sonar repeats itself"]
     assert min(heights) > 1.5
     assert max(heights) < 4.5
@@ -188,7 +188,7 @@ def test_one_that_is_kidnapped_holds_finds_its_place_and_flies_on(flight: Flight
     simulation, told, poses = flight.simulation, [], []
     simulation.graph.subscribe("/uav1/slam/status", lambda p: told.append(p.message.data))
     simulation.graph.subscribe("/uav1/slam/pose", lambda p: poses.append(p.message))
-    simulation.inject_fault({"kind": "displacement", "uav": "uav1", "offset_m": [0.0, 3.0, 0.0]})
+    simulation.faults.inject({"kind": "displacement", "uav": "uav1", "offset_m": [0.0, 3.0, 0.0]})
     simulation.run(20.0)
     states = [json.loads(text)["state"] for text in told]
     assert "lost" in states
@@ -219,14 +219,14 @@ def test_a_map_of_other_cells_is_refused_in_flight(flight: Flight, folder: Any) 
 
 def test_a_uav_that_is_not_heard_is_named_and_heard_again(simulate_search: Any) -> None:
     simulation, problems = simulate_search
-    simulation.inject_fault({"kind": "radio", "uav": "uav2", "at_s": 8.0, "until_s": 16.0})
+    simulation.faults.inject({"kind": "radio", "uav": "uav2", "at_s": 8.0, "until_s": 16.0})
     simulation.run(7.5)
     assert problems == {"uav1": "", "uav2": ""}
     simulation.run(7.5)
     assert problems == {"uav1": "silent: uav2", "uav2": "silent: uav1"}
     simulation.run(2.0)
     assert problems == {"uav1": "", "uav2": ""}
-    assert not [e for e in simulation.events if e.kind in CONTACTS]
+    assert not [e for e in simulation.diagnostics.events if e.kind in CONTACTS]
 
 
 @pytest.fixture(name="simulate_search")

@@ -53,21 +53,21 @@ class Forgetful(Node):
 
 def flown(simulation, seconds):
     simulation.run(seconds)
-    return simulation.digest()
+    return simulation.diagnostics.digest()
 
 
 def test_restored_flight_repeats_itself(simulate, wood_data):
     wood_data["duration_s"] = 30.0
     simulation = simulate(wood_data)
-    simulation.enable_digest()
+    simulation.diagnostics.enable_digest()
     simulation.run(6.0037)
     kept = simulation.snapshot()
     first = flown(simulation, 4.0)
-    events = simulation.events
+    events = simulation.diagnostics.events
     simulation.restore(kept)
     assert simulation.time_ns == kept.time_ns
     assert flown(simulation, 4.0) == first
-    assert simulation.events == events
+    assert simulation.diagnostics.events == events
 
     later = simulation.snapshot()
     beyond = flown(simulation, 1.0)
@@ -79,7 +79,7 @@ def test_restored_flight_repeats_itself(simulate, wood_data):
 
 def test_states_kept_do_not_change_with_the_flight(simulate, wood_data):
     simulation = simulate(wood_data)
-    simulation.enable_digest()
+    simulation.diagnostics.enable_digest()
     simulation.run(1.0)
     kept = simulation.snapshot()
     ends = set()
@@ -91,14 +91,14 @@ def test_states_kept_do_not_change_with_the_flight(simulate, wood_data):
 
 def test_reset_is_a_fresh_start(simulate, wood_data):
     fresh = simulate(wood_data)
-    fresh.enable_digest()
+    fresh.diagnostics.enable_digest()
     expected = flown(fresh, 5.0)
     used = simulate(wood_data)
-    used.enable_digest()
+    used.diagnostics.enable_digest()
     used.run(7.0013)
     used.reset()
     assert used.time_ns == 0
-    assert used.events == ()
+    assert used.diagnostics.events == ()
     assert flown(used, 5.0) == expected
 
 
@@ -133,18 +133,18 @@ def test_reset_makes_a_node_without_state_anew(simulate, flat_data, latency_s):
     flat_data["types"]["f450"]["nodes"] = [keeping, entry, twice]
 
     def counts(simulation):
-        for node in simulation.nodes:
+        for node in simulation.vehicles.nodes:
             node.join()
-        return [node.count for node in simulation.nodes[1:]]
+        return [node.count for node in simulation.vehicles.nodes[1:]]
 
     def fly(simulation):
         simulation.uavs["uav1"].take_off(2.0)
         simulation.run(1.0)
-        return simulation.digest(), counts(simulation)
+        return simulation.diagnostics.digest(), counts(simulation)
 
     fresh, used = simulate(flat_data), simulate(flat_data)
     for simulation in (fresh, used):
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
     expected = fly(fresh)
     assert expected[1] == [10, 20]
     used.run(0.77)
@@ -152,7 +152,7 @@ def test_reset_makes_a_node_without_state_anew(simulate, flat_data, latency_s):
         used.reset()
         assert fly(used) == expected
     assert len(used._engine.timer_agenda._heap) == len(fresh._engine.timer_agenda._heap)
-    used.reset_uav("uav1")
+    used.vehicles.reset("uav1")
     assert counts(used) == [0, 0]
     used.run(0.5)
     assert counts(used) == [5, 10]
@@ -168,7 +168,7 @@ def test_snapshot_of_another_simulation_is_refused(simulate, flat_data):
 
 def test_posted_restore_takes_the_run_back(simulate, flat_data):
     simulation = simulate(flat_data)
-    simulation.enable_digest()
+    simulation.diagnostics.enable_digest()
     simulation.uavs["uav1"].take_off(2.0)
     simulation.run(1.0)
     kept = simulation.snapshot()
@@ -176,7 +176,7 @@ def test_posted_restore_takes_the_run_back(simulate, flat_data):
     done = simulation.post(lambda: simulation.restore(kept))
     simulation.step(1)  # to 2.301 s once more
     assert done.done()
-    posted = simulation.digest()
+    posted = simulation.diagnostics.digest()
     simulation.restore(kept)
     assert flown(simulation, 1.301) == posted
 
@@ -231,7 +231,7 @@ def test_a_single_uav_begins_anew_and_the_other_flies_on(simulate, flat_data):
         simulation.uavs["uav1"].command_rotor_speeds([0.0] * 4)
         simulation.run(2.0)
     assert used.uavs["uav1"].crashed
-    used.reset_uav("uav1")
+    used.vehicles.reset("uav1")
     assert not used.uavs["uav1"].crashed
     again, first = told(used, 6_000_000_000), told(fresh, 0)
     for simulation in (used, fresh):
@@ -248,9 +248,9 @@ def test_a_single_uav_begins_anew_and_the_other_flies_on(simulate, flat_data):
     used.uavs["uav1"].go_to([-6.0, 0.0, 3.0])
     used.run(12.0)
     with pytest.raises(CommandError, match="uav1 cannot go back to its start: uav2 is there"):
-        used.reset_uav("uav1")
+        used.vehicles.reset("uav1")
     with pytest.raises(CommandError, match="no UAV 'uav7'; known: uav1, uav2"):
-        used.reset_uav("uav7")
+        used.vehicles.reset("uav7")
 
 
 def test_after_a_reset_in_mid_run_the_pace_is_kept():

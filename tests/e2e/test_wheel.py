@@ -16,7 +16,7 @@ import volery, pathlib
 assert "site-packages" in volery.__file__, volery.__file__
 with volery.Simulation(volery.load_scenario("longleaf")) as simulation:
     simulation.run(1.0)
-    print(len(simulation.forest), simulation.time_s)
+    print(len(simulation.world.forest), simulation.time_s)
 """
 
 

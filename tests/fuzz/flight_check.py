@@ -32,7 +32,7 @@ def refused_or_flown(load):
             for numbers in (state.position_map, state.velocity_map, state.attitude):
                 assert np.isfinite(numbers).all()
             assert np.abs(state.velocity_map).max() <= 1e4
-            simulation.snapshot() if not simulation.nodes else None
+            simulation.snapshot() if not simulation.vehicles.nodes else None
     except DivergenceError as error:
         check_message(error)
         OUTCOMES["stopped in flight"] += 1

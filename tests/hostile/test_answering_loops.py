@@ -68,7 +68,7 @@ def test_a_client_that_starts_such_a_loop_does_not_end_the_run(start, caplog):
 
 @pytest.mark.timeout(240, func_only=True)
 def test_a_loop_that_multiplies_ends_too(monkeypatch):
-    monkeypatch.setattr("volery.graph.graph._MAX_ANSWERS_AT_ONCE", 5_000)
+    monkeypatch.setattr("volery.graph.response_chains._MAX_RESPONSES_AT_ONCE", 5_000)
     graph = Graph(lambda: 0)
     publisher = graph.advertise("/a", String)
 
@@ -108,7 +108,7 @@ class PressedError(Exception):
 @pytest.mark.timeout(240, func_only=True)
 def test_ctrl_c_is_heard_while_a_partner_is_silent(simulate, flat_data):
     simulation = simulate(flat_data)
-    simulation.add_partner("silent", period_s=0.02, timeout_s=1e6)
+    simulation.clock.add_partner("silent", period_s=0.02, timeout_s=1e6)
 
     def look(_progress):
         if simulation.time_ns:
@@ -121,20 +121,20 @@ def test_ctrl_c_is_heard_while_a_partner_is_silent(simulate, flat_data):
 @pytest.mark.timeout(240, func_only=True)
 def test_quit_is_heard_while_a_partner_is_silent(simulate, flat_data):
     simulation = simulate(flat_data)
-    simulation.add_partner("silent", period_s=0.02, timeout_s=1e6)
-    simulation.post(simulation.quit)
+    simulation.clock.add_partner("silent", period_s=0.02, timeout_s=1e6)
+    simulation.post(simulation.clock.quit)
     simulation.run(1.0)
-    assert simulation.quitting
+    assert simulation.clock.quitting
 
 
 @pytest.mark.timeout(240, func_only=True)
 def test_quit_in_a_meeting_ends_the_run(simulate, flat_data):
     simulation = simulate(flat_data)
-    simulation.add_partner("silent", period_s=0.02, timeout_s=1e6)
+    simulation.clock.add_partner("silent", period_s=0.02, timeout_s=1e6)
 
     def look(_progress):
         if simulation.time_ns:
-            simulation.quit()
+            simulation.clock.quit()
 
     simulation.run(1.0, on_progress=look)
     assert simulation.time_ns == 20_000_000

@@ -79,7 +79,7 @@ def test_a_fault_of_a_client_that_becomes_impossible_changes_nothing(client, cap
     np.testing.assert_allclose(client.simulation.uavs["uav1"].position_map, before, atol=0.01)
     assert "stranger" in caplog.text
     assert "displacement" in caplog.text
-    told = [event.detail for event in client.simulation.events if event.kind == "fault"]
+    told = [event.detail for event in client.simulation.diagnostics.events if event.kind == "fault"]
     assert "under the ground" in told[-1]
 
 
@@ -258,7 +258,7 @@ def test_nasty_values_in_every_field_of_every_service(whole):
             answer = client.call(service, request)
             assert answer is not None or service == "/step_simulation", service
             assert not RAW.search(str(answer)[:3000]), (service, str(request)[:500])
-            whole.resume()
+            whole.clock.resume()
             whole.step(2)
             asked += 1
     assert asked > 2000

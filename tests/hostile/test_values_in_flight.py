@@ -108,7 +108,7 @@ def subscribed(node):
 def flown(simulate, request):
     simulation = simulate(flight(request.param))
     simulation.step(RATE_HZ * 2)
-    return Client(simulation), simulation.nodes[0]
+    return Client(simulation), simulation.vehicles.nodes[0]
 
 
 every_node = pytest.mark.parametrize("flown", NODES, indirect=True)

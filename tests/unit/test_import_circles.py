@@ -10,7 +10,6 @@ _SOURCE = Path(__file__).parents[2] / "src"
 
 ALLOWED = {
     "volery.engine.stages": "the stages are the methods of the engine, one function each",
-    "volery.runtime.simulation": "Simulation's facets",
 }
 """Reasons for the circles through a module."""
 

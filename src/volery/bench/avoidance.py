@@ -97,7 +97,10 @@ def fly(way: str, field: str, seed: int) -> Flight:
                 simulation.run(_SLICE_S)
                 places.append(uav.position_map.copy())
             metres = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
-            touched = any(str(event.kind) in ("impact", "collision") for event in simulation.events)
+            touched = any(
+                str(event.kind) in ("impact", "collision")
+                for event in simulation.diagnostics.events
+            )
             arrived = not touched and float(places[-1][0]) > _COURSE_M - 2.0
             return Flight(way, field, seed, touched, arrived, metres, simulation.time_s)
 

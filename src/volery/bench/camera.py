@@ -96,7 +96,7 @@ def _real_time_factor(uavs: int) -> float:
             nonlocal received
             received += 1
 
-        for name in simulation.uav_names:
+        for name in simulation.vehicles.names:
             for topic in ("image_raw", "depth"):
                 simulation.graph.subscribe(f"/{name}/camera/{topic}", count)
         simulation.run(2.5)  # climb

@@ -75,7 +75,7 @@ def real_time_factor(uavs: int, *, rings: bool = False) -> float:
             nonlocal received
             received += 1
 
-        for topic in (*simulation.mounts, *simulation.cloud_mounts):
+        for topic in (*simulation.vehicles.lidar_mounts, *simulation.vehicles.point_cloud_mounts):
             simulation.graph.subscribe(topic, count)
         simulation.run(2.5)  # climb
         for uav in simulation.uavs.values():

@@ -183,13 +183,13 @@ def fly(scenario: Scenario, *, threads: int = 2) -> Search:
         simulation.run()
         wall_s = time.perf_counter() - before
         kinds = (EventKind.IMPACT, EventKind.COLLISION)
-        forest = simulation.forest
+        forest = simulation.world.forest
         return Search(
             scenario,
             uavs,
             wall_s,
             simulation.time_s,
-            sum(event.kind in kinds for event in simulation.events),
+            sum(event.kind in kinds for event in simulation.diagnostics.events),
             np.zeros((0, 2)) if forest is None else np.asarray(forest.position_map[:, :2]),
         )
 

@@ -35,11 +35,11 @@ def shares(uavs: int, seconds: float) -> dict[str, float]:
     scenario = search_scenario(uavs, 1, _CLIMB_S + seconds + 1.0)
     with Simulation(scenario, threads=1) as simulation:
         simulation.run(_CLIMB_S)
-        nodes, stages = _busy(simulation), simulation.stage_cpu_s
+        nodes, stages = _busy(simulation), simulation.diagnostics.stage_cpu_s
         began = time.process_time()
         simulation.run(seconds)
         process_s = time.process_time() - began
-        took = {k: v - stages[k] for k, v in simulation.stage_cpu_s.items()}
+        took = {k: v - stages[k] for k, v in simulation.diagnostics.stage_cpu_s.items()}
         thought = {name: busy - nodes[name] for name, busy in _busy(simulation).items()}
         inline_s = sum(
             busy for name, busy in thought.items() if name not in _with_latency(simulation)
@@ -57,7 +57,7 @@ def shares(uavs: int, seconds: float) -> dict[str, float]:
 def _busy(simulation: Simulation) -> dict[str, float]:
     """Returns the nodes' CPU seconds so far, by name; waits for workers."""
     busy: dict[str, float] = {}
-    for node in simulation.nodes:
+    for node in simulation.vehicles.nodes:
         node.join()
         busy[node.get_name()] = busy.get(node.get_name(), 0.0) + node.busy_s
     return busy
@@ -65,4 +65,4 @@ def _busy(simulation: Simulation) -> dict[str, float]:
 
 def _with_latency(simulation: Simulation) -> set[str]:
     """Returns the names of nodes with threads of their own."""
-    return {node.get_name() for node in simulation.nodes if node.has_worker}
+    return {node.get_name() for node in simulation.vehicles.nodes if node.has_worker}

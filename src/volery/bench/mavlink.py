@@ -7,11 +7,14 @@ import subprocess
 import sys
 import threading
 import time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from volery.core.errors import VoleryError
+
+if TYPE_CHECKING:
+    from volery.runtime import Simulation
 
 _VEHICLES = 10
 _STEADY_S = 10.0
@@ -75,9 +78,9 @@ def _fly_ten(*, streams: bool) -> tuple[float, list[float]]:
         return share, _ask(simulation) if streams else []
 
 
-def _ask(simulation: Any) -> list[float]:
+def _ask(simulation: Simulation) -> list[float]:
     """Sends requests to a vehicle of a running simulation from another process."""
-    simulation.use_low_latency()
+    simulation.gateway.use_low_latency()
     thread = threading.Thread(target=lambda: simulation.run(600.0, speed=1.0))
     thread.start()
     command = [
@@ -91,7 +94,7 @@ def _ask(simulation: Any) -> list[float]:
     try:
         done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False, timeout=120)
     finally:
-        simulation.quit()
+        simulation.clock.quit()
         thread.join()
     if done.returncode:
         raise VoleryError("the client of the bench mavlink failed")

@@ -96,7 +96,7 @@ def _streams() -> dict[str, float]:
         bridges.open(_bridge())
         topics = [
             f"/{uav}/laser/{name}/scan"
-            for uav in simulation.uav_names
+            for uav in simulation.vehicles.names
             for name in ("horizontal", "nodding")
         ]
         published: dict[tuple[str, int], int] = {}

@@ -136,7 +136,7 @@ def flying() -> Iterator[BridgeHost]:
     with Simulation(_scenario()) as simulation:
         simulation.step(1)
         with BridgeHost(simulation.gateway) as bridges:
-            simulation.use_low_latency()
+            simulation.gateway.use_low_latency()
             over = threading.Event()
 
             def run() -> None:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -15,8 +15,10 @@ from volery.core.errors import BridgeError
 
 if TYPE_CHECKING:
     from volery.bridges.bridge_factory import Bridge, BridgeOptions
+    from volery.graph.session import Gateway
     from volery.mavlink.hil.px4_bridge import Px4Bridge
     from volery.mavlink.hil.px4_processes import Px4Instances
+    from volery.runtime.vehicles.uav import Uav
     from volery.scenario.schema import Scenario
 
 _LONGEST_START_S = 60.0
@@ -48,8 +50,13 @@ def fit_out(scenario: Scenario, options: RunOptions) -> Scenario:
 
 
 @contextmanager
-def open_bridges(simulation: Any, options: RunOptions) -> Iterator[None]:
-    """Opens the bridges of `options`, prints their addresses and closes them on exit."""
+def open_bridges(
+    gateway: Gateway, options: RunOptions, uavs: Mapping[str, Uav] | None = None
+) -> Iterator[None]:
+    """Opens the bridges of `options`, prints their addresses and closes them on exit.
+
+    uavs: the UAVs for which PX4s run if `options` has a PX4 folder.
+    """
     if not options.bridges:
         yield
         return
@@ -58,12 +65,12 @@ def open_bridges(simulation: Any, options: RunOptions) -> Iterator[None]:
 
     bridge_options = _bridge_options(options)
     wanted = [make_bridge(text, bridge_options) for text in options.bridges]
-    with BridgeHost(simulation.gateway) as bridges:
+    with BridgeHost(gateway) as bridges:
         for bridge in wanted:
             bridges.open(bridge)
             typer.echo(f"open    {bridge.name}", err=True)
-        simulation.use_low_latency()
-        with _px4_instances(simulation, wanted, options):
+        gateway.use_low_latency()
+        with _px4_instances(uavs or {}, wanted, options):
             yield
 
 
@@ -84,32 +91,34 @@ def _bridge_options(options: RunOptions) -> BridgeOptions:
 
 
 @contextmanager
-def _px4_instances(simulation: Any, bridges: list[Bridge], options: RunOptions) -> Iterator[None]:
+def _px4_instances(
+    uavs: Mapping[str, Uav], bridges: list[Bridge], options: RunOptions
+) -> Iterator[None]:
     """Runs a PX4 for each UAV if `options` has a PX4 folder; waits until all are connected."""
-    if options.px4_dir is None:
+    if options.px4_dir is None or not uavs:
         yield
         return
     from volery.cli.px4 import parameters_for
     from volery.mavlink.hil.px4_bridge import Px4Bridge
     from volery.mavlink.hil.px4_processes import Px4Instances, find_px4
 
-    build, count = find_px4(options.px4_dir), len(simulation.uav_names)
-    parameters = [parameters_for(uav.airframe) for uav in simulation.uavs.values()]
+    build, count = find_px4(options.px4_dir), len(uavs)
+    parameters = [parameters_for(uav.airframe) for uav in uavs.values()]
     bridge = next(bridge for bridge in bridges if isinstance(bridge, Px4Bridge))
     with Px4Instances(build, count, speed=options.speed, parameters=parameters) as instances:
         typer.echo(f"started {build.binary}, instances 0 to {count - 1}", err=True)
         end_s = time.monotonic() + _LONGEST_START_S
         while len(bridge.connected) < count:
             if instances.wait(_LOOK_S) or time.monotonic() > end_s:
-                raise BridgeError(instances.failure or _missing(simulation, bridge, instances))
+                raise BridgeError(instances.failure or _missing(uavs, bridge, instances))
         yield
 
 
-def _missing(simulation: Any, bridge: Px4Bridge, instances: Px4Instances) -> str:
+def _missing(names: Iterable[str], bridge: Px4Bridge, instances: Px4Instances) -> str:
     """Returns an error text with the missing PX4s, their addresses and last output."""
     return "\n".join(
         f"{uav}: PX4 {number} has not connected to {bridge.address(number)} within "
         f"{_LONGEST_START_S:g} s; last output:{instances.words_of(number) or ' nothing'}"
-        for number, uav in enumerate(simulation.uav_names)
+        for number, uav in enumerate(names)
         if uav not in bridge.connected
     )

@@ -22,8 +22,9 @@ from volery.core.plurals import counted
 
 if TYPE_CHECKING:
     from volery.bridges.logs.log_writer import LogWriter
-    from volery.graph.graph import Subscription
+    from volery.graph.topics import Subscription
     from volery.report.collect import FlightCollector
+    from volery.runtime.simulation import Simulation
     from volery.scenario.changes import Changes
 
 _CONTACTS_SHOWN = 10
@@ -91,7 +92,7 @@ class CommandLineFlight:
 
     def __init__(
         self,
-        simulation: Any,
+        simulation: Simulation,
         options: RunOptions,
         progress: FlightProgress,
         interrupts: Interrupts,
@@ -106,7 +107,7 @@ class CommandLineFlight:
         self._recorded: Subscription | None = None
         self._collector: FlightCollector | None = None
         if options.digest:
-            simulation.enable_digest()
+            simulation.diagnostics.enable_digest()
         if options.report is not None:
             from volery.report.collect import FlightCollector
 
@@ -116,7 +117,7 @@ class CommandLineFlight:
             from volery.bridges.logs.recorded_topics import recorded_topics
 
             matches = recorded_topics(simulation.graph, options.topics, options.exclude)
-            warn_of_size(simulation.picture_rates, matches)
+            warn_of_size(simulation.diagnostics.image_rates, matches)
             self._log = open_log(options.record, overwrite=options.overwrite)
             self._recorded = simulation.graph.subscribe_all(self._log.write, matches)
 
@@ -141,7 +142,7 @@ class CommandLineFlight:
             code, problem = USER_ERROR, "The flight ended with an error"
             complain_of(error)
         finally:
-            self._wall_s = time.perf_counter() - start - self._simulation.paused_s
+            self._wall_s = time.perf_counter() - start - self._simulation.clock.paused_s
             closed = self._close_log()
         self._progress.finish(self._simulation.time_s)
         self._tell_flight(problem)
@@ -161,20 +162,20 @@ class CommandLineFlight:
             raise _StoppedError
         if options.start_paused:
             start_paused(
-                simulation, can_be_resumed=bool(options.bridges) or options.page is not None
+                simulation.clock, can_be_resumed=bool(options.bridges) or options.page is not None
             )
 
     def _stay(self) -> None:
         """Keeps the page open until Ctrl-C; steps after the scenario's end are not recorded."""
         simulation = self._simulation
-        if simulation.quitting:
+        if simulation.clock.quitting:
             return
         typer.echo("the page stays open; Ctrl-C ends it", err=True)
         try:
             with self._keys:
-                while not simulation.quitting:
+                while not simulation.clock.quitting:
                     simulation.wait_at_end(self._stop_if_pressed)
-                    simulation.run(speed=simulation.speed, on_progress=self._on_progress)
+                    simulation.run(speed=simulation.clock.speed, on_progress=self._on_progress)
         except _StoppedError:
             return
 
@@ -185,10 +186,10 @@ class CommandLineFlight:
     def _on_progress(self, progress: Any) -> None:
         self._stop_if_pressed()
         for key in self._keys.pressed():
-            steer(self._simulation, key, progress.real_time_factor)
+            steer(self._simulation.clock, key, progress.real_time_factor)
         self._before_s = progress.before_s
         self._progress.update(
-            progress.time_s, progress.real_time_factor, paused=self._simulation.paused
+            progress.time_s, progress.real_time_factor, paused=self._simulation.clock.paused
         )
 
     def _close_log(self) -> bool:
@@ -215,7 +216,7 @@ class CommandLineFlight:
         try:
             flight = self._collector.finish(
                 self._wall_s,
-                digest=self._simulation.digest() if self._options.digest else "",
+                digest=self._simulation.diagnostics.digest() if self._options.digest else "",
                 interrupted=interrupted,
                 log_path=self._options.record,
                 log_messages=self._log.messages if self._log else 0,
@@ -232,17 +233,19 @@ class CommandLineFlight:
     def _tell_flight(self, problem: str) -> None:
         simulated = self._simulation.time_s
         factor = (self._before_s + simulated) / self._wall_s if self._wall_s > 0.0 else 0.0
-        count = len(self._simulation.uav_names)
+        count = len(self._simulation.uavs)
         head = f"{problem}: flew" if problem else "Flew"
         since = " since the last reset" if self._before_s else ""
         typer.echo(
             f"{head} {simulated:.1f} s{since} with {counted(count, 'UAV')} "
             f"in {self._wall_s:.1f} s ({factor:.1f} x real time){self._reason(problem)}"
         )
-        city = self._simulation.city
+        city = self._simulation.world.city
         if city is not None:
             typer.echo(f"  {city.report.summary()}")
-        events = [e for e in self._simulation.events if str(e.kind) in {"impact", "collision"}]
+        events = [
+            e for e in self._simulation.diagnostics.events if str(e.kind) in {"impact", "collision"}
+        ]
         for event in events[:_CONTACTS_SHOWN]:
             typer.echo(f"  {event.describe()}")
         if len(events) > _CONTACTS_SHOWN:
@@ -259,7 +262,7 @@ class CommandLineFlight:
 
     def _all_down(self) -> bool:
         simulation = self._simulation
-        return simulation.scenario.ends_when == "all_landed" and not simulation.quitting
+        return simulation.scenario.ends_when == "all_landed" and not simulation.clock.quitting
 
     def _tell_files(self, report: Path | None) -> None:
         if self._log is not None:
@@ -269,5 +272,5 @@ class CommandLineFlight:
         if report is not None:
             typer.echo(f"report  {report}")
         if self._options.digest:
-            typer.echo(f"digest  {self._simulation.digest()}")
-            typer.echo(f"topics  {self._simulation.digest(by_topic=True)}")
+            typer.echo(f"digest  {self._simulation.diagnostics.digest()}")
+            typer.echo(f"topics  {self._simulation.diagnostics.digest(by_topic=True)}")

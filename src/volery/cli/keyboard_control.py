@@ -3,28 +3,31 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from volery.runtime.facets.clock import RunClock
 
 SLOWEST, FASTEST = 2.0**-10, 2.0**16
 
 
-def steer(simulation: Any, key: str, real_time_factor: float) -> None:
+def steer(clock: RunClock, key: str, real_time_factor: float) -> None:
     """Executes the command of `key`; ignores other keys.
 
     real_time_factor: the measured factor of the run, from which the first - starts at full speed.
     """
     if key == " ":
-        (simulation.resume if simulation.paused else simulation.pause)()
+        (clock.resume if clock.paused else clock.pause)()
     elif key in ".s":
-        (simulation.single_step if simulation.paused else simulation.pause)()
+        (clock.single_step if clock.paused else clock.pause)()
     elif key in "+=":
-        if simulation.speed is not None:
-            simulation.set_speed(min(simulation.speed * 2.0, FASTEST))
+        if clock.speed is not None:
+            clock.set_speed(min(clock.speed * 2.0, FASTEST))
     elif key == "-":
-        speed = _power_of_two(real_time_factor) if simulation.speed is None else simulation.speed
-        simulation.set_speed(max(speed / 2.0, SLOWEST))
+        speed = _power_of_two(real_time_factor) if clock.speed is None else clock.speed
+        clock.set_speed(max(speed / 2.0, SLOWEST))
     elif key == "m":
-        simulation.set_speed(None)
+        clock.set_speed(None)
 
 
 def _power_of_two(factor: float) -> float:

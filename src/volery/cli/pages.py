@@ -7,7 +7,7 @@ import socket
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from volery.scenario.catalog import ScenarioCatalog
     from volery.scenario.schema import Scenario
     from volery.server.page_server import PageServer
+    from volery.server.server_state import World
     from volery.server.settings import PageSettings
 
 AT_THE_USUAL_PLACE = ""
@@ -36,12 +37,14 @@ class Page:
         if self._server is not None:
             self._server.building(scenario.name, scenario.description, message)
 
-    def showing(self, world: Any, message: str = "") -> AbstractContextManager[None]:
-        """Gives clients access to a simulation or an idle server while the context lasts."""
+    def showing(
+        self, world: World, message: str = "", log: str = ""
+    ) -> AbstractContextManager[None]:
+        """Gives clients access to a world while the context lasts; see `PageServer.showing`."""
         if self._server is None:
             return nullcontext()
-        world.use_low_latency()
-        return self._server.showing(world, message)
+        world.gateway.use_low_latency()
+        return self._server.showing(world, message, log)
 
 
 @contextmanager

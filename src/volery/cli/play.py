@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -14,6 +14,9 @@ from volery.cli.interrupt import Interrupts, stopped_how
 from volery.cli.keyboard_control import steer
 from volery.cli.keys import Keys
 from volery.core.plurals import counted
+
+if TYPE_CHECKING:
+    from volery.runtime.replay.log_player import LogPlayer
 
 _BRIDGES = ("rosbridge",)
 """Bridges that open by default."""
@@ -44,7 +47,7 @@ def play(
         interrupts.be_gentle()
         _introduce(player)
         with (
-            open_bridges(player, replace(options, bridges=options.bridges or _BRIDGES)),
+            open_bridges(player.gateway, replace(options, bridges=options.bridges or _BRIDGES)),
             Keys() as keys,
         ):
 
@@ -63,7 +66,7 @@ def play(
                 typer.echo(f"Stopped {stopped_how()} at {player.time_s:.3f} s", err=True)
 
 
-def _introduce(player: Any) -> None:
+def _introduce(player: LogPlayer) -> None:
     told = player.describe()
     what = f", a flight of '{told['scenario']}'" if told["scenario"] else ""
     span = f"{player.start_s:.3f} to {player.end_s:.3f} s"

@@ -91,12 +91,13 @@ def _build_and_fly(options: RunOptions, interrupts: Interrupts, page: Page) -> t
         simulation = Simulation(
             scenario, threads=threads, recordings=options.recordings, on_load=change.ask
         )
-        change.quit = simulation.quit
+        change.quit = simulation.clock.quit
         if flight is not None:
             simulation.replay_commands(flight)
         try:
             interrupts.be_gentle()
-            with spared_objects(), open_bridges(simulation, options), page.showing(simulation):
+            bridges = open_bridges(simulation.gateway, options, simulation.uavs)
+            with spared_objects(), bridges, page.showing(simulation):
                 code = CommandLineFlight(simulation, options, progress, interrupts).fly()
         finally:
             simulation.close()
@@ -113,7 +114,7 @@ def _wait_for_world(options: RunOptions, interrupts: Interrupts, page: Page) -> 
     change = _Change(options)
     idle = IdleServer(change.ask)
     typer.echo("no world is loaded; load one with /load_world; Ctrl-C exits", err=True)
-    with open_bridges(idle, options), page.showing(idle):
+    with open_bridges(idle.gateway, options), page.showing(idle):
         while not (change.asked or idle.quitting or interrupts.pressed):
             idle.wait(_GLANCE_S)
         idle.wait(_FAREWELL_S)

@@ -25,6 +25,7 @@ from volery.scenario import changes
 from volery.scenario.changes import LogRequest
 
 if TYPE_CHECKING:
+    from volery.runtime.simulation import Simulation
     from volery.scenario.catalog import ScenarioCatalog
     from volery.scenario.changes import WorldRequest
     from volery.scenario.schema import Scenario
@@ -163,14 +164,15 @@ class _Host:
             on_load=self._wish.ask,
             shelf=self._wish.shelf,
         ) as simulation:
-            self._present, self._wish.quit = scenario, simulation.quit
+            self._present, self._wish.quit = scenario, simulation.clock.quit
             self._interrupts.be_gentle()
             shown = page.showing(simulation, self._problem)
-            with spared_objects(), open_bridges(simulation, first), shown:
+            bridges = open_bridges(simulation.gateway, first, simulation.uavs)
+            with spared_objects(), bridges, shown:
                 self._problem = ""
                 typer.echo(f"flying  {scenario.name}", err=True)
                 self._stay(simulation)
-            self._quits = simulation.quitting and not self._wish.asked
+            self._quits = simulation.clock.quitting and not self._wish.asked
 
     def _play(self, log: Path) -> None:
         """Opens a log and plays it."""
@@ -185,8 +187,8 @@ class _Host:
             self._wish.quit = player.quit
             self._interrupts.be_gentle()
             first, page = self._options.first, self._page
-            shown = page.showing(player, self._problem)
-            with spared_objects(), open_bridges(player, first), shown:
+            shown = page.showing(player, self._problem, player.name)
+            with spared_objects(), open_bridges(player.gateway, first), shown:
                 self._problem = ""
                 typer.echo(f"playing {log.name}", err=True)
                 while not (self._wish.asked or player.quitting or self._interrupts.pressed):
@@ -199,13 +201,13 @@ class _Host:
         self._wish.want(self._present)
         self._wish.quit()
 
-    def _stay(self, simulation: Any) -> None:
+    def _stay(self, simulation: Simulation) -> None:
         """Runs the scenario; at its end stays paused until a reset or another request."""
         speed = self._wish.speed
         try:
-            while not simulation.quitting:
+            while not simulation.clock.quitting:
                 simulation.run(speed=speed, on_progress=self._look)
-                speed = simulation.speed
+                speed = simulation.clock.speed
                 simulation.wait_at_end(self._look)
         except _StoppedError:
             return
@@ -220,7 +222,8 @@ class _Host:
         from volery.runtime.idle_server import IdleServer
 
         idle = IdleServer(self._wish.ask, self._wish.shelf)
-        with open_bridges(idle, self._options.first), self._page.showing(idle, self._problem):
+        bridges = open_bridges(idle.gateway, self._options.first)
+        with bridges, self._page.showing(idle, self._problem):
             typer.echo("no world is loaded", err=True)
             self._problem = ""
             while not (self._wish.asked or idle.quitting or self._interrupts.pressed):

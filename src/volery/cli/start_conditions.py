@@ -5,18 +5,22 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import typer
 
 from volery.core.errors import CommandError
+
+if TYPE_CHECKING:
+    from volery.runtime.facets.clock import RunClock
+    from volery.runtime.simulation import Simulation
 
 DEFAULT_TIMEOUT_S = 60.0
 _PERIOD_S = 0.02
 
 
 def wait_for_clients(
-    simulation: Any,
+    simulation: Simulation,
     names: Sequence[str],
     timeout_s: float,
     is_stopped: Callable[[], bool],
@@ -37,7 +41,7 @@ def wait_for_clients(
         if is_stopped():
             return False
         if time.monotonic() >= until:
-            present = ", ".join(sorted(simulation.client_names)) or "none"
+            present = ", ".join(sorted(simulation.diagnostics.client_names)) or "none"
             raise CommandError(
                 f"--wait-for: {', '.join(missing)} not connected within {timeout_s:g} s; "
                 f"connected: {present}"
@@ -51,7 +55,7 @@ def wait_for_clients(
     return True
 
 
-def start_paused(simulation: Any, *, can_be_resumed: bool) -> None:
+def start_paused(clock: RunClock, *, can_be_resumed: bool) -> None:
     """Pauses the clock before the first step.
 
     Raises `CommandError` if no client could resume the run.
@@ -61,7 +65,7 @@ def start_paused(simulation: Any, *, can_be_resumed: bool) -> None:
             "--start-paused: nothing can resume this run; open the page (--page) or a bridge "
             "(--bridge rosbridge), or start it at a terminal"
         )
-    simulation.pause()
+    clock.pause()
     typer.echo(
         "paused before the first step: space at this terminal, Play on the page or "
         "/set_simulation_state resumes the run",
@@ -69,7 +73,7 @@ def start_paused(simulation: Any, *, can_be_resumed: bool) -> None:
     )
 
 
-def _missing(simulation: Any, names: Sequence[str]) -> list[str]:
-    present = simulation.client_names
+def _missing(simulation: Simulation, names: Sequence[str]) -> list[str]:
+    present = simulation.diagnostics.client_names
     words = {word for name in present for word in (name, *name.split(), name.rpartition("/")[2])}
     return [name for name in names if name not in words]

@@ -86,14 +86,14 @@ class Engine:
         crash_on_contact: bool,
         num_envs: int = 1,
         estimation: Estimation | None = None,
-        on_post: Callable[[], None] | None = None,
+        inbox: CommandQueue | None = None,
     ) -> None:
         self.fleet = fleet
         self.scene = scene
         self.ground = terrain
         self.terrain = terrain.grid
         self.sink = sink
-        self.inbox = CommandQueue(on_post=on_post)
+        self.inbox = inbox or CommandQueue()
         self.while_waiting: Callable[[], bool] = lambda: True
         """Called repeatedly while waiting for a lock-step partner; returns whether the run
         continues."""

@@ -6,7 +6,7 @@ are. A partner that exceeds its timeout ends the run with an error or, if so agr
 partner cannot be restored to an earlier state; a partner that restarts by itself allows the
 simulation to be reset.
 
-    partner = simulation.add_partner("control_state", period_s=0.02, timeout_s=5.0)
+    partner = simulation.clock.add_partner("control_state", period_s=0.02, timeout_s=5.0)
 
     # in the partner's thread
     while (time_ns := partner.wait()) is not None:

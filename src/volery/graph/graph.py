@@ -17,180 +17,28 @@ import logging
 import math
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, MutableSequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from volery.core.errors import GraphError, NodeError, VoleryError
+from volery.core.errors import GraphError, VoleryError
 from volery.graph.actions import Actions
 from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import Published, message_type, type_name
 from volery.graph.parameters import Parameters
 from volery.graph.qos import DEFAULT_QOS, QoSProfile
+from volery.graph.response_chains import ResponseChains
 from volery.graph.service_reply import ServiceReply
+from volery.graph.topics import Callback, Publisher, Subscription, Topic, TopicInfo
 
-Callback = Callable[[Published], None]
 AsyncHandler = Callable[[Any, ServiceReply], None]
 """Handles a request and responds through the reply, at once or later."""
 
 _log = logging.getLogger(__name__)
 
-MAX_ANSWERS_IN_A_ROW = 10_000
-"""Maximum length of a chain of messages at one simulated instant, each published in response to the
-previous one; a longer chain means that nodes respond to each other, or to themselves, endlessly."""
-_MAX_ANSWERS_AT_ONCE = 1_000_000
-"""Maximum number of responses on one topic at one simulated instant, where several nodes respond to
-each message."""
-_ANSWERS_NAMED = 50
-
 MOST_UNUSED = 1000
 """Maximum number of topics stored without publisher or subscriber."""
-
-
-@dataclass(frozen=True)
-class TopicInfo:
-    """Describes a topic."""
-
-    name: str
-    msgtype: str
-    publishers: int
-    subscribers: int
-    messages: int
-    latched: bool
-    """Whether later subscribers receive a publisher's last message."""
-
-
-class _Topic:
-    def __init__(self, name: str, msgtype: str) -> None:
-        self.name = name
-        self.msgtype = msgtype
-        self.callbacks: list[Callback] = []
-        self.external: list[Callback] = []  # the callbacks that other threads have attached
-        self.num_attached = 0  # number of external subscriptions so far
-        self.publishers = 0
-        self.messages = 0
-        self.answer_ns = -1  # time of the last message published in response to another one ...
-        self.answers = 0  # ... and the number of such messages at that instant
-        self.latched = False
-        self.last_messages: dict[
-            Publisher, Published
-        ] = {}  # last message of each latched publisher
-
-    @property
-    def used(self) -> bool:
-        """Whether the topic has publishers or subscribers."""
-        return bool(self.publishers or self.callbacks)
-
-
-class Publisher:
-    """Publishes messages of one type on one topic."""
-
-    def __init__(self, graph: Graph, topic: _Topic, *, latched: bool = False) -> None:
-        self._graph = graph
-        self._topic = topic
-        self.latched = latched
-        self.owner = ""
-        """Full name of the publisher's node; empty: none."""
-        self.lasting = False
-        """Whether snapshots exclude its messages.
-
-        A queued message stays queued when another state is restored, and is delivered once.
-        """
-        self.cancelled = False
-        """Whether the publisher has been cancelled."""
-
-    @property
-    def msgtype(self) -> str:
-        """Type of the messages."""
-        return self._topic.msgtype
-
-    @property
-    def topic(self) -> str:
-        """Name of the topic."""
-        return self._topic.name
-
-    @property
-    def has_subscribers(self) -> bool:
-        """Whether a message would be delivered or latched; otherwise it need not be built."""
-        return bool(
-            self.latched or self._topic.callbacks or self._graph.is_recorded(self._topic.name)
-        )
-
-    def publish(self, message: Any) -> None:
-        """Queues a message for delivery; has no effect after `cancel`."""
-        if not self.cancelled:
-            self._graph.enqueue(self, self._topic, message)
-
-    def check(self, message: Any) -> None:
-        """Raises `GraphError` if the message is not of the topic's type."""
-        name = getattr(message, "__msgtype__", None)
-        if name != self.msgtype:
-            raise GraphError(f"topic '{self.topic}' carries {self.msgtype}, not {name}")
-
-    def publish_posted(self, message: Any) -> None:
-        """Queues a message published before `cancel` that arrives later, even after `cancel`."""
-        self._graph.enqueue(self, self._topic, message)
-
-    @property
-    def subscriptions(self) -> int:
-        """Number of subscribers to this topic by name."""
-        return len(self._topic.callbacks)
-
-    @property
-    def has_internal_subscribers(self) -> bool:
-        """Whether a node of the simulation subscribes to this topic by name."""
-        return len(self._topic.callbacks) > len(self._topic.external)
-
-    @property
-    def has_external_subscribers(self) -> bool:
-        """Whether an external client receives the topic."""
-        return bool(self._topic.external)
-
-    @property
-    def num_external_subscriptions(self) -> int:
-        """Number of external subscriptions so far; a greater number means a new subscriber."""
-        return self._topic.num_attached
-
-    def publish_external(self, message: Any) -> None:
-        """Passes a message to the external clients, at once; the simulation does not receive it.
-
-        This is for messages that depend on wall time or on the connected clients: nodes, digests
-        and recorders must not depend on them.
-        """
-        if not self.cancelled:
-            self._graph.publish_external(self, self._topic, message)
-
-    @property
-    def is_latching(self) -> bool:
-        """Whether later subscribers receive its last message."""
-        return self.latched and not self.cancelled
-
-    def cancel(self) -> None:
-        """Stops publishing and discards the latched message."""
-        if not self.cancelled:
-            self.cancelled = True
-            self._graph.remove_publisher(self, self._topic)
-
-
-class Subscription:
-    """A running subscription; `cancel` ends it and calls `left`."""
-
-    def __init__(
-        self,
-        callbacks: MutableSequence[Any],
-        callback: Callback,
-        left: Callable[[], None] = lambda: None,
-    ) -> None:
-        self._callbacks = callbacks
-        self._callback = callback
-        self._left = left
-
-    def cancel(self) -> None:
-        """Stops receiving."""
-        if self._callback in self._callbacks:
-            self._callbacks.remove(self._callback)
-            self._left()
 
 
 class _Listener:
@@ -211,7 +59,7 @@ def _match_all(_topic: str) -> bool:
 class _QueuedMessage(NamedTuple):
     """A queued message; `only` is the late subscriber that a latched message is for."""
 
-    topic: _Topic
+    topic: Topic
     published: Published
     sender: Publisher
     only: Callback | None = None
@@ -244,8 +92,8 @@ class Graph:
     ) -> None:
         self._now_ns = now_ns
         self._post = post
-        self._topics: dict[str, _Topic] = {}
-        self._unused: dict[str, _Topic] = {}
+        self._topics: dict[str, Topic] = {}
+        self._unused: dict[str, Topic] = {}
         self._services: dict[str, _Service] = {}
         self.actions = Actions()
         """Action servers."""
@@ -254,7 +102,7 @@ class Graph:
         self._to_all: list[_Listener] = []
         self._queue: deque[_QueuedMessage] = deque()
         self._answers = 0  # length of the chain that a message published now extends
-        self._endless: set[tuple[str, str]] = set()
+        self._chains = ResponseChains()
         self.acting_client = ""
         """External client whose command is being executed; empty: none. A subscriber that fails on
         a message caused by a client is logged, and does not end the run."""
@@ -294,7 +142,7 @@ class Graph:
             found.latched = found.latched or latched
         return Publisher(self, found, latched=latched)
 
-    def remove_publisher(self, publisher: Publisher, topic: _Topic) -> None:
+    def remove_publisher(self, publisher: Publisher, topic: Topic) -> None:
         """Removes a publisher; used by `Publisher`."""
         with self._members:
             topic.publishers -= 1
@@ -383,43 +231,18 @@ class Graph:
         found = self._topics.get(topic)
         return None if found is None else found.msgtype
 
-    def enqueue(self, sender: Publisher, topic: _Topic, message: Any) -> None:
+    def enqueue(self, sender: Publisher, topic: Topic, message: Any) -> None:
         """Queues a message; used by `Publisher`."""
         sender.check(message)
         topic.messages += 1
         if sender.has_subscribers:
             published = Published(topic.name, topic.msgtype, self._now_ns(), message)
             client, answers = self.acting_client, self._answers
-            if answers and self._is_endless(sender, topic, published, answers):
+            if answers and self._chains.is_endless(sender, topic, published, answers, client):
                 return
             self._queue.append(_QueuedMessage(topic, published, sender, None, client, answers))
 
-    def _is_endless(
-        self, sender: Publisher, topic: _Topic, published: Published, answers: int
-    ) -> bool:
-        """Returns whether nodes respond endlessly; raises `NodeError` unless a client began it."""
-        topic.answers = topic.answers + 1 if topic.answer_ns == published.time_ns else 1
-        topic.answer_ns = published.time_ns
-        if answers > MAX_ANSWERS_IN_A_ROW - _ANSWERS_NAMED:
-            self._endless.add((published.topic, sender.owner))
-        if answers <= MAX_ANSWERS_IN_A_ROW and topic.answers <= _MAX_ANSWERS_AT_ONCE:
-            return False
-        named = {*self._endless, (published.topic, sender.owner)}
-        self._endless.clear()
-        topics = ", ".join(sorted({f"'{name}'" for name, _ in named}))
-        nodes = ", ".join(sorted({owner for _, owner in named if owner})) or "callbacks"
-        reason = (
-            f"messages trigger each other endlessly at {published.time_ns / 1e9:.3f} s: "
-            f"on {topics}, published by {nodes}; publish later, from a timer, or not at all"
-        )
-        if not self.acting_client:
-            raise NodeError(reason)
-        _log.warning(
-            "%s (started by %s): the remaining messages are dropped", reason, self.acting_client
-        )
-        return True
-
-    def publish_external(self, sender: Publisher, topic: _Topic, message: Any) -> None:
+    def publish_external(self, sender: Publisher, topic: Topic, message: Any) -> None:
         """Passes a message to external clients only; used by `Publisher`."""
         sender.check(message)
         topic.messages += 1
@@ -537,7 +360,7 @@ class Graph:
         finally:
             self._queue.extend(reversed(after))
 
-    def _drop_unused(self, topic: _Topic) -> None:
+    def _drop_unused(self, topic: Topic) -> None:
         """Removes the oldest unused topic when there are more than MOST_UNUSED."""
         with self._members:
             if not topic.used:
@@ -547,7 +370,7 @@ class Graph:
                 if not oldest.used:
                     del self._topics[oldest.name]
 
-    def _send_latched(self, topics: list[_Topic], callback: Callback) -> None:
+    def _send_latched(self, topics: list[Topic], callback: Callback) -> None:
         """Queues latched messages before all others, which are newer."""
         now_ns = self._now_ns()
         queued = [
@@ -557,14 +380,14 @@ class Graph:
         ]
         self._queue.extendleft(reversed(queued))
 
-    def _known_topic(self, name: str, msgtype: str | type[Any] | None) -> _Topic:
+    def _known_topic(self, name: str, msgtype: str | type[Any] | None) -> Topic:
         if msgtype is not None:
             return self._topic(name, msgtype)
         if name not in self._topics:
             raise GraphError(f"no topic '{name}'; give a type to subscribe before it exists")
         return self._topics[name]
 
-    def _topic(self, name: str, msgtype: str | type[Any]) -> _Topic:
+    def _topic(self, name: str, msgtype: str | type[Any]) -> Topic:
         kind = msgtype if isinstance(msgtype, str) else type_name(msgtype)
         _check_name(name)
         topic = self._topics.get(name)
@@ -573,7 +396,7 @@ class Graph:
                 message_type(kind)
             except KeyError:
                 raise GraphError(f"topic '{name}': unknown message type '{kind}'") from None
-            topic = self._topics[name] = _Topic(name, kind)
+            topic = self._topics[name] = Topic(name, kind)
         if topic.msgtype != kind:
             raise GraphError(f"topic '{name}' carries {topic.msgtype}, not {kind}")
         return topic

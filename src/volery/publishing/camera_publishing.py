@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from volery.graph.graph import Graph, Publisher
+from volery.graph.graph import Graph
 from volery.graph.messages import CameraInfo, CompressedImage, Image, PointCloud2
+from volery.graph.topics import Publisher
 from volery.publishing import camera_messages as messages
 from volery.publishing.camera_messages import Camera
 from volery.publishing.image_sizes import bytes_per_image

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from volery.core import rotations
 from volery.engine.events import Event
-from volery.graph.graph import Graph, Publisher
+from volery.graph.graph import Graph
 from volery.graph.messages import (
     BatteryState,
     Clock,
@@ -40,6 +40,7 @@ from volery.graph.messages import (
     single,
     time_from_ns,
 )
+from volery.graph.topics import Publisher
 from volery.publishing.camera_messages import OPTICAL_ATTITUDE, Camera, optical_frame
 from volery.publishing.camera_publishing import CameraPublisher
 from volery.publishing.lidar_publishing import LidarPublisher, laser_frame

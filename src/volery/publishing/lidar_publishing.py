@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.graph.graph import Graph, Publisher
+from volery.graph.graph import Graph
 from volery.graph.messages import (
     LaserEcho,
     LaserScan,
@@ -22,6 +22,7 @@ from volery.graph.messages import (
     header,
     single,
 )
+from volery.graph.topics import Publisher
 from volery.publishing.lidar_returns import ReturnsPublisher
 from volery.sensors.lidar_model import LidarModel
 from volery.sensors.mount import Mount

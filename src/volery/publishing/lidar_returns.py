@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core import rotations
-from volery.graph.graph import Graph, Publisher
+from volery.graph.graph import Graph
 from volery.graph.messages import PointCloud2, PointField, header
+from volery.graph.topics import Publisher
 from volery.sensors.mount import Mount, nodding_angle_at
 from volery.sensors.samples import LidarScans, SensorId
 from volery.sensors.scan_patterns import PlanarScan, ScanPattern

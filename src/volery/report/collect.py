@@ -30,8 +30,9 @@ from volery.report.structures import seen_from_above
 from volery.report.voxels import VoxelSet
 
 if TYPE_CHECKING:
-    from volery.graph.graph import Subscription
     from volery.graph.messages import Published
+    from volery.graph.topics import Subscription
+    from volery.runtime.simulation import Simulation
 
 Array = NDArray[np.float64]
 
@@ -63,20 +64,19 @@ class _Uav:
 class FlightCollector:
     """Subscribes to a simulation; `finish` returns the flight as data.
 
-    `simulation` is a `volery.Simulation`: the collector reads its graph, mounts, terrain, forest,
-    scene, events and times.
+    The collector reads the simulation's graph, mounts, terrain, forest, scene, events and times.
     """
 
-    def __init__(self, simulation: Any) -> None:
+    def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
         self._voxels = VoxelSet(VOXEL_M)
         self._scans = 0
-        self._uavs = {name: _Uav() for name in simulation.uav_names}
+        self._uavs = {name: _Uav() for name in simulation.uavs}
         self._subscriptions: list[Subscription] = []
         for name, uav in self._uavs.items():
             self._subscribe(f"/{name}/ground_truth/odom", self._track(uav), "nav_msgs/msg/Odometry")
-        mounts: Mapping[str, Any] = simulation.mounts
-        clouds: Mapping[str, Any] = simulation.cloud_mounts
+        mounts: Mapping[str, Any] = simulation.vehicles.lidar_mounts
+        clouds: Mapping[str, Any] = simulation.vehicles.point_cloud_mounts
         weights = {t: NODDING_WEIGHT if m.nods else 1.0 for t, m in mounts.items()}
         for topic, mount in mounts.items():
             uav = self._uavs[topic.split("/")[1]]
@@ -145,7 +145,7 @@ class FlightCollector:
             subscription.cancel()
         simulation = self._simulation
         scenario = simulation.scenario
-        grid = simulation.terrain.grid
+        grid = simulation.world.terrain.grid
         return FlightData(
             scenario=scenario.name,
             description=scenario.description,
@@ -155,11 +155,11 @@ class FlightCollector:
             wall_s=wall_s,
             uavs=tuple(self._finished(name, uav) for name, uav in self._uavs.items()),
             ground=Ground(np.asarray(grid.heights), (grid.origin_x, grid.origin_y), grid.spacing),
-            trees=trees_of(simulation.forest),
-            structures=seen_from_above(solid.mesh for solid in simulation.scene.solids),
+            trees=trees_of(simulation.world.forest),
+            structures=seen_from_above(solid.mesh for solid in simulation.world.scene.solids),
             lidar=self._lidar_map(),
-            events=tuple(_event(event) for event in simulation.events),
-            stage_seconds=dict(simulation.stage_seconds),
+            events=tuple(_event(event) for event in simulation.diagnostics.events),
+            stage_seconds=dict(simulation.diagnostics.stage_seconds),
             clearance_reach_m=CLEARANCE_REACH_M,
             digest=digest,
             interrupted=interrupted,
@@ -178,20 +178,20 @@ class FlightCollector:
             position_map=position,
             speed_m_s=rows[:, 3],
             height_m=position[:, 2]
-            - self._simulation.terrain.height(position[:, 0], position[:, 1]),
+            - self._simulation.world.terrain.height(position[:, 0], position[:, 1]),
             clearance_m=self._clearance(position),
         )
 
     def _ground(self, points: NDArray[np.floating]) -> Array:
         """Returns the height of the ground below points (n, 3)."""
         x, y = points[:, 0].astype(np.float64), points[:, 1].astype(np.float64)
-        return np.asarray(self._simulation.terrain.height(x, y), dtype=np.float64)
+        return np.asarray(self._simulation.world.terrain.height(x, y), dtype=np.float64)
 
     def _clearance(self, points: Array) -> Array:
         found = np.full(len(points), np.inf)
         for start in range(0, len(points), _CLEARANCE_BATCH):
             part = slice(start, start + _CLEARANCE_BATCH)
-            result = self._simulation.scene.clearance(
+            result = self._simulation.world.scene.clearance(
                 points[part], CLEARANCE_REACH_M, include_terrain=False
             )
             found[part] = result.distance

@@ -58,8 +58,8 @@ def fly(scenario: Scenario) -> RecordedSearch:
                 lambda p, name=name: phases.update({name: p.message.phase}),  # type: ignore[misc]
             )
             told.ways[name], told.calls[name] = [], []
-        told.trees = trees_of(simulation.forest)
-        while not simulation.finished and not _have_met(phases):
+        told.trees = trees_of(simulation.world.forest)
+        while not simulation.clock.finished and not _have_met(phases):
             simulation.run(_PERIOD_S)
             for name, uav in simulation.uavs.items():
                 x, y, _ = uav.position_map

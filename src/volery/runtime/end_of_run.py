@@ -8,18 +8,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from volery.core.clock import s_from_ns
 from volery.core.errors import CommandError
+from volery.engine.engine import Engine
+from volery.engine.pacing import Pacer
 from volery.graph.session import ClientCommand
 from volery.runtime.replay.command_effects import restarts
-
-if TYPE_CHECKING:
-    from volery.engine.engine import Engine
-    from volery.engine.pacing import Pacer
-    from volery.runtime.replay.command_log import CommandLog
-    from volery.runtime.run_loop import RunLoop
+from volery.runtime.run_loop import RunLoop
 
 _PERIOD_S = 0.02
 """Wall time between two checks of client requests, s."""
@@ -28,12 +24,11 @@ _PERIOD_S = 0.02
 class EndOfRun:
     """Holds a simulation at its end; `waits` is True meanwhile."""
 
-    def __init__(self, engine: Engine, pacer: Pacer, loop: RunLoop, commands: CommandLog) -> None:
+    def __init__(self, engine: Engine, pacer: Pacer, loop: RunLoop) -> None:
         self._engine = engine
         self._pacer = pacer
         self._loop = loop
         self.waits = False
-        commands.refuse = self._refusal
 
     @property
     def notice(self) -> str:
@@ -66,6 +61,6 @@ class EndOfRun:
         """Accepts commands again after another state was restored."""
         self.waits = self.waits and self._loop.finished
 
-    def _refusal(self, command: ClientCommand) -> str:
+    def refusal(self, command: ClientCommand) -> str:
         """Returns why a client's command is refused; empty: accepted."""
         return self.notice if self.waits and not restarts(command) else ""

@@ -18,15 +18,16 @@ class GridMapManager:
 
     It reads all maps of the scenario at the start, so that a broken file fails then. A change is
     an event of kind `world`. A UAV inside a new block touches it with the next step.
+
+    on_blocks: called after the blocks changed, also after a restore; it must change nothing.
     """
 
-    def __init__(self, scenario: Scenario, engine: Engine) -> None:
+    def __init__(self, scenario: Scenario, engine: Engine, on_blocks: Callable[[], object]) -> None:
         world = scenario.world.grid_map
         self._engine = engine
+        self._on_blocks = on_blocks
         self.tell: Callable[[GridMap], None] = lambda _grid: None
         """Callback with each map that is shown; it must change nothing."""
-        self.on_blocks: Callable[[], object] = lambda: None
-        """Callback after the blocks changed, also after a restore; it must change nothing."""
         entries = () if world is None else world.maps
         self._maps = {entry.called: read_grid_map(scenario, entry) for entry in entries}
         starting = None if world is None or world.starting is None else self._maps[world.starting]
@@ -102,4 +103,4 @@ class GridMapManager:
     def _stand(self, grid: GridMap | None, blocks: tuple[Solid, ...]) -> None:
         self._engine.replace_solids((*self._others, *blocks))
         self._current, self._blocks = grid, blocks
-        self.on_blocks()
+        self._on_blocks()

@@ -23,6 +23,9 @@ class IdleServer:
     `on_load` was called or it is `quitting`.
     """
 
+    scenario = geometry = operators = None
+    waits_at_end = False
+
     def __init__(self, on_load: OnLoad, shelf: ScenarioCatalog | None = None) -> None:
         self.quitting = False
         self._inbox = CommandQueue()
@@ -33,9 +36,6 @@ class IdleServer:
         get, put = f"{_SRV}/GetSimulationState", f"{_SRV}/SetSimulationState"
         offer_result(self.graph, "/get_simulation_state", get, self._get_state)
         offer_result(self.graph, "/set_simulation_state", put, self._set_state)
-
-    def use_low_latency(self) -> None:
-        """As of `Simulation`; here nothing else is done anyway."""
 
     def wait(self, timeout_s: float) -> None:
         """Serve clients for up to so long, or until the next of them came."""

@@ -15,9 +15,8 @@ from volery.runtime.monitoring.progress import Progress, ProgressPublisher
 class RunLoop:
     """Advances `engine` at the rate of `pacer` until `duration_s`, or until `has_ended()`.
 
-    `has_ended` must depend on the simulated world alone. `look` is called between two pieces and
-    repeatedly while the run is held; it must change nothing. With `past_end` or `replays` set,
-    the duration does not end the run.
+    `has_ended` must depend on the simulated world alone. With `past_end` or `replays` set, the
+    duration does not end the run.
     """
 
     def __init__(
@@ -27,7 +26,6 @@ class RunLoop:
         self._pacer = pacer
         self._duration_s = duration_s
         self._has_ended = has_ended
-        self.look: Callable[[], None] = _nothing
         self.owed_ns = 0
         """Simulated time, ns, requested from runs but shorter than a physics step, still due."""
         self.quitting = False
@@ -53,8 +51,12 @@ class RunLoop:
         seconds: float | None,
         speed: float | None,
         on_progress: Callable[[Progress], None] | None,
+        look: Callable[[], None],
     ) -> None:
-        """Advances by `seconds`; None advances to the end."""
+        """Advances by `seconds`; None advances to the end.
+
+        look: called between two pieces and repeatedly while the run is held; changes nothing.
+        """
         engine, pacer = self._engine, self._pacer
         start_ns = engine.time_ns
         if seconds is None:
@@ -75,12 +77,12 @@ class RunLoop:
         engine.while_waiting = while_waiting
         while not over:
             self._advance(find_end(), until)
-            self.look()
+            look()
             over = engine.fleet.step >= find_end() or (until is not None and until())
             over = over or self.quitting
             while self._is_held() and not (over and pacer.paused):
                 engine.process_commands(pacer.idle_s())
-                self.look()
+                look()
                 teller.tell(s_from_ns(engine.time_ns) - s_from_ns(start_ns))
                 if self.quitting:
                     over = True
@@ -129,7 +131,3 @@ class RunLoop:
     def _whole_steps(self, seconds: float) -> int:
         steps, self.owed_ns = divmod(self.owed_ns + ns_from_s(seconds), self._engine.dt_ns)
         return steps
-
-
-def _nothing() -> None:
-    """Does nothing."""

@@ -67,8 +67,8 @@ def draw(name: str) -> bytes:
     with Simulation(_with_photographer(load_scenario(name), view)) as simulation:
         simulation.run(view.at_s)
         eye = simulation.uavs["uav1"].position_map + view.eye_m
-        photographer = simulation.uav_names[-1]
-        simulation.set_uav_pose(photographer, eye, (0.0, 0.0, 0.0, 1.0))
+        photographer = simulation.vehicles.names[-1]
+        simulation.vehicles.set_pose(photographer, eye, (0.0, 0.0, 0.0, 1.0))
         taken: list[Published] = []
         simulation.graph.subscribe(f"/{photographer}/card/image_raw", taken.append)
         simulation.run(_EXPOSURE_S)

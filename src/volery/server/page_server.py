@@ -26,7 +26,6 @@ from volery.core.network_access import LOOPBACK
 from volery.core.pending_connections import look_at_http
 from volery.core.rare_log import RepeatFilter
 from volery.scenario.catalog import ScenarioCatalog
-from volery.scenario.schema import Scenario
 from volery.server.app import make_app
 from volery.server.auth import check_rights
 from volery.server.http_protocol import HEAD_TIMEOUT_S, http_protocol
@@ -118,14 +117,15 @@ class PageServer:
         )
 
     @contextmanager
-    def showing(self, world: World, message: str = "") -> Iterator[None]:
+    def showing(self, world: World, message: str = "", log: str = "") -> Iterator[None]:
         """Connects clients to a world, and disconnects them at the end.
 
-        message: an earlier error, such as that another world could not be built.
+        message: an earlier error, such as that another world could not be built. log: name of the
+        log that is played.
         """
-        scenario: Scenario | None = getattr(world, "scenario", None)
-        name: str | None = getattr(world, "name", None) if scenario is None else scenario.name
-        if name is None:
+        scenario = world.scenario
+        name = log if scenario is None else scenario.name
+        if not name:
             told = ServerSituation(
                 ServerActivity.FAILED if message else ServerActivity.NO_WORLD, message=message
             )

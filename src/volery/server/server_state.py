@@ -18,10 +18,8 @@ from volery.bridges.rosbridge.protocol import ServerContext
 from volery.bridges.rosbridge.rosapi import RosApi
 from volery.bridges.rosbridge.tf_republisher import TfRepublisher
 from volery.bridges.rosbridge.websocket_session import SERVICE_RESTART, WebSocketSession
-from volery.graph.graph import Graph
 from volery.graph.session import Gateway
 from volery.runtime.build.geometry import Geometry
-from volery.runtime.end_of_run import EndOfRun
 from volery.runtime.vehicles.control_authority import ControlAuthority
 from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.schema import Scenario
@@ -55,31 +53,41 @@ class ServerSituation:
 
 
 class World(Protocol):
-    """A world that clients can join: a simulation, an idle server, a log.
+    """A world that clients can join: a simulation, an idle server, a log."""
 
-    If it has a `scenario`, `geometry` and `operators`, like a `Simulation`, the server serves them
-    as well. A log of unknown origin has a `name` instead of a scenario.
-    """
+    @property
+    def gateway(self) -> Gateway:
+        """Joins clients to the graph."""
 
-    graph: Graph
-    gateway: Gateway
+    @property
+    def scenario(self) -> Scenario | None:
+        """Scenario; None: no world, or a log of unknown origin."""
 
-    def use_low_latency(self) -> None:
-        """Reduces the latency of responses to clients."""
+    @property
+    def geometry(self) -> Geometry | None:
+        """Present geometry; None: nothing to show."""
+
+    @property
+    def operators(self) -> ControlAuthority | None:
+        """Operators in control of UAVs; None: there are no UAVs to control."""
+
+    @property
+    def waits_at_end(self) -> bool:
+        """Whether a simulation stays paused at the end of its scenario."""
 
 
 class JoinedWorld:
     """A world that clients have joined, and the state that its sessions share."""
 
     def __init__(self, world: World) -> None:
-        graph = world.graph
+        now_ns = world.gateway.graph.now_ns
         self.gateway = world.gateway
-        self.scenario: Scenario | None = getattr(world, "scenario", None)
-        self.operators: ControlAuthority | None = getattr(world, "operators", None)
-        self.shared = ServerContext(MessageEncoder("ros2"), graph.now_ns)
+        self.scenario = world.scenario
+        self.operators = world.operators
+        self.shared = ServerContext(MessageEncoder("ros2"), now_ns)
         self.bulk = BulkTurns()
         self._world = world
-        self._rosapi = RosApi(world.gateway, "ros2", graph.now_ns)
+        self._rosapi = RosApi(world.gateway, "ros2", now_ns)
         self._rosapi.start()
         self._transforms = TfRepublisher(world.gateway)
         self._transforms.start()
@@ -87,14 +95,12 @@ class JoinedWorld:
     @property
     def geometry(self) -> Geometry | None:
         """Current geometry of the world; None: nothing to show."""
-        geometry: Geometry | None = getattr(self._world, "geometry", None)
-        return geometry
+        return self._world.geometry
 
     @property
     def has_ended(self) -> bool:
         """Whether a simulation waits at the end of its scenario."""
-        end: EndOfRun | None = getattr(self._world, "end", None)
-        return end is not None and end.waits
+        return self._world.waits_at_end
 
     def leave(self) -> None:
         """Stops the services for clients."""

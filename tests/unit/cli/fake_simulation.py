@@ -18,6 +18,26 @@ STEP_NS = 25_000_000
 SCAN = "/uav1/laser/horizontal/scan"
 
 
+class FakeDiagnostics:
+    image_rates: dict[str, float] = {}  # noqa: RUF012
+    stage_seconds = {"lidars": 0.2, "dynamics": 0.1}  # noqa: RUF012
+
+    def __init__(self) -> None:
+        self.events: list[Event] = []
+        self._digest = False
+
+    def enable_digest(self) -> None:
+        self._digest = True
+
+    def digest(self, *, by_topic: bool = False) -> str:
+        assert self._digest
+        return "ab" * 32
+
+
+def _clearance(points: Any, reach_m: float, include_terrain: bool = True) -> Any:
+    return SimpleNamespace(distance=np.full(len(points), reach_m))
+
+
 class FakeSimulation:
     wall_s_per_step = 0.0
     made: list[FakeSimulation] = []  # noqa: RUF012
@@ -29,50 +49,35 @@ class FakeSimulation:
         self.threads = threads
         self.time_ns = 0
         self.graph = Graph(lambda: self.time_ns)
+        self.gateway = None
         self.commands = SimpleNamespace(end=lambda: None)
-        self.uav_names = tuple(f"uav{k + 1}" for k in range(scenario.uav_count))
-        self.mounts = {SCAN: make_mount((0.0, 0.0, 0.1))}
-        self.cloud_mounts = {}
-        self.terrain = Terrain.flat(100.0, 0.0, (-50.0, -50.0))
-        self.forest = None
-        self.city = None
-        self.events: list[Event] = []
-        self.stage_seconds = {"lidars": 0.2, "dynamics": 0.1}
-        self.picture_rates: dict[str, float] = {}
+        self.uavs = {f"uav{k + 1}": None for k in range(scenario.uav_count)}
+        self.clock = SimpleNamespace(
+            paused=False, paused_s=0.0, speed=None, quitting=False, quit=lambda: None
+        )
+        self.vehicles = SimpleNamespace(
+            lidar_mounts={SCAN: make_mount((0.0, 0.0, 0.1))}, point_cloud_mounts={}
+        )
+        self.world = SimpleNamespace(
+            terrain=Terrain.flat(100.0, 0.0, (-50.0, -50.0)),
+            forest=None,
+            city=None,
+            scene=SimpleNamespace(clearance=_clearance, solids=()),
+        )
+        self.diagnostics = FakeDiagnostics()
         self.closed = False
-        self.picture_rates: dict[str, float] = {}
-        self.paused, self.paused_s = False, 0.0
-        self.speed: float | None = None
-        self._digest = False
         self._odom = self.graph.advertise("/uav1/ground_truth/odom", m.Odometry)
         self._scan = self.graph.advertise(SCAN, m.LaserScan)
         FakeSimulation.made.append(self)
-
-    def quit(self) -> None:
-        """Nobody loads another world here."""
 
     @property
     def time_s(self) -> float:
         return self.time_ns / 1e9
 
-    @property
-    def scene(self) -> Any:
-        def clearance(points: Any, reach_m: float, include_terrain: bool = True) -> Any:
-            return SimpleNamespace(distance=np.full(len(points), reach_m))
-
-        return SimpleNamespace(clearance=clearance, solids=())
-
-    def enable_digest(self) -> None:
-        self._digest = True
-
-    def digest(self, *, by_topic: bool = False) -> str:
-        assert self._digest
-        return "ab" * 32
-
     def run(
         self, seconds: float | None = None, *, speed: float | None = None, on_progress: Any = None
     ) -> None:
-        self.speed = speed
+        self.clock.speed = speed
         start = told = time.perf_counter()
         while self.time_s < self.scenario.duration_s:
             self._publish()
@@ -93,7 +98,9 @@ class FakeSimulation:
                     )
                 )
         where = (1.0, 2.0, 3.0)
-        self.events.append(Event(self.time_ns, "uav1", EventKind.COLLISION, where, 2.5, "tree 7"))
+        self.diagnostics.events.append(
+            Event(self.time_ns, "uav1", EventKind.COLLISION, where, 2.5, "tree 7")
+        )
 
     def _publish(self) -> None:
         t = self.time_ns

@@ -61,10 +61,10 @@ def test_options_reach_the_simulation(invoke: Invoke) -> None:
     assert result.exit_code == 0, result.output
     (simulation,) = FakeSimulation.made
     assert (simulation.scenario.seed, simulation.scenario.duration_s) == (9, 0.5)
-    assert (simulation.speed, simulation.threads) == (50.0, 2)
+    assert (simulation.clock.speed, simulation.threads) == (50.0, 2)
     assert "log" not in result.stdout
     invoke("run", "hover", "--seconds", 0.5)
-    assert FakeSimulation.made[-1].speed is None
+    assert FakeSimulation.made[-1].clock.speed is None
 
 
 def test_ros1_log(invoke: Invoke, tmp_path: Path) -> None:

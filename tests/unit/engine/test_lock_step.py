@@ -38,13 +38,13 @@ def test_engine_waits_and_obeys_in_time(simulate, flat_data):
     digests = set()
     for pause_s, slices in ((0.0, [1.0]), (0.003, [0.0401] * 24 + [0.0376])):
         simulation = airborne(simulate, flat_data)
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         times = []
-        partner = simulation.add_partner("operator", period_s=0.05)
+        partner = simulation.clock.add_partner("operator", period_s=0.05)
         thread = operator(partner, simulation.uavs["uav1"], times, pause_s)
         for seconds in slices:
             simulation.run(seconds)
-        digests.add(simulation.digest())
+        digests.add(simulation.diagnostics.digest())
         simulation.close()
         thread.join(60.0)
         assert not thread.is_alive()
@@ -56,7 +56,7 @@ def test_partners_work_side_by_side_and_speak_in_order(simulate, flat_data):
     simulation = airborne(simulate, flat_data)
     said = []
     both = threading.Barrier(2)
-    partners = [simulation.add_partner(n, period_s=0.01, timeout_s=20.0) for n in ("a", "b")]
+    partners = [simulation.clock.add_partner(n, period_s=0.01, timeout_s=20.0) for n in ("a", "b")]
 
     def work(partner):
         while partner.wait(60.0) is not None:
@@ -71,14 +71,14 @@ def test_partners_work_side_by_side_and_speak_in_order(simulate, flat_data):
 
 def test_silent_partner_ends_the_run(simulate, flat_data):
     simulation = airborne(simulate, flat_data)
-    simulation.add_partner("px4", period_s=0.01, timeout_s=0.05)
+    simulation.clock.add_partner("px4", period_s=0.01, timeout_s=0.05)
     with pytest.raises(PartnerError, match=r"'px4' did not answer within 0\.05 s .* at 0\.010 s"):
         simulation.run(0.1)
 
 
 def test_silent_partner_is_left_behind_where_agreed(simulate, flat_data):
     simulation = airborne(simulate, flat_data)
-    partner = simulation.add_partner("px4", period_s=0.01, timeout_s=0.05, on_timeout="leave")
+    partner = simulation.clock.add_partner("px4", period_s=0.01, timeout_s=0.05, on_timeout="leave")
     simulation.run(0.1)
     assert partner.has_left
     assert partner.wait(1.0) is None
@@ -86,7 +86,7 @@ def test_silent_partner_is_left_behind_where_agreed(simulate, flat_data):
 
 def test_leaving_lets_the_run_go_on(simulate, flat_data):
     simulation = airborne(simulate, flat_data)
-    partner = simulation.add_partner("guest", period_s=0.01, timeout_s=20.0)
+    partner = simulation.clock.add_partner("guest", period_s=0.01, timeout_s=20.0)
 
     def work():
         partner.wait(60.0)
@@ -101,7 +101,7 @@ def test_leaving_lets_the_run_go_on(simulate, flat_data):
 
 def test_speaking_out_of_turn_is_refused(simulate, flat_data):
     simulation = airborne(simulate, flat_data)
-    partner = simulation.add_partner("guest", period_s=0.01)
+    partner = simulation.clock.add_partner("guest", period_s=0.01)
     with pytest.raises(PartnerError, match="no barrier to reply to"):
         partner.reply()
     with pytest.raises(PartnerError, match=r"no barrier within 0\.01 s"):
@@ -110,7 +110,7 @@ def test_speaking_out_of_turn_is_refused(simulate, flat_data):
 
 def test_states_are_not_kept_while_a_partner_takes_part(simulate, flat_data):
     simulation = airborne(simulate, flat_data)
-    simulation.add_partner("px4", period_s=0.01)
+    simulation.clock.add_partner("px4", period_s=0.01)
     with pytest.raises(SnapshotError, match="partner 'px4' is external"):
         simulation.snapshot()
 
@@ -118,13 +118,13 @@ def test_states_are_not_kept_while_a_partner_takes_part(simulate, flat_data):
 @pytest.mark.parametrize("values", [{"period_s": 0.0}, {"period_s": 1.0, "timeout_s": -1.0}])
 def test_impossible_terms_are_refused(simulate, flat_data, values):
     with pytest.raises(CommandError, match="finite and positive"):
-        airborne(simulate, flat_data).add_partner("guest", **values)
+        airborne(simulate, flat_data).clock.add_partner("guest", **values)
 
 
 def test_partners_that_begin_anew_come_along_in_a_reset(simulate, flat_data):
     simulation = airborne(simulate, flat_data)
     times = []
-    partner = simulation.add_partner("operator", period_s=0.02, supports_reset=True)
+    partner = simulation.clock.add_partner("operator", period_s=0.02, supports_reset=True)
     operator(partner, simulation.uavs["uav1"], times)
     simulation.run(0.05)
     with pytest.raises(SnapshotError, match="partner 'operator' is external"):

@@ -51,7 +51,7 @@ def test_nothing_that_is_not_finite_happens(flying):
     flying._engine.fleet.state.velocity_map[0] = (0.0, 0.0, -1e9)
     with pytest.raises(DivergenceError):
         flying.run(1.0)
-    assert all(map(math.isfinite, [x for e in flying.events for x in e.position_map]))
+    assert all(map(math.isfinite, [x for e in flying.diagnostics.events for x in e.position_map]))
 
 
 def test_an_error_that_nan_causes_is_told_as_such(flying):
@@ -74,7 +74,7 @@ def test_other_errors_stay_what_they_are(flying):
 
 
 def test_a_spawned_uav_is_looked_at(flying):
-    flying.spawn_uav("late", "f450", (5.0, 5.0, 3.0))
+    flying.vehicles.spawn("late", "f450", (5.0, 5.0, 3.0))
     flying.run(0.1)
     flying._engine.fleet.state.velocity_map[2] = math.nan
     with pytest.raises(DivergenceError, match="late"):

@@ -97,7 +97,7 @@ def test_output_comes_after_the_latency(simulate, scenario):
     for stamp, seen_at, released_at, _ in heard:
         assert seen_at == stamp
         assert released_at == stamp + LATENCY_NS
-    (node,) = simulation.nodes
+    (node,) = simulation.vehicles.nodes
     assert node.threads == {"volery-thinker"}
 
 
@@ -106,7 +106,7 @@ def test_node_without_latency_answers_at_once(simulate, scenario):
     heard = listen(simulation)
     simulation.run(0.1)
     assert all(stamp == seen == released for stamp, seen, released, _ in heard)
-    assert simulation.nodes[0].threads == {threading.current_thread().name}
+    assert simulation.vehicles.nodes[0].threads == {threading.current_thread().name}
 
 
 def test_speed_of_the_computer_and_slices_change_nothing(simulate, scenario):
@@ -114,18 +114,18 @@ def test_speed_of_the_computer_and_slices_change_nothing(simulate, scenario):
     for node, slices in ((Thinker, [0.5]), (Slow, [0.5]), (Slow, [0.0103] * 48 + [0.0056])):
         simulation = simulate(scenario(node, 0.05))
         listen(simulation)
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         simulation.uavs["uav1"].take_off(2.0)
         for seconds in slices:
             simulation.run(seconds)
-        digests.add(simulation.digest())
+        digests.add(simulation.diagnostics.digest())
     assert len(digests) == 1
 
 
 def test_engine_runs_on_while_a_node_thinks(simulate, scenario):
     """Thinking 20 x 4 ms beside the engine takes less wall time than the sum of both."""
     simulation = simulate(scenario(Slow, 0.05))
-    (node,) = simulation.nodes
+    (node,) = simulation.vehicles.nodes
     simulation.run(0.2)
     joined_late = []
     simulation.graph.subscribe("/uav1/odom", lambda _: joined_late.append(node.seen))
@@ -139,7 +139,7 @@ def test_service_answer_is_a_later_input(simulate, scenario):
     simulation = simulate(scenario(Thinker, 0.05))
     simulation.uavs["uav1"].take_off(2.0)
     simulation.run(0.3)
-    (node,) = simulation.nodes
+    (node,) = simulation.vehicles.nodes
     node.join()
     assert node.answers == [(2 * ODOM_PERIOD_NS + 50_000_000, True)]
     assert simulation.uavs["uav1"].mode.name == "LAND"

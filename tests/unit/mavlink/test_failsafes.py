@@ -165,8 +165,8 @@ def test_a_low_battery_warns_returns_and_lands(flight):
     simulation, station = flight
     station.set("COM_LOW_BAT_ACT", 3)
     station.up(2.0)
-    memory = simulation._crew.nodes[0].core.context.memory
-    core = simulation._crew.nodes[0].core
+    core = simulation.vehicles.nodes[0].core
+    memory = core.context.memory
     update = core.update
     drained = {"charge": 0.5, "voltage": 11.0, "current": 9.0}
     core.update = lambda state: update(state._replace(**drained))
@@ -188,7 +188,7 @@ def test_without_satellites_it_is_not_armed_and_lands():
     with simulation:
         station.seconds(1.0)
         station.up(2.0)
-        simulation.inject_fault({"kind": "gnss_loss", "uav": "uav1"})
+        simulation.faults.inject({"kind": "gnss_loss", "uav": "uav1"})
         station.seconds(4.0)
         assert station.present_mode == HOLD
         station.seconds(2.5)

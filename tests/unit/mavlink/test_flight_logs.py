@@ -240,7 +240,7 @@ def test_a_closed_link_leaves_nothing(flight):
     fly_once(station, 1.0)
     entries(station)
     station.send("log_request_data", 1, 1, 0, 0, 0xFFFFFFFF)
-    (autopilot,) = (node for node in simulation.nodes if node.get_name() == "autopilot")
+    (autopilot,) = (node for node in simulation.vehicles.nodes if node.get_name() == "autopilot")
     autopilot.core.close_link(station.link)
     station.seconds(0.1)
     transfers = autopilot.core.context.log.transfers
@@ -254,10 +254,10 @@ def test_logging_changes_no_flight():
         parameters = {"px4": {"SDLOG_MODE": mode}}
         simulation, station = fly(nodes=[{"node": "mavlink_autopilot", "parameters": parameters}])
         with simulation:
-            simulation.enable_digest()
+            simulation.diagnostics.enable_digest()
             station.seconds(0.1)
             fly_once(station, 2.0)
-            digests.append(simulation.digest())
+            digests.append(simulation.diagnostics.digest())
     assert digests[0] == digests[1]
 
 
@@ -330,7 +330,7 @@ def test_the_file_has_no_name_and_goes_with_its_owner(monkeypatch, tmp_path):
 
 def test_a_log_that_is_full_or_cannot_be_written_is_told_of_once(flight, monkeypatch):
     simulation, station = flight
-    (autopilot,) = (node for node in simulation.nodes if node.get_name() == "autopilot")
+    (autopilot,) = (node for node in simulation.vehicles.nodes if node.get_name() == "autopilot")
     storage = autopilot.core.context.log.storage
     storage._capacity = 10_000
     fly_once(station, 1.0)

@@ -102,7 +102,7 @@ def test_the_shell_replies(flight):
 
 def test_the_shell_keeps_no_endless_lines(flight):
     simulation, station = flight
-    (autopilot,) = (node for node in simulation.nodes if node.get_name() == "autopilot")
+    (autopilot,) = (node for node in simulation.vehicles.nodes if node.get_name() == "autopilot")
     for _ in range(8):
         shell(station, "x" * 70)
         assert all(len(line) <= 200 for line in autopilot.core.context.memory.shells.values())

@@ -33,13 +33,13 @@ class Running:
         self._thread = threading.Thread(target=lambda: simulation.run(600.0, speed=1.0))
 
     def __enter__(self):
-        self.simulation.use_low_latency()
+        self.simulation.gateway.use_low_latency()
         self._thread.start()
         return self
 
     def __exit__(self, *_):
-        self.simulation.resume()
-        self.simulation.quit()
+        self.simulation.clock.resume()
+        self.simulation.clock.quit()
         self._thread.join()
         self.bridges.close()
         self.simulation.close()
@@ -93,12 +93,12 @@ def test_every_vehicle_has_a_port_and_the_ground_station_hears_all(running):
 
 def test_heartbeats_go_on_while_the_simulation_stands_still(running, client):
     assert client.wait_heartbeat(timeout=60.0)
-    running.simulation.pause()
+    running.simulation.clock.pause()
     time.sleep(0.3)
     while client.recv_msg():
         pass
     beats = [client.recv_match(type="HEARTBEAT", blocking=True, timeout=60.0) for _ in range(2)]
-    running.simulation.resume()
+    running.simulation.clock.resume()
     assert all(beats)
 
 
@@ -165,12 +165,12 @@ def test_names_of_the_command_line():
     simulation = Simulation(scenario(), threads=1)
     with simulation:
         options = RunOptions("flat", bridges=(f"mavlink={BASE + 200}", "mavlink-tcp=0"))
-        with open_bridges(simulation, options):
+        with open_bridges(simulation.gateway, options):
             simulation.run(0.1)
         with (
             pytest.raises(BridgeError, match="is not a serial line"),
             open_bridges(
-                simulation, RunOptions("flat", bridges=("mavlink-serial=/dev/null:57600",))
+                simulation.gateway, RunOptions("flat", bridges=("mavlink-serial=/dev/null:57600",))
             ),
         ):
             pass

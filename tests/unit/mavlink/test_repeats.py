@@ -17,7 +17,7 @@ def offboard_flight(simulation, station):
     assert station.mode(6) == 0
     station.stream(1.0, station.velocity, 1.0, 0.5, 0.0)
     station.seconds(1.5)  # and is lost
-    return simulation.digest()
+    return simulation.diagnostics.digest()
 
 
 def test_a_flight_in_pieces_is_the_flight_in_one():
@@ -28,13 +28,13 @@ def test_a_flight_in_pieces_is_the_flight_in_one():
     ):
         simulation = Simulation(scenario(), threads=1)
         with simulation:
-            simulation.enable_digest()
+            simulation.diagnostics.enable_digest()
             station = Station(simulation)
             seconds(simulation, 0.14)
             station.command(400, 1.0)
             station.command(22)
             seconds(simulation, 3.5)
-            digests.append(simulation.digest())
+            digests.append(simulation.diagnostics.digest())
     assert digests[0] == digests[1]
 
 
@@ -69,7 +69,7 @@ def test_a_recorded_flight_is_repeated(tmp_path):
     simulation = Simulation(scenario(), threads=1)
     log = open_log(path)
     with simulation:
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         simulation.graph.subscribe_all(log.write)
         gate = simulation.gateway.open("ground station")
         station = GatewayStation(simulation, gate)
@@ -79,10 +79,10 @@ def test_a_recorded_flight_is_repeated(tmp_path):
     flight = read_flight(path)
     again = Simulation(scenario_of(flight.origin), threads=1)
     with again:
-        again.enable_digest()
+        again.diagnostics.enable_digest()
         again.replay_commands(flight)
         again.run()
-        assert again.digest() == digest
+        assert again.diagnostics.digest() == digest
 
 
 class GatewayStation(Station):

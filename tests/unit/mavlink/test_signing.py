@@ -143,13 +143,13 @@ def test_a_vehicle_hears_only_who_has_the_key():
     with simulation, BridgeHost(simulation.gateway) as bridges:
         bridge = MavlinkTcp(port=free_port(), key=KEY)
         bridges.open(bridge)
-        simulation.use_low_latency()
+        simulation.gateway.use_low_latency()
         run.start()
         try:
             assert ack(bridge.port, None) is None
             assert ack(bridge.port, KEY).get_signed()
         finally:
-            simulation.quit()
+            simulation.clock.quit()
             run.join()
 
 

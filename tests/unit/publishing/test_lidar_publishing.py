@@ -80,8 +80,8 @@ def test_several_clouds_a_uav_have_topics_of_their_own(flown):
         {"name": "front", "model": "mid_40", "topic": "livox/points", "phase_s": 0.05},
         {"name": "level"},
     )
-    assert set(simulation.mounts) == {f"/uav{n}/laser/level/scan" for n in (1, 2)}
-    assert set(simulation.cloud_mounts) == {
+    assert set(simulation.vehicles.lidar_mounts) == {f"/uav{n}/laser/level/scan" for n in (1, 2)}
+    assert set(simulation.vehicles.point_cloud_mounts) == {
         f"/uav{n}/{topic}" for n in (1, 2) for topic in ("points", "livox/points")
     }
     assert found["/uav2/points"][0].message.header.frame_id == "uav2/laser_top"

@@ -119,7 +119,7 @@ def test_nobody_inside_is_shown_returns_and_they_go_with_their_uav(simulate, woo
     assert box.take()
     assert topic not in heard
     assert "/uav1/laser/nodding/scan" in heard
-    simulation.delete_uav("uav1")
+    simulation.vehicles.delete("uav1")
     simulation.run(0.2)
     assert box.take() == []
     assert simulation.graph.publishers(topic) == 0

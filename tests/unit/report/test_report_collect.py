@@ -12,7 +12,7 @@ import pytest
 from volery.core import rotations
 from volery.engine.events import Event, EventKind
 from volery.graph import messages as m
-from volery.graph.graph import Subscription
+from volery.graph.topics import Subscription
 from volery.report.collect import FlightCollector
 from volery.report.scan_placing import scan_points
 from volery.sensors.mount import make_mount
@@ -40,13 +40,13 @@ class FakeSimulation:
     """One UAV flying east at 5 m/s, 3 m above flat ground, turning left at 0.8 rad/s."""
 
     graph: FakeGraph = field(default_factory=FakeGraph)
-    uav_names: tuple[str, ...] = ("uav1",)
-    mounts: dict[str, Any] = field(default_factory=dict)
-    cloud_mounts: dict[str, Any] = field(default_factory=dict)
-    terrain: Terrain = field(default_factory=lambda: Terrain.flat(200.0, 1.0, (-100.0, -100.0)))
-    forest: Any = None
-    events: list[Event] = field(default_factory=list)
-    stage_seconds: dict[str, float] = field(default_factory=lambda: {"lidars": 0.5})
+    uavs: tuple[str, ...] = ("uav1",)
+    vehicles: Any = field(
+        default_factory=lambda: SimpleNamespace(lidar_mounts=dict(MOUNTS), point_cloud_mounts={})
+    )
+    diagnostics: Any = field(
+        default_factory=lambda: SimpleNamespace(events=[], stage_seconds={"lidars": 0.5})
+    )
     time_ns: int = 2_000 * MS
     scenario: Any = field(
         default_factory=lambda: SimpleNamespace(
@@ -55,12 +55,16 @@ class FakeSimulation:
     )
 
     @property
-    def scene(self) -> Any:
+    def world(self) -> Any:
         def clearance(points: Any, reach_m: float, include_terrain: bool = True) -> Any:
             assert not include_terrain
             return SimpleNamespace(distance=np.minimum(np.abs(points[:, 0] - 5.0), reach_m))
 
-        return SimpleNamespace(clearance=clearance, solids=())
+        return SimpleNamespace(
+            terrain=Terrain.flat(200.0, 1.0, (-100.0, -100.0)),
+            forest=None,
+            scene=SimpleNamespace(clearance=clearance, solids=()),
+        )
 
 
 def pose_at(t: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -170,8 +174,8 @@ def test_points_of_a_cloud_return_to_the_wall() -> None:
 
 
 def test_collects_a_flight(tmp_path: Path) -> None:
-    simulation = FakeSimulation(mounts=dict(MOUNTS))
-    simulation.events.append(
+    simulation = FakeSimulation()
+    simulation.diagnostics.events.append(
         Event(1_500 * MS, "uav1", EventKind.COLLISION, (7.5, 0.0, 4.0), 5.0, "tree 3")
     )
     collector = FlightCollector(simulation)

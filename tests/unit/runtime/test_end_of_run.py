@@ -37,7 +37,7 @@ class Client:
                 request = request_of(self.simulation.graph, service, **fields)
                 self.session.call(service, request, reply)
                 self.simulation.process_commands()
-            elif self.simulation.finished:
+            elif self.simulation.clock.finished:
                 raise EndedError
 
         with suppress(EndedError):
@@ -50,7 +50,7 @@ class Client:
 def ended(simulate, flat_data):
     simulation = simulate(flat_data | {"duration_s": 0.05})
     simulation.run()
-    assert simulation.finished
+    assert simulation.clock.finished
     return simulation
 
 
@@ -93,16 +93,16 @@ def test_the_status_says_so(ended):
 
     with pytest.raises(EndedError):
         ended.wait_at_end(look)
-    assert not ended.end.waits
+    assert not ended.waits_at_end
 
 
 def test_it_flies_on_where_asked(ended):
     client = Client(ended)
     (answer,) = client.at_end(("/volery/continue_run", {}))
     assert answer.success
-    assert not ended.paused
+    assert not ended.clock.paused
     ended.run(0.02)
-    assert not ended.finished
+    assert not ended.clock.finished
     assert ended.time_ns == 70_000_000
     assert ask(ended, "/uav1/take_off").success
 
@@ -112,7 +112,7 @@ def test_a_run_to_the_end_past_the_end_lasts_until_somebody_quits(ended):
 
     def look(progress):
         if progress.time_s > 0.5:
-            ended.quit()
+            ended.clock.quit()
 
     ended.run(on_progress=look)
     assert ended.time_s > 0.5
@@ -130,8 +130,8 @@ def test_a_reset_brings_the_end_back(ended):
 def test_a_reset_ends_the_wait(ended):
     (answer,) = Client(ended).at_end(("/reset_simulation", {"scope": 255}))
     assert code_of(answer) == 1
-    assert not ended.finished
-    assert not ended.end.waits
+    assert not ended.clock.finished
+    assert not ended.waits_at_end
 
 
 def test_only_an_ended_run_is_continued(simulate, flat_data):

@@ -127,7 +127,7 @@ def test_a_uav_that_stands_is_put_into_the_air_and_hovers(trio):
     assert code_of(put(trio, "uav1", (5.0, 10.0, uav.position_map[2]))) == OK
     trio.run(0.5)
     assert uav.mode.name == "LANDED"
-    assert not trio.events[-1].kind.name.startswith("COLL")
+    assert not trio.diagnostics.events[-1].kind.name.startswith("COLL")
 
 
 def test_a_uav_that_flies_holds_where_it_was_put(trio):
@@ -168,8 +168,8 @@ def test_places_that_are_none(trio, position, reason):
 
 def test_no_place_inside_a_tree(simulate, wood_data):
     simulation = simulate(wood_data)
-    x, y, _z = simulation.forest.position_map[7]
-    height = float(simulation.terrain.height(x, y)) + 0.5
+    x, y, _z = simulation.world.forest.position_map[7]
+    height = float(simulation.world.terrain.height(x, y)) + 0.5
     response = put(simulation, "uav1", (float(x), float(y), height))
     assert code_of(response) == INVALID_POSE
     assert "tree" in response.result.error_message
@@ -191,11 +191,11 @@ def test_states_that_cannot_be_set(trio):
 def test_a_set_state_is_the_same_again(simulate, flat_data):
     def digest():
         simulation = simulate(flat_data)
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         simulation.run(0.1)
         put(simulation, "uav1", (0.0, 10.0, 3.0))
         simulation.run(1.0)
-        return simulation.digest()
+        return simulation.diagnostics.digest()
 
     assert digest() == digest()
 

@@ -77,11 +77,11 @@ def test_the_name_is_told_when_blocks_change_and_after_a_restore():
         first = simulation.geometry
         assert told == [first.id]
         kept = simulation.snapshot()
-        simulation.grid_world.change(block_height_m=9.0)
+        simulation.world.grid_map.change(block_height_m=9.0)
         simulation.step(2)
         assert simulation.geometry.id != first.id
         assert told == [first.id, simulation.geometry.id]
-        simulation.grid_world.change(block_height_m=9.0)  # nothing else stands there
+        simulation.world.grid_map.change(block_height_m=9.0)  # nothing else stands there
         simulation.step(2)
         assert len(told) == 2
         simulation.restore(kept)

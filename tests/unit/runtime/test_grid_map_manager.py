@@ -81,12 +81,12 @@ def test_the_next_scan_sees_the_change(simulate, blocks_data):
         ({"name": "near"}, 8.0),
         ({"name": "far", "cell_size_m": 2.0, "block_height_m": 2.5}, 8.0),
     ):
-        simulation.grid_world.change(**change)
+        simulation.world.grid_map.change(**change)
         seen = len(ahead.ranges)
         simulation.run(0.025)  # one scan
         assert len(ahead.ranges) == seen + 1
         assert ahead.ranges[-1] == pytest.approx(want, abs=1e-3), change
-    told = [event for event in simulation.events if event.kind is EventKind.WORLD]
+    told = [event for event in simulation.diagnostics.events if event.kind is EventKind.WORLD]
     assert len(told) == 6
     assert "'far', 5 x 7 cells of 2 m, blocks 2.5 m high" in told[-1].describe()
 
@@ -94,15 +94,15 @@ def test_the_next_scan_sees_the_change(simulate, blocks_data):
 def test_runs_with_changes_are_the_same_twice_and_from_slices(simulate, blocks_data):
     def fly(step):
         simulation = simulate(blocks_data)
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         while simulation.time_ns < 600_000_000:
             at_ms = simulation.time_ns // 1_000_000
             if at_ms == 200:
-                simulation.grid_world.change("far", block_height_m=3.0)
+                simulation.world.grid_map.change("far", block_height_m=3.0)
             if at_ms == 400:
                 simulation.graph.call("/volery/set_grid_map", set_request(simulation, "near"))
             simulation.step(step)
-        return simulation.digest(), len(simulation.events)
+        return simulation.diagnostics.digest(), len(simulation.diagnostics.events)
 
     assert fly(200) == fly(200) == fly(8)
     assert fly(200)[1] == 2
@@ -134,7 +134,7 @@ def test_a_map_of_the_graph_becomes_blocks(simulate, blocks_data):
     simulation.run(0.03)
     assert ahead.ranges[-1] == pytest.approx(4.0, abs=1e-3)
     assert shown[-1].data.tolist() == [0, 100, *[0] * 7, 100]
-    assert (simulation.grid_world.current.name, simulation.grid_world.current.rows) == (
+    assert (simulation.world.grid_map.current.name, simulation.world.grid_map.current.rows) == (
         "map_command",
         2,
     )
@@ -155,11 +155,11 @@ def test_a_matrix_stands_as_it_is_read_and_told_as_the_message_wants(simulate, t
     assert shown[0].data.tolist() == [100, 100, 100, 0, 100, 0]
     x, y = np.meshgrid([5.5, 6.5], [7.5, 6.5, 5.5])
     above = np.column_stack([x.ravel(), y.ravel(), np.full(6, 20.0)])
-    down = simulation.scene.cast(above, np.tile([0.0, 0.0, -1.0], (6, 1)), 50.0)
+    down = simulation.world.scene.cast(above, np.tile([0.0, 0.0, -1.0], (6, 1)), 50.0)
     heights = (20.0 - down.distance).reshape(3, 2)
     np.testing.assert_allclose(heights, [[5, 0], [5, 0], [5, 5]], atol=1e-5)
     again = grid_of(shown[0], 5.0)
-    np.testing.assert_array_equal(again.blocked, simulation.grid_world.current.blocked)
+    np.testing.assert_array_equal(again.blocked, simulation.world.grid_map.current.blocked)
 
 
 @pytest.mark.parametrize(("blocked", "want"), [(False, np.inf), (True, 3.0)])
@@ -170,7 +170,7 @@ def test_unknown_cells_are_free_or_blocked(simulate, blocks_data, blocked, want)
     sender = simulation.graph.advertise("/map_command", OccupancyGrid)
     simulation.run(0.05)
     assert np.isinf(ahead.ranges[-1])
-    assert simulation.grid_world.current is None
+    assert simulation.world.grid_map.current is None
     sender.publish(occupancy([0, -1], 2, y=-1.5, resolution=3.0))
     simulation.run(0.05)
     assert ahead.ranges[-1] == pytest.approx(want, abs=1e-3)
@@ -178,7 +178,7 @@ def test_unknown_cells_are_free_or_blocked(simulate, blocks_data, blocked, want)
 
 def test_maps_that_are_none_are_refused_in_an_event(simulate, blocks_data):
     simulation = simulate(blocks_data)
-    before = simulation.grid_world.current
+    before = simulation.world.grid_map.current
     sender = simulation.graph.advertise("/map_command", OccupancyGrid)
     wrong = [
         occupancy([0, 0, 0], 3),
@@ -193,12 +193,12 @@ def test_maps_that_are_none_are_refused_in_an_event(simulate, blocks_data):
     for message in wrong:
         sender.publish(message)
     simulation.step(1)
-    told = [event.detail for event in simulation.events]
+    told = [event.detail for event in simulation.diagnostics.events]
     assert len(told) == len(wrong)
     assert all(text.startswith("a grid map was refused: ") for text in told)
     words = ("as many entries", "cell_size_m", "finite", "about z", "0 x 1 cells", "beyond the")
     assert all(word in text for word, text in zip(words, told, strict=True)), told
-    assert simulation.grid_world.current is before
+    assert simulation.world.grid_map.current is before
 
 
 def test_services_change_and_tell(simulate, blocks_data):
@@ -222,19 +222,19 @@ def test_services_change_and_tell(simulate, blocks_data):
 
 def test_resets_and_snapshots_take_the_map_along(simulate, blocks_data):
     simulation = simulate(blocks_data)
-    simulation.enable_digest()
+    simulation.diagnostics.enable_digest()
     ahead = Ahead(simulation)
     simulation.run(0.1)
-    simulation.grid_world.change("far")
+    simulation.world.grid_map.change("far")
     simulation.run(0.1)
     kept = simulation.snapshot()
     simulation.run(0.2)
-    want, seen = simulation.digest(), ahead.ranges[-8:]
-    simulation.grid_world.change("near", block_height_m=LOW_M)
+    want, seen = simulation.diagnostics.digest(), ahead.ranges[-8:]
+    simulation.world.grid_map.change("near", block_height_m=LOW_M)
     simulation.run(0.1)
     simulation.restore(kept)
     simulation.run(0.2)
-    assert simulation.digest() == want
+    assert simulation.diagnostics.digest() == want
     assert ahead.ranges[-8:] == seen
     assert seen[-1] == pytest.approx(12.0, abs=1e-3)
     shown = []
@@ -243,23 +243,23 @@ def test_resets_and_snapshots_take_the_map_along(simulate, blocks_data):
     simulation.run(0.1)
     assert ahead.ranges[-1] == pytest.approx(FIRST_WALL_M, abs=1e-3)
     assert shown[-1] == 3
-    assert simulation.grid_world.current.block_height_m == TALL_M
+    assert simulation.world.grid_map.current.block_height_m == TALL_M
 
 
 def test_who_is_in_a_new_block_touches_it_with_the_next_step(simulate, blocks_data):
     simulation = simulate(blocks_data)
     simulation.run(0.1)
-    assert not simulation.events
-    simulation.grid_world.change("far", cell_size_m=60.0)
-    simulation.grid_world.change("near", cell_size_m=3.0)
+    assert not simulation.diagnostics.events
+    simulation.world.grid_map.change("far", cell_size_m=60.0)
+    simulation.world.grid_map.change("near", cell_size_m=3.0)
     simulation.run(0.1)
-    assert {event.kind for event in simulation.events} == {EventKind.WORLD}
+    assert {event.kind for event in simulation.diagnostics.events} == {EventKind.WORLD}
     sender = simulation.graph.advertise("/map_command", OccupancyGrid)
     sender.publish(occupancy([100], 1, x=-20.0, y=-20.0, resolution=40.0))
     simulation.step(1)  # it is taken at the end of this one
     at_ns = simulation.time_ns
     simulation.step(5)
-    touch = next(e for e in simulation.events if e.kind is EventKind.COLLISION)
+    touch = next(e for e in simulation.diagnostics.events if e.kind is EventKind.COLLISION)
     assert (touch.uav, touch.partner, touch.time_ns) == ("uav1", "block", at_ns + 1_000_000)
 
 
@@ -273,7 +273,7 @@ def test_uavs_are_not_placed_in_blocks(simulate, blocks_data):
     blocks_data["uavs"] = [
         {"type": "f450", "position_m": [7.5, 0.0], "placement": "nearest_free"},
     ]
-    start = simulate(blocks_data).starts[0].position_map
+    start = simulate(blocks_data).vehicles.start_poses[0].position_map
     assert np.linalg.norm(start[:2] - [7.5, 0.0]) < 4.0
     assert not 5.0 < start[0] < 10.0
 
@@ -302,4 +302,4 @@ def test_without_the_table_there_is_no_map(simulate, flat_data):
     simulation = simulate(flat_data)
     assert "/map" not in [topic.name for topic in simulation.graph.topics()]
     with pytest.raises(CommandError, match="no grid map yet"):
-        simulation.grid_world.change(block_height_m=3.0)
+        simulation.world.grid_map.change(block_height_m=3.0)

@@ -69,7 +69,7 @@ def test_actors_come_after_the_uavs(simulate, flat_data):
     watcher = Watcher(simulation, TF)
     simulation.run(0.02)
     assert list(poses(watcher.last(TF))) == ["uav1/base_link", "walker"]
-    simulation.set_actor_pose("walker", [31.0, 2.0, 0.0])
+    simulation.world.set_actor_pose("walker", [31.0, 2.0, 0.0])
     simulation.process_commands()
     time.sleep(0.06)
     simulation.process_commands()
@@ -80,12 +80,12 @@ def test_who_comes_and_goes_is_told(simulate, flat_data):
     simulation = simulate(flat_data)
     watcher = Watcher(simulation, TF, VEHICLES)
     simulation.run(0.02)
-    simulation.spawn_uav("scout", "crazyflie", [5.0, 5.0, 0.0])
+    simulation.vehicles.spawn("scout", "crazyflie", [5.0, 5.0, 0.0])
     simulation.run(0.2)
     assert list(poses(watcher.last(TF))) == ["uav1/base_link", "scout/base_link"]
     scout = watcher.last(VEHICLES).vehicles[1]
     assert (scout.name, scout.airframe, scout.type) == ("scout", "crazyflie", "crazyflie")
-    simulation.delete_uav("uav1")
+    simulation.vehicles.delete("uav1")
     simulation.run(0.2)
     assert list(poses(watcher.last(TF))) == ["scout/base_link"]
     assert [v.name for v in watcher.last(VEHICLES).vehicles] == ["scout"]
@@ -132,7 +132,7 @@ def test_the_ground_the_air_and_a_wreck(simulate, flat_data):
     simulation.run(0.2)
     standing = watcher.last(VEHICLES).vehicles[0]
     assert (standing.mode, standing.airborne, standing.rotor_speed) == ("LANDED", False, 0.0)
-    simulation.set_uav_pose("uav1", [0.0, 0.0, 8.0], [0.0, 0.0, 0.0, 1.0])
+    simulation.vehicles.set_pose("uav1", [0.0, 0.0, 8.0], [0.0, 0.0, 0.0, 1.0])
     simulation.run(0.2)
     assert watcher.last(VEHICLES).vehicles[0].airborne
     simulation.uavs["uav1"].stop_rotors()
@@ -199,10 +199,10 @@ def paused(simulate, three):
     """Three UAVs that stand still in time, in a run of its own thread."""
     simulation = simulate(three)
     simulation.run(3.0)
-    simulation.pause()
+    simulation.clock.pause()
     with InThread(simulation, 60.0, speed=1.0):
         yield simulation
-        simulation.quit()
+        simulation.clock.quit()
 
 
 def test_who_comes_while_paused_is_told_at_once(paused):
@@ -235,14 +235,14 @@ def test_what_changes_while_paused_is_shown(paused):
         wait_for(look)
 
     moved = [4.0, 7.0, 5.0]
-    paused.post(lambda: paused.set_uav_pose("uav2", moved, [0.0, 0.0, 0.0, 1.0])).result()
+    paused.post(lambda: paused.vehicles.set_pose("uav2", moved, [0.0, 0.0, 0.0, 1.0])).result()
     shows(TF, lambda m: poses(m)["uav2/base_link"][0] == moved)
     shows(VEHICLES, lambda m: m.vehicles[1].position.z == 5.0)
     paused.post(paused.uavs["uav1"].land).result()
     shows(VEHICLES, lambda m: m.vehicles[0].mode == "LAND")
-    paused.single_step(5)
+    paused.clock.single_step(5)
     shows(TF, lambda m: stamp_s(m) == pytest.approx(3.005))
-    paused.post(lambda: paused.spawn_uav("extra", "crazyflie", [9.0, 9.0, 0.0])).result()
+    paused.post(lambda: paused.vehicles.spawn("extra", "crazyflie", [9.0, 9.0, 0.0])).result()
     shows(TF, lambda m: "extra/base_link" in poses(m))
     shows(VEHICLES, lambda m: m.vehicles[-1].name == "extra")
 
@@ -281,16 +281,16 @@ def test_the_status_comes_in_wall_time_also_while_paused(paused):
     assert not last.replaying
     stamps = [m.wall.sec + 1e-9 * m.wall.nanosec for m in told]
     assert stamps == sorted(stamps)
-    paused.resume()
+    paused.clock.resume()
     time.sleep(1.4)
     last = watcher.last(STATUS)
     assert last.state == 1
     assert last.real_time_factor == pytest.approx(1.0, abs=0.25)
     stages = dict(zip(last.stages, last.load, strict=True))
-    assert list(stages) == list(paused.stage_seconds)
+    assert list(stages) == list(paused.diagnostics.stage_seconds)
     assert 0.0 < stages["advance_vehicles"] < 1.0
     assert sum(stages.values()) < 1.0
-    paused.set_speed(None)
+    paused.clock.set_speed(None)
     wait_for(lambda: any(m.speed == 0.0 for m in watcher.take(STATUS)))
 
 
@@ -300,13 +300,13 @@ def test_the_status_knows_of_recordings_and_losses(simulate, flat_data, tmp_path
     late = Watcher(simulation, TF, depth=2)
     assert ask(simulation, "/volery/start_recording", path="day/a.mcap").success
     simulation.run(0.2)  # ten true poses, of which the slow client loses eight
-    simulation._live._status.jumped()
+    simulation._monitor._status.jumped()
     simulation.process_commands()
     told = watcher.last(STATUS)
     assert (told.recording, told.dropped, told.clients) == ("day/a.mcap", 8, 2)
     late.session.close()
     assert ask(simulation, "/volery/stop_recording").success
-    simulation._live._status.jumped()
+    simulation._monitor._status.jumped()
     simulation.process_commands()
     told = watcher.last(STATUS)
     assert (told.recording, told.dropped, told.clients) == ("", 8, 1)
@@ -333,22 +333,22 @@ def test_the_speedometer_looks_back_over_a_second():
 def test_who_watches_changes_nothing(simulate, wood_data):
     def digest(watched):
         simulation = simulate(wood_data)
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         if not watched:
             simulation.run(1.0)
-            return simulation.digest()
+            return simulation.diagnostics.digest()
         watcher = Watcher(simulation, TF, VEHICLES, STATUS, "/uav1/laser/nodding/points")
         with InThread(simulation, 1.0, speed=2.0):
             wait_for(lambda: simulation.time_s > 0.2)
-            simulation.pause()
+            simulation.clock.pause()
             wait_for(lambda: watcher.take(STATUS))
-            simulation.single_step(7)
+            simulation.clock.single_step(7)
             late = Watcher(simulation, TF, VEHICLES)
             wait_for(lambda: late.take(VEHICLES))
-            simulation.set_speed(0.5)
-            simulation.resume()
+            simulation.clock.set_speed(0.5)
+            simulation.clock.resume()
         assert watcher.take("/uav1/laser/nodding/points")
-        return simulation.digest()
+        return simulation.diagnostics.digest()
 
     assert digest(watched=True) == digest(watched=False)
 
@@ -357,7 +357,9 @@ def test_nobody_inside_sees_what_follows_wall_time(paused):
     heard = []
     Watcher(paused, STATUS, TF)
     paused.post(lambda: paused.graph.subscribe_all(lambda m: heard.append(m.topic))).result()
-    paused.post(lambda: paused.set_uav_pose("uav1", [3.0, 3.0, 4.0], [0.0, 0.0, 0.0, 1.0])).result()
+    paused.post(
+        lambda: paused.vehicles.set_pose("uav1", [3.0, 3.0, 4.0], [0.0, 0.0, 0.0, 1.0])
+    ).result()
     time.sleep(0.6)
     assert STATUS not in heard
     assert TF not in heard

@@ -9,9 +9,9 @@ from volery.core.errors import CommandError
 
 
 def digest_of(simulation, seconds, **options):
-    simulation.enable_digest()
+    simulation.diagnostics.enable_digest()
     simulation.run(seconds, **options)
-    return simulation.digest()
+    return simulation.diagnostics.digest()
 
 
 class InThread:
@@ -35,7 +35,7 @@ class InThread:
 
     def __exit__(self, kind, *_exception):
         if kind is not None:
-            self._arguments[0].resume()
+            self._arguments[0].clock.resume()
         self._thread.join(60.0)
         assert not self._thread.is_alive()
         if self._error is not None:
@@ -54,22 +54,22 @@ def test_results_do_not_depend_on_pauses(simulate, flat_data):
     flat_data["uavs"][0]["on_start"] = "take_off"
     plain = digest_of(simulate(flat_data), 2.0)
     simulation = simulate(flat_data)
-    simulation.enable_digest()
-    simulation.pause()
+    simulation.diagnostics.enable_digest()
+    simulation.clock.pause()
     with InThread(simulation, 2.0, speed=20.0):
-        simulation.single_step()
+        simulation.clock.single_step()
         wait_for(lambda: simulation.time_ns == 1_000_000)
-        simulation.single_step(7)
+        simulation.clock.single_step(7)
         wait_for(lambda: simulation.time_ns == 8_000_000)
         for _ in range(20):
-            simulation.resume()
+            simulation.clock.resume()
             time.sleep(0.003)
-            simulation.pause()
-            simulation.set_speed(40.0 if simulation.speed == 20.0 else 20.0)
-        simulation.set_speed(None)
-        simulation.resume()
+            simulation.clock.pause()
+            simulation.clock.set_speed(40.0 if simulation.clock.speed == 20.0 else 20.0)
+        simulation.clock.set_speed(None)
+        simulation.clock.resume()
     assert simulation.time_s == pytest.approx(2.0)
-    assert simulation.digest() == plain
+    assert simulation.diagnostics.digest() == plain
 
 
 def test_a_paused_run_stands_still_does_what_is_posted_and_tells(simulate, flat_data):
@@ -81,8 +81,8 @@ def test_a_paused_run_stands_still_does_what_is_posted_and_tells(simulate, flat_
         told.append(progress)
         load.append(time.thread_time())  # of the thread that runs
 
-    simulation.pause()
-    assert simulation.paused
+    simulation.clock.pause()
+    assert simulation.clock.paused
     with InThread(simulation, 0.5, on_progress=on_progress):
         wait_for(lambda: len(told) >= 3)
         assert all(progress.paused and progress.time_s == 0.0 for progress in told)
@@ -94,10 +94,10 @@ def test_a_paused_run_stands_still_does_what_is_posted_and_tells(simulate, flat_
         calls, elapsed = len(told) - before, time.perf_counter() - start
         assert calls <= 10 * elapsed + 2
         assert load[before + calls - 1] - load[before] < 0.05 * elapsed
-        simulation.resume()
+        simulation.clock.resume()
     assert simulation.time_s == pytest.approx(0.5)
     assert not told[-1].paused
-    assert simulation.paused_s > 1.0
+    assert simulation.clock.paused_s > 1.0
     assert uav.mode.name == "TAKE_OFF"
 
 
@@ -106,14 +106,14 @@ def test_nothing_is_caught_up_after_a_pause(simulate, flat_data):
     simulation.run(0.1)
     with InThread(simulation, 10.0, speed=1.0):
         wait_for(lambda: simulation.time_s > 0.1)
-        simulation.pause()
+        simulation.clock.pause()
         time.sleep(2.0)
         at = simulation.time_s
         resumed = time.perf_counter()
-        simulation.resume()
+        simulation.clock.resume()
         wait_for(lambda: simulation.time_s > at + 0.02)
         came_to, since = simulation.time_s, time.perf_counter() - resumed
-        simulation.set_speed(None)
+        simulation.clock.set_speed(None)
     assert came_to - at < since + 0.1  # and not two seconds more
 
 
@@ -122,10 +122,10 @@ def test_full_speed_and_back(simulate, flat_data):
     simulation.run(0.1)
     start = time.perf_counter()
     with InThread(simulation, 3.0, speed=0.01):
-        wait_for(lambda: simulation.speed == 0.01)
-        simulation.set_speed(None)
+        wait_for(lambda: simulation.clock.speed == 0.01)
+        simulation.clock.set_speed(None)
     assert time.perf_counter() - start < 100.0  # not 300
-    assert simulation.speed is None
+    assert simulation.clock.speed is None
 
 
 def test_a_pause_from_on_progress(simulate, flat_data):
@@ -136,11 +136,11 @@ def test_a_pause_from_on_progress(simulate, flat_data):
     def on_progress(progress):
         seen.append((simulation.time_ns, progress.paused))
         if len(seen) == 1:
-            simulation.pause()
+            simulation.clock.pause()
         elif len(seen) == 3:
-            simulation.single_step(5)
+            simulation.clock.single_step(5)
         elif len(seen) == 5:
-            simulation.resume()
+            simulation.clock.resume()
 
     simulation.run(6.0, speed=10.0, on_progress=on_progress)
     assert [paused for _, paused in seen[1:5]] == [True] * 4
@@ -152,11 +152,11 @@ def test_a_pause_from_on_progress(simulate, flat_data):
 def test_refusals(simulate, flat_data):
     simulation = simulate(flat_data)
     with pytest.raises(CommandError, match="paused run"):
-        simulation.single_step()
-    simulation.pause()
+        simulation.clock.single_step()
+    simulation.clock.pause()
     with pytest.raises(CommandError, match="at least 1"):
-        simulation.single_step(0)
+        simulation.clock.single_step(0)
     with pytest.raises(CommandError, match="positive real-time factor"):
-        simulation.set_speed(-1.0)
+        simulation.clock.set_speed(-1.0)
     simulation.step(3)  # the caller's own steps ask nobody
     assert simulation.time_ns == 3_000_000

@@ -14,7 +14,7 @@ def test_under_the_ground(simulate, flat_data):
 
 def test_inside_a_tree(simulate, wood_data):
     free = simulate(wood_data)
-    x, y, _ = free.forest.position_map[0]
+    x, y, _ = free.world.forest.position_map[0]
     wood_data["uavs"] = [{"type": "surveyor", "position_m": [float(x), float(y)]}]
     with pytest.raises(PlacementError, match=r"lies in tree \d+.*nearest_free"):
         simulate(wood_data)
@@ -33,7 +33,7 @@ def test_nearest_free_finds_room_to_stand_and_climb(simulate, wood_data):
     simulation = simulate(wood_data)
     for uav in simulation.uavs.values():
         column = uav.position_map + np.array([[0, 0, 0], [0, 0, 1], [0, 0, 2]])
-        room = simulation.scene.clearance(column, 1.5, include_terrain=False)
+        room = simulation.world.scene.clearance(column, 1.5, include_terrain=False)
         assert room.distance.min() >= 1.4
 
 
@@ -42,7 +42,7 @@ def test_a_line_of_uavs_is_evenly_spaced(simulate, flat_data):
     simulation = simulate(flat_data)
     xs = [uav.position_map[0] for uav in simulation.uavs.values()]
     np.testing.assert_allclose(xs, [0, 5, 10, 15, 20])
-    assert simulation.uav_names == ("uav1", "uav2", "uav3", "uav4", "uav5")
+    assert simulation.vehicles.names == ("uav1", "uav2", "uav3", "uav4", "uav5")
 
 
 def test_missing_files_name_the_places_looked_at(simulate, flat_data):
@@ -84,7 +84,7 @@ def test_feet_in_the_ground_and_places_beyond_the_terrain(simulate, flat_data):
 def test_the_ground_reaches_around_the_origin(simulate, flat_data):
     flat_data["uavs"] = [{"type": "f450", "position_m": [-40.0, -40.0]}]
     simulation = simulate(flat_data)
-    hits = simulation.scene.cast([[-40.0, -40.0, 5.0]], [[0.0, 0.0, -1.0]], 30.0)
+    hits = simulation.world.scene.cast([[-40.0, -40.0, 5.0]], [[0.0, 0.0, -1.0]], 30.0)
     assert hits.distance[0] == pytest.approx(5.0)
 
 

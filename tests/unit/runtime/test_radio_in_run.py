@@ -60,7 +60,7 @@ def scenario_of(last_x: float = 60.0, count: int = 3, **radio: Any) -> Any:
 
 
 def heard(simulation: Simulation, row: int = 0) -> list[tuple[int, str]]:
-    node = simulation.nodes[row]
+    node = simulation.vehicles.nodes[row]
     assert isinstance(node, Talker)
     return node.heard
 
@@ -76,8 +76,8 @@ def test_everybody_with_a_radio_hears_the_others() -> None:
         late = [time_ns % 100_000_000 for time_ns, _ in heard(simulation)]
         assert min(late) >= 2_000_000  # latency and time on the air
         assert "/uav4/radio/hello" not in [topic.name for topic in simulation.graph.topics()]
-        assert simulation.radio is not None
-        assert simulation.radio.statistics.lost_on_link <= 4
+        assert simulation.vehicles.radio is not None
+        assert simulation.vehicles.radio.statistics.lost_on_link <= 4
 
 
 def test_ideal_links_take_no_time() -> None:
@@ -89,7 +89,7 @@ def test_ideal_links_take_no_time() -> None:
 
 def test_a_lost_radio_neither_sends_nor_hears() -> None:
     with Simulation(scenario_of(links="ideal")) as simulation:
-        simulation.inject_fault({"kind": "radio", "uav": "uav2", "at_s": 1.05, "until_s": 2.05})
+        simulation.faults.inject({"kind": "radio", "uav": "uav2", "at_s": 1.05, "until_s": 2.05})
         simulation.run(3.0)
         missing = [t for t, _ in heard(simulation, 1) if 1.05e9 < t < 2.05e9]
         assert missing == []
@@ -97,20 +97,20 @@ def test_a_lost_radio_neither_sends_nor_hears() -> None:
         assert len(to_first) == 20
         assert len(heard(simulation, 1)) == 40
         with pytest.raises(CommandError, match="uav4 has no radio; with one: uav1"):
-            simulation.inject_fault({"kind": "radio", "uav": "uav4"})
+            simulation.faults.inject({"kind": "radio", "uav": "uav4"})
 
 
 def test_a_snapshot_holds_what_is_on_the_air() -> None:
     with Simulation(scenario_of(latency_s=0.03, power_dbm=-18.0)) as simulation:
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         simulation.run(1.01)  # said, not yet heard
         kept = simulation.snapshot()
         simulation.run(1.5)
-        first, digest = heard(simulation), simulation.digest()
+        first, digest = heard(simulation), simulation.diagnostics.digest()
         simulation.restore(kept)
         simulation.run(1.5)
         assert heard(simulation) == first
-        assert simulation.digest() == digest
+        assert simulation.diagnostics.digest() == digest
         simulation.reset(seed=9)
         simulation.run(2.51)
         assert heard(simulation) != first
@@ -121,20 +121,20 @@ def test_slicing_and_threads_change_nothing(slices: int) -> None:
     digests = []
     for threads, parts in ((1, 1), (2, slices)):
         with Simulation(scenario_of(power_dbm=-18.0), threads=threads) as simulation:
-            simulation.enable_digest()
+            simulation.diagnostics.enable_digest()
             for _ in range(parts):
                 simulation.run(1.4 / parts)
-            digests.append(simulation.digest())
+            digests.append(simulation.diagnostics.digest())
     assert digests[0] == digests[1]
 
 
 def test_a_uav_that_comes_later_is_heard() -> None:
     with Simulation(scenario_of(links="ideal")) as simulation:
         simulation.run(0.5)
-        simulation.spawn_uav("late", "talker", [30.0, 20.0, 0.0])
+        simulation.vehicles.spawn("late", "talker", [30.0, 20.0, 0.0])
         simulation.run(0.5)
         assert "/late" in {name for _, name in heard(simulation)}
-        simulation.delete_uav("late")
+        simulation.vehicles.delete("late")
         simulation.run(0.5)
         assert heard(simulation)[-1][0] > 1.3e9
 
@@ -143,13 +143,13 @@ def test_a_uav_that_comes_later_is_heard() -> None:
 def test_a_uav_in_the_place_of_another_has_a_radio_of_its_own(links: str) -> None:
     with Simulation(scenario_of(links=links)) as simulation:
         for _ in range(2):
-            row = len(simulation.nodes)
-            simulation.spawn_uav("uav9", "talker", [30.0, 20.0, 0.0])
+            row = len(simulation.vehicles.nodes)
+            simulation.vehicles.spawn("uav9", "talker", [30.0, 20.0, 0.0])
             simulation.run(0.5)
             said = [name for _, name in heard(simulation)]
             assert said.count("/uav9") >= 4
             assert 8 <= len(heard(simulation, row)) <= 15  # of three, and nothing of before
-            simulation.delete_uav("uav9")
+            simulation.vehicles.delete("uav9")
             simulation.run(0.5)
             heard(simulation).clear()
 
@@ -178,9 +178,9 @@ def test_what_stands_between() -> None:
         }
     )
     with Simulation(scenario) as simulation:
-        forest = simulation.forest
+        forest = simulation.world.forest
         assert forest is not None
-        sight = LineOfSight(simulation.scene, forest)
+        sight = LineOfSight(simulation.world.scene, forest)
         tree = int(np.argmax(forest.height_m))
         x, y, _ = forest.position_map[tree]
         crown = 0.65 * forest.height_m[tree]

@@ -51,12 +51,12 @@ def test_a_publisher_with_a_timer(fly):
     first = logs[0]
     assert (first.name, first.level) == ("uav1.talker", Log.INFO)
     assert (first.file, first.function) == ("minimal_nodes.py", "Talker.timer_callback")
-    assert simulation.nodes[0].count == 4
+    assert simulation.vehicles.nodes[0].count == 4
 
 
 def test_a_subscriber_with_parameters(fly):
     simulation, _ = fly("Talker", "Listener", parameters={})
-    listener = simulation.nodes[1]
+    listener = simulation.vehicles.nodes[1]
     assert listener.lines == ["heard hello 0", "again hello 1", "again hello 2", "again hello 3"]
     results = listener.set_parameters(
         [ParameterSetting("speed", value=3.0), ParameterSetting("speed", value=2)]
@@ -72,14 +72,14 @@ def test_a_subscriber_with_parameters(fly):
 
 def test_a_client_that_waits_for_a_service_of_a_later_node(fly):
     simulation, logs = fly("AddClient", "AddServer", seconds=3.2)
-    client = simulation.nodes[0]
+    client = simulation.vehicles.nodes[0]
     assert client.sums == [42, 43, 44]
     assert [entry.msg for entry in logs] == ["42 at 1", "43 at 2", "44 at 3"]
 
 
 def test_nodes_with_a_latency_too(fly):
     simulation, _ = fly("AddClient", "AddServer", "Talker", "Listener", latency_s=0.05, seconds=3.4)
-    client, _, _, listener = simulation.nodes
+    client, _, _, listener = simulation.vehicles.nodes
     assert client.sums == [42, 43, 44]
     assert len(listener.lines) == 6
 

@@ -28,9 +28,9 @@ def forest(open_air):
 
 
 def digest_of(simulation):
-    simulation.enable_digest()
+    simulation.diagnostics.enable_digest()
     simulation.run(0.3)
-    return simulation.digest()
+    return simulation.diagnostics.digest()
 
 
 @pytest.mark.parametrize("world", [{}, {"seed": 3, "forest": FOREST}])
@@ -62,7 +62,7 @@ def test_where_the_seed_grows_the_world_other_seeds_are_refused_with_what_to_do(
         changed = forest.with_(world={"seed": 1})
     with Simulation(changed) as simulation, Simulation(forest) as old:
         simulation.reset(seed=7)
-        positions = [each.forest.position_map for each in (simulation, old)]
+        positions = [each.world.forest.position_map for each in (simulation, old)]
         assert np.array_equal(*positions) == (advice == "fixed")
 
 
@@ -88,12 +88,12 @@ def test_what_begins_after_a_reset_has_the_random_streams_of_its_seed(open_air):
             if first is not None:
                 kept = first(simulation)
                 simulation.restore(kept)
-            simulation.enable_digest()
+            simulation.diagnostics.enable_digest()
             simulation.run(0.2)
-            simulation.spawn_uav("uav2", "t", [20.0, 0.0, 5.0])
-            simulation.reset_uav("uav1")
+            simulation.vehicles.spawn("uav2", "t", [20.0, 0.0, 5.0])
+            simulation.vehicles.reset("uav1")
             simulation.run(0.4)
-            return simulation.digest()
+            return simulation.diagnostics.digest()
 
     def reset(simulation):
         simulation.reset(seed=7)

@@ -146,10 +146,10 @@ def test_commands_of_the_wrong_type(simulate, flat_data, wrong):
 def test_a_run_ends_at_its_duration(simulate, flat_data):
     flat_data["duration_s"] = 0.35
     simulation = simulate(flat_data)
-    assert not simulation.finished
+    assert not simulation.clock.finished
     simulation.run()
     assert simulation.time_s == pytest.approx(0.35)
-    assert simulation.finished
+    assert simulation.clock.finished
 
 
 def test_the_package_names_its_entrances():

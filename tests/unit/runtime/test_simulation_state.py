@@ -41,7 +41,7 @@ def test_playing_pausing_stopping(simulate, flat_data):
     assert enter(simulation, PLAYING) == ALREADY
     simulation.run(0.1)
     assert enter(simulation, PAUSED) == OK
-    assert simulation.paused
+    assert simulation.clock.paused
     assert state(simulation) == PAUSED
     assert enter(simulation, STOPPED) == OK
     assert state(simulation) == STOPPED
@@ -49,7 +49,7 @@ def test_playing_pausing_stopping(simulate, flat_data):
     assert enter(simulation, PAUSED) == WRONG_TRANSITION
     assert enter(simulation, PLAYING) == OK
     assert state(simulation) == PLAYING
-    assert not simulation.paused
+    assert not simulation.clock.paused
     for wanted in (4, 5, 77):
         assert enter(simulation, wanted) == WRONG_TRANSITION
 
@@ -59,7 +59,7 @@ def test_quitting_ends_a_run_and_later_ones(simulate, flat_data):
     with InThread(simulation, None, speed=1.0):
         simulation.post(lambda: enter(simulation, QUITTING)).result(10.0)
     assert simulation.time_s < 30.0
-    assert simulation.finished
+    assert simulation.clock.finished
     assert state(simulation) == QUITTING
     before = simulation.time_ns
     simulation.run(1.0)
@@ -69,9 +69,9 @@ def test_quitting_ends_a_run_and_later_ones(simulate, flat_data):
 
 def test_quitting_ends_a_paused_run(simulate, flat_data):
     simulation = simulate(flat_data)
-    simulation.pause()
+    simulation.clock.pause()
     with InThread(simulation, None):
-        simulation.quit()
+        simulation.clock.quit()
     assert simulation.time_ns == 0
 
 
@@ -88,33 +88,33 @@ def test_reset(simulate, flat_data):
 def test_reset_of_what_was_spawned(simulate, flat_data):
     simulation = simulate(flat_data)
     simulation.run(0.1)
-    simulation.spawn_uav("extra", "f450", [20.0, 0.0, 0.0])
+    simulation.vehicles.spawn("extra", "f450", [20.0, 0.0, 0.0])
     response = ask(simulation, "/reset_simulation", scope=1 | 2)
     assert code_of(response) == UNSUPPORTED
     assert "SCOPE_SPAWNED" in response.result.error_message
     assert code_of(ask(simulation, "/reset_simulation", scope=4)) == OK
-    assert simulation.uav_names == ("uav1",)
+    assert simulation.vehicles.names == ("uav1",)
     assert simulation.time_ns == 100_000_000
-    simulation.spawn_uav("extra", "f450", [20.0, 0.0, 0.0])
+    simulation.vehicles.spawn("extra", "f450", [20.0, 0.0, 0.0])
     assert code_of(ask(simulation, "/reset_simulation", scope=1 | 2 | 4)) == OK
-    assert simulation.uav_names == ("uav1",)
+    assert simulation.vehicles.names == ("uav1",)
     assert simulation.time_ns == 0
 
 
 def test_a_reset_that_cannot_be_is_told(simulate, flat_data):
     simulation = simulate(flat_data)
-    partner = simulation.add_partner("other", period_s=0.1)
+    partner = simulation.clock.add_partner("other", period_s=0.1)
     response = ask(simulation, "/reset_simulation")
     assert code_of(response) == FAILED
     assert "other" in response.result.error_message
     assert enter(simulation, STOPPED) == 102
-    assert not simulation.paused
+    assert not simulation.clock.paused
     partner.leave()
 
 
 def test_steps_are_answered_when_they_are_made(simulate, flat_data):
     simulation = simulate(flat_data)
-    simulation.pause()
+    simulation.clock.pause()
     first = ask_later(simulation, "/step_simulation", steps=7)
     second = ask_later(simulation, "/step_simulation", steps=250)
     assert not first
@@ -122,13 +122,13 @@ def test_steps_are_answered_when_they_are_made(simulate, flat_data):
         wait_for(lambda: second)
         assert simulation.time_ns == 257_000_000
         assert code_of(first[0]) == code_of(second[0]) == OK
-        simulation.quit()
+        simulation.clock.quit()
 
 
 @pytest.mark.parametrize(("steps", "code"), [(0, FAILED), (2**63, FAILED)])
 def test_steps_that_are_none(simulate, flat_data, steps, code):
     simulation = simulate(flat_data)
-    simulation.pause()
+    simulation.clock.pause()
     (response,) = ask_later(simulation, "/step_simulation", steps=steps)
     assert code_of(response) == code
 
@@ -144,15 +144,15 @@ def test_steps_while_playing_are_refused(simulate, flat_data):
 @pytest.mark.parametrize(
     ("end", "why"),
     [
-        (lambda s: s.resume(), "the simulation continues"),
+        (lambda s: s.clock.resume(), "the simulation continues"),
         (lambda s: s.reset(), "reset"),
-        (lambda s: s.quit(), "quits"),
+        (lambda s: s.clock.quit(), "quits"),
         (lambda s: s.close(), "closed"),
     ],
 )
 def test_steps_that_are_interrupted_are_answered(simulate, flat_data, end, why):
     simulation = simulate(flat_data)
-    simulation.pause()
+    simulation.clock.pause()
     answers = ask_later(simulation, "/step_simulation", steps=5)
     end(simulation)
     assert code_of(answers[0]) == FAILED
@@ -170,11 +170,11 @@ def send(simulation, steps):
 
 def test_the_action_tells_how_far_it_is(simulate, flat_data):
     simulation = simulate(flat_data)
-    simulation.pause()
+    simulation.clock.pause()
     goal, told, ended = send(simulation, 350)
     with InThread(simulation, 5.0):
         wait_for(lambda: ended)
-        simulation.quit()
+        simulation.clock.quit()
     progress = [(one.completed_steps, one.remaining_steps) for one in told]
     assert progress == [(100, 250), (200, 150), (300, 50), (350, 0)]
     ((status, response),) = ended
@@ -188,7 +188,7 @@ def test_the_action_can_be_cancelled_and_refused(simulate, flat_data):
     _, _, ended = send(simulation, 5)
     assert ended[0][0] is GoalStatus.ABORTED
     assert code_of(ended[0][1]) == INCORRECT_STATE
-    simulation.pause()
+    simulation.clock.pause()
     goal, _, ended = send(simulation, 1_000_000)
     behind, _, ended_behind = send(simulation, 20)
     assert goal.cancel()
@@ -197,7 +197,7 @@ def test_the_action_can_be_cancelled_and_refused(simulate, flat_data):
     with InThread(simulation, 5.0):
         wait_for(lambda: ended_behind)
         assert simulation.time_ns == 20_000_000
-        simulation.quit()
+        simulation.clock.quit()
     assert behind.status is GoalStatus.SUCCEEDED
     simulation.graph.actions.destroy_server("/simulate_steps")
     with pytest.raises(GraphError, match="no server"):
@@ -250,7 +250,7 @@ def test_requests_of_other_threads_reach_a_paused_run(simulate, flat_data):
     simulation = simulate(flat_data)
     session = simulation.gateway.open("client")
     answers = []
-    simulation.pause()
+    simulation.clock.pause()
     with InThread(simulation, 5.0):
         from volery.graph.service_reply import ServiceReply
 
@@ -261,5 +261,5 @@ def test_requests_of_other_threads_reach_a_paused_run(simulate, flat_data):
         assert simulation.time_ns == 3_000_000
         time.sleep(0.05)
         assert simulation.time_ns == 3_000_000
-        simulation.quit()
+        simulation.clock.quit()
     session.close()

@@ -77,15 +77,15 @@ def test_others_do_not_notice(simulate, mixed, deleted):
     changing = simulate(mixed)
     witness = Witness(changing, names)
     fly(changing, 0.3137)
-    changing.spawn_uav("extra", "full", [0.0, 40.0, 3.0])
+    changing.vehicles.spawn("extra", "full", [0.0, 40.0, 3.0])
     fly(changing, 0.4)
-    changing.delete_uav(deleted)
+    changing.vehicles.delete(deleted)
     fly(changing, 0.5)
-    changing.spawn_uav("later", "model", [0.0, 60.0, 3.0])
+    changing.vehicles.spawn("later", "model", [0.0, 60.0, 3.0])
     fly(changing, 0.4)
     assert witness.messages == seen.messages
     assert witness.states() == seen.states()
-    assert changing.uav_names[-1] == "later"
+    assert changing.vehicles.names[-1] == "later"
 
 
 def test_who_flies_a_trajectory_flies_on(simulate, flat_data):
@@ -98,9 +98,9 @@ def test_who_flies_a_trajectory_flies_on(simulate, flat_data):
         uav.follow_trajectory(Trajectory.from_samples([0.0, 3.0, 6.0], uav.position_map + path))
         simulation.run(1.5)
         if change:
-            simulation.spawn_uav("other", "f450", [50.0, 0.0, 0.0])
+            simulation.vehicles.spawn("other", "f450", [50.0, 0.0, 0.0])
             simulation.run(1.0)
-            simulation.delete_uav("other")
+            simulation.vehicles.delete("other")
         else:
             simulation.run(1.0)
         simulation.run(4.0)
@@ -113,7 +113,7 @@ def test_a_new_one_stands_measures_and_flies(simulate, flat_data):
     simulation = simulate(flat_data)
     simulation.run(0.5)
     heard = []
-    uav = simulation.spawn_uav("extra", "f450", [12.0, 3.0, 0.0])
+    uav = simulation.vehicles.spawn("extra", "f450", [12.0, 3.0, 0.0])
     simulation.graph.subscribe("/extra/imu", heard.append)
     transforms = []
     simulation.graph.subscribe("/tf_static", transforms.append)
@@ -127,12 +127,12 @@ def test_a_new_one_stands_measures_and_flies(simulate, flat_data):
     simulation.run(4.0)
     assert uav.mode is FlightMode.HOLD
     np.testing.assert_allclose(uav.position_map, [12.0, 3.0, 2.6], atol=0.2)
-    assert simulation.spawned == ("extra",)
+    assert simulation.vehicles.spawned == ("extra",)
 
 
 def test_in_the_air_it_holds(simulate, flat_data):
     simulation = simulate(flat_data)
-    uav = simulation.spawn_uav("extra", "f450", [12.0, 3.0, 6.0], [0.0, 0.0, 1.0, 0.0])
+    uav = simulation.vehicles.spawn("extra", "f450", [12.0, 3.0, 6.0], [0.0, 0.0, 1.0, 0.0])
     simulation.run(2.0)
     assert uav.mode is FlightMode.HOLD
     np.testing.assert_allclose(uav.position_map, [12.0, 3.0, 6.0], atol=0.05)
@@ -140,12 +140,12 @@ def test_in_the_air_it_holds(simulate, flat_data):
 
 def test_any_airframe_comes_with_the_usual_sensors(simulate, flat_data):
     simulation = simulate(flat_data)
-    assert simulation.spawnable[0] == "f450"
-    for row, kind in enumerate(simulation.spawnable):
-        uav = simulation.spawn_uav(f"new{row}", kind, [10.0 + 5.0 * row, 0.0, 0.0])
+    assert simulation.vehicles.spawnable[0] == "f450"
+    for row, kind in enumerate(simulation.vehicles.spawnable):
+        uav = simulation.vehicles.spawn(f"new{row}", kind, [10.0 + 5.0 * row, 0.0, 0.0])
         uav.take_off(2.0)
     simulation.run(6.0)
-    for row, kind in enumerate(simulation.spawnable):
+    for row, kind in enumerate(simulation.vehicles.spawnable):
         uav = simulation.uavs[f"new{row}"]
         assert uav.mode is FlightMode.HOLD, kind
         assert simulation.graph.publishers(f"/new{row}/imu") == 1
@@ -160,13 +160,13 @@ def test_newcomers_are_seen_and_met(simulate, flat_data):
     simulation.graph.subscribe("/uav1/laser/horizontal/scan", scans.append)
     simulation.run(0.2)
     assert np.isinf(scans[-1].message.ranges).all()
-    simulation.spawn_uav("under", "f450", [3.0, 0.0, 0.0])
+    simulation.vehicles.spawn("under", "f450", [3.0, 0.0, 0.0])
     simulation.run(0.2)
     assert scans[-1].message.ranges.min() == pytest.approx(3.0, abs=0.4)
-    above = simulation.spawn_uav("above", "f450", [3.0, 0.0, 2.0])
+    above = simulation.vehicles.spawn("above", "f450", [3.0, 0.0, 2.0])
     above.stop_rotors()
     simulation.run(2.0)
-    pairs = {(e.uav, e.partner) for e in simulation.events if e.kind == "collision"}
+    pairs = {(e.uav, e.partner) for e in simulation.diagnostics.events if e.kind == "collision"}
     assert ("above", "under") in pairs
     assert ("under", "above") in pairs
 
@@ -176,8 +176,8 @@ def test_what_is_deleted_is_gone(simulate, flat_data):
     simulation = simulate(flat_data)
     gone = simulation.uavs["uav1"]
     simulation.run(0.1)
-    simulation.delete_uav("uav1")
-    assert simulation.uav_names == ("uav2",)
+    simulation.vehicles.delete("uav1")
+    assert simulation.vehicles.names == ("uav2",)
     assert not [t for t in simulation.graph.topics() if "uav1" in t.name and t.publishers]
     assert not [t for t in simulation.graph.topics() if "uav1" in t.name and t.subscribers]
     assert not [s for s in simulation.graph.services() if "uav1" in s]
@@ -193,29 +193,29 @@ def test_what_is_deleted_is_gone(simulate, flat_data):
     simulation.run(4.0)
     assert simulation.uavs["uav2"].mode is FlightMode.HOLD
     with pytest.raises(CommandError, match="at least one"):
-        simulation.delete_uav("uav2")
+        simulation.vehicles.delete("uav2")
     with pytest.raises(CommandError, match="no UAV 'uav1'"):
-        simulation.delete_uav("uav1")
+        simulation.vehicles.delete("uav1")
 
 
 def test_nodes_begin_and_end_with_their_uav(simulate, wood_data):
     simulation = simulate(wood_data)
-    nodes = len(simulation.nodes)
+    nodes = len(simulation.vehicles.nodes)
     simulation.run(0.2)
     other = simulation.uavs["uav1"]
     room = np.add(other.position_map, [0.0, -2.0, 0.0])
-    simulation.spawn_uav("third", other.type_name, room)
-    own = [node for node in simulation.nodes if node.get_namespace() == "/third"]
+    simulation.vehicles.spawn("third", other.type_name, room)
+    own = [node for node in simulation.vehicles.nodes if node.get_namespace() == "/third"]
     assert len(own) == nodes // 2
     heard = []
     simulation.graph.subscribe("/third/gap_following/phase", heard.append)
     simulation.run(1.0)
     assert heard
-    simulation.delete_uav("third")
+    simulation.vehicles.delete("third")
     heard.clear()
     simulation.run(1.0)
     assert not heard
-    assert len(simulation.nodes) == nodes
+    assert len(simulation.vehicles.nodes) == nodes
 
 
 def test_faults_find_their_uav_or_nobody(simulate, flat_data):
@@ -230,8 +230,8 @@ def test_faults_find_their_uav_or_nobody(simulate, flat_data):
     ]
     simulation = simulate(flat_data)
     simulation.run(0.1)
-    simulation.delete_uav("uav1")
-    simulation.spawn_uav("extra", "f450", [60.0, 0.0, 0.0])
+    simulation.vehicles.delete("uav1")
+    simulation.vehicles.spawn("extra", "f450", [60.0, 0.0, 0.0])
     counts = {"uav2": 0, "uav3": 0, "extra": 0}
     for name in counts:
         simulation.graph.subscribe(
@@ -242,23 +242,25 @@ def test_faults_find_their_uav_or_nobody(simulate, flat_data):
     np.testing.assert_array_equal(health, [[1, 1, 1, 1], [1, 1, 0, 1], [1, 1, 1, 1]])
     assert counts["uav2"] == counts["extra"] == 180
     assert counts["uav3"] < 70
-    assert {e.uav for e in simulation.events if e.kind == "fault"} == {"uav3"}
+    assert {e.uav for e in simulation.diagnostics.events if e.kind == "fault"} == {"uav3"}
 
 
 def test_a_reset_brings_back_the_fleet_of_the_start(simulate, wood_data):
     def digest(change):
         simulation = simulate(wood_data)
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         if change:
             simulation.run(0.3)
-            simulation.spawn_uav("extra", next(iter(simulation.types)), [5.0, 5.0, 30.0])
+            simulation.vehicles.spawn(
+                "extra", next(iter(simulation.vehicles.types)), [5.0, 5.0, 30.0]
+            )
             simulation.run(0.3)
-            simulation.delete_uav("uav1")
+            simulation.vehicles.delete("uav1")
             simulation.run(0.3)
             simulation.reset()
-        assert simulation.uav_names == ("uav1", "uav2")
+        assert simulation.vehicles.names == ("uav1", "uav2")
         simulation.run(1.5)
-        return simulation.digest()
+        return simulation.diagnostics.digest()
 
     assert digest(True) == digest(False)
 
@@ -268,13 +270,13 @@ def test_one_of_the_same_name_is_another(simulate, flat_data):
     flat_data["uavs"].append({"type": "f450", "position_m": [20.0, 0.0, 5.0]})
     simulation = simulate(flat_data)
     simulation.run(0.2)
-    simulation.delete_uav("uav2")
-    new = simulation.spawn_uav("uav2", "f450", [30.0, 0.0, 0.0])
-    assert simulation.spawned == ("uav2",)
+    simulation.vehicles.delete("uav2")
+    new = simulation.vehicles.spawn("uav2", "f450", [30.0, 0.0, 0.0])
+    assert simulation.vehicles.spawned == ("uav2",)
     assert new.mode is FlightMode.LANDED
     assert new.position_map[0] == 30.0
     simulation.reset()
-    assert simulation.spawned == ()
+    assert simulation.vehicles.spawned == ()
     assert simulation.uavs["uav2"].position_map[0] == 20.0
 
 
@@ -282,7 +284,7 @@ def test_snapshots_are_of_one_fleet(simulate, flat_data):
     simulation = simulate(flat_data)
     simulation.run(0.2)
     kept = simulation.snapshot()
-    simulation.spawn_uav("extra", "f450", [20.0, 0.0, 0.0])
+    simulation.vehicles.spawn("extra", "f450", [20.0, 0.0, 0.0])
     with pytest.raises(SnapshotError, match=r"spawned or deleted.*snapshot of uav1"):
         simulation.restore(kept)
     both = simulation.snapshot()
@@ -291,7 +293,7 @@ def test_snapshots_are_of_one_fleet(simulate, flat_data):
     simulation.restore(both)
     simulation.run(0.5)
     np.testing.assert_array_equal(simulation.uavs["extra"].position_map, there)
-    simulation.delete_spawned()
+    simulation.vehicles.delete_spawned()
     simulation.restore(kept)
     assert simulation.time_s == pytest.approx(0.2)
 
@@ -299,11 +301,11 @@ def test_snapshots_are_of_one_fleet(simulate, flat_data):
 def test_a_spawned_one_goes_back_to_where_it_began(simulate, flat_data):
     simulation = simulate(flat_data)
     simulation.run(1.0)
-    uav = simulation.spawn_uav("extra", "f450", [20.0, 0.0, 4.0])
+    uav = simulation.vehicles.spawn("extra", "f450", [20.0, 0.0, 4.0])
     uav.set_rotor_health(0, 0.9)
     uav.command_velocity([1.0, 0.0, 0.0])
     simulation.run(1.0)
-    simulation.reset_uav("extra")
+    simulation.vehicles.reset("extra")
     np.testing.assert_array_equal(uav.position_map, [20.0, 0.0, 4.0])
     assert simulation._engine.fleet.state.rotor_health[1, 0] == 1.0
     simulation.run(1.0)
@@ -314,7 +316,7 @@ def test_before_the_first_step_it_is_as_if_it_had_been_there(simulate, flat_data
     def measured(data, spawn):
         simulation = simulate(data)
         if spawn:
-            simulation.spawn_uav("uav2", "f450", [20.0, 0.0, 5.0])
+            simulation.vehicles.spawn("uav2", "f450", [20.0, 0.0, 5.0])
         seen = Witness(simulation, ["uav1", "uav2"])
         simulation.run(0.5)
         return sorted(seen.messages), seen.states()
@@ -338,9 +340,9 @@ def test_before_the_first_step_it_is_as_if_it_had_been_there(simulate, flat_data
 def test_names_and_types_that_cannot_be(simulate, flat_data, name, kind, fault):
     simulation = simulate(flat_data)
     with pytest.raises(SpawnError) as raised:
-        simulation.spawn_uav(name, kind, [20.0, 0.0, 0.0])
+        simulation.vehicles.spawn(name, kind, [20.0, 0.0, 0.0])
     assert raised.value.fault is fault
-    assert simulation.uav_names == ("uav1",)
+    assert simulation.vehicles.names == ("uav1",)
 
 
 @pytest.mark.parametrize(
@@ -356,8 +358,8 @@ def test_names_and_types_that_cannot_be(simulate, flat_data, name, kind, fault):
 def test_places_that_cannot_be(simulate, flat_data, place, says):
     simulation = simulate(flat_data)
     with pytest.raises(PlacementError, match=says):
-        simulation.spawn_uav("extra", "f450", place)
-    assert simulation.uav_names == ("uav1",)
+        simulation.vehicles.spawn("extra", "f450", place)
+    assert simulation.vehicles.names == ("uav1",)
 
 
 def test_not_in_the_middle_of_a_tick(simulate, flat_data):
@@ -366,19 +368,19 @@ def test_not_in_the_middle_of_a_tick(simulate, flat_data):
 
     def spawn(_published):
         with pytest.raises(CommandError, match="post"):
-            simulation.spawn_uav("extra", "f450", [20.0, 0.0, 0.0])
-        seen.append(simulation.post(lambda: simulation.spawn_uav("extra", "f450", [20, 0, 0])))
+            simulation.vehicles.spawn("extra", "f450", [20.0, 0.0, 0.0])
+        seen.append(simulation.post(lambda: simulation.vehicles.spawn("extra", "f450", [20, 0, 0])))
         subscription.cancel()
 
     subscription = simulation.graph.subscribe("/uav1/imu", spawn)
     simulation.run(0.1)
     assert seen[0].result().name == "extra"
-    assert simulation.uav_names == ("uav1", "extra")
+    assert simulation.vehicles.names == ("uav1", "extra")
 
 
 def test_noise_follows_from_the_name(simulate, flat_data):
     simulation = simulate(flat_data)
-    simulation.spawn_uav("extra", "f450", [20.0, 0.0, 0.0])
-    keys = {f.id.path: f.key for f in simulation._crew.fitted}
+    simulation.vehicles.spawn("extra", "f450", [20.0, 0.0, 0.0])
+    keys = {f.id.path: f.key for f in simulation._manager.fitted}
     assert keys["extra/imu"] == stream_key(simulation.scenario.seed, "extra/imu/imu")
     assert keys["extra/imu"] != keys["uav1/imu"]

@@ -241,11 +241,11 @@ def test_applied_commands_are_the_same_in_equal_runs(simulate, flat_data):
 
     def digest():
         simulation = simulate(flat_data)
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         for _ in range(5):
             fly(simulation, 1.0, "uav1")
             simulation.run(0.1)
-        return simulation.digest()
+        return simulation.diagnostics.digest()
 
     assert digest() == digest()
 
@@ -262,7 +262,7 @@ def test_a_goal_below_the_ground_is_refused(pair, z):
 
 def test_a_goal_inside_an_obstacle_is_refused(simulate, wood_data):
     wood = simulate(wood_data)
-    trunk = wood.forest.position_map[0] + [0.0, 0.0, 1.0]
+    trunk = wood.world.forest.position_map[0] + [0.0, 0.0, 1.0]
     x, y, z = trunk.tolist()
     response = ask(wood, "/uav1/go_to", position={"x": x, "y": y, "z": z})
     assert not response.success

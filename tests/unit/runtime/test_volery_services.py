@@ -23,7 +23,7 @@ def test_weather(simulate, flat_data):
     assert (response.profile, response.gusts) == ("uniform", 0)
     refused(ask(simulation, "/volery/set_weather", wind={"x": 1e6}), "out of range")
     refused(ask(simulation, "/volery/set_weather", w20=float("nan")), "w20")
-    assert simulation.weather.w20_m_s == 7.0
+    assert simulation.world.weather.w20_m_s == 7.0
 
 
 def test_gusts(simulate, flat_data):
@@ -31,7 +31,7 @@ def test_gusts(simulate, flat_data):
     gust = {"amplitude": {"x": 5.0}, "rise": 0.5}
     assert ask(simulation, "/volery/gust", **gust, duration=2.0).success
     assert ask(simulation, "/volery/gust", **gust).success
-    first, second = simulation.weather.gusts
+    first, second = simulation.world.weather.gusts
     assert first.end_s == 2.0
     assert second.end_s == float("inf")
     assert ask(simulation, "/volery/get_weather").gusts == 2
@@ -44,10 +44,10 @@ def test_faults(simulate, flat_data):
     fault = {"kind": "motor", "uav": "uav1", "rotor": 1, "thrust_factor": 0.5}
     assert ask(simulation, "/volery/inject_fault", fault=json.dumps(fault)).success
     simulation.run(0.01)
-    assert simulation.events[-1].kind.name == "FAULT"
+    assert simulation.diagnostics.events[-1].kind.name == "FAULT"
     assert ask(simulation, "/volery/end_fault", fault=json.dumps(fault)).success
     simulation.run(0.01)
-    assert simulation.events[-1].detail == "fault over: motor"
+    assert simulation.diagnostics.events[-1].detail == "fault over: motor"
     assert simulation._engine.fleet.state.rotor_health[0, 1] == 1.0
     gust = {"kind": "gust", "velocity_m_s": [1.0, 0.0, 0.0]}
     refused(ask(simulation, "/volery/end_fault", fault=json.dumps(gust)), "cannot be ended")
@@ -62,10 +62,10 @@ def test_faults(simulate, flat_data):
 def test_speed(simulate, flat_data):
     simulation = simulate(flat_data)
     assert ask(simulation, "/volery/set_speed", factor=2.5).success
-    assert simulation.speed == 2.5
+    assert simulation.clock.speed == 2.5
     for factor in (0.0, -3.0):
         assert ask(simulation, "/volery/set_speed", factor=factor).success
-        assert simulation.speed is None
+        assert simulation.clock.speed is None
     refused(ask(simulation, "/volery/set_speed", factor=float("nan")), "speed")
 
 
@@ -176,20 +176,20 @@ def test_kept_states_are_bounded(simulate, flat_data):
 def test_what_follows_a_restore_is_the_same_again(simulate, flat_data):
     flat_data["uavs"][0]["on_start"] = "take_off"
     simulation = simulate(flat_data)
-    simulation.enable_digest()
+    simulation.diagnostics.enable_digest()
     simulation.run(0.5)
     ask(simulation, "/volery/save_snapshot", name="there")
     simulation.run(0.5)
-    first = simulation.digest()
+    first = simulation.diagnostics.digest()
     simulation.post(lambda: ask(simulation, "/volery/restore_snapshot", name="there"))
     simulation.process_commands()
     simulation.run(0.5)
-    assert simulation.digest() == first
+    assert simulation.diagnostics.digest() == first
 
 
 def test_states_that_cannot_be_kept_are_told(simulate, flat_data):
     simulation = simulate(flat_data)
-    partner = simulation.add_partner("other", period_s=0.1)
+    partner = simulation.clock.add_partner("other", period_s=0.1)
     refused(ask(simulation, "/volery/save_snapshot", name="a"), "other")
     partner.leave()
 

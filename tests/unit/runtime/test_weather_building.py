@@ -59,12 +59,12 @@ def test_a_run_in_turbulence_is_the_same_however_it_is_cut(simulate, flat_data):
     digests, air = [], []
     for cuts in ([2.0], [0.013, 0.5, 0.487, 1.0]):
         simulation = simulate(flat_data)
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         (uav,) = simulation.uavs.values()
         uav.take_off()
         for cut in cuts:
             simulation.run(cut)
-        digests.append(simulation.digest())
+        digests.append(simulation.diagnostics.digest())
         air.append(simulation._engine.fleet.state.air_velocity_map.copy())
     assert digests[0] == digests[1]
     assert np.abs(air[0] - [3, 0, 0]).max() > 1e-3
@@ -75,13 +75,13 @@ def test_weather_changes_while_it_runs(simulate, flat_data):
     (uav,) = simulation.uavs.values()
     uav.take_off()
     simulation.run(2.0)
-    simulation.gust_now((4.0, 0.0, 0.0), rise_s=0.2, lasts_s=1.0)
-    assert simulation.weather.gusts == (Gust((4, 0, 0), 2.0, 0.2, 3.0),)
+    simulation.world.gust_now((4.0, 0.0, 0.0), rise_s=0.2, lasts_s=1.0)
+    assert simulation.world.weather.gusts == (Gust((4, 0, 0), 2.0, 0.2, 3.0),)
     simulation.run(0.5)
     air = simulation._engine.fleet.state.air_velocity_map
     np.testing.assert_array_equal(air, [[4, 0, 0]])
     simulation.run(0.6)
     assert not air.any()
-    simulation.set_weather(Weather((0.0, 1.0, 0.0)))
+    simulation.world.set_weather(Weather((0.0, 1.0, 0.0)))
     simulation.run(0.01)
     np.testing.assert_array_equal(air, [[0, 1, 0]])

@@ -35,7 +35,7 @@ def listen(simulation, topic):
 
 def test_a_scenario_has_weather_and_hour(simulate, flat_data):
     flat_data["world"] = {"weather": WET, "light": {"hour_of_day": 7.5, "date": "2025-03-20"}}
-    weather = simulate(flat_data).weather
+    weather = simulate(flat_data).world.weather
     assert weather.particles == Particles(rain_mm_h=12.0, fog_visibility_m=150.0)
     assert weather.hour_of_day == 7.5
 
@@ -62,19 +62,19 @@ def test_services_set_some_fields_or_all(simulate, flat_data):
         simulation, "/volery/set_weather", only=["rain", "hour_of_day"], rain=8.0, hour_of_day=12.0
     )
     assert some.success
-    assert simulation.weather.velocity_map == (3.0, 0.0, 0.0)
+    assert simulation.world.weather.velocity_map == (3.0, 0.0, 0.0)
     told = ask(simulation, "/volery/get_weather")
     assert (told.wind.x, told.w20, told.rain, told.snow, told.hour_of_day) == (3, 5, 8, 0, 12)
-    visibility = 1 / (1 / 20e3 + 1 / simulation.weather.particles.visibility_m)
+    visibility = 1 / (1 / 20e3 + 1 / simulation.world.weather.particles.visibility_m)
     assert told.visibility == pytest.approx(visibility)
     assert told.sun_elevation == pytest.approx(math.radians(90 - 47.4 + 23.44), abs=0.005)
     assert told.sun_azimuth == pytest.approx(math.pi, abs=0.05)
     assert ask(simulation, "/volery/set_weather", fog_visibility=80.0).success
-    assert simulation.weather.particles == Particles(fog_visibility_m=80.0)
-    assert simulation.weather.velocity_map == (0.0, 0.0, 0.0)
-    assert simulation.weather.hour_of_day == 12.0
+    assert simulation.world.weather.particles == Particles(fog_visibility_m=80.0)
+    assert simulation.world.weather.velocity_map == (0.0, 0.0, 0.0)
+    assert simulation.world.weather.hour_of_day == 12.0
     assert ask(simulation, "/volery/set_weather").success
-    assert simulation.weather.particles == CLEAR_AIR
+    assert simulation.world.weather.particles == CLEAR_AIR
 
 
 def test_services_refuse_what_cannot_be(simulate, flat_data):
@@ -89,7 +89,7 @@ def test_services_refuse_what_cannot_be(simulate, flat_data):
         response = ask(simulation, "/volery/set_weather", **fields)
         assert not response.success
         assert word in response.message
-    assert simulation.weather.particles == CLEAR_AIR
+    assert simulation.world.weather.particles == CLEAR_AIR
 
 
 def test_the_weather_is_told_at_once_and_at_each_change(simulate, flat_data):
@@ -121,7 +121,7 @@ def test_what_is_told_can_be_commanded(simulate, flat_data):
     command = other.graph.advertise("/weather_command", "volery_interfaces/msg/Weather")
     command.publish(heard[-1])
     other.run(0.01)
-    assert other.weather == one.weather
+    assert other.world.weather == one.world.weather
     broken = zero_message("volery_interfaces/msg/Weather")
     broken.rain = -1.0
     command.publish(broken)
@@ -131,7 +131,7 @@ def test_what_is_told_can_be_commanded(simulate, flat_data):
     endless.gusts = [gust(Vector3(1e9, 0.0, 0.0), 0.0, 1.0, 0.0, still)]
     command.publish(endless)
     other.run(0.01)
-    assert other.weather == one.weather
+    assert other.world.weather == one.world.weather
 
 
 def test_a_recorded_weather_plays_back_exactly(simulate, seeing_data, tmp_path):
@@ -158,7 +158,7 @@ def test_a_recorded_weather_plays_back_exactly(simulate, seeing_data, tmp_path):
     )
     again.run(0.25)
     clouds_again, pictures_again, place_again = flown(again)
-    assert again.weather == first.weather
+    assert again.world.weather == first.world.weather
     np.testing.assert_array_equal(place_again, place)
     for one, other in ((clouds, clouds_again), (pictures, pictures_again)):
         assert len(one) >= 4
@@ -183,16 +183,16 @@ def test_sensors_see_a_change_at_once_and_a_restore_takes_it_back(simulate, seei
     assert all(a != b for a, b in zip(seen[0][-len(hidden) :], hidden, strict=True))
     assert np.asarray(pictures[-1].data).std() < 0.5 * np.frombuffer(seen[1][-1], np.uint8).std()
     simulation.restore(clear)
-    assert simulation.weather.particles == CLEAR_AIR
+    assert simulation.world.weather.particles == CLEAR_AIR
     clouds.clear()
     pictures.clear()
     simulation.run(0.3)
     assert [bytes(m.data) for m in clouds] == seen[0][-len(clouds) :]
     assert [bytes(m.data) for m in pictures] == seen[1][-len(pictures) :]
     simulation.restore(foggy)
-    assert simulation.weather.particles == Particles(fog_visibility_m=30.0)
+    assert simulation.world.weather.particles == Particles(fog_visibility_m=30.0)
     simulation.reset()
-    assert simulation.weather.particles == CLEAR_AIR
+    assert simulation.world.weather.particles == CLEAR_AIR
 
 
 def test_rain_is_the_same_in_runs_that_are_cut_otherwise(simulate, seeing_data):
@@ -200,10 +200,10 @@ def test_rain_is_the_same_in_runs_that_are_cut_otherwise(simulate, seeing_data):
     digests = []
     for pieces, threads in ((1, 1), (7, 2)):
         simulation = simulate(seeing_data, threads=threads)
-        simulation.enable_digest()
+        simulation.diagnostics.enable_digest()
         for _ in range(pieces):
             simulation.run(0.35 / pieces)
-        digests.append(simulation.digest())
+        digests.append(simulation.diagnostics.digest())
     assert digests[0] == digests[1]
 
 

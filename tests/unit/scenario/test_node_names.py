@@ -103,7 +103,7 @@ def planner_of_another_package(tmp_path, monkeypatch):
 def test_nodes_of_other_packages_fly_by_name(planner_of_another_package, flat_data, simulate):
     simulation = simulate({**flat_data, "nodes": [{"node": planner_of_another_package}]})
     simulation.run(0.01)
-    assert [type(node).__name__ for node in simulation.nodes] == ["Stranger"]
+    assert [type(node).__name__ for node in simulation.vehicles.nodes] == ["Stranger"]
 
 
 def test_a_confined_scenario_starts_no_node_of_another_package(planner_of_another_package):

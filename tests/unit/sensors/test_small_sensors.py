@@ -86,7 +86,7 @@ def test_imu_noise_is_as_its_model_says(simulate, flat_data):
     flat_data["uavs"][0]["count"] = 5
     simulation = simulate(flat_data)
     rows = [[] for _ in range(5)]
-    for i, name in enumerate(simulation.uav_names):
+    for i, name in enumerate(simulation.vehicles.names):
         simulation.graph.subscribe(f"/{name}/imu", lambda m, i=i: rows[i].append(m.message))
     simulation.run(20.0)
     gyro = np.array([[vector(m.angular_velocity) for m in row[200:]] for row in rows])
@@ -148,7 +148,7 @@ def test_sonar_measures_the_height_and_says_when_it_cannot(simulate, flat_data):
     ]
     simulation = simulate(flat_data)
     got = {}
-    for name in simulation.uav_names:
+    for name in simulation.vehicles.names:
         simulation.graph.subscribe(f"/{name}/range", lambda m, n=name: got.update({n: m.message}))
     simulation.run(0.05)
     assert got["uav1"].range == pytest.approx(5.0 - 0.05, abs=1e-3)

@@ -28,7 +28,7 @@ class Flight:
         self._thread.start()
 
     def close(self):
-        self.simulation.quit()
+        self.simulation.clock.quit()
         self._thread.join()
         self.simulation.close()
 

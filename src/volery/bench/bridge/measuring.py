@@ -27,8 +27,8 @@ from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.core.errors import VoleryError
-from volery.graph.graph import Publisher
 from volery.graph.messages import Header, Time, message_type
+from volery.graph.topics import Publisher
 from volery.runtime import Simulation
 from volery.scenario.load import load_scenario, parse_scenario
 from volery.scenario.schema import Scenario
@@ -125,7 +125,7 @@ def in_real_time(scenario: Scenario) -> Iterator[tuple[Simulation, BridgeHost]]:
     with Simulation(scenario) as simulation:
         simulation.step(1)  # compile before any measurement
         with BridgeHost(simulation.gateway) as bridges:
-            simulation.use_low_latency()
+            simulation.gateway.use_low_latency()
             over = threading.Event()
             thread = threading.Thread(target=_run, args=(simulation, over))
             thread.start()
@@ -218,7 +218,7 @@ def stop_latencies(world: World) -> list[float]:
     simulation.post(
         lambda: simulation.graph.create_service("/bench/recover", _TRIGGER, recover)
     ).result()
-    simulation.outlet.watch = look
+    simulation.diagnostics.on_advance(look)
     sent = world.ros_tcp("stops", "uav1", _STOPS)["sent_ns"]
     return [1e-9 * (stop - send) for send, stop in zip(sent, stopped_ns, strict=True)]
 
@@ -258,7 +258,7 @@ def stream_figures() -> dict[str, float]:
     with running(stream_scenario()) as world:
         topics = [
             f"/{uav}/laser/{name}/scan"
-            for uav in world.simulation.uav_names
+            for uav in world.simulation.vehicles.names
             for name in ("horizontal", "nodding")
         ]
         published: dict[tuple[str, int], int] = {}

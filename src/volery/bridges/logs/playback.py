@@ -16,7 +16,8 @@ from volery.bridges.logs.log_formats import open_chunks
 from volery.bridges.logs.timeline import Shown, Timeline, TimelinePosition
 from volery.bridges.topic_patterns import topic_filter
 from volery.core.errors import GraphError, RecordingError
-from volery.graph.graph import Graph, Publisher
+from volery.graph.graph import Graph
+from volery.graph.topics import Publisher
 
 LATCHED = ("/tf_static", "/map", "/weather", "/volery/scenario", "/robot_description")
 """Topics whose last message is sent to later subscribers."""

@@ -17,8 +17,9 @@ from dataclasses import dataclass
 from volery.bridges.logs.log_writer import LogWriter
 from volery.bridges.logs.recorded_topics import recorded_topics
 from volery.core.errors import RecordingError
-from volery.graph.graph import Graph, Subscription
+from volery.graph.graph import Graph
 from volery.graph.messages import Published
+from volery.graph.topics import Subscription
 
 
 @dataclass(frozen=True)

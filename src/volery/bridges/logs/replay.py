@@ -24,8 +24,9 @@ from volery.bridges.logs.stream import LogStream
 from volery.bridges.topic_patterns import renamer, topic_filter
 from volery.core.clock import NS_PER_S, ns_from_s
 from volery.core.errors import GraphError, RecordingError
-from volery.graph.graph import Graph, Publisher
+from volery.graph.graph import Graph
 from volery.graph.nodes.deferred_execution import Deferred
+from volery.graph.topics import Publisher
 
 EVERYTHING = ("/**",)
 CLOCK = ("/clock",)

@@ -22,13 +22,13 @@ from volery.bridges.nodes.mirrored_graph import MirroredGraph
 from volery.core.clock import NS_PER_S, ns_from_s
 from volery.core.errors import GraphError
 from volery.graph.connection import GraphConnection
-from volery.graph.graph import Subscription
 from volery.graph.messages import Clock, Published, Time, message_type
 from volery.graph.nodes.failures import reported_failures
 from volery.graph.nodes.launch import Context
 from volery.graph.nodes.presence import TYPE as PRESENCE_TYPE
 from volery.graph.nodes.presence import presence_topic
 from volery.graph.qos import QoSProfile
+from volery.graph.topics import Subscription
 
 ClockKind = Literal["auto", "simulated", "wall"]
 _LONGEST_WAIT_S = 0.2

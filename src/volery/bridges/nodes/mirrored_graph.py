@@ -7,11 +7,12 @@ from typing import Any
 
 from volery.core.errors import GraphError
 from volery.graph.connection import GraphConnection, HostsNodes, call_and_wait
-from volery.graph.graph import AsyncHandler, Callback, Graph, Publisher, Subscription
+from volery.graph.graph import AsyncHandler, Graph
 from volery.graph.messages import Published, type_name
 from volery.graph.qos import DEFAULT_QOS, QoSProfile
 from volery.graph.service_reply import ServiceReply
 from volery.graph.subscription_queue import SubscriptionQueue
+from volery.graph.topics import Callback, Publisher, Subscription
 
 _CALL_TIMEOUT_S = 10.0
 

@@ -15,9 +15,9 @@ from volery.bridges.ros1.writer_thread import Ros1WriterThread
 from volery.bridges.shared_names import SharedNames
 from volery.core.errors import GraphError
 from volery.graph.codecs.ros1 import ros1_codec
-from volery.graph.graph import TopicInfo
 from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Session
+from volery.graph.topics import TopicInfo
 
 _SERVICE_TIMEOUT_S = 30.0
 

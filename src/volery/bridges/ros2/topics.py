@@ -15,8 +15,8 @@ from volery.bridges.ros2.writer_thread import Ros2WriterThread
 from volery.bridges.shared_names import SharedNames
 from volery.core.errors import GraphError
 from volery.graph.codecs.cdr import decode_cdr
-from volery.graph.graph import TopicInfo
 from volery.graph.session import Session
+from volery.graph.topics import TopicInfo
 
 
 class Ros2Topics:

@@ -19,9 +19,9 @@ from volery.bridges.ros_tcp.outbox import RosTcpOutbox
 from volery.bridges.ros_tcp.payloads import payloads_of
 from volery.bridges.ros_tcp.wire import Generation, RosTcpFrame, number_field
 from volery.core.errors import BridgeError, GraphError
-from volery.graph.graph import TopicInfo
 from volery.graph.session import Gateway
 from volery.graph.subscription_queue import Wake
+from volery.graph.topics import TopicInfo
 
 _REFUSED = re.compile(r"Not registered to publish topic '([^']+)'")
 """Endpoints' error for each message of an unknown type."""

@@ -18,9 +18,9 @@ from volery.core.clock import stamp_from_ns
 from volery.core.errors import GraphError
 from volery.graph.codecs.json_codec import JsonCodec
 from volery.graph.codecs.ros1_names import ros2_name
-from volery.graph.graph import TopicInfo
 from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Gateway, Session, SessionInfo
+from volery.graph.topics import TopicInfo
 
 SIMULATION_NODE = "/volery"
 PREFIX = "/rosapi/"

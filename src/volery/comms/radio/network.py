@@ -21,8 +21,9 @@ from volery.comms.protocol import StationFrame, StationFrameKind
 from volery.comms.radio.channel import RadioChannel
 from volery.comms.server.settings import RouterSettings
 from volery.core.errors import CommandError, CommsError
-from volery.graph.graph import Graph, Publisher, Subscription
+from volery.graph.graph import Graph
 from volery.graph.messages import Published
+from volery.graph.topics import Publisher, Subscription
 from volery.scenario.radio import RelayedTopic
 
 _TICK_S = 0.5

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from volery.graph.graph import Publisher, Subscription
 from volery.graph.message_copies import message_copier
 from volery.graph.nodes.deferred_execution import DeferredExecutor
+from volery.graph.topics import Publisher, Subscription
 
 
 class NodePublisher(Publisher):

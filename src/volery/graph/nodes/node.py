@@ -23,7 +23,7 @@ from functools import partial
 from typing import Any
 
 from volery.core.errors import GraphError, NodeError, VoleryError
-from volery.graph.graph import Subscription, check_period
+from volery.graph.graph import check_period
 from volery.graph.message_copies import copy_message
 from volery.graph.messages import Published, message_type
 from volery.graph.nodes.deferred_execution import DeferredExecutor
@@ -37,6 +37,7 @@ from volery.graph.nodes.service_client import Client
 from volery.graph.nodes.timer import Timer, Timers
 from volery.graph.parameters import ParameterSetting
 from volery.graph.qos import DEFAULT_DEPTH, QoSProfile, profile_of
+from volery.graph.topics import Subscription
 
 __all__ = ["Clock", "Context", "Node", "Timers"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from volery.core.errors import DataFileError, ScenarioError, VoleryError
 from volery.core.geodesy import LocalFrame
@@ -169,14 +169,22 @@ def build_scene(
     return scene
 
 
-def build_world(
-    scenario: Scenario, threads: int
-) -> tuple[Terrain, City | None, Forest | None, Scene]:
-    """Returns terrain, city, forest and scene of a scenario."""
+class BuiltWorld(NamedTuple):
+    """The static world of a scenario, and the scene that rays are cast into."""
+
+    terrain: Terrain
+    city: City | None
+    forest: Forest | None
+    scene: Scene
+
+
+def build_world(scenario: Scenario, threads: int) -> BuiltWorld:
+    """Returns the world of a scenario. Raises `ScenarioError`, `DataFileError`."""
     terrain = build_terrain(scenario)
     city = build_city(scenario, terrain)
     forest = build_forest(scenario, terrain, city)
-    return terrain, city, forest, build_scene(scenario, terrain, forest, city, threads=threads)
+    scene = build_scene(scenario, terrain, forest, city, threads=threads)
+    return BuiltWorld(terrain, city, forest, scene)
 
 
 def geometry_of(scenario: Scenario) -> Geometry:

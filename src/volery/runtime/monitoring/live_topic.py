@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from volery.graph.graph import Publisher
+from volery.graph.topics import Publisher
 
 Timers = Callable[..., None]
 """`every(period_s, callback, has_subscribers=...)` schedules a callback in simulated time."""

@@ -3,27 +3,41 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING
 
-from volery.engine.engine import Engine
+from volery.graph.session import Gateway
 from volery.runtime.monitoring.ground_truth_tf import ground_truth_topic
 from volery.runtime.monitoring.status import Status, StatusSources
 from volery.runtime.monitoring.vehicles import VehicleTopic
+from volery.runtime.vehicles.control_authority import ControlAuthority
+from volery.runtime.vehicles.manager import VehicleManager
 
-if TYPE_CHECKING:
-    from volery.runtime.simulation import Simulation
+_CLOCK_PERIOD_S = 0.01
+_DIGEST_PERIOD_S = 0.01
 
 
 class Monitor:
-    """Publishes poses, vehicles and run state; changes nothing in the simulation."""
+    """Publishes clock, poses, vehicles and run state; changes nothing in the simulation."""
 
-    def __init__(self, simulation: Simulation, engine: Engine, told: StatusSources) -> None:
-        self._graph = simulation.graph
-        vehicles = VehicleTopic(
-            engine, simulation.uavs, simulation.gateway, simulation.operators.holder_of
+    def __init__(
+        self,
+        manager: VehicleManager,
+        gateway: Gateway,
+        operators: ControlAuthority,
+        sources: StatusSources,
+    ) -> None:
+        self._graph = gateway.graph
+        engine, publisher, outlet = manager.engine, manager.publisher, manager.outlet
+        vehicles = VehicleTopic(engine, manager.uavs, gateway, operators.holder_of)
+        self._present = (ground_truth_topic(gateway.graph, engine), vehicles.present)
+        self._status = Status(manager.scenario, engine, gateway, sources)
+        engine.every(
+            _CLOCK_PERIOD_S,
+            lambda: publisher.publish_clock(engine.time_ns),
+            wanted=lambda: publisher.clock_wanted,
         )
-        self._present = (ground_truth_topic(simulation.graph, engine), vehicles.present)
-        self._status = Status(simulation, told)
+        engine.every(
+            _DIGEST_PERIOD_S, outlet.take_fingerprint, wanted=lambda: outlet.digest is not None
+        )
         for present in self._present:
             present.begin(engine.every)
 

@@ -10,16 +10,16 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from volery.core.clock import NS_PER_S
+from volery.engine.engine import Engine
 from volery.graph.messages import message_type, time_from_ns
+from volery.graph.session import Gateway
 from volery.runtime.monitoring.memory import resident_mb
-
-if TYPE_CHECKING:
-    from volery.runtime.simulation import Simulation
+from volery.scenario.schema import Scenario
 
 TOPIC = "/volery/status"
 _TYPE = "volery_interfaces/msg/SimulationStatus"
@@ -71,20 +71,26 @@ class Speedometer:
 
 @dataclass
 class StatusSources:
-    """Provides the parts of the status that services know."""
+    """Provides the parts of the status that neither the engine nor the gateway has."""
 
+    speed: Callable[[], float | None]
     state: Callable[[], int]
     recording: Callable[[], str]
+    replaying: Callable[[], bool]
     ended: Callable[[], bool]
 
 
 class Status:
     """Publishes the status five times a second of wall time."""
 
-    def __init__(self, simulation: Simulation, told: StatusSources) -> None:
-        self._simulation = simulation
-        self._told = told
-        self._publisher = simulation.graph.advertise(TOPIC, _TYPE)
+    def __init__(
+        self, scenario: Scenario, engine: Engine, gateway: Gateway, sources: StatusSources
+    ) -> None:
+        self._scenario = scenario
+        self._engine = engine
+        self._gateway = gateway
+        self._sources = sources
+        self._publisher = gateway.graph.advertise(TOPIC, _TYPE)
         self._speedometer = Speedometer()
         self._next_s = 0.0
 
@@ -93,9 +99,8 @@ class Status:
         if now_s < self._next_s:
             return
         self._next_s = now_s + _PERIOD_S
-        simulation = self._simulation
-        stages = simulation.stage_seconds
-        pace = self._speedometer.read(now_s, simulation.time_ns, stages)
+        stages = self._engine.stage_seconds
+        pace = self._speedometer.read(now_s, self._engine.time_ns, stages)
         if self._publisher.has_external_subscribers:
             self._publisher.publish_external(self._message(pace, list(stages)))
 
@@ -105,23 +110,23 @@ class Status:
         self._next_s = 0.0
 
     def _message(self, pace: RunTiming, stages: list[str]) -> Any:
-        simulation, gateway = self._simulation, self._simulation.gateway
+        scenario, gateway, sources = self._scenario, self._gateway, self._sources
         load = np.array(pace.load)
         load.flags.writeable = False
         return message_type(_TYPE)(
-            time_from_ns(simulation.time_ns),
+            time_from_ns(self._engine.time_ns),
             time_from_ns(time.time_ns()),
-            simulation.scenario.name,
-            self._told.state(),
-            simulation.speed or 0.0,
+            scenario.name,
+            sources.state(),
+            sources.speed() or 0.0,
             pace.real_time_factor,
-            simulation.scenario.duration_s,
-            self._told.recording(),
+            scenario.duration_s,
+            sources.recording(),
             stages,
             load,
             resident_mb(),
             len(gateway.sessions()),
             gateway.dropped,
-            simulation.replaying,
-            self._told.ended(),
+            sources.replaying(),
+            sources.ended(),
         )

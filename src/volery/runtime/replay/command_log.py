@@ -36,11 +36,17 @@ class _StoredCommand(NamedTuple):
 
 
 class CommandLog:
-    """Records the commands of a simulation's gateway; see `graph.session`."""
+    """Records the commands of a simulation's gateway; see `graph.session`.
 
-    def __init__(self, graph: Graph, engine: Engine) -> None:
+    refuse: returns why a command is refused at present; empty: accepted.
+    """
+
+    def __init__(
+        self, graph: Graph, engine: Engine, refuse: Callable[[ClientCommand], str] | None = None
+    ) -> None:
         self._graph = graph
         self._engine = engine
+        self._refuse = refuse or _accept
         self._publisher = graph.advertise(records.TOPIC, records.TYPE)
         self._publisher.lasting = True
         self._kept: list[_StoredCommand] = []
@@ -50,15 +56,13 @@ class CommandLog:
         self._ended = False
         self.repeats = False
         """Whether a replay is running: clients may observe, and change nothing."""
-        self.refuse: Callable[[ClientCommand], str] = _accept
-        """Returns why a command is refused at present; empty: accepted."""
 
     def watch(self, taken: ClientCommand) -> None:
         """Records a command. Raises `GraphError` if it is refused."""
         weight = weight_of(taken)
         if self.repeats and weight is CommandEffect.CHANGES:
             raise GraphError("a recorded flight is repeated; nothing else may change it")
-        if reason := self.refuse(taken):
+        if reason := self._refuse(taken):
             raise GraphError(reason)
         if weight is not CommandEffect.ASKS:
             self.note(taken, weight)

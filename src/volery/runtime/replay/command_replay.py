@@ -20,9 +20,10 @@ from volery.core.errors import CommandError, GraphError
 from volery.engine.command_queue import CommandTime
 from volery.engine.engine import Engine
 from volery.engine.pacing import Pacer
-from volery.graph.graph import Graph, Publisher
+from volery.graph.graph import Graph
 from volery.graph.service_reply import ServiceReply
 from volery.graph.session import ClientCommand, Gateway
+from volery.graph.topics import Publisher
 from volery.runtime.replay.command_effects import CommandEffect, weight_of
 from volery.runtime.replay.command_log import CommandLog
 from volery.runtime.services.simulation_state import RunState

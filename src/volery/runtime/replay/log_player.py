@@ -50,6 +50,10 @@ class LogPlayer(PlaybackControl):
     nothing in it.
     """
 
+    operators = None
+    """Playback has no UAVs to control."""
+    waits_at_end = False
+
     def __init__(
         self,
         path: Path | str,

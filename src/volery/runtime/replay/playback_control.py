@@ -171,9 +171,6 @@ class PlaybackControl:
         self.quitting = True
         self._inbox.wake()
 
-    def use_low_latency(self) -> None:
-        """Does nothing: a player serves its clients at once anyway."""
-
     def describe(self) -> dict[str, Any]:
         """Returns the fields of `volery_interfaces/srv/PlayerInfo` that describe the log."""
         played, topics = self._playback, self._playback.topics

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from volery.core.errors import CommandError
+from volery.graph.graph import Graph
 from volery.graph.messages import (
     PoseStamped,
     Published,
@@ -16,28 +17,28 @@ from volery.graph.messages import (
     Vector3,
     header,
 )
+from volery.runtime.facets.world import SimulationWorld
 from volery.world.actors import MovingActors
 from volery.world.actors.motions import GivenMotion
-
-if TYPE_CHECKING:
-    from volery.runtime.simulation import Simulation
 
 _PERIOD_S = 0.02
 
 
-def offer_actors(simulation: Simulation, actors: MovingActors, every: Callable[..., None]) -> None:
+def offer_actors(
+    graph: Graph, world: SimulationWorld, actors: MovingActors, every: Callable[..., None]
+) -> None:
     """Publishes all actors on `/tf`, 50 times a second; subscribes to `/actors/NAME/pose`.
 
     A pose there, in the map frame, becomes the actor's pose; a zero quaternion keeps its heading.
     Invalid poses are ignored, as a topic has no response; actors that move by themselves have no
     such topic.
     """
-    graph = simulation.graph
     transforms = graph.advertise("/tf", TFMessage)
 
     def tell() -> None:
-        stamp = header(simulation.time_ns, "map")
-        poses = actors.poses_at(simulation.time_ns).tolist()
+        time_ns = graph.now_ns()
+        stamp = header(time_ns, "map")
+        poses = actors.poses_at(time_ns).tolist()
         transforms.publish(
             TFMessage(
                 [
@@ -53,10 +54,10 @@ def offer_actors(simulation: Simulation, actors: MovingActors, every: Callable[.
     for actor in actors.actors:
         if isinstance(actor.motion, GivenMotion):
             topic = f"/actors/{actor.name}/pose"
-            graph.subscribe(topic, _placing(simulation, actor.name), PoseStamped)
+            graph.subscribe(topic, _placing(world, actor.name), PoseStamped)
 
 
-def _placing(simulation: Simulation, name: str) -> Callable[[Published], None]:
+def _placing(world: SimulationWorld, name: str) -> Callable[[Published], None]:
     def receive(published: Published) -> None:
         message: Any = published.message
         if message.header.frame_id not in ("", "map"):
@@ -64,7 +65,7 @@ def _placing(simulation: Simulation, name: str) -> Callable[[Published], None]:
         place, turn = message.pose.position, message.pose.orientation
         attitude = [turn.x, turn.y, turn.z, turn.w]
         try:
-            simulation.set_actor_pose(
+            world.set_actor_pose(
                 name,
                 [place.x, place.y, place.z],
                 attitude if any(attitude) else None,

@@ -4,43 +4,48 @@ from __future__ import annotations
 
 import json
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from volery.core.errors import CommandError
+from volery.graph.graph import Graph
+from volery.runtime.facets.faults import SimulationFaults
+from volery.runtime.facets.world import SimulationWorld
 from volery.runtime.services.results import Fields, offer_command
 from volery.runtime.services.weather_messages import changed, fields_of
-
-if TYPE_CHECKING:
-    from volery.runtime.simulation import Simulation
+from volery.scenario.schema import World
 
 _OURS = "volery_interfaces/srv"
 
 
-def offer_air_and_faults(simulation: Simulation) -> None:
-    """Creates the services set_weather, get_weather, gust, inject_fault and end_fault."""
+def offer_air_and_faults(
+    graph: Graph, settings: World, world: SimulationWorld, faults: SimulationFaults
+) -> None:
+    """Creates the services set_weather, get_weather, gust, inject_fault and end_fault.
+
+    settings: the world of the scenario.
+    """
 
     def set_weather(request: Any) -> None:
-        simulation.set_weather(changed(simulation.weather, request, request.only))
+        world.set_weather(changed(world.weather, request, request.only))
 
     def get_weather(_request: Any) -> Fields:
-        weather = simulation.weather
+        weather = world.weather
         return {
-            **fields_of(simulation.scenario.world, weather),
+            **fields_of(settings, weather),
             "gusts": len(weather.gusts),
         }
 
     def gust(request: Any) -> None:
         amplitude = (request.amplitude.x, request.amplitude.y, request.amplitude.z)
         lasts_s = request.duration if request.duration != 0.0 else math.inf
-        simulation.gust_now(amplitude, request.rise, lasts_s)
+        world.gust_now(amplitude, request.rise, lasts_s)
 
     def inject_fault(request: Any) -> None:
-        simulation.inject_fault(_fault_of(request))
+        faults.inject(_fault_of(request))
 
     def end_fault(request: Any) -> None:
-        simulation.end_fault(_fault_of(request))
+        faults.end(_fault_of(request))
 
-    graph = simulation.graph
     offer_command(graph, "/volery/set_weather", f"{_OURS}/SetWeather", set_weather)
     offer_command(graph, "/volery/get_weather", f"{_OURS}/GetWeather", get_weather)
     offer_command(graph, "/volery/gust", f"{_OURS}/Gust", gust)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.errors import PlacementError
+from volery.graph.graph import Graph
 from volery.graph.messages import Point, Pose, Quaternion, Twist, Vector3, header, message_type
+from volery.runtime.facets.vehicles import SimulationVehicles
+from volery.runtime.facets.world import SimulationWorld
 from volery.runtime.services.entity_views import Entity, entities_of_actors, entity_of_uav
 from volery.runtime.services.filters import (
     BoundsType,
@@ -19,9 +22,7 @@ from volery.runtime.services.filters import (
     tag_filter,
 )
 from volery.runtime.services.results import Fields, RefusedError, ResultCode, filled, offer_result
-
-if TYPE_CHECKING:
-    from volery.runtime.simulation import Simulation
+from volery.runtime.vehicles.uav import Uav
 
 Array = NDArray[np.float64]
 
@@ -35,12 +36,20 @@ _FASTEST = 100.0
 class Entities:
     """Serves the states and properties of UAVs and actors, and moves them."""
 
-    def __init__(self, simulation: Simulation) -> None:
-        self._simulation = simulation
+    def __init__(
+        self,
+        graph: Graph,
+        uavs: Mapping[str, Uav],
+        vehicles: SimulationVehicles,
+        world: SimulationWorld,
+    ) -> None:
+        self._graph = graph
+        self._uavs = uavs
+        self._vehicles = vehicles
+        self._world = world
 
     def offer(self) -> None:
         """Creates the services for entities."""
-        graph = self._simulation.graph
         for name, srvtype, handler in (
             ("get_entities", "GetEntities", self._names),
             ("get_entities_states", "GetEntitiesStates", self._states),
@@ -49,7 +58,7 @@ class Entities:
             ("get_entity_bounds", "GetEntityBounds", self._bounds),
             ("set_entity_state", "SetEntityState", self._set_state),
         ):
-            offer_result(graph, f"/{name}", f"{_SRV}/{srvtype}", handler)
+            offer_result(self._graph, f"/{name}", f"{_SRV}/{srvtype}", handler)
 
     # ------------------------------------------------------------------------------------ queries
 
@@ -82,10 +91,9 @@ class Entities:
 
     def _all(self) -> Iterator[Entity]:
         """Yields UAVs in fleet order, then actors."""
-        simulation = self._simulation
-        for uav in simulation.uavs.values():
-            yield entity_of_uav(uav, simulation.types)
-        yield from entities_of_actors(simulation.actors, simulation.time_ns)
+        for uav in self._uavs.values():
+            yield entity_of_uav(uav, self._vehicles.types)
+        yield from entities_of_actors(self._world.actors, self._graph.now_ns())
 
     def _chosen(self, filters: Any) -> list[Entity]:
         """Returns the entities that pass all filters."""
@@ -104,7 +112,7 @@ class Entities:
     def _state_of(self, entity: Entity) -> Any:
         accel = message_type("geometry_msgs/msg/Accel")
         state = {
-            "header": header(self._simulation.time_ns, "map"),
+            "header": header(self._graph.now_ns(), "map"),
             "pose": pose_message(entity.position, entity.attitude),
             "twist": Twist(_vector(entity.velocity), _vector(entity.omega)),
             "acceleration": accel(
@@ -144,7 +152,7 @@ class Entities:
         if request.set_pose:
             self._place(entity.name, state.pose)
         if request.set_twist:
-            self._simulation.set_uav_velocity(entity.name, *twist)
+            self._vehicles.set_velocity(entity.name, *twist)
 
     def _set_actor(self, entity: Entity, request: Any) -> None:
         position, attitude = entity.position, entity.attitude
@@ -158,13 +166,13 @@ class Entities:
             if any(_numbers(request.state.twist.angular)):
                 raise RefusedError(ResultCode.FEATURE_UNSUPPORTED, "actors do not turn by a twist")
             velocity = np.array(_numbers(request.state.twist.linear))
-        self._simulation.set_actor_pose(entity.name, position, attitude, velocity)
+        self._world.set_actor_pose(entity.name, position, attitude, velocity)
 
     def _place(self, name: str, pose: Any) -> None:
         turn = pose.orientation
         try:
             attitude = [turn.x, turn.y, turn.z, turn.w]
-            self._simulation.set_uav_pose(name, _numbers(pose.position), attitude)
+            self._vehicles.set_pose(name, _numbers(pose.position), attitude)
         except PlacementError as error:
             raise RefusedError(_INVALID_POSE, str(error)) from None
 

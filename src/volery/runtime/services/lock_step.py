@@ -14,41 +14,40 @@ from typing import Any
 
 from volery.core.clock import NS_PER_S
 from volery.core.errors import CommandError
-from volery.engine.lock_step import Partner
 from volery.graph.graph import Graph
 from volery.graph.messages import Clock, Published, message_type, time_from_ns
+from volery.runtime.facets.clock import SimulationClock
 
 SERVICE = "/volery/join_lock_step"
 TYPE = "volery_interfaces/srv/JoinLockStep"
 
 
-def open_lock_step(simulation: Any) -> None:
-    """Creates `SERVICE` on the graph of a `Simulation`."""
+def open_lock_step(graph: Graph, clock: SimulationClock) -> None:
+    """Creates `SERVICE`."""
     response = message_type(f"{TYPE}_Response")
 
     def join(request: Any) -> Any:
         try:
-            _LockStepTopics(simulation, request)
+            _LockStepTopics(graph, clock, request)
         except CommandError as error:
             return response(success=False, message=str(error), now=time_from_ns(0))
-        return response(success=True, message="", now=time_from_ns(simulation.time_ns))
+        return response(success=True, message="", now=time_from_ns(graph.now_ns()))
 
-    simulation.graph.create_service(SERVICE, TYPE, join)
+    graph.create_service(SERVICE, TYPE, join)
 
 
 class _LockStepTopics:
     """Runs the barriers with one client."""
 
-    def __init__(self, simulation: Any, request: Any) -> None:
+    def __init__(self, graph: Graph, clock: SimulationClock, request: Any) -> None:
         name = request.name
         if not name.isidentifier():
             raise CommandError(f"'{name}' is no name for a partner: use letters, digits and _")
-        graph: Graph = simulation.graph
         self._graph = graph
         self._done = f"/volery/lock_step/{name}/done"
         if graph.publishers(self._done) == 0:
             raise CommandError(f"advertise {self._done} before joining, and subscribe to .../go")
-        self._partner: Partner = simulation.add_partner(
+        self._partner = clock.add_partner(
             name,
             period_s=request.period_s,
             timeout_s=request.timeout_s,

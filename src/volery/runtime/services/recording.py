@@ -9,8 +9,9 @@ from volery.bridges.logs.log_writer import LogWriter, open_log
 from volery.bridges.logs.recorded_topics import recorded_topics
 from volery.bridges.logs.recordings_quota import room_left
 from volery.core.errors import RecordingError
-from volery.graph.graph import Graph, Subscription
+from volery.graph.graph import Graph
 from volery.graph.messages import Published
+from volery.graph.topics import Subscription
 from volery.runtime.replay.command_log import CommandLog
 from volery.runtime.services.results import Fields, offer_command
 

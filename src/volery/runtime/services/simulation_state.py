@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import IntEnum
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from volery.core.errors import SnapshotError
+from volery.graph.graph import Graph
+from volery.runtime.end_of_run import EndOfRun
+from volery.runtime.facets.clock import SimulationClock
+from volery.runtime.facets.vehicles import SimulationVehicles
 from volery.runtime.replay.command_effects import CONTINUE_RUN
 from volery.runtime.services.results import (
     Fields,
@@ -15,9 +20,6 @@ from volery.runtime.services.results import (
     offer_command,
     offer_result,
 )
-
-if TYPE_CHECKING:
-    from volery.runtime.simulation import Simulation
 
 _SRV = "simulation_interfaces/srv"
 _ALREADY_THERE = 101
@@ -38,36 +40,49 @@ class RunState(IntEnum):
 
 
 class SimulationStateServices:
-    """Serves the state of a simulation; stopped means paused at the start, after a reset."""
+    """Serves the state of a simulation; stopped means paused at the start, after a reset.
 
-    def __init__(self, simulation: Simulation) -> None:
-        self._simulation = simulation
+    reset: returns the simulation to its start.
+    """
+
+    def __init__(
+        self,
+        graph: Graph,
+        clock: SimulationClock,
+        vehicles: SimulationVehicles,
+        end: EndOfRun,
+        reset: Callable[[], None],
+    ) -> None:
+        self._graph = graph
+        self._clock = clock
+        self._vehicles = vehicles
+        self._end = end
+        self._reset_all = reset
         self._stopped = False
 
     def offer(self) -> None:
         """Creates the services of the simulation's state."""
-        graph = self._simulation.graph
         for name, srvtype, handler in (
             ("get_simulation_state", "GetSimulationState", self._get),
             ("set_simulation_state", "SetSimulationState", self._set),
             ("reset_simulation", "ResetSimulation", self._reset),
         ):
-            offer_result(graph, f"/{name}", f"{_SRV}/{srvtype}", handler)
-        offer_command(graph, CONTINUE_RUN, "std_srvs/srv/Trigger", self._continue)
+            offer_result(self._graph, f"/{name}", f"{_SRV}/{srvtype}", handler)
+        offer_command(self._graph, CONTINUE_RUN, "std_srvs/srv/Trigger", self._continue)
 
     def _continue(self, _request: Any) -> Fields:
-        self._simulation.end.fly_on()
+        self._end.fly_on()
         return {"message": "the flight continues past the scenario's end"}
 
     @property
     def state(self) -> RunState:
         """Present state."""
-        simulation = self._simulation
-        if simulation.quitting:
+        if self._clock.quitting:
             return RunState.QUITTING
-        if not simulation.paused:
+        if not self._clock.paused:
             return RunState.PLAYING
-        return RunState.STOPPED if self._stopped and simulation.time_ns == 0 else RunState.PAUSED
+        at_start = self._stopped and self._graph.now_ns() == 0
+        return RunState.STOPPED if at_start else RunState.PAUSED
 
     def _get(self, _request: Any) -> Fields:
         state = {"state": int(self.state)}
@@ -80,28 +95,28 @@ class SimulationStateServices:
         if state is RunState.QUITTING:
             raise RefusedError(WRONG_TRANSITION, "the simulation is quitting")
         if wanted == RunState.PLAYING:
-            if self._simulation.end.waits:
-                raise RefusedError(WRONG_TRANSITION, self._simulation.end.notice)
+            if self._end.waits:
+                raise RefusedError(WRONG_TRANSITION, self._end.notice)
             self._stopped = False
-            self._simulation.resume()
+            self._clock.resume()
         elif wanted == RunState.PAUSED:
             if state is RunState.STOPPED:
                 raise RefusedError(WRONG_TRANSITION, "it is stopped; play it, then pause it")
-            self._simulation.pause()
+            self._clock.pause()
         elif wanted == RunState.STOPPED:
             self._stop()
         elif wanted == RunState.QUITTING:
-            self._simulation.quit()
+            self._clock.quit()
         else:
             raise RefusedError(WRONG_TRANSITION, f"state {wanted} cannot be requested")
 
     def _stop(self) -> None:
         try:
-            self._simulation.reset()
+            self._reset_all()
         except SnapshotError as error:
             raise RefusedError(_TRANSITION_FAILED, str(error)) from None
         self._stopped = True
-        self._simulation.pause()
+        self._clock.pause()
 
     def _reset(self, request: Any) -> None:
         """Resets time and state together, and deletes spawned UAVs."""
@@ -109,12 +124,12 @@ class SimulationStateServices:
         if scope != _ALL and scope & ~(_TIME | _STATE | _SPAWNED):
             raise RefusedError(ResultCode.OPERATION_FAILED, f"there is no scope {scope}")
         if scope == _SPAWNED:
-            self._simulation.delete_spawned()
+            self._vehicles.delete_spawned()
             return
         if scope not in (0, _ALL) and not (scope & _TIME and scope & _STATE):
             reason = "time and state are reset together: SCOPE_DEFAULT, SCOPE_ALL, or both bits"
             raise RefusedError(ResultCode.FEATURE_UNSUPPORTED, reason)
-        if scope == _TIME | _STATE and self._simulation.spawned:
+        if scope == _TIME | _STATE and self._vehicles.spawned:
             reason = "a reset deletes spawned UAVs: add SCOPE_SPAWNED, or delete them first"
             raise RefusedError(ResultCode.FEATURE_UNSUPPORTED, reason)
-        self._simulation.reset()
+        self._reset_all()

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from volery.core.errors import CommandError
 from volery.core.plurals import counted
 from volery.engine.single_steps import StepRequest
 from volery.graph.actions import Goal
+from volery.graph.graph import Graph
+from volery.runtime.end_of_run import EndOfRun
+from volery.runtime.facets.clock import SimulationClock
 from volery.runtime.services.results import (
     RefusedError,
     ResultCode,
@@ -18,16 +21,13 @@ from volery.runtime.services.results import (
     result,
 )
 
-if TYPE_CHECKING:
-    from volery.runtime.simulation import Simulation
-
 _SERVICE = "simulation_interfaces/srv/StepSimulation"
 _ACTION = "simulation_interfaces/action/SimulateSteps"
 _MOST_STEPS = 1_000_000_000
 CANCELLED = "cancelled"
 
 
-def offer_steps(simulation: Simulation) -> None:
+def offer_steps(graph: Graph, clock: SimulationClock, end: EndOfRun) -> None:
     """Creates the service `/step_simulation` and the action `/simulate_steps`.
 
     Steps are physics steps; the thread that runs the simulation makes them.
@@ -38,32 +38,30 @@ def offer_steps(simulation: Simulation) -> None:
             if steps.over:
                 settle(_interrupted(steps) or {})
 
-        _begin(simulation, int(request.steps), tell)
+        _begin(clock, end, int(request.steps), tell)
 
-    offer_result_later(simulation.graph, "/step_simulation", _SERVICE, step)
-    simulation.graph.actions.create_server(
-        "/simulate_steps", _ACTION, lambda goal: _take(simulation, goal)
-    )
+    offer_result_later(graph, "/step_simulation", _SERVICE, step)
+    graph.actions.create_server("/simulate_steps", _ACTION, lambda goal: _take(clock, end, goal))
 
 
-def _begin(simulation: Simulation, steps: int, tell: Any) -> StepRequest:
+def _begin(clock: SimulationClock, end: EndOfRun, steps: int, tell: Any) -> StepRequest:
     if not 1 <= steps <= _MOST_STEPS:
         raise RefusedError(
             ResultCode.OPERATION_FAILED, f"steps must be 1 to {_MOST_STEPS}, not {steps}"
         )
-    if simulation.end.waits:
-        raise RefusedError(ResultCode.INCORRECT_STATE, simulation.end.notice)
-    if not simulation.paused:
+    if end.waits:
+        raise RefusedError(ResultCode.INCORRECT_STATE, end.notice)
+    if not clock.paused:
         raise RefusedError(
             ResultCode.INCORRECT_STATE, "steps need a paused simulation; pause it first"
         )
     try:
-        return simulation.single_step(steps, tell)
+        return clock.single_step(steps, tell)
     except CommandError as error:  # the simulation was resumed meanwhile
         raise RefusedError(ResultCode.INCORRECT_STATE, str(error)) from None
 
 
-def _take(simulation: Simulation, goal: Goal) -> None:
+def _take(clock: SimulationClock, end: EndOfRun, goal: Goal) -> None:
     def tell(steps: StepRequest) -> None:
         progress = {"completed_steps": steps.made, "remaining_steps": steps.left}
         goal.feedback(filled(f"{_ACTION}_Feedback", progress))
@@ -78,11 +76,11 @@ def _take(simulation: Simulation, goal: Goal) -> None:
             goal.abort(_result(failed(interrupted)))
 
     try:
-        request = _begin(simulation, int(goal.request.steps), tell)
+        request = _begin(clock, end, int(goal.request.steps), tell)
     except RefusedError as refusal:
         goal.abort(_result(failed(refusal)))
         return
-    goal.when_cancelled(lambda: simulation.cancel_steps(request))
+    goal.when_cancelled(lambda: clock.cancel_steps(request))
 
 
 def _interrupted(steps: StepRequest) -> RefusedError | None:

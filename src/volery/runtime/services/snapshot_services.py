@@ -2,36 +2,55 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from volery.core.errors import CommandError
+from volery.graph.graph import Graph
 from volery.graph.messages import time_from_ns
+from volery.runtime.facets.clock import SimulationClock
+from volery.runtime.facets.vehicles import SimulationVehicles
 from volery.runtime.services.results import Fields, offer_command
 from volery.runtime.snapshot import Snapshot
-
-if TYPE_CHECKING:
-    from volery.runtime.simulation import Simulation
 
 _OURS = "volery_interfaces/srv"
 _MOST_STATES = 16
 _LONGEST_NAME = 100
 
 
+class SnapshotOwner(Protocol):
+    """Saves and restores its state: a simulation."""
+
+    def snapshot(self) -> Snapshot:
+        """Returns the present state."""
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Restores a state of this owner."""
+
+
 class SnapshotServices:
     """Provides `/volery/save_snapshot`, `restore_snapshot`, `delete_snapshot` and more."""
 
-    def __init__(self, simulation: Simulation) -> None:
-        self._simulation = simulation
+    def __init__(
+        self,
+        graph: Graph,
+        owner: SnapshotOwner,
+        clock: SimulationClock,
+        vehicles: SimulationVehicles,
+    ) -> None:
+        self._graph = graph
+        self._owner = owner
+        self._clock = clock
+        self._vehicles = vehicles
         self._kept: dict[str, Snapshot] = {}
 
     def offer(self) -> None:
         """Creates the services."""
-        graph = self._simulation.graph
+        graph = self._graph
         for name, handler in (
             ("save_snapshot", self._keep),
             ("restore_snapshot", self._restore),
             ("delete_snapshot", self._forget),
-            ("reset_uav", lambda request: self._simulation.reset_uav(request.name)),
+            ("reset_uav", lambda request: self._vehicles.reset(request.name)),
         ):
             offer_command(graph, f"/volery/{name}", f"{_OURS}/ByName", handler)
         offer_command(graph, "/volery/list_snapshots", f"{_OURS}/ListSnapshots", self._list)
@@ -43,12 +62,12 @@ class SnapshotServices:
             raise CommandError(f"the name of a snapshot has 1 to {_LONGEST_NAME} characters")
         if name not in self._kept and len(self._kept) >= _MOST_STATES:
             raise CommandError(f"{_MOST_STATES} snapshots are saved; delete one first")
-        kept = self._kept[name] = self._simulation.snapshot()
+        kept = self._kept[name] = self._owner.snapshot()
         return {"message": f"saved the state at {kept.time_s:.3f} s"}
 
     def _restore(self, request: Any) -> Fields:
         kept = self._find(request.name)
-        self._simulation.restore(kept)
+        self._owner.restore(kept)
         return {"message": f"restored the state at {kept.time_s:.3f} s"}
 
     def _forget(self, request: Any) -> None:
@@ -67,4 +86,4 @@ class SnapshotServices:
 
     def _set_speed(self, request: Any) -> None:
         factor = request.factor
-        self._simulation.set_speed(None if factor <= 0.0 else factor)
+        self._clock.set_speed(None if factor <= 0.0 else factor)

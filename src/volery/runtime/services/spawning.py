@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from volery.core.errors import PlacementError, SpawnError, SpawnFault, VoleryError
+from volery.graph.graph import Graph
+from volery.runtime.facets.vehicles import SimulationVehicles
 from volery.runtime.services.results import (
     Fields,
     RefusedError,
@@ -15,9 +17,6 @@ from volery.runtime.services.results import (
     offer_result,
     result,
 )
-
-if TYPE_CHECKING:
-    from volery.runtime.simulation import Simulation
 
 _SRV = "simulation_interfaces/srv"
 _MSG = "simulation_interfaces/msg"
@@ -39,21 +38,22 @@ _CODES = {
 class SpawnServices:
     """Serves the list of spawnable types; spawns and deletes UAVs."""
 
-    def __init__(self, simulation: Simulation) -> None:
-        self._simulation = simulation
+    def __init__(self, graph: Graph, vehicles: SimulationVehicles) -> None:
+        self._graph = graph
+        self._vehicles = vehicles
 
     def offer(self) -> None:
         """Creates the services."""
-        graph = self._simulation.graph
+        graph = self._graph
         offer_result(graph, "/get_spawnables", f"{_SRV}/GetSpawnables", self._spawnables)
         offer_result(graph, "/spawn_entity", f"{_SRV}/SpawnEntity", self._spawn)
         offer_result(graph, "/spawn_entities", f"{_SRV}/SpawnEntities", self._spawn_each)
         offer_result(graph, "/delete_entity", f"{_SRV}/DeleteEntity", self._delete)
 
     def _spawnables(self, _request: Any) -> Fields:
-        types = self._simulation.types
+        types = self._vehicles.types
         told = []
-        for name in self._simulation.spawnable:
+        for name in self._vehicles.spawnable:
             kind = types.get(name)
             what = f"{kind.airframe}, {kind.plant}" if kind else "airframe with the usual sensors"
             fields = {"entity_resource": resource(name), "description": f"UAV: {what}"}
@@ -76,7 +76,7 @@ class SpawnServices:
         try:
             place, turn = pose.pose.position, pose.pose.orientation
             attitude = [turn.x, turn.y, turn.z, turn.w]
-            self._simulation.spawn_uav(
+            self._vehicles.spawn(
                 name,
                 request.entity_resource.uri,
                 [place.x, place.y, place.z],
@@ -106,13 +106,13 @@ class SpawnServices:
         return {"results": results}
 
     def _delete(self, request: Any) -> None:
-        if request.entity not in self._simulation.uavs:
+        if request.entity not in self._vehicles.names:
             raise RefusedError(ResultCode.NOT_FOUND, f"there is no entity '{request.entity}'")
-        self._simulation.delete_uav(request.entity)
+        self._vehicles.delete(request.entity)
 
     def _name(self, request: Any) -> str:
         """Returns the requested name, or a free one where that is allowed or no name is given."""
-        wished, taken = str(request.name), self._simulation.uavs
+        wished, taken = str(request.name), self._vehicles.names
         if wished and not (wished in taken and request.allow_renaming):
             return wished
         if not wished and not request.allow_renaming:

@@ -15,8 +15,9 @@ import numpy as np
 
 from volery.control.flight_modes import FlightMode
 from volery.engine.engine import Engine
-from volery.graph.graph import Graph, Publisher
+from volery.graph.graph import Graph
 from volery.graph.messages import Point, Pose, Quaternion, Vector3, header, message_type
+from volery.graph.topics import Publisher
 from volery.runtime.services.results import Close, Fields, offer_command
 from volery.runtime.vehicles.uav import Uav
 from volery.scenario.navigation import Origin

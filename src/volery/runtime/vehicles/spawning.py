@@ -29,8 +29,6 @@ from volery.scenario.schema import (
     UavType,
 )
 from volery.vehicle.airframe import Airframe, airframe_names, load_airframe
-from volery.world.scene import Scene
-from volery.world.terrain import Terrain
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 _TAKEN = ("volery", "tf", "tf_static", "clock", "events", "rosapi", "map", "map_command", "actors")
@@ -40,40 +38,40 @@ _TAKEN = ("volery", "tf", "tf_static", "clock", "events", "rosapi", "map", "map_
 class Spawner:
     """Adds UAVs to a fleet and removes them."""
 
-    def __init__(
-        self, crew: VehicleManager, keeper: SnapshotManager, scene: Scene, terrain: Terrain
-    ) -> None:
-        self._crew = crew
-        self._keeper = keeper
-        self._scene = scene
-        self._terrain = terrain
+    def __init__(self, manager: VehicleManager, snapshots: SnapshotManager) -> None:
+        self._manager = manager
+        self._snapshots = snapshots
+        self._scene = manager.engine.scene
+        self._terrain = manager.terrain
 
     @property
     def kinds(self) -> tuple[str, ...]:
         """Types that can be spawned: scenario types, and airframes with the usual sensors."""
-        types = self._crew.scenario.types
+        types = self._manager.scenario.types
         return (*types, *(name for name in airframe_names() if name not in types))
 
     def spawn(self, name: str, kind: str, position_map: ArrayLike, attitude: ArrayLike) -> Uav:
-        """Adds a UAV; see `Simulation.spawn_uav` for arguments and errors."""
+        """Adds a UAV; see `SimulationVehicles.spawn` for arguments and errors."""
         self._check_name(name)
         airframe = self._airframe_of(kind)
         start = self._start(name, kind, airframe, position_map, attitude)
-        before = self._crew.starts
+        before = self._manager.starts
         try:
-            self._crew.regroup((*before, start))
-            self._crew.start_nodes()
+            self._manager.regroup((*before, start))
+            self._manager.start_nodes()
         except Exception:
-            if self._crew.starts != before:
-                self._crew.regroup(before)
+            if self._manager.starts != before:
+                self._manager.regroup(before)
             raise
-        self._keeper.enlist(name)
-        return self._crew.uavs[name]
+        self._snapshots.enlist(name)
+        return self._manager.uavs[name]
 
     def delete(self, names: Collection[str]) -> None:
         """Removes UAVs. Raises `CommandError` if none would be left."""
         if names:
-            self._crew.regroup([start for start in self._crew.starts if start.name not in names])
+            self._manager.regroup(
+                [start for start in self._manager.starts if start.name not in names]
+            )
 
     def _check_name(self, name: str) -> None:
         if not _NAME.fullmatch(name) or name in _TAKEN:
@@ -82,7 +80,7 @@ class Spawner:
                 f"'{name}' is no name for a UAV: up to 40 of a-z, 0-9 and _, a letter first, and "
                 f"none of {', '.join(_TAKEN)}",
             )
-        if name in self._crew.uavs:
+        if name in self._manager.uavs:
             raise SpawnError(SpawnFault.NAME_TAKEN, f"there is a UAV '{name}' already")
         actors = self._scene.actors
         if actors is not None and name in actors.names:
@@ -92,10 +90,10 @@ class Spawner:
         if kind not in self.kinds:
             known = ", ".join(self.kinds)
             raise SpawnError(SpawnFault.TYPE, f"there is no UAV type '{kind}'; known: {known}")
-        scenario = self._crew.scenario
+        scenario = self._manager.scenario
         if kind not in scenario.types:
             types = {**scenario.types, kind: usual_type(load_airframe(kind))}
-            self._crew.scenario = scenario = scenario.model_copy(update={"types": types})
+            self._manager.scenario = scenario = scenario.model_copy(update={"types": types})
         return load_airframe(scenario.access.find_model(scenario.types[kind].airframe))
 
     def _start(
@@ -114,7 +112,7 @@ class Spawner:
         except CommandError as error:
             raise PlacementError(str(error)) from None
         place = on_ground(place, airframe, self._terrain)
-        others = near(self._crew.starts, self._crew.engine.fleet.state.position_map, place)
+        others = near(self._manager.starts, self._manager.engine.fleet.state.position_map, place)
         check_place(place, airframe, self._scene, self._terrain, others, name)
         stands = stands_on_ground(place, airframe, self._terrain)
         return StartPose(name, kind, airframe, place, turn, on_ground=stands, takes_off=False)

@@ -10,11 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from volery.core import rotations
 from volery.core.errors import CommandError, PlacementError
-from volery.engine.engine import Engine
 from volery.runtime.build.placement import StartPose, check_place, lifted, stands_on_ground
 from volery.runtime.vehicles.manager import VehicleManager
-from volery.world.scene import Scene
-from volery.world.terrain import Terrain
 
 Array = NDArray[np.float64]
 
@@ -25,17 +22,11 @@ _REACH_M = 10.0
 class Teleporter:
     """Teleports UAVs of an engine to free positions."""
 
-    def __init__(
-        self,
-        engine: Engine,
-        scene: Scene,
-        terrain: Terrain,
-        crew: VehicleManager,
-    ) -> None:
-        self._engine = engine
-        self._scene = scene
-        self._terrain = terrain
-        self._crew = crew
+    def __init__(self, manager: VehicleManager) -> None:
+        self._manager = manager
+        self._engine = manager.engine
+        self._scene = manager.engine.scene
+        self._terrain = manager.terrain
 
     def place(self, row: int, position_map: ArrayLike, attitude: ArrayLike) -> None:
         """Teleports UAV `row` to (3,), m, and (4,), x y z w, map from body; its velocity continues.
@@ -46,7 +37,7 @@ class Teleporter:
         position = np.asarray(position_map, dtype=np.float64)
         if position.shape != (3,) or not np.isfinite(position).all():
             raise PlacementError(f"a position is three finite numbers, not {position_map!r}")
-        fleet, start = self._engine.fleet, self._crew.starts[row]
+        fleet, start = self._engine.fleet, self._manager.starts[row]
         try:
             position = lifted(position, start.airframe, self._terrain)
             self._check(row, position)
@@ -55,7 +46,7 @@ class Teleporter:
         except CommandError as error:
             raise PlacementError(str(error)) from None
         self._engine.collisions.forget(np.array([row]))
-        streams = {f.id.uav: f.key for f in self._crew.fitted if f.id.name == "odom"}
+        streams = {f.id.uav: f.key for f in self._manager.fitted if f.id.name == "odom"}
         if self._engine.estimation is not None and row in streams:
             self._engine.estimation.restart({row: streams[row]})
 
@@ -69,9 +60,9 @@ class Teleporter:
         self._engine.fleet.push(row, velocity_map, omega_body)
 
     def _check(self, row: int, position: Array) -> None:
-        start = self._crew.starts[row]
+        start = self._manager.starts[row]
         present = self._engine.fleet.state.position_map
-        around = near(self._crew.starts, present, position)
+        around = near(self._manager.starts, present, position)
         others = [other for other in around if other.name != start.name]
         check_place(position, start.airframe, self._scene, self._terrain, others, start.name)
 

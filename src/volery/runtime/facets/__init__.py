@@ -1,0 +1,1 @@
+"""The facets of a `Simulation`: its clock, vehicles, world, faults and diagnostics."""

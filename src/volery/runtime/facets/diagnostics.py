@@ -1,0 +1,71 @@
+"""Diagnostics of a simulation: events, digests, computing time, clients."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from volery.core.errors import CommandError
+from volery.engine.events import Event
+from volery.engine.lock_step import Partner
+from volery.graph.nodes.presence import outside_nodes
+from volery.graph.session import Gateway
+from volery.runtime.vehicles.manager import VehicleManager
+
+
+class SimulationDiagnostics:
+    """Reads what happens in a simulation; changes nothing."""
+
+    def __init__(
+        self,
+        manager: VehicleManager,
+        gateway: Gateway,
+        partners: Sequence[Partner],
+    ) -> None:
+        self._manager, self._gateway, self._partners = manager, gateway, partners
+        self._engine, self._outlet = manager.engine, manager.outlet
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """All events so far, oldest first."""
+        return tuple(self._outlet.events)
+
+    @property
+    def stage_seconds(self) -> dict[str, float]:
+        """Wall seconds in each stage of the step so far."""
+        return dict(self._engine.stage_seconds)
+
+    @property
+    def stage_cpu_s(self) -> dict[str, float]:
+        """CPU seconds of this thread in each stage so far."""
+        return dict(self._engine.stage_cpu_s)
+
+    @property
+    def image_rates(self) -> dict[str, float]:
+        """Approximate bytes per simulated second of each camera topic in a log."""
+        return self._manager.publisher.cameras.log_rates()
+
+    @property
+    def client_names(self) -> frozenset[str]:
+        """Full names of external nodes, of lock-step partners and of clients of bridges."""
+        partners = (partner.name for partner in self._partners if not partner.has_left)
+        sessions = (info.name for info in self._gateway.sessions() if " " in info.name)
+        return frozenset((*outside_nodes(self._gateway.graph), *partners, *sessions))
+
+    def on_advance(self, callback: Callable[[], None]) -> None:
+        """Calls `callback` after each call of the fused step; it must change nothing."""
+        self._outlet.watch = callback
+
+    def enable_digest(self) -> None:
+        """Computes a digest of all states and messages from now on; call before the first step."""
+        self._outlet.enable_digest()
+
+    def digest(self, *, by_topic: bool = False) -> str:
+        """Returns the SHA-256 of all states and sensor messages since `enable_digest`, in order.
+
+        by_topic: independent of the order of different topics, for comparisons with external
+        nodes. Raises `CommandError` without `enable_digest`.
+        """
+        digest = self._outlet.digest
+        if digest is None:
+            raise CommandError("call enable_digest() before the run")
+        return digest.hexdigest_by_topic() if by_topic else digest.hexdigest()
