@@ -13,7 +13,7 @@ import typer
 from volery.cli.app import app
 
 _ROOT = Path(__file__).parents[2]
-_SOURCE = _ROOT / "src" / "volery"
+_SOURCES = (_ROOT / "src" / "volery", _ROOT / "benchmarks" / "volery_benchmarks")
 
 
 def banned_words() -> set[str]:
@@ -36,8 +36,9 @@ def parts_of(name: str) -> list[str]:
 
 def names() -> Iterator[tuple[str, str]]:
     """(name, where it is) of all modules and classes."""
-    for path in sorted(_SOURCE.rglob("*.py")):
-        where = path.relative_to(_SOURCE)
+    paths = [(source, path) for source in _SOURCES for path in sorted(source.rglob("*.py"))]
+    for source, path in paths:
+        where = path.relative_to(source)
         yield from ((part, str(where)) for part in where.with_suffix("").parts)
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.ClassDef):

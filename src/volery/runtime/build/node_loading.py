@@ -115,7 +115,7 @@ def _check_allowed(node: str, path: str, where: str, access: ScenarioAccess) -> 
             "upload starts shipped nodes only; name your own file of the scenario to allow its "
             "nodes"
         )
-    if path.startswith("volery.") and not access.is_trusted:
+    if path.startswith(("volery.", "volery_benchmarks.")) and not access.is_trusted:
         raise ScenarioError(f"{where}: '{node}' is no node that ships with Volery")
 
 
