@@ -41,7 +41,7 @@ class DepthAvoidance(DepthCourse):
 
     """
 
-    STATE = ("_obstacles", "_steering")
+    STATE = (*DepthCourse.STATE, "_obstacles", "_steering")
 
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:

@@ -54,7 +54,15 @@ class RegionAvoidance(DepthCourse):
 
     """
 
-    STATE = ("_state", "_mean", "_sides", "_side", "_since_ns", "_free_ns")
+    STATE = (
+        *DepthCourse.STATE,
+        "_state",
+        "_mean",
+        "_sides",
+        "_side",
+        "_since_ns",
+        "_free_ns",
+    )
 
     def __init__(self, **options: Any) -> None:
         super().__init__("region_avoidance", **options)

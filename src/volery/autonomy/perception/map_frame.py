@@ -6,8 +6,6 @@ SLAM that has lost tracking stops publishing it.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +14,7 @@ from volery.autonomy.perception.scan_points import OdometrySample
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
 from volery.core.rotation_kernels import moved_points
+from volery.core.saved_state import SavedAttributes
 from volery.core.vectors import norm
 from volery.graph.messages import Odometry, TFMessage, stamp_of
 
@@ -27,8 +26,10 @@ _SILENT_NS = NS_PER_S
 """Timeout of a transform, by the odometry's clock."""
 
 
-class MapFrame:
+class MapFrame(SavedAttributes):
     """The transform from one odometry frame to the map."""
+
+    STATE = ("odom_frame", "_known", "_odom_ns", "_told_ns")
 
     def __init__(self) -> None:
         self.odom_frame = ""
@@ -92,13 +93,3 @@ class MapFrame:
             rotations.rotate(at.attitude, pose.velocity),
             pose.omega_body,
         )
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        times = {"odom_ns": self._odom_ns, "told_ns": dict(self._told_ns)}
-        return {"odom_frame": self.odom_frame, "known": dict(self._known), **times}
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        self.odom_frame, self._known = state["odom_frame"], dict(state["known"])
-        self._odom_ns, self._told_ns = state["odom_ns"], dict(state["told_ns"])

@@ -19,7 +19,7 @@ from volery.autonomy.planning.voxel_space import SolidVoxels, VoxelSpace
 from volery.autonomy.status import publish_status
 from volery.core.clock import NS_PER_S
 from volery.core.errors import DataFileError, NodeError, PlanError
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import (
     Bool,
     Odometry,
@@ -43,10 +43,9 @@ _STUCK_M = 1.0
 _MARGIN_M = 25.0
 _TRIES = 3
 """Attempts after which the goal is given up."""
-_STATE = ("_goal", "_way", "_place", "_since_ns", "_best_m", "_tries", "_plans", "_told", "_map")
 
 
-class GlobalPlanner(Node):
+class GlobalPlanner(SavedAttributes, Node):
     """Plans `planning/path` to `planning/goal` (PoseStamped, map).
 
     `planning/goal_status` is JSON: state (waiting, planned, refused, unreachable), reason, goal,
@@ -61,6 +60,9 @@ class GlobalPlanner(Node):
     iterations: bound of the search. seed: of its random numbers.
 
     """
+
+    PARTS = ("_frame",)
+    STATE = ("_goal", "_way", "_place", "_since_ns", "_best_m", "_tries", "_plans", "_told", "_map")
 
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
@@ -107,15 +109,6 @@ class GlobalPlanner(Node):
         self.create_subscription(Bool, "planning/pause", self._on_pause, 1)
         self.create_service("std_srvs/srv/Trigger", "~/stop", self._on_stop)
         self.create_timer(_PERIOD_S, self._on_timer)
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        return {"frame": self._frame.get_state(), **save_attributes(self, _STATE)}
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        self._frame.set_state(state["frame"])
-        restore_attributes(self, {name: state[name] for name in _STATE})
 
     # ------------------------------------------------------------------------------ subscriptions
 

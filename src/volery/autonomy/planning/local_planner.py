@@ -26,7 +26,7 @@ from volery.autonomy.planning.reciprocal_avoidance import Separation, half_plane
 from volery.autonomy.planning.surroundings import Surroundings
 from volery.autonomy.planning.trajectory_messages import trajectory_message
 from volery.core.clock import NS_PER_S, ns_from_s
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import (
     Bool,
     JointState,
@@ -48,10 +48,9 @@ _LEAST_HEIGHT_M = 1.0
 """Height above ground below which the planner is inactive: the vehicle takes off or lands."""
 _TELL_S = 1.0
 """Period of the status; changes of state or problems are published at once."""
-_STATE = ("_way", "_way_map", "_neighbours", "_told", "_told_ns", "_plans", "_frame_was", "_paused")
 
 
-class LocalPlanner(Node):
+class LocalPlanner(SavedAttributes, Node):
     """Follows `planning/path` by `planning/trajectory`; publishes `planning/status`.
 
     An empty path makes the UAV hold. The status is JSON: state (waiting, holding, flying, turning,
@@ -75,6 +74,18 @@ class LocalPlanner(Node):
     separation_m: horizontal distance to keep from the UAVs that report on `radio/team`.
 
     """
+
+    PARTS = ("_sight", "_planning", "_frame")
+    STATE = (
+        "_way",
+        "_way_map",
+        "_neighbours",
+        "_told",
+        "_told_ns",
+        "_plans",
+        "_frame_was",
+        "_paused",
+    )
 
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
@@ -135,19 +146,6 @@ class LocalPlanner(Node):
         self.create_subscription(report, "radio/team", self._on_report, 20)
         self.create_subscription(Bool, "planning/pause", self._on_pause, 1)
         self.create_timer(period, self._on_timer)
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        parts = {
-            name: getattr(self, name).get_state() for name in ("_sight", "_planning", "_frame")
-        }
-        return {"parts": parts, **save_attributes(self, _STATE)}
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        for name, part in state["parts"].items():
-            getattr(self, name).set_state(part)
-        restore_attributes(self, {name: state[name] for name in _STATE})
 
     # ------------------------------------------------------------------------------ subscriptions
 

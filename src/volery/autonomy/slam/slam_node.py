@@ -23,7 +23,7 @@ from volery.autonomy.slam.tracker import Tracker
 from volery.autonomy.status import publish_status
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import (
     Imu,
     JointState,
@@ -56,7 +56,7 @@ _MOST_RAD_S, _MOST_M_S2 = 60.0, 500.0
 """Beyond the range of any IMU."""
 
 
-class Slam(Node):
+class Slam(SavedAttributes, Node):
     """Publishes `slam/odom`, `slam/pose`, `slam/path` (latched), `slam/status`, and `/tf`.
 
     Parameters
@@ -73,7 +73,8 @@ class Slam(Node):
 
     """
 
-    _PLAIN = ("_nod", "_omega", "_told", "_taken_ns", "_odom_ns", "_refused", "_resets", "_shown")
+    PARTS = ("_tracker", "_level", "_way", "_health")
+    STATE = ("_nod", "_omega", "_told", "_taken_ns", "_odom_ns", "_refused", "_resets", "_shown")
 
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
@@ -154,17 +155,6 @@ class Slam(Node):
         )
         self.create_timer(pose_period_s, self._tell_pose)
         self.create_timer(0.5, self._tell_status)
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        parts = {n: getattr(self, n).get_state() for n in ("_tracker", "_level", "_way", "_health")}
-        return {"parts": parts, **save_attributes(self, self._PLAIN)}
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        for name, part in state["parts"].items():
-            getattr(self, name).set_state(part)
-        restore_attributes(self, {name: state[name] for name in self._PLAIN})
 
     # ------------------------------------------------------------------------------ subscriptions
 

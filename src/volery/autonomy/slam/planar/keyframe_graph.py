@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,7 @@ from volery.autonomy.slam.planar.poses import between, compose, grown, turned
 from volery.autonomy.slam.planar.settings import PlanarSettings
 from volery.autonomy.slam.planar.tracker import PlanarTrackerState
 from volery.autonomy.slam.pose_graph import load_gtsam
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 
 Array = NDArray[np.float64]
 
@@ -34,10 +33,10 @@ _AT_LAST = 8
 """Number of closures that change little after which the graph is optimized."""
 
 
-class PlanarKeyframeGraph:
+class PlanarKeyframeGraph(SavedAttributes):
     """Holds keyframes and their graph; `start` (3,) is the first one's pose in the map."""
 
-    _STATE = (
+    STATE = (
         "frames", "poses", "edges", "session", "is_placed", "closures", "tried", "changes",
         "covariance",
         "_spread", "_pending", "_tried_at", "_cursor", "_waiting",
@@ -221,11 +220,3 @@ class PlanarKeyframeGraph:
         self.closures -= before - len(self.edges)
         self._waiting = 0
         self.changes += 1
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        return save_attributes(self, self._STATE)
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        restore_attributes(self, state)

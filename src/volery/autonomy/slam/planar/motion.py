@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from volery.autonomy.slam.planar.poses import compose, turned
 from volery.autonomy.slam.planar.settings import MotionSettings
+from volery.core.saved_state import SavedAttributes
 
 Array = NDArray[np.float64]
 
@@ -24,8 +25,10 @@ _LONGEST_S = 3.0
 """Max duration of a constant-velocity prediction; after it the velocity is unknown."""
 
 
-class PlanarMotion:
+class PlanarMotion(SavedAttributes):
     """Holds pose (3,), velocity (3,) in the body's axes, and their covariance (6, 6)."""
+
+    STATE = ("pose", "velocity", "covariance")
 
     def __init__(self, settings: MotionSettings) -> None:
         self._settings = settings
