@@ -1,6 +1,6 @@
 """Shapes of the airframes for the page, written from their data files.
 
-    python -m volery.vehicle.typescript > web/src/scene/uavs/airframes.generated.ts
+    python tools/typescript_airframes.py > web/src/scene/uavs/airframes.generated.ts
 
 The page draws a UAV from its airframe's file: positions of rotors and feet, and the body's box.
 """
@@ -13,7 +13,7 @@ import sys
 from volery.vehicle.airframe import Airframe, airframe_names, load_airframe
 
 _HEAD = """\
-// Written by `python -m volery.vehicle.typescript` from the airframes' data files.
+// Written by `python tools/typescript_airframes.py` from the airframes' data files.
 // A test of the project fails when this file is older than they are.
 
 /** Body axes: x forward, y left, z up; metres. */

@@ -1,6 +1,6 @@
 """Generates TypeScript message types from the message definitions.
 
-    python -m volery.graph.codecs.typescript > web/src/messages/generated.ts
+    python tools/typescript_messages.py > web/src/messages/generated.ts
 
 Interfaces are named `package_Type`, with `_Request` and `_Response` for services. 64-bit integers
 are `number` or, beyond 2^53, `bigint`; arrays of numbers are typed arrays where the transport
@@ -19,7 +19,7 @@ from volery.graph.codecs.definition_store import EMPTY_MEMBER
 from volery.graph.typestore import typestore
 
 _HEAD = """\
-// Written by `python -m volery.graph.codecs.typescript` from the definitions of the messages.
+// Written by `python tools/typescript_messages.py` from the definitions of the messages.
 // A test of the project fails when this file is older than they are.
 """
 _ARRAYS = {

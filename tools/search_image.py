@@ -1,6 +1,6 @@
 """Runs the scenario `cooperative_search` and draws paths, detection and meeting positions.
 
-python -m volery.report.search_image docs/pictures/cooperative_search.png
+python tools/search_image.py docs/pictures/cooperative_search.png
 """
 
 from __future__ import annotations

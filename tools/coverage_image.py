@@ -1,6 +1,6 @@
 """Draws a coverage plan: areas and tours.
 
-python -m volery.report.coverage_image docs/pictures/coverage.png
+python tools/coverage_image.py docs/pictures/coverage.png
 """
 
 from __future__ import annotations

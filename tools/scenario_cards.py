@@ -1,7 +1,7 @@
 """Renders the images of the scenario cards with Volery's own camera.
 
-    python -m volery.server.card_renderer              # all shipped scenarios
-    python -m volery.server.card_renderer hover longleaf
+    python tools/scenario_cards.py              # all shipped scenarios
+    python tools/scenario_cards.py hover longleaf
 
 An additional UAV, the photographer, carries a camera that looks at the first UAV.
 """
