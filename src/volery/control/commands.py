@@ -336,10 +336,6 @@ class FleetCommands:
         control_state["thrust"] = min(thrust, most_thrust)
         control_state["yaw_rate"] = rate
 
-    def set_home(self, i: int, position: ArrayLike) -> None:
-        """Sets the home (3,) m, map, of UAV `i`; by default its last take-off position."""
-        self._control_states["home"][i] = checked("home", position, (3,), MAX_COORDINATE)
-
     # -------------------------------------------------------------------------------- inside
 
     def _refuse_wreck(self, i: int) -> None:

@@ -8,7 +8,6 @@ without acceleration. A change of velocity by dv in time T needs 1.5 dv / T at m
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -151,8 +150,3 @@ def fan(
     cruise[-1] = 0.0
     brake = change_s(velocity, limits)
     return PrimitiveCandidates(start, velocity, np.append(o.ravel(), 0.0), rise, cruise, brake)
-
-
-def reach_of(speed: float, limits: MotionLimits) -> float:
-    """Returns the length (m) of the longest primitive at `speed`: the range to observe."""
-    return speed * (limits.horizon_s + 0.75 * speed / limits.acceleration + math.sqrt(0.5))
