@@ -21,7 +21,7 @@ from volery.report.alignment import (
     umeyama,
 )
 from volery.report.logged_flights import LoggedFlight, LoggedUav, read_flight, read_way
-from volery.report.page import STYLE, ReportError
+from volery.report.page import ReportError, html_page
 from volery.report.trajectories import RecordedTrajectory
 from volery.report.trajectory_charts import (
     ChartLine,
@@ -289,16 +289,5 @@ def _figures(lines: Sequence[ChartLine], trunks: Array, true: TrueTrunks, told: 
 
 
 def _page(title: str, lead: Sequence[str], parts: Sequence[str]) -> str:
-    name = escape(title)
-    head = [
-        "<!doctype html>",
-        '<html lang="en"><head><meta charset="utf-8">',
-        '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        '<meta name="color-scheme" content="light dark">',
-        f"<title>{name} · flight report</title>",
-        f"<style>{STYLE}{_APART}</style></head><body><main>",
-        f'<header><p class="kicker">Volery flight report</p><h1>{name}</h1>',
-        *lead,
-        "</header>",
-    ]
-    return "\n".join([*head, *parts, "</main></body></html>"]) + "\n"
+    header = f'<header><p class="kicker">Volery flight report</p><h1>{escape(title)}</h1>'
+    return html_page(title, [header, *lead, "</header>", *parts], _APART)
