@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.sensors.lidar import RayBatch, make_batch, scan_rays, stack_mounts
 from volery.sensors.lidar_model import load_lidar
 from volery.sensors.mount import make_mount
@@ -20,8 +20,6 @@ EXTENT_M, TREES = 500.0, 5000
 PIECE_M = 150.0
 """Side of the piece that is flattened to triangles for peers, m; it holds 450 of the trees."""
 _UAVS = 100
-
-Array = NDArray[np.float64]
 
 
 def forest_of(extent: float, terrain: Terrain) -> Forest:

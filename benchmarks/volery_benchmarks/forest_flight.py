@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.engine.events import EventKind
 from volery.graph.messages import Published, stamp_of
 from volery.report.alignment import Alignment, at_times, ate_rmse_m, common_times, umeyama
@@ -20,8 +20,6 @@ from volery.runtime import Simulation
 from volery.scenario import overrides
 from volery.scenario.load import load_scenario, parse_scenario
 from volery.scenario.schema import Scenario
-
-Array = NDArray[np.float64]
 
 SIGHT_M = 6.0
 """Distance up to which the task manager counts a position as seen, m."""

@@ -23,8 +23,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.sensors.lidar import sample_lidars
 from volery.sensors.lidar_model import load_lidar
 from volery.world.mesh import Mesh, concatenate
@@ -42,8 +42,6 @@ from volery_benchmarks.forest_beams import (
 )
 
 _FEWEST_ROUNDS, _MOST_ROUNDS = 5, 40
-
-Array = NDArray[np.float64]
 
 
 def measure(seconds_budget: float = 40.0) -> dict[str, float]:

@@ -11,10 +11,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.vehicle.airframe import load_airframe
 from volery.world.terrain import Terrain
@@ -26,8 +26,6 @@ FARTHEST_M = 0.5
 """Max position error of a hover, m; beyond it speeds are not compared. Modelling choice."""
 _APART_M, _ALTITUDE_M = 2.0, 10.0
 _STEPS = 500
-
-Array = NDArray[np.float64]
 
 
 def hover_task(contest: HoverContest) -> Task:

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.world.mesh import Mesh
 from volery.world.scene import Scene
 from volery.world.terrain import Terrain
@@ -27,8 +27,6 @@ TOLERANCE_M = 0.01
 LEAST_AGREEMENT = 0.99
 """Min fraction of rays that must agree before speeds are compared; the rest graze edges of
 leaves. Modelling choice."""
-
-Array = NDArray[np.float64]
 
 
 def ray_task(contest: RayContest, folder: Path) -> Task:

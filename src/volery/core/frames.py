@@ -9,9 +9,9 @@ Quaternions are x y z w.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from volery.core.arrays import Array
 
 
 def gltf_from_enu(v: ArrayLike) -> Array:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.engine.events import Event
 from volery.graph.graph import Graph, Publisher
 from volery.graph.messages import (
@@ -59,8 +60,6 @@ from volery.sensors.samples import (
     SensorId,
 )
 from volery.vehicle.battery import BatteryLevel
-
-Array = NDArray[np.float64]
 
 SENSOR_TOPICS: dict[type[Any], tuple[SensorTopic, ...]] = {**NAVIGATION_TOPICS}
 """Topics of each kind of samples with one message per row."""

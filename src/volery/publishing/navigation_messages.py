@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.graph.messages import (
     FluidPressure,
     MagneticField,
@@ -21,8 +21,6 @@ from volery.graph.messages import (
 )
 from volery.publishing.sensor_topics import SensorTopic
 from volery.sensors.samples import GnssSamples, MagneticSamples, PressureSamples, SensorId
-
-Array = NDArray[np.float64]
 
 _ZERO_CELSIUS_K = 273.15
 _NOT_MEASURED = -1.0

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.report.flight_data import (
     FlightData,
@@ -32,8 +33,6 @@ from volery.report.voxels import VoxelSet
 if TYPE_CHECKING:
     from volery.graph.graph import Subscription
     from volery.graph.messages import Published
-
-Array = NDArray[np.float64]
 
 TRACK_PERIOD_NS = NS_PER_S // 20
 SCANS_PER_S = 24.0

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.publishing.lidar_publishing import cloud_points
-
-Array = NDArray[np.float64]
 
 MAX_RANGE_M = 28.0
 """Longer beams are not mapped, because of heading errors and dropouts."""

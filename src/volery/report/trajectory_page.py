@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.errors import VoleryError
 from volery.core.plurals import counted
 from volery.report.alignment import (
@@ -31,8 +31,6 @@ from volery.report.trajectory_charts import (
     ways_from_above,
 )
 from volery.report.true_trunks import TrueTrunks, true_trunks
-
-Array = NDArray[np.float64]
 
 _LEAST = 10
 """Min number of common poses for an error."""

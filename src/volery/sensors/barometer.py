@@ -14,13 +14,12 @@ from pydantic import NonNegativeFloat, PositiveFloat
 
 from volery.control.fleet import Fleet
 from volery.core import atmosphere, rotations
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S, Schedule
 from volery.sensors.bank import NoisyBank
 from volery.sensors.model import SensorModel, load_model
 from volery.sensors.noise import gauss_markov_of_sigma
 from volery.sensors.samples import PressureSamples, SensorId, owned
-
-Array = NDArray[np.float64]
 
 
 class BarometerModel(SensorModel):

@@ -9,12 +9,11 @@ from volery.control.estimator.errors import pose_covariance, twist_covariance
 from volery.control.estimator.estimator import Estimator
 from volery.control.fleet import Fleet
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.clock import Schedule
 from volery.core.rows import in_one_piece
 from volery.sensors.bank import Memoryless
 from volery.sensors.samples import OdometrySamples, SensorId, owned
-
-Array = NDArray[np.float64]
 
 
 class EstimateBank(Memoryless):

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from volery.control.fleet import Fleet
+from volery.core.arrays import Array
 from volery.core.clock import Schedule
 from volery.core.errors import CommandError
 from volery.sensors.bank import Bank, rows_of, uav_rows
 from volery.sensors.samples import Samples, SensorId, owned
 
-Array = NDArray[np.float64]
 Arrays = dict[str, Any]
 """Quantities by name, each (S, ...): row i belongs to sensor i."""
 

@@ -14,6 +14,7 @@ from pydantic import NonNegativeFloat, PositiveFloat
 
 from volery.control.fleet import Fleet
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S, Schedule, ns_from_s
 from volery.core.errors import CommandError, DataFileError
 from volery.core.geodesy import LocalFrame
@@ -23,8 +24,6 @@ from volery.sensors.model import SensorModel, load_model
 from volery.sensors.noise import gauss_markov_of_sigma
 from volery.sensors.samples import GnssSamples, SensorId, owned
 from volery.vehicle.pose_history import KEPT_NS, PoseHistory, pose_at
-
-Array = NDArray[np.float64]
 
 FOREVER_NS = np.iinfo(np.int64).max
 _LONGEST_DELAY_NS = KEPT_NS - 6_000_000

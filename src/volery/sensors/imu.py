@@ -15,14 +15,13 @@ from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from volery.control.fleet import Fleet
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S, Schedule
 from volery.sensors.bank import NoisyBank
 from volery.sensors.inertial_kernels import feel_motion
 from volery.sensors.model import SensorModel, load_model
 from volery.sensors.noise import gauss_markov
 from volery.sensors.samples import ImuSamples, SensorId, owned
-
-Array = NDArray[np.float64]
 
 
 class ImuModel(SensorModel):

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from volery.control.fleet import Fleet
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S, Schedule
 from volery.sensors.bank import NoisyBank
 from volery.sensors.inertial_kernels import feel_vector
@@ -17,7 +18,6 @@ from volery.sensors.model import SensorModel, load_model
 from volery.sensors.noise import gauss_markov
 from volery.sensors.samples import MagneticSamples, SensorId, owned
 
-Array = NDArray[np.float64]
 Row = tuple[float, float, float]
 
 

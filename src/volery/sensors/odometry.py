@@ -10,6 +10,7 @@ from pydantic import NonNegativeFloat
 
 from volery.control.fleet import Fleet
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.clock import Schedule
 from volery.core.rows import in_one_piece
 from volery.sensors.bank import Memoryless, NoisyBank, uav_rows
@@ -17,7 +18,6 @@ from volery.sensors.inertial_kernels import body_twists
 from volery.sensors.model import SensorModel, load_model
 from volery.sensors.samples import OdometrySamples, SensorId, owned
 
-Array = NDArray[np.float64]
 _NUMBERS_A_SAMPLE = 10
 
 

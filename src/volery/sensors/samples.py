@@ -12,11 +12,10 @@ from typing import Any, ClassVar, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.geodesy import LocalFrame
 from volery.sensors.cameras.model import CameraModel
 from volery.sensors.lidar_model import LidarModel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -13,14 +13,13 @@ import math
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.vehicle.compiled import inner_kernel
 from volery.vehicle.plant import MAX_CONTACTS
 from volery.vehicle.rotation_math import matrix_of, three
 from volery.world.terrain import TerrainGrid, terrain_height, terrain_normal
 
-Array = NDArray[np.float64]
 Three: TypeAlias = tuple[float, float, float]
 Six: TypeAlias = tuple[float, float, float, float, float, float]
 """Velocity (m/s) and rates (rad/s) in the body frame."""

@@ -8,15 +8,13 @@ from enum import StrEnum
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.perception.list_parameters import declare_numbers
 from volery.autonomy.perception.scan_points import OdometrySample
+from volery.core.arrays import Array
 from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import CameraInfo, Image, Odometry, String, Twist, Vector3
 from volery.graph.nodes.node import Node
-
-Array = NDArray[np.float64]
 
 _PERIOD_S = 0.05
 _BLIND_AFTER_S = 0.5

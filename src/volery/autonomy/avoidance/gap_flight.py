@@ -14,7 +14,6 @@ from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.avoidance.gap_steering import GapSteering, SpeedLimits
 from volery.autonomy.avoidance.obstacle_memory import ObstacleMemory
@@ -23,11 +22,10 @@ from volery.autonomy.perception.list_parameters import declare_mount
 from volery.autonomy.perception.scan_points import OdometrySample, ScanProjector
 from volery.autonomy.perception.speckle_filter import SpeckleFilter
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import JointState, LaserScan, Odometry, Range, Twist, Vector3
 from volery.graph.nodes.node import Node
-
-Array = NDArray[np.float64]
 
 _SONAR_MEMORY_S = 0.5
 

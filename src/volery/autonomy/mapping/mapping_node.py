@@ -8,9 +8,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from volery.autonomy.mapping import messages
 from volery.autonomy.mapping.map_files import MapLimits, node_count, read_map, write_map
 from volery.autonomy.mapping.octree import Octree
@@ -37,8 +34,6 @@ from volery.graph.messages import (
     stamp_of,
 )
 from volery.graph.nodes.node import Node
-
-Array = NDArray[np.float64]
 
 _SONAR_MEMORY_S = 0.5
 _SILENT_S = 2.0

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.perception.scan_rays import Rays
+from volery.core.arrays import Array
 from volery.core.compiled import kernel
 from volery.core.saved_state import SavedAttributes
 
-Array = NDArray[np.float64]
 Scores = NDArray[np.int8]
 
 UNKNOWN = -128

@@ -7,18 +7,16 @@ SLAM that has lost tracking stops publishing it.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.perception.motion_history import Pose
 from volery.autonomy.perception.scan_points import OdometrySample
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.rotation_kernels import moved_points
 from volery.core.saved_state import SavedAttributes
 from volery.core.vectors import norm
 from volery.graph.messages import Odometry, TFMessage, stamp_of
-
-Array = NDArray[np.float64]
 
 MAP = "map"
 UNKNOWN_PLACE = "pose in the map unknown"

@@ -18,6 +18,7 @@ from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.planning.search_area import SearchArea
 from volery.autonomy.planning.viewpoints import Viewpoint, next_viewpoint
 from volery.autonomy.status import publish_status
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.errors import PlanError
 from volery.core.plurals import counted
@@ -36,8 +37,6 @@ from volery.graph.messages import (
     single,
 )
 from volery.graph.nodes.node import Node
-
-Array = NDArray[np.float64]
 
 POLYGON: type[Any] = message_type("geometry_msgs/msg/PolygonStamped")
 _LEVEL = Quaternion(0.0, 0.0, 0.0, 1.0)

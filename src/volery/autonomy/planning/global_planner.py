@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.mapping.messages import OCTOMAP, voxels_of
 from volery.autonomy.perception.list_parameters import declare_numbers
@@ -17,6 +16,7 @@ from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.planning.global_path import PathSearch, plan_way
 from volery.autonomy.planning.voxel_space import SolidVoxels, VoxelSpace
 from volery.autonomy.status import publish_status
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.errors import DataFileError, NodeError, PlanError
 from volery.core.saved_state import SavedAttributes
@@ -32,8 +32,6 @@ from volery.graph.messages import (
     header,
 )
 from volery.graph.nodes.node import Node
-
-Array = NDArray[np.float64]
 
 _LEVEL = Quaternion(0.0, 0.0, 0.0, 1.0)
 _PERIOD_S = 1.0

@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.perception.list_parameters import declare_mount
 from volery.autonomy.perception.map_frame import MAP, UNKNOWN_PLACE, MapFrame
@@ -25,6 +24,7 @@ from volery.autonomy.planning.receding_horizon import (
 from volery.autonomy.planning.reciprocal_avoidance import Separation, half_planes
 from volery.autonomy.planning.surroundings import Surroundings
 from volery.autonomy.planning.trajectory_messages import trajectory_message
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S, ns_from_s
 from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import (
@@ -39,8 +39,6 @@ from volery.graph.messages import (
     message_type,
 )
 from volery.graph.nodes.node import Node
-
-Array = NDArray[np.float64]
 
 _CARROT_M = 9.0
 """Distance of the lookahead point along the path; the planning window extends to 12 m."""

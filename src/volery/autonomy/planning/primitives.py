@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from volery.core.arrays import Array
 
 _LEAST_S = 0.5
 """Shortest change of velocity: the attitude loop cannot follow a shorter one (modelling choice)."""

@@ -31,11 +31,10 @@ from volery.autonomy.planning.primitives import (
 )
 from volery.autonomy.planning.reciprocal_avoidance import HalfPlane, violation
 from volery.autonomy.planning.surface import Surface
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.saved_state import SavedAttributes
 from volery.core.vectors import norm
-
-Array = NDArray[np.float64]
 
 _DIRECTIONS = np.arange(-math.pi, math.pi, math.pi / 20.0)
 _SPEEDS = np.array([1.0, 0.7, 0.4, 0.15])

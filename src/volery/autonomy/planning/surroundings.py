@@ -5,9 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from volery.autonomy.perception.ground_plane import GroundPlane
 from volery.autonomy.perception.motion_history import MotionHistory, NodHistory
 from volery.autonomy.perception.scan_points import OdometrySample
@@ -16,11 +13,10 @@ from volery.autonomy.perception.stuck_sensors import RangeRepeats, ScanRepeats
 from volery.autonomy.planning.clearance import Clearance, clearance_of
 from volery.autonomy.planning.local_grid import LocalGrid
 from volery.autonomy.planning.surface import Surface
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import JointState, LaserScan, Range, stamp_of
-
-Array = NDArray[np.float64]
 
 _SHAPE = (128, 128, 32)
 _WINDOW = (96, 96, 24)

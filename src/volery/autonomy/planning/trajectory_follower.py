@@ -6,7 +6,6 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.perception.stuck_sensors import is_stuck
@@ -24,8 +23,6 @@ from volery.graph.messages import (
     Vector3,
 )
 from volery.graph.nodes.node import Node
-
-Array = NDArray[np.float64]
 
 _PERIOD_S = 0.04
 _STALE_S = 0.5

@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.search.settings import SearchSettings
@@ -21,6 +20,7 @@ from volery.autonomy.search.teammates import (
     SearchPhase,
     Teammate,
 )
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.errors import GraphError
 from volery.core.saved_state import SavedAttributes
@@ -28,8 +28,6 @@ from volery.core.vectors import norm
 from volery.graph.messages import Odometry, Point, Twist, header, message_type
 from volery.graph.nodes.node import Node
 from volery.graph.nodes.service_client import Client, Future
-
-Array = NDArray[np.float64]
 
 _PHASES = frozenset(map(str, SearchPhase))
 _STILL_UP = frozenset({SearchPhase.CLIMB, SearchPhase.ALOFT})

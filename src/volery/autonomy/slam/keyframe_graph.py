@@ -6,7 +6,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.slam.inertial_kernels import G, Q
 from volery.autonomy.slam.keyframes import (
@@ -23,11 +22,10 @@ from volery.autonomy.slam.settings import ScanMatching
 from volery.autonomy.slam.sweep import SweepPoints
 from volery.autonomy.slam.tracker import Tracker
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.saved_state import SavedAttributes
 from volery.core.vectors import norm
-
-Array = NDArray[np.float64]
 
 _STEP_M, _STEP_RAD, _STEP_S = 2.0, 0.6, 10.0
 """Motion, or time, between keyframes."""

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.slam.inertial_kernels import G, Q
 from volery.autonomy.slam.keyframes import levelling
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.saved_state import SavedAttributes
-
-Array = NDArray[np.float64]
 
 
 class LevelOdometry(SavedAttributes):

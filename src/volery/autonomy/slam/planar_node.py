@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.perception.list_parameters import declare_numbers
 from volery.autonomy.perception.scan_rays import is_usable
@@ -21,6 +20,7 @@ from volery.autonomy.slam.planar.settings import PlanarSettings, ReturnSettings
 from volery.autonomy.slam.planar.tracker import PlanarTracker
 from volery.autonomy.status import publish_status
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import (
@@ -32,8 +32,6 @@ from volery.graph.messages import (
     stamp_of,
 )
 from volery.graph.nodes.node import Node
-
-Array = NDArray[np.float64]
 
 _JUMP_NS = NS_PER_S // 2
 """Step back in stamps from which the clock has been set back."""

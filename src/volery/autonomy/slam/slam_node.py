@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.perception.list_parameters import declare_mount, declare_numbers
 from volery.autonomy.perception.motion_history import NodHistory
@@ -36,8 +35,6 @@ from volery.graph.messages import (
     stamp_of,
 )
 from volery.graph.nodes.node import Node
-
-Array = NDArray[np.float64]
 
 _JUMP_NS = NS_PER_S // 2
 """Step back in stamps from which the clock has been set back."""

@@ -35,12 +35,11 @@ from volery.autonomy.slam.stationarity import (
 )
 from volery.autonomy.slam.sweep import Sweep, SweepPoints
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.rotation_kernels import moved_points
 from volery.core.saved_state import SavedAttributes
 from volery.core.vectors import norm
-
-Array = NDArray[np.float64]
 
 _KEPT = 64
 """Number of IMU samples whose states are stored to place beams: 0.3 s at 200 Hz."""

@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.perception.map_frame import MapFrame
 from volery.autonomy.perception.scan_points import OdometrySample
@@ -15,6 +14,7 @@ from volery.autonomy.search.colour_blob import ColourRange, colour_mask, largest
 from volery.autonomy.search.ground_view import GroundView, Intrinsics, pose_at
 from volery.autonomy.team.observations import PositionUncertainty, Tracks, sighting_of
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import (
@@ -28,8 +28,6 @@ from volery.graph.messages import (
     stamp_of,
 )
 from volery.graph.nodes.node import Node
-
-Array = NDArray[np.float64]
 
 _TYPE = "volery_interfaces/msg/Targets"
 _MATE_S, _MATE_M = 2.0, 1.0

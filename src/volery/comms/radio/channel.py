@@ -9,7 +9,6 @@ from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.comms.addresses import is_station
 from volery.comms.link_model import Delivery
@@ -17,11 +16,11 @@ from volery.comms.protocol import StationFrame
 from volery.comms.radio.path_loss import Paths, loss_db
 from volery.comms.radio.reception import air_time_ns, packet_error_rate, snr_db
 from volery.core import rng
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.saved_state import SavedAttributes
 from volery.scenario.radio import Radio
 
-Array = NDArray[np.float64]
 Places = Callable[[], Mapping[int, Array]]
 """Returns the stations' positions: address to (3,) m, map."""
 Looks = Callable[[Array, Array], Paths]

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.errors import PlacementError
 from volery.graph.messages import Point, Pose, Quaternion, Twist, Vector3, header, message_type
 from volery.runtime.services.entity_views import Entity, entities_of_actors, entity_of_uav
@@ -22,8 +22,6 @@ from volery.runtime.services.results import Fields, RefusedError, ResultCode, fi
 
 if TYPE_CHECKING:
     from volery.runtime.simulation import Simulation
-
-Array = NDArray[np.float64]
 
 _MSG = "simulation_interfaces/msg"
 _SRV = "simulation_interfaces/srv"

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.slam.planar.loop_closure import PlanarLoopCloser, PlanarLoopClosure
 from volery.autonomy.slam.planar.pose_graph import PlanarEdge, optimised
@@ -14,9 +13,8 @@ from volery.autonomy.slam.planar.poses import between, compose, grown, turned
 from volery.autonomy.slam.planar.settings import PlanarSettings
 from volery.autonomy.slam.planar.tracker import PlanarTrackerState
 from volery.autonomy.slam.pose_graph import load_gtsam
+from volery.core.arrays import Array
 from volery.core.saved_state import SavedAttributes
-
-Array = NDArray[np.float64]
 
 _ASTRAY = np.diag([1000.0**2, 1000.0**2, 3.0**2])
 """Covariance of the step over which tracking was lost."""

@@ -10,13 +10,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.slam.planar.poses import compose, turned
 from volery.autonomy.slam.planar.settings import MotionSettings
+from volery.core.arrays import Array
 from volery.core.saved_state import SavedAttributes
-
-Array = NDArray[np.float64]
 
 _LEAST_M, _LEAST_RAD = 1e-3, 3e-4
 """Min standard deviations of a prediction."""

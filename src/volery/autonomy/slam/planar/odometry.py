@@ -6,15 +6,13 @@ import math
 from bisect import bisect_right
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.slam.planar.poses import between, compose
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import Odometry, stamp_of
-
-Array = NDArray[np.float64]
 
 _KEPT = 512
 _JUMP_BACK_NS = NS_PER_S // 2

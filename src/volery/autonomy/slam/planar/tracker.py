@@ -11,7 +11,6 @@ from collections import deque
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.slam.planar.health import is_open
 from volery.autonomy.slam.planar.local_map import PlanarSubmap, ScanMatch
@@ -19,10 +18,9 @@ from volery.autonomy.slam.planar.motion import PlanarMotion
 from volery.autonomy.slam.planar.poses import between, placed
 from volery.autonomy.slam.planar.scans import thinned
 from volery.autonomy.slam.planar.settings import PlanarSettings
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.saved_state import SavedAttributes
-
-Array = NDArray[np.float64]
 
 _LEVELS = 4
 _TURN_M = 0.3
