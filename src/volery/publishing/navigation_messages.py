@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from volery.core.arrays import Array
+from volery.core.arrays import read_only
 from volery.graph.messages import (
     FluidPressure,
     MagneticField,
@@ -40,7 +40,7 @@ def fix(readings: GnssSamples, row: int) -> NavSatFix:
         float(np.degrees(latitude)),
         float(np.degrees(longitude)),
         float(altitude),
-        _read_only(np.diag(variance).reshape(9)),
+        read_only(np.diag(variance).reshape(9)),
         NavSatFix.COVARIANCE_TYPE_DIAGONAL_KNOWN if has_fix else NavSatFix.COVARIANCE_TYPE_UNKNOWN,
     )
 
@@ -54,7 +54,7 @@ def fix_velocity(readings: GnssSamples, row: int) -> TwistWithCovarianceStamped 
         header(readings.stamp_ns, "map"),
         TwistWithCovariance(
             Twist(Vector3(*readings.velocity_map[row].tolist()), Vector3(0.0, 0.0, 0.0)),
-            _read_only(np.diag(variance).reshape(36)),
+            read_only(np.diag(variance).reshape(36)),
         ),
     )
 
@@ -82,7 +82,7 @@ def magnetic_field(readings: MagneticSamples, row: int) -> MagneticField:
     return MagneticField(
         header(readings.stamp_ns, _frame(readings.sensors[row])),
         Vector3(*readings.field[row].tolist()),
-        _read_only(np.diag([readings.field_variance] * 3).reshape(9)),
+        read_only(np.diag([readings.field_variance] * 3).reshape(9)),
     )
 
 
@@ -102,8 +102,3 @@ NAVIGATION_TOPICS: dict[type[Any], tuple[SensorTopic, ...]] = {
 
 def _frame(sensor: SensorId) -> str:
     return f"{sensor.uav_name}/{sensor.name}"
-
-
-def _read_only(array: Array) -> Array:
-    array.flags.writeable = False
-    return array

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
+from volery.graph.messages import stamp_of
 from volery.report.flight_data import (
     FlightData,
     FlightEvent,
@@ -26,7 +27,7 @@ from volery.report.flight_data import (
     Trees,
     UavTrack,
 )
-from volery.report.scan_placing import end_ns, scan_points, stamp_ns
+from volery.report.scan_placing import end_ns, scan_points
 from volery.report.structures import seen_from_above
 from volery.report.voxels import VoxelSet
 
@@ -93,7 +94,7 @@ class FlightCollector:
     def _track(self, uav: _Uav) -> Callable[[Published], None]:
         def receive(published: Published) -> None:
             message = published.message
-            stamp = stamp_ns(message)
+            stamp = stamp_of(message)
             uav.poses.append((stamp, message.pose.pose))
             if stamp >= uav.next_row_ns:
                 uav.next_row_ns = stamp + TRACK_PERIOD_NS

@@ -7,7 +7,7 @@ Row i of every array belongs to `sensors[i]`. Arrays are new, owned by the sampl
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, TypeAlias
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -232,9 +232,3 @@ Samples: TypeAlias = (
     | MagneticSamples
     | BatterySamples
 )
-
-
-def owned(array: NDArray[Any]) -> NDArray[Any]:
-    """Makes the array read-only and returns it."""
-    array.flags.writeable = False
-    return array
