@@ -61,8 +61,8 @@ serve: $(VENV)/.installed page ## serve the page until Ctrl-C: http://127.0.0.1:
 	$(BIN)/volery serve
 
 lint: $(VENV)/.installed-tests ## style, types, layers
-	$(BIN)/ruff check src tests examples tools
-	$(BIN)/ruff format --check src tests examples tools
+	$(BIN)/ruff check src benchmarks tests examples tools
+	$(BIN)/ruff format --check src benchmarks tests examples tools
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	@if .ci/node_fits; then $(MAKE) --no-print-directory web/node_modules/.package-lock.json \
@@ -81,8 +81,8 @@ bench: $(VENV)/.installed-bench page ## measure this machine and its peers, rewr
 	$(BIN)/volery bench peers --out runs/peers.json
 	@.ci/install_browser
 	$(BIN)/volery bench page --out runs/page.json
-	$(BIN)/python -m volery.bench.document runs/bench.json runs/page.json runs/peers.json > docs/benchmarks.md
-	$(BIN)/python -m volery.bench.bridge.latency_page docs runs/bench.json
+	$(BIN)/python -m volery_benchmarks.document runs/bench.json runs/page.json runs/peers.json > docs/benchmarks.md
+	$(BIN)/python -m volery_benchmarks.bridge.latency_page docs runs/bench.json
 
 clean: ## remove what was built or flown here
 	rm -rf $(VENV) dist build runs .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -7,13 +7,13 @@ import math
 
 import numpy as np
 import pytest
+from standing import standing_pose
 
 from volery.control.fleet import Fleet
 from volery.control.fleet_events import FleetEventKind
 from volery.control.flight_modes import FlightMode
 from volery.core import rotations
 from volery.vehicle.airframe import Airframe, airframe_names, hover_thrusts, load_airframe
-from volery.vehicle.contact import standing_pose
 from volery.vehicle.plant import contact_points
 from volery.world.terrain import Terrain
 from volery.world.weather import Weather

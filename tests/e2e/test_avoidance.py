@@ -6,9 +6,9 @@ import itertools
 
 import pytest
 
-from volery.bench.avoidance import FIELDS, WAYS, Flight, field_scenario, figures_of
 from volery.control.flight_modes import FlightMode
 from volery.scenario.load import load_scenario
+from volery_benchmarks.avoidance import FIELDS, WAYS, Flight, field_scenario, figures_of
 
 COURSE_M = 32.0
 

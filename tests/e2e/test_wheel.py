@@ -38,6 +38,7 @@ def test_page_is_in_what_is_published(tmp_path):
     names = zipfile.ZipFile(wheel).namelist()
     assert PAGE.removeprefix("src/") in names
     assert any(name.startswith("volery/server/static/assets/index-") for name in names)
+    assert "volery_benchmarks/registry.py" in names
 
 
 @pytest.mark.slow

@@ -23,7 +23,7 @@ from volery.cli.trust import may_run_local_nodes
 from volery.core.errors import ScenarioError, VoleryError
 from volery.graph import messages as m
 from volery.runtime import Simulation
-from volery.runtime.build.node_loading import find_node, is_local, local_nodes
+from volery.runtime.build.node_loading import find_node, is_local
 from volery.runtime.replay.scenario_record import scenario_of
 from volery.runtime.warmup.requirements import needs_of
 from volery.scenario.access import ScenarioAccess
@@ -106,7 +106,7 @@ def test_a_module_beside_a_scenario_is_not_imported(
         entry = {"": "", "absolute": str(trap.folder), "relative": os.path.relpath(trap.folder)}
         monkeypatch.syspath_prepend(entry[on_path])
     scenario = load_scenario(trap.file)
-    assert local_nodes(scenario) == (trap.node,)
+    assert is_local(trap.module, scenario.access)
     needs_of(scenario)  # what is compiled before the flight asks nodes, too
     with pytest.raises(ScenarioError, match="only if you trust it: give --trust"):
         Simulation(scenario, threads=1)
@@ -135,7 +135,7 @@ def test_installed_packages_start(
     (trap.folder / f"{trap.module}.py").rename(site / f"{trap.module}.py")
     monkeypatch.syspath_prepend(str(site))
     scenario = load_scenario(trap.file)
-    assert local_nodes(scenario) == ()
+    assert not is_local(trap.module, scenario.access)
     with Simulation(scenario, threads=1):
         assert trap.has_run
 
@@ -159,7 +159,8 @@ def test_an_installed_one_counts_before_one_beside(
 
 
 @pytest.mark.parametrize(
-    "node", ["volery.cli.__main__:main", "volery.bench.search_peer:Calling", "volery.graph:Node"]
+    "node",
+    ["volery.cli.__main__:main", "volery_benchmarks.search_peer:Calling", "volery.graph:Node"],
 )
 def test_programs_of_volery_are_no_nodes(trap: Trap, node: str) -> None:
     """Importing some of them would start them."""

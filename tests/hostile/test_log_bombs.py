@@ -159,7 +159,7 @@ def test_chunks_of_a_hundred_megabytes_are_read(tmp_path):
     path.write_bytes(MCAP_MAGIC + mcap_chunk("lz4", packed, len(data), zlib.crc32(data)))
     walk = LogWalk(path)
     assert sum(1 for _ in walk) == 100
-    assert walk.damaged_chunks == 0
+    assert walk.damage.count == 0
 
 
 def test_many_chunks_cost_no_more_than_a_file_may(tmp_path, monkeypatch):

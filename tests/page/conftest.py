@@ -10,7 +10,7 @@ if not MISSING:
     from page_browsing import Browsing
     from page_serving import Served
 
-    from volery.bench.page.browser import browser_path, open_browser
+    from volery_benchmarks.page.browser import browser_path, open_browser
 
 COMPOSED_PLAINLY = ("--disable-gpu-compositing", "--disable-gpu-rasterization")
 """WebGL stays as it is; the page around it is put together without software's OpenGL, which takes

@@ -8,7 +8,7 @@ import urllib.request
 
 import roslibpy
 
-from volery.bench.page.serving import PageProcess
+from volery_benchmarks.page.serving import PageProcess
 
 ANSWER_S = 180.0
 

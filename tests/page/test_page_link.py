@@ -148,7 +148,7 @@ def test_a_topic_of_unknown_type_is_listed_and_harms_nothing(browsing, chromium)
 
 
 def test_256_uavs(browsing, tmp_path):
-    from volery.bench.page.worlds import crowd
+    from volery_benchmarks.page.worlds import crowd
 
     path = tmp_path / "crowd.toml"
     path.write_text(crowd(256))

@@ -10,9 +10,9 @@ WEB = Path(__file__).parents[2] / "web"
 
 def test_message_types_are_those_of_the_definitions():
     written = (WEB / "src/messages/generated.ts").read_text()
-    hint = "python -m volery.graph.codecs.typescript > web/src/messages/generated.ts"
+    hint = "python tools/typescript_messages.py > web/src/messages/generated.ts"
     # in a process that knows no types of other tests
-    words = [sys.executable, "-m", "volery.graph.codecs.typescript"]
+    words = [sys.executable, WEB.parent / "tools" / "typescript_messages.py"]
     told = subprocess.run(words, check=True, capture_output=True, text=True, timeout=120).stdout
     assert written.strip() == told.strip(), hint
 

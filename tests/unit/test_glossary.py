@@ -13,7 +13,7 @@ import typer
 from volery.cli.app import app
 
 _ROOT = Path(__file__).parents[2]
-_SOURCE = _ROOT / "src" / "volery"
+_SOURCES = (_ROOT / "src" / "volery", _ROOT / "benchmarks" / "volery_benchmarks")
 
 
 def banned_words() -> set[str]:
@@ -35,7 +35,7 @@ BANNED_IN_ALL_NAMES = {
 }
 """Words that names of functions, parameters and attributes do not contain either."""
 UNCHECKED = (
-    *("bench/", "runtime/", "mavlink/autopilot/", "cli/flight.py", "bridges/logs/chunks.py"),
+    *("runtime/", "mavlink/autopilot/", "cli/flight.py", "bridges/logs/chunks.py"),
     "bridges/logs/disk_file.py",  # `tell` of Python's files
 )
 """Files and folders whose functions, parameters and attributes may still contain them."""
@@ -48,8 +48,9 @@ def parts_of(name: str) -> list[str]:
 
 def names() -> Iterator[tuple[str, str]]:
     """(name, where it is) of all modules and classes."""
-    for path in sorted(_SOURCE.rglob("*.py")):
-        where = path.relative_to(_SOURCE)
+    paths = [(source, path) for source in _SOURCES for path in sorted(source.rglob("*.py"))]
+    for source, path in paths:
+        where = path.relative_to(source)
         yield from ((part, str(where)) for part in where.with_suffix("").parts)
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.ClassDef):
@@ -58,8 +59,8 @@ def names() -> Iterator[tuple[str, str]]:
 
 def inner_names() -> Iterator[tuple[str, str]]:
     """(name, where it is) of functions, methods, their parameters, and attributes that are set."""
-    for path in sorted(_SOURCE.rglob("*.py")):
-        where = path.relative_to(_SOURCE).as_posix()
+    for path in sorted(_SOURCES[0].rglob("*.py")):
+        where = path.relative_to(_SOURCES[0]).as_posix()
         if where.startswith(UNCHECKED):
             continue
         for node in ast.walk(ast.parse(path.read_text())):

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import typer
 
-from volery.bench.document import render
-from volery.bench.registry import BENCHES, Result, find
 from volery.cli.tables import print_table
 from volery.core.errors import VoleryError
+from volery_benchmarks.document import render
+from volery_benchmarks.registry import BENCHES, Result, find
 
 
 def measure_and_show(
@@ -48,7 +48,7 @@ def measure_and_show(
 @contextmanager
 def _with_progress() -> Iterator[None]:
     """Makes long benches report their progress on standard error."""
-    log, handler = logging.getLogger("volery.bench"), logging.StreamHandler()
+    log, handler = logging.getLogger("volery_benchmarks"), logging.StreamHandler()
     log.setLevel(logging.INFO)
     log.addHandler(handler)
     try:

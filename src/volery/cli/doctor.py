@@ -146,7 +146,7 @@ def _forests() -> str:
 
 
 def _cores() -> str:
-    from volery.bench.machine import usable_cores
+    from volery.core.machine import usable_cores
 
     cores = usable_cores()
     if cores < _CORES:
@@ -155,7 +155,7 @@ def _cores() -> str:
 
 
 def _memory() -> str:
-    from volery.bench.machine import memory_bytes
+    from volery.core.machine import memory_bytes
 
     gib = memory_bytes() / 2**30
     if gib < _MEMORY_GIB:

@@ -208,7 +208,7 @@ class CommandLineFlight:
         if self._collector is None or self._options.report is None:
             self._tell_files(None)
             return True
-        from volery.bench.machine import describe_machine, describe_versions
+        from volery.core.machine import describe_machine, describe_versions
         from volery.report.page import write_report
 
         self._progress.note("drawing the report")

@@ -26,6 +26,7 @@ from volery.cli.options import (
     TrustOption,
 )
 from volery.cli.start_conditions import DEFAULT_TIMEOUT_S
+from volery.cli.tables import print_table
 from volery.core.errors import BridgeError
 
 
@@ -237,12 +238,20 @@ def list_scenarios(
     nodes: Annotated[bool, typer.Option("--nodes", help="List registered nodes instead.")] = False,
 ) -> None:
     """List the shipped scenarios."""
-    from volery.cli.list import show_nodes, show_scenarios
-
     if nodes:
-        show_nodes()
-    else:
-        show_scenarios()
+        from volery.scenario.node_names import registered_nodes
+
+        print_table(("node", "class"), list(registered_nodes().items()))
+        return
+    from volery.scenario import library
+    from volery.scenario.load import load_scenario
+
+    rows = []
+    for name in library.names():
+        scenario = load_scenario(name)
+        count = str(scenario.uav_count)
+        rows.append((name, count, f"{scenario.duration_s:g} s", library.describe(name)))
+    print_table(("scenario", "UAVs", "duration", "what it is"), rows, right=(1, 2))
 
 
 @guarded

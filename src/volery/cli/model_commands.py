@@ -8,6 +8,8 @@ from typing import Annotated
 import typer
 
 from volery.cli.error_reporting import guarded
+from volery.cli.tables import print_table
+from volery.core.errors import VoleryError
 
 
 @guarded
@@ -19,9 +21,16 @@ def identify(
     ] = 2,
 ) -> None:
     """Fit the identified plant to an airframe's rigid body and write it as a data file."""
-    from volery.cli.identify import identify_and_write
+    from volery.control import identification
+    from volery.vehicle.airframe import load_airframe
 
-    identify_and_write(airframe, out, order)
+    if not out.parent.is_dir():
+        raise VoleryError(f"{out}: folder {out.parent} does not exist")
+    model = identification.identify(load_airframe(airframe), 1 if order == 1 else 2)
+    out.write_text(identification.to_toml(model), encoding="utf-8")
+    errors = model.fit_error.model_dump() if model.fit_error else {}
+    rows = [(name, f"{value:.4g}") for name, value in errors.items()]
+    print_table((str(out), "error (root mean square)"), rows, right=(1,))
 
 
 @guarded
@@ -33,9 +42,18 @@ def export(
     ] = "sensing",
 ) -> None:
     """Write the world of a scenario as glTF: ground, trees, buildings."""
-    from volery.cli.export import export_and_report
+    from volery import load_scenario
+    from volery.runtime.build.world_export import export_world
+    from volery.world.trees import DetailLevel
 
-    export_and_report(scenario, file, detail)
+    if file.suffix.lower() != ".glb":
+        raise VoleryError(f"{file}: worlds are written as binary glTF; the name must end in .glb")
+    if not file.parent.is_dir():
+        raise VoleryError(f"{file}: folder {file.parent} does not exist")
+    if detail not in list(DetailLevel):
+        raise VoleryError(f"--detail must be one of {', '.join(DetailLevel)} (found {detail!r})")
+    size = export_world(load_scenario(scenario), file, detail=DetailLevel(detail))
+    typer.echo(f"{file} ({size / 1e6:.1f} MB)")
 
 
 @guarded

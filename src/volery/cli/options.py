@@ -2,108 +2,68 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
 from typer.core import TyperCommand
 
-FLIGHT, FILES, BRIDGES = "Flight", "Output files", "Bridges and access"
-ROS2, AUTOPILOTS = "ROS 2", "Autopilots"
-"""Panels of options in help texts."""
+# Options by their panel in help texts.
+flight_option = partial(typer.Option, rich_help_panel="Flight")
+file_option = partial(typer.Option, rich_help_panel="Output files")
+bridge_option = partial(typer.Option, rich_help_panel="Bridges and access")
+ros2_option = partial(typer.Option, rich_help_panel="ROS 2")
+autopilot_option = partial(typer.Option, rich_help_panel="Autopilots")
 
 BridgesOption = Annotated[
     list[str] | None,
-    typer.Option(
-        help="Open a bridge to other programs: NAME or NAME=[HOST:]PORT, repeatable.",
-        rich_help_panel=BRIDGES,
-    ),
+    bridge_option(help="Open a bridge to other programs: NAME or NAME=[HOST:]PORT, repeatable."),
 ]
 RemoteOption = Annotated[
-    bool,
-    typer.Option(
-        "--allow-remote", help="Allow bridges to accept remote clients.", rich_help_panel=BRIDGES
-    ),
+    bool, bridge_option("--allow-remote", help="Allow bridges to accept remote clients.")
 ]
 TokenOption = Annotated[
     str | None, typer.Option(envvar="VOLERY_TOKEN", help="Require this token from remote clients.")
 ]
 BridgeTokenOption = Annotated[
-    str | None,
-    typer.Option(
-        envvar="VOLERY_TOKEN",
-        help="Require this token from remote clients.",
-        rich_help_panel=BRIDGES,
-    ),
+    str | None, bridge_option(envvar="VOLERY_TOKEN", help="Require this token from remote clients.")
 ]
 Ros2Option = Annotated[
-    bool,
-    typer.Option(
-        "--ros2",
-        help="Join the ROS 2 graph by the bridge ros2 or ros2-zenoh.",
-        rich_help_panel=ROS2,
-    ),
+    bool, ros2_option("--ros2", help="Join the ROS 2 graph by the bridge ros2 or ros2-zenoh.")
 ]
 DomainOption = Annotated[
-    int | None,
-    typer.Option(
-        min=0, max=232, help="Set the ROS 2 domain; default: ROS_DOMAIN_ID.", rich_help_panel=ROS2
-    ),
+    int | None, ros2_option(min=0, max=232, help="Set the ROS 2 domain; default: ROS_DOMAIN_ID.")
 ]
 MiddlewareOption = Annotated[
-    Literal["dds", "zenoh"],
-    typer.Option(help="Set the middleware of --ros2.", rich_help_panel=ROS2),
+    Literal["dds", "zenoh"], ros2_option(help="Set the middleware of --ros2.")
 ]
 InterfaceOption = Annotated[
     list[str] | None,
-    typer.Option(
-        help="Use this network interface for DDS, repeatable; default: loopback.",
-        rich_help_panel=ROS2,
-    ),
+    ros2_option(help="Use this network interface for DDS, repeatable; default: loopback."),
 ]
 TrustOption = Annotated[
-    bool,
-    typer.Option(
-        "--trust", help="Run node code from the scenario's folder.", rich_help_panel=FLIGHT
-    ),
+    bool, flight_option("--trust", help="Run node code from the scenario's folder.")
 ]
 ThreadsOption = Annotated[
     int | None,
-    typer.Option(
-        min=1,
-        max=256,
-        help="Set the number of threads; results do not depend on it.",
-        rich_help_panel=FLIGHT,
-    ),
+    flight_option(min=1, max=256, help="Set the number of threads; results do not depend on it."),
 ]
 Px4DirOption = Annotated[
     Path | None,
-    typer.Option(
-        help="Start the PX4 build of this folder for each UAV; opens the bridge px4.",
-        rich_help_panel=AUTOPILOTS,
-    ),
+    autopilot_option(help="Start the PX4 build of this folder for each UAV; opens the bridge px4."),
 ]
 SilenceOption = Annotated[
-    float,
-    typer.Option(
-        min=0.1,
-        help="Set the timeout of autopilots in lock step, wall s.",
-        rich_help_panel=AUTOPILOTS,
-    ),
+    float, autopilot_option(min=0.1, help="Set the timeout of autopilots in lock step, wall s.")
 ]
 MavlinkKeyOption = Annotated[
     Path | None,
-    typer.Option(
-        help="Sign MAVLink by the SHA-256 of this file's text; drop unsigned frames.",
-        rich_help_panel=AUTOPILOTS,
-    ),
+    autopilot_option(help="Sign MAVLink by the SHA-256 of this file's text; drop unsigned frames."),
 ]
 DropOption = Annotated[
     bool,
-    typer.Option(
-        "--drop-on-timeout",
-        help="Continue after an autopilot times out; default: end the run.",
-        rich_help_panel=AUTOPILOTS,
+    autopilot_option(
+        "--drop-on-timeout", help="Continue after an autopilot times out; default: end the run."
     ),
 ]
 

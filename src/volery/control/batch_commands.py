@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from volery.control.flight_modes import FlightMode
 from volery.control.setpoints import ControlLevel
 from volery.core import rotations
-
-Array = NDArray[np.float64]
+from volery.core.arrays import Array
 
 _DEAF = (FlightMode.LANDED, FlightMode.TAKE_OFF, FlightMode.CRASHED)
 

@@ -21,13 +21,12 @@ from volery.control.setpoints import (
 )
 from volery.control.trajectory import Trajectory
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.errors import CommandError
 from volery.vehicle.airframe import GRAVITY, Airframe
 from volery.vehicle.identified import IdentifiedModel
 from volery.vehicle.kinematic import Kinematic
 from volery.vehicle.plant_types import Plant, RigidBody
-
-Array = NDArray[np.float64]
 
 DEFAULT_RETURN_HEIGHT_M = 10.0
 
@@ -335,10 +334,6 @@ class FleetCommands:
         )
         control_state["thrust"] = min(thrust, most_thrust)
         control_state["yaw_rate"] = rate
-
-    def set_home(self, i: int, position: ArrayLike) -> None:
-        """Sets the home (3,) m, map, of UAV `i`; by default its last take-off position."""
-        self._control_states["home"][i] = checked("home", position, (3,), MAX_COORDINATE)
 
     # -------------------------------------------------------------------------------- inside
 

@@ -12,10 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.vehicle.compiled import inner_kernel
 from volery.vehicle.rotation_math import four, product, three
-
-Array = NDArray[np.float64]
 
 BELIEF = np.dtype(
     [

@@ -41,6 +41,7 @@ from volery.control.setpoints import (
     checked_attitude,
     checked_within,
 )
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S, s_from_ns
 from volery.core.errors import CommandError
 from volery.core.rows import Rows
@@ -62,8 +63,6 @@ from volery.world.weather import CALM, Gust, Weather
 from volery.world.weather.dryden import new_turbulence
 from volery.world.weather.table import air_of
 from volery.world.weather.wind_field import nodes_of
-
-Array = NDArray[np.float64]
 
 DEFAULT_TIMEOUT_S = 0.5
 """Time after which a velocity command without successor ends in HOLD, s."""

@@ -11,13 +11,12 @@ from volery.control.estimated_state import new_beliefs
 from volery.control.flight_modes import FlightMode
 from volery.control.fused_step import UAV
 from volery.control.setpoints import checked, new_control_states
+from volery.core.arrays import Array
 from volery.core.errors import CommandError
 from volery.core.plurals import counted
 from volery.vehicle.fleet import NEVER, new_bodies
 from volery.vehicle.plant_types import Plant
 from volery.world.weather.dryden import new_turbulence
-
-Array = NDArray[np.float64]
 
 
 def one_each(value: ArrayLike, count: int) -> ArrayLike:

@@ -14,6 +14,7 @@ from volery.control.gains import GAINS
 from volery.control.plant_dispatch import fly_otherwise
 from volery.control.rates_attitude import hold_attitude, hold_rates
 from volery.control.setpoints import CONTROL_STATE
+from volery.core.arrays import Array
 from volery.vehicle.battery import GUIDANCE_TICKS as BATTERY_TICKS
 from volery.vehicle.battery import drain
 from volery.vehicle.compiled import fused_kernel, inner_kernel
@@ -35,8 +36,6 @@ from volery.vehicle.rigid_body_kernels import (
 from volery.vehicle.rotation_math import three
 from volery.world.terrain import TerrainGrid
 from volery.world.weather.dryden import TURBULENCE
-
-Array = NDArray[np.float64]
 
 UAV = np.dtype(
     [

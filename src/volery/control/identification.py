@@ -11,7 +11,6 @@ from importlib import import_module
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.control.identification_flights import (
     SAMPLE_S,
@@ -21,6 +20,7 @@ from volery.control.identification_flights import (
     everything_at_once,
     velocity_errors,
 )
+from volery.core.arrays import Array
 from volery.core.errors import VoleryError
 from volery.core.extras import missing_package
 from volery.vehicle.airframe import GRAVITY, Airframe
@@ -33,8 +33,6 @@ from volery.vehicle.identified import (
     transition,
 )
 from volery.vehicle.plant_types import RigidBody
-
-Array = NDArray[np.float64]
 
 _MOST_DEAD_TIME_S = 0.1
 

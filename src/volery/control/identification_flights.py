@@ -7,15 +7,13 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.vehicle.airframe import GRAVITY, Airframe
 from volery.vehicle.plant_types import Plant, RigidBody
 from volery.world.terrain import Terrain
-
-Array = NDArray[np.float64]
 
 SAMPLE_S = 0.002
 """Time between two samples, s; two physics steps."""

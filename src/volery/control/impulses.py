@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from volery.control.setpoints import checked
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.vectors import norm
 from volery.vehicle.airframe import Airframe
 from volery.vehicle.fleet import FleetState
-
-Array = NDArray[np.float64]
 
 
 def collide(

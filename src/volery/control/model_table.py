@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from volery.control.fused_step import MODEL
 from volery.control.gains import ControlRates, gains_of
 from volery.control.stability import check_stability
+from volery.core.arrays import Array
 from volery.core.errors import CommandError
 from volery.core.plurals import counted
 from volery.scenario.schema import RotorWear
@@ -19,8 +20,6 @@ from volery.vehicle.identified import REFERENCE_COLUMNS, IdentifiedModel, identi
 from volery.vehicle.kinematic import Kinematic, kinematic_row
 from volery.vehicle.plant import plant_of
 from volery.vehicle.plant_types import IDENTIFIED_LOOPS, Plant, kind_of
-
-Array = NDArray[np.float64]
 
 
 def model_table(

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from volery.control.flight_modes import FlightMode
 from volery.control.trajectory_kernels import SEGMENT_COLUMNS
-
-Array = NDArray[np.float64]
+from volery.core.arrays import Array
 
 _LEAST_ROWS = 64
 

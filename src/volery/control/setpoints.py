@@ -13,10 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from volery.core.arrays import Array
 from volery.core.errors import CommandError
 from volery.vehicle.airframe import MAX_ROTORS
-
-Array = NDArray[np.float64]
 
 MAX_COORDINATE = 1e6
 """Maximum distance of positions from the map's origin, m."""

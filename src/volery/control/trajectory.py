@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from volery.control.setpoints import MAX_COORDINATE, checked
 from volery.control.trajectory_kernels import BEGIN, END, FIRST, ORDER, SEGMENT_COLUMNS
+from volery.core.arrays import Array
 from volery.core.errors import CommandError
-
-Array = NDArray[np.float64]
 
 _MAX_SEGMENTS = 100_000
 _MAX_DURATION_S = 1e6

@@ -13,9 +13,9 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from volery.core.arrays import Array
 
 SEMI_MAJOR_M = 6_378_137.0
 """WGS-84 defining parameter."""

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from volery.core.arrays import Array
 
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 IDENTITY.flags.writeable = False
@@ -80,30 +80,6 @@ def matrix(q: ArrayLike) -> Array:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def from_matrix(rotation: ArrayLike) -> Array:
-    """Returns the quaternion of one (3, 3) rotation matrix, with w >= 0."""
-    r = np.asarray(rotation, dtype=np.float64)
-    four_squares = np.array(
-        [
-            1.0 + r[0, 0] - r[1, 1] - r[2, 2],
-            1.0 - r[0, 0] + r[1, 1] - r[2, 2],
-            1.0 - r[0, 0] - r[1, 1] + r[2, 2],
-            1.0 + r[0, 0] + r[1, 1] + r[2, 2],
-        ]
-    )
-    largest = int(np.argmax(four_squares))
-    columns = np.array(
-        [
-            [four_squares[0], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0], r[2, 1] - r[1, 2]],
-            [r[0, 1] + r[1, 0], four_squares[1], r[1, 2] + r[2, 1], r[0, 2] - r[2, 0]],
-            [r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], four_squares[2], r[1, 0] - r[0, 1]],
-            [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], four_squares[3]],
-        ]
-    )
-    q = normalize(columns[largest])
-    return q if q[3] >= 0.0 else -q
-
-
 def from_rpy(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> Array:
     """Returns quaternions (..., 4) of fixed-axis roll, pitch, yaw (REP-103), rad."""
     roll, pitch, yaw = np.broadcast_arrays(
@@ -164,9 +140,3 @@ def logarithm(q: ArrayLike) -> Array:
     angle = 2.0 * np.arctan2(length, q[..., 3:])
     factor = np.where(length > 1e-12, angle / np.where(length > 1e-12, length, 1.0), 2.0)
     return np.asarray(q[..., :3] * factor)
-
-
-def slerp(p: ArrayLike, q: ArrayLike, fraction: ArrayLike) -> Array:
-    """Interpolates on a great arc from `p` (fraction 0) to `q` (1), shapes (..., 4)."""
-    step = logarithm(multiply(conjugate(p), q))
-    return multiply(p, exponential(step * np.asarray(fraction, dtype=np.float64)[..., None]))

@@ -2,19 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any, Protocol, runtime_checkable
-
-
-def save_attributes(owner: object, names: Iterable[str]) -> dict[str, Any]:
-    """Returns the attributes `names` of `owner`, not copied: the caller copies them."""
-    return {name: getattr(owner, name) for name in names}
-
-
-def restore_attributes(owner: object, state: dict[str, Any]) -> None:
-    """Sets the attributes of `owner` to what `save_attributes` returned."""
-    for name, value in state.items():
-        setattr(owner, name, value)
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 
 @runtime_checkable
@@ -26,3 +14,24 @@ class Stateful(Protocol):
 
     def set_state(self, state: Any) -> None:
         """Restores a saved state."""
+
+
+class SavedAttributes:
+    """Saves the attributes that a subclass names; a `Stateful`."""
+
+    STATE: ClassVar[tuple[str, ...]] = ()
+    """Names of attributes that change. They are not copied: the caller copies them."""
+    PARTS: ClassVar[tuple[str, ...]] = ()
+    """Names of attributes that are `Stateful` and keep their identity."""
+
+    def get_state(self) -> dict[str, Any]:
+        """Returns the state for a snapshot."""
+        state = {name: getattr(self, name) for name in self.STATE}
+        return state | {name: getattr(self, name).get_state() for name in self.PARTS}
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Restores what `get_state` returned."""
+        for name in self.PARTS:
+            getattr(self, name).set_state(state[name])
+        for name in self.STATE:
+            setattr(self, name, state[name])

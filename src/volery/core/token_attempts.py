@@ -31,8 +31,6 @@ class TokenAttempts:
         self._penalty_s = PENALTY_S if penalty_s is None else penalty_s
         self._penalties = asyncio.Semaphore(max_penalties)
         self._queues: dict[str, _Queue] = {}
-        self.num_wrong = 0
-        """Number of wrong tokens so far."""
 
     @property
     def num_waiting(self) -> int:
@@ -58,7 +56,6 @@ class TokenAttempts:
 
         gone: waits until the client has disconnected.
         """
-        self.num_wrong += 1
         async with self._penalties:
             if gone is None:
                 await asyncio.sleep(self._penalty_s)

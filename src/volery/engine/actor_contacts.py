@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.world.actors import MovingActors
 from volery.world.scene import Scene, Solid
 from volery.world.scene_content import BodyShape
-
-Array = NDArray[np.float64]
 
 _LEAST_GAP_M = 1e-3
 """In contact, check again after each millimetre."""

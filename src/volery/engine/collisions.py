@@ -18,13 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
+from volery.core.arrays import Array
 from volery.core.compiled import brief_kernel
 from volery.core.vectors import norm
 from volery.engine.actor_contacts import ActorContacts, ActorShapes
 from volery.engine.events import Event, EventKind
 from volery.world.scene import Scene
-
-Array = NDArray[np.float64]
 
 _LOOK_REACH_M = 8.0
 """Maximum distance of a query, which is repeated after that distance."""

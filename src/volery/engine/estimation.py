@@ -15,6 +15,7 @@ from volery.control.estimator.initial_estimate import drawn_start
 from volery.control.estimator.settings import StartSigmas
 from volery.control.fleet import Fleet
 from volery.core import atmosphere
+from volery.core.arrays import Array
 from volery.core.rows import Rows, in_one_piece
 from volery.sensors.samples import (
     GnssSamples,
@@ -26,7 +27,6 @@ from volery.sensors.samples import (
     SensorId,
 )
 
-Array = NDArray[np.float64]
 T = TypeVar("T", bound=np.generic)
 
 

@@ -6,11 +6,9 @@ import logging
 from collections.abc import Callable, Collection
 from typing import Any, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from volery.control.fleet import Fleet
 from volery.control.setpoints import MAX_COORDINATE, checked
+from volery.core.arrays import Array
 from volery.core.clock import ns_from_s, s_from_ns
 from volery.core.errors import CommandError
 from volery.engine.engine import Engine, SensorBank
@@ -28,8 +26,6 @@ from volery.sensors.faults import FaultableBank
 from volery.sensors.gnss import GnssBank
 from volery.vehicle.plant_types import RigidBody
 from volery.world.weather import Gust
-
-Array = NDArray[np.float64]
 
 _log = logging.getLogger(__name__)
 

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import read_only
 from volery.graph.messages import (
     CameraInfo,
     CompressedImage,
@@ -65,7 +66,7 @@ def compressed(frames: CameraFrames, row: int, camera: Camera) -> CompressedImag
     quality = camera.settings.jpeg_quality
     data = codecs.jpeg(image, quality) if codec == "jpeg" else codecs.png(image)
     text = f"rgb8; {codec} compressed bgr8"
-    return CompressedImage(_pair_header(frames, camera), text, _read_only(data))
+    return CompressedImage(_pair_header(frames, camera), text, read_only(data))
 
 
 def depth(frames: CameraFrames, row: int, camera: Camera) -> Image:
@@ -84,7 +85,7 @@ def compressed_depth(frames: CameraFrames, row: int, camera: Camera) -> Compress
         else codecs.packed_millimetres(codecs.millimetres(seen))
     )
     text = f"{encoding}; compressedDepth png"
-    return CompressedImage(_header(frames, camera), text, _read_only(data))
+    return CompressedImage(_header(frames, camera), text, read_only(data))
 
 
 def points(frames: CameraFrames, row: int, camera: Camera) -> PointCloud2:
@@ -125,10 +126,10 @@ def camera_info(frames: CameraFrames, row: int, camera: Camera) -> CameraInfo:  
         model.height,
         model.width,
         "plumb_bob",
-        _read_only(np.array(model.distortion)),
-        _read_only(k.reshape(9)),
-        _read_only(np.eye(3).reshape(9)),
-        _read_only(np.hstack([k, beside]).reshape(12)),
+        read_only(np.array(model.distortion)),
+        read_only(k.reshape(9)),
+        read_only(np.eye(3).reshape(9)),
+        read_only(np.hstack([k, beside]).reshape(12)),
         0,
         0,
         RegionOfInterest(0, 0, 0, 0, False),
@@ -151,9 +152,4 @@ def _pair_header(frames: CameraFrames, camera: Camera) -> Header:
 
 def _bytes(array: NDArray[Any]) -> NDArray[np.uint8]:
     """Returns the array's memory as bytes, in C order."""
-    return _read_only(np.ascontiguousarray(array).view(np.uint8).reshape(-1))
-
-
-def _read_only(array: NDArray[Any]) -> NDArray[Any]:
-    array.flags.writeable = False
-    return array
+    return read_only(np.ascontiguousarray(array).view(np.uint8).reshape(-1))

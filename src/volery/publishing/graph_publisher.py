@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core import rotations
+from volery.core.arrays import Array, read_only
 from volery.engine.events import Event
 from volery.graph.graph import Graph
 from volery.graph.messages import (
@@ -60,8 +61,6 @@ from volery.sensors.samples import (
     SensorId,
 )
 from volery.vehicle.battery import BatteryLevel
-
-Array = NDArray[np.float64]
 
 SENSOR_TOPICS: dict[type[Any], tuple[SensorTopic, ...]] = {**NAVIGATION_TOPICS}
 """Topics of each kind of samples with one message per row."""
@@ -291,8 +290,8 @@ class GraphPublisher:
                     JointState(
                         header(joints.stamp_ns, ""),
                         [f"laser_{sensor.name}"],
-                        _read_only(joints.angle[i : i + 1].copy()),
-                        _read_only(joints.rate[i : i + 1].copy()),
+                        read_only(joints.angle[i : i + 1].copy()),
+                        read_only(joints.rate[i : i + 1].copy()),
                         _NO_EFFORT,
                     )
                 )
@@ -372,13 +371,8 @@ def _fixed_frame(parent: str, child: str) -> TransformStamped:
 
 @lru_cache(maxsize=256)
 def _diagonal(variance: float) -> Array:
-    return _read_only(np.diag([variance] * 3).reshape(9))
+    return read_only(np.diag([variance] * 3).reshape(9))
 
 
 def _matrix(diagonal: Array) -> Array:
-    return _read_only(np.diag(diagonal).reshape(36))
-
-
-def _read_only(array: Array) -> Array:
-    array.flags.writeable = False
-    return array
+    return read_only(np.diag(diagonal).reshape(36))

@@ -13,14 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.graph.graph import Graph
 from volery.graph.messages import PointCloud2, PointField, header
 from volery.graph.topics import Publisher
 from volery.sensors.mount import Mount, nodding_angle_at
 from volery.sensors.samples import LidarScans, SensorId
 from volery.sensors.scan_patterns import PlanarScan, ScanPattern
-
-Array = NDArray[np.float64]
 
 MOST_RETURNS = 360
 """Maximum returns of a planar sweep: one per degree of the horizon ..."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from volery.core.arrays import read_only
 from volery.graph.messages import (
     FluidPressure,
     MagneticField,
@@ -21,8 +21,6 @@ from volery.graph.messages import (
 )
 from volery.publishing.sensor_topics import SensorTopic
 from volery.sensors.samples import GnssSamples, MagneticSamples, PressureSamples, SensorId
-
-Array = NDArray[np.float64]
 
 _ZERO_CELSIUS_K = 273.15
 _NOT_MEASURED = -1.0
@@ -42,7 +40,7 @@ def fix(readings: GnssSamples, row: int) -> NavSatFix:
         float(np.degrees(latitude)),
         float(np.degrees(longitude)),
         float(altitude),
-        _read_only(np.diag(variance).reshape(9)),
+        read_only(np.diag(variance).reshape(9)),
         NavSatFix.COVARIANCE_TYPE_DIAGONAL_KNOWN if has_fix else NavSatFix.COVARIANCE_TYPE_UNKNOWN,
     )
 
@@ -56,7 +54,7 @@ def fix_velocity(readings: GnssSamples, row: int) -> TwistWithCovarianceStamped 
         header(readings.stamp_ns, "map"),
         TwistWithCovariance(
             Twist(Vector3(*readings.velocity_map[row].tolist()), Vector3(0.0, 0.0, 0.0)),
-            _read_only(np.diag(variance).reshape(36)),
+            read_only(np.diag(variance).reshape(36)),
         ),
     )
 
@@ -84,7 +82,7 @@ def magnetic_field(readings: MagneticSamples, row: int) -> MagneticField:
     return MagneticField(
         header(readings.stamp_ns, _frame(readings.sensors[row])),
         Vector3(*readings.field[row].tolist()),
-        _read_only(np.diag([readings.field_variance] * 3).reshape(9)),
+        read_only(np.diag([readings.field_variance] * 3).reshape(9)),
     )
 
 
@@ -104,8 +102,3 @@ NAVIGATION_TOPICS: dict[type[Any], tuple[SensorTopic, ...]] = {
 
 def _frame(sensor: SensorId) -> str:
     return f"{sensor.uav_name}/{sensor.name}"
-
-
-def _read_only(array: Array) -> Array:
-    array.flags.writeable = False
-    return array

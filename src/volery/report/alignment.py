@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from volery.core.arrays import Array
 
 _RATE_HZ, _SMOOTHED = 10.0, 5
 _LEAST_COMMON = 0.3

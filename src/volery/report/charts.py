@@ -17,10 +17,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.report.flight_data import FlightData, UavTrack
 from volery.report.palette import CSS_NAMES, FAINT, GRID, INK, UAV_COLORS, uav_color
-
-Array = NDArray[np.float64]
 
 _LEGEND_LIMIT = len(UAV_COLORS)
 _POINTS = 1200

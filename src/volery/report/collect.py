@@ -16,7 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
+from volery.graph.messages import stamp_of
 from volery.report.flight_data import (
     FlightData,
     FlightEvent,
@@ -25,7 +27,7 @@ from volery.report.flight_data import (
     Trees,
     UavTrack,
 )
-from volery.report.scan_placing import end_ns, scan_points, stamp_ns
+from volery.report.scan_placing import end_ns, scan_points
 from volery.report.structures import seen_from_above
 from volery.report.voxels import VoxelSet
 
@@ -33,8 +35,6 @@ if TYPE_CHECKING:
     from volery.graph.messages import Published
     from volery.graph.topics import Subscription
     from volery.runtime.simulation import Simulation
-
-Array = NDArray[np.float64]
 
 TRACK_PERIOD_NS = NS_PER_S // 20
 SCANS_PER_S = 24.0
@@ -94,7 +94,7 @@ class FlightCollector:
     def _track(self, uav: _Uav) -> Callable[[Published], None]:
         def receive(published: Published) -> None:
             message = published.message
-            stamp = stamp_ns(message)
+            stamp = stamp_of(message)
             uav.poses.append((stamp, message.pose.pose))
             if stamp >= uav.next_row_ns:
                 uav.next_row_ns = stamp + TRACK_PERIOD_NS

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from volery.core.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -9,19 +9,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.perception.static_transforms import StaticTransforms
 from volery.bridges.logs.decoding import LogDecoder
 from volery.bridges.logs.recorded_flight import RecordedScenario
 from volery.bridges.logs.records import LogRecord, LogWalk
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.errors import GraphError, RecordingError, VoleryError
 from volery.graph.messages import stamp_of
 from volery.report.trajectories import RecordedTrajectory
 from volery.report.trunk_survey import LEVEL, NODDING, TrunkSurvey
-
-Array = NDArray[np.float64]
 
 TRUTH = "ground_truth/odom"
 ESTIMATES = ("slam/pose", "slam/odom", "odom")

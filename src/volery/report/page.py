@@ -15,6 +15,7 @@ from volery.report.flight_data import FlightData, UavTrack
 from volery.report.palette import uav_color
 
 _EVENTS_SHOWN = 60
+_STYLE = Path(__file__).with_name("report.css")
 
 
 class ReportError(VoleryError):
@@ -54,26 +55,35 @@ def page(flight: FlightData) -> str:
     title = escape(flight.scenario)
     count = len(flight.uavs)
     fleet = counted(count, "UAV")
-    parts = [
+    return html_page(
+        flight.scenario,
+        [
+            '<header><p class="kicker">Volery flight report</p>',
+            f"<h1>{title}</h1>",
+            f'<p class="lead">{escape(flight.description)}</p>' if flight.description else "",
+            f'<p class="note">{escape(_ending(flight))}</p>' if flight.interrupted else "",
+            "</header>",
+            _tiles(flight, fleet),
+            *_figures(flight),
+            _uav_table(flight),
+            _events(flight),
+            _details(flight),
+        ],
+    )
+
+
+def html_page(title: str, parts: Iterable[str], more_style: str = "") -> str:
+    """Returns an HTML file of a report from its parts; empty ones are left out."""
+    style = f"\n{_STYLE.read_text(encoding='utf-8')}{more_style}"
+    head = (
         "<!doctype html>",
         '<html lang="en"><head><meta charset="utf-8">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
         '<meta name="color-scheme" content="light dark">',
-        f"<title>{title} · flight report</title>",
-        f"<style>{STYLE}</style></head><body><main>",
-        '<header><p class="kicker">Volery flight report</p>',
-        f"<h1>{title}</h1>",
-        f'<p class="lead">{escape(flight.description)}</p>' if flight.description else "",
-        f'<p class="note">{escape(_ending(flight))}</p>' if flight.interrupted else "",
-        "</header>",
-        _tiles(flight, fleet),
-        *_figures(flight),
-        _uav_table(flight),
-        _events(flight),
-        _details(flight),
-        "</main></body></html>",
-    ]
-    return "\n".join(part for part in parts if part) + "\n"
+        f"<title>{escape(title)} · flight report</title>",
+        f"<style>{style}</style></head><body><main>",
+    )
+    return "\n".join(part for part in (*head, *parts, "</main></body></html>") if part) + "\n"
 
 
 def _ending(flight: FlightData) -> str:
@@ -245,64 +255,3 @@ def _clearance(metres: float, flight: FlightData) -> str:
     if math.isinf(metres):
         return f"> {flight.clearance_reach_m:g} m"
     return f"{metres:.2f} m"
-
-
-STYLE = """
-:root { --page: #fbfaf7; --ink: #1d2126; --faint: #5d6670; --grid: #e3e1da; --card: #ffffff;
-  --accent: #2c6e49; --alarm: #c92a2a; }
-@media (prefers-color-scheme: dark) {
-  :root { --page: #14181d; --ink: #e6e8ea; --faint: #9aa4ae; --grid: #2b3138; --card: #1a1f26;
-    --accent: #7fc79a; --alarm: #ff8787; }
-  .map img { filter: brightness(.9); } }
-* { box-sizing: border-box; }
-html { -webkit-text-size-adjust: 100%; }
-body { margin: 0; background: var(--page); color: var(--ink);
-  font: 17px/1.6 system-ui, -apple-system, "Segoe UI", "Noto Sans", "Liberation Sans", sans-serif; }
-main { max-width: 1080px; margin: 0 auto; padding: 3.5rem 1.5rem 5rem; }
-h1, h2 { font-family: "Iowan Old Style", "Palatino Linotype", Palatino, "Noto Serif",
-  "Liberation Serif", Georgia, serif; font-weight: 600; letter-spacing: -.01em; }
-h1 { font-size: clamp(2.2rem, 6vw, 3.4rem); line-height: 1.1; margin: .1em 0 .35em; }
-h2 { font-size: 1.6rem; margin: 3.2rem 0 1rem; }
-.kicker { margin: 0; color: var(--accent); font-size: .85rem; font-weight: 600;
-  letter-spacing: .09em; text-transform: uppercase; }
-.lead { margin: 0; max-width: 44em; font-size: 1.15rem; color: var(--faint); }
-.note { border-left: 4px solid var(--alarm); padding: .4em 1em; background: var(--card); }
-.tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(9.5rem, 1fr)); gap: 1px;
-  margin: 2.2rem 0 0; background: var(--grid); border: 1px solid var(--grid); border-radius: 10px;
-  overflow: hidden; }
-.tiles div { display: flex; flex-direction: column; padding: 1rem 1.1rem; background: var(--card); }
-.tiles dd { margin: 0; font-size: 1.55rem; font-weight: 600; font-variant-numeric: tabular-nums;
-  white-space: nowrap; }
-.tiles dt { color: var(--faint); font-size: .88rem; }
-figure { margin: 0 0 1.8rem; }
-figcaption { margin-top: .6rem; color: var(--faint); font-size: .92rem; line-height: 1.5;
-  max-width: 52em; }
-figcaption b { color: var(--ink); }
-.map img { display: block; width: 100%; height: auto; border-radius: 10px;
-  border: 1px solid var(--grid); }
-.pair { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 30rem), 1fr));
-  gap: 1.2rem; }
-.chart { margin: 0; padding: 1rem 1.1rem; background: var(--card); border: 1px solid var(--grid);
-  border-radius: 10px; }
-.chart svg { display: block; width: 100%; height: auto; }
-.chart text { font-family: system-ui, -apple-system, "Segoe UI", "Noto Sans", "Liberation Sans",
-  sans-serif; }
-.scroll { overflow-x: auto; }
-table { border-collapse: collapse; width: 100%; font-size: .95rem; }
-th, td { padding: .5rem .9rem .5rem 0; border-bottom: 1px solid var(--grid); text-align: left;
-  vertical-align: top; }
-thead th { color: var(--faint); font-weight: 500; font-size: .86rem; }
-tbody th { font-weight: 600; white-space: nowrap; }
-.numbers td, .numbers thead th:not(:first-child) { text-align: right; white-space: nowrap;
-  font-variant-numeric: tabular-nums; }
-.numbers i { display: inline-block; width: .75em; height: .75em; border-radius: 50%;
-  margin-right: .6em; }
-.facts th { width: 13rem; color: var(--faint); font-weight: 500; }
-.facts td { overflow-wrap: anywhere; font-variant-numeric: tabular-nums; }
-.events { padding: 0; list-style: none; font-variant-numeric: tabular-nums; font-size: .95rem; }
-.events li { padding: .35rem 0; border-bottom: 1px solid var(--grid); }
-.events .contact { color: var(--alarm); }
-@media (max-width: 600px) { main { padding: 2rem 1rem 3rem; } body { font-size: 16px; }
-  .facts th { width: 8rem; white-space: normal; } }
-@media print { body { background: #fff; } figure, table { break-inside: avoid; } }
-"""

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
+from volery.graph.messages import stamp_of
 from volery.publishing.lidar_publishing import cloud_points
-
-Array = NDArray[np.float64]
 
 MAX_RANGE_M = 28.0
 """Longer beams are not mapped, because of heading errors and dropouts."""
@@ -25,7 +25,7 @@ def scan_points(scan: Any, mount: Any, poses: deque[tuple[int, Any]]) -> NDArray
     Each beam is placed from the body's poses before and after it, which come from `poses` (time in
     ns, geometry_msgs/Pose); the two positions are interpolated.
     """
-    start_ns = stamp_ns(scan)
+    start_ns = stamp_of(scan)
     if not poses or poses[0][0] > start_ns:
         return None
     along, fraction = _beams_of_cloud(scan) if _is_cloud(scan) else _beams_of_scan(scan)
@@ -108,19 +108,13 @@ def _arrays(pose: Any) -> tuple[Array, Array]:
     return np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
 
 
-def stamp_ns(message: Any) -> int:
-    """Returns the stamp of a message, ns."""
-    stamp = message.header.stamp
-    return int(stamp.sec) * NS_PER_S + int(stamp.nanosec)
-
-
 def end_ns(scan: Any) -> int:
     """Returns the time of the last beam of a LaserScan or PointCloud2, ns."""
     if _is_cloud(scan):
         sweep_s = float(cloud_points(scan)["time"].max(initial=0.0))
     else:
         sweep_s = float((len(scan.ranges) - 1) * scan.time_increment)
-    return stamp_ns(scan) + round(sweep_s * NS_PER_S)
+    return stamp_of(scan) + round(sweep_s * NS_PER_S)
 
 
 def _is_cloud(message: Any) -> bool:

@@ -9,13 +9,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.collections import EllipseCollection
-from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.report.charts import as_svg, new_axes
 from volery.report.palette import FAINT, INK, UAV_COLORS
 from volery.report.true_trunks import TrueTrunks
-
-Array = NDArray[np.float64]
 
 _MAP_SIZE = (7.2, 6.4)
 _POINTS = 1500

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.errors import VoleryError
 from volery.core.plurals import counted
 from volery.report.alignment import (
@@ -21,7 +21,7 @@ from volery.report.alignment import (
     umeyama,
 )
 from volery.report.logged_flights import LoggedFlight, LoggedUav, read_flight, read_way
-from volery.report.page import STYLE, ReportError
+from volery.report.page import ReportError, html_page
 from volery.report.trajectories import RecordedTrajectory
 from volery.report.trajectory_charts import (
     ChartLine,
@@ -31,8 +31,6 @@ from volery.report.trajectory_charts import (
     ways_from_above,
 )
 from volery.report.true_trunks import TrueTrunks, true_trunks
-
-Array = NDArray[np.float64]
 
 _LEAST = 10
 """Min number of common poses for an error."""
@@ -291,16 +289,5 @@ def _figures(
 
 
 def _page(title: str, lead: Sequence[str], parts: Sequence[str]) -> str:
-    name = escape(title)
-    head = [
-        "<!doctype html>",
-        '<html lang="en"><head><meta charset="utf-8">',
-        '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        '<meta name="color-scheme" content="light dark">',
-        f"<title>{name} · flight report</title>",
-        f"<style>{STYLE}{_APART}</style></head><body><main>",
-        f'<header><p class="kicker">Volery flight report</p><h1>{name}</h1>',
-        *lead,
-        "</header>",
-    ]
-    return "\n".join([*head, *parts, "</main></body></html>"]) + "\n"
+    header = f'<header><p class="kicker">Volery flight report</p><h1>{escape(title)}</h1>'
+    return html_page(title, [header, *lead, "</header>", *parts], _APART)

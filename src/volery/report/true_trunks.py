@@ -6,14 +6,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.bridges.logs.recorded_flight import RecordedScenario
+from volery.core.arrays import Array
 from volery.core.errors import VoleryError
 from volery.runtime.build.worlds import build_city, build_forest, build_terrain
 from volery.runtime.replay.scenario_record import scenario_of
-
-Array = NDArray[np.float64]
 
 _NEAR_M = 15.0
 """Max distance to the trajectory, as in the detection by scans."""

@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 from volery.autonomy.mapping.vertical_structures import VerticalStructures
 from volery.autonomy.perception.static_transforms import Mount, StaticTransforms
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.graph.messages import stamp_of
 from volery.report.trajectories import RecordedTrajectory
 from volery.report.trunks import TrunkMap, trunks_of_scan
-
-Array = NDArray[np.float64]
 
 LEVEL, NODDING = "laser/horizontal/scan", "laser/nodding/scan"
 _JOINT = "laser_nodding"

@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from volery.core.arrays import Array
 
 _NEAREST_M, _FARTHEST_M = 0.6, 15.0
 _APART_M = 0.35

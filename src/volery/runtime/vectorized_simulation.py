@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from volery.core.arrays import Array
 from volery.core.clock import ns_from_s, s_from_ns
 from volery.core.errors import CommandError, ScenarioError
 from volery.core.plurals import counted
@@ -36,8 +37,6 @@ from volery.runtime.warmup.parallel_compilation import compiled
 from volery.runtime.warmup.requirements import needs_of
 from volery.scenario.schema import Scenario
 from volery.vehicle.fleet import FleetState
-
-Array = NDArray[np.float64]
 
 
 class VectorizedSimulation:

@@ -14,13 +14,12 @@ from pydantic import NonNegativeFloat, PositiveFloat
 
 from volery.control.fleet import Fleet
 from volery.core import atmosphere, rotations
+from volery.core.arrays import Array, read_only
 from volery.core.clock import NS_PER_S, Schedule
 from volery.sensors.bank import NoisyBank
 from volery.sensors.model import SensorModel, load_model
 from volery.sensors.noise import gauss_markov_of_sigma
-from volery.sensors.samples import PressureSamples, SensorId, owned
-
-Array = NDArray[np.float64]
+from volery.sensors.samples import PressureSamples, SensorId
 
 
 class BarometerModel(SensorModel):
@@ -79,8 +78,8 @@ class BarometerBank(NoisyBank):
         return PressureSamples(
             self.sensors,
             time_ns,
-            owned(pressure),
-            owned(atmosphere.temperature(self._origin_altitude + z)),
+            read_only(pressure),
+            read_only(atmosphere.temperature(self._origin_altitude + z)),
             self._model.noise_pa**2 if self._noise.enabled else 0.0,
         )
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from volery.control.fleet import Fleet
+from volery.core.arrays import read_only
 from volery.core.clock import Schedule
 from volery.core.errors import DataFileError
 from volery.sensors.bank import Memoryless, uav_rows
-from volery.sensors.samples import BatterySamples, SensorId, owned
+from volery.sensors.samples import BatterySamples, SensorId
 
 
 class BatteryBank(Memoryless):
@@ -33,8 +34,8 @@ class BatteryBank(Memoryless):
                     "[battery] table"
                 )
             packs.append(airframe.battery)
-        self._capacity_ah = owned(np.array([pack.capacity_ah for pack in packs]))
-        self._cells = owned(np.array([pack.cells for pack in packs]))
+        self._capacity_ah = read_only(np.array([pack.capacity_ah for pack in packs]))
+        self._cells = read_only(np.array([pack.cells for pack in packs]))
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> BatterySamples:  # noqa: ARG002
         """Returns voltages, currents and charges (S,) of measurement `k`; see `Bank`."""
@@ -42,10 +43,10 @@ class BatteryBank(Memoryless):
         return BatterySamples(
             self.sensors,
             time_ns,
-            owned(state.battery_voltage[rows]),
-            owned(state.battery_current[rows]),
-            owned(state.battery_charge[rows]),
+            read_only(state.battery_voltage[rows]),
+            read_only(state.battery_current[rows]),
+            read_only(state.battery_charge[rows]),
             self._capacity_ah,
             self._cells,
-            owned(state.battery_level[rows]),
+            read_only(state.battery_level[rows]),
         )

@@ -11,10 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.world.embree import LANES
-
-Array = NDArray[np.float64]
-
 
 TABLE_ROWS = 4
 KNOTS_APART_NS = 1_000_000

@@ -9,12 +9,11 @@ from volery.control.estimator.errors import pose_covariance, twist_covariance
 from volery.control.estimator.estimator import Estimator
 from volery.control.fleet import Fleet
 from volery.core import rotations
+from volery.core.arrays import Array, read_only
 from volery.core.clock import Schedule
 from volery.core.rows import in_one_piece
 from volery.sensors.bank import Memoryless
-from volery.sensors.samples import OdometrySamples, SensorId, owned
-
-Array = NDArray[np.float64]
+from volery.sensors.samples import OdometrySamples, SensorId
 
 
 class EstimateBank(Memoryless):
@@ -51,11 +50,11 @@ class EstimateBank(Memoryless):
         return OdometrySamples(
             self.sensors,
             time_ns,
-            owned(state.position_map[rows].copy()),
-            owned(attitude),
-            owned(rotations.rotate(rotations.conjugate(attitude), velocity)),
-            owned(state.omega_body[rows].copy()),
-            owned(np.diagonal(pose_covariance(covariance), axis1=1, axis2=2).copy()),
-            owned(np.diagonal(twist, axis1=1, axis2=2).copy()),
+            read_only(state.position_map[rows].copy()),
+            read_only(attitude),
+            read_only(rotations.rotate(rotations.conjugate(attitude), velocity)),
+            read_only(state.omega_body[rows].copy()),
+            read_only(np.diagonal(pose_covariance(covariance), axis1=1, axis2=2).copy()),
+            read_only(np.diagonal(twist, axis1=1, axis2=2).copy()),
             is_ground_truth=False,
         )

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from volery.control.fleet import Fleet
+from volery.core.arrays import Array, read_only
 from volery.core.clock import Schedule
 from volery.core.errors import CommandError
 from volery.sensors.bank import Bank, rows_of, uav_rows
-from volery.sensors.samples import Samples, SensorId, owned
+from volery.sensors.samples import Samples, SensorId
 
-Array = NDArray[np.float64]
 Arrays = dict[str, Any]
 """Quantities by name, each (S, ...): row i belongs to sensor i."""
 
@@ -113,7 +113,7 @@ class FaultTable:
         self._kind = np.array(state["kind"])
         self._bias = np.array(state["bias"])
         self._known = np.array(state["known"])
-        self._last = {name: owned(np.array(array)) for name, array in state["last"].items()}
+        self._last = {name: read_only(np.array(array)) for name, array in state["last"].items()}
         self._is_quiet = False
 
     def reset(self, rows: NDArray[np.int64]) -> None:
@@ -150,7 +150,7 @@ class FaultTable:
                 array = arrays[name].copy()
                 each = bias[rows] if count > 1 else bias[rows].reshape(-1, *[1] * (array.ndim - 1))
                 array[rows] += each.astype(array.dtype)
-                changed[name] = owned(array)
+                changed[name] = read_only(array)
         return changed
 
     def _repeat(self, arrays: Arrays) -> Arrays:
@@ -162,7 +162,7 @@ class FaultTable:
             if len(rows) and last[name].shape == array.shape:
                 mixed = array.copy()
                 mixed[rows] = last[name][rows]
-                changed[name] = owned(mixed)
+                changed[name] = read_only(mixed)
         return changed
 
 
@@ -240,6 +240,6 @@ def _kind_of(kind: FaultKind | str) -> FaultKind:
 
 def _without(samples: Samples, arrays: Arrays, dropped: NDArray[np.bool_]) -> Samples:
     kept = np.flatnonzero(~dropped)
-    left: Arrays = {name: owned(array[kept]) for name, array in arrays.items()}
+    left: Arrays = {name: read_only(array[kept]) for name, array in arrays.items()}
     sensors = tuple(samples.sensors[i] for i in kept)
     return replace(samples, sensors=sensors, **left)

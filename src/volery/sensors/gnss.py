@@ -14,6 +14,7 @@ from pydantic import NonNegativeFloat, PositiveFloat
 
 from volery.control.fleet import Fleet
 from volery.core import rotations
+from volery.core.arrays import Array, read_only
 from volery.core.clock import NS_PER_S, Schedule, ns_from_s
 from volery.core.errors import CommandError, DataFileError
 from volery.core.geodesy import LocalFrame
@@ -21,10 +22,8 @@ from volery.sensors.bank import NoisyBank, rows_of
 from volery.sensors.gnss_denial import NOWHERE, GnssDenial
 from volery.sensors.model import SensorModel, load_model
 from volery.sensors.noise import gauss_markov_of_sigma
-from volery.sensors.samples import GnssSamples, SensorId, owned
+from volery.sensors.samples import GnssSamples, SensorId
 from volery.vehicle.pose_history import KEPT_NS, PoseHistory, pose_at
-
-Array = NDArray[np.float64]
 
 FOREVER_NS = np.iinfo(np.int64).max
 _LONGEST_DELAY_NS = KEPT_NS - 6_000_000
@@ -118,11 +117,11 @@ class GnssBank(NoisyBank):
             self.sensors,
             time_ns,
             self._frame,
-            owned(has_fix),
-            owned(position),
-            owned(velocity),
-            owned(np.full(shape, known * (self._wander.sigma**2 + self._white**2))),
-            owned(np.full(shape, known * self._velocity_noise**2)),
+            read_only(has_fix),
+            read_only(position),
+            read_only(velocity),
+            read_only(np.full(shape, known * (self._wander.sigma**2 + self._white**2))),
+            read_only(np.full(shape, known * self._velocity_noise**2)),
         )
 
     def deny(self, uav: int, since_ns: int, until_ns: int = FOREVER_NS) -> None:

@@ -15,14 +15,13 @@ from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from volery.control.fleet import Fleet
+from volery.core.arrays import Array, read_only
 from volery.core.clock import NS_PER_S, Schedule
 from volery.sensors.bank import NoisyBank
 from volery.sensors.inertial_kernels import feel_motion
 from volery.sensors.model import SensorModel, load_model
 from volery.sensors.noise import gauss_markov
-from volery.sensors.samples import ImuSamples, SensorId, owned
-
-Array = NDArray[np.float64]
+from volery.sensors.samples import ImuSamples, SensorId
 
 
 class ImuModel(SensorModel):
@@ -116,8 +115,8 @@ class ImuBank(NoisyBank):
         return ImuSamples(
             self.sensors,
             time_ns,
-            owned(reading[:, :3].copy()),
-            owned(reading[:, 3:].copy()),
+            read_only(reading[:, :3].copy()),
+            read_only(reading[:, 3:].copy()),
             float(self._white[0] ** 2),
             float(self._white[3] ** 2),
         )

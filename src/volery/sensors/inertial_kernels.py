@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.compiled import brief_kernel
 from volery.core.rotation_kernels import cross, quaternion_product, rotate_vector
-
-Array = NDArray[np.float64]
 
 GRAVITY = 9.80665
 """Standard gravity, m/s^2 (ISO 80000-3)."""

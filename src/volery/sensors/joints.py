@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from volery.control.fleet import Fleet
+from volery.core.arrays import read_only
 from volery.core.clock import NS_PER_S, Schedule
 from volery.sensors.bank import Memoryless
 from volery.sensors.mount import Mount, nodding_angle_at
-from volery.sensors.samples import JointAngles, SensorId, owned
+from volery.sensors.samples import JointAngles, SensorId
 
 _RATE_HZ = 80.0
 _DIFFERENCE_NS = 1_000_000
@@ -30,4 +31,4 @@ class JointBank(Memoryless):
         now = np.array([nodding_angle_at(mount, time_ns) for mount in self._mounts])
         soon = np.array([nodding_angle_at(m, time_ns + _DIFFERENCE_NS) for m in self._mounts])
         rate = (soon - now) / (_DIFFERENCE_NS / NS_PER_S)
-        return JointAngles(self.sensors, time_ns, owned(now), owned(rate))
+        return JointAngles(self.sensors, time_ns, read_only(now), read_only(rate))

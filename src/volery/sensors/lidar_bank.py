@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
+from volery.core.arrays import read_only
 from volery.core.clock import Schedule
 from volery.core.errors import DataFileError
 from volery.sensors.bank import NoisyBank
@@ -13,7 +14,7 @@ from volery.sensors.lidar import make_batch, sample_echoes, stack_mounts
 from volery.sensors.lidar_model import LidarModel
 from volery.sensors.mount import Mount
 from volery.sensors.particle_echoes import ParticleTable, particle_table
-from volery.sensors.samples import LidarScans, SensorId, owned
+from volery.sensors.samples import LidarScans, SensorId
 from volery.vehicle.pose_history import KEPT_NS
 from volery.world.scene import Scene
 from volery.world.weather import CLEAR_AIR, Particles
@@ -78,8 +79,8 @@ class LidarBank(NoisyBank):
             time_ns,
             self._model,
             k,
-            owned(echoes.ranges),
-            owned(echoes.intensities),
+            read_only(echoes.ranges),
+            read_only(echoes.intensities),
         )
 
     def _air_of(self, particles: Particles) -> ParticleTable | None:

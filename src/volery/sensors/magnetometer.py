@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from volery.control.fleet import Fleet
+from volery.core.arrays import Array, read_only
 from volery.core.clock import NS_PER_S, Schedule
 from volery.sensors.bank import NoisyBank
 from volery.sensors.inertial_kernels import feel_vector
 from volery.sensors.model import SensorModel, load_model
 from volery.sensors.noise import gauss_markov
-from volery.sensors.samples import MagneticSamples, SensorId, owned
+from volery.sensors.samples import MagneticSamples, SensorId
 
-Array = NDArray[np.float64]
 Row = tuple[float, float, float]
 
 
@@ -83,7 +83,7 @@ class MagnetometerBank(NoisyBank):
         return MagneticSamples(
             self.sensors,
             time_ns,
-            owned(field),
+            read_only(field),
             self._white**2 if self._noise.enabled else 0.0,
         )
 

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from volery.core import rng
-
-Array = NDArray[np.float64]
+from volery.core.arrays import Array
 
 
 class NoiseStreams:

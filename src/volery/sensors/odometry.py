@@ -10,14 +10,14 @@ from pydantic import NonNegativeFloat
 
 from volery.control.fleet import Fleet
 from volery.core import rotations
+from volery.core.arrays import Array, read_only
 from volery.core.clock import Schedule
 from volery.core.rows import in_one_piece
 from volery.sensors.bank import Memoryless, NoisyBank, uav_rows
 from volery.sensors.inertial_kernels import body_twists
 from volery.sensors.model import SensorModel, load_model
-from volery.sensors.samples import OdometrySamples, SensorId, owned
+from volery.sensors.samples import OdometrySamples, SensorId
 
-Array = NDArray[np.float64]
 _NUMBERS_A_SAMPLE = 10
 
 
@@ -95,12 +95,12 @@ class OdometryBank(NoisyBank):
         return OdometrySamples(
             self.sensors,
             time_ns,
-            owned(self._position_odom.copy()),
-            owned(rotations.multiply(self._yaw_turn(), attitude)),
-            owned(twist[:, :3].copy()),
-            owned(twist[:, 3:].copy()),
-            owned(variance),
-            owned(np.tile(self._twist_noise**2, (len(self._rows), 1))),
+            read_only(self._position_odom.copy()),
+            read_only(rotations.multiply(self._yaw_turn(), attitude)),
+            read_only(twist[:, :3].copy()),
+            read_only(twist[:, 3:].copy()),
+            read_only(variance),
+            read_only(np.tile(self._twist_noise**2, (len(self._rows), 1))),
             is_ground_truth=False,
         )
 
@@ -135,12 +135,12 @@ class GroundTruthBank(Memoryless):
         return OdometrySamples(
             self.sensors,
             time_ns,
-            owned(fleet.state.position_map[self._taken].copy()),
-            owned(fleet.state.attitude[self._taken].copy()),
-            owned(twist[:, :3].copy()),
-            owned(twist[:, 3:].copy()),
-            owned(zero),
-            owned(zero.copy()),
+            read_only(fleet.state.position_map[self._taken].copy()),
+            read_only(fleet.state.attitude[self._taken].copy()),
+            read_only(twist[:, :3].copy()),
+            read_only(twist[:, 3:].copy()),
+            read_only(zero),
+            read_only(zero.copy()),
             is_ground_truth=True,
         )
 

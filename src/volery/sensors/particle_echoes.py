@@ -36,8 +36,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.sensors.lidar_model import LidarModel
 from volery.world.weather.particles import (
     Particles,
@@ -49,8 +49,6 @@ from volery.world.weather.particles import (
     snow_extinction,
     snow_slope,
 )
-
-Array = NDArray[np.float64]
 
 WAVELENGTH_NM = 905.0
 """Wavelength of all shipped LIDARs except Ouster's, which have 865 nm."""

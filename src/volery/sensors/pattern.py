@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import PositiveFloat
 
+from volery.core.arrays import Array
 from volery.sensors.beam_table import BeamTable, block_table, in_packets
 from volery.sensors.model import SensorModel
 from volery.world.embree import LANES
-
-Array = NDArray[np.float64]
 
 MOST_BEAMS = 1 << 20
 """Maximum number of beams of a sweep."""

@@ -7,16 +7,15 @@ Row i of every array belongs to `sensors[i]`. Arrays are new, owned by the sampl
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, TypeAlias
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.geodesy import LocalFrame
 from volery.sensors.cameras.model import CameraModel
 from volery.sensors.lidar_model import LidarModel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -233,9 +232,3 @@ Samples: TypeAlias = (
     | MagneticSamples
     | BatterySamples
 )
-
-
-def owned(array: NDArray[Any]) -> NDArray[Any]:
-    """Makes the array read-only and returns it."""
-    array.flags.writeable = False
-    return array

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PrivateAttr, model_validator
 
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S, ns_from_s
 from volery.core.errors import DataFileError
 from volery.scenario.access import ScenarioAccess
@@ -23,7 +24,6 @@ from volery.sensors.beam_table import BeamTable, block_table, row_table
 from volery.sensors.pattern import MOST_BEAMS, Pattern, median_spacing
 from volery.world.embree import LANES
 
-Array = NDArray[np.float64]
 Degrees = Annotated[float, Field(ge=-360.0, le=360.0)]
 _TILE_COLUMNS = 4
 """Columns of a packet of a ring scanner; LANES / 4 neighbouring rings fill it."""

@@ -11,13 +11,13 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from volery.control.fleet import Fleet
 from volery.core import rotations
+from volery.core.arrays import Array, read_only
 from volery.core.clock import Schedule
 from volery.sensors.bank import NoisyBank
 from volery.sensors.model import SensorModel, load_model
-from volery.sensors.samples import RangeSamples, SensorId, owned
+from volery.sensors.samples import RangeSamples, SensorId
 from volery.world.scene import Scene
 
-Array = NDArray[np.float64]
 _RINGS = ((0.0, 1), (0.5, 6), (1.0, 12))
 """Rays of the cone: fraction of the half angle and number of rays on that ring."""
 
@@ -92,7 +92,7 @@ class SonarBank(NoisyBank):
         return RangeSamples(
             self.sensors,
             time_ns,
-            owned(nearest),
+            read_only(nearest),
             math.radians(self._model.field_of_view_deg),
             self._model.range_min_m,
             self._model.range_max_m,

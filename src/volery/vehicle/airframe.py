@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, model_validator
 
+from volery.core.arrays import Array
 from volery.scenario.data_files import find_data_file, load_data_file
 from volery.vehicle.battery import Battery, open_circuit_voltage
 from volery.vehicle.tables import NotNegative, Positive, PositiveVector, Table, Vector
@@ -26,8 +26,6 @@ MAX_ROTORS = 12
 MAX_FEET = 8
 _HOVER_MARGIN = 1.1
 _AIRFRAMES = Path(__file__).parent / "airframes"
-
-Array = NDArray[np.float64]
 
 
 def _possible_inertia(moments: PositiveVector) -> PositiveVector:

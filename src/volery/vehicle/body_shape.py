@@ -7,13 +7,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.vehicle.airframe import Airframe, RotorGeometry
 from volery.world.materials import Material
 from volery.world.mesh import Mesh
 from volery.world.rotor_kernels import DISC_SIDES
 from volery.world.scene_content import BodyShape
-
-Array = NDArray[np.float64]
 
 _ARM_WIDTH_M = 0.025
 

@@ -13,16 +13,13 @@ import math
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-from volery.core import rotations
-from volery.vehicle.airframe import Airframe
+from volery.core.arrays import Array
 from volery.vehicle.compiled import inner_kernel
 from volery.vehicle.plant import MAX_CONTACTS
 from volery.vehicle.rotation_math import matrix_of, three
-from volery.world.terrain import Terrain, TerrainGrid, terrain_height, terrain_normal
+from volery.world.terrain import TerrainGrid, terrain_height, terrain_normal
 
-Array = NDArray[np.float64]
 Three: TypeAlias = tuple[float, float, float]
 Six: TypeAlias = tuple[float, float, float, float, float, float]
 """Velocity (m/s) and rates (rad/s) in the body frame."""
@@ -63,20 +60,6 @@ def steepest_cosine(grid: TerrainGrid) -> float:
     below = np.hypot(across[:-1, :], up[:, 1:])
     above = np.hypot(across[1:, :], up[:, :-1])
     return float(1.0 / math.sqrt(1.0 + max(below.max(), above.max()) ** 2))
-
-
-def standing_pose(airframe: Airframe, terrain: Terrain, x: float, y: float, yaw: float) -> Array:
-    """Returns the pose (7,) x, y, z m, quaternion x y z w, of a vehicle on the ground at (x, y).
-
-    The vehicle tilts with the ground; no foot is below the terrain.
-    """
-    normal = terrain.normal(x, y)
-    tilt = np.array([-normal[1], normal[0], 0.0, 1.0 + normal[2]])
-    attitude = rotations.multiply(rotations.normalize(tilt), rotations.from_rpy(0.0, 0.0, yaw))
-    feet = rotations.rotate(attitude, np.array(airframe.ground.feet_m))
-    ground = terrain.height(x + feet[:, 0], y + feet[:, 1])
-    z = float((ground - feet[:, 2]).max())
-    return np.concatenate([[x, y, z], attitude])
 
 
 @inner_kernel

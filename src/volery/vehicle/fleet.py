@@ -7,9 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from volery.core.arrays import Array
 from volery.vehicle.airframe import MAX_ROTORS
-
-Array = NDArray[np.float64]
 
 BODY = np.dtype(
     [

@@ -21,12 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
+from volery.core.arrays import Array
 from volery.scenario.data_files import find_data_file, load_data_file
 from volery.vehicle.airframe import GRAVITY, Airframe
 from volery.vehicle.compiled import inner_kernel
 from volery.vehicle.rotation_math import four, matrix_of, nudged, three
 
-Array = NDArray[np.float64]
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 Gain = Annotated[float, Field(gt=0.0, le=2.0)]

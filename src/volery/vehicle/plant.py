@@ -8,11 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.scenario.schema import RotorWear
 from volery.vehicle.airframe import MAX_FEET, MAX_ROTORS, Airframe
 from volery.vehicle.battery import BATTERY, battery_row
-
-Array = NDArray[np.float64]
 
 AIR_DENSITY = 1.225
 """Density of air, kg/m^3: International Standard Atmosphere at sea level."""

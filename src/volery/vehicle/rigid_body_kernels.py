@@ -12,9 +12,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from volery.core.arrays import Array
 from volery.core.simd import LANES, lanes_at, put_lanes
 from volery.vehicle.aerodynamics import air_wrench
 from volery.vehicle.airframe import GRAVITY
@@ -22,8 +20,6 @@ from volery.vehicle.compiled import apart_kernel, inner_kernel
 from volery.vehicle.contact import NO_TOUCH, classify_touch, resolve_contact
 from volery.vehicle.rotation_math import matrix_of, nudged, three, turned
 from volery.world.terrain import TerrainGrid, terrain_height
-
-Array = NDArray[np.float64]
 
 _GROUND_MARGIN = 0.05
 """Margin when the next terrain query is postponed, m."""

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from volery.core.arrays import Array
 from volery.vehicle.compiled import inner_kernel
-
-Array = NDArray[np.float64]
 
 
 @inner_kernel

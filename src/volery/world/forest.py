@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.errors import ScenarioError
 from volery.core.plurals import counted
 from volery.core.rng import generator
@@ -24,7 +25,6 @@ from volery.world.species_map import shipped_species
 from volery.world.terrain import Terrain
 from volery.world.trees import BREAST_HEIGHT_M, Species, TreeModel, grow_models, load_species
 
-Array = NDArray[np.float64]
 Region = tuple[float, float, float, float]
 
 _LOWEST_TREE_M = 0.3

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.world.gltf_container import Container, entry, field
-
-Array = NDArray[np.float64]
 
 MOST_PARTS = 100_000
 """Maximum number of meshes in nodes, each counted as often as used."""

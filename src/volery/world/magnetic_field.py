@@ -13,11 +13,9 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.geodesy import LocalFrame, ecef_from_geodetic
-
-Array = NDArray[np.float64]
 
 EPOCH_YEAR = 2025.0
 _FILE = Path(__file__).parent / "data" / "igrf14_2025.csv"

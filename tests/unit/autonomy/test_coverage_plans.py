@@ -12,10 +12,10 @@ from volery.autonomy.coverage.flight import CoverageFlight, CoveragePhase
 from volery.autonomy.coverage.plan import UNREACHABLE, plan_coverage
 from volery.autonomy.coverage.spanning_tree import CoverageTour
 from volery.autonomy.coverage.waypoints import HeightProfile, WaypointProgress, route_waypoints
-from volery.bench.coverage import CASES
 from volery.core.errors import PlanError
 from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import OccupancyGrid
+from volery_benchmarks.coverage import CASES
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)

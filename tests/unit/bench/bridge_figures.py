@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from volery.bench.bridge.latency_figures import IMAGE_BYTES, size_figures
-from volery.bench.registry import Result
+from volery_benchmarks.bridge.latency_figures import IMAGE_BYTES, size_figures
+from volery_benchmarks.registry import Result
 
 _HEADER_BYTES = 49
 _SPREAD_S = (0.0, -0.5e-3, 0.0, 1.5e-3, 0.0)

@@ -1,7 +1,7 @@
 """The page of figures: several runs of a bench are told by their median and their span."""
 
-from volery.bench.document import render
-from volery.bench.registry import Result
+from volery_benchmarks.document import render
+from volery_benchmarks.registry import Result
 
 
 def run(rays, bench="lidar", machine="a"):

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from volery.bench.forest_flight import SIGHT_M, Flown, Search, area_of, search_scenario
-from volery.bench.forest_search import figures_of
-from volery.bench.registry import find
 from volery.core.errors import VoleryError
 from volery.graph import messages as m
 from volery.graph.codecs.zero import zero_message
 from volery.report.trunk_survey import LEVEL
+from volery_benchmarks.forest_flight import SIGHT_M, Flown, Search, area_of, search_scenario
+from volery_benchmarks.forest_search import figures_of
+from volery_benchmarks.registry import find
 
 TREES = np.array([[30.0, 250.0], [34.0, 260.0], [200.0, 430.0]])
 STANDING = np.concatenate([TREES, [[60.0, 252.0]]])

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from volery.bench.hostile import measuring
-from volery.bench.registry import BENCHES
+from volery_benchmarks.hostile import measuring
+from volery_benchmarks.registry import BENCHES
 
 
 def test_calls_without_an_answer_count_as_the_longest():

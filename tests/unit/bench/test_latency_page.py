@@ -8,16 +8,16 @@ import xml.etree.ElementTree as ET
 import pytest
 from bridge_figures import LATENCIES, result
 
-from volery.bench.bridge import latency_page
-from volery.bench.bridge.latency_figures import (
+from volery.core.errors import VoleryError
+from volery_benchmarks.bridge import latency_page
+from volery_benchmarks.bridge.latency_figures import (
     IMAGE_BYTES,
     end_point_figures,
     fit_line,
     one_way_latencies,
     size_figures,
 )
-from volery.bench.document import render as render_benchmarks
-from volery.core.errors import VoleryError
+from volery_benchmarks.document import render as render_benchmarks
 
 
 def cells(text, first):

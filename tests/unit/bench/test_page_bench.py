@@ -2,9 +2,9 @@
 
 import pytest
 
-from volery.bench.page.streams import lost
-from volery.bench.page.worlds import crowd, forest
 from volery.scenario.load import load_scenario
+from volery_benchmarks.page.streams import lost
+from volery_benchmarks.page.worlds import crowd, forest
 
 PERIOD_NS = 33_000_000
 

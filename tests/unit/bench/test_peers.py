@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from volery.bench import registry
-from volery.bench.document import render
-from volery.bench.peers import rays
-from volery.bench.peers.catalogue import PEERS, Contest, HoverContest, Peer, RayContest
-from volery.bench.peers.contests import measure_peers
-from volery.bench.peers.environments import environment
-from volery.bench.peers.failure import PeerError, last_line
-from volery.bench.peers.hover import check_hover, hover_task
-from volery.bench.peers.peer_process import PeerProcess
-from volery.bench.peers.task import Task
-from volery.bench.registry import Measured, Result
 from volery.cli.app import app
 from volery.world.mesh import Mesh
+from volery_benchmarks import registry
+from volery_benchmarks.document import render
+from volery_benchmarks.peers import rays
+from volery_benchmarks.peers.catalogue import PEERS, Contest, HoverContest, Peer, RayContest
+from volery_benchmarks.peers.contests import measure_peers
+from volery_benchmarks.peers.environments import environment
+from volery_benchmarks.peers.failure import PeerError, last_line
+from volery_benchmarks.peers.hover import check_hover, hover_task
+from volery_benchmarks.peers.peer_process import PeerProcess
+from volery_benchmarks.peers.task import Task
+from volery_benchmarks.registry import Measured, Result
 
 HERE = Path(sys.executable)
 HOVER = HoverContest(drones=4, worlds=1, steps=50)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import statistics
 
-from volery.bench import search
-from volery.bench.registry import BENCHES
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
+from volery_benchmarks import search
+from volery_benchmarks.registry import BENCHES
 
 
 def test_figures_leave_the_first_calls_out():

@@ -12,17 +12,17 @@ import typer
 from fake_simulation import FakeSimulation
 from typer.testing import CliRunner
 
-from volery.bench import registry
-from volery.bench.document import read_results, render
-from volery.bench.machine import describe_machine, describe_versions
-from volery.bench.registry import Result
 from volery.bridges.logs.log_writer import open_log
 from volery.cli import doctor, start
 from volery.cli.app import app
 from volery.cli.error_reporting import guarded, word_logs
 from volery.core.errors import VoleryError
+from volery.core.machine import describe_machine, describe_versions
 from volery.scenario import library
 from volery.scenario.load import load_scenario
+from volery_benchmarks import registry
+from volery_benchmarks.document import read_results, render
+from volery_benchmarks.registry import Result
 
 runner = CliRunner()
 FIGURES = {"ns_per_drone_step_n1000": 120.5, "us_per_step_n1": 2.5, "other": 3.0}

@@ -2,7 +2,7 @@
 
 import pytest
 
-from volery.bench.fleet import largest
+from volery_benchmarks.fleet import largest
 
 
 @pytest.mark.parametrize("limit", [1, 4, 5, 7, 60, 61, 95, 400])

@@ -13,7 +13,6 @@ import time
 import pytest
 from live_graph import LiveGraph
 
-from volery.bench.comms import served
 from volery.bridges.bridge_host import BridgeHost
 from volery.cli.gcs import parse_server
 from volery.comms.addresses import ALL, ALL_GROUND, FIRST_GROUND, Identity, batch_address, is_meant
@@ -40,6 +39,7 @@ from volery.comms.station.tcp import Station
 from volery.core.errors import CommsError
 from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import Header, Point, String, Time, Vector3, message_type
+from volery_benchmarks.comms import served
 
 State = message_type(STATE_TYPE)
 States = message_type("volery_interfaces/msg/VehicleStates")

@@ -7,7 +7,6 @@ import socket
 
 import pytest
 
-from volery.bench.comms import Traffic, served
 from volery.comms.addresses import ALL, Identity
 from volery.comms.control_payloads import Hello, Reason, encode_hello
 from volery.comms.protocol import StationFrameKind, encode_frame
@@ -16,6 +15,7 @@ from volery.comms.server.tcp import CommsServer
 from volery.comms.station.tcp import Station
 from volery.core.errors import BridgeError, CommsError
 from volery.core.framing import Flaw
+from volery_benchmarks.comms import Traffic, served
 
 
 async def until(true) -> None:

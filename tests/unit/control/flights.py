@@ -1,11 +1,11 @@
 """Vehicles and grounds that the control tests fly."""
 
 import numpy as np
+from standing import standing_pose
 
 from volery.control.fleet import Fleet
 from volery.control.flight_modes import FlightMode
 from volery.vehicle.airframe import Airframe, load_airframe
-from volery.vehicle.contact import standing_pose
 from volery.world.terrain import Terrain
 from volery.world.weather import Weather
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from flights import F450, FLAT, LEVEL, in_air, on_ground, ring, track
+from standing import standing_pose
 
 from volery.control.estimator.errors import EstimationError
 from volery.control.fleet import Fleet
@@ -12,7 +13,6 @@ from volery.control.fused_step import UAV
 from volery.control.setpoints import CONTROL_STATE
 from volery.core import rotations
 from volery.core.errors import CommandError
-from volery.vehicle.contact import standing_pose
 from volery.vehicle.fleet import BODY
 from volery.vehicle.plant import contact_points
 from volery.world.terrain import Terrain

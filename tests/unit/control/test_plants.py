@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from flights import F450, FLAT, LEVEL, track
 from scipy.linalg import expm
+from standing import standing_pose
 
 from volery.control.fleet import Fleet
 from volery.control.fleet_events import FleetEventKind
@@ -11,7 +12,6 @@ from volery.control.flight_modes import FlightMode
 from volery.control.trajectory import Trajectory
 from volery.core import rotations
 from volery.core.errors import CommandError
-from volery.vehicle.contact import standing_pose
 from volery.vehicle.identified import FirstOrder, SecondOrder, load_identified, transition
 from volery.vehicle.kinematic import Kinematic
 from volery.vehicle.plant_types import RigidBody

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[3]
-SOURCE = ROOT / "src" / "volery"
+PACKAGES = {"volery": ROOT / "src", "volery_benchmarks": ROOT / "benchmarks"}
 
 DISTRIBUTIONS = {"open3d": "open3d"}
 """Distributions of import names, where the distribution need not be installed for the tests."""
@@ -63,10 +63,11 @@ def module_names(tree: ast.AST):
 def third_party() -> dict[str, str]:
     """Import names with the first file that imports each."""
     found = {}
-    for file in sorted(SOURCE.rglob("*.py")):
+    files = [file for name, folder in PACKAGES.items() for file in (folder / name).rglob("*.py")]
+    for file in sorted(files):
         for module in module_names(ast.parse(file.read_text(encoding="utf-8"))):
             top = module.partition(".")[0]
-            if top and top not in sys.stdlib_module_names and top != "volery":
+            if top and top not in sys.stdlib_module_names | PACKAGES.keys():
                 found.setdefault(top, str(file.relative_to(ROOT)))
     return found
 

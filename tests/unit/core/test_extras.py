@@ -59,7 +59,7 @@ def ros2(middleware):
 
 
 def browser():
-    from volery.bench.page.browser import open_browser
+    from volery_benchmarks.page.browser import open_browser
 
     with open_browser():
         pass

@@ -1,6 +1,8 @@
 """Cards of scenarios, and their pictures."""
 
 from io import BytesIO
+from pathlib import Path
+from runpy import run_path
 
 import pytest
 from page_bench import ask, serving
@@ -9,9 +11,10 @@ from PIL import Image
 from volery.scenario import library
 from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.load import load_scenario, parse_scenario
-from volery.server.card_renderer import HEIGHT, VIEWS, WIDTH
 from volery.server.cards import CARDS
 from volery.server.scenarios import cards_of
+
+RENDERER = run_path(str(Path(__file__).parents[3] / "tools" / "scenario_cards.py"))
 
 
 @pytest.mark.parametrize("name", library.names())
@@ -19,14 +22,14 @@ def test_every_scenario_that_ships_has_a_picture(name):
     path = CARDS / f"{name}.jpg"
     with Image.open(path) as picture:
         assert picture.format == "JPEG"
-        assert picture.size == (WIDTH, HEIGHT)
+        assert picture.size == (RENDERER["WIDTH"], RENDERER["HEIGHT"])
         low, high = picture.convert("L").getextrema()
         assert high - low > 40, "the picture shows nothing"
     assert path.stat().st_size < 80_000
 
 
 def test_views_are_of_scenarios_that_ship():
-    assert set(VIEWS) <= set(library.names())
+    assert set(RENDERER["VIEWS"]) <= set(library.names())
 
 
 def test_cards_tell_what_the_scenarios_say():

@@ -1,4 +1,4 @@
-// Written by `python -m volery.graph.codecs.typescript` from the definitions of the messages.
+// Written by `python tools/typescript_messages.py` from the definitions of the messages.
 // A test of the project fails when this file is older than they are.
 
 export interface builtin_interfaces_Duration {

@@ -11,16 +11,14 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.avoidance.depth_course import DepthCourse
 from volery.autonomy.avoidance.gap_steering import GapSteering, SpeedLimits
 from volery.autonomy.avoidance.obstacle_memory import ObstacleMemory
 from volery.autonomy.perception.depth_projection import DepthProjector
 from volery.autonomy.perception.scan_points import OdometrySample
+from volery.core.arrays import Array
 from volery.graph.messages import CameraInfo, Image
-
-Array = NDArray[np.float64]
 
 _LEAST_HEIGHT_M = 0.5
 """Min height above the take-off position; lower points are ground and herbs."""
@@ -41,7 +39,7 @@ class DepthAvoidance(DepthCourse):
 
     """
 
-    STATE = ("_obstacles", "_steering")
+    STATE = (*DepthCourse.STATE, "_obstacles", "_steering")
 
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:

@@ -5,23 +5,20 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from enum import StrEnum
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.perception.list_parameters import declare_numbers
 from volery.autonomy.perception.scan_points import OdometrySample
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.arrays import Array
+from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import CameraInfo, Image, Odometry, String, Twist, Vector3
 from volery.graph.nodes.node import Node
-
-Array = NDArray[np.float64]
 
 _PERIOD_S = 0.05
 _BLIND_AFTER_S = 0.5
 """Time without an image after which the UAV stops."""
-_STATE = ("phase", "pose", "_home", "_course", "_image_ns", "_info")
 
 
 class DepthCoursePhase(StrEnum):
@@ -33,7 +30,7 @@ class DepthCoursePhase(StrEnum):
     LAND = "land"
 
 
-class DepthCourse(Node):
+class DepthCourse(SavedAttributes, Node):
     """Takes off, flies `distance_m` ahead at a height, lands, with a depth camera and odometry.
 
     Parameters
@@ -46,8 +43,7 @@ class DepthCourse(Node):
 
     """
 
-    STATE: tuple[str, ...] = ()
-    """Additional attributes of a subclass that a snapshot stores."""
+    STATE: ClassVar[tuple[str, ...]] = ("phase", "pose", "_home", "_course", "_image_ns", "_info")
 
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
@@ -91,14 +87,6 @@ class DepthCourse(Node):
     def doing(self) -> str:
         """Value of `~/phase` on the course."""
         return str(self.phase)
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        return save_attributes(self, (*_STATE, *self.STATE))
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        restore_attributes(self, state)
 
     # --------------------------------------------------------------------------------- the course
 

@@ -11,10 +11,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.avoidance.gap_steering import GapSteering, SpeedLimits
 from volery.autonomy.avoidance.obstacle_memory import ObstacleMemory
@@ -23,16 +22,15 @@ from volery.autonomy.perception.list_parameters import declare_mount
 from volery.autonomy.perception.scan_points import OdometrySample, ScanProjector
 from volery.autonomy.perception.speckle_filter import SpeckleFilter
 from volery.core import rotations
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.arrays import Array
+from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import JointState, LaserScan, Odometry, Range, Twist, Vector3
 from volery.graph.nodes.node import Node
-
-Array = NDArray[np.float64]
 
 _SONAR_MEMORY_S = 0.5
 
 
-class GapFlight(Node):
+class GapFlight(SavedAttributes, Node):
     """Subscribes to scans, range and odometry, and commands `cmd_vel`; a subclass sets the goal.
 
     Parameters
@@ -48,7 +46,7 @@ class GapFlight(Node):
 
     """
 
-    STATE: tuple[str, ...] = (
+    STATE: ClassVar[tuple[str, ...]] = (
         "_pose",
         "_joint",
         "_range",
@@ -93,14 +91,6 @@ class GapFlight(Node):
         self.create_subscription(JointState, "joint_states", self._on_joint, 5)
         self.create_subscription(Range, "range", self._on_range, 5)
         self._command = self.create_publisher(Twist, "cmd_vel", 1)
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        return save_attributes(self, self.STATE)
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        restore_attributes(self, state)
 
     @property
     def _height(self) -> float:

@@ -7,14 +7,12 @@ from enum import StrEnum
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.avoidance.gap_flight import GapFlight
 from volery.autonomy.perception.list_parameters import declare_points
 from volery.autonomy.perception.scan_points import OdometrySample
+from volery.core.arrays import Array
 from volery.graph.messages import String
-
-Array = NDArray[np.float64]
 
 _PERIOD_S = 0.05
 _LEAST_CLIMB_M = 1.0

@@ -9,13 +9,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.avoidance.gaps import choose_heading, free_distances, wrap
 from volery.autonomy.avoidance.obstacle_memory import ObstacleMemory
 from volery.autonomy.perception.scan_points import OdometrySample
-
-Array = NDArray[np.float64]
+from volery.core.arrays import Array
 
 REACH_M = 14.0
 """Range of the obstacles that matter."""

@@ -11,11 +11,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.compiled import kernel
-
-Array = NDArray[np.float64]
 
 SECTORS = 180
 SECTOR_ANGLES: Array = np.linspace(-np.pi, np.pi, SECTORS, endpoint=False) + np.pi / SECTORS

@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.compiled import kernel
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 

@@ -13,17 +13,15 @@ from enum import StrEnum
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.avoidance.depth_course import DepthCourse
 from volery.autonomy.avoidance.gaps import wrap
 from volery.autonomy.perception.depth_projection import depth_of, mean_depth, region_of
 from volery.autonomy.perception.list_parameters import declare_numbers
 from volery.autonomy.perception.scan_points import OdometrySample
+from volery.core.arrays import Array
 from volery.core.errors import NodeError
 from volery.graph.messages import CameraInfo, Image
-
-Array = NDArray[np.float64]
 
 _STILL_M_S = 0.2
 _BACK_M = 0.3
@@ -54,7 +52,15 @@ class RegionAvoidance(DepthCourse):
 
     """
 
-    STATE = ("_state", "_mean", "_sides", "_side", "_since_ns", "_free_ns")
+    STATE = (
+        *DepthCourse.STATE,
+        "_state",
+        "_mean",
+        "_sides",
+        "_side",
+        "_since_ns",
+        "_free_ns",
+    )
 
     def __init__(self, **options: Any) -> None:
         super().__init__("region_avoidance", **options)

@@ -11,10 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from volery.autonomy.coverage.cells import Mask
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.errors import PlanError
 from volery.core.vectors import norm
-
-Array = NDArray[np.float64]
 
 BLOCKED_FROM = 50
 """Occupancy, in per cent, from which a cell is blocked; unknown cells (-1) are blocked as well."""

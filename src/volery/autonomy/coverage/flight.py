@@ -6,13 +6,9 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
-import numpy as np
-from numpy.typing import NDArray
-
 from volery.autonomy.coverage.waypoints import WaypointProgress
+from volery.core.arrays import Array
 from volery.core.vectors import norm
-
-Array = NDArray[np.float64]
 
 _PROGRESS_M = 0.2
 """Decrease of the distance that counts as progress. Modelling choice."""

@@ -26,7 +26,7 @@ from volery.autonomy.coverage.plan import (
 from volery.autonomy.coverage.waypoints import HeightProfile, route_waypoints
 from volery.core import rotations
 from volery.core.errors import PlanError
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import (
     Float32,
     OccupancyGrid,
@@ -43,11 +43,10 @@ _REPEAT = 10
 """Periods after which a goal and the progress are published again: a UAV ignores goals during
 take-off.
 """
-_STATE = ("_field", "_flights", "_plan", "_covered", "_refused", "_ticks", "_published_covered")
 """Names of the attributes that a snapshot stores."""
 
 
-class CoveragePlanner(Node):
+class CoveragePlanner(SavedAttributes, Node):
     """Plans on `/map` for `/uavN/odom`; commands `/uavN/goal_pose`, `take_off` and `land`.
 
     Parameters
@@ -62,6 +61,8 @@ class CoveragePlanner(Node):
     seed: of the division's random numbers.
 
     """
+
+    STATE = ("_field", "_flights", "_plan", "_covered", "_refused", "_ticks", "_published_covered")
 
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
@@ -106,14 +107,6 @@ class CoveragePlanner(Node):
             self.create_subscription(Odometry, f"/{name}/odom", self._listener(number), 5)
         self.create_subscription(OccupancyGrid, "/map", self._on_map, 1)
         self.create_timer(_PERIOD_S, self._on_timer)
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        return save_attributes(self, _STATE)
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        restore_attributes(self, state)
 
     # ------------------------------------------------------------------------------ subscriptions
 

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from volery.autonomy.coverage.cells import CoverageCells
 from volery.autonomy.coverage.field import CoverageField
 from volery.autonomy.coverage.spanning_tree import CoverageTour
+from volery.core.arrays import Array
 from volery.core.errors import PlanError
-
-Array = NDArray[np.float64]
 
 _HIGHEST = 1e4
 

@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.errors import DataFileError
-
-Array = NDArray[np.float64]
 
 _FREE, _UNKNOWN, _OCCUPIED = 254, 205, 0
 """Grey values that map_saver writes and map_server reads in mode trinary."""

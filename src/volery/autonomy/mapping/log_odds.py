@@ -12,9 +12,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.compiled import kernel
-
-Array = NDArray[np.float64]
 
 _HIT, _MISS, _LEAST, _MOST = 0.85, 0.4, -4.0, 6.0
 """ln of the odds of a scan's hit (0.70) and miss (0.60), and bounds (modelling choices)."""

@@ -8,9 +8,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from volery.autonomy.mapping import messages
 from volery.autonomy.mapping.map_files import MapLimits, node_count, read_map, write_map
 from volery.autonomy.mapping.octree import Octree
@@ -26,7 +23,7 @@ from volery.autonomy.perception.scan_rays import Beams, RayMaker, Rays
 from volery.autonomy.status import publish_status
 from volery.core.clock import NS_PER_S
 from volery.core.errors import DataFileError, NodeError
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import (
     JointState,
     LaserScan,
@@ -38,8 +35,6 @@ from volery.graph.messages import (
 )
 from volery.graph.nodes.node import Node
 
-Array = NDArray[np.float64]
-
 _SONAR_MEMORY_S = 0.5
 _SILENT_S = 2.0
 """Time without data, or without returns, after which a sensor is reported."""
@@ -47,10 +42,9 @@ _LEAST_HEIGHT_M = 1.0
 """Min height above ground for the grid; lower it would show the ground."""
 _MOST_FILES = 100
 """Max number of files in a map folder, as clients of the graph name them. Modelling choice."""
-_PLAIN_STATE = ("_motion", "_nod", "_intakes", "_ground", "_range", "_last_status", "_slab_z")
 
 
-class Mapping(Node):
+class Mapping(SavedAttributes, Node):
     """Publishes `octomap_binary` and `projected_map` (both latched), `~/status`.
 
     Services: `~/octomap` (octomap_msgs/GetOctomap); `~/save` and `~/load` (ByName: a file's name in
@@ -71,6 +65,9 @@ class Mapping(Node):
     map_file: initial map, a file in `folder`.
 
     """
+
+    PARTS = ("_octree", "_grid", "_frame")
+    STATE = ("_motion", "_nod", "_intakes", "_ground", "_range", "_last_status", "_slab_z")
 
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
@@ -138,17 +135,6 @@ class Mapping(Node):
         self.create_timer(voxels_s, self._publish_voxels)
         self.create_timer(grid_s, self._publish_grid)
         self.create_timer(1.0, self._publish_status)
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        parts = {name: getattr(self, name).get_state() for name in ("_octree", "_grid", "_frame")}
-        return {"parts": parts, **save_attributes(self, _PLAIN_STATE)}
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        for name, part in state["parts"].items():
-            getattr(self, name).set_state(part)
-        restore_attributes(self, {name: state[name] for name in _PLAIN_STATE})
 
     # ------------------------------------------------------------------------------ subscriptions
 

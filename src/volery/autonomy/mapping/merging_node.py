@@ -13,15 +13,13 @@ from volery.autonomy.perception.map_frame import MAP
 from volery.autonomy.perception.motion_history import Pose
 from volery.autonomy.status import publish_status
 from volery.core.errors import DataFileError, PlanError
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 from volery.core.vectors import norm
 from volery.graph.messages import String, TFMessage
 from volery.graph.nodes.node import Node
 
-_STATE = ("_maps", "_placements", "_changed", "_last_status", "_reasons")
 
-
-class MapMerging(Node):
+class MapMerging(SavedAttributes, Node):
     """Publishes `~/octomap_binary` (latched, `map`) of all `topics`, and `~/status` (JSON).
 
     A map in a frame other than `map` is placed by the transform between both in `/tf`; without it
@@ -35,6 +33,8 @@ class MapMerging(Node):
     max_cells: bound of all maps' known cells together.
 
     """
+
+    STATE = ("_maps", "_placements", "_changed", "_last_status", "_reasons")
 
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
@@ -62,14 +62,6 @@ class MapMerging(Node):
         self.create_timer(
             float(self.declare_parameter("period_s", 20.0, min_value=0.01).value), self._on_timer
         )
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        return save_attributes(self, _STATE)
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        restore_attributes(self, state)
 
     def _listener(self, topic: str) -> Callable[[Any], None]:
         def on_map(message: Any) -> None:

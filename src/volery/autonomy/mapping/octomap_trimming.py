@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.mapping.octomap_stream import DEPTH
+from volery.core.arrays import Array
 from volery.core.compiled import kernel
 from volery.core.errors import DataFileError
 
-Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 Integers = NDArray[np.int32]
 

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from volery.autonomy.mapping.octomap_stream import Voxels, binary_from_full, decode_full
 from volery.autonomy.mapping.octomap_trimming import trimmed
 from volery.autonomy.perception.scan_rays import Rays
+from volery.core.arrays import Array
 from volery.core.compiled import brief_kernel
 from volery.core.errors import NodeError
 
-Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 
 _KEPT_SHARE = 0.7

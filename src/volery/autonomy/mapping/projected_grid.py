@@ -8,16 +8,16 @@ scan a hit outweighs all rays that pass its cell, so that thin trunks remain.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.perception.scan_rays import Rays
+from volery.core.arrays import Array
 from volery.core.compiled import kernel
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 
-Array = NDArray[np.float64]
 Scores = NDArray[np.int8]
 
 UNKNOWN = -128
@@ -35,8 +35,10 @@ class HeightSlab(NamedTuple):
     half_m: float
 
 
-class ProjectedGrid:
+class ProjectedGrid(SavedAttributes):
     """A square grid of bounded extent around its initial position."""
+
+    STATE = ("score", "_scan", "_number", "origin", "outside")
 
     def __init__(self, cell_m: float, extent_m: float) -> None:
         self.cell_m = cell_m
@@ -49,14 +51,6 @@ class ProjectedGrid:
         """Column and row of the lower left cell, counted from the map's origin."""
         self.outside = 0
         """Number of hits beyond the grid."""
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        return save_attributes(self, ("score", "_scan", "_number", "origin", "outside"))
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        restore_attributes(self, state)
 
     def begin_at(self, place: Array) -> None:
         """Centres the grid on `place` (2+,) m, if it has no position yet."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from volery.core.arrays import Array
 
 _GROUND_WITHIN_M, _LOWEST_SHARE, _LEAST_GROUND = 1.5, 0.05, 6
 """Radius, quantile and min number of the lowest returns around a position that give the ground."""

@@ -9,7 +9,8 @@ from volery.autonomy.mapping.merging import PlacedMap, merged
 from volery.autonomy.mapping.octomap_stream import Voxels, decode_binary, decode_full
 from volery.autonomy.mapping.octree import Octree
 from volery.autonomy.mapping.projected_grid import HeightSlab, ProjectedGrid
-from volery.autonomy.perception.warmup import fixed, some_rays
+from volery.autonomy.perception.warmup import some_rays
+from volery.core.arrays import read_only
 
 _REACH_M = 15.0
 
@@ -27,7 +28,7 @@ def growing_map() -> None:
 
 def read_maps() -> None:
     """Compiles the kernels that read another node's maps."""
-    empty = fixed(np.zeros(0, np.uint8))
+    empty = read_only(np.zeros(0, np.uint8))
     decode_binary(empty)
     decode_full(empty)
 

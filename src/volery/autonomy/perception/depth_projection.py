@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.perception.scan_points import OdometrySample
+from volery.core.arrays import Array
 from volery.core.compiled import kernel
 from volery.core.errors import GraphError
 from volery.core.rotation_kernels import rotate_vector
 from volery.graph.messages import CameraInfo, Image
 
-Array = NDArray[np.float64]
 Picture = NDArray[np.float32]
 
 _NEAREST_M = 0.3

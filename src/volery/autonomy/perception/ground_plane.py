@@ -7,9 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.compiled import brief_kernel
-
-Array = NDArray[np.float64]
 
 _CELL_M = 2.0
 _CELLS = 16

@@ -6,20 +6,17 @@ SLAM that has lost tracking stops publishing it.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.perception.motion_history import Pose
 from volery.autonomy.perception.scan_points import OdometrySample
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.rotation_kernels import moved_points
+from volery.core.saved_state import SavedAttributes
 from volery.core.vectors import norm
 from volery.graph.messages import Odometry, TFMessage, stamp_of
-
-Array = NDArray[np.float64]
 
 MAP = "map"
 UNKNOWN_PLACE = "pose in the map unknown"
@@ -27,8 +24,10 @@ _SILENT_NS = NS_PER_S
 """Timeout of a transform, by the odometry's clock."""
 
 
-class MapFrame:
+class MapFrame(SavedAttributes):
     """The transform from one odometry frame to the map."""
+
+    STATE = ("odom_frame", "_known", "_odom_ns", "_tf_ns")
 
     def __init__(self) -> None:
         self.odom_frame = ""
@@ -92,13 +91,3 @@ class MapFrame:
             rotations.rotate(at.attitude, pose.velocity),
             pose.omega_body,
         )
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        times = {"odom_ns": self._odom_ns, "tf_ns": dict(self._tf_ns)}
-        return {"odom_frame": self.odom_frame, "known": dict(self._known), **times}
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        self.odom_frame, self._known = state["odom_frame"], dict(state["known"])
-        self._odom_ns, self._tf_ns = state["odom_ns"], dict(state["tf_ns"])

@@ -6,15 +6,13 @@ from bisect import bisect_right
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.perception.stuck_sensors import is_stuck
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.vectors import norm
-
-Array = NDArray[np.float64]
 
 _KEPT = 64
 """Number of stored poses and angles: more than a second of each."""

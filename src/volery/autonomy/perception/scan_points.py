@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.compiled import kernel
 from volery.core.rotation_kernels import cross, rotate_vector
 from volery.graph.messages import LaserScan, Odometry
-
-Array = NDArray[np.float64]
 
 _NEAREST_M = 0.45
 """Min range; nearer returns are from the vehicle itself, or noise."""

@@ -15,12 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.perception.motion_history import MotionHistory, NodHistory, Pose
+from volery.core.arrays import Array
 from volery.core.clock import ns_from_s
 from volery.core.compiled import brief_kernel, kernel
 from volery.core.rotation_kernels import rotate_vector
 from volery.graph.messages import LaserScan, stamp_of
-
-Array = NDArray[np.float64]
 
 
 class Rays(NamedTuple):

@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.vectors import norm
 from volery.graph.messages import TFMessage
-
-Array = NDArray[np.float64]
 
 _JOINTS = 16
 """Max number of frames between body and sensor."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.perception.depth_projection import DepthProjector
 from volery.autonomy.perception.ground_plane import GroundPlane
@@ -19,6 +18,7 @@ from volery.autonomy.perception.scan_rays import Beams, RayMaker, Rays, has_retu
 from volery.autonomy.perception.speckle_filter import SpeckleFilter
 from volery.autonomy.perception.stuck_sensors import ScanRepeats
 from volery.core import rotations
+from volery.core.arrays import read_only
 from volery.core.clock import NS_PER_S
 from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import CameraInfo, Image, LaserScan
@@ -57,22 +57,16 @@ def depth_points() -> None:
     """Compiles the kernel that projects depth images to points."""
     image, info = zero_message("sensor_msgs/msg/Image"), zero_message("sensor_msgs/msg/CameraInfo")
     image.height = image.width = 1
-    image.encoding, image.data = "32FC1", fixed(np.zeros(4, np.uint8))
-    info.k = fixed(np.ones(9))
+    image.encoding, image.data = "32FC1", read_only(np.zeros(4, np.uint8))
+    info.k = read_only(np.ones(9))
     told: tuple[Image, CameraInfo] = image, info
     DepthProjector([0.0, 0.0, 0.0]).points(*told, a_pose(0))
-
-
-def fixed(array: NDArray[Any]) -> NDArray[Any]:
-    """Makes an array read-only, as those of messages are, and returns it."""
-    array.flags.writeable = False
-    return array
 
 
 def a_scan() -> LaserScan:
     """Returns a scan of three beams at time 0, two with returns."""
     scan: Any = zero_message("sensor_msgs/msg/LaserScan")
-    scan.ranges = fixed(np.array([1.0, 2.0, np.inf], np.float32))
+    scan.ranges = read_only(np.array([1.0, 2.0, np.inf], np.float32))
     scan.angle_increment, scan.range_max = 0.1, 10.0
     told: LaserScan = scan
     return told

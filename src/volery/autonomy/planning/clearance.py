@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from volery.autonomy.planning.distances import Squares, squared_distances
 from volery.autonomy.planning.local_grid import UNKNOWN, Scores
+from volery.core.arrays import Array
 from volery.core.compiled import kernel
-
-Array = NDArray[np.float64]
 
 FAR_CELLS = 7
 """Largest distance that is measured, cells."""

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from volery.autonomy.planning.clearance import Clearance
 from volery.autonomy.planning.distances import Squares
 from volery.autonomy.planning.surface import Surface
+from volery.core.arrays import Array
 from volery.core.compiled import inner_kernel, kernel
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 _SEED_M = 2.5

@@ -18,10 +18,11 @@ from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.planning.search_area import SearchArea
 from volery.autonomy.planning.viewpoints import Viewpoint, next_viewpoint
 from volery.autonomy.status import publish_status
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.errors import PlanError
 from volery.core.plurals import counted
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import (
     Float32,
     OccupancyGrid,
@@ -37,8 +38,6 @@ from volery.graph.messages import (
 )
 from volery.graph.nodes.node import Node
 
-Array = NDArray[np.float64]
-
 POLYGON: type[Any] = message_type("geometry_msgs/msg/PolygonStamped")
 _LEVEL = Quaternion(0.0, 0.0, 0.0, 1.0)
 _PERIOD_S = 0.5
@@ -51,20 +50,6 @@ _STALE = 0.15
 _BLOCKED_S = 8.0
 """A goal is given up after this time without progress towards it."""
 _NEARER_M = 1.0
-_STATE = (
-    "_motion",
-    "_area",
-    "_grid",
-    "_goal",
-    "_since_ns",
-    "_best_m",
-    "_refused",
-    "_visited",
-    "_state",
-    "_reason",
-    "_last_status",
-    "_sent",
-)
 
 
 class ExplorationState(StrEnum):
@@ -76,7 +61,7 @@ class ExplorationState(StrEnum):
     BLOCKED = "blocked"
 
 
-class Exploration(Node):
+class Exploration(SavedAttributes, Node):
     """Searches `search_area` by `planning/goal`; publishes `exploration/status` and `/covered`.
 
     `search_area` is geometry_msgs/PolygonStamped in the map; a new one replaces it, an empty one
@@ -91,6 +76,22 @@ class Exploration(Node):
     resolution_m: cell size of the area.
 
     """
+
+    PARTS = ("_frame",)
+    STATE = (
+        "_motion",
+        "_area",
+        "_grid",
+        "_goal",
+        "_since_ns",
+        "_best_m",
+        "_refused",
+        "_visited",
+        "_state",
+        "_reason",
+        "_last_status",
+        "_sent",
+    )
 
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
@@ -134,15 +135,6 @@ class Exploration(Node):
         self.create_subscription(String, "planning/goal_status", self._on_goal_status, 5)
         self.create_timer(_PERIOD_S, self._on_timer)
         self.create_timer(2.0, self._publish_searched)
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        return {"frame": self._frame.get_state(), **save_attributes(self, _STATE)}
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        self._frame.set_state(state["frame"])
-        restore_attributes(self, {name: state[name] for name in _STATE})
 
     # ------------------------------------------------------------------------------ subscriptions
 

@@ -15,13 +15,11 @@ import threading
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.planning.voxel_space import VoxelSpace
+from volery.core.arrays import Array
 from volery.core.errors import NodeError, PlanError
 from volery.core.extras import missing_package
-
-Array = NDArray[np.float64]
 
 _OMPL = threading.Lock()
 

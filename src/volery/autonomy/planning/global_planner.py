@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.mapping.messages import OCTOMAP, voxels_of
 from volery.autonomy.perception.list_parameters import declare_numbers
@@ -17,9 +16,10 @@ from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.planning.global_path import PathSearch, plan_path
 from volery.autonomy.planning.voxel_space import SolidVoxels, VoxelSpace
 from volery.autonomy.status import publish_status
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.errors import DataFileError, NodeError, PlanError
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import (
     Bool,
     Odometry,
@@ -33,8 +33,6 @@ from volery.graph.messages import (
 )
 from volery.graph.nodes.node import Node
 
-Array = NDArray[np.float64]
-
 _LEVEL = Quaternion(0.0, 0.0, 0.0, 1.0)
 _PERIOD_S = 1.0
 _STUCK_S = 6.0
@@ -43,20 +41,9 @@ _STUCK_M = 1.0
 _MARGIN_M = 25.0
 _TRIES = 3
 """Attempts after which the goal is given up."""
-_STATE = (
-    "_goal",
-    "_waypoints",
-    "_position",
-    "_since_ns",
-    "_best_m",
-    "_tries",
-    "_plans",
-    "_last_status",
-    "_map",
-)
 
 
-class GlobalPlanner(Node):
+class GlobalPlanner(SavedAttributes, Node):
     """Plans `planning/path` to `planning/goal` (PoseStamped, map).
 
     `planning/goal_status` is JSON: state (waiting, planned, refused, unreachable), reason, goal,
@@ -71,6 +58,19 @@ class GlobalPlanner(Node):
     max_iterations: bound of the search. seed: of its random numbers.
 
     """
+
+    PARTS = ("_frame",)
+    STATE = (
+        "_goal",
+        "_waypoints",
+        "_position",
+        "_since_ns",
+        "_best_m",
+        "_tries",
+        "_plans",
+        "_last_status",
+        "_map",
+    )
 
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
@@ -117,15 +117,6 @@ class GlobalPlanner(Node):
         self.create_subscription(Bool, "planning/pause", self._on_pause, 1)
         self.create_service("std_srvs/srv/Trigger", "~/stop", self._on_stop)
         self.create_timer(_PERIOD_S, self._on_timer)
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        return {"frame": self._frame.get_state(), **save_attributes(self, _STATE)}
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        self._frame.set_state(state["frame"])
-        restore_attributes(self, {name: state[name] for name in _STATE})
 
     # ------------------------------------------------------------------------------ subscriptions
 

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.perception.scan_rays import Rays
+from volery.core.arrays import Array
 from volery.core.compiled import kernel
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Scores = NDArray[np.int8]
 
@@ -27,8 +27,10 @@ cleared after 12 scans that pass through it.
 """
 
 
-class LocalGrid:
+class LocalGrid(SavedAttributes):
     """Holds `shape` cells of `cell_m` around the vehicle; above 0: occupied, `UNKNOWN`: unknown."""
+
+    STATE = ("_score", "_scan", "_number", "_low")
 
     def __init__(self, cell_m: float, shape: tuple[int, int, int]) -> None:
         self.cell_m = cell_m
@@ -37,14 +39,6 @@ class LocalGrid:
         self._number = 0
         self._low: Integers | None = None
         """Index of the lowest cell (3,), counted from the frame's origin."""
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        return save_attributes(self, ("_score", "_scan", "_number", "_low"))
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        restore_attributes(self, state)
 
     def move_to(self, place: Array) -> None:
         """Centres the grid on `place` (3,) m; cells that enter it are unknown."""

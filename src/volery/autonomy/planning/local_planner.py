@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.perception.list_parameters import declare_mount
 from volery.autonomy.perception.map_frame import MAP, UNKNOWN_PLACE, MapFrame
@@ -25,8 +24,9 @@ from volery.autonomy.planning.receding_horizon import (
 from volery.autonomy.planning.reciprocal_avoidance import Separation, half_planes
 from volery.autonomy.planning.surroundings import Surroundings
 from volery.autonomy.planning.trajectory_messages import trajectory_message
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S, ns_from_s
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import (
     Bool,
     JointState,
@@ -40,27 +40,15 @@ from volery.graph.messages import (
 )
 from volery.graph.nodes.node import Node
 
-Array = NDArray[np.float64]
-
 _LOOKAHEAD_M = 9.0
 """Distance of the lookahead point along the path; the planning window extends to 12 m."""
 _LEAST_HEIGHT_M = 1.0
 """Height above ground below which the planner is inactive: the vehicle takes off or lands."""
 _TELL_S = 1.0
 """Period of the status; changes of state or problems are published at once."""
-_STATE = (
-    "_lookahead",
-    "_path_map",
-    "_neighbours",
-    "_last_status",
-    "_last_status_ns",
-    "_plans",
-    "_frame_was",
-    "_paused",
-)
 
 
-class LocalPlanner(Node):
+class LocalPlanner(SavedAttributes, Node):
     """Follows `planning/path` by `planning/trajectory`; publishes `planning/status`.
 
     An empty path makes the UAV hold. The status is JSON: state (waiting, holding, flying, turning,
@@ -84,6 +72,18 @@ class LocalPlanner(Node):
     separation_m: horizontal distance to keep from the UAVs that report on `radio/team`.
 
     """
+
+    PARTS = ("_sight", "_planning", "_frame")
+    STATE = (
+        "_lookahead",
+        "_path_map",
+        "_neighbours",
+        "_last_status",
+        "_last_status_ns",
+        "_plans",
+        "_frame_was",
+        "_paused",
+    )
 
     @classmethod
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
@@ -148,19 +148,6 @@ class LocalPlanner(Node):
         self.create_subscription(report, "radio/team", self._on_report, 20)
         self.create_subscription(Bool, "planning/pause", self._on_pause, 1)
         self.create_timer(period, self._on_timer)
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        parts = {
-            name: getattr(self, name).get_state() for name in ("_sight", "_planning", "_frame")
-        }
-        return {"parts": parts, **save_attributes(self, _STATE)}
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        for name, part in state["parts"].items():
-            getattr(self, name).set_state(part)
-        restore_attributes(self, {name: state[name] for name in _STATE})
 
     # ------------------------------------------------------------------------------ subscriptions
 

@@ -12,9 +12,9 @@ from volery.autonomy.planning.clearance import Clearance
 from volery.autonomy.planning.cost_to_go import CostToGo
 from volery.autonomy.planning.distances import Squares
 from volery.autonomy.planning.primitives import PrimitiveCandidates
+from volery.core.arrays import Array
 from volery.core.compiled import inner_kernel, kernel
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 _STEP_S = 0.08

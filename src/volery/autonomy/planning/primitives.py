@@ -8,14 +8,12 @@ without acceleration. A change of velocity by dv in time T needs 1.5 dv / T at m
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from volery.core.arrays import Array
 
 _LEAST_S = 0.5
 """Shortest change of velocity: the attitude loop cannot follow a shorter one (modelling choice)."""
@@ -151,8 +149,3 @@ def fan(
     cruise[-1] = 0.0
     brake = change_s(velocity, limits)
     return PrimitiveCandidates(start, velocity, np.append(o.ravel(), 0.0), rise, cruise, brake)
-
-
-def reach_of(speed: float, limits: MotionLimits) -> float:
-    """Returns the length (m) of the longest primitive at `speed`: the range to observe."""
-    return speed * (limits.horizon_s + 0.75 * speed / limits.acceleration + math.sqrt(0.5))

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,11 +31,10 @@ from volery.autonomy.planning.primitives import (
 )
 from volery.autonomy.planning.reciprocal_avoidance import HalfPlane, violation
 from volery.autonomy.planning.surface import Surface
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 from volery.core.vectors import norm
-
-Array = NDArray[np.float64]
 
 _DIRECTIONS = np.arange(-math.pi, math.pi, math.pi / 20.0)
 _SPEEDS = np.array([1.0, 0.7, 0.4, 0.15])
@@ -97,8 +96,10 @@ class Observations(NamedTuple):
     planes: list[HalfPlane]
 
 
-class RecedingHorizonPlanner:
+class RecedingHorizonPlanner(SavedAttributes):
     """Holds the current plan and computes the next one."""
+
+    STATE = ("doing", "_path", "_began_ns", "yaw", "least_m")
 
     def __init__(self, policy: PlannerSettings) -> None:
         self.policy = policy
@@ -109,14 +110,6 @@ class RecedingHorizonPlanner:
         """Wanted heading, rad."""
         self.least_m = math.inf
         """Min distance to obstacles along the current plan, m."""
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        return save_attributes(self, ("doing", "_path", "_began_ns", "yaw", "least_m"))
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        restore_attributes(self, state)
 
     def state_at(self, time_ns: int) -> PrimitiveState | None:
         """Returns the planned motion; None before the first plan."""

@@ -13,12 +13,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.vectors import norm
-
-Array = NDArray[np.float64]
 
 
 class Neighbour(NamedTuple):

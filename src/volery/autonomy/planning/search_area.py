@@ -7,10 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.compiled import kernel
 from volery.core.errors import PlanError
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Grid = NDArray[np.int8]
 

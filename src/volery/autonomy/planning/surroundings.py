@@ -5,9 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from volery.autonomy.perception.ground_plane import GroundPlane
 from volery.autonomy.perception.motion_history import MotionHistory, NodHistory
 from volery.autonomy.perception.scan_points import OdometrySample
@@ -16,11 +13,10 @@ from volery.autonomy.perception.stuck_sensors import RangeRepeats, ScanRepeats
 from volery.autonomy.planning.clearance import Clearance, clearance_of
 from volery.autonomy.planning.local_grid import LocalGrid
 from volery.autonomy.planning.surface import Surface
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import JointState, LaserScan, Range, stamp_of
-
-Array = NDArray[np.float64]
 
 _SHAPE = (128, 128, 32)
 _WINDOW = (96, 96, 24)
@@ -32,7 +28,7 @@ _SILENT_S = 0.5
 _JUMP_BACK_NS = NS_PER_S // 2
 
 
-class Surroundings:
+class Surroundings(SavedAttributes):
     """Processes scans, joint angles and ranges, in the frame of the odometry."""
 
     def __init__(self, mounts: dict[str, Any], cell_m: float, scan_rate_hz: float) -> None:
@@ -53,7 +49,8 @@ class Surroundings:
         self._is_sonar_stuck = False
         self._upright_cells = math.ceil(0.75 / cell_m)
 
-    _PLAIN = (
+    PARTS = ("_grid",)
+    STATE = (
         "motion",
         "_nod",
         "_repeats",
@@ -66,15 +63,6 @@ class Surroundings:
         "_range_repeats",
         "_is_sonar_stuck",
     )
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        return {"grid": self._grid.get_state(), **save_attributes(self, self._PLAIN)}
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        self._grid.set_state(state["grid"])
-        restore_attributes(self, {name: state[name] for name in self._PLAIN})
 
     def on_joint(self, message: JointState) -> None:
         """Stores the angle of the nodding mount."""

@@ -6,14 +6,13 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.perception.stuck_sensors import is_stuck
 from volery.autonomy.planning.trajectory_messages import TrajectorySamples, samples_of
 from volery.autonomy.status import publish_status
 from volery.core.clock import NS_PER_S, ns_from_s
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 from volery.core.vectors import norm
 from volery.graph.messages import (
     Bool,
@@ -25,8 +24,6 @@ from volery.graph.messages import (
 )
 from volery.graph.nodes.node import Node
 
-Array = NDArray[np.float64]
-
 _PERIOD_S = 0.04
 _STALE_S = 0.5
 """Time without odometry after which the follower commands zero velocity."""
@@ -35,10 +32,9 @@ _CARRIED_S = 0.1
 _TURN_GAIN, _TURN_RAD_S = 1.8, 1.2
 _OFF_M = 2.0
 """Distance from the plan beyond which the follower stops and waits for another plan."""
-_STATE = ("_pose", "_received_ns", "_frame", "_plan", "_next", "_last_status", "_paused")
 
 
-class TrajectoryFollower(Node):
+class TrajectoryFollower(SavedAttributes, Node):
     """Publishes `cmd_vel` to follow `planning/trajectory`; publishes `~/status`.
 
     The node commands velocities rather than positions: positions would be in the autopilot's frame,
@@ -53,6 +49,8 @@ class TrajectoryFollower(Node):
     lookahead_s: time by which the commanded velocity is ahead, to compensate for the vehicle's lag.
 
     """
+
+    STATE = ("_pose", "_received_ns", "_frame", "_plan", "_next", "_last_status", "_paused")
 
     def __init__(self, **options: Any) -> None:
         super().__init__("follower", **options)
@@ -76,14 +74,6 @@ class TrajectoryFollower(Node):
         )
         self.create_subscription(Bool, "planning/pause", self._on_pause, 1)
         self.create_timer(_PERIOD_S, self._on_timer)
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        return save_attributes(self, _STATE)
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        restore_attributes(self, state)
 
     def _on_odometry(self, message: Odometry) -> None:
         pose = OdometrySample.from_odometry(message)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.planning.primitives import PrimitivePath
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S, ns_from_s
 from volery.graph.messages import (
     MultiDOFJointTrajectory,
@@ -22,8 +23,6 @@ from volery.graph.messages import (
     message_type,
     stamp_of,
 )
-
-Array = NDArray[np.float64]
 
 _STEP_S = 0.2
 """Time between samples; the velocity is linear between them."""

@@ -11,11 +11,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.planning.search_area import SearchArea
-
-Array = NDArray[np.float64]
+from volery.core.arrays import Array
 
 _TURN = 0.1
 _WAY_M = 80.0

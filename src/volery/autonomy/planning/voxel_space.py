@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from volery.autonomy.mapping.octomap_stream import Voxels
 from volery.autonomy.planning.distances import squared_distances
+from volery.core.arrays import Array
 from volery.core.compiled import inline_kernel, kernel
 from volery.core.errors import PlanError
 
-Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 Integers = NDArray[np.int32]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from volery.autonomy.perception.warmup import fixed, some_rays
+from volery.autonomy.perception.warmup import some_rays
 from volery.autonomy.planning.clearance import clearance_of
 from volery.autonomy.planning.local_grid import LocalGrid
 from volery.autonomy.planning.primitives import MotionLimits, PrimitiveState
@@ -16,6 +16,7 @@ from volery.autonomy.planning.receding_horizon import (
 from volery.autonomy.planning.search_area import SearchArea
 from volery.autonomy.planning.surface import Surface
 from volery.autonomy.planning.voxel_space import SolidVoxels, VoxelSpace
+from volery.core.arrays import read_only
 
 _SHAPE = (8, 8, 8)
 
@@ -23,7 +24,7 @@ _SHAPE = (8, 8, 8)
 def searched_area() -> None:
     """Compiles the kernels of the search area."""
     area = SearchArea(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0]]), 1.0)
-    area.look(np.zeros(3), fixed(np.zeros((2, 2), np.int8)), np.zeros(2), 1.0, 1.0)
+    area.look(np.zeros(3), read_only(np.zeros((2, 2), np.int8)), np.zeros(2), 1.0, 1.0)
     area.gains(np.zeros((1, 2)), 1.0)
 
 

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.search.calls import JOIN, RescueCalls, RescueClaim
@@ -17,6 +16,7 @@ from volery.autonomy.search.steering import is_at
 from volery.autonomy.search.team_flight import TeamFlight
 from volery.autonomy.search.teammates import CAN_COME, GOING_HOME, ON_THE_WAY, RISING, SearchPhase
 from volery.core import rng
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.vectors import norm
 from volery.graph.messages import (
@@ -27,8 +27,6 @@ from volery.graph.messages import (
     header,
     stamp_of,
 )
-
-Array = NDArray[np.float64]
 
 _BORDER_M = 1.0
 """Distance of waypoints to the border of the area: more than a UAV's tracking error."""

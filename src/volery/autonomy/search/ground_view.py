@@ -6,15 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.perception.scan_points import OdometrySample
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.errors import GraphError
 from volery.core.vectors import norm
 from volery.graph.messages import CameraInfo
 
-Array = NDArray[np.float64]
 Disc = tuple[float, float, float]
 
 _STEEP = 0.17

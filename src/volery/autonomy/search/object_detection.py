@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.search.colour_blob import NO_DISCS, colour_mask, largest_blob, pixels_of
 from volery.autonomy.search.ground_view import GroundView, Intrinsics, pose_at
 from volery.autonomy.search.settings import SearchSettings
+from volery.core.arrays import Array
 from volery.graph.messages import Image, stamp_of
-
-Array = NDArray[np.float64]
 
 _TEAMMATE_M = 0.7
 """Radius of the ball around a teammate, which may have the colour too. Modelling choice."""

@@ -6,13 +6,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.core import rng
+from volery.core.arrays import Array
 from volery.core.errors import GraphError
 from volery.core.plurals import counted
-
-Array = NDArray[np.float64]
 
 
 class Area(NamedTuple):

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from volery.autonomy.perception.scan_points import OdometrySample
+from volery.core.arrays import Array
 from volery.core.vectors import norm
 from volery.graph.messages import Twist, Vector3
-
-Array = NDArray[np.float64]
 
 _GAIN_PER_S = 0.8
 _BRAKE_M_S2 = 1.0

@@ -5,10 +5,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.search.settings import SearchSettings
@@ -21,15 +20,14 @@ from volery.autonomy.search.teammates import (
     SearchPhase,
     Teammate,
 )
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.errors import GraphError
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 from volery.core.vectors import norm
 from volery.graph.messages import Odometry, Point, Twist, header, message_type
 from volery.graph.nodes.node import Node
 from volery.graph.nodes.service_client import Client, Future
-
-Array = NDArray[np.float64]
 
 _PHASES = frozenset(map(str, SearchPhase))
 _STILL_UP = frozenset({SearchPhase.CLIMB, SearchPhase.ALOFT})
@@ -47,14 +45,14 @@ _ARRIVED_M, _ARRIVED_M_S = 0.5, 0.4
 """All modelling choices."""
 
 
-class TeamFlight(Node):
+class TeamFlight(SavedAttributes, Node):
     """Takes off, flies in its layer, lands where it took off; exchanges `search/state`.
 
     A UAV leaves the column over its take-off position only when no teammate climbs, and descends
     only when no teammate is under way; in between each flies at a height of its own.
     """
 
-    STATE: tuple[str, ...] = (
+    STATE: ClassVar[tuple[str, ...]] = (
         "phase",
         "pose",
         "teammates",
@@ -93,14 +91,6 @@ class TeamFlight(Node):
             topic = self._of(name, "state")
             self.create_subscription(self._state_type, topic, self._listener(name), 5)
         self.create_timer(_PERIOD_S, self._on_timer)
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        return save_attributes(self, self.STATE)
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        restore_attributes(self, state)
 
     def act(self, pose: OdometrySample) -> None:
         """Runs the phases between climb and landing; a subclass overrides it."""

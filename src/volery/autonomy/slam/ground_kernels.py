@@ -11,9 +11,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.compiled import inner_kernel
 
-Array = NDArray[np.float64]
 Keys = NDArray[np.int64]
 
 GROUND_CELL_M = 1.0

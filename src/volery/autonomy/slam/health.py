@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from volery.autonomy.slam.match import MANY, MISFIT
 from volery.autonomy.slam.tracker import Tracker
 from volery.core.clock import NS_PER_S
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 
 _SILENT_NS = NS_PER_S
 _LOST_NS = NS_PER_S
@@ -17,10 +15,10 @@ _UNSURE_M = 1.0
 """Standard deviation of the position above which tracking is lost, m."""
 
 
-class SlamHealth:
+class SlamHealth(SavedAttributes):
     """Monitors a tracker; `state` is starting, tracking, degraded or lost."""
 
-    _STATE = ("state", "problems", "received_ns", "_misfit_ns", "_scarce_ns")
+    STATE = ("state", "problems", "received_ns", "_misfit_ns", "_scarce_ns")
 
     def __init__(self, names: tuple[str, ...], now_ns: int) -> None:
         self.state = "starting"
@@ -73,11 +71,3 @@ class SlamHealth:
     def restart(self) -> None:
         """Resets the misfit times after the tracker has begun a new map."""
         self._misfit_ns = self._scarce_ns = None
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        return save_attributes(self, self._STATE)
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        restore_attributes(self, state)

@@ -18,10 +18,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.compiled import brief_kernel, inner_kernel
 from volery.core.rotation_kernels import matrix_rows, quaternion_product, rotate_vector
-
-Array = NDArray[np.float64]
 
 STATES = 17
 P, V, Q, BG, BA, G = 0, 3, 6, 10, 13, 16

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.slam.inertial_kernels import G, Q
 from volery.autonomy.slam.keyframes import (
@@ -23,11 +22,10 @@ from volery.autonomy.slam.settings import ScanMatching
 from volery.autonomy.slam.sweep import SweepPoints
 from volery.autonomy.slam.tracker import Tracker
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 from volery.core.vectors import norm
-
-Array = NDArray[np.float64]
 
 _STEP_M, _STEP_RAD, _STEP_S = 2.0, 0.6, 10.0
 """Motion, or time, between keyframes."""
@@ -51,13 +49,13 @@ class KeyframePose(NamedTuple):
     attitude: Array
 
 
-class KeyframeGraph:
+class KeyframeGraph(SavedAttributes):
     """Holds the keyframes of one vehicle and their graph.
 
     `start` (4,) is the first keyframe's pose in the map.
     """
 
-    _STATE = (
+    STATE = (
         "frames", "poses", "edges", "closures", "refused", "session", "is_placed", "correction",
         "relocation", "_gathering", "_tried", "_settling",
     )  # fmt: skip
@@ -251,14 +249,6 @@ class KeyframeGraph:
             rotations.from_rpy(0.0, 0.0, float(pose[3]) - level.yaw), level.attitude
         )
         self.correction = KeyframePose(pose[:3] - rotations.rotate(turn, frame.position), turn)
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        return save_attributes(self, self._STATE)
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        restore_attributes(self, state)
 
 
 def _is_since(frame: Keyframe, time_ns: int | None) -> bool:

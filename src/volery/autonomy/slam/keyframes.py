@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from volery.autonomy.slam.matching_kernels import GROUND, UPRIGHT
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.vectors import norm
-
-Array = NDArray[np.float64]
 
 _MOST_POINTS = {UPRIGHT: 400, GROUND: 150}
 

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.slam.relocalization_kernels import count_drawn, draw, shares_around
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
-
-Array = NDArray[np.float64]
 
 _NOW_NS, _BEFORE_NS = NS_PER_S // 4, 2 * NS_PER_S
 """Duration of the instant that is checked, and of the time before it that it is compared with."""

@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.slam.inertial_kernels import G, Q
 from volery.autonomy.slam.keyframes import levelling
 from volery.core import rotations
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.arrays import Array
+from volery.core.saved_state import SavedAttributes
 
-Array = NDArray[np.float64]
 
-
-class LevelOdometry:
+class LevelOdometry(SavedAttributes):
     """Integrates the tracker's motion; each step is levelled by the current estimate of gravity.
 
     So the odometry neither jumps nor tilts as the estimate improves: users combine it with an IMU
     and assume that gravity points straight down.
     """
 
-    _STATE = ("_was", "position")
+    STATE = ("_was", "position")
 
     def __init__(self) -> None:
         self._was: Array | None = None
@@ -38,11 +34,3 @@ class LevelOdometry:
             self.position = self.position + rotations.rotate(turn, state[:3] - self._was)
         self._was = state[:3].copy()
         return self.position, rotations.multiply(turn, state[Q : Q + 4])
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        return save_attributes(self, self._STATE)
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        restore_attributes(self, state)

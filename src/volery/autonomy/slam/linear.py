@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.compiled import brief_kernel, inner_kernel
-
-Array = NDArray[np.float64]
 
 
 @inner_kernel

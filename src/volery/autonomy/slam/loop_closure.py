@@ -15,8 +15,7 @@ from volery.autonomy.slam.matching_kernels import UPRIGHT
 from volery.autonomy.slam.pose_graph import PoseGraphEdge, between
 from volery.autonomy.slam.relocalization_kernels import draw, draw_maps, refine, search
 from volery.autonomy.slam.settings import ScanMatching
-
-Array = NDArray[np.float64]
+from volery.core.arrays import Array
 
 _PICTURE = 400
 _ROUNDS = 8

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
-
-Array = NDArray[np.float64]
 
 MANY, MISFIT = 15.0, 0.25
 """Min number of returns for a check, and min matched fraction relative to the usual one.

@@ -16,10 +16,10 @@ from volery.autonomy.slam.ground_kernels import Keys, add_ground, plane_at
 from volery.autonomy.slam.inertial_kernels import STATES, P, Q, add_error, rotation_matrix
 from volery.autonomy.slam.linear import eliminate
 from volery.autonomy.slam.upright_kernels import Cells, add_upright, nearest_upright
+from volery.core.arrays import Array
 from volery.core.compiled import inner_kernel, kernel, owning_kernel
 from volery.core.rotation_kernels import quaternion_product, rotate_vector
 
-Array = NDArray[np.float64]
 Kinds = NDArray[np.int8]
 
 LEFT_OUT, UPRIGHT, GROUND, NEW_GROUND = 0, 1, 2, 3

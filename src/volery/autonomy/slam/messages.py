@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.slam.linear import block
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.graph.messages import (
     Odometry,
     PathMessage,
@@ -28,7 +28,6 @@ from volery.graph.messages import (
     message_type,
 )
 
-Array = NDArray[np.float64]
 _OF_POSE = np.array([0, 1, 2, 6, 7, 8])
 POSE = message_type("geometry_msgs/msg/PoseWithCovarianceStamped")
 

@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.perception.list_parameters import declare_numbers
 from volery.autonomy.perception.scan_rays import is_usable
@@ -21,8 +20,9 @@ from volery.autonomy.slam.planar.settings import PlanarSettings, ReturnSettings
 from volery.autonomy.slam.planar.tracker import PlanarTracker
 from volery.autonomy.status import publish_status
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import (
     LaserScan,
     Odometry,
@@ -33,8 +33,6 @@ from volery.graph.messages import (
 )
 from volery.graph.nodes.node import Node
 
-Array = NDArray[np.float64]
-
 _JUMP_NS = NS_PER_S // 2
 """Step back in stamps from which the clock has been set back."""
 _WAITING = 4
@@ -43,7 +41,7 @@ _PATH_NS = 2_000_000
 """Time between two paths, for each keyframe in them."""
 
 
-class PlanarSlam(Node):
+class PlanarSlam(SavedAttributes, Node):
     """Publishes `slam/odom`, `slam/pose`, `slam/path` (latched), `slam/status`, and `/tf`.
 
     Parameters
@@ -58,7 +56,8 @@ class PlanarSlam(Node):
 
     """
 
-    _PLAIN = (
+    PARTS = ("_follower", "_keyframe_graph", "_odometry")
+    STATE = (
         "_taken_ns",
         "_before",
         "_refused",
@@ -67,6 +66,8 @@ class PlanarSlam(Node):
         "_received_ns",
         "_path_ns",
         "_path_of",
+        "_waiting",
+        "_joints",
     )
 
     @classmethod
@@ -124,22 +125,6 @@ class PlanarSlam(Node):
             self.create_subscription(TFMessage, "/tf_static", self._on_joints, 10)
         self.create_subscription(LaserScan, "laser/horizontal/scan", self._on_scan, 10)
         self.create_timer(0.5, self._publish_status)
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        parts = {
-            n: getattr(self, n).get_state() for n in ("_follower", "_keyframe_graph", "_odometry")
-        }
-        more = {"waiting": list(self._waiting), "joints": dict(self._joints.joints)}
-        return {"parts": parts, **more, **save_attributes(self, self._PLAIN)}
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        for name, part in state["parts"].items():
-            getattr(self, name).set_state(part)
-        self._waiting = list(state["waiting"])
-        self._joints.joints = dict(state["joints"])
-        restore_attributes(self, {name: state[name] for name in self._PLAIN})
 
     # ------------------------------------------------------------------------------ subscriptions
 

@@ -11,11 +11,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.errors import NodeError
-
-Array = NDArray[np.float64]
 
 _ROUNDS = 12
 

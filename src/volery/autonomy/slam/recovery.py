@@ -5,16 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.slam.inertial_kernels import BA, BG, STATES, G, P, Q, V, move, observe
 from volery.autonomy.slam.local_maps import Submaps
 from volery.autonomy.slam.matching_kernels import carry_along
 from volery.autonomy.slam.recovery_kernels import find_attitude, find_place
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
-
-Array = NDArray[np.float64]
 
 GAP_S = 0.05
 """Duration of motion that an IMU sample covers; the motion after it is unknown."""

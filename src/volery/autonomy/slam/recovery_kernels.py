@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.slam.ground_kernels import GROUND_CELL_M, GROUND_CELLS, Keys, key_of
 from volery.autonomy.slam.inertial_kernels import P, rotation_matrix, turn_left
 from volery.autonomy.slam.upright_kernels import CELL_M, CELLS, LAYER_M, LAYERS, LEAST, Cells
+from volery.core.arrays import Array
 from volery.core.compiled import inner_kernel, kernel, owning_kernel
-
-Array = NDArray[np.float64]
 
 _ON_GROUND_M = 0.35
 _OVER_GROUND_M = 0.6

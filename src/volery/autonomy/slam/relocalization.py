@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from volery.autonomy.slam.keyframes import Keyframe
 from volery.autonomy.slam.loop_closure import AROUND, LoopCloser
 from volery.autonomy.slam.pose_graph import PoseGraphEdge, between, compose
-
-Array = NDArray[np.float64]
+from volery.core.arrays import Array
 
 _REACH_M, _TURN_RAD = 12.0, 0.2
 """Max distance to an old keyframe, and from the gyroscope's heading; after all keyframes have been

@@ -12,9 +12,9 @@ from volery.autonomy.slam.inertial_kernels import STATE_NUMBERS, P, Q
 from volery.autonomy.slam.linear import eliminate
 from volery.autonomy.slam.matching_kernels import GROUND, UPRIGHT, gather
 from volery.autonomy.slam.upright_kernels import Cells, add_upright
+from volery.core.arrays import Array
 from volery.core.compiled import inner_kernel, kernel
 
-Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 
 _FOUR = (0, 1, 2, 5)

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.perception.list_parameters import declare_mount, declare_numbers
 from volery.autonomy.perception.motion_history import NodHistory
@@ -23,7 +22,7 @@ from volery.autonomy.slam.tracker import Tracker
 from volery.autonomy.status import publish_status
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import (
     Imu,
     JointState,
@@ -36,8 +35,6 @@ from volery.graph.messages import (
     stamp_of,
 )
 from volery.graph.nodes.node import Node
-
-Array = NDArray[np.float64]
 
 _JUMP_NS = NS_PER_S // 2
 """Step back in stamps from which the clock has been set back."""
@@ -56,7 +53,7 @@ _MOST_RAD_S, _MOST_M_S2 = 60.0, 500.0
 """Beyond the range of any IMU."""
 
 
-class Slam(Node):
+class Slam(SavedAttributes, Node):
     """Publishes `slam/odom`, `slam/pose`, `slam/path` (latched), `slam/status`, and `/tf`.
 
     Parameters
@@ -73,7 +70,8 @@ class Slam(Node):
 
     """
 
-    _PLAIN = (
+    PARTS = ("_tracker", "_level", "_keyframe_graph", "_health")
+    STATE = (
         "_nod",
         "_omega",
         "_last_status",
@@ -161,20 +159,6 @@ class Slam(Node):
         )
         self.create_timer(pose_period_s, self._publish_pose)
         self.create_timer(0.5, self._publish_status)
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        parts = {
-            n: getattr(self, n).get_state()
-            for n in ("_tracker", "_level", "_keyframe_graph", "_health")
-        }
-        return {"parts": parts, **save_attributes(self, self._PLAIN)}
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        for name, part in state["parts"].items():
-            getattr(self, name).set_state(part)
-        restore_attributes(self, {name: state[name] for name in self._PLAIN})
 
     # ------------------------------------------------------------------------------ subscriptions
 

@@ -7,15 +7,13 @@ from collections import deque
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.slam.inertial_kernels import BG, STATE_NUMBERS, STATES, G, P, Q, V, observe
 from volery.autonomy.slam.keyframes import Level, turn_of_heading
 from volery.autonomy.slam.settings import GRAVITY_M_S2, ImuNoise
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
-
-Array = NDArray[np.float64]
 
 _STILL = 100
 """Number of samples that the detection uses: 0.5 s at 200 Hz."""

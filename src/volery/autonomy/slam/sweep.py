@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.slam.inertial_kernels import P, Q
+from volery.core.arrays import Array
 from volery.core.compiled import kernel
 from volery.core.rotation_kernels import rotate_vector
 
-Array = NDArray[np.float64]
 Times = NDArray[np.int64]
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,12 +35,11 @@ from volery.autonomy.slam.stationarity import (
 )
 from volery.autonomy.slam.sweep import Sweep, SweepPoints
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.rotation_kernels import moved_points
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 from volery.core.vectors import norm
-
-Array = NDArray[np.float64]
 
 _KEPT = 64
 """Number of IMU samples whose states are stored to place beams: 0.3 s at 200 Hz."""
@@ -57,14 +55,14 @@ _RECENT_NS = NS_PER_S
 """Max age of a sonar range that gives the ground height."""
 
 
-class Tracker:
+class Tracker(SavedAttributes):
     """Holds the filter, its maps, and the sweeps that wait for the motion during them.
 
     `start` (4,): x, y, z in m and yaw in rad of the start pose. Tracking begins after half a second
     at rest, from gravity.
     """
 
-    _STATE = (
+    STATE = (
         "state", "covariance", "is_ready", "is_standing", "has_flown", "match", "sight",
         "standing_height", "travelled_m", "recovery", "_times", "_states", "_imu", "_waiting",
         "_maps", "_inserted", "_rest", "settling", "_broad", "_near_ground_ns", "_low_since_ns",
@@ -321,11 +319,3 @@ class Tracker:
             self._seed_below(self._range[1])
 
     # ------------------------------------------------------------------------------------- state
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        return save_attributes(self, self._STATE)
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        restore_attributes(self, state)

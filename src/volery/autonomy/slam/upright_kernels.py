@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.slam.ground_kernels import Keys, key_of
+from volery.core.arrays import Array
 from volery.core.compiled import inner_kernel
 
 Cells = NDArray[np.float32]
-Array = NDArray[np.float64]
-
 CELL_M = 0.5
 LAYER_M = 1.0
 CELLS, LAYERS = 192, 16

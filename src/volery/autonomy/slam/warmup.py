@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from volery.autonomy.perception.warmup import fixed
 from volery.autonomy.slam import messages
 from volery.autonomy.slam.inertial_kernels import STATES
 from volery.autonomy.slam.keyframes import Keyframe
@@ -17,6 +16,7 @@ from volery.autonomy.slam.settings import GRAVITY_M_S2, ScanMatching
 from volery.autonomy.slam.sweep import Sweep
 from volery.autonomy.slam.tracker import Tracker
 from volery.core import rotations
+from volery.core.arrays import read_only
 from volery.core.clock import NS_PER_S
 
 _PERIOD_NS = NS_PER_S // 200
@@ -35,7 +35,7 @@ def motion() -> None:
 
     feel(2 * _STANDING)
     assert tracker.is_ready
-    ranges = fixed(np.array([1.0, 2.0, np.inf], np.float32))
+    ranges = read_only(np.array([1.0, 2.0, np.inf], np.float32))
     tracker.add_sweep(Sweep("level", tracker.time_ns, 1e6, 0.0, 0.1, ranges, np.zeros(3)))
     feel(2)
     assert "level" in tracker.match

@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from volery.core.arrays import Array
+
 Mask = NDArray[np.bool_]
 
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from volery.autonomy.perception.scan_points import OdometrySample
 from volery.core.clock import NS_PER_S
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 from volery.core.vectors import norm
 from volery.graph.messages import Range
 
@@ -20,11 +19,12 @@ _AIRBORNE_M = 0.6
 _GROUND_M, _GROUND_S = 0.35, 2.0
 """A UAV that is still for this time with a sonar range below this one stands on the ground."""
 _NEVER_NS = -1 << 62
-_STATE = ("stand_m", "_low_since_ns", "_sonar_m", "_sonar_ns")
 
 
-class GroundContact:
+class GroundContact(SavedAttributes):
     """The height of the last stand and the newest sonar range. All limits are modelling choices."""
+
+    STATE = ("stand_m", "_low_since_ns", "_sonar_m", "_sonar_ns")
 
     def __init__(self) -> None:
         self.stand_m = 0.0
@@ -32,14 +32,6 @@ class GroundContact:
         self._low_since_ns: int | None = None
         """Time since which the sonar reports the ground; None: it does not."""
         self._sonar_m, self._sonar_ns = math.inf, _NEVER_NS
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        return save_attributes(self, _STATE)
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a state of `get_state`."""
-        restore_attributes(self, state)
 
     def on_range(self, message: Range, now_ns: int) -> None:
         """Takes a range of the sonar."""

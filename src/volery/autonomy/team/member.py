@@ -20,7 +20,7 @@ from volery.autonomy.team.target_list import Detection, TargetList
 from volery.autonomy.team.team_state import TYPE as REPORT_TYPE
 from volery.autonomy.team.team_state import MissionPhase, TeamState
 from volery.core.clock import NS_PER_S
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import (
     BatteryState,
     Odometry,
@@ -38,31 +38,32 @@ POSE_TIMEOUT_S = 1.0
 """Age of the newest pose from which on the position counts as unknown. Modelling choice."""
 _TARGETS_TYPE = "volery_interfaces/msg/Targets"
 _STATUS_TYPE = "volery_interfaces/msg/MissionStatus"
-_STATE = (
-    "phase",
-    "sector",
-    "since_ns",
-    "coverage",
-    "progress_ns",
-    "searched",
-    "given_up",
-    "targets",
-    "team",
-    "pose",
-    "pose_ns",
-    "battery",
-    "received_ns",
-    "_frame",
-    "_num_reports",
-)
 """All attributes that change."""
 
 
-class TeamMember:
+class TeamMember(SavedAttributes):
     """Publishes `team`, `mission` and `targets` through its node.
 
     Subscribes to odometry, battery, detections and `radio/team`.
     """
+
+    STATE = (
+        "phase",
+        "sector",
+        "since_ns",
+        "coverage",
+        "progress_ns",
+        "searched",
+        "given_up",
+        "targets",
+        "team",
+        "pose",
+        "pose_ns",
+        "battery",
+        "received_ns",
+        "_frame",
+        "_num_reports",
+    )
 
     def __init__(self, node: Node, settings: TeamSettings) -> None:
         self._node, self._settings = node, settings
@@ -106,14 +107,6 @@ class TeamMember:
         )
         if settings.use_map_tf:
             node.create_subscription(TFMessage, "/tf", self._on_tf, 50)
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        return save_attributes(self, _STATE)
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a state of `get_state`."""
-        restore_attributes(self, state)
 
     def workers(self) -> dict[str, Worker]:
         """Returns the UAVs that share the search, by name: itself and those with recent reports."""

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from volery.autonomy.search.search_positions import Area
+from volery.core.arrays import Array
 from volery.graph.messages import (
     Point,
     Point32,
@@ -17,8 +15,6 @@ from volery.graph.messages import (
     header,
     single,
 )
-
-Array = NDArray[np.float64]
 
 
 def polygon_of(area: Area | None, z: float, time_ns: int) -> PolygonStamped:

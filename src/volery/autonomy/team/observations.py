@@ -19,12 +19,10 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.team.target_list import Detection
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
-
-Array = NDArray[np.float64]
 
 _GATE = 9.21
 """99th percentile of chi squared with two degrees of freedom."""

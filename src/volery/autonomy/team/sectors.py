@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.search.search_positions import Area
+from volery.core.arrays import Array
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 

@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.perception.map_frame import MapFrame
 from volery.autonomy.perception.scan_points import OdometrySample
@@ -15,8 +14,9 @@ from volery.autonomy.search.colour_blob import ColourRange, colour_mask, largest
 from volery.autonomy.search.ground_view import GroundView, Intrinsics, pose_at
 from volery.autonomy.team.observations import PositionUncertainty, Tracks, sighting_of
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import (
     CameraInfo,
     Image,
@@ -29,8 +29,6 @@ from volery.graph.messages import (
 )
 from volery.graph.nodes.node import Node
 
-Array = NDArray[np.float64]
-
 _TYPE = "volery_interfaces/msg/Targets"
 _MATE_S, _MATE_M = 2.0, 1.0
 """Max age of a teammate's report, s, and radius of the ball around it. Modelling choice."""
@@ -38,7 +36,7 @@ _STALE_S = 0.5
 """Max age of odometry and range at the time of an image."""
 
 
-class TargetDetection(Node):
+class TargetDetection(SavedAttributes, Node):
     """Detects patches of a colour, projects them to the ground, publishes `~/targets`.
 
     Subscribes to `CAMERA/image_raw`, its `camera_info`, odometry, and `range`, the distance to the
@@ -109,14 +107,6 @@ class TargetDetection(Node):
         self.create_subscription(Image, f"{camera}/image_raw", self._on_image, 1)
         report = message_type("volery_interfaces/msg/TeamReport")
         self.create_subscription(report, "radio/team", self._on_report, 20)
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        return save_attributes(self, self.STATE)
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        restore_attributes(self, state)
 
     def _on_tf(self, message: TFMessage) -> None:
         self._frame.on_tf(message)

@@ -7,11 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.graph.messages import Point, header, message_type, stamp_of
-
-Array = NDArray[np.float64]
 
 TYPE = "volery_interfaces/msg/Target"
 _TOLD = 2

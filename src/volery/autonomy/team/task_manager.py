@@ -27,7 +27,7 @@ from volery.autonomy.team.settings import TeamSettings
 from volery.autonomy.team.team_state import ALOFT, MissionPhase
 from volery.core.clock import NS_PER_S
 from volery.core.errors import GraphError
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 from volery.core.vectors import norm
 from volery.graph.messages import (
     Bool,
@@ -59,26 +59,11 @@ _NEVER_NS = -1 << 62
 HELD, LANDED = "held by the operator", "landed by the operator"
 DOWN = "came down, and not by its mission"
 """All limits are modelling choices."""
-_STATE = (
-    "problem",
-    "_home",
-    "_began_ns",
-    "_phase_ns",
-    "_requested_ns",
-    "_nearest_m",
-    "_highest_m",
-    "_ordered_home",
-    "_order",
-    "_paused",
-    "_has_risen",
-    "_climbs",
-    "_explores",
-)
 """All attributes that change."""
 _PARTS = ("member", "ground")
 
 
-class TaskManager(Node):
+class TaskManager(SavedAttributes, Node):
     """Takes off, has its sectors explored, shares targets, returns home and lands.
 
     Publishes `search_area` (area to explore; no corners: none), the goal on `goal_topic`,
@@ -109,6 +94,23 @@ class TaskManager(Node):
     goal_topic: topic of goals. Not `goal_pose`, to which flight modes fly straight.
 
     """
+
+    PARTS = ("member", "ground")
+    STATE = (
+        "problem",
+        "_home",
+        "_began_ns",
+        "_phase_ns",
+        "_requested_ns",
+        "_nearest_m",
+        "_highest_m",
+        "_ordered_home",
+        "_order",
+        "_paused",
+        "_has_risen",
+        "_climbs",
+        "_explores",
+    )
 
     def __init__(self, **options: Any) -> None:
         super().__init__("task_manager", **options)
@@ -155,17 +157,6 @@ class TaskManager(Node):
         self.create_subscription(Range, "range", self._on_range, 5)
         self.create_subscription(String, "exploration/status", self._on_explorer, 5)
         self.create_timer(_PERIOD_S, self._on_timer)
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        parts = {name: getattr(self, name).get_state() for name in _PARTS}
-        return {"parts": parts, **save_attributes(self, _STATE)}
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a state of `get_state`."""
-        for name in _PARTS:
-            getattr(self, name).set_state(state["parts"][name])
-        restore_attributes(self, {name: state[name] for name in _STATE})
 
     @property
     def phase(self) -> MissionPhase:

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from volery.autonomy.team.assignment import Worker
 from volery.autonomy.team.sectors import from_bits
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.graph.messages import stamp_of
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 TYPE = "volery_interfaces/msg/TeamReport"

@@ -45,6 +45,8 @@ class Recorder:
         Log to write; `stop` closes it.
     topics, exclude
         See `recorded_topics`. Raises `GraphError` for an invalid pattern.
+    max_bytes
+        Size of the log beyond which the recording ends with a failure; None: unlimited.
 
     """
 
@@ -54,9 +56,11 @@ class Recorder:
         log: LogWriter,
         topics: Iterable[str] = (),
         exclude: Iterable[str] = (),
+        max_bytes: int | None = None,
     ) -> None:
         self._graph = graph
-        self._log = log
+        self.log = log
+        self._max_bytes = max_bytes
         self._matches = recorded_topics(graph, topics, exclude)
         self._subscription: Subscription | None = None
         self._ended = False
@@ -68,12 +72,12 @@ class Recorder:
         """Returns the counts so far; any thread may call it."""
         failure = "" if self._failure is None else str(self._failure)
         running = self._subscription is not None
-        return RecordingInfo(str(self._log.path), running, self._messages, failure)
+        return RecordingInfo(str(self.log.path), running, self._messages, failure)
 
     def start(self) -> None:
         """Starts recording. Raises `RecordingError` for a recorder that was started before."""
         if self._ended or self._subscription is not None:
-            raise RecordingError(f"{self._log.path}: this recording was started before")
+            raise RecordingError(f"{self.log.path}: this recording was started before")
         self._subscription = self._graph.subscribe_all(self._take, self._matches)
 
     def stop(self) -> None:
@@ -83,24 +87,26 @@ class Recorder:
         """
         if self._ended:
             return
-        self._end()
-        self._log.close()
+        self._ended = True
+        self._unsubscribe()
+        self.log.close()
         if self._failure is not None:
             raise self._failure
 
     def _take(self, published: Published) -> None:
         if not self._ended and self._failure is None:
             try:
-                self._log.write(published)
+                self.log.write(published)
+                if self._max_bytes is not None and self.log.size_bytes > self._max_bytes:
+                    raise RecordingError(
+                        f"{self.log.path.name}: ended, as the folder for recordings is full; "
+                        "remove some"
+                    )
             except RecordingError as error:
                 self._failure = error
                 self._unsubscribe()
                 return
             self._messages += 1
-
-    def _end(self) -> None:
-        self._ended = True
-        self._unsubscribe()
 
     def _unsubscribe(self) -> None:
         if self._subscription is not None:

@@ -104,11 +104,6 @@ class LogWalk:
     _topics: dict[int, LogTopic] = field(default_factory=dict)
     _schemas: dict[int, Schema] = field(default_factory=dict)
 
-    @property
-    def damaged_chunks(self) -> int:
-        """Number of chunks and records skipped so far."""
-        return self.damage.count
-
     def __iter__(self) -> Iterator[LogRecord]:
         size = self.path.stat().st_size
         self._unpacking, self._described = UnpackingBudget(self.path, size), TopicBudget(self.path)

@@ -69,11 +69,6 @@ class Timeline:
         self.start_ns = min((piece.start_ns for piece in self._pieces), default=0)
         self.end_ns = self._ends[-1] if self._pieces else 0
 
-    @property
-    def shifted(self) -> bool:
-        """Whether the log's own time went back somewhere."""
-        return any(piece.shift_ns for piece in self._pieces)
-
     def shift_ns(self, place: TimelinePosition) -> int:
         """Returns the offset of the line to the log's own time, before a position."""
         number = min(place.piece, len(self._pieces) - 1)

@@ -27,13 +27,13 @@ from volery.bridges.rosbridge.wire import (
     encode_json,
 )
 from volery.core.errors import GraphError, VoleryError
+from volery.graph.codecs.cdr import known
 from volery.graph.codecs.json_codec import JsonCodec
 from volery.graph.codecs.json_decoding import decode_plain
 from volery.graph.codecs.ros1_names import ros1_name, ros2_name
 from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Handler, SessionInfo
 from volery.graph.subscription_queue import Wake
-from volery.graph.typestore import typestore
 
 MOST_WAITING = 1000
 """Publications that may wait for the network."""
@@ -68,7 +68,7 @@ class ClientState(RemoteTopics):
     """
 
     def __init__(self, token: str | None, wake: Wake, generation: Generation = "ros2") -> None:
-        super().__init__(threading.RLock(), _check_type)
+        super().__init__(threading.RLock(), known)
         self.problems: deque[str] = deque(maxlen=MOST_PROBLEMS)
         self.dropped = 0
         self._token = token
@@ -181,7 +181,7 @@ class ClientState(RemoteTopics):
 
     def create_service(self, service: str, srvtype: str, handler: Handler) -> None:
         """Creates a service."""
-        _check_type(f"{srvtype}_Request")
+        known(f"{srvtype}_Request")
         with self._lock:
             if service in self._offers:
                 raise GraphError(f"service '{service}' exists already")
@@ -333,8 +333,3 @@ def _service_type_of(values: Any) -> str:
     """Returns the ROS 2 name of the service type in rosapi's answer; empty if there is none."""
     found = values.get("type") if isinstance(values, dict) else None
     return ros2_name(found, "srv") if isinstance(found, str) and found else ""
-
-
-def _check_type(msgtype: str) -> None:
-    if msgtype not in typestore().types:
-        raise GraphError(f"unknown message type '{msgtype}'")

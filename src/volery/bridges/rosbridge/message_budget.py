@@ -45,7 +45,6 @@ _COMMA, _COLON, _OBJECT, _LIST = b",:{["
 
 _BYTE_STRING, _TEXT, _ARRAY, _MAP, _TAG, _SIMPLE = 2, 3, 4, 5, 6, 7
 _INDEFINITE = 31
-_BREAK = 0xFF
 _LEAST_RUN = 64
 """Length below which runs of numbers are counted one by one."""
 

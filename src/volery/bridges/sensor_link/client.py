@@ -22,7 +22,6 @@ from volery.bridges.sensor_link.payloads import (
     decode_notice,
     decode_payload,
     encode_payload,
-    stamp_of,
 )
 from volery.bridges.sensor_link.server import IMAGE_PORT, PORT
 from volery.bridges.sensor_link.wire import (
@@ -33,6 +32,7 @@ from volery.bridges.sensor_link.wire import (
 )
 from volery.core.errors import BridgeError, GraphError
 from volery.core.network_access import write_while_open
+from volery.graph.messages import stamp_of
 from volery.graph.session import Gateway, Session
 from volery.graph.subscription_queue import SubscriptionQueue
 

@@ -169,12 +169,6 @@ def decode_notice(payload: bytes) -> str:
     return payload.decode(errors="replace")
 
 
-def stamp_of(message: Any) -> int:
-    """Returns the stamp of a message's header, ns."""
-    stamp = message.header.stamp
-    return int(stamp.sec) * NS_PER_S + int(stamp.nanosec)
-
-
 def _texts(*texts: str) -> bytes:
     parts = []
     for text in texts:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 from volery.bridges.bridge_host import wake_of
-from volery.bridges.sensor_link.payloads import PAYLOADS, encode_payload, stamp_of
+from volery.bridges.sensor_link.payloads import PAYLOADS, encode_payload
 from volery.bridges.sensor_link.wire import (
     SensorLinkKind,
     crc_of_head,
@@ -19,7 +19,7 @@ from volery.bridges.sensor_link.wire import (
 from volery.core.clock import NS_PER_S
 from volery.core.errors import BridgeError, GraphError
 from volery.core.framing import crc16, crc_bytes
-from volery.graph.messages import Published
+from volery.graph.messages import Published, stamp_of
 from volery.graph.session import Gateway, Session
 from volery.graph.subscription_queue import SubscriptionQueue
 

@@ -9,7 +9,6 @@ from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.comms.addresses import is_station
 from volery.comms.link_model import Delivery
@@ -17,11 +16,11 @@ from volery.comms.protocol import StationFrame
 from volery.comms.radio.path_loss import Paths, loss_db
 from volery.comms.radio.reception import air_time_ns, packet_error_rate, snr_db
 from volery.core import rng
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
-from volery.core.saved_state import restore_attributes, save_attributes
+from volery.core.saved_state import SavedAttributes
 from volery.scenario.radio import Radio
 
-Array = NDArray[np.float64]
 Places = Callable[[], Mapping[int, Array]]
 """Returns the stations' positions: address to (3,) m, map."""
 Looks = Callable[[Array, Array], Paths]
@@ -39,7 +38,7 @@ class _Sent(NamedTuple):
     ends_ns: int
 
 
-class RadioChannel:
+class RadioChannel(SavedAttributes):
     """Decides loss and delay of frames; call it in the order of time.
 
     seed: of the run. Each pair has random streams of its own, indexed by the frame's number, so
@@ -47,7 +46,6 @@ class RadioChannel:
     """
 
     STATE = ("_free_ns", "_sent", "_losses", "_looked_ns", "counts", "_seed")
-    """Names of the attributes that a snapshot stores."""
 
     def __init__(self, radio: Radio, seed: int, places: Places, looks: Looks) -> None:
         self._radio = radio
@@ -106,11 +104,11 @@ class RadioChannel:
 
     def get_state(self) -> dict[str, Any]:
         """Returns the state for a snapshot."""
-        return copy.deepcopy(save_attributes(self, self.STATE))
+        return copy.deepcopy(super().get_state())
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Restores a saved state."""
-        restore_attributes(self, copy.deepcopy(state))
+        super().set_state(copy.deepcopy(state))
 
     def _try(
         self, source: int, destination: int, frame: StationFrame, snr: float

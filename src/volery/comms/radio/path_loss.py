@@ -16,9 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.scenario.radio import Radio
-
-Array = NDArray[np.float64]
 
 _LIGHT_M_S = 299_792_458.0
 _REFERENCE_M = 1.0

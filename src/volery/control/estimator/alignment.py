@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from volery.control.estimator.records import (
     ACCEL_BIAS,
@@ -18,9 +18,8 @@ from volery.control.estimator.records import (
 )
 from volery.control.estimator.settings import EstimatorSettings, StartSigmas
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.vehicle.airframe import GRAVITY
-
-Array = NDArray[np.float64]
 
 
 def align_at_rest(

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from volery.core.arrays import Array
 from volery.core.errors import EstimatorError
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 

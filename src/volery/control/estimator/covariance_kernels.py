@@ -9,9 +9,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from volery.control.estimator.compiled import part_kernel
 from volery.control.estimator.records import (
     ACCEL_BIAS,
@@ -24,10 +21,10 @@ from volery.control.estimator.records import (
     STATES,
     VELOCITY,
 )
+from volery.core.arrays import Array
 from volery.vehicle.compiled import inner_kernel
 from volery.vehicle.rotation_math import three
 
-Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 _V, _R, _G, _A = (first * STATES for first in (VELOCITY, ROTATION, GYRO_BIAS, ACCEL_BIAS))
 

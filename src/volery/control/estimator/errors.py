@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.control.estimator.records import GYRO_BIAS, POSITION, ROTATION, VELOCITY
 from volery.core import rotations
-
-Array = NDArray[np.float64]
+from volery.core.arrays import Array
 
 _OF_POSE = np.r_[POSITION : POSITION + 3, ROTATION : ROTATION + 3]
 

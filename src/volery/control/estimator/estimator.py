@@ -34,9 +34,9 @@ from volery.control.estimator.records import (
 )
 from volery.control.estimator.settings import EstimatorSettings, Mounting, StartSigmas
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.errors import EstimatorError
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 _AT_CENTRE = Mounting()
 _IN_THE_AIR = StartSigmas()

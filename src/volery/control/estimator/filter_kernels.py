@@ -41,11 +41,11 @@ from volery.control.estimator.records import (
     STATES,
     VELOCITY,
 )
+from volery.core.arrays import Array
 from volery.core.rotation_kernels import rotate_vector
 from volery.vehicle.compiled import fused_kernel, inner_kernel
 from volery.vehicle.rotation_math import four, product, three
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 Records = NDArray[np.void]
 

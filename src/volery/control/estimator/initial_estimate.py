@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from volery.control.estimator.settings import StartSigmas
 from volery.core import rng, rotations
-
-Array = NDArray[np.float64]
+from volery.core.arrays import Array
 
 _NUMBERS = 9
 

@@ -9,9 +9,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from volery.control.estimator.compiled import part_kernel
 from volery.control.estimator.records import (
     GNSS,
@@ -28,11 +25,11 @@ from volery.control.estimator.records import (
     STATES,
     VELOCITY,
 )
+from volery.core.arrays import Array
 from volery.core.rotation_kernels import cross, rotate_vector
 from volery.vehicle.compiled import inner_kernel
 from volery.vehicle.rotation_math import four, three, turned
 
-Array = NDArray[np.float64]
 _OFFSET_0 = PRESSURE_OFFSET
 
 

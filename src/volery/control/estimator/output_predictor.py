@@ -11,11 +11,11 @@ from volery.control.estimator.compiled import part_kernel
 from volery.control.estimator.covariance_kernels import carry, decay, transform, transpose
 from volery.control.estimator.motion_kernels import flow_on, motion_at_horizon, still, travelled
 from volery.control.estimator.records import STATES
+from volery.core.arrays import Array
 from volery.core.rotation_kernels import cross, rotate_vector
 from volery.vehicle.compiled import fused_kernel, inner_kernel
 from volery.vehicle.rotation_math import four, three
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 Records = NDArray[np.void]
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.vehicle.compiled import fused_kernel, inner_kernel
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 Records = NDArray[np.void]
 

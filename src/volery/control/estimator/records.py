@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from volery.control.estimator.settings import EstimatorSettings, Mounting
 from volery.core import rotations
 
-Array = NDArray[np.float64]
-
 POSITION, VELOCITY, ROTATION, GYRO_BIAS, ACCEL_BIAS = 0, 3, 6, 9, 12
 """First of three error states each: map, map, rotation vector in the map, body, body ..."""
 PRESSURE_OFFSET, HEADING_OFFSET, GNSS_OFFSET = 15, 16, 17

@@ -59,9 +59,7 @@ class NodePublisher(Publisher):
         """Stops publishing."""
         self._publisher.cancel()
 
-    def destroy(self) -> None:
-        """Stops publishing."""
-        self._publisher.cancel()
+    destroy = cancel
 
 
 class NodeSubscription:
@@ -83,9 +81,7 @@ class NodeSubscription:
         """Stops receiving."""
         self._subscription.cancel()
 
-    def destroy(self) -> None:
-        """Stops receiving."""
-        self._subscription.cancel()
+    destroy = cancel
 
 
 class NodeService:

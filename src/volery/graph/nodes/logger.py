@@ -91,9 +91,7 @@ class NodeLogger:
         """Logs at level WARN; returns whether the line was logged."""
         return self._log(message, LoggingSeverity.WARN, options)
 
-    def warn(self, message: str, **options: Any) -> bool:
-        """Logs at level WARN; returns whether the line was logged."""
-        return self._log(message, LoggingSeverity.WARN, options)
+    warn = warning
 
     def error(self, message: str, **options: Any) -> bool:
         """Logs at level ERROR; returns whether the line was logged."""

@@ -33,8 +33,6 @@ class Offboard:
 
     setpoint: OffboardSetpoint | None = None
     time_ns: int = -(1 << 62)
-    begun_ns: int = -(1 << 62)
-    """Time since which they have arrived without a gap."""
     source: Source | None = None
     """Sender; others are ignored until this one is silent."""
     refused: set[Source] = field(default_factory=set)

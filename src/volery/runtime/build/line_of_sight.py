@@ -6,12 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.comms.radio.path_loss import Paths
+from volery.core.arrays import Array
 from volery.runtime.build.radio_crowns import Crowns
 from volery.world.forest import Forest
 from volery.world.materials import Material
 from volery.world.scene import Hits, Scene
-
-Array = NDArray[np.float64]
 
 _MOST_SURFACES = 192
 """Max number of surfaces; behind more of them no signal is left, and they are not counted."""

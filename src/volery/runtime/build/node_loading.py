@@ -28,8 +28,8 @@ from volery.graph.nodes.imports import provide_ros_imports
 from volery.graph.nodes.launch import Launch, make_node
 from volery.graph.nodes.node import Context, Node
 from volery.scenario.access import ScenarioAccess
-from volery.scenario.node_names import node_module, node_path
-from volery.scenario.schema import NodeEntry, Scenario
+from volery.scenario.node_names import node_path
+from volery.scenario.schema import NodeEntry
 
 _SHIPPED = ("volery.autonomy.", "volery.comms.", "volery.mavlink.")
 """Packages with nodes; some other modules of Volery are programs that an import would start."""
@@ -85,12 +85,6 @@ def find_node(entry: NodeEntry, where: str, access: ScenarioAccess) -> type[Any]
         return _find_class(path, where)
 
 
-def local_nodes(scenario: Scenario) -> tuple[str, ...]:
-    """Returns the scenario's nodes beside it or in the working folder. Imports nothing."""
-    access, names = scenario.access, [entry.node for entry in scenario.node_entries]
-    return tuple(n for n in dict.fromkeys(names) if is_local(node_module(n), access))
-
-
 def is_local(module: str | None, access: ScenarioAccess) -> bool:
     """Returns whether a module is found only in the scenario's folder or the working folder.
 
@@ -115,7 +109,7 @@ def _check_allowed(node: str, path: str, where: str, access: ScenarioAccess) -> 
             "upload starts shipped nodes only; name your own file of the scenario to allow its "
             "nodes"
         )
-    if path.startswith("volery.") and not access.is_trusted:
+    if path.startswith(("volery.", "volery_benchmarks.")) and not access.is_trusted:
         raise ScenarioError(f"{where}: '{node}' is no node that ships with Volery")
 
 

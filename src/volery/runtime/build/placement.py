@@ -7,16 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.errors import PlacementError
 from volery.scenario.schema import Scenario, UavGroup
 from volery.vehicle.airframe import Airframe
 from volery.world.scene import Scene
 from volery.world.terrain import Terrain
-
-Array = NDArray[np.float64]
 
 _SEARCH_STEP_M = 1.0
 _SEARCH_RADIUS_M = 30.0

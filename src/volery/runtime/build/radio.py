@@ -4,18 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-from numpy.typing import NDArray
-
 from volery.comms.radio.channel import RadioChannel
 from volery.comms.radio.network import RadioNetwork
+from volery.core.arrays import Array
 from volery.engine.engine import Engine
 from volery.graph.graph import Graph
 from volery.runtime.build.line_of_sight import LineOfSight
 from volery.scenario.schema import Scenario
 from volery.world.forest import Forest
-
-Array = NDArray[np.float64]
 
 
 def build_radio(

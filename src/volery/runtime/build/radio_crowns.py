@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.vectors import norm
 from volery.world.forest import Forest
 from volery.world.trees.model import TreeModel
-
-Array = NDArray[np.float64]
 
 _WITHIN = 0.9
 """Fraction of a crown's leaves inside its ellipsoid. Modelling choice."""

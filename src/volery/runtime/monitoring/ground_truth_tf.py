@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.engine.engine import Engine
 from volery.graph.graph import Graph
 from volery.graph.lazy_list import LazyList
@@ -23,8 +23,6 @@ from volery.graph.messages import (
     header,
 )
 from volery.runtime.monitoring.live_topic import LiveTopic
-
-Array = NDArray[np.float64]
 
 TOPIC = "/ground_truth/tf"
 _PERIOD_S = 0.02

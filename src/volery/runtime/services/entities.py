@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.errors import PlacementError
 from volery.graph.graph import Graph
 from volery.graph.messages import Point, Pose, Quaternion, Twist, Vector3, header, message_type
@@ -23,8 +23,6 @@ from volery.runtime.services.filters import (
 )
 from volery.runtime.services.results import Fields, RefusedError, ResultCode, filled, offer_result
 from volery.runtime.vehicles.uav import Uav
-
-Array = NDArray[np.float64]
 
 _MSG = "simulation_interfaces/msg"
 _SRV = "simulation_interfaces/srv"

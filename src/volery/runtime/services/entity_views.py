@@ -7,17 +7,15 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.runtime.services.filters import Category
 from volery.runtime.vehicles.uav import Uav
 from volery.scenario.schema import UavType
 from volery.vehicle.body_shape import body_shape
 from volery.world.actors import MovingActor, MovingActors
 from volery.world.scene_content import BodyShape
-
-Array = NDArray[np.float64]
 
 _CATEGORIES = {"person": Category.HUMAN}
 """Categories of actor kinds; all others are dynamic objects."""

@@ -7,13 +7,11 @@ from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.errors import PatternError
 from volery.core.patterns import posix_search
 from volery.runtime.services.results import RefusedError, ResultCode
-
-Array = NDArray[np.float64]
 
 
 class Category(IntEnum):

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import Any
 
 from volery.bridges.logs.log_writer import LogWriter, open_log
 from volery.bridges.logs.recorded_topics import recorded_topics
+from volery.bridges.logs.recording import Recorder
 from volery.bridges.logs.recordings_quota import room_left
 from volery.core.errors import RecordingError
 from volery.graph.graph import Graph
-from volery.graph.messages import Published
-from volery.graph.topics import Subscription
 from volery.runtime.replay.command_log import CommandLog
 from volery.runtime.services.results import Fields, offer_command
 
@@ -25,11 +25,7 @@ class RecordingServices:
         self._graph = graph
         self._commands = commands
         self._folder = None if folder is None else Path(folder)
-        self._log: LogWriter | None = None
-        self._subscription: Subscription | None = None
-        self._failure: RecordingError | None = None
-        self._room = 0
-        """Max size of the present log, bytes."""
+        self._recorder: Recorder | None = None
 
     def offer(self) -> None:
         """Creates the services."""
@@ -40,67 +36,43 @@ class RecordingServices:
     @property
     def name(self) -> str:
         """Path of the log being recorded, below the folder; empty: none."""
-        if self._log is None or self._folder is None:
+        if self._recorder is None or self._folder is None:
             return ""
-        return self._log.path.relative_to(self._folder.resolve()).as_posix()
+        return self._recorder.log.path.relative_to(self._folder.resolve()).as_posix()
 
     def close(self) -> None:
         """Ends a recording that is still running."""
-        if self._log is not None:
-            try:
+        if self._recorder is not None:
+            with contextlib.suppress(RecordingError):  # whole chunks are in the file
                 self._commands.end()
-                self._end()
-            except RecordingError:
-                return  # no client is left to report to; whole chunks are in the file
+                self._end(self._recorder)
 
     def _start(self, request: Any) -> Fields:
-        if self._log is not None:
-            raise RecordingError(f"{self._log.path.name} is being recorded; stop that first")
+        if self._recorder is not None:
+            raise RecordingError(
+                f"{self._recorder.log.path.name} is being recorded; stop that first"
+            )
         path = self._checked(request.path)
-        self._failure = None
-        matches = recorded_topics(self._graph, request.topics, request.exclude)
-        self._room = room_left(path.parent if self._folder is None else self._folder)
-        self._log = open_log(path)
+        topics, exclude = request.topics, request.exclude
+        matches = recorded_topics(self._graph, topics, exclude)
+        room = room_left(path.parent if self._folder is None else self._folder)
+        self._recorder = Recorder(self._graph, open_log(path), topics, exclude, room)
         for earlier in self._commands.earlier():
             if matches(earlier.topic):
-                self._log.write(earlier)
-        self._subscription = self._graph.subscribe_all(self._write, matches)
+                self._recorder.log.write(earlier)
+        self._recorder.start()
         return {"path": str(path)}
 
     def _stop(self, _request: Any) -> Fields:
-        if self._log is None:
+        if self._recorder is None:
             raise RecordingError("nothing is being recorded")
-        failure = self._failure
-        log = self._end()
-        if failure is not None:
-            raise failure
+        log = self._end(self._recorder)
         return {"path": str(log.path), "messages": log.messages}
 
-    def _end(self) -> LogWriter:
-        log, self._log = self._log, None
-        assert log is not None
-        self._leave()
-        log.close()
-        return log
-
-    def _leave(self) -> None:
-        if self._subscription is not None:
-            self._subscription.cancel()
-            self._subscription = None
-
-    def _write(self, published: Published) -> None:
-        """Records a message; an error ends the recording, and stop_recording reports it."""
-        try:
-            if self._log is not None and self._failure is None:
-                self._log.write(published)
-                if self._log.size_bytes > self._room:
-                    raise RecordingError(
-                        f"{self._log.path.name}: ended, as the folder for recordings is full; "
-                        "remove some"
-                    )
-        except RecordingError as error:
-            self._failure = error
-            self._leave()
+    def _end(self, recorder: Recorder) -> LogWriter:
+        self._recorder = None
+        recorder.stop()
+        return recorder.log
 
     def _checked(self, name: str) -> Path:
         if self._folder is None:

@@ -8,9 +8,9 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.control.flight_modes import FlightMode
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.vectors import norm
 from volery.engine.engine import Engine
@@ -19,8 +19,6 @@ from volery.graph.graph import Graph
 from volery.graph.messages import Odometry, Published, stamp_of
 from volery.runtime.services.results import Close
 from volery.scenario.schema import EstimateSensor, ExternalOdometrySource, Sensor
-
-Array = NDArray[np.float64]
 
 _LOOK_S = 0.1
 _SILENT_S, _TOLD_S = 2.0, 5.0

@@ -8,9 +8,9 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.comms.radio.network import RadioNetwork
+from volery.core.arrays import Array
 from volery.core.errors import CommandError, PlacementError
 from volery.engine.engine import Engine
 from volery.engine.faults import FaultPlan
@@ -31,8 +31,6 @@ from volery.runtime.vehicles.uav import Uav
 from volery.scenario.schema import Scenario, Sensor
 from volery.vehicle.airframe import Airframe
 from volery.world.terrain import Terrain
-
-Array = NDArray[np.float64]
 
 _ROOT = "/"
 """Namespace of the nodes of the whole system."""

@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.errors import CommandError, PlacementError
 from volery.runtime.build.placement import StartPose, check_place, lifted, stands_on_ground
 from volery.runtime.vehicles.manager import VehicleManager
-
-Array = NDArray[np.float64]
 
 _REACH_M = 10.0
 """Larger than the distance at which any two UAVs touch, m."""

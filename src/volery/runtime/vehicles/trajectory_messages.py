@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.control.trajectory import Trajectory
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.errors import CommandError
 from volery.runtime.vehicles.uav import Uav
-
-Array = NDArray[np.float64]
 
 
 def follow_message(uav: Uav, message: Any) -> None:

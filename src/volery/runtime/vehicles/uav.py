@@ -6,17 +6,17 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from volery.control.fleet import Fleet
 from volery.control.flight_modes import FlightMode
 from volery.control.setpoints import MAX_COORDINATE, checked
 from volery.control.trajectory import Trajectory
+from volery.core.arrays import Array
 from volery.core.errors import CommandError
 from volery.scenario.schema import Flight
 from volery.vehicle.airframe import Airframe
 
-Array = NDArray[np.float64]
 CheckGoal = Callable[[Array, Airframe], None]
 """Raises `CommandError` if a UAV cannot be at a position (3,), m, in the map frame."""
 

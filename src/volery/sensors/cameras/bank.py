@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
+from volery.core.arrays import read_only
 from volery.core.clock import Schedule
 from volery.core.errors import DataFileError
 from volery.sensors.bank import NoisyBank
@@ -18,7 +19,7 @@ from volery.sensors.cameras.model import CameraModel
 from volery.sensors.cameras.precipitation import falling_in
 from volery.sensors.lidar import make_batch, stack_mounts
 from volery.sensors.mount import Mount
-from volery.sensors.samples import CameraFrames, SensorId, owned
+from volery.sensors.samples import CameraFrames, SensorId
 from volery.vehicle.pose_history import KEPT_NS
 from volery.world.scene import Scene
 from volery.world.weather import Weather
@@ -104,7 +105,7 @@ def _arrays(images: Images) -> dict[str, Any]:
     """Returns the arrays of all parts; a part that was not rendered has no pixels."""
     count = next(len(part) for part in images if part is not None)
     return {
-        name: owned(np.zeros((count, 0, 0), _KINDS[name]) if part is None else part)
+        name: read_only(np.zeros((count, 0, 0), _KINDS[name]) if part is None else part)
         for name, part in images._asdict().items()
     }
 

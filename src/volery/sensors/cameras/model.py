@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
+from volery.core.arrays import Array
 from volery.sensors.cameras.lens import distort, undistort
 from volery.sensors.cameras.pixel_table import PixelTable, make_table
 from volery.sensors.model import SensorModel, load_model
 
-Array = NDArray[np.float64]
 Side = Annotated[int, Field(ge=1, le=8192)]
 
 

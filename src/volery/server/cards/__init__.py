@@ -1,4 +1,4 @@
-"""Images of the shipped scenarios, `NAME.jpg`; `volery.server.card_renderer` renders them."""
+"""Images of the shipped scenarios, `NAME.jpg`; `tools/scenario_cards.py` renders them."""
 
 from pathlib import Path
 

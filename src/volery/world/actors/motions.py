@@ -11,9 +11,10 @@ from collections.abc import Callable, Sequence
 from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from volery.core.arrays import Array
+
 HeightAt = Callable[[float, float], float]
 """Returns z of the ground at (x, y) of the map, m."""
 

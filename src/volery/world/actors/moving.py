@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from volery.core.arrays import Array
 from volery.core.clock import s_from_ns
 from volery.core.errors import CommandError
 from volery.world.actors.motions import ActorMotion, GivenMotion
 from volery.world.scene_content import BodyShape
-
-Array = NDArray[np.float64]
 
 _VELOCITY_STEP_S = 1e-3
 

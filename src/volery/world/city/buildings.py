@@ -8,16 +8,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.rng import generator
 from volery.world.city.outlines import Outline
 from volery.world.materials import Material
 from volery.world.mesh import Mesh, concatenate
 from volery.world.scene_content import Look, Solid
 from volery.world.terrain import Terrain
-
-Array = NDArray[np.float64]
 
 FOUNDATION_M = 0.5
 """Depth of walls below the lowest ground, so that nothing passes under them."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.rng import generator
 from volery.world.city.streets import Streets, kerb_lines
 from volery.world.inventory import Inventory
@@ -15,8 +16,6 @@ from volery.world.materials import Material
 from volery.world.mesh import Mesh, concatenate
 from volery.world.scene_content import Solid
 from volery.world.terrain import Terrain
-
-Array = NDArray[np.float64]
 
 _FROM_KERB_M = 0.5
 """Distance of a lamp's post from the kerb, on the pavement."""

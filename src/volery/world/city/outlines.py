@@ -14,15 +14,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.errors import DataFileError
 from volery.core.geodesy import LocalFrame
 from volery.core.plurals import counted
 from volery.world.city.geojson import Feature, Ring, read_features
 from volery.world.city.heights import Height, HeightRule, height_of
 
-Array = NDArray[np.float64]
 Region = tuple[float, float, float, float]
 
 LEAST_AREA_M2 = 1.0

@@ -15,10 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.world.ground_cover import GroundCover
 from volery.world.materials import Material
-
-Array = NDArray[np.float64]
 
 _ROADWAY_M = 3.0
 """Minimum width of asphalt: a car's (modelling choice)."""

@@ -10,13 +10,12 @@ from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from volery.core.arrays import Array
 from volery.core.quantities import Quantity
 from volery.scenario.base import Bounded
 
-Array = NDArray[np.float64]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 

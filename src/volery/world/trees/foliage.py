@@ -11,11 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.world.mesh import EMPTY, Mesh
-
-Array = NDArray[np.float64]
 
 _LONGEST_STAND_IN = 2.2
 """Maximum length over width of a simplified leaf: slivers have poor bounding boxes."""

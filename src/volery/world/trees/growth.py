@@ -7,15 +7,13 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.world.mesh import EMPTY, Mesh, concatenate
 from volery.world.trees.branches import UP, Branches, across, tubes, unit
 from volery.world.trees.foliage import Blades, quads, stand_ins
 from volery.world.trees.model import BREAST_HEIGHT_M, DetailLevel, TreeMesh
 from volery.world.trees.species import Simplified, Species
-
-Array = NDArray[np.float64]
 
 GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 """Angle between successive branches, which distributes them evenly around the stem."""

@@ -33,11 +33,6 @@ class TreeMesh:
     wood: Mesh
     leaves: Mesh
 
-    @property
-    def triangle_count(self) -> int:
-        """Triangles of wood and leaves together."""
-        return len(self.wood) + len(self.leaves)
-
 
 @dataclass(frozen=True, eq=False)
 class TreeModel:

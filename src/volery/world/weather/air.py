@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from volery.core.arrays import Array
 from volery.core.compiled import inner_kernel
 from volery.world.terrain import TerrainGrid, terrain_height
 from volery.world.weather.dryden import turbulent_velocity
 from volery.world.weather.gusts import gust_velocity
 from volery.world.weather.mean_wind import FIELD, UNIFORM, mean_wind
-
-Array = NDArray[np.float64]
 
 
 @inner_kernel

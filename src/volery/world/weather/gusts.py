@@ -5,12 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from volery.core.arrays import Array
 from volery.core.compiled import inner_kernel
-
-Array = NDArray[np.float64]
 
 
 @inner_kernel

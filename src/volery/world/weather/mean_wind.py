@@ -5,13 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from volery.core.arrays import Array
 from volery.core.compiled import inner_kernel
 from volery.world.weather.wind_field import field_velocity
-
-Array = NDArray[np.float64]
 
 UNIFORM, LOG, POWER, FIELD = 0, 1, 2, 3
 """Kinds of mean wind."""

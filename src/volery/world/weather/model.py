@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from volery.core.errors import CommandError
 from volery.scenario.wind import MAX_GUSTS, MAX_WIND_M_S
-from volery.world.weather.particles import CLEAR_AIR, Particles
+from volery.world.weather.particles import CLEAR_AIR, Particles, check_range
 from volery.world.weather.wind_field import WindField
 
 Vector = tuple[float, float, float]
@@ -36,8 +36,8 @@ class LogProfile:
     """Roughness length z0 (default: open, grass; classes of Davenport and Wieringa)."""
 
     def __post_init__(self) -> None:
-        _within("roughness_m", self.roughness_m, 1e-6, 10.0)
-        _within("reference_height_m", self.reference_height_m, 0.1, 304.8)
+        check_range("roughness_m", self.roughness_m, 1e-6, 10.0)
+        check_range("reference_height_m", self.reference_height_m, 0.1, 304.8)
         if self.reference_height_m < 2.0 * self.roughness_m:
             raise CommandError("reference_height_m must be at least twice roughness_m")
 
@@ -51,8 +51,8 @@ class PowerProfile:
     """Default: the one-seventh power law of neutral air over open land."""
 
     def __post_init__(self) -> None:
-        _within("reference_height_m", self.reference_height_m, 0.1, 304.8)
-        _within("exponent", self.exponent, 0.0, 1.0)
+        check_range("reference_height_m", self.reference_height_m, 0.1, 304.8)
+        check_range("exponent", self.exponent, 0.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,8 +76,8 @@ class Gust:
         object.__setattr__(
             self, "front_velocity_map", _wind("front_velocity_map", self.front_velocity_map)
         )
-        _within("start_s", self.start_s, -1e9, 1e9)
-        _within("rise_s", self.rise_s, 1e-3, 1e6)
+        check_range("start_s", self.start_s, -1e9, 1e9)
+        check_range("rise_s", self.rise_s, 1e-3, 1e6)
         # half a microsecond of slack for times that were added up
         if not self.end_s - self.start_s >= 2.0 * self.rise_s - 5e-7:
             raise CommandError("end_s must leave time to rise and to fall: start_s + 2 rise_s")
@@ -110,9 +110,9 @@ class Weather:
     def __post_init__(self) -> None:
         object.__setattr__(self, "velocity_map", _wind("velocity_map", self.velocity_map))
         object.__setattr__(self, "gusts", tuple(self.gusts))
-        _within("w20_m_s", self.w20_m_s, 0.0, MAX_WIND_M_S)
+        check_range("w20_m_s", self.w20_m_s, 0.0, MAX_WIND_M_S)
         if self.hour_of_day is not None:
-            _within("hour_of_day", self.hour_of_day, 0.0, 24.0)
+            check_range("hour_of_day", self.hour_of_day, 0.0, 24.0)
         if self.field is not None and (self.profile is not None or self.velocity_map != _STILL):
             raise CommandError("a wind field replaces velocity_map and profile; leave them out")
         if len(self.gusts) > MAX_GUSTS:
@@ -137,11 +137,6 @@ def _wind(what: str, value: ArrayLike) -> Vector:
         )
     x, y, z = vector.tolist()
     return x, y, z
-
-
-def _within(what: str, value: float, low: float, high: float) -> None:
-    if not low <= value <= high:  # true for NaN
-        raise CommandError(f"{what} = {value:g} is out of range; {low:g} to {high:g} is allowed")
 
 
 CALM = Weather()

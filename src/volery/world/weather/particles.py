@@ -54,12 +54,12 @@ class Particles:
     dust_visibility_m: float = math.inf
 
     def __post_init__(self) -> None:
-        _within("rain_mm_h", self.rain_mm_h, 0.0, MAX_RAIN_MM_H)
-        _within("snow_mm_h", self.snow_mm_h, 0.0, MAX_SNOW_MM_H)
+        check_range("rain_mm_h", self.rain_mm_h, 0.0, MAX_RAIN_MM_H)
+        check_range("snow_mm_h", self.snow_mm_h, 0.0, MAX_SNOW_MM_H)
         for name in ("fog_visibility_m", "dust_visibility_m"):
             value = getattr(self, name)
             if value != math.inf:
-                _within(name, value, MIN_VISIBILITY_M, MAX_VISIBILITY_M)
+                check_range(name, value, MIN_VISIBILITY_M, MAX_VISIBILITY_M)
 
     @property
     def visibility_m(self) -> float:
@@ -68,7 +68,8 @@ class Particles:
         return _FAINT / whole if whole > 0.0 else math.inf
 
 
-def _within(what: str, value: float, low: float, high: float) -> None:
+def check_range(what: str, value: float, low: float, high: float) -> None:
+    """Raises `CommandError` for a value outside of a range."""
     if not low <= value <= high:  # true for NaN
         raise CommandError(f"{what} = {value:g} is out of range; {low:g} to {high:g} is allowed")
 

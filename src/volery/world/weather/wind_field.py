@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from volery.core.arrays import Array
 from volery.core.compiled import inner_kernel
 from volery.core.errors import CommandError
 from volery.scenario.wind import MAX_WIND_M_S
 from volery.world.weather.wind_field_files import read_wind_field
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False, slots=True)

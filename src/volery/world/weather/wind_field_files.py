@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.errors import DataFileError
 from volery.core.plurals import counted
 from volery.scenario.wind import MAX_WIND_M_S
 
-Array = NDArray[np.float64]
 Field = tuple[Array, tuple[float, float, float], tuple[float, float, float]]
 
 _COLUMNS = ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s")

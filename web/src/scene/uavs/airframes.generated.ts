@@ -1,4 +1,4 @@
-// Written by `python -m volery.vehicle.typescript` from the airframes' data files.
+// Written by `python tools/typescript_airframes.py` from the airframes' data files.
 // A test of the project fails when this file is older than they are.
 
 /** Body axes: x forward, y left, z up; metres. */

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.slam.linear import eliminate
 from volery.autonomy.slam.planar.map_kernels import (
@@ -22,9 +21,8 @@ from volery.autonomy.slam.planar.map_kernels import (
     THICK,
     Grid,
 )
+from volery.core.arrays import Array
 from volery.core.compiled import inner_kernel, kernel
-
-Array = NDArray[np.float64]
 
 _TIGHT_M = 0.12
 """Final width of the gate."""

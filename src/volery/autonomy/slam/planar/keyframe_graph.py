@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.slam.planar.loop_closure import PlanarLoopCloser, PlanarLoopClosure
 from volery.autonomy.slam.planar.pose_graph import PlanarEdge, optimised
@@ -15,9 +13,8 @@ from volery.autonomy.slam.planar.poses import between, compose, grown, turned
 from volery.autonomy.slam.planar.settings import PlanarSettings
 from volery.autonomy.slam.planar.tracker import PlanarTrackerState
 from volery.autonomy.slam.pose_graph import load_gtsam
-from volery.core.saved_state import restore_attributes, save_attributes
-
-Array = NDArray[np.float64]
+from volery.core.arrays import Array
+from volery.core.saved_state import SavedAttributes
 
 _ASTRAY = np.diag([1000.0**2, 1000.0**2, 3.0**2])
 """Covariance of the step over which tracking was lost."""
@@ -34,10 +31,10 @@ _AT_LAST = 8
 """Number of closures that change little after which the graph is optimized."""
 
 
-class PlanarKeyframeGraph:
+class PlanarKeyframeGraph(SavedAttributes):
     """Holds keyframes and their graph; `start` (3,) is the first one's pose in the map."""
 
-    _STATE = (
+    STATE = (
         "frames", "poses", "edges", "session", "is_placed", "closures", "tried", "changes",
         "covariance",
         "_spread", "_pending", "_tried_at", "_cursor", "_waiting",
@@ -221,11 +218,3 @@ class PlanarKeyframeGraph:
         self.closures -= before - len(self.edges)
         self._waiting = 0
         self.changes += 1
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        return save_attributes(self, self._STATE)
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        restore_attributes(self, state)

@@ -6,14 +6,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.slam.planar.fit_kernels import fit
 from volery.autonomy.slam.planar.map_kernels import CELL_M, blur, build, pool
 from volery.autonomy.slam.planar.search_kernels import search
 from volery.autonomy.slam.planar.settings import MatchingSettings
-
-Array = NDArray[np.float64]
+from volery.core.arrays import Array
 
 _MOST_CELLS = 30_000
 _NOWHERE = np.array([0.0, 0.0, -1.0])

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.slam.planar.local_map import PlanarSubmap, ScanMatch
 from volery.autonomy.slam.planar.pose_graph import PlanarEdge
@@ -15,8 +14,7 @@ from volery.autonomy.slam.planar.poses import between, placed
 from volery.autonomy.slam.planar.scans import thinned
 from volery.autonomy.slam.planar.settings import PlanarSettings
 from volery.autonomy.slam.planar.tracker import PlanarTrackerState
-
-Array = NDArray[np.float64]
+from volery.core.arrays import Array
 
 _LEVELS = 6
 _MOST_FRAMES, _MOST_QUERIES = 24, 12

@@ -11,9 +11,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.compiled import inner_kernel, kernel
 
-Array = NDArray[np.float64]
 Grid = NDArray[np.int32]
 Field = NDArray[np.uint8]
 

@@ -10,12 +10,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.slam.planar.poses import compose, turned
 from volery.autonomy.slam.planar.settings import MotionSettings
-
-Array = NDArray[np.float64]
+from volery.core.arrays import Array
+from volery.core.saved_state import SavedAttributes
 
 _LEAST_M, _LEAST_RAD = 1e-3, 3e-4
 """Min standard deviations of a prediction."""
@@ -24,8 +23,10 @@ _LONGEST_S = 3.0
 """Max duration of a constant-velocity prediction; after it the velocity is unknown."""
 
 
-class PlanarMotion:
+class PlanarMotion(SavedAttributes):
     """Holds pose (3,), velocity (3,) in the body's axes, and their covariance (6, 6)."""
+
+    STATE = ("pose", "velocity", "covariance")
 
     def __init__(self, settings: MotionSettings) -> None:
         self._settings = settings

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.slam.planar.poses import between, compose
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
+from volery.core.saved_state import SavedAttributes
 from volery.graph.messages import Odometry, stamp_of
-
-Array = NDArray[np.float64]
 
 _KEPT = 512
 _JUMP_BACK_NS = NS_PER_S // 2
@@ -23,8 +21,10 @@ _MOST_M_S, _MOST_RAD_S = 20.0, 20.0
 """Speeds above which a step is a reset of the odometry."""
 
 
-class WheelOdometry:
+class WheelOdometry(SavedAttributes):
     """Holds recent poses; ignores poses that are not finite, late or repeated."""
+
+    STATE = ("_times", "_poses", "refused")
 
     def __init__(self) -> None:
         self._times: list[int] = []
@@ -35,15 +35,6 @@ class WheelOdometry:
     def newest_ns(self) -> int | None:
         """Time of the newest pose, ns; None: no pose."""
         return self._times[-1] if self._times else None
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        return {"times": list(self._times), "poses": list(self._poses), "refused": self.refused}
-
-    def set_state(self, state: dict[str, Any]) -> None:
-        """Restores a saved state."""
-        self._times, self._poses = list(state["times"]), list(state["poses"])
-        self.refused = state["refused"]
 
     def add(self, message: Odometry) -> None:
         """Adds a pose."""

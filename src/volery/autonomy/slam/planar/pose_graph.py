@@ -6,12 +6,10 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.slam.planar.poses import between
 from volery.autonomy.slam.pose_graph import load_gtsam
-
-Array = NDArray[np.float64]
+from volery.core.arrays import Array
 
 _ROUNDS = 20
 _BEND = 3.0

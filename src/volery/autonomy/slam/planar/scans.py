@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from volery.autonomy.perception.static_transforms import Mount
 from volery.autonomy.slam.planar.settings import ReturnSettings
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.compiled import kernel
 from volery.graph.messages import LaserScan
-
-Array = NDArray[np.float64]
 
 
 def returns(scan: LaserScan, mount: Mount, velocity: Array, kept: ReturnSettings) -> Array:

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.slam.planar.map_kernels import CELL_M, FULL, Field
+from volery.core.arrays import Array
 from volery.core.compiled import inner_kernel, kernel
 
-Array = NDArray[np.float64]
 Cells = NDArray[np.int32]
 
 _MOST_NODES = 400_000

@@ -11,7 +11,6 @@ from collections import deque
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.slam.planar.health import is_open
 from volery.autonomy.slam.planar.local_map import PlanarSubmap, ScanMatch
@@ -19,10 +18,9 @@ from volery.autonomy.slam.planar.motion import PlanarMotion
 from volery.autonomy.slam.planar.poses import between, placed
 from volery.autonomy.slam.planar.scans import thinned
 from volery.autonomy.slam.planar.settings import PlanarSettings
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
-from volery.core.saved_state import restore_attributes, save_attributes
-
-Array = NDArray[np.float64]
+from volery.core.saved_state import SavedAttributes
 
 _LEVELS = 4
 _TURN_M = 0.3
@@ -60,7 +58,7 @@ class PlanarTrackerState(NamedTuple):
     """Number of tracking losses."""
 
 
-class PlanarTracker:
+class PlanarTracker(SavedAttributes):
     """Holds motion, local map and the newest keyframe."""
 
     def __init__(self, settings: PlanarSettings) -> None:
@@ -83,21 +81,16 @@ class PlanarTracker:
         """Covariance of the pose relative to the newest keyframe, in that one's axes."""
         self._fresh_share = 0.0
 
-    _STATE = (
+    PARTS = ("motion",)
+    STATE = (
         "time_ns", "travelled", "travelled_m", "share", "usual", "session", "misfits", "is_blind",
         "is_open", "_misfit_ns", "_has_odometry", "_last", "_since", "_fresh_share",
+        "_local",
     )  # fmt: skip
-
-    def get_state(self) -> dict[str, Any]:
-        """Returns the state for a snapshot."""
-        motion = save_attributes(self.motion, ("pose", "velocity", "covariance"))
-        return {"motion": motion, "local": tuple(self._local), **save_attributes(self, self._STATE)}
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Restores a saved state."""
-        restore_attributes(self.motion, state["motion"])
-        self._local = deque(state["local"])
-        restore_attributes(self, {name: state[name] for name in self._STATE})
+        super().set_state(state)
         self._redraw()
 
     def set_clock(self, time_ns: int) -> None:

@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.core.arrays import Array
 from volery.core.errors import DataFileError
-
-Array = NDArray[np.float64]
 
 _FREE, _UNKNOWN, _WALL = (255, 255, 255), (226, 228, 230), (20, 24, 28)
 _WAY, _BEGIN, _END = (214, 80, 48), (46, 140, 80), (40, 90, 190)

@@ -11,12 +11,11 @@ from volery.autonomy.mapping.log_odds import LogOddsGrid
 from volery.autonomy.mapping.vertical_structures import VerticalStructures
 from volery.autonomy.perception.static_transforms import Mount
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.errors import RecordingError
 from volery.graph.messages import LaserScan, stamp_of
 from volery.runtime.replay.slam.offline_slam import SlamResult
 from volery.runtime.replay.slam.trajectory import EstimatedTrajectory
-
-Array = NDArray[np.float64]
 
 _NEAREST_M = 0.05
 _MARGIN_M = 1.0

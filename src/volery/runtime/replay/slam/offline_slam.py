@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.autonomy.perception.static_transforms import Mount, StaticTransforms
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.errors import RecordingError
 from volery.graph.messages import LaserScan, stamp_of
@@ -30,8 +30,6 @@ from volery.runtime.replay.slam.topic_selection import (
 )
 from volery.runtime.replay.slam.trajectory import EstimatedTrajectory, corrected, way_m
 from volery.runtime.warmup.parallel_compilation import compile_all
-
-Array = NDArray[np.float64]
 
 _JOINT = "laser_nodding"
 _APART_M, _APART_RAD = 0.25, 0.2

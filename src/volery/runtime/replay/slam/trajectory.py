@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core import rotations
+from volery.core.arrays import Array
 from volery.core.errors import DataFileError
 
-Array = NDArray[np.float64]
 Times = NDArray[np.int64]
 
 _NEAR_NS = 100_000_000

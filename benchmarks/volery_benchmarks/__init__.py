@@ -1,0 +1,1 @@
+"""Benchmarks: modules with `measure() -> dict[str, float]`, run by `volery bench NAME`."""

@@ -1,1 +1,0 @@
-"""Benches: modules with `measure() -> dict[str, float]`, run by `volery bench NAME`."""

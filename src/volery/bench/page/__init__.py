@@ -1,5 +1,0 @@
-"""Measures the page's speed, the age of its data and its cost for the simulation."""
-
-from volery.bench.page.measuring import measure
-
-__all__ = ["measure"]

@@ -1,0 +1,117 @@
+"""Renders the images of the scenario cards with Volery's own camera.
+
+    python tools/scenario_cards.py              # all shipped scenarios
+    python tools/scenario_cards.py hover longleaf
+
+An additional UAV, the photographer, carries a camera that looks at the first UAV.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import dataclass
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+
+from volery.graph.messages import Published
+from volery.runtime.simulation import Simulation
+from volery.scenario import library
+from volery.scenario.load import load_scenario, parse_scenario
+from volery.scenario.schema import Scenario
+from volery.server.cards import CARDS
+
+WIDTH, HEIGHT = 480, 270
+_QUALITY = 85
+"""Quality of the JPEG file, as in libjpeg: about 25 kB an image."""
+_TYPE = "photographer"
+_STUDIO_M = 150.0
+"""Initial height of the photographer, above the highest ground."""
+_EXPOSURE_S = 0.3
+
+
+@dataclass(frozen=True)
+class CardView:
+    """Time and viewpoint of a card; the camera looks at the first UAV."""
+
+    at_s: float = 6.0
+    """Simulated time, s."""
+    eye_m: tuple[float, float, float] = (-5.0, -2.5, 1.8)
+    """Offset from the first UAV, map axes, m."""
+    fov_deg: float = 60.0
+
+
+VIEWS = {
+    "city_flight": CardView(12.0, (-6.0, -1.5, 2.0), 70.0),
+    "cooperative_search": CardView(12.0, (-4.0, -2.5, 2.0), 65.0),
+    "coverage": CardView(20.0, (-7.0, -7.0, 5.0), 70.0),
+    "forest_cameras": CardView(10.0, (-4.0, -1.0, 1.0), 70.0),
+    "forest_procedural": CardView(10.0, (-3.5, -1.0, 1.2), 70.0),
+    "forest_rain": CardView(10.0, (-3.0, -1.0, 0.6), 70.0),
+    "forest_search": CardView(11.0, (-2.5, 2.2, 0.9), 70.0),
+    "forest_survey": CardView(10.0, (-3.0, 1.2, 0.8), 70.0),
+    "grid_map": CardView(14.0, (-15.0, -11.0, 12.0), 65.0),
+    "hover": CardView(5.0, (-1.6, -1.0, 0.45)),
+    "longleaf": CardView(10.0, (-3.5, 1.2, 1.0), 70.0),
+    "obstacle_field": CardView(10.0, (-4.0, -2.0, 1.6), 70.0),
+    "plug_in": CardView(10.0, (-6.0, -5.0, 4.0), 70.0),
+    "swarm_100": CardView(8.0, (-2.2, -2.2, 0.9), 70.0),
+}
+
+
+def draw(name: str) -> bytes:
+    """Returns the card of a shipped scenario as a JPEG file."""
+    view = VIEWS.get(name, CardView())
+    with Simulation(_with_photographer(load_scenario(name), view)) as simulation:
+        simulation.run(view.at_s)
+        eye = simulation.uavs["uav1"].position_map + view.eye_m
+        photographer = simulation.vehicles.names[-1]
+        simulation.vehicles.set_pose(photographer, eye, (0.0, 0.0, 0.0, 1.0))
+        taken: list[Published] = []
+        simulation.graph.subscribe(f"/{photographer}/card/image_raw", taken.append)
+        simulation.run(_EXPOSURE_S)
+    return _jpeg(taken[-1].message)
+
+
+def _with_photographer(scenario: Scenario, view: CardView) -> Scenario:
+    """Returns the scenario with an additional UAV whose camera looks against `eye_m`."""
+    x, y, z = (-side for side in view.eye_m)
+    pitch_deg = -math.degrees(math.atan2(z, math.hypot(x, y)))
+    camera = {
+        "kind": "camera",
+        "name": "card",
+        "width": WIDTH,
+        "height": HEIGHT,
+        "horizontal_fov_deg": view.fov_deg,
+        "samples": 4,
+        "rate_hz": 10.0,
+        "rpy_deg": (0.0, pitch_deg, math.degrees(math.atan2(y, x))),
+    }
+    data = scenario.model_dump(exclude_unset=True)
+    data["types"][_TYPE] = {"airframe": "crazyflie", "plant": "kinematic", "sensors": [camera]}
+    first = scenario.uavs[0].position_m
+    waiting = {"type": _TYPE, "position_m": (first[0], first[1], _STUDIO_M)}
+    data["uavs"] = [*data["uavs"], waiting]
+    return parse_scenario(data, where=scenario.name, access=scenario.access)
+
+
+def _jpeg(message: Any) -> bytes:
+    from PIL import Image
+
+    pixels = np.asarray(message.data, dtype=np.uint8).reshape(message.height, message.width, 3)
+    file = BytesIO()
+    Image.fromarray(pixels).save(file, "jpeg", quality=_QUALITY, optimize=True)
+    return file.getvalue()
+
+
+def main(names: list[str]) -> None:
+    """Renders the cards of some scenarios, or of all."""
+    for name in names or library.names():
+        (CARDS / f"{name}.jpg").write_bytes(draw(name))
+        sys.stdout.write(f"{name}\n")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
