@@ -15,7 +15,7 @@ from concurrent.futures import TimeoutError as FutureTimeoutError
 from typing import Any, ClassVar, Protocol, TypeVar
 
 from volery.bridges.remote_topics import RemoteTopics
-from volery.core.errors import BridgeError, GraphError, UnreachableError
+from volery.core.errors import GraphError, UnreachableError
 from volery.graph.qos import DEFAULT_DEPTH
 from volery.graph.service_reply import ServiceReply
 from volery.graph.session import Handler
@@ -87,7 +87,7 @@ class RemoteClient(ABC):
         if connect_timeout_s:
             try:
                 self.wait_until_connected(connect_timeout_s)
-            except BridgeError:
+            except BaseException:  # also after Ctrl-C, or its thread runs into the end of Python
                 self.close()
                 raise
 

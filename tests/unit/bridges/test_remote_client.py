@@ -120,3 +120,13 @@ def test_calls_that_are_open_when_it_leaves_fail(loop, client):
     assert isinstance(outcome.get(timeout=60.0), GraphError)
     with pytest.raises(GraphError, match="planner is closed"):
         client.call("/waits", Request(), ServiceReply(outcome.put, outcome.put))
+
+
+def test_ctrl_c_while_it_connects_leaves_no_thread(monkeypatch):
+    def interrupted(_client, _timeout_s):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(RosTcpClient, "wait_until_connected", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        RosTcpClient("127.0.0.1", 9, name="stopped early")
+    assert not [t for t in threading.enumerate() if t.name.startswith("stopped early")]
