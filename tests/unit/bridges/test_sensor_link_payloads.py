@@ -15,13 +15,12 @@ from volery.bridges.sensor_link.payloads import (
     decode_payload,
     encode_notice,
     encode_payload,
-    stamp_of,
 )
 from volery.bridges.sensor_link.wire import SensorLinkKind
 from volery.core.errors import BridgeError
 from volery.graph import messages as m
 from volery.graph.codecs.cdr import encode_cdr
-from volery.graph.messages import message_type
+from volery.graph.messages import message_type, stamp_of
 
 Image = message_type("sensor_msgs/msg/Image")
 STAMP_NS = 12_345_678_901

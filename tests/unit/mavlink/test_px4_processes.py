@@ -150,12 +150,11 @@ time.sleep(1000)
 def test_one_that_never_connects_is_told_with_its_last_words(tmp_path, monkeypatch):
     make_px4(tmp_path, HANGS)
     monkeypatch.setattr("volery.cli.bridges._LONGEST_START_S", 1.0)
-    uav = SimpleNamespace(airframe=load_airframe("f450"))
-    simulation = SimpleNamespace(uav_names=["uav1"], uavs={"uav1": uav})
+    uavs = {"uav1": SimpleNamespace(airframe=load_airframe("f450"))}
     options = RunOptions("hover", px4_dir=tmp_path)
     with (
         pytest.raises(BridgeError) as error,
-        _px4_instances(simulation, [Px4Bridge(port=free_port())], options),
+        _px4_instances(uavs, [Px4Bridge(port=free_port())], options),
     ):
         pass
     said = str(error.value)
