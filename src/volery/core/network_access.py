@@ -12,7 +12,7 @@ from volery.core.errors import BridgeError
 LOOPBACK = frozenset({"127.0.0.1", "::1", "localhost"})
 PROBES = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}
 """TCP keepalive: a peer silent for 5 s is probed every 5 s, at most 3 times."""
-MAX_UNSENT_BYTES = 128 * 1024
+MAX_UNSENT_BYTES = 512 * 1024
 """Bytes that the system takes from us beyond those on their way to the peer.
 
 By default it takes megabytes for a peer that does not read: work for nothing, and messages that
