@@ -12,12 +12,6 @@ from volery.core.errors import BridgeError
 LOOPBACK = frozenset({"127.0.0.1", "::1", "localhost"})
 PROBES = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}
 """TCP keepalive: a peer silent for 5 s is probed every 5 s, at most 3 times."""
-MAX_UNSENT_BYTES = 512 * 1024
-"""Bytes that the system takes from us beyond those on their way to the peer.
-
-By default it takes megabytes for a peer that does not read: work for nothing, and messages that
-arrive seconds old.
-"""
 
 
 def check_address(host: str, *, anywhere: bool, flag: str) -> None:
@@ -59,9 +53,9 @@ def write_while_open(transport: asyncio.WriteTransport, data: bytes) -> None:
 
 
 def tend(sock: socket.socket) -> None:
-    """Sends small messages at once, bounds unsent bytes, and detects a peer that vanished."""
+    """Sends small messages at once, and detects a peer that vanished silently."""
     sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-    for option, value in (PROBES | {"TCP_NOTSENT_LOWAT": MAX_UNSENT_BYTES}).items():
+    for option, value in PROBES.items():
         if hasattr(socket, option):
             sock.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)

@@ -6,8 +6,9 @@ import struct
 from contextlib import suppress
 from types import SimpleNamespace
 
+from volery.bridges.unsent import MAX_UNSENT_BYTES, bound_unsent
 from volery.comms.server.tcp import CommsServer
-from volery.core.network_access import MAX_UNSENT_BYTES, tend, write_while_open
+from volery.core.network_access import write_while_open
 from volery.mavlink.links.tcp_bridge import _TcpClient
 
 
@@ -76,7 +77,7 @@ def test_a_peer_that_does_not_read_takes_little():
         peer.connect(server.getsockname())
         sock, _ = server.accept()
         with sock:
-            tend(sock)
+            bound_unsent(sock)
             sock.setblocking(False)
             sent = 0
             with suppress(BlockingIOError):
