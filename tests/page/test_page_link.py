@@ -1,6 +1,7 @@
 """What the page says and does when the link breaks, the server restarts or the world is large."""
 
 import asyncio
+import json
 import os
 import re
 import signal
@@ -59,7 +60,12 @@ def test_the_page_comes_back_with_the_server(browsing, served):
     row = page.get_by_role("listitem", name="/uav1/odom", exact=True)
     row.get_by_role("button", name="/uav1/odom", exact=True).click()
     row.locator("[data-path='pose.pose.position.z']").wait_for()
+    # a server that stops reports "building" in its last second
+    building = json.dumps(served.status() | {"state": "building"})
+    page.route("**/api/status", lambda route: route.fulfill(body=building))
+    page.get_by_role("heading", name="Building").wait_for()
     served.stop()
+    page.unroute("**/api/status")
     banner = page.get_by_role("alert").filter(has_text="No connection")
     banner.wait_for()
     keep_picture(page, "link_lost")

@@ -13,22 +13,32 @@ import { TriangleAlert } from "lucide-react";
 import { useState } from "react";
 import { useConnection } from "../state/connection.ts";
 import { useSimulation } from "../state/simulation.ts";
+import { situationOf } from "../state/situation.ts";
 import { hadToken, showToken } from "../state/token.ts";
 import { openWindow } from "../state/windows.ts";
 import { Banner } from "./Banner.tsx";
 import { Ended } from "./Ended.tsx";
 
-/** What stands between the user and a flight, if anything does: told over the scene. */
+/** Shows over the scene why nothing flies, or why the data is not live. */
 export function Situation() {
   const server = useSimulation((simulation) => simulation.server);
+  const reachable = useSimulation((simulation) => simulation.reachable);
   const ended = useSimulation(({ status }) => status?.ended ?? false);
   const link = useConnection((connection) => connection.state);
-  if (server?.token_needed === true || link === "refused") return <TokenNeeded />;
-  if (server?.state === "building") return <Building />;
-  if (server?.state === "failed") return <Failed />;
-  if (server?.state === "no_world") return <NoWorld />;
-  if (link === "open" && ended) return <Ended />;
-  return <Banner />;
+  switch (situationOf(server, reachable, link, ended)) {
+    case "token_needed":
+      return <TokenNeeded />;
+    case "building":
+      return <Building />;
+    case "failed":
+      return <Failed />;
+    case "no_world":
+      return <NoWorld />;
+    case "ended":
+      return <Ended />;
+    case "flying":
+      return <Banner />;
+  }
 }
 
 function Building() {

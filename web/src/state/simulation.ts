@@ -17,11 +17,18 @@ export interface ServerStatus {
 }
 
 interface SimulationState {
+  /** The last status that arrived. */
   server: ServerStatus | null;
+  /** Whether the server answered the last request. */
+  reachable: boolean;
   status: volery_interfaces_SimulationStatus | null;
 }
 
-export const useSimulation = create<SimulationState>(() => ({ server: null, status: null }));
+export const useSimulation = create<SimulationState>(() => ({
+  server: null,
+  reachable: false,
+  status: null,
+}));
 
 const ASK_MS = 1000;
 
@@ -38,9 +45,10 @@ export function followSimulation(ownServer: boolean): void {
   const ask = async () => {
     try {
       const answer = await fetch("./api/status", { cache: "no-store" });
-      if (answer.ok) useSimulation.setState({ server: (await answer.json()) as ServerStatus });
+      const answered = answer.ok ? { server: (await answer.json()) as ServerStatus } : {};
+      useSimulation.setState({ reachable: answer.ok, ...answered });
     } catch {
-      // the link's own state tells that the server is gone
+      useSimulation.setState({ reachable: false });
     }
     setTimeout(() => void ask(), ASK_MS);
   };
