@@ -24,8 +24,6 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 import numba
 
-from volery.core.part_compiler import PartCompiler
-
 F = TypeVar("F", bound=Callable[..., Any])
 
 _CONFIG: Any = numba.config
@@ -126,7 +124,7 @@ def inner_kernel(function: F, **options: Any) -> F:
     option `_nrt`), because the counts are in memory shared by all threads, and each change of a
     count is an atomic instruction. For a part that creates arrays, use `owning_kernel`.
     """
-    fixed = {"no_cpython_wrapper": True, "_nrt": False, "pipeline_class": PartCompiler}
+    fixed = {"no_cpython_wrapper": True, "_nrt": False}
     choices = {**fixed, **options}
     part: Any = _decorate(function, **choices)
 

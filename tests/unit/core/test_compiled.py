@@ -6,6 +6,29 @@ import sys
 
 from volery.core import compiled
 
+_TWO_KERNELS = """
+import sys
+from volery.core.compiled import inner_kernel, kernel
+
+@inner_kernel
+def lift(x, by):
+    return x * by if x > 0.0 else min(by, 2.0)
+
+@inner_kernel
+def lift_twice(x, by):
+    return lift(lift(x, by), by)
+
+@kernel
+def first(x):
+    return lift_twice(x, 3.0)
+
+@kernel
+def second(x):
+    return lift_twice(x, 5.0) + lift(x, 7.0)
+
+print({"first": first, "second": second}[sys.argv[1]](2.0), len(lift_twice.stats.cache_hits))
+"""
+
 
 def test_cache_key_depends_on_every_kernel_source(monkeypatch, tmp_path):
     source = tmp_path / "callee.py"
@@ -46,3 +69,20 @@ def test_only_a_brief_kernel_keeps_pythons_lock():
     assert kept(1.5) == given(1.5) == 3.0
     assert not kept.targetoptions["nogil"]
     assert given.targetoptions["nogil"]
+
+
+def test_a_part_from_the_cache_links_into_another_kernel(tmp_path):
+    (tmp_path / "two.py").write_text(_TWO_KERNELS)
+    env = {**os.environ, "VOLERY_CACHE_DIR": str(tmp_path / "cache")}
+    answers = [
+        subprocess.run(
+            [sys.executable, str(tmp_path / "two.py"), name],
+            env=env,
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout.split()
+        for name in ("first", "second", "first")
+    ]
+    # The third takes the whole kernel from the cache, and asks for no part.
+    assert answers == [["18.0", "0"], ["64.0", "1"], ["18.0", "0"]]
