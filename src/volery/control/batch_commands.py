@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -47,3 +49,27 @@ def command_velocities(
     control_states["deadline_step"][hears] = step + control_states["timeout_steps"][hears]
     control_states["turning"][hears] = True
     control_states["yaw_rate_target"][hears] = yaw_rate[hears]
+
+
+def enter_low_level(
+    bodies: NDArray[np.void],
+    control_states: NDArray[np.void],
+    step: int,
+    level: ControlLevel,
+    setpoints: Mapping[str, Array],
+) -> None:
+    """Sets low-level setpoints (N, ...) by field of all UAVs, except those that have crashed.
+
+    The batch form of the commands of single UAVs to rotors, rates and attitudes.
+    """
+    chosen = control_states["mode"] != FlightMode.CRASHED
+    rests = chosen & (bodies["on_ground"] | bodies["asleep"])
+    bodies["last_contact_step"][rests] = step
+    bodies["asleep"][chosen] = False
+    bodies["still_steps"][chosen] = 0
+    bodies["ground_budget"][chosen] = 0.0
+    bodies["downwash_budget"][chosen] = 0.0
+    control_states["mode"][chosen] = FlightMode.LOW_LEVEL
+    control_states["level"][chosen] = level
+    for name, values in setpoints.items():
+        control_states[name][chosen] = values[chosen]

@@ -6,12 +6,13 @@ from volery.engine.faults import FaultPlan
 from volery.runtime.build.engine import ConnectedEngine
 from volery.runtime.build.radio import build_radio
 from volery.runtime.build.worlds import BuiltWorld
+from volery.runtime.conditional_runs import ConditionalRuns
 from volery.runtime.vehicles.manager import VehicleManager
 from volery.scenario.schema import Scenario
 
 
 def build_vehicles(
-    scenario: Scenario, connected: ConnectedEngine, world: BuiltWorld
+    scenario: Scenario, connected: ConnectedEngine, world: BuiltWorld, runs: ConditionalRuns
 ) -> VehicleManager:
     """Returns the manager of the engine's vehicles, which are not on the graph yet."""
     engine, graph = connected.engine, connected.graph
@@ -25,5 +26,6 @@ def build_vehicles(
         FaultPlan(engine, radio),
         connected.starts,
         world.terrain,
+        runs,
         radio,
     )

@@ -1,0 +1,162 @@
+"""Settles the futures of flight commands from events and flight modes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from volery.control.fleet import Fleet
+from volery.control.flight_modes import FlightMode
+from volery.core.clock import s_from_ns
+from volery.core.errors import CommandError
+from volery.engine.events import Event, EventKind
+from volery.runtime.vehicles.flight_future import FlightFuture, FlightResult
+
+Place = tuple[Fleet, int]
+"""Fleet and row of a UAV."""
+Wait = Callable[[Callable[[], bool], float], bool]
+"""Advances the simulation until a condition is true, by a time at most; see `ConditionalRuns`."""
+
+_CONTACTS = (EventKind.IMPACT, EventKind.COLLISION)
+_COMMANDS = {
+    FlightMode.TAKE_OFF: ("take_off", (FlightMode.TAKE_OFF,), FlightMode.HOLD),
+    FlightMode.GO_TO: ("go_to", (FlightMode.GO_TO,), FlightMode.HOLD),
+    FlightMode.LAND: ("land", (FlightMode.LAND,), FlightMode.LANDED),
+    FlightMode.RETURN: ("return_home", (FlightMode.RETURN, FlightMode.LAND), FlightMode.LANDED),
+}
+"""Command, modes and final mode of a UAV in a flight mode that ends."""
+CHECK_PERIOD_S = 0.02
+"""Period of the checks for what ends without an event: braking, teleports."""
+
+
+class FlightFutures:
+    """Futures of the present flight commands of all UAVs, at most one of each.
+
+    place_of: returns fleet and row of a UAV by its name; raises `CommandError` once it is deleted.
+    """
+
+    def __init__(self, place_of: Callable[[str], Place], wait: Wait) -> None:
+        self._place_of = place_of
+        self._wait = wait
+        self._pending: dict[str, FlightFuture] = {}
+        self._checked: dict[str, FlightFuture] = {}
+        """Pending futures that may end without an event while code waits for their callbacks."""
+
+    def begin(
+        self, uav: str, command: str, active: tuple[FlightMode, ...], final: FlightMode
+    ) -> FlightFuture:
+        """Returns the future of a command that a UAV has just accepted."""
+        self.replace(uav, command)
+        future = FlightFuture(self, uav, command, active, final)
+        self._pending[uav] = future
+        if command == "hold":
+            self._checked[uav] = future
+        return future
+
+    def watch(self, future: FlightFuture) -> None:
+        """Checks a future in each period, because code waits for its callbacks."""
+        self._checked[future.uav] = future
+
+    def replace(self, uav: str, command: str) -> None:
+        """Fails a UAV's pending future, because it has accepted another command."""
+        self.fail(uav, f"{command} replaced it")
+
+    def fail(self, uav: str, reason: str) -> None:
+        """Fails a UAV's pending future."""
+        future = self._pending.pop(uav, None)
+        if future is not None:
+            self._checked.pop(uav, None)
+            future.fail(self._time_s(future), reason)
+
+    def fail_all(self, reason: str) -> None:
+        """Fails all pending futures."""
+        for uav in tuple(self._pending):
+            self.fail(uav, reason)
+
+    def pending(self, uav: str) -> FlightFuture | None:
+        """Returns the future of a UAV's present command, None without one.
+
+        A command that was given without a handle, such as the take-off of an environment, has one
+        from now on.
+        """
+        future = self._pending.get(uav)
+        if future is None or future.done():
+            fleet, row = self._place_of(uav)
+            mode = fleet.mode(row)
+            return self.begin(uav, *_COMMANDS[mode]) if mode in _COMMANDS else None
+        return future
+
+    # ------------------------------------------------------------------------------ what settles
+
+    @property
+    def needs_checks(self) -> bool:
+        """Whether `check` has futures to check."""
+        return bool(self._checked)
+
+    def check(self) -> None:
+        """Settles what has ended without an event."""
+        for future in tuple(self._checked.values()):
+            self.update(future)
+
+    def check_all(self) -> None:
+        """Settles the futures of UAVs that were commanded without their handles."""
+        for future in tuple(self._pending.values()):
+            self.update(future)
+
+    def happened(self, event: Event) -> None:
+        """Settles the future of the event's UAV, if the event ends its command."""
+        for uav in (event.uav, event.partner):
+            future = self._pending.get(uav)
+            if future is None:
+                continue
+            fleet, row = self._place_of(uav)
+            mode = fleet.mode(row)
+            if mode is FlightMode.CRASHED and event.kind in _CONTACTS:
+                other = event.partner if uav == event.uav else event.uav
+                self.fail(uav, f"it hit {other} at {event.speed_m_s:.2f} m/s and crashed")
+            elif event.kind is EventKind.MODE and mode is future.final:
+                self._complete(future, event.time_ns)
+            else:
+                self.update(future)
+
+    def update(self, future: FlightFuture) -> None:
+        """Settles the future if its UAV brakes no more, has crashed or has left its modes."""
+        if future.is_settled:
+            return
+        try:
+            fleet, row = self._place_of(future.uav)
+        except CommandError as error:
+            self.fail(future.uav, str(error))
+            return
+        mode = fleet.mode(row)
+        if future.command == "hold" and mode is FlightMode.HOLD:
+            if not fleet.is_braking(row):
+                self._complete(future, fleet.time_ns)
+        elif mode is FlightMode.CRASHED:
+            self.fail(future.uav, "it crashed")
+        elif mode not in future.active:
+            self.fail(future.uav, f"its flight mode changed to {mode.name}")
+
+    def describe(self, future: FlightFuture) -> str:
+        """Returns mode and position of a future's UAV."""
+        fleet, row = self._place_of(future.uav)
+        x, y, z = fleet.state.position_map[row].tolist()
+        return f"{fleet.mode(row).name} at ({x:.2f}, {y:.2f}, {z:.2f}) m"
+
+    def wait(self, is_done: Callable[[], bool], timeout_s: float) -> bool:
+        """Advances the simulation, or waits for it, until `is_done()`; returns whether it is."""
+        return self._wait(is_done, timeout_s)
+
+    # ----------------------------------------------------------------------------------- inside
+
+    def _complete(self, future: FlightFuture, time_ns: int) -> None:
+        self._pending.pop(future.uav, None)
+        self._checked.pop(future.uav, None)
+        fleet, row = self._place_of(future.uav)
+        x, y, z = fleet.state.position_map[row].tolist()
+        future.complete(FlightResult(time_ns, (x, y, z), fleet.mode(row)))
+
+    def _time_s(self, future: FlightFuture) -> float:
+        try:
+            return s_from_ns(self._place_of(future.uav)[0].time_ns)
+        except CommandError:
+            return 0.0
