@@ -18,6 +18,7 @@ from volery.control.commands import FleetCommands
 from volery.control.estimator.errors import EstimationError
 from volery.control.fleet_events import FleetEvent, event_of
 from volery.control.fleet_rows import (
+    as_bytes,
     checked_modes,
     checked_plants,
     new_uavs,
@@ -25,6 +26,7 @@ from volery.control.fleet_rows import (
     restarted_rows,
 )
 from volery.control.flight_modes import FlightMode
+from volery.control.flying_start import FlyingStart, set_motion
 from volery.control.fused_step import EVENT, EVENTS_A_STEP, advance_fleet
 from volery.control.gains import STANDARD_RATES, ControlRates
 from volery.control.model_table import (
@@ -380,6 +382,10 @@ class Fleet(FleetCommands):
         """Gives the UAVs `rows` the turbulence of UAVs with `names` in a run with `seed`."""
         self._uavs["turbulence"]["key"][rows] = new_turbulence(seed, names)["key"]
 
+    def set_turbulence_keys(self, rows: NDArray[np.int64], keys: NDArray[np.uint64]) -> None:
+        """Sets the random streams (K,) of the turbulence around the UAVs `rows` (K,)."""
+        self._uavs["turbulence"]["key"][rows] = keys
+
     def restart(
         self,
         start: dict[str, Any],
@@ -394,14 +400,28 @@ class Fleet(FleetCommands):
         """
         start_rows = rows if start_rows is None else start_rows
         air_tick = self.step // self._periods[2]
-        fresh = restarted_rows(start["uavs"][start_rows], self.step, air_tick)
+        fresh = restarted_rows(start["uavs"], start_rows, self.step, air_tick)
         fresh["model"] = self._uavs["model"][rows]
         fresh["turbulence"]["key"] = self._uavs["turbulence"]["key"][rows]
-        self._uavs[rows] = fresh
+        as_bytes(self._uavs)[rows] = as_bytes(fresh)
         self.history.position[:, rows] = start["position"][0, start_rows]
         self.history.attitude[:, rows] = start["attitude"][0, start_rows]
         if len(self._references) == len(self):
             self._references[rows, :] = start["references"][start_rows, :1]
+
+    def restart_in_flight(
+        self, start: dict[str, Any], rows: NDArray[np.int64], motion: FlyingStart
+    ) -> None:
+        """Resets the UAVs `rows` (K,), but with another motion.
+
+        start: a state at step 0 in which the UAVs hold in the air.
+        """
+        self.restart(start, rows)
+        set_motion(self._uavs, rows, motion)
+        self.history.position[:, rows] = motion.position_map
+        self.history.attitude[:, rows] = motion.attitude
+        if len(self._references) == len(self):
+            self._references[rows, :, :4] = motion.attitude[:, None]
 
     def continue_from(self, other: Fleet, pairs: Sequence[tuple[int, int]]) -> None:
         """Continues from another fleet, with UAVs of it and new ones.

@@ -64,12 +64,19 @@ def new_uavs(
     return uavs
 
 
-def restarted_rows(start: NDArray[np.void], step: int, air_tick: int) -> NDArray[np.void]:
-    """Returns the rows `start` (K,) of step 0, with times shifted to `step`.
+def as_bytes(records: NDArray[np.void]) -> NDArray[np.void]:
+    """Returns a view of records without fields, whose rows numpy copies 20 times faster."""
+    return records.view((np.void, records.dtype.itemsize))
+
+
+def restarted_rows(
+    start: NDArray[np.void], rows: NDArray[np.int64], step: int, air_tick: int
+) -> NDArray[np.void]:
+    """Returns copies of the rows `rows` (K,) of `start` of step 0, with times shifted to `step`.
 
     air_tick: number of the air update at which their turbulence begins.
     """
-    fresh = start.copy()
+    fresh: NDArray[np.void] = as_bytes(start)[rows].view(start.dtype)
     fresh["turbulence"]["first_tick"] = air_tick
     for name in ("deadline_step", "start_step"):
         fresh["control_state"][name] += step

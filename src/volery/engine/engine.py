@@ -23,7 +23,7 @@ from volery.engine.fleet_resizing import common_rows, continue_bank
 from volery.engine.lock_step import Partner
 from volery.engine.one_shot_timers import OneShotTimers
 from volery.engine.scheduler import Scheduler
-from volery.engine.sensor_restart import Keys, restart_sensors
+from volery.engine.sensor_restart import Streams, restart_sensors
 from volery.engine.stages import STAGES, Tick, take_commands
 from volery.engine.state_check import StateCheck
 from volery.sensors.bank import Bank
@@ -281,17 +281,15 @@ class Engine:
         return events
 
     def restart_sensors(
-        self, uavs: NDArray[np.int64], keys: Keys
+        self, uavs: NDArray[np.int64], streams: Streams
     ) -> list[tuple[Samples, NDArray[np.int64]]]:
         """Restarts the sensors of `uavs`, and the estimates that use them.
 
-        See `engine.sensor_restart`; the random stream of an estimate has the key of sensor `odom`.
+        See `engine.sensor_restart`; the random stream of an estimate is that of sensor `odom`.
         """
         if self.estimation is not None:
-            self.estimation.restart(
-                {uav: key for (uav, name), key in keys.items() if name == "odom"}
-            )
-        return restart_sensors(self.sensor_agenda, self.banks, self.fleet, uavs, keys)
+            self.estimation.restart(streams.of_estimates(uavs))
+        return restart_sensors(self.sensor_agenda, self.banks, self.fleet, uavs, streams)
 
     def regroup(
         self,

@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
+from volery.control.flying_start import FlyingStart
 from volery.core.clock import NS_PER_S
 from volery.core.errors import CommandError, DivergenceError
+from volery.core.rng import stream_key
 from volery.engine.engine import Engine
 from volery.engine.events import Event
 from volery.runtime.build.estimation import build_estimation
@@ -21,6 +23,7 @@ from volery.runtime.build.fleet import add_bodies, build_fleet
 from volery.runtime.build.placement import StartPose
 from volery.runtime.build.sensor_suites import SensorInstance, fit_sensors, refit
 from volery.runtime.build.sensors import build_banks
+from volery.runtime.environment_streams import EnvironmentStreams
 from volery.runtime.vehicles.flight_futures import CHECK_PERIOD_S, FlightFutures, Wait
 from volery.runtime.vehicles.sample_stream import SampleStream
 from volery.runtime.vehicles.uav import Uav
@@ -33,6 +36,7 @@ from volery.sensors.samples import Samples
 from volery.sensors.sensor_samples import SensorSample
 from volery.world.scene import Scene
 from volery.world.terrain import Terrain
+from volery.world.weather.dryden import turbulence_stream
 
 SampleArrays: TypeAlias = dict[str, NDArray[Any]]
 
@@ -96,9 +100,13 @@ class EnvironmentBlock:
         """By bank: (S,) whether the last sample of a sensor is from before its reset."""
         self.futures = futures = FlightFutures(self._fleet_row_of, wait)
         self._engine.every(CHECK_PERIOD_S, futures.check, wanted=lambda: futures.needs_checks)
+        self._streams = EnvironmentStreams(self._fitted, len(self._starts), banks, self.seeds)
         self._stir_air(np.arange(num_envs))
-        self._start_state = self.fleet.get_state()
+        self._landed_state = self.fleet.get_state()
+        self._flying_state: dict[str, Any] | None = None
+        self._is_estimated = estimation is not None
         self._take_off(np.arange(len(everyone)))
+        self._start_state = self._landed_state if self._is_estimated else self.fleet.get_state()
 
     # -------------------------------------------------------------------------------------- time
 
@@ -137,24 +145,38 @@ class EnvironmentBlock:
         except DivergenceError as error:
             raise self._of_copy(error) from None
 
-    def reset(self, envs: NDArray[np.int64], seeds: Sequence[int] | None) -> None:
-        """Resets the environments `envs`, numbered within the block."""
-        if seeds is not None:
-            for k, seed in zip(envs, seeds, strict=True):
-                self.seeds[k] = seed
+    def reset(
+        self,
+        envs: NDArray[np.int64],
+        seeds: Sequence[int] | None,
+        motion: FlyingStart | None = None,
+    ) -> None:
+        """Resets the environments `envs` (R,), numbered within the block.
+
+        seeds: (R,) new ones, None for the present ones. motion: of the R * n UAVs, which then start
+        in the air, None for the scenario's start.
+        """
         num_uavs = len(self._starts)
         rows = (envs[:, None] * num_uavs + np.arange(num_uavs)).ravel()
-        self.fleet.restart(self._start_state, rows)
-        self._stir_air(envs)
+        if motion is None:
+            self.fleet.restart(self._start_state, rows)
+        else:
+            self.fleet.restart_in_flight(self._in_flight(), rows, motion)
+        if seeds is not None:
+            for k, seed in zip(envs.tolist(), seeds, strict=True):
+                self.seeds[k] = seed
+            self._streams.renew(envs)
+            self._stir_air(envs)
         self._engine.collisions.forget(rows)
         self._began_ns[envs] = self.time_ns
-        for path in self._paths_of(rows):
-            self.futures.fail(path, "the environment was reset")
+        if self.futures.has_pending:
+            for path in self._paths_of(rows):
+                self.futures.fail(path, "the environment was reset")
         self._mark_old(rows)
-        keys = self._keys_of(envs)
-        for samples, fresh in self._engine.restart_sensors(rows, keys):
+        for samples, fresh in self._engine.restart_sensors(rows, self._streams):
             self._renew(samples, fresh)
-        self._take_off(rows)
+        if motion is None and self._is_estimated:
+            self._take_off(rows)
 
     def get_state(self) -> dict[str, Any]:
         """Returns everything that changes."""
@@ -179,7 +201,8 @@ class EnvironmentBlock:
         self._is_old = {bank: rows.copy() for bank, rows in state["is_old"].items()}
         self._events = list(state["events"])
         self._began_ns = state["began"].copy()
-        self.seeds = list(state["seeds"])
+        self.seeds[:] = state["seeds"]
+        self._streams.renew(np.arange(len(self.seeds)))
 
     # -------------------------------------------------------------------------------- observations
 
@@ -341,16 +364,27 @@ class EnvironmentBlock:
                 flight = self._scenario.types[start.type_name].flight
                 self.fleet.take_off(row, flight.take_off_altitude_m)
 
+    def _in_flight(self) -> dict[str, Any]:
+        """Returns the state at step 0 in which all UAVs hold in the air."""
+        if self._flying_state is None:
+            present = self.fleet.get_state()
+            self.fleet.set_state(self._landed_state)
+            for row in range(len(self.fleet)):
+                state = self.fleet.state
+                self.fleet.put(row, state.position_map[row], state.attitude[row])
+                self.fleet.push(row, np.zeros(3), np.zeros(3))
+            self._flying_state = self.fleet.get_state()
+            self.fleet.set_state(present)
+        return self._flying_state
+
     def _stir_air(self, envs: NDArray[np.int64]) -> None:
         """Seeds the turbulence of each environment."""
         num_uavs = len(self._starts)
-        names = [start.name for start in self._starts]
-        for k in envs:
-            self.fleet.seed_turbulence(self.seeds[k], k * num_uavs + np.arange(num_uavs), names)
-
-    def _keys_of(self, envs: NDArray[np.int64]) -> dict[tuple[int, str], np.uint64]:
-        """Returns the noise streams by UAV row and sensor name."""
-        return {(f.id.uav, f.id.name): f.key for k in envs for f in self._fit(int(k))}
+        rows = envs[:, None] * num_uavs + np.arange(num_uavs)
+        for place, start in enumerate(self._starts):
+            name = turbulence_stream(start.name)
+            keys = [stream_key(self.seeds[env], name) for env in envs.tolist()]
+            self.fleet.set_turbulence_keys(rows[:, place], np.array(keys, np.uint64))
 
 
 def _arrays(samples: Samples) -> dict[str, NDArray[Any]]:

@@ -35,6 +35,7 @@ from volery.runtime.build.worlds import build_city, build_forest, build_scene, b
 from volery.runtime.checks import check_reset_seed, check_seconds, check_steps
 from volery.runtime.environment_block import EnvironmentBlock, EnvironmentEvent, SampleArrays
 from volery.runtime.environment_sensors import EnvironmentSensors
+from volery.runtime.environment_start import EnvironmentStart
 from volery.runtime.vehicles.batch_commands import BatchCommands, joined_states
 from volery.runtime.vehicles.flight_futures import FlightFutures
 from volery.runtime.vehicles.uav import Uav
@@ -152,9 +153,21 @@ class VectorizedSimulation(BatchCommands):
         steps, self._owed_ns = divmod(self._owed_ns + ns_from_s(seconds), dt_ns)
         self.step(steps)
 
-    def reset(self, envs: ArrayLike | None = None, seeds: Sequence[int] | None = None) -> None:
-        """Resets `envs` (default: all), by numbers or mask (K,), optionally with new `seeds`."""
+    def reset(
+        self,
+        envs: ArrayLike | None = None,
+        seeds: Sequence[int] | None = None,
+        *,
+        start: EnvironmentStart | None = None,
+    ) -> None:
+        """Resets `envs` (default: all), by numbers or mask (K,), optionally with new `seeds`.
+
+        start: motion of their UAVs, which then start in the air; None for the scenario's start.
+        Positions inside obstacles are not refused: the first step reports the collision.
+        """
         chosen = self._chosen(envs)
+        num_uavs = len(self._starts)
+        motion = None if start is None else start.spread(len(chosen), num_uavs)
         for seed in seeds or ():
             check_reset_seed(self.scenario, seed)
         if seeds is not None and len(seeds) != len(chosen):
@@ -163,7 +176,9 @@ class VectorizedSimulation(BatchCommands):
             here = np.flatnonzero((chosen >= first) & (chosen < first + len(block.seeds)))
             if len(here):
                 own = None if seeds is None else [seeds[k] for k in here.tolist()]
-                block.reset(chosen[here] - first, own)
+                rows = (here[:, None] * num_uavs + np.arange(num_uavs)).ravel()
+                part = None if motion is None else motion.rows(rows)
+                block.reset(chosen[here] - first, own, part)
 
     def get_state(self) -> list[Any]:
         """Returns the present state of all environments, for `set_state`."""

@@ -84,16 +84,36 @@ def near_bodies(
 ) -> int:
     """Lists in `near` the bodies that rays from a box may hit; returns their number.
 
-    low, high: corners of the box, m, map. uav: the row of the rays' UAV; -1 for rays of no UAV or
-    of several.
+    low, high: corners of the box, m, map. uav: the row of the rays' UAV; -1 for rays of no UAV.
+    """
+    return near_bodies_of_several(bodies, low, high, reach, uav, uav, near)
+
+
+@inner_kernel
+def near_bodies_of_several(
+    bodies: BodyTable,
+    low: tuple[float, float, float],
+    high: tuple[float, float, float],
+    reach: float,
+    first_uav: int,
+    last_uav: int,
+    near: NDArray[np.int32],
+) -> int:
+    """Lists bodies as `near_bodies`, for rays of the UAVs from `first_uav` to `last_uav`.
+
+    Both are rows; -1 if rays of no UAV are among them.
     """
     count = 0
     uavs = bodies.scene.shape[0] - bodies.actors
-    first = 0 if uav < 0 else uav - uav % bodies.uavs_per_env
-    uavs_per_env = uavs if uav < 0 else bodies.uavs_per_env
-    for n in range(uavs_per_env + bodies.actors):
-        i = first + n if n < uavs_per_env else uavs + n - uavs_per_env
-        if i == uav:
+    first, seen = 0, uavs
+    if first_uav >= 0:
+        first = first_uav - first_uav % bodies.uavs_per_env
+        seen = last_uav - last_uav % bodies.uavs_per_env + bodies.uavs_per_env - first
+        if bodies.uavs_per_env == 1:  # rays do not see their own UAV, nor other environments
+            seen = 0
+    for n in range(seen + bodies.actors):
+        i = first + n if n < seen else uavs + n - seen
+        if i == first_uav == last_uav and i >= 0:
             continue
         squared = 0.0
         for j in range(3):

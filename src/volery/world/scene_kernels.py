@@ -9,7 +9,12 @@ from numpy.typing import NDArray
 
 from volery.core.compiled import inner_kernel, kernel
 from volery.core.workers import fetch_add
-from volery.world.body_kernels import cast_at_body, hide_behind_body, near_bodies
+from volery.world.body_kernels import (
+    cast_at_body,
+    hide_behind_body,
+    near_bodies,
+    near_bodies_of_several,
+)
 from volery.world.embree import (
     DIRECTION,
     FAR,
@@ -157,6 +162,7 @@ def cast_block(
 def _near_chunk(
     scene: SceneHandle,
     origins: NDArray[np.float64],
+    exclude: NDArray[np.int32],
     first: int,
     last: int,
     reach: float,
@@ -170,7 +176,12 @@ def _near_chunk(
         x0, x1 = min(x0, origins[i, 0]), max(x1, origins[i, 0])
         y0, y1 = min(y0, origins[i, 1]), max(y1, origins[i, 1])
         z0, z1 = min(z0, origins[i, 2]), max(z1, origins[i, 2])
-    return near_bodies(scene.bodies, (x0, y0, z0), (x1, y1, z1), reach, -1, near)
+    low_uav = high_uav = exclude[first if exclude.shape[0] > 1 else 0]
+    for i in range(first + 1, last if exclude.shape[0] > 1 else 0):
+        low_uav, high_uav = min(low_uav, exclude[i]), max(high_uav, exclude[i])
+    return near_bodies_of_several(
+        scene.bodies, (x0, y0, z0), (x1, y1, z1), reach, low_uav, high_uav, near
+    )
 
 
 @inner_kernel
@@ -209,7 +220,7 @@ def cast_rays(
         if first >= count:
             return
         last = min(first + CHUNK, count)
-        near_count = _near_chunk(scene, origins, first, last, reach, block.near)
+        near_count = _near_chunk(scene, origins, exclude, first, last, reach, block.near)
         if near_count > 0:
             _load_skips(block, exclude, first, last)
         packets = (last - first + LANES - 1) // LANES
@@ -295,7 +306,7 @@ def find_occluded(
             for j in range(3):
                 squared += (targets[i, j] - origins[i, j]) ** 2
             longest = max(longest, squared)
-        near_count = _near_chunk(scene, origins, first, last, np.sqrt(longest), block.near)
+        near_count = _near_chunk(scene, origins, exclude, first, last, np.sqrt(longest), block.near)
         if near_count > 0:
             _load_skips(block, exclude, first, last)
         for p in range((last - first + LANES - 1) // LANES):

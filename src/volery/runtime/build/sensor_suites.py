@@ -148,7 +148,12 @@ def refit(fitted: Sequence[SensorInstance], seed: int, first_row: int = 0) -> li
 
 def noise_key(seed: int, kind: str, sensor: SensorId) -> np.uint64:
     """Returns the noise stream of a sensor in a run with `seed`; `kind` is the bank's name."""
-    return stream_key(seed, f"{sensor.uav_name}/{kind}/{sensor.name}")
+    return stream_key(seed, stream_name(kind, sensor))
+
+
+def stream_name(kind: str, sensor: SensorId) -> str:
+    """Returns the name of a sensor's noise stream; `kind` is the bank's name."""
+    return f"{sensor.uav_name}/{kind}/{sensor.name}"
 
 
 class _LidarModels:

@@ -88,6 +88,11 @@ class FlightFutures:
     # ------------------------------------------------------------------------------ what settles
 
     @property
+    def has_pending(self) -> bool:
+        """Whether any command has not ended."""
+        return bool(self._pending)
+
+    @property
     def needs_checks(self) -> bool:
         """Whether `check` has futures to check."""
         return bool(self._checked)

@@ -15,6 +15,7 @@ from volery.core.arrays import Array
 from volery.core.errors import CommandError, PlacementError
 from volery.engine.engine import Engine
 from volery.engine.faults import FaultPlan
+from volery.engine.sensor_restart import NamedStreams
 from volery.graph.graph import Graph
 from volery.graph.nodes.node import Node
 from volery.publishing.graph_publisher import GraphPublisher
@@ -240,7 +241,7 @@ class VehicleManager:
     def _restart_sensors(self, fresh: set[str]) -> None:
         keys = {(f.id.uav, f.id.name): f.key for f in self.fitted if f.id.uav_name in fresh}
         rows = [row for row, start in enumerate(self.starts) if start.name in fresh]
-        self.engine.restart_sensors(np.array(rows, np.int64), keys)
+        self.engine.restart_sensors(np.array(rows, np.int64), NamedStreams(keys))
 
     def _now_ns(self) -> int:
         return self.engine.time_ns

@@ -68,8 +68,13 @@ _DIRECT, _LAGGED = math.sqrt(1.5), (1.0 - math.sqrt(3.0)) * _SQRT_HALF
 def new_turbulence(seed: int, names: Sequence[str]) -> NDArray[np.void]:
     """Returns filters (N,) that have not begun, with the random streams of UAVs `names`."""
     rows = np.zeros(len(names), TURBULENCE)
-    rows["key"] = [stream_key(seed, f"{name}/turbulence") for name in names]
+    rows["key"] = [stream_key(seed, turbulence_stream(name)) for name in names]
     return rows
+
+
+def turbulence_stream(name: str) -> str:
+    """Returns the name of the random stream of the turbulence around UAV `name`."""
+    return f"{name}/turbulence"
 
 
 @inner_kernel
