@@ -158,7 +158,9 @@ def test_a_crash_fails_it_with_the_obstacle(flying):
 def test_timeouts(flying):
     future = flying.uavs["uav1"].go_to([9.0, 0.0, 2.0])
     before = flying.time_s
-    with pytest.raises(WaitTimeoutError, match=r"go_to of uav1 is not done: GO_TO at .* within 0.5 s"):
+    with pytest.raises(
+        WaitTimeoutError, match=r"go_to of uav1 is not done: GO_TO at .* within 0.5 s"
+    ):
         future.wait(timeout_s=0.5)
     assert flying.time_s == pytest.approx(before + 0.5)
     assert not future.done()
