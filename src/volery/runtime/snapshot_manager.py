@@ -9,6 +9,7 @@ import numpy as np
 
 from volery.core.errors import SnapshotError
 from volery.engine.lock_step import Partner
+from volery.engine.sensor_restart import NamedStreams
 from volery.graph.nodes.node import Node
 from volery.runtime.build.fleet import check_free
 from volery.runtime.build.placement import StartPose
@@ -135,7 +136,8 @@ class SnapshotManager:
         return [node for node in self._manager.nodes if node.get_namespace() == f"/{name}"]
 
     def _restart_sensors(self, rows: Any, fitted: Sequence[SensorInstance]) -> None:
-        self._engine.restart_sensors(rows, {(f.id.uav, f.id.name): f.key for f in fitted})
+        streams = NamedStreams({(f.id.uav, f.id.name): f.key for f in fitted})
+        self._engine.restart_sensors(rows, streams)
 
     def _check(self, what: str, *, to_start: bool = False) -> None:
         check_partners(self._partners, what, to_start=to_start)

@@ -42,6 +42,7 @@ from volery.runtime.vehicles.uav import Uav
 from volery.runtime.warmup.parallel_compilation import compiled
 from volery.runtime.warmup.requirements import needs_of
 from volery.scenario.schema import Scenario
+from volery.vehicle.airframe import Airframe
 from volery.vehicle.fleet import FleetState
 
 
@@ -110,6 +111,16 @@ class VectorizedSimulation(BatchCommands):
     def uav_names(self) -> tuple[str, ...]:
         """Names of the n UAVs of each environment."""
         return tuple(start.name for start in self._starts)
+
+    @property
+    def airframes(self) -> tuple[Airframe, ...]:
+        """Airframes of the n UAVs of each environment."""
+        return tuple(start.airframe for start in self._starts)
+
+    @property
+    def dt_ns(self) -> int:
+        """Length of a physics step, ns."""
+        return self._blocks[0].dt_ns
 
     @property
     def time_ns(self) -> int:

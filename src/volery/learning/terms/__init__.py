@@ -1,0 +1,1 @@
+"""Parts of tasks: observations, rewards, terminations and starts, each a small pure function."""
