@@ -14,7 +14,7 @@ STATES = ("position_map", "velocity_map", "attitude", "omega_body", "rotor_speed
 @pytest.fixture
 def envs(flat_data):
     flat_data["uavs"] = [
-        {"type": "f450", "position_m": [0.0, 0.0, 0.0]},
+        {"type": "f450", "position_m": [0.0, 0.0, 0.2], "on_start": "take_off"},
         {"type": "f450", "position_m": [4.0, 0.0, 4.2]},
     ]
     with VectorizedSimulation(parse_scenario(flat_data), 4, threads=2) as made:
@@ -81,9 +81,10 @@ def test_a_later_start_flies_as_one_at_the_beginning(envs, flat_data):
     np.testing.assert_array_equal(found[others], accelerations[others])
 
 
-def test_one_position_serves_all_and_the_next_reset_starts_on_the_ground(envs):
-    envs.reset(start=EnvironmentStart([1.0, 2.0, 6.0]))
-    assert (envs.state().position_map == [1.0, 2.0, 6.0]).all()
+def test_starts_broadcast_and_the_next_reset_starts_on_the_ground(envs):
+    positions = [[1.0, 2.0, 6.0], [1.0, 5.0, 6.0]]
+    envs.reset(start=EnvironmentStart(positions))
+    assert (envs.state().position_map == positions).all()
     envs.run(1.0)
     np.testing.assert_allclose(envs.state().position_map[..., 2], 6.0, atol=0.3)
     envs.reset()
