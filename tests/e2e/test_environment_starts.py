@@ -45,6 +45,7 @@ def test_a_start_equals_a_uav_that_is_placed_and_pushed(envs, flat_data):
     start = motion(4)
     envs.reset(start=start)
     assert_start(envs, slice(None), start)
+    flat_data["uavs"][0]["on_start"] = "wait"
     with VectorizedSimulation(parse_scenario(flat_data), 4, threads=1) as placed:
         fleet = placed._blocks[0].fleet
         rows = [np.reshape(value, (8, -1)) for value in vars(start).values()]
