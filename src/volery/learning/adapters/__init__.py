@@ -1,0 +1,1 @@
+"""Adapters of tasks to trainers that do not take a `gymnasium.vector.VectorEnv`."""

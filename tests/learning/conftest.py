@@ -1,0 +1,5 @@
+"""Tests of learning run where its packages are installed."""
+
+import pytest
+
+pytest.importorskip("gymnasium")

@@ -1,0 +1,223 @@
+"""Every task keeps the rules of Gymnasium, and each environment equals a single one."""
+
+import itertools
+import pickle
+from dataclasses import replace
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
+
+from volery.core.errors import CommandError, ScenarioError
+from volery.learning.registration import register_tasks
+from volery.learning.single_env import TaskEnv
+from volery.learning.tasks import TASKS, load_task
+from volery.learning.vector_env import TaskVectorEnv
+from volery.runtime.environment_start import EnvironmentStart
+
+pytestmark = pytest.mark.filterwarnings("error")
+every_task = pytest.mark.parametrize("name", TASKS)
+
+
+@pytest.fixture
+def make():
+    """Make vector environments that are closed at the end of the test."""
+    made = []
+
+    def build(name, count=3, **options):
+        made.append(TaskVectorEnv(load_task(name), count, **options))
+        return made[-1]
+
+    yield build
+    for env in made:
+        env.close()
+
+
+def play(env, decisions, seed=5):
+    """Returns what random actions bring: observations, rewards, ends and infos."""
+    env.action_space.seed(seed)
+    observation, _ = env.reset(seed=seed)
+    steps = [(observation, None, None, None, {})]
+    for _ in range(decisions):
+        steps.append(env.step(env.action_space.sample()))
+    return steps
+
+
+@every_task
+def test_gymnasium_finds_nothing_wrong(name):
+    register_tasks()
+    env = gymnasium.make(f"volery/{name.title()}-v0")
+    check_env(env.unwrapped)
+    env.close()
+
+
+@every_task
+def test_make_vec_gives_the_native_environment(name):
+    register_tasks()
+    env = gymnasium.make_vec(f"volery/{name.title()}-v0", num_envs=2)
+    assert isinstance(env.unwrapped, TaskVectorEnv)
+    assert env.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
+    env.close()
+
+
+@every_task
+def test_each_environment_equals_a_single_one(make, name):
+    decisions, seed = 150, 5
+    steps = play(make(name), decisions, seed)
+    actions = gymnasium.vector.utils.batch_space(TaskEnv(load_task(name)).action_space, 3)
+    actions.seed(seed)
+    taken = [actions.sample() for _ in range(decisions)]
+    ended = 0
+    for k in range(3):
+        single = TaskEnv(load_task(name))
+        observation, _ = single.reset(seed=seed + k)
+        np.testing.assert_array_equal(observation, steps[0][0][k])
+        for i, (seen, reward, terminated, truncated, info) in enumerate(steps[1:]):
+            own = single.step(taken[i][k])
+            assert own[1:4] == (reward[k], terminated[k], truncated[k])
+            observation = own[0]
+            if terminated[k] or truncated[k]:
+                np.testing.assert_array_equal(observation, info["final_obs"][k])
+                assert own[4]["success"] == info["success"][k]
+                observation, _ = single.reset()
+                ended += 1
+            np.testing.assert_array_equal(observation, seen[k])
+        single.close()
+    assert ended
+
+
+@every_task
+def test_threads_and_neighbours_change_nothing(make, name):
+    one, other = play(make(name, 3, threads=1), 60), play(make(name, 3, threads=3), 60)
+    for a, b in zip(one, other, strict=True):
+        np.testing.assert_array_equal(a[0], b[0])
+        np.testing.assert_array_equal(a[1], b[1])
+
+
+@every_task
+def test_observations_lie_in_the_space_and_belong_to_the_caller(make, name):
+    env = make(name)
+    steps = play(env, 40)
+    first = steps[0][0].copy()
+    for observation, *_ in steps:
+        assert env.observation_space.contains(observation)
+        assert observation.dtype == np.float32
+    np.testing.assert_array_equal(steps[0][0], first)
+    steps[-1][0][:] = 7.0
+    again = env.step(env.action_space.sample())[0]
+    assert not (again == 7.0).all()
+
+
+@every_task
+def test_the_step_after_the_end_resets_in_next_step_mode(make, name):
+    env, same = make(name, autoreset_mode="NextStep"), make(name)
+    steps, others = play(env, 150), play(same, 150)
+    resets = 0
+    for before, after in itertools.pairwise(steps[1:]):
+        over = before[2] | before[3]
+        assert (after[1][over] == 0.0).all()
+        assert not (after[2] | after[3])[over].any()
+        resets += over.sum()
+    assert resets
+    first = next(i for i, step in enumerate(others[1:], 1) if (step[2] | step[3]).any())
+    over = others[first][2] | others[first][3]
+    np.testing.assert_array_equal(steps[first][0][over], others[first][4]["final_obs"][over])
+    np.testing.assert_array_equal(steps[first + 1][0][over], others[first][0][over])
+
+
+@every_task
+def test_without_autoreset_a_mask_resets(make, name):
+    env = make(name, autoreset_mode="Disabled")
+    env.reset(seed=1)
+    over = np.zeros(3, np.bool_)
+    while not over.any():
+        observation, _, terminated, truncated, _ = env.step(env.action_space.sample())
+        over = terminated | truncated
+    with pytest.raises(CommandError, match="have ended; reset them"):
+        env.step(env.action_space.sample())
+    again, _ = env.reset(options={"reset_mask": over})
+    np.testing.assert_array_equal(again[~over], observation[~over])
+    assert (again[over] != observation[over]).any()
+    env.step(env.action_space.sample())
+
+
+@every_task
+def test_reward_terms_and_ends_sum_to_the_return(make, name):
+    task = load_task(name)
+    ends = {0.0} | {end.reward for end in task.terminations}
+    seen = 0
+    for *_, info in play(make(name), 200)[1:]:
+        for k in np.flatnonzero(info.get("_episode", np.zeros(3))):
+            terms = sum(sums[k] for sums in info["reward_terms"].values())
+            extra = info["episode"]["r"][k] - terms
+            assert min(abs(extra - end) for end in ends) < 1e-6
+            assert 1 <= info["episode"]["l"][k] <= task.episode_decisions
+            seen += 1
+    assert seen
+
+
+@every_task
+def test_a_state_is_restored_to_the_byte(make, name):
+    env = make(name)
+    play(env, 30)
+    state = env.episodes.get_state()
+    actions = [env.action_space.sample() for _ in range(30)]
+    one = [env.step(action)[:2] for action in actions]
+    env.episodes.set_state(state)
+    for action, (observation, reward) in zip(actions, one, strict=True):
+        again = env.step(action)
+        np.testing.assert_array_equal(again[0], observation)
+        np.testing.assert_array_equal(again[1], reward)
+
+
+def test_impossible_actions_are_refused(make):
+    env = make("hover")
+    with pytest.raises(CommandError, match=r"environments \[0, 1, 2\] have ended; reset them"):
+        env.step(env.action_space.sample())
+    env.reset(seed=0)
+    with pytest.raises(CommandError, match=r"actions have shape \(3, 4\), not \(2, 4\)"):
+        env.step(np.zeros((2, 4)))
+    with pytest.raises(CommandError, match=r"action \[1, 2\] is nan; actions must be finite"):
+        env.step(np.where(np.arange(12).reshape(3, 4) == 6, np.nan, 0.0))
+    with pytest.raises(CommandError, match="numbers"):
+        env.step([["up"] * 4] * 3)
+    with pytest.raises(CommandError, match="2 seeds for 3 environments"):
+        env.reset(seed=[1, 2])
+    with pytest.raises(CommandError, match="reset_mask: 3 booleans"):
+        env.reset(options={"reset_mask": [True]})
+    homing = make("homing")
+    homing.reset(seed=0)
+    with pytest.raises(CommandError, match="whole numbers from 0 to 6"):
+        homing.step(np.array([0, 7, 1]))
+    with pytest.raises(ScenarioError, match="unknown task 'fly'; known: hover, homing"):
+        load_task("fly")
+
+
+def test_the_zero_action_keeps_a_level_uav_at_its_height(make):
+    env = make("hover")
+    env.reset(seed=0)
+    fleet = env.episodes.envs
+    fleet.reset(start=EnvironmentStart([0.0, 0.0, 10.0]))
+    env.episodes.flight.refresh()
+    for _ in range(50):
+        env.step(np.zeros((3, 4)))
+    np.testing.assert_allclose(fleet.state().position_map[:, 0], [[0.0, 0.0, 10.0]] * 3, atol=0.02)
+
+
+def test_actions_are_delayed(make):
+    late = TaskVectorEnv(replace(load_task("homing"), action_delay=2), 1)
+    late.reset(seed=0)
+    positions = []
+    for _ in range(4):
+        late.step(np.array([1]))
+        positions.append(late.episodes.flight.state.velocity_map[0, 0, 0])
+    assert abs(positions[1]) < 0.05 < positions[3]
+    late.close()
+
+
+@every_task
+def test_tasks_travel_to_other_processes(name):
+    load = pickle.loads(pickle.dumps(load_task))
+    assert load(name).name == name
