@@ -1,0 +1,1 @@
+"""Training of policies; needs `pip install "volery[train]"`."""
