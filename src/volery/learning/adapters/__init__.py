@@ -1,1 +1,0 @@
-"""Adapters of tasks to trainers that do not take a `gymnasium.vector.VectorEnv`."""

@@ -1,1 +1,0 @@
-"""Training of policies; needs `pip install "volery[train]"`."""
