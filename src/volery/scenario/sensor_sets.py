@@ -6,6 +6,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
+from volery.core.data_tables import read_table
 from volery.scenario.schema import UavType
 
 SensorSet = Literal["lidar", "camera", "sonar", "navigation"]
@@ -25,40 +26,9 @@ class _Set:
         return {sensor["kind"] for sensor in self.sensors}
 
 
-# Positions of the shipped scenarios on an F450: a horizontal scanner on top, the others below.
-_SETS: dict[SensorSet, _Set] = {
-    "lidar": _Set(
-        "a horizontal and a nodding UTM-30LX LIDAR",
-        (
-            {"kind": "lidar", "name": "horizontal", "position_m": [0.0, 0.0, 0.18]},
-            {
-                "kind": "lidar",
-                "name": "nodding",
-                "position_m": [0.10, 0.0, -0.08],
-                "nodding": {"amplitude_deg": 45.0, "period_s": 1.0},
-            },
-        ),
-    ),
-    "camera": _Set(
-        "a camera that looks ahead, colour and depth, 320 x 240 at 10 Hz",
-        (
-            {
-                "kind": "camera",
-                "name": "camera",
-                "position_m": [0.12, 0.0, 0.06],
-                "width": 320,
-                "height": 240,
-            },
-        ),
-    ),
-    "sonar": _Set(
-        "a sonar that looks down",
-        ({"kind": "sonar", "position_m": [0.0, 0.0, -0.05], "rpy_deg": [0.0, 90.0, 0.0]},),
-    ),
-    "navigation": _Set(
-        "satellite navigation, barometer and magnetometer",
-        ({"kind": "gnss"}, {"kind": "barometer"}, {"kind": "magnetometer"}),
-    ),
+_SETS = {
+    name: _Set(row["description"], tuple(row["sensors"]))
+    for name, row in read_table(__file__, "sensor_sets.toml").items()
 }
 
 
