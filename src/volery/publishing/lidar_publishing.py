@@ -114,14 +114,7 @@ class LidarPublisher:
 def _scan_message(scans: LidarScans, pattern: PlanarScan, row: int) -> LaserScan:
     intensities = scans.intensities[row]
     return LaserScan(
-        header(scans.stamp_ns, laser_frame(scans.sensors[row])),
-        single(pattern.angle_min_rad),
-        single(pattern.angle_max_rad),
-        single(pattern.angle_increment_rad),
-        single(pattern.time_increment_s),
-        single(1.0 / pattern.rate_hz),
-        single(scans.model.range.min_m),
-        single(scans.model.range.max_m),
+        *_head(scans, pattern, row),
         scans.echoes[row, 0],
         intensities[0] if len(intensities) else _NO_INTENSITIES,
     )
@@ -135,19 +128,22 @@ def _echo_message(scans: LidarScans, pattern: PlanarScan, row: int) -> MultiEcho
     for array in (ranges, intensities):
         array.flags.writeable = False
     return MultiEchoLaserScan(
-        header(scans.stamp_ns, laser_frame(scans.sensors[row])),
-        single(pattern.angle_min_rad),
-        single(pattern.angle_max_rad),
-        single(pattern.angle_increment_rad),
-        single(pattern.time_increment_s),
-        single(1.0 / pattern.rate_hz),
-        single(scans.model.range.min_m),
-        single(scans.model.range.max_m),
+        *_head(scans, pattern, row),
         [LaserEcho(beam[:n]) for beam, n in zip(ranges, count, strict=True)],
         [LaserEcho(beam[:n]) for beam, n in zip(intensities, count, strict=True)]
         if intensities.size
         else [],
     )
+
+
+def _head(scans: LidarScans, pattern: PlanarScan, row: int) -> tuple[Any, ...]:
+    """Returns the fields of both messages up to the ranges."""
+    numbers = (
+        *(pattern.angle_min_rad, pattern.angle_max_rad, pattern.angle_increment_rad),
+        *(pattern.time_increment_s, 1.0 / pattern.rate_hz),
+        *(scans.model.range.min_m, scans.model.range.max_m),
+    )
+    return header(scans.stamp_ns, laser_frame(scans.sensors[row])), *map(single, numbers)
 
 
 def _cloud_message(stamped: Any, points: NDArray[Any]) -> PointCloud2:

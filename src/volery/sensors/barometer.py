@@ -6,7 +6,7 @@ sea level is that of the scenario's origin plus z.
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from volery.core import atmosphere, rotations
 from volery.core.arrays import Array, read_only
 from volery.core.clock import NS_PER_S, Schedule
 from volery.sensors.bank import NoisyBank
-from volery.sensors.model import SensorModel, load_model
+from volery.sensors.model import SensorModel
 from volery.sensors.noise import gauss_markov_of_sigma
 from volery.sensors.samples import PressureSamples, SensorId
 
@@ -25,16 +25,13 @@ from volery.sensors.samples import PressureSamples, SensorId
 class BarometerModel(SensorModel):
     """Noise and drift in Pa; see the data files in `models/`."""
 
+    kind: ClassVar = "barometer"
+
     name: str
     noise_pa: NonNegativeFloat
     drift_pa: NonNegativeFloat
     """Long-run standard deviation of the drift, Pa."""
     drift_correlation_s: PositiveFloat
-
-
-def load_barometer_model(name: str, folder: Path | None = None) -> BarometerModel:
-    """Returns the model by shipped name or `.toml` path, also relative to `folder`."""
-    return load_model(BarometerModel, "barometer", name, folder)
 
 
 class BarometerBank(NoisyBank):

@@ -6,7 +6,7 @@ PX4's Gazebo classic. The drift continues while a fix is lost.
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from volery.core.errors import CommandError, DataFileError
 from volery.core.geodesy import LocalFrame
 from volery.sensors.bank import NoisyBank, rows_of
 from volery.sensors.gnss_denial import NOWHERE, GnssDenial
-from volery.sensors.model import SensorModel, load_model
+from volery.sensors.model import SensorModel
 from volery.sensors.noise import gauss_markov_of_sigma
 from volery.sensors.samples import GnssSamples, SensorId
 from volery.vehicle.pose_history import KEPT_NS, PoseHistory, pose_at
@@ -34,6 +34,8 @@ _LONGEST_DELAY_NS = KEPT_NS - 6_000_000
 class GnssModel(SensorModel):
     """Delay, noise and drift; see the data files in `models/`."""
 
+    kind: ClassVar = "GNSS"
+
     name: str
     delay_s: NonNegativeFloat
     horizontal_noise_m: NonNegativeFloat
@@ -46,11 +48,6 @@ class GnssModel(SensorModel):
     vertical_velocity_noise_m_s: NonNegativeFloat
     reacquisition_s: NonNegativeFloat
     """Time from the return of the signals to the next fix."""
-
-
-def load_gnss_model(name: str, folder: Path | None = None) -> GnssModel:
-    """Returns the model by shipped name or `.toml` path, also relative to `folder`."""
-    return load_model(GnssModel, "GNSS", name, folder)
 
 
 class GnssBank(NoisyBank):

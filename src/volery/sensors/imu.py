@@ -8,7 +8,7 @@ constant. A sensor may also warm up: a bias drawn once that decays as exp(-t / t
 from __future__ import annotations
 
 import math
-from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,13 +19,15 @@ from volery.core.arrays import Array, read_only
 from volery.core.clock import NS_PER_S, Schedule
 from volery.sensors.bank import NoisyBank
 from volery.sensors.inertial_kernels import feel_motion
-from volery.sensors.model import SensorModel, load_model
+from volery.sensors.model import SensorModel
 from volery.sensors.noise import gauss_markov
 from volery.sensors.samples import ImuSamples, SensorId
 
 
 class ImuModel(SensorModel):
     """Noise of an IMU; see the data files in `models/`."""
+
+    kind: ClassVar = "IMU"
 
     name: str
     gyro_noise_density_rad_s_sqrt_hz: NonNegativeFloat
@@ -40,11 +42,6 @@ class ImuModel(SensorModel):
     """Standard deviation of a cold sensor's bias, in addition to the turn-on bias."""
     accel_warm_up_bias_m_s2: NonNegativeFloat = 0.0
     warm_up_time_constant_s: PositiveFloat = 60.0
-
-
-def load_imu_model(name: str, folder: Path | None = None) -> ImuModel:
-    """Returns the model by shipped name or `.toml` path, also relative to `folder`."""
-    return load_model(ImuModel, "IMU", name, folder)
 
 
 class ImuBank(NoisyBank):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from volery.core.arrays import Array, read_only
 from volery.core.clock import NS_PER_S, Schedule
 from volery.sensors.bank import NoisyBank
 from volery.sensors.inertial_kernels import feel_vector
-from volery.sensors.model import SensorModel, load_model
+from volery.sensors.model import SensorModel
 from volery.sensors.noise import gauss_markov
 from volery.sensors.samples import MagneticSamples, SensorId
 
@@ -24,6 +24,8 @@ Row = tuple[float, float, float]
 class MagnetometerModel(SensorModel):
     """Iron and noise; see the data files in `models/`."""
 
+    kind: ClassVar = "magnetometer"
+
     name: str
     noise_density_t_sqrt_hz: NonNegativeFloat
     random_walk_t_s_sqrt_hz: NonNegativeFloat
@@ -32,11 +34,6 @@ class MagnetometerModel(SensorModel):
     """Field of magnetised parts, T, in the sensor frame."""
     soft_iron: tuple[Row, Row, Row] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     """Distortion of the outer field by magnetisable parts, in the sensor frame."""
-
-
-def load_magnetometer_model(name: str, folder: Path | None = None) -> MagnetometerModel:
-    """Returns the model by shipped name or `.toml` path, also relative to `folder`."""
-    return load_model(MagnetometerModel, "magnetometer", name, folder)
 
 
 class MagnetometerBank(NoisyBank):

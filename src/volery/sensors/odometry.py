@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from volery.core.clock import Schedule
 from volery.core.rows import in_one_piece
 from volery.sensors.bank import Memoryless, NoisyBank, uav_rows
 from volery.sensors.inertial_kernels import body_twists
-from volery.sensors.model import SensorModel, load_model
+from volery.sensors.model import SensorModel
 from volery.sensors.samples import OdometrySamples, SensorId
 
 _NUMBERS_A_SAMPLE = 10
@@ -24,17 +24,14 @@ _NUMBERS_A_SAMPLE = 10
 class OdometryModel(SensorModel):
     """Drift and noise; see the data files in `models/`."""
 
+    kind: ClassVar = "odometry"
+
     name: str
     horizontal_drift_m_sqrt_m: NonNegativeFloat
     vertical_drift_m_sqrt_m: NonNegativeFloat
     yaw_drift_rad_sqrt_m: NonNegativeFloat
     velocity_noise_m_s: NonNegativeFloat
     rate_noise_rad_s: NonNegativeFloat
-
-
-def load_odometry_model(name: str, folder: Path | None = None) -> OdometryModel:
-    """Returns the model by shipped name or `.toml` path, also relative to `folder`."""
-    return load_model(OdometryModel, "odometry", name, folder)
 
 
 class OdometryBank(NoisyBank):

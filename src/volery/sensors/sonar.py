@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from volery.core import rotations
 from volery.core.arrays import Array, read_only
 from volery.core.clock import Schedule
 from volery.sensors.bank import NoisyBank
-from volery.sensors.model import SensorModel, load_model
+from volery.sensors.model import SensorModel
 from volery.sensors.samples import RangeSamples, SensorId
 from volery.world.scene import Scene
 
@@ -25,17 +25,14 @@ _RINGS = ((0.0, 1), (0.5, 6), (1.0, 12))
 class SonarModel(SensorModel):
     """Range, cone and noise; see the data files in `models/`."""
 
+    kind: ClassVar = "sonar"
+
     name: str
     range_min_m: NonNegativeFloat
     range_max_m: PositiveFloat
     resolution_m: PositiveFloat
     field_of_view_deg: float = Field(gt=0.0, lt=180.0)
     noise_m: NonNegativeFloat
-
-
-def load_sonar_model(name: str, folder: Path | None = None) -> SonarModel:
-    """Returns the model by shipped name or `.toml` path, also relative to `folder`."""
-    return load_model(SonarModel, "sonar", name, folder)
 
 
 class SonarBank(NoisyBank):

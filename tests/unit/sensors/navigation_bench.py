@@ -5,7 +5,7 @@ import numpy as np
 from volery.control.fleet import Fleet
 from volery.core.clock import Schedule
 from volery.core.geodesy import LocalFrame
-from volery.sensors.gnss import GnssBank, load_gnss_model
+from volery.sensors.gnss import GnssBank, GnssModel
 from volery.sensors.gnss_denial import NOWHERE
 from volery.sensors.samples import SensorId
 from volery.vehicle.airframe import load_airframe
@@ -38,7 +38,7 @@ def keys_of(count, first=11):
 
 def gnss_bank(count=1, *, noise=False, denial=NOWHERE, lever=(0.0, 0.0, 0.0), **changes):
     return GnssBank(
-        load_gnss_model("gnss_m8").model_copy(update=changes),
+        GnssModel.load("gnss_m8").model_copy(update=changes),
         Schedule.from_hz(5.0),
         sensors_of(count),
         np.tile(np.array(lever), (count, 1)),

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from volery.core import rotations
-from volery.sensors.imu import load_imu_model
-from volery.sensors.odometry import load_odometry_model
+from volery.sensors.imu import ImuModel
+from volery.sensors.odometry import OdometryModel
 
 G = 9.80665
 
@@ -81,7 +81,7 @@ def test_imu_lever_arm_feels_centripetal_acceleration(simulate, flat_data):
 
 
 def test_imu_noise_is_as_its_model_says(simulate, flat_data):
-    model = load_imu_model("adis16448")
+    model = ImuModel.load("adis16448")
     flat_data["types"]["f450"]["sensors"] = [{"kind": "imu"}]
     flat_data["uavs"][0]["count"] = 5
     simulation = simulate(flat_data)
@@ -113,7 +113,7 @@ def test_imu_random_walk_grows_as_its_model_says():
     from volery.sensors.imu import ImuBank
     from volery.sensors.samples import SensorId
 
-    model = load_imu_model("adis16448").model_copy(update={"gyro_turn_on_bias_rad_s": 0.0})
+    model = ImuModel.load("adis16448").model_copy(update={"gyro_turn_on_bias_rad_s": 0.0})
     count = 400
     bank = ImuBank(
         model,
@@ -189,7 +189,7 @@ def test_odometry_drifts_with_distance_and_says_so():
     from volery.sensors.samples import SensorId
 
     count, distance = 500, 100.0
-    model = load_odometry_model("visual_inertial")
+    model = OdometryModel.load("visual_inertial")
     fleet = still_fleet()
     sensors = tuple(SensorId(0, f"u{i}", "odom") for i in range(count))
     keys = np.arange(count, dtype=np.uint64)

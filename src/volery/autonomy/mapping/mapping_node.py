@@ -31,7 +31,6 @@ from volery.graph.messages import (
     Odometry,
     Range,
     String,
-    stamp_of,
 )
 from volery.graph.nodes.node import Node
 
@@ -150,9 +149,7 @@ class Mapping(SavedAttributes, Node):
         self._intakes[name].add(scan)
 
     def _on_joint(self, message: JointState) -> None:
-        if len(message.name) and message.name[0] == "laser_nodding" and len(message.velocity):
-            angle, rate = float(message.position[0]), float(message.velocity[0])
-            self._nod.add(stamp_of(message), angle, rate)
+        self._nod.add_message(message)
 
     def _on_range(self, message: Range) -> None:
         if math.isfinite(message.range):

@@ -194,9 +194,7 @@ class Slam(SavedAttributes, Node):
             self._lose(*_UNKNOWN)
 
     def _on_joint(self, message: JointState) -> None:
-        if len(message.name) and message.name[0] == "laser_nodding" and len(message.velocity):
-            angle, rate = float(message.position[0]), float(message.velocity[0])
-            self._nod.add(stamp_of(message), angle, rate)
+        self._nod.add_message(message)
 
     def _on_range(self, message: Range) -> None:
         self._tracker.add_range(stamp_of(message), float(message.range))

@@ -18,22 +18,22 @@ from volery.runtime.build.sensor_suites import PICTURE, RESULT_OF, SensorInstanc
 from volery.runtime.build.worlds import light_of
 from volery.scenario import schema
 from volery.sensors.bank import Bank
-from volery.sensors.barometer import BarometerBank, load_barometer_model
+from volery.sensors.barometer import BarometerBank, BarometerModel
 from volery.sensors.battery import BatteryBank
 from volery.sensors.faults import FaultableBank
-from volery.sensors.gnss import GnssBank, load_gnss_model
-from volery.sensors.imu import ImuBank, load_imu_model
+from volery.sensors.gnss import GnssBank, GnssModel
+from volery.sensors.imu import ImuBank, ImuModel
 from volery.sensors.joints import JointBank
 from volery.sensors.lidar_bank import LidarBank
 from volery.sensors.lidar_model import LidarModel
-from volery.sensors.magnetometer import MagnetometerBank, load_magnetometer_model
-from volery.sensors.odometry import GroundTruthBank, OdometryBank, load_odometry_model
+from volery.sensors.magnetometer import MagnetometerBank, MagnetometerModel
+from volery.sensors.odometry import GroundTruthBank, OdometryBank, OdometryModel
 from volery.sensors.samples import (
     JointAngles,
     SensorId,
 )
 from volery.sensors.scan_patterns import PlanarScan
-from volery.sensors.sonar import SonarBank, load_sonar_model
+from volery.sensors.sonar import SonarBank, SonarModel
 from volery.world.scene import Scene
 
 if TYPE_CHECKING:
@@ -113,12 +113,12 @@ class _Builder:
 
     def _camera(self, group: list[SensorInstance]) -> Bank:
         from volery.sensors.cameras.bank import CameraBank
-        from volery.sensors.cameras.model import load_camera
+        from volery.sensors.cameras.model import CameraModel
 
         spec = group[0].spec
         own = {name: getattr(spec, name) for name in PICTURE if getattr(spec, name) is not None}
         return CameraBank(
-            load_camera(self._model(spec.model)).model_copy(update=own),
+            CameraModel.load(self._model(spec.model)).model_copy(update=own),
             _schedule(group),
             _ids(group),
             tuple(s.mount for s in group),
@@ -129,17 +129,17 @@ class _Builder:
 
     def _imu(self, group: list[SensorInstance]) -> Bank:
         spec = group[0].spec
-        model = load_imu_model(self._model(spec.model))
+        model = ImuModel.load(self._model(spec.model))
         return ImuBank(model, _schedule(group), _ids(group), *_places(group), _keys(group))
 
     def _sonar(self, group: list[SensorInstance]) -> Bank:
-        model = load_sonar_model(self._model(group[0].spec.model))
+        model = SonarModel.load(self._model(group[0].spec.model))
         return SonarBank(
             model, _schedule(group), _ids(group), *_places(group), _keys(group), self._scene
         )
 
     def _odometry(self, group: list[SensorInstance]) -> Bank:
-        model = load_odometry_model(self._model(group[0].spec.model))
+        model = OdometryModel.load(self._model(group[0].spec.model))
         return OdometryBank(model, _schedule(group), _ids(group), _keys(group), self._fleet)
 
     def _estimate(self, group: list[SensorInstance]) -> Bank:
@@ -155,7 +155,7 @@ class _Builder:
         return GroundTruthBank(_schedule(group), _ids(group))
 
     def _gnss(self, group: list[SensorInstance]) -> Bank:
-        model = load_gnss_model(self._model(group[0].spec.model))
+        model = GnssModel.load(self._model(group[0].spec.model))
         places, _ = _places(group)
         return GnssBank(
             model,
@@ -168,13 +168,13 @@ class _Builder:
         )
 
     def _barometer(self, group: list[SensorInstance]) -> Bank:
-        model = load_barometer_model(self._model(group[0].spec.model))
+        model = BarometerModel.load(self._model(group[0].spec.model))
         places, _ = _places(group)
         altitude = self._world.origin.altitude_m
         return BarometerBank(model, _schedule(group), _ids(group), places, _keys(group), altitude)
 
     def _magnetometer(self, group: list[SensorInstance]) -> Bank:
-        model = load_magnetometer_model(self._model(group[0].spec.model))
+        model = MagnetometerModel.load(self._model(group[0].spec.model))
         _, turns = _places(group)
         field = magnetic_field_map(self._world)
         return MagnetometerBank(model, _schedule(group), _ids(group), turns, _keys(group), field)

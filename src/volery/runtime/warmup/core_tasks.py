@@ -12,17 +12,17 @@ from volery.core.geodesy import LocalFrame
 from volery.engine.collisions import BOUNCE, Collisions
 from volery.runtime.build.worlds import light_of
 from volery.scenario.schema import World
-from volery.sensors.gnss import GnssBank, load_gnss_model
-from volery.sensors.imu import ImuBank, load_imu_model
+from volery.sensors.gnss import GnssBank, GnssModel
+from volery.sensors.imu import ImuBank, ImuModel
 from volery.sensors.joints import JointBank
 from volery.sensors.lidar_bank import LidarBank
 from volery.sensors.lidar_model import load_lidar
-from volery.sensors.magnetometer import MagnetometerBank, load_magnetometer_model
+from volery.sensors.magnetometer import MagnetometerBank, MagnetometerModel
 from volery.sensors.mount import make_mount
 from volery.sensors.odometry import GroundTruthBank
 from volery.sensors.point_cloud import PointMaker
 from volery.sensors.samples import SensorId
-from volery.sensors.sonar import SonarBank, load_sonar_model
+from volery.sensors.sonar import SonarBank, SonarModel
 from volery.vehicle.airframe import load_airframe
 from volery.vehicle.body_shape import body_shape
 from volery.vehicle.kinematic import Kinematic
@@ -55,8 +55,8 @@ def _look_and_measure(count: int) -> None:
     keys = np.zeros(count, dtype=np.uint64)
     for bank in (
         LidarBank(load_lidar(), schedule, sensors, count * mounts, keys, scene),
-        SonarBank(load_sonar_model("downward_sonar"), schedule, sensors, place, turn, keys, scene),
-        ImuBank(load_imu_model("adis16448"), schedule, sensors, place, turn, keys),
+        SonarBank(SonarModel.load("downward_sonar"), schedule, sensors, place, turn, keys, scene),
+        ImuBank(ImuModel.load("adis16448"), schedule, sensors, place, turn, keys),
         GroundTruthBank(schedule, sensors),
         JointBank(sensors, count * mounts),
     ):
@@ -97,11 +97,11 @@ _RAIN = Weather(particles=Particles(rain_mm_h=1.0))
 def _render_images(weather: Weather) -> None:
     from volery.sensors.cameras.bank import CameraBank
     from volery.sensors.cameras.cloud import organised_points
-    from volery.sensors.cameras.model import load_camera
+    from volery.sensors.cameras.model import CameraModel
 
     scene, fleet, sensors = _scene(), _fleet(), _sensors()
     fleet.set_weather(weather)
-    model = load_camera().model_copy(update={"width": 8, "height": 8})
+    model = CameraModel.load("pinhole").model_copy(update={"width": 8, "height": 8})
     schedule, keys = Schedule.from_hz(10.0), np.zeros(2, dtype=np.uint64)
     mounts = 2 * (make_mount(),)
     bank = CameraBank(model, schedule, sensors, mounts, keys, scene, light_of(World()))
@@ -113,7 +113,7 @@ def _render_images(weather: Weather) -> None:
 def fixes() -> None:
     """Compiles GNSS."""
     gnss, schedule, keys = (
-        load_gnss_model("gnss_m8"),
+        GnssModel.load("gnss_m8"),
         Schedule.from_hz(10.0),
         np.zeros(2, np.uint64),
     )
@@ -123,7 +123,7 @@ def fixes() -> None:
 
 def magnetic_fields() -> None:
     """Compiles magnetometers."""
-    compass, schedule = load_magnetometer_model("magnetometer_px4"), Schedule.from_hz(10.0)
+    compass, schedule = MagnetometerModel.load("magnetometer_px4"), Schedule.from_hz(10.0)
     keys = np.zeros(2, np.uint64)
     bank = MagnetometerBank(compass, schedule, _sensors(), _level(), keys, np.zeros(3))
     bank.sample(0, 0, _fleet())
