@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -68,20 +67,14 @@ class Mapping(SavedAttributes, Node):
     PARTS = ("_octree", "_grid", "_frame")
     STATE = ("_motion", "_nod", "_intakes", "_ground", "_range", "_last_status", "_slab_z")
 
-    @classmethod
-    def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Returns the tasks that compile the kernels of this node."""
-        from volery.autonomy.mapping import warmup
-        from volery.autonomy.perception import warmup as seeing
-
-        return (
-            warmup.growing_map,
-            warmup.read_maps,
-            seeing.scan_returns,
-            seeing.scan_repeats,
-            seeing.scan_rays,
-            seeing.ground,
-        )
+    WARMUP_TASKS = (
+        "volery.autonomy.mapping.warmup:growing_map",
+        "volery.autonomy.mapping.warmup:read_maps",
+        "volery.autonomy.perception.warmup:scan_returns",
+        "volery.autonomy.perception.warmup:scan_repeats",
+        "volery.autonomy.perception.warmup:scan_rays",
+        "volery.autonomy.perception.warmup:ground",
+    )
 
     def __init__(self, **options: Any) -> None:
         super().__init__("mapping", **options)
