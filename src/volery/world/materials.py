@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 
@@ -36,6 +37,8 @@ class Material(IntEnum):
 
 
 _TABLE = read_table(__file__, "materials.toml")
-REFLECTIVITY = np.array([_TABLE[material.name] for material in Material])
+PROPERTIES: dict[Material, dict[str, Any]] = {m: _TABLE[m.name] for m in Material}
+"""Properties of surfaces by material; `materials.toml` explains them."""
+REFLECTIVITY = np.array([surface["reflectivity"] for surface in PROPERTIES.values()])
 """(materials,) fraction of near-infrared light that a surface reflects, by `Material`."""
 REFLECTIVITY.flags.writeable = False
