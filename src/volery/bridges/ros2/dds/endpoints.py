@@ -60,7 +60,7 @@ class _Endpoint:
         self._node = node
         self._entities: list[tuple[Any, bool]] = []
         self._topics: list[Any] = []
-        self._numbers: list[int] = []
+        self._listened: list[int] = []
 
     def _add_writer(self, topic: Topic, qos: Any) -> Any:
         """Adds a writer of the node."""
@@ -78,7 +78,7 @@ class _Endpoint:
                 if sample.sample_info.valid_data:  # else it only reports that a writer has left
                     take(sample.cdr, sample.sample_info.publication_handle)
 
-        self._numbers.append(self._place.ear.listen(reader, take_all))
+        self._listened.append(self._place.ear.listen(reader, take_all))
         return self._add(topic, reader, writes=False)
 
     def _add(self, topic: Topic, entity: Any, *, writes: bool) -> Any:
@@ -89,8 +89,8 @@ class _Endpoint:
 
     def close(self) -> None:
         """Deletes the entities; further calls do nothing."""
-        while self._numbers:
-            self._place.ear.forget(self._numbers.pop())
+        while self._listened:
+            self._place.ear.forget(self._listened.pop())
         while self._entities:
             entity, writes = self._entities.pop()
             self._place.record.remove(self._node, entity, writes=writes)
