@@ -11,7 +11,9 @@ import pytest
 
 from volery.control.fleet import Fleet
 from volery.core.clock import Schedule
+from volery.sensors.bank import SensorGroup
 from volery.sensors.imu import ImuBank, ImuModel
+from volery.sensors.mount import make_mount
 from volery.sensors.samples import SensorId
 from volery.vehicle.airframe import load_airframe
 
@@ -23,14 +25,10 @@ def fleet():
 
 
 def bank_of(model, count, rate_hz=RATE_HZ):
-    return ImuBank(
-        model,
-        Schedule.from_hz(rate_hz),
-        tuple(SensorId(0, f"u{i}", "imu") for i in range(count)),
-        np.zeros((count, 3)),
-        np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)),
-        np.arange(count, dtype=np.uint64) + np.uint64(7),
-    )
+    sensors = tuple(SensorId(0, f"u{i}", "imu") for i in range(count))
+    keys = np.arange(count, dtype=np.uint64) + np.uint64(7)
+    mounts = (make_mount(),) * count
+    return ImuBank(model, SensorGroup(Schedule.from_hz(rate_hz), sensors, mounts, keys))
 
 
 @pytest.fixture(scope="module")

@@ -4,10 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from navigation_bench import LEVEL, fleet_of, keys_of, put, sensors_of
+from navigation_bench import LEVEL, fleet_of, keys_of, put
 
 from volery.core import rotations
-from volery.core.clock import Schedule
 from volery.sensors.barometer import BarometerBank, BarometerModel
 from volery.sensors.magnetometer import MagnetometerBank, MagnetometerModel
 from volery.world.magnetic_field import field_of_angles
@@ -16,25 +15,17 @@ FIELD = np.array([1.3e-6, 21.5e-6, -43.2e-6])
 
 
 def barometers(count=1, *, noise=False, altitude=488.0, lever=(0.0, 0.0, 0.0), **changes):
-    return BarometerBank(
-        BarometerModel.load("barometer_px4").model_copy(update=changes),
-        Schedule.from_hz(50.0),
-        sensors_of(count, "pressure"),
-        np.tile(np.array(lever), (count, 1)),
-        keys_of(count) if noise else None,
-        altitude,
-    )
+    model = BarometerModel.load("barometer_px4").model_copy(update=changes)
+    keys = keys_of(count) if noise else None
+    group = group_of(count, "pressure", 50.0, keys, position_body=lever)
+    return BarometerBank(model, group, altitude)
 
 
 def magnetometers(count=1, *, noise=False, turn=LEVEL, field=FIELD, **changes):
-    return MagnetometerBank(
-        MagnetometerModel.load("magnetometer_px4").model_copy(update=changes),
-        Schedule.from_hz(100.0),
-        sensors_of(count, "mag"),
-        np.tile(np.array(turn), (count, 1)),
-        keys_of(count) if noise else None,
-        field,
-    )
+    model = MagnetometerModel.load("magnetometer_px4").model_copy(update=changes)
+    keys = keys_of(count) if noise else None
+    group = group_of(count, "mag", 100.0, keys, attitude_body=turn)
+    return MagnetometerBank(model, group, field)
 
 
 @pytest.mark.parametrize(
