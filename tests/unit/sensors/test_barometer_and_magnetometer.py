@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from navigation_bench import LEVEL, fleet_of, keys_of, put
+from navigation_bench import LEVEL, fleet_of, group_of, keys_of, put
 
 from volery.core import rotations
 from volery.sensors.barometer import BarometerBank, BarometerModel
