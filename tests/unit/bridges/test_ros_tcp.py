@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import time
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -207,6 +208,20 @@ def test_claims_cost_no_memory():
     for parser in parsers:
         parser.feed(slow_number(2) + b"/a" + slow_number(64 << 20) + bytes(20))
     assert resident_bytes() - before < 32 << 20
+
+
+def test_large_payloads_need_no_huge_pages():
+    """The system compacts memory for each of them, and no other client is served meanwhile."""
+    parser, before = RosTcpFrameParser(), huge_page_bytes()
+    (frame,) = parser.feed(ros_tcp.frame("/a", bytes(32 << 20)))
+    assert huge_page_bytes() - before < 8 << 20
+    assert len(frame.payload) == 32 << 20
+
+
+def huge_page_bytes():
+    lines = Path("/proc/self/smaps_rollup").read_text().splitlines()
+    (line,) = (line for line in lines if line.startswith("AnonHugePages:"))
+    return 1024 * int(line.split()[1])
 
 
 def resident_bytes():
