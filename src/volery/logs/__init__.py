@@ -1,0 +1,1 @@
+"""Logs as data: topics, times, arrays, tables and plots of recorded flights."""
