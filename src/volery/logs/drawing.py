@@ -52,12 +52,11 @@ def draw_fields(data: TopicData, fields: Sequence[str], axes: Axes | None) -> Ax
 
 def draw_paths(log: Log, uavs: Sequence[str], axes: Axes | None) -> Axes:
     """Draws the paths of UAVs, or of all, from above."""
-    names = tuple(uavs) or log.uavs
-    if not names:
+    trajectories = log.trajectories(*uavs)
+    if not trajectories:
         raise VoleryError(f"{log.path}: there are no topics with poses to draw")
     axes = new_axes() if axes is None else axes
-    for name in names:
-        found = log.trajectory(name)
+    for name, found in trajectories.items():
         every = max(len(found.position) // _POINTS, 1)
         x, y = found.position[::every, :2].T
         label = found.topic if name == found.topic else f"{name} ({found.topic})"
@@ -67,7 +66,7 @@ def draw_paths(log: Log, uavs: Sequence[str], axes: Axes | None) -> Axes:
     axes.set_xlabel("x, m")
     axes.set_ylabel("y, m")
     axes.grid(visible=True, alpha=0.3)
-    if len(names) <= _LEGEND_LIMIT:
+    if len(trajectories) <= _LEGEND_LIMIT:
         axes.legend()
     return axes
 

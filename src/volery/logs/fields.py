@@ -1,4 +1,4 @@
-"""Names the fields of a message type, with dots, and reads them from messages.
+"""Names the fields of a message type, with dots.
 
 A field is a leaf of the type: a number, a text, an array of numbers, or a list of anything else.
 `pose.pose.position` names a message of numbers, whose fields become columns of one array; a stamp
@@ -7,10 +7,9 @@ such as `header.stamp` becomes nanoseconds.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -48,14 +47,9 @@ class Field:
     length: int | None = None
     """Length of a fixed array."""
 
-    @property
-    def is_small(self) -> bool:
-        """Whether each message holds the same small amount of it."""
-        return self.dtype is not None or self.length is not None
-
 
 Column = NDArray[Any]
-Read = Callable[[Any], Any]
+"""Values of a field in n messages."""
 
 
 @lru_cache(maxsize=256)
@@ -87,26 +81,6 @@ def messages_in(msgtype: str) -> dict[str, str]:
             found[name] = detail
             found |= {f"{name}.{inner}": t for inner, t in messages_in(detail).items()}
     return found
-
-
-def column(field: Field, values: Sequence[Any]) -> Column:
-    """Returns the values of a field in n messages as one array.
-
-    Numbers: (n,). Arrays of equal lengths: (n, length). All else: (n,) of objects.
-    """
-    if field.dtype is not None:
-        return np.array(values, dtype=field.dtype)
-    if field.is_array and values and len({len(value) for value in values}) == 1:
-        return np.stack(values)
-    found = np.empty(len(values), dtype=object)
-    for k, value in enumerate(values):
-        found[k] = value
-    return found
-
-
-def reader(name: str) -> Read:
-    """Returns the function that reads a field, by its name with dots, from a message."""
-    return attrgetter(name)
 
 
 def parts_of(name: str, msgtype: str) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from volery.core.errors import GraphError, VoleryError
 from volery.core.plurals import counted
 from volery.logs.sources import LogSource, open_source
 from volery.logs.topic_count import TopicCount
-from volery.logs.topic_data import WHOLE_NS, LoggedMessage, TopicData, clipped
+from volery.logs.topic_data import WHOLE_NS, LoggedMessage, TopicData, clipped, load_numbers
 from volery.logs.trajectories import LoggedTrajectory, pose_topics, read_trajectory
 from volery.logs.transforms import LoggedTransforms
 
@@ -145,6 +145,7 @@ class Log:
                 f"the topics of '{topics}' have several types ({', '.join(sorted(types))}): use a "
                 "pattern for one of them"
             )
+        load_numbers([self[name] for name in names])
         frames = []
         for name in names:
             frame = self[name].to_pandas(fields)
@@ -164,13 +165,26 @@ class Log:
     def trajectory(self, uav: str, topic: str | None = None) -> LoggedTrajectory:
         """Returns the poses of a UAV, from the ground truth if it is recorded, else an estimate.
 
-        topic: the topic with the poses; None: the preferred one of that UAV.
+        topic: the topic with the poses; None: the preferred one of that UAV. Raises `VoleryError`
+        if there are none.
+        """
+        if topic is None:
+            return self.trajectories(uav)[uav]
+        return read_trajectory(uav, self[topic])
+
+    def trajectories(self, *uavs: str) -> dict[str, LoggedTrajectory]:
+        """Returns the poses of UAVs, or of all, by name; reads the log once.
+
+        Raises `VoleryError` for a UAV without poses.
         """
         known = pose_topics(self.topics)
-        if topic is None and uav not in known:
-            names = ", ".join(known) or "none"
-            raise VoleryError(f"{self.path}: there are no poses of '{uav}'; UAVs: {names}")
-        return read_trajectory(uav, self[topic or known[uav]])
+        for uav in uavs:
+            if uav not in known:
+                names = ", ".join(known) or "none"
+                raise VoleryError(f"{self.path}: there are no poses of '{uav}'; UAVs: {names}")
+        found = {uav: self[known[uav]] for uav in uavs or known}
+        load_numbers(list(found.values()))
+        return {uav: read_trajectory(uav, data) for uav, data in found.items()}
 
     # ------------------------------------------------------------------------------------ figures
 

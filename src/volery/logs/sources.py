@@ -11,11 +11,7 @@ from collections.abc import Iterator, Set
 from pathlib import Path
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from volery.bridges.logs.chunks import Chunk, ChunkedLog
-from volery.bridges.logs.content import Content, Head
 from volery.bridges.logs.log_formats import open_chunks
 from volery.bridges.logs.records import LogRecord
 from volery.bridges.logs.ros2_bags import mcap_parts
@@ -42,9 +38,6 @@ class LogSource(Protocol):
     def records(self, topics: Set[str], start_ns: int, end_ns: int) -> Iterator[LogRecord]:
         """Yields the records of `topics` from `start_ns` to before `end_ns`."""
 
-    def times_ns(self, topic: str, start_ns: int, end_ns: int) -> NDArray[np.int64]:
-        """Returns the times (n,), ns, of a topic's messages from `start_ns` to before `end_ns`."""
-
     def close(self) -> None:
         """Closes the file."""
 
@@ -67,21 +60,6 @@ class ChunkSource:
 
     def records(self, topics: Set[str], start_ns: int, end_ns: int) -> Iterator[LogRecord]:
         """Yields the records of `topics` from `start_ns` to before `end_ns`."""
-        for part, content, head in self._heads(topics, start_ns, end_ns):
-            yield part.record(content, head)
-
-    def times_ns(self, topic: str, start_ns: int, end_ns: int) -> NDArray[np.int64]:
-        """Returns the times (n,), ns, of a topic's messages from `start_ns` to before `end_ns`."""
-        heads = self._heads({topic}, start_ns, end_ns)
-        return np.fromiter((head.time_ns for _, _, head in heads), np.int64)
-
-    def close(self) -> None:
-        """Closes the files."""
-        self._closing()
-
-    def _heads(
-        self, topics: Set[str], start_ns: int, end_ns: int
-    ) -> Iterator[tuple[ChunkedLog, Content, Head]]:
         if not self._closing.alive:
             raise RecordingError(f"{self._parts[0].path}: the log is closed; open it again")
         for part in self._parts:
@@ -92,7 +70,11 @@ class ChunkSource:
                 content = part.content(chunk)
                 for head in content.heads:
                     if head.channel in channels and start_ns <= head.time_ns < end_ns:
-                        yield part, content, head
+                        yield part.record(content, head)
+
+    def close(self) -> None:
+        """Closes the files."""
+        self._closing()
 
 
 def open_source(path: Path) -> LogSource:

@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Set
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from volery.bridges.logs.records import LogRecord
 from volery.bridges.logs.ros2_bags import BagWalk, sqlite_index
 from volery.logs.topic_count import TopicCount
@@ -34,11 +31,6 @@ class SqliteSource:
         walk = BagWalk(self._path, topics, start_ns, end_ns)
         yield from walk
         self.problem = self.problem or walk.problem
-
-    def times_ns(self, topic: str, start_ns: int, end_ns: int) -> NDArray[np.int64]:
-        """Returns the times (n,), ns, of a topic's messages from `start_ns` to before `end_ns`."""
-        records = self.records({topic}, start_ns, end_ns)
-        return np.fromiter((record.time_ns for record in records), np.int64)
 
     def close(self) -> None:
         """Does nothing: the file is opened for each reading."""

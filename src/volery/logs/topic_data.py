@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -15,15 +15,8 @@ from volery.core.clock import NS_PER_S, ns_from_s
 from volery.core.errors import GraphError, RecordingError, VoleryError
 from volery.graph.codecs.cdr import known
 from volery.graph.codecs.ros1_names import ros2_name
-from volery.logs.fields import (
-    Column,
-    column,
-    fields_of,
-    is_time,
-    nanoseconds,
-    parts_of,
-    reader,
-)
+from volery.logs.columns import Columns, Wanted, read_columns
+from volery.logs.fields import Column, fields_of, is_time, nanoseconds, parts_of
 from volery.logs.message_arrays import cloud_array, image_array, scan_angles
 from volery.logs.sources import LogSource
 
@@ -46,19 +39,12 @@ class LoggedMessage(NamedTuple):
     message: Any
 
 
-class _Columns(NamedTuple):
-    """Times and columns of the messages that can be decoded."""
-
-    times_ns: NDArray[np.int64]
-    columns: dict[str, Column]
-
-
 class TopicData:
     """The n messages of one topic, in the order of the log.
 
     `data["pose.pose.position.z"]` is a field of all messages, `data["pose.pose.position"]` the
-    fields of a message of numbers as one array (n, 3). Fields are read at their first use: numbers
-    and fixed arrays together, and then kept; texts, variable arrays and lists at each use.
+    fields of a message of numbers as one array (n, 3). Numbers are read together at the first use
+    and then kept; texts, arrays and lists are read at each use.
     """
 
     def __init__(
@@ -69,8 +55,7 @@ class TopicData:
         """Name of the topic."""
         self.msgtype = msgtype
         """Name of the type in ROS 2 style."""
-        self.refused = 0
-        """Number of messages that cannot be decoded; known after the first use of a field."""
+        self._kept: Columns | None = None
 
     def __repr__(self) -> str:
         return f"TopicData({self.topic!r}, {self.msgtype})"
@@ -85,6 +70,11 @@ class TopicData:
         """Returns the number of messages, n."""
         return len(self.times_ns)
 
+    @property
+    def refused(self) -> int:
+        """Number of messages that are left out: they cannot be decoded, or have another type."""
+        return self._numbers.refused
+
     # ----------------------------------------------------------------------------------- columns
 
     @property
@@ -95,7 +85,7 @@ class TopicData:
     @property
     def times_ns(self) -> NDArray[np.int64]:
         """Times (n,) of the log, ns: when the messages were recorded."""
-        return self._small.times_ns
+        return self._numbers.times_ns
 
     @property
     def times_s(self) -> Array:
@@ -127,11 +117,10 @@ class TopicData:
         """Returns several fields, or all, by name; as `data[field]`, but reads the log once."""
         names = fields or self.fields
         parts = {name: parts_of(name, self._type) for name in names}
-        wanted = {part for some in parts.values() for part in some}
-        found = {name: self._small.columns[name] for name in wanted if name in self._small.columns}
-        missing = wanted - found.keys()
+        found = self._numbers.columns
+        missing = {part for some in parts.values() for part in some} - found.keys()
         if missing:
-            found |= self._read(missing).columns
+            found = found | self._read(missing)
         return {name: self._joined(name, [found[part] for part in parts[name]]) for name in names}
 
     def padded(self, field: str, fill: float = np.nan) -> Column:
@@ -174,12 +163,10 @@ class TopicData:
     def messages(self) -> Iterator[LoggedMessage]:
         """Yields the messages one by one, without keeping them."""
         decoder = LogDecoder()
-        self.refused = 0
         for record in self._source.records({self.topic}, *self._range_ns):
             try:
                 decoded = decoder.decode(record)
             except GraphError:
-                self.refused += 1
                 continue
             if decoded.msgtype == self._type:
                 yield LoggedMessage(self.topic, record.time_ns, decoded.message)
@@ -233,21 +220,22 @@ class TopicData:
             raise RecordingError(f"{self.topic} cannot be read: {error}") from None
         return name
 
-    @cached_property
-    def _small(self) -> _Columns:
-        return self._read({field.name for field in fields_of(self._type) if field.is_small})
+    @property
+    def _numbers(self) -> Columns:
+        """Times and all numbers, which are kept."""
+        if self._kept is None:
+            load_numbers([self])
+        assert self._kept is not None
+        return self._kept
 
-    def _read(self, names: Iterable[str]) -> _Columns:
+    def _wanted_numbers(self) -> Wanted:
+        names = [field.name for field in fields_of(self._type) if field.dtype is not None]
+        return Wanted(self._type, names)
+
+    def _read(self, names: Iterable[str]) -> dict[str, Column]:
         """Reads columns in one pass over the log."""
-        fields = {field.name: field for field in fields_of(self._type)}
-        reads = [(name, reader(name), []) for name in names]  # type: ignore[var-annotated]
-        times: list[int] = []
-        for found in self.messages():
-            times.append(found.time_ns)
-            for _, read, values in reads:
-                values.append(read(found.message))
-        columns = {name: column(fields[name], values) for name, _, values in reads}
-        return _Columns(np.array(times, np.int64), columns)
+        wanted = {self.topic: Wanted(self._type, names)}
+        return read_columns(self._source, wanted, *self._range_ns)[self.topic].columns
 
     def _joined(self, name: str, columns: list[Column]) -> Column:
         if is_time(name, self._type):
@@ -257,6 +245,18 @@ class TopicData:
     def _check_type(self, types: tuple[str, ...], what: str) -> None:
         if self._type not in types:
             raise VoleryError(f"{self.topic} holds no {what}: its type is {self._type}")
+
+
+def load_numbers(topics: Sequence[TopicData]) -> None:
+    """Reads the numbers of topics of one log and range of times, in one pass over the log."""
+    missing = {data.topic: data for data in topics if data._kept is None}
+    if not missing:
+        return
+    first = next(iter(missing.values()))
+    wanted = {name: data._wanted_numbers() for name, data in missing.items()}
+    found = read_columns(first._source, wanted, *first._range_ns)
+    for name, data in missing.items():
+        data._kept = found[name]
 
 
 def clipped(range_ns: tuple[int, int], start_s: float, end_s: float) -> tuple[int, int]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from volery.core.arrays import Array
+from volery.core.errors import VoleryError
 from volery.logs.topic_count import TopicCount
 from volery.logs.topic_data import TopicData
 
@@ -73,8 +74,14 @@ def natural(name: str) -> tuple[int, str]:
 
 
 def read_trajectory(uav: str, data: TopicData) -> LoggedTrajectory:
-    """Returns the poses of a topic; leaves out those that are not finite."""
-    field = _POSES[data.msgtype]
+    """Returns the poses of a topic; leaves out those that are not finite.
+
+    Raises `VoleryError` for a topic without poses.
+    """
+    field = _POSES.get(data.msgtype)
+    if field is None:
+        types = ", ".join(_POSES)
+        raise VoleryError(f"{data.topic} holds no poses: its type is {data.msgtype}, not {types}")
     columns = data.columns(f"{field}.position", f"{field}.orientation")
     position, attitude = columns.values()
     finite = np.isfinite(position).all(axis=1) & np.isfinite(attitude).all(axis=1)

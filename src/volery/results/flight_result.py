@@ -153,10 +153,11 @@ class FlightResult:
         """Returns one row for the table of a study: numbers of the whole flight by name.
 
         `scenario`, `seed`, `uavs` (number), `duration_s`, `contacts` and `crashed` (numbers),
-        `distance_m` and `max_speed_m_s` (mean and max over the UAVs), `min_separation_m` (inf for
+        `distance_m` and `max_speed_m_s` (mean and max over the UAVs), `min_separation_m` (nan for
         one UAV).
         """
         speeds = self.speed_m_s[np.isfinite(self.speed_m_s)]
+        nearest_m = float(self.separation_m.min(initial=np.inf))
         return {
             "scenario": self.scenario,
             "seed": self.seed,
@@ -166,7 +167,7 @@ class FlightResult:
             "crashed": int(self.crashed.sum()),
             "distance_m": float(self.distance_m.mean()) if len(self) else 0.0,
             "max_speed_m_s": float(speeds.max(initial=0.0)),
-            "min_separation_m": float(self.separation_m.min(initial=np.inf)),
+            "min_separation_m": nearest_m if np.isfinite(nearest_m) else np.nan,
         }
 
     # ------------------------------------------------------------------------------------- tables
