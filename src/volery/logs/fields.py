@@ -86,20 +86,28 @@ def messages_in(msgtype: str) -> dict[str, str]:
 def parts_of(name: str, msgtype: str) -> tuple[str, ...]:
     """Returns the names of the fields that `name` stands for: itself, or those of a message.
 
-    Raises `VoleryError`, with the type's fields, for an unknown name and for a message that is not
+    Raises `VoleryError`, with similar fields, for an unknown name and for a message that is not
     of numbers alone.
     """
     if any(field.name == name for field in fields_of(msgtype)):
         return (name,)
     inner = messages_in(msgtype).get(name)
     if inner is None:
-        known = ", ".join(field.name for field in fields_of(msgtype))
-        raise VoleryError(f"{msgtype} has no field '{name}'; it has {known}")
+        raise VoleryError(f"{msgtype} has no field '{name}'; {_similar(name, msgtype)}")
     fields = fields_of(inner)
     if any(field.dtype is None for field in fields):
         names = ", ".join(f"{name}.{field.name}" for field in fields)
         raise VoleryError(f"'{name}' of {msgtype} holds more than numbers; ask for one of {names}")
     return tuple(f"{name}.{field.name}" for field in fields)
+
+
+def _similar(name: str, msgtype: str) -> str:
+    """Returns a phrase with the fields whose names are similar, or with all."""
+    from difflib import get_close_matches
+
+    known = [field.name for field in fields_of(msgtype)]
+    near = get_close_matches(name, [*known, *messages_in(msgtype)])
+    return f"similar ones: {', '.join(near)}" if near else f"it has {', '.join(known)}"
 
 
 def is_time(name: str, msgtype: str) -> bool:

@@ -32,7 +32,7 @@ _CLOSEST = 3
 
 
 def open_log(path: str | Path) -> Log:
-    """Opens a log as data: MCAP, a ROS 1 bag, or a ROS 2 bag (folder or .db3 file).
+    """Opens a log as data: MCAP, a ROS 1 bag, a ROS 2 bag (folder or .db3 file), or PX4's ULog.
 
     Truncated and damaged files are read as far as possible; `Log.problem` describes the damage.
     Raises `RecordingError` if the file is missing, no log, or exceeds the limits of logs.

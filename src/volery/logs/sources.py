@@ -1,7 +1,8 @@
 """Reads the records of selected topics from logs of each format, without reading the others.
 
 MCAP files and ROS 1 bags are read chunk by chunk; a ROS 2 bag is a folder of MCAP files or an
-SQLite file. A file is closed with its source, at the latest when the last user of the source ends.
+SQLite file; ULog is PX4's format. A file is closed with its source, at the latest when the last
+user of the source ends.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from volery.bridges.logs.ros2_bags import mcap_parts
 from volery.core.errors import RecordingError
 from volery.logs.sqlite_source import SqliteSource
 from volery.logs.topic_count import TopicCount
+from volery.logs.ulog_source import UlogSource
 
 
 class LogSource(Protocol):
@@ -80,9 +82,7 @@ class ChunkSource:
 def open_source(path: Path) -> LogSource:
     """Opens a log of any format. Raises `RecordingError` if the file is missing or no log."""
     if path.suffix == ".ulg":
-        raise RecordingError(
-            f"{path}: PX4's ULog is not read; record MCAP or a bag of the vehicle's ROS topics"
-        )
+        return UlogSource(path)
     files = mcap_parts(path)
     if not files and (path.is_dir() or path.suffix == ".db3"):
         return SqliteSource(path)

@@ -108,8 +108,8 @@ class TopicData:
         """Returns a field of all messages.
 
         Numbers (n,); arrays of equal lengths (n, length); other arrays, texts and lists (n,) of
-        objects. A message of k numbers (n, k); a stamp (n,), ns. Raises `VoleryError`, with the
-        fields of the type, for an unknown name.
+        objects. A message of k numbers (n, k); a stamp (n,), ns. Raises `VoleryError`, with
+        similar names, for an unknown one.
         """
         return self.columns(field)[field]
 

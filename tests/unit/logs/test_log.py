@@ -12,6 +12,7 @@ from logged_messages import COUNT, write_log, write_sqlite_bag
 from volery.bridges.logs.decoding import LogDecoder
 from volery.core.errors import RecordingError, VoleryError
 from volery.logs import open_log
+from volery.logs.sources import ChunkSource
 
 TIMES_S = np.arange(COUNT) / 10.0
 
@@ -200,6 +201,94 @@ def test_other_topics_are_not_decoded(mcap, monkeypatch):
     assert decoded == ["/uav1/odom"] * COUNT
 
 
+def test_topics_of_several_uavs_are_read_in_one_pass(mcap, monkeypatch):
+    passes = []
+    records = ChunkSource.records
+
+    def counted(self, topics, start_ns, end_ns):
+        passes.append(set(topics))
+        return records(self, topics, start_ns, end_ns)
+
+    both = {"/uav1/odom", "/uav2/odom"}
+    with open_log(mcap) as log:
+        monkeypatch.setattr(ChunkSource, "records", counted)
+        log.to_pandas("/*/odom", ["pose.pose.position"])
+        assert passes.count(both) == 1
+        assert len(passes) == 3  # with the types of both, each of one record
+        passes.clear()
+        trajectories = log.trajectories()
+        assert list(trajectories) == ["uav1", "uav2"]
+        assert trajectories["uav2"].position[3].tolist() == [pytest.approx(0.3), 2.0, 2.0]
+        assert passes == []  # numbers are kept
+
+
+def test_a_range_without_messages_has_empty_columns(log):
+    data = log["/uav1/odom"].between(50.0)
+    assert len(data) == 0
+    assert data["pose.pose.position"].shape == (0, 3)
+    assert data["pose.covariance"].shape == (0, 36)
+    assert data["header.frame_id"].shape == data.stamps_ns.shape == (0,)
+    assert data.to_pandas().empty
+    later = log.between(50.0)
+    assert later["/uav1/gappy_scan"].padded("ranges").shape == (0, 0)
+    assert later.trajectory("uav1").position.shape == (0, 3)
+    assert list(later["/uav1/image"].images()) == []
+
+
+def test_a_topic_without_messages(tmp_path):
+    from mcap.writer import Writer
+
+    with (tmp_path / "empty.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
+        writer.register_channel("/note", "cdr", schema)
+        writer.finish()
+    with open_log(tmp_path / "empty.mcap") as log:
+        assert log.topics["/note"] == ("std_msgs/msg/String", 0)
+        assert len(log["/note"]) == 0
+        assert log["/note"]["data"].shape == (0,)
+        assert (log.start_s, log.end_s, log.uavs) == (0.0, 0.0, ())
+        assert "<td>/note</td>" in log._repr_html_()
+        with pytest.raises(VoleryError, match="there are no topics with poses to draw"):
+            log.plot_paths()
+
+
+def test_messages_that_cannot_be_decoded_are_counted(tmp_path):
+    from mcap.writer import Writer
+
+    with (tmp_path / "short.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("std_msgs/msg/Float64", "ros2msg", b"float64 data")
+        channel = writer.register_channel("/x", "cdr", schema)
+        for k, data in enumerate([bytes(4) + bytes(8), bytes(4) + bytes(3), bytes(4) + bytes(8)]):
+            writer.add_message(channel, k, b"\x00\x01" + data[2:], k)
+        writer.finish()
+    with open_log(tmp_path / "short.mcap") as log:
+        assert log["/x"]["data"].tolist() == [0.0, 0.0]
+        assert log["/x"].times_ns.tolist() == [0, 2]
+        assert log["/x"].refused == 1
+
+
+@pytest.mark.parametrize("suffix", [".mcap", ".bag"])
+def test_a_damaged_chunk_is_left_out(tmp_path, suffix):
+    path = write_log(tmp_path / f"whole{suffix}")
+    data = bytearray(path.read_bytes())
+    third = len(data) // 3
+    data[third : third + 40] = bytes(40)
+    path.write_bytes(data)
+    with open_log(path) as log:
+        assert len(log["/uav1/odom"]) == 0
+        assert "1 damaged chunk left out" in log.problem
+
+
+def test_one_file_of_a_ros2_bag(tmp_path):
+    bag = write_sqlite_bag(tmp_path / "bag")
+    with open_log(next(bag.glob("*.db3"))) as log:
+        assert log.topics["/uav1/odom"].messages == len(log["/uav1/odom"]) == COUNT
+
+
 @pytest.mark.parametrize("suffix", [".mcap", ".bag"])
 def test_a_truncated_log_is_read_as_far_as_possible(tmp_path, suffix):
     from logged_messages import published
@@ -233,6 +322,12 @@ def test_errors_name_what_is_there(mcap):
             list(log.messages("/uav9/**"))
         with pytest.raises(VoleryError, match="String has no field 'pose'; it has data"):
             log["/note"]["pose"]
+        with pytest.raises(
+            VoleryError, match=r"no field 'pose\.pose\.postion'; similar ones: pose\.pose\.position"
+        ):
+            log["/uav1/odom"]["pose.pose.postion"]
+        with pytest.raises(VoleryError, match="/note holds no poses: its type is std_msgs"):
+            log.trajectory("uav1", "/note")
         with pytest.raises(VoleryError, match=r"'header' of .* holds more than numbers"):
             log["/uav1/odom"]["header"]
         with pytest.raises(VoleryError, match="/note holds no images: its type is std_msgs"):
@@ -250,9 +345,9 @@ def test_a_missing_file_and_no_log(tmp_path):
     (tmp_path / "text.mcap").write_text("no log at all")
     with pytest.raises(RecordingError, match="neither an MCAP log nor a ROS 1 bag"):
         open_log(tmp_path / "text.mcap")
-    (tmp_path / "px4.ulg").write_bytes(b"ULog")
-    with pytest.raises(RecordingError, match="ULog is not read"):
-        open_log(tmp_path / "px4.ulg")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(RecordingError, match="cannot be read as a ROS 2 bag"):
+        open_log(tmp_path / "empty")
 
 
 def test_a_log_without_users_is_closed(mcap):
