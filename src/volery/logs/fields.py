@@ -23,7 +23,7 @@ from volery.graph.codecs.cdr import is_number_array
 from volery.graph.typestore import typestore
 
 _TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
-_DTYPES = {
+_DTYPES: dict[str, type[Any]] = {
     "bool": np.bool_,
     "byte": np.uint8,
     "octet": np.uint8,
@@ -59,6 +59,7 @@ def fields_of(msgtype: str) -> tuple[Field, ...]:
 
 
 def _fields(msgtype: str, prefix: str) -> Iterator[Field]:
+    described: Any
     for field, described in typestore().fielddefs[msgtype][1]:
         name = prefix + normalize_fieldname(field)
         kind, detail = described
@@ -75,7 +76,9 @@ def _fields(msgtype: str, prefix: str) -> Iterator[Field]:
 def messages_in(msgtype: str) -> dict[str, str]:
     """Returns the types of nested messages (not of lists) by their names with dots."""
     found: dict[str, str] = {}
-    for field, (kind, detail) in typestore().fielddefs[msgtype][1]:
+    described: Any
+    for field, described in typestore().fielddefs[msgtype][1]:
+        kind, detail = described
         if kind == Nodetype.NAME:
             name = normalize_fieldname(field)
             found[name] = detail

@@ -123,5 +123,6 @@ def cloud_array(message: Any) -> NDArray[Any]:
 
 def scan_angles(message: Any) -> NDArray[np.float64]:
     """Returns the angles (k,), rad, of the beams of a LaserScan."""
-    count = len(message.ranges)
-    return float(message.angle_min) + float(message.angle_increment) * np.arange(count)
+    number = np.arange(len(message.ranges), dtype=np.float64)
+    angles: NDArray[np.float64] = message.angle_min + message.angle_increment * number
+    return angles

@@ -9,6 +9,7 @@ import numpy as np
 
 from volery.core.arrays import Array
 from volery.core.errors import VoleryError
+from volery.core.plurals import counted
 from volery.logs.topic_count import TopicCount
 from volery.logs.topic_data import TopicData
 
@@ -33,7 +34,7 @@ _NO_UAVS = ("actors", "volery", "coverage")
 """First parts of Volery's topics with poses that are no UAVs."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LoggedTrajectory:
     """The poses of one UAV in a log, n samples, in the order of the log; finite ones only."""
 
@@ -45,7 +46,11 @@ class LoggedTrajectory:
     position: Array
     """(n, 3) m, in the frame of the topic's messages."""
     attitude: Array
-    """(n, 4) quaternions x y z w."""
+    """(n, 4) quaternions x y z w, that frame from body."""
+
+    def __repr__(self) -> str:
+        samples = counted(len(self.times_s), "sample")
+        return f"LoggedTrajectory({self.uav!r}, {self.topic!r}: {samples})"
 
 
 def pose_topics(topics: Mapping[str, TopicCount]) -> dict[str, str]:

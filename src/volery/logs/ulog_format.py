@@ -44,8 +44,8 @@ TEXTS = LogTopic(
 class _Leaf(NamedTuple):
     name: str
     ros_type: str
-    size: int
-    count: int | None
+    item_bytes: int
+    length: int | None
     """Length of an array; None for a number."""
 
 
@@ -63,22 +63,20 @@ class UlogTopic:
         source = target = 0
         lines = []
         for leaf in leaves:
-            length = leaf.size * (1 if leaf.count is None else leaf.count)
-            if source + length > _MAX_BYTES:
+            size = leaf.item_bytes * (1 if leaf.length is None else leaf.length)
+            if source + size > _MAX_BYTES:
                 raise ValueError(
                     f"samples of topic '{name}' would have more than {_MAX_BYTES} bytes"
                 )
             if leaf.name == _TIME and leaf.ros_type == "uint64":
                 self._time_at = source
             if not leaf.name.startswith("_padding"):
-                target += -target % leaf.size
-                self._copies.append(
-                    (slice(source, source + length), slice(target, target + length))
-                )
-                array = "" if leaf.count is None else f"[{leaf.count}]"
+                target += -target % leaf.item_bytes
+                self._copies.append((slice(source, source + size), slice(target, target + size)))
+                array = "" if leaf.length is None else f"[{leaf.length}]"
                 lines.append(f"{leaf.ros_type}{array} {leaf.name}\n")
-                target += length
-            source += length
+                target += size
+            source += size
         if self._time_at < 0:
             raise ValueError(f"topic '{name}' has no field 'uint64_t {_TIME}'")
         self._size = self._copies[-1][0].stop

@@ -78,10 +78,10 @@ class UlogSource:
         layouts: dict[int, UlogTopic] = {}
         budget = TopicBudget(self._path)
         for kind, payload in self._messages():
-            sample = None
+            sample: _Sample | None = None
             if kind == ord("D") and len(payload) > _NUMBER.size:
                 layout = layouts.get(_NUMBER.unpack_from(payload)[0])
-                sample = layout and _sample(layout, payload[_NUMBER.size :])
+                sample = None if layout is None else _sample(layout, payload[_NUMBER.size :])
             elif kind in b"LC":
                 sample = _text_sample(_TEXT if kind == ord("L") else _TAGGED_TEXT, payload)
             elif kind == ord("F"):

@@ -27,7 +27,7 @@ NO_MODE = -1
 CONTACTS = (EventKind.IMPACT, EventKind.COLLISION)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class UavFlight:
     """The flight of one UAV, t samples; nan where the UAV did not exist."""
 
@@ -46,6 +46,9 @@ class UavFlight:
     """(t,) remaining fraction of the capacity; 1 without a battery."""
     mode: NDArray[np.int8]
     """(t,) numbers of `FlightMode`; -1 where the UAV did not exist."""
+
+    def __repr__(self) -> str:
+        return f"UavFlight({self.name!r}: {counted(len(self.times_s), 'sample')})"
 
 
 @dataclass(frozen=True, eq=False)

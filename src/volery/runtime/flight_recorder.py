@@ -79,6 +79,10 @@ class _Segment:
         self.rows[k, :, _MODE] = [int(fleet.mode(row)) for row in range(len(self.names))]
         self.count = k + 1
 
+    def ends_at(self, time_ns: int) -> bool:
+        """Returns whether the last sample is of a time."""
+        return self.count > 0 and int(self.times_ns[self.count - 1]) == time_ns
+
     def cut(self, time_ns: int) -> None:
         """Drops the samples at and after a time."""
         self.count = int(np.searchsorted(self.times_ns[: self.count], time_ns))
@@ -138,34 +142,14 @@ class FlightRecorder:
 
     def result(self) -> FlightResult:
         """Returns the flight so far, up to the present time; the arrays are copies."""
-        if self.is_recording:
-            self._sample()
-        filled = [segment for segment in self._segments if segment.count]
-        names = tuple(dict.fromkeys(name for segment in filled for name in segment.names))
-        total = sum(segment.count for segment in filled)
-        rows = np.full((len(names), total, _WIDTH), np.nan)
-        rows[:, :, _MODE] = NO_MODE
-        times = np.zeros(total, np.int64)
-        first = 0
-        for segment in filled:
-            part = slice(first, first + segment.count)
-            times[part] = segment.times_ns[: segment.count]
-            where = [names.index(name) for name in segment.names]
-            rows[where, part] = segment.rows[: segment.count].swapaxes(0, 1)
-            first += segment.count
-        edges = np.cumsum([0, *_COLUMNS.values()])
-        states = [rows[:, :, a:b].copy() for a, b in pairwise(edges)]
-        return FlightResult(
-            self._run.name,
-            self._run.seed,
-            names,
-            times / NS_PER_S,
-            *states,
-            rows[:, :, _BATTERY].copy(),
-            rows[:, :, _MODE].astype(np.int8),
-            self._recorded_events() if self._events is None else self._events,
-            self._run.world,
-        )
+        if not self.is_recording:
+            return self._result()
+        had_sample = self._segments[-1].ends_at(self._engine.time_ns)
+        self._sample()
+        result = self._result()
+        if not had_sample:  # later results keep to the rate
+            self._segments[-1].cut(self._engine.time_ns)
+        return result
 
     def __enter__(self) -> FlightRecorder:
         return self
@@ -192,6 +176,35 @@ class FlightRecorder:
             last = _Segment.of(names)
             self._segments.append(last)
         last.add(time_ns, fleet)
+
+    def _result(self) -> FlightResult:
+        filled = [segment for segment in self._segments if segment.count]
+        names = tuple(dict.fromkeys(name for segment in filled for name in segment.names))
+        total = sum(segment.count for segment in filled)
+        rows = np.full((len(names), total, _WIDTH), np.nan)
+        rows[:, :, _MODE] = NO_MODE
+        times = np.zeros(total, np.int64)
+        first = 0
+        for segment in filled:
+            part = slice(first, first + segment.count)
+            times[part] = segment.times_ns[: segment.count]
+            where = [names.index(name) for name in segment.names]
+            rows[where, part] = segment.rows[: segment.count].swapaxes(0, 1)
+            first += segment.count
+        edges = np.cumsum([0, *_COLUMNS.values()])
+        columns = zip(_COLUMNS, pairwise(edges), strict=True)
+        states = {name: rows[:, :, a:b].copy() for name, (a, b) in columns}
+        return FlightResult(
+            scenario=self._run.name,
+            seed=self._run.seed,
+            uavs=names,
+            times_s=times / NS_PER_S,
+            battery_charge=rows[:, :, _BATTERY].copy(),
+            mode=rows[:, :, _MODE].astype(np.int8),
+            events=self._recorded_events() if self._events is None else self._events,
+            world=self._run.world,
+            **states,
+        )
 
     def _recorded_events(self) -> tuple[Event, ...]:
         now_ns, start_ns = self._engine.time_ns, self._start_ns

@@ -9,7 +9,6 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from volery.bridges.logs.replay import Replay
 from volery.core.clock import s_from_ns
 from volery.core.errors import CommandError, ScenarioError
 from volery.engine.lock_step import Partner
@@ -58,6 +57,7 @@ from volery.world.ground_cover import BARE_GROUND
 
 if TYPE_CHECKING:
     from volery.bridges.logs.recorded_flight import RecordedFlight
+    from volery.bridges.logs.replay import Replay
     from volery.results import FlightResult
 
 
@@ -288,7 +288,9 @@ class Simulation:
         The first message appears now. Raises `RecordingError` if there is no log at the path.
         """
         self._check_open()
-        if not isinstance(replay, Replay):
+        if isinstance(replay, (str, Path)):
+            from volery.bridges.logs.replay import Replay
+
             replay = Replay(replay)
         replay.start(self.graph, self._engine, lambda: self.time_ns)
         self._replays.append(replay)

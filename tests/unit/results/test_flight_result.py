@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -64,6 +65,18 @@ def test_numbers_of_the_flight(result):
         "max_speed_m_s": 1.0,
         "min_separation_m": 3.0,
     }
+
+
+def test_one_uav_has_no_separation(result):
+    alone = replace(
+        result,
+        uavs=("uav1",),
+        position_map=result.position_map[:1],
+        velocity_map=result.velocity_map[:1],
+        mode=result.mode[:1],
+    )
+    assert np.isinf(alone.separation_m).all()
+    assert np.isnan(alone.summary()["min_separation_m"])
 
 
 def test_one_uav(result):

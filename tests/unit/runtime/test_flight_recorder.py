@@ -62,6 +62,19 @@ def test_fly_returns_the_flight_with_its_events(simulation):
     assert before.times_s[0] == 6.0
 
 
+def test_results_in_between_add_no_samples_to_later_ones(simulation):
+    recorder = simulation.record(10.0)
+    simulation.run(0.25)
+    assert recorder.result().times_s.tolist() == [0.0, 0.1, 0.2, 0.25]
+    simulation.vehicles.spawn("guest", "f450", [5.0, 5.0, 3.0])
+    assert recorder.result().uavs == ("uav1", "guest")
+    assert "<b>flat</b>" in simulation._repr_html_()
+    simulation.run(0.15)
+    result = recorder.result()
+    assert result.times_s.tolist() == [0.0, 0.1, 0.2, 0.3, 0.4]
+    assert np.isfinite(result["guest"].position_map[3:]).all()
+
+
 def test_a_stopped_recorder_keeps_its_flight(simulation):
     with simulation.record() as recorder:
         simulation.run(1.0)
