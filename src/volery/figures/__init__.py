@@ -1,4 +1,4 @@
-"""Draws flights: maps as PNG, charts as SVG, from plain `FlightData`.
+"""Drawings of flights: maps as PNG, charts as SVG, from plain `FlightData`.
 
-Reports, results of flights and logs use these drawings.
+Reports, results and logs use them; nothing here reads a simulation or a file.
 """

@@ -1,5 +1,7 @@
 """Logs as data: topics, times, arrays, tables and plots of simulated and real flights.
 
+Formats of files are in `volery.bridges.logs`; only ULog, which no bridge needs, is read here.
+
 log = open_log("flight.mcap")
 height = log["/uav1/odom"]["pose.pose.position.z"]
 table = log.to_pandas("/*/odom", ["pose.pose.position"])

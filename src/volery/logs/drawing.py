@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from io import BytesIO
 from typing import TYPE_CHECKING
@@ -11,13 +11,11 @@ import numpy as np
 
 from volery.core.arrays import Array
 from volery.core.errors import VoleryError
-from volery.results.drawing import new_axes, png_html
+from volery.figures.notebook import new_axes, png_html
+from volery.logs.fields import Column
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from volery.logs.log import Log
-    from volery.logs.topic_data import TopicData
 
 _DATES_S = 1e8
 """Times above it, s, are Unix times: no run lasts as long."""
@@ -26,59 +24,57 @@ _POINTS = 5000
 _LEGEND_LIMIT = 12
 
 
-def draw_fields(data: TopicData, fields: Sequence[str], axes: Axes | None) -> Axes:
-    """Draws fields of numbers over time, each component of a message or array as a line."""
-    if not fields:
-        raise VoleryError(f"name the fields of {data.topic} to plot: {', '.join(data.fields)}")
-    columns = data.columns(*fields)
+def draw_fields(
+    topic: str, times_s: Array, columns: Mapping[str, Column], axes: Axes | None
+) -> Axes:
+    """Draws fields of numbers over time, each component of a message or array as a line.
+
+    times_s: (n,). Raises `VoleryError` if a column holds no numbers.
+    """
     for name, values in columns.items():
         if values.dtype == object or values.dtype.kind not in "iufb":
-            raise VoleryError(f"'{name}' of {data.topic} cannot be plotted: it holds no numbers")
+            raise VoleryError(f"'{name}' of {topic} cannot be plotted: it holds no numbers")
     axes = new_axes() if axes is None else axes
-    times, label = _clock_of(data.times_s)
+    times, label = _clock_of(times_s)
     for name, values in columns.items():
         if values.ndim == 1:
-            axes.plot(times, values, label=f"{data.topic} {name}")
+            axes.plot(times, values, label=f"{topic} {name}")
         else:
             for k, line in enumerate(values.T):
-                axes.plot(times, line, label=f"{data.topic} {name}[{k}]")
+                axes.plot(times, line, label=f"{topic} {name}[{k}]")
     axes.set_xlabel(label)
-    if len(fields) == 1:
-        axes.set_ylabel(fields[0])
+    if len(columns) == 1:
+        axes.set_ylabel(next(iter(columns)))
     if len(axes.lines) <= _LEGEND_LIMIT:
         axes.legend()
     return axes
 
 
-def draw_paths(log: Log, uavs: Sequence[str], axes: Axes | None) -> Axes:
-    """Draws the paths of UAVs, or of all, from above."""
-    trajectories = log.trajectories(*uavs)
-    if not trajectories:
-        raise VoleryError(f"{log.path}: there are no topics with poses to draw")
+def draw_paths(paths: Mapping[str, Array], axes: Axes | None) -> Axes:
+    """Draws paths (n, 3), m, by label from above."""
     axes = new_axes() if axes is None else axes
-    for name, found in trajectories.items():
-        every = max(len(found.position) // _POINTS, 1)
-        x, y = found.position[::every, :2].T
-        label = found.topic if name == found.topic else f"{name} ({found.topic})"
+    for label, position in paths.items():
+        every = max(len(position) // _POINTS, 1)
+        x, y = position[::every, :2].T
         (line,) = axes.plot(x, y, label=label)
         axes.plot(x[-1:], y[-1:], "o", color=line.get_color())
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel("x, m")
     axes.set_ylabel("y, m")
     axes.grid(visible=True, alpha=0.3)
-    if len(trajectories) <= _LEGEND_LIMIT:
+    if len(paths) <= _LEGEND_LIMIT:
         axes.legend()
     return axes
 
 
-def paths_html(log: Log) -> str:
-    """Returns the paths of all UAVs as an `<img>`; empty without any."""
-    if not log.uavs:
+def paths_html(paths: Mapping[str, Array]) -> str:
+    """Returns paths (n, 3), m, by label as an `<img>`; empty without any."""
+    if not paths:
         return ""
     from matplotlib.figure import Figure
 
     figure = Figure(layout="constrained")
-    draw_paths(log, (), figure.add_subplot())
+    draw_paths(paths, figure.add_subplot())
     file = BytesIO()
     figure.savefig(file, format="png", dpi=110)
     return png_html(file.getvalue())

@@ -12,6 +12,7 @@ import numpy as np
 
 from volery.bridges.logs.decoding import LogDecoder
 from volery.bridges.topic_patterns import topic_filter
+from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.errors import GraphError, VoleryError
 from volery.core.plurals import counted
@@ -196,7 +197,10 @@ class Log:
         """Draws the paths of UAVs, or of all, from above; returns matplotlib's axes."""
         from volery.logs.drawing import draw_paths
 
-        return draw_paths(self, uavs, axes)
+        paths = self._paths(uavs)
+        if not paths:
+            raise VoleryError(f"{self.path}: there are no topics with poses to draw")
+        return draw_paths(paths, axes)
 
     # ------------------------------------------------------------------------------------- closing
 
@@ -229,10 +233,17 @@ class Log:
         return (
             f"<div><b>{escape(self.path.name)}</b>: {self.start_s:.3f} to {self.end_s:.3f} s, "
             f"{counted(len(self), 'topic')}</div>{problem}<table><tr><th>topic</th><th>type</th>"
-            f"<th>messages</th></tr>{rows}</table>{paths_html(self)}"
+            f"<th>messages</th></tr>{rows}</table>{paths_html(self._paths())}"
         )
 
     # -------------------------------------------------------------------------------------- inside
+
+    def _paths(self, uavs: tuple[str, ...] = ()) -> dict[str, Array]:
+        """Returns the positions (n, 3), m, of UAVs, or of all, by label."""
+        return {
+            uav if uav == found.topic else f"{uav} ({found.topic})": found.position
+            for uav, found in self.trajectories(*uavs).items()
+        }
 
     def _matching(self, patterns: tuple[str, ...]) -> list[str]:
         """Returns the topics that match names or patterns; all without any."""

@@ -150,7 +150,7 @@ class TopicData:
         A column for each number and text; arrays and lists are objects. A message of numbers in
         `fields`, such as `pose.pose.position`, becomes a column for each of its fields.
         """
-        from volery.results.tables import data_frame
+        from volery.core.data_frames import data_frame
 
         parts = [part for name in fields for part in parts_of(name, self._type)]
         found = self.columns(*parts)
@@ -204,7 +204,9 @@ class TopicData:
         """
         from volery.logs.drawing import draw_fields
 
-        return draw_fields(self, fields, axes)
+        if not fields:
+            raise VoleryError(f"name the fields of {self.topic} to plot: {', '.join(self.fields)}")
+        return draw_fields(self.topic, self.times_s, self.columns(*fields), axes)
 
     # ------------------------------------------------------------------------------------ inside
 

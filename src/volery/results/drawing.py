@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import base64
+from collections.abc import Mapping
 from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from volery.core.arrays import Array
 from volery.core.errors import VoleryError
 from volery.core.plurals import counted
 from volery.figures.flight_data import FlightData, Ground, UavTrack, drawn_event
-from volery.results.flight_result import FlightResult, quantities
+from volery.figures.notebook import new_axes, png_html
+from volery.results.flight_states import FlightStates
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,17 +21,16 @@ if TYPE_CHECKING:
 _MARGIN_M = 20.0
 """Width of the plain ground around paths without a world."""
 _LEGEND_LIMIT = 12
-_MAP_WIDTH_PX = 640
 
 
-def flight_png(result: FlightResult) -> bytes:
+def flight_png(result: FlightStates) -> bytes:
     """Returns the paths from above, over the world, as PNG."""
     from volery.figures.maps import top_view
 
     return top_view(_flight_data(result))
 
 
-def flight_html(result: FlightResult) -> str:
+def flight_html(result: FlightStates) -> str:
     """Returns a line of text and the map as HTML."""
     text = (
         f"<b>{escape(result.scenario)}</b>, seed {result.seed}: "
@@ -39,13 +40,7 @@ def flight_html(result: FlightResult) -> str:
     return f"<div>{text}</div>{png_html(flight_png(result))}"
 
 
-def png_html(png: bytes) -> str:
-    """Returns an `<img>` that holds a PNG."""
-    data = base64.b64encode(png).decode("ascii")
-    return f'<img width="{_MAP_WIDTH_PX}" alt="map" src="data:image/png;base64,{data}">'
-
-
-def draw_flight(result: FlightResult, axes: Axes | None) -> Axes:
+def draw_flight(result: FlightStates, axes: Axes | None) -> Axes:
     """Draws the paths from above, over the world."""
     from volery.figures.maps import draw_top_view
 
@@ -54,9 +49,9 @@ def draw_flight(result: FlightResult, axes: Axes | None) -> Axes:
     return axes
 
 
-def draw_over_time(result: FlightResult, quantity: str, axes: Axes | None) -> Axes:
+def draw_over_time(result: FlightStates, quantity: str, axes: Axes | None) -> Axes:
     """Draws a quantity of each UAV over time."""
-    known = quantities(result)
+    known = _quantities(result)
     if quantity not in known:
         raise VoleryError(f"cannot draw '{quantity}' over time: use {', '.join(known)}")
     values, label = known[quantity]
@@ -70,14 +65,7 @@ def draw_over_time(result: FlightResult, quantity: str, axes: Axes | None) -> Ax
     return axes
 
 
-def new_axes() -> Axes:
-    """Returns the axes of a new figure of pyplot, which notebooks and `pyplot.show()` show."""
-    from matplotlib import pyplot
-
-    return pyplot.subplots(layout="constrained")[1]
-
-
-def _flight_data(result: FlightResult) -> FlightData:
+def _flight_data(result: FlightStates) -> FlightData:
     world = result.world
     tracks = []
     for row, name in enumerate(result.uavs):
@@ -108,3 +96,14 @@ def _plain_ground(tracks: list[UavTrack]) -> Ground:
     low = flown.min(axis=0) - _MARGIN_M
     spacing = float((flown.max(axis=0) - low).max() + _MARGIN_M)
     return Ground(np.zeros((2, 2)), (float(low[0]), float(low[1])), spacing)
+
+
+def _quantities(result: FlightStates) -> Mapping[str, tuple[Array, str]]:
+    """Returns the quantities (n, t) that can be drawn over time, each with its label."""
+    return {
+        "height": (result.position_map[:, :, 2], "height (z), m"),
+        "x": (result.position_map[:, :, 0], "x, m"),
+        "y": (result.position_map[:, :, 1], "y, m"),
+        "speed": (result.speed_m_s, "speed, m/s"),
+        "battery": (result.battery_charge, "battery charge"),
+    }

@@ -1,22 +1,20 @@
-"""Tables of pandas, which is imported at the first use."""
+"""Returns the samples and the events of a flight as tables of pandas."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from volery.control.flight_modes import FlightMode
 from volery.core.clock import s_from_ns
-from volery.core.errors import VoleryError
-from volery.core.extras import missing_package
+from volery.core.data_frames import data_frame
 from volery.engine.events import Event
+from volery.results.flight_states import FlightStates
 
 if TYPE_CHECKING:
     import pandas
-
-    from volery.results.flight_result import FlightResult
 
 _AXES = {
     "position_map": ("x_m", "y_m", "z_m"),
@@ -26,16 +24,7 @@ _AXES = {
 }
 
 
-def data_frame(columns: Mapping[str, Any], what: str = "to_pandas()") -> pandas.DataFrame:
-    """Returns columns as a table. Raises `VoleryError` without pandas; `what` names the caller."""
-    try:
-        import pandas
-    except ImportError:
-        raise VoleryError(missing_package(what, "pandas", "pandas")) from None
-    return pandas.DataFrame(dict(columns))
-
-
-def flight_table(result: FlightResult) -> pandas.DataFrame:
+def flight_table(result: FlightStates) -> pandas.DataFrame:
     """Returns the samples of a flight, UAV by UAV; see `FlightResult.to_pandas`."""
     n, t = len(result), len(result.times_s)
     exists = (result.mode >= 0).ravel()

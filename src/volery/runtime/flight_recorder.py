@@ -18,7 +18,8 @@ from volery.core.errors import CommandError
 from volery.engine.engine import Engine
 from volery.engine.events import Event
 from volery.results.drawn_world import DrawnWorld
-from volery.results.flight_result import NO_MODE, FlightResult
+from volery.results.flight_result import FlightResult
+from volery.results.flight_states import NO_MODE
 
 DEFAULT_RATE_HZ = 20.0
 _FIRST_CAPACITY = 256

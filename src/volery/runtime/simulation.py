@@ -278,7 +278,8 @@ class Simulation:
         """Returns time, UAVs and a map with the recorded paths, for notebooks."""
         from volery.runtime.notebook_view import simulation_html
 
-        return simulation_html(self, self._recorders.present())
+        flight = self._recorders.present()
+        return simulation_html(self.scenario, self.time_s, self.uavs.values(), flight)
 
     # ---------------------------------------------------------------------------------------- logs
 

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from volery.core.data_frames import data_frame
 from volery.core.errors import VoleryError
 from volery.engine.events import Event, EventKind
 from volery.results import FlightResult
-from volery.results.tables import data_frame
 
 
 @pytest.fixture
