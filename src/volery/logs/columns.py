@@ -20,7 +20,9 @@ class Wanted(NamedTuple):
     """What is read of a topic: its type, and names of fields with dots."""
 
     msgtype: str
+    """Name of the type in ROS 2 style."""
     fields: Iterable[str]
+    """Names of fields with dots."""
 
 
 class Columns(NamedTuple):
@@ -29,6 +31,7 @@ class Columns(NamedTuple):
     times_ns: NDArray[np.int64]
     """(n,) time of the log, ns."""
     columns: dict[str, Column]
+    """Columns by names of fields."""
     refused: int
     """Number of messages that cannot be decoded, or have another type."""
 

@@ -51,6 +51,7 @@ class Log:
 
     def __init__(self, path: Path, source: LogSource, range_ns: tuple[int, int]) -> None:
         self.path = path
+        """File or folder of the log."""
         self._source = source
         self._range_ns = range_ns
         self._data: dict[str, TopicData] = {}
@@ -110,7 +111,7 @@ class Log:
         return len(self._source.topics)
 
     def between(self, start_s: float = 0.0, end_s: float = np.inf) -> Log:
-        """Returns the same log, limited to messages from `start_s` to before `end_s`."""
+        """Returns the same log, limited to messages from `start_s` to before `end_s`, s."""
         return Log(self.path, self._source, clipped(self._range_ns, start_s, end_s))
 
     # ----------------------------------------------------------------------------------- messages

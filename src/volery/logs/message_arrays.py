@@ -122,7 +122,7 @@ def cloud_array(message: Any) -> NDArray[Any]:
 
 
 def scan_angles(message: Any) -> NDArray[np.float64]:
-    """Returns the angles (k,), rad, of the beams of a LaserScan."""
+    """Returns the angles (K,), rad, of the beams of a LaserScan."""
     number = np.arange(len(message.ranges), dtype=np.float64)
     angles: NDArray[np.float64] = message.angle_min + message.angle_increment * number
     return angles

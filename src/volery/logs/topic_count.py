@@ -11,3 +11,4 @@ class TopicCount(NamedTuple):
     msgtype: str
     """Name in ROS 2 style, `nav_msgs/msg/Odometry`."""
     messages: int
+    """Number of messages."""

@@ -34,9 +34,11 @@ class LoggedMessage(NamedTuple):
     """A message of a log."""
 
     topic: str
+    """Name of the topic."""
     time_ns: int
     """Time of the log, ns: when the message was recorded."""
     message: Any
+    """Message with the fields of its type; arrays are read-only."""
 
 
 class TopicData:
@@ -108,7 +110,7 @@ class TopicData:
         """Returns a field of all messages.
 
         Numbers (n,); arrays of equal lengths (n, length); other arrays, texts and lists (n,) of
-        objects. A message of k numbers (n, k); a stamp (n,), ns. Raises `VoleryError`, with
+        objects. A message of k numbers (n, K); a stamp (n,), ns. Raises `VoleryError`, with
         similar names, for an unknown one.
         """
         return self.columns(field)[field]
@@ -124,7 +126,10 @@ class TopicData:
         return {name: self._joined(name, [found[part] for part in parts[name]]) for name in names}
 
     def padded(self, field: str, fill: float = np.nan) -> Column:
-        """Returns arrays of different lengths as one array (n, max length), padded with `fill`."""
+        """Returns arrays of numbers of different lengths as one array (n, K), padded with `fill`.
+
+        Raises `VoleryError` for a field of texts or messages.
+        """
         values = self[field]
         if values.ndim == 2:
             return values
@@ -140,7 +145,7 @@ class TopicData:
         return rows
 
     def between(self, start_s: float = 0.0, end_s: float = np.inf) -> TopicData:
-        """Returns the messages from `start_s` to before `end_s` of the log's time."""
+        """Returns the messages from `start_s` to before `end_s`, s, of the log's time."""
         start_ns, end_ns = clipped(self._range_ns, start_s, end_s)
         return TopicData(self._source, self.topic, self.msgtype, start_ns, end_ns)
 
@@ -172,7 +177,7 @@ class TopicData:
                 yield LoggedMessage(self.topic, record.time_ns, decoded.message)
 
     def images(self) -> Iterator[NDArray[Any]]:
-        """Yields images (height, width) or (height, width, channels), one by one.
+        """Yields images (H, W) or (H, W, C) one by one.
 
         Colours are red, green, blue; depth is in m (floats) or mm (uint16), as recorded. Raises
         `VoleryError` for a topic without images or an unknown encoding.
@@ -189,7 +194,7 @@ class TopicData:
 
     @property
     def angles_rad(self) -> Array:
-        """Angles (k,), rad, of the beams of LaserScans, by the first scan."""
+        """Angles (K,), rad, of the beams of LaserScans, by the first scan."""
         self._check_type((_SCAN,), "scans")
         for found in self.messages():
             return scan_angles(found.message)

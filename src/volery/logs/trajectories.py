@@ -39,6 +39,7 @@ class LoggedTrajectory:
     """The poses of one UAV in a log, n samples, in the order of the log; finite ones only."""
 
     uav: str
+    """Name of the UAV."""
     topic: str
     """Topic of the poses."""
     times_s: Array

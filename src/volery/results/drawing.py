@@ -99,7 +99,7 @@ def _plain_ground(tracks: list[UavTrack]) -> Ground:
 
 
 def _quantities(result: FlightStates) -> Mapping[str, tuple[Array, str]]:
-    """Returns the quantities (n, t) that can be drawn over time, each with its label."""
+    """Returns the quantities (n, T) that can be drawn over time, each with its label."""
     return {
         "height": (result.position_map[:, :, 2], "height (z), m"),
         "x": (result.position_map[:, :, 0], "x, m"),

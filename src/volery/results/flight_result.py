@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FlightResult(FlightStates):
-    """The flight of n UAVs, t samples of the true states; nan where a UAV did not exist.
+    """The flight of n UAVs, T samples of the true states; nan where a UAV did not exist.
 
     `result["uav1"]` is one UAV's flight, `to_pandas()` a table of all samples, `summary()` one row
     of numbers for the table of a study, `plot()` a map with the paths.

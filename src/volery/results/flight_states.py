@@ -26,23 +26,24 @@ CONTACTS = (EventKind.IMPACT, EventKind.COLLISION)
 
 @dataclass(frozen=True, eq=False)
 class UavFlight:
-    """The flight of one UAV, t samples; nan where the UAV did not exist."""
+    """The flight of one UAV, T samples; nan where the UAV did not exist."""
 
     name: str
+    """Name of the UAV."""
     times_s: Array
-    """(t,) simulated time, s."""
+    """(T,) simulated time, s."""
     position_map: Array
-    """(t, 3) m, map."""
+    """(T, 3) m, map."""
     velocity_map: Array
-    """(t, 3) m/s, map."""
+    """(T, 3) m/s, map."""
     attitude: Array
-    """(t, 4) quaternions x y z w, map from body."""
+    """(T, 4) quaternions x y z w, map from body."""
     omega_body: Array
-    """(t, 3) rad/s, body (FLU)."""
+    """(T, 3) rad/s, body (FLU)."""
     battery_charge: Array
-    """(t,) remaining fraction of the capacity; 1 without a battery."""
+    """(T,) remaining fraction of the capacity; 1 without a battery."""
     mode: NDArray[np.int8]
-    """(t,) numbers of `FlightMode`; -1 where the UAV did not exist."""
+    """(T,) numbers of `FlightMode`; -1 where the UAV did not exist."""
 
     def __repr__(self) -> str:
         return f"UavFlight({self.name!r}: {counted(len(self.times_s), 'sample')})"
@@ -50,27 +51,28 @@ class UavFlight:
 
 @dataclass(frozen=True, eq=False)
 class FlightStates:
-    """The flight of n UAVs, t samples of the true states; nan where a UAV did not exist."""
+    """The flight of n UAVs, T samples of the true states; nan where a UAV did not exist."""
 
     scenario: str
     """Name of the scenario."""
     seed: int
+    """Seed of the scenario, or of the last reset."""
     uavs: tuple[str, ...]
     """Names (n,)."""
     times_s: Array
-    """(t,) simulated time, s."""
+    """(T,) simulated time, s."""
     position_map: Array
-    """(n, t, 3) m, map."""
+    """(n, T, 3) m, map."""
     velocity_map: Array
-    """(n, t, 3) m/s, map."""
+    """(n, T, 3) m/s, map."""
     attitude: Array
-    """(n, t, 4) quaternions x y z w, map from body."""
+    """(n, T, 4) quaternions x y z w, map from body."""
     omega_body: Array
-    """(n, t, 3) rad/s, body (FLU)."""
+    """(n, T, 3) rad/s, body (FLU)."""
     battery_charge: Array
-    """(n, t) remaining fraction of the capacity; 1 without a battery."""
+    """(n, T) remaining fraction of the capacity; 1 without a battery."""
     mode: NDArray[np.int8]
-    """(n, t) numbers of `FlightMode`; -1 where the UAV did not exist."""
+    """(n, T) numbers of `FlightMode`; -1 where the UAV did not exist."""
     events: tuple[Event, ...] = ()
     """Events of the recorded time, oldest first."""
     world: DrawnWorld | None = None
@@ -116,7 +118,7 @@ class FlightStates:
 
     @cached_property
     def speed_m_s(self) -> Array:
-        """Speeds (n, t), m/s."""
+        """Speeds (n, T), m/s."""
         return np.asarray(np.linalg.norm(self.velocity_map, axis=2), dtype=np.float64)
 
     @cached_property
@@ -132,13 +134,13 @@ class FlightStates:
 
     @property
     def crashed(self) -> NDArray[np.bool_]:
-        """Whether each UAV (n,) crashed."""
+        """For each UAV (n,), whether it crashed."""
         crashed: NDArray[np.bool_] = (self.mode == int(FlightMode.CRASHED)).any(axis=1)
         return crashed
 
     @cached_property
     def separation_m(self) -> Array:
-        """Distances (t,), m, between the two UAVs that are nearest to each other; inf for one."""
+        """Distances (T,), m, between the two UAVs that are nearest to each other; inf for one."""
         nearest = np.full(len(self.times_s), np.inf)
         for row in range(len(self) - 1):
             apart = np.linalg.norm(self.position_map[row + 1 :] - self.position_map[row], axis=2)
