@@ -211,7 +211,8 @@ class TopicData:
 
         if not fields:
             raise VoleryError(f"name the fields of {self.topic} to plot: {', '.join(self.fields)}")
-        return draw_fields(self.topic, self.times_s, self.columns(*fields), axes)
+        lines = [part for name in fields for part in self._lines_of(name)]
+        return draw_fields(self.topic, self.times_s, self.columns(*lines), axes)
 
     # ------------------------------------------------------------------------------------ inside
 
@@ -248,6 +249,10 @@ class TopicData:
         if is_time(name, self._type):
             return nanoseconds(*columns)
         return columns[0] if len(columns) == 1 else np.stack(columns, axis=1)
+
+    def _lines_of(self, field: str) -> tuple[str, ...]:
+        """Returns the fields of a message, which are drawn as lines with their names."""
+        return (field,) if is_time(field, self._type) else parts_of(field, self._type)
 
     def _check_type(self, types: tuple[str, ...], what: str) -> None:
         if self._type not in types:

@@ -168,6 +168,9 @@ def test_plots(log):
     (line,) = axes.lines
     assert np.array_equal(line.get_xdata(), TIMES_S)
     assert line.get_ydata()[-1] == pytest.approx(1.9)
+    axes = log["/uav1/odom"].plot("pose.pose.position", axes=Figure().add_subplot())
+    labels = [line.get_label() for line in axes.lines]
+    assert labels == [f"/uav1/odom pose.pose.position.{axis}" for axis in "xyz"]
     paths = log.plot_paths(axes=Figure().add_subplot())
     assert [text.get_text() for text in paths.get_legend().get_texts()] == [
         "uav1 (/uav1/odom)",
