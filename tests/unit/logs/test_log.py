@@ -257,6 +257,24 @@ def test_a_topic_without_messages(tmp_path):
             log.plot_paths()
 
 
+def test_a_topic_of_another_encoding_is_one_error(tmp_path):
+    from mcap.writer import Writer
+
+    with (tmp_path / "foxglove.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("foxglove.Pose", "jsonschema", b"{}")
+        writer.add_message(writer.register_channel("/pose", "json", schema), 0, b"{}", 0)
+        writer.finish()
+    with open_log(tmp_path / "foxglove.mcap") as log:
+        assert log.topics["/pose"] == ("foxglove.Pose", 1)
+        with pytest.raises(
+            RecordingError,
+            match="^/pose cannot be read: messages encoded as 'json' are not decoded, only cdr",
+        ):
+            log["/pose"].fields  # noqa: B018
+
+
 def test_messages_that_cannot_be_decoded_are_counted(tmp_path):
     from mcap.writer import Writer
 
