@@ -270,7 +270,7 @@ def test_a_topic_of_another_encoding_is_one_error(tmp_path):
         assert log.topics["/pose"] == ("foxglove.Pose", 1)
         with pytest.raises(
             RecordingError,
-            match="^/pose cannot be read: messages encoded as 'json' are not decoded, only cdr",
+            match=r"^/pose cannot be read: messages encoded as 'json' are not decoded, only cdr",
         ):
             log["/pose"].fields  # noqa: B018
 
