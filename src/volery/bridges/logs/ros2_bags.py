@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import re
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from contextlib import closing
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from volery.bridges.logs.budgets import MAX_CHUNK_BYTES, UnpackingBudget
 from volery.bridges.logs.reader import summarize
@@ -24,17 +24,40 @@ _FORMS = {"msg": "ros2msg", "idl": "ros2idl"}
 _TABLES = ("messages", "topics", "message_definitions", "metadata", "schema")
 
 
+class BagIndex(NamedTuple):
+    """The contents of a bag of SQLite files: types and numbers of messages by topic, times, ns."""
+
+    types: dict[str, str]
+    counts: dict[str, int]
+    start_ns: int
+    end_ns: int
+
+
 def bag_topics(path: Path) -> dict[str, str]:
     """Returns types by topic. Raises `RecordingError` if there is no bag or it exceeds limits."""
-    if parts := _mcap_parts(path):
+    if parts := mcap_parts(path):
         return {t.topic: t.msgtype for part in parts for t in summarize(part).topics}
+    return sqlite_index(path).types
+
+
+def sqlite_index(path: Path) -> BagIndex:
+    """Returns the contents of a bag of SQLite files.
+
+    Raises `RecordingError` if there is no bag or it exceeds limits.
+    """
     from rosbags.rosbag2 import Reader
 
     _check_metadata(path)
     _check_files(path)
     try:
         with Reader(path) as reader:
-            return {one.topic: one.msgtype for one in reader.connections}
+            counts: dict[str, int] = {}
+            for one in reader.connections:
+                counts[one.topic] = counts.get(one.topic, 0) + one.msgcount
+            types = {one.topic: one.msgtype for one in reader.connections}
+            if not sum(counts.values()):
+                return BagIndex(types, counts, 0, 0)
+            return BagIndex(types, counts, reader.start_time, reader.end_time - 1)
     except RecordingError:
         raise
     except Exception as error:  # the reader's errors on a folder that is no bag
@@ -44,12 +67,23 @@ def bag_topics(path: Path) -> dict[str, str]:
 class BagWalk:
     """Iterates over the records of a ROS 2 bag; afterwards `problem` describes any damage."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(
+        self,
+        path: Path,
+        topics: Set[str] | None = None,
+        start_ns: int | None = None,
+        end_ns: int | None = None,
+    ) -> None:
+        """Selects the records of `topics` (None: all), from `start_ns` to before `end_ns`.
+
+        The selection applies to SQLite files.
+        """
         self._path = path
+        self._topics, self._range_ns = topics, (start_ns, end_ns)
         self.problem = ""
 
     def __iter__(self) -> Iterator[LogRecord]:
-        parts = _mcap_parts(self._path)
+        parts = mcap_parts(self._path)
         for part in parts:
             walk = LogWalk(part)
             yield from walk
@@ -64,7 +98,14 @@ class BagWalk:
         budget = UnpackingBudget(self._path, _size(self._path))
         try:
             with Reader(self._path) as reader:
-                for connection, time_ns, data in reader.messages():
+                chosen = [
+                    one
+                    for one in reader.connections
+                    if self._topics is None or one.topic in self._topics
+                ]
+                if not chosen:
+                    return
+                for connection, time_ns, data in reader.messages(chosen, *self._range_ns):
                     budget.spend(len(data))
                     if connection.id not in topics:
                         topics[connection.id] = _topic(connection)
@@ -81,8 +122,11 @@ def _topic(connection: Any) -> LogTopic:
     return LogTopic(connection.topic, connection.msgtype, definition, "cdr", form)
 
 
-def _mcap_parts(path: Path) -> list[Path]:
-    """Returns the MCAP files of a bag's folder in order: `x_0.mcap` to `x_10.mcap`."""
+def mcap_parts(path: Path) -> list[Path]:
+    """Returns the MCAP files of a bag's folder in order: `x_0.mcap` to `x_10.mcap`.
+
+    Empty if `path` is a file, or a folder without any.
+    """
     found = path.glob("*.mcap") if path.is_dir() else ()
     return sorted(found, key=lambda part: (len(part.name), part.name))
 

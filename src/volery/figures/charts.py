@@ -18,8 +18,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from volery.core.arrays import Array
-from volery.report.flight_data import FlightData, UavTrack
-from volery.report.palette import CSS_NAMES, FAINT, GRID, INK, UAV_COLORS, uav_color
+from volery.figures.flight_data import FlightData, UavTrack
+from volery.figures.palette import CSS_NAMES, FAINT, GRID, INK, UAV_COLORS, uav_color
 
 _LEGEND_LIMIT = len(UAV_COLORS)
 _POINTS = 1200

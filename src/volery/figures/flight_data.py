@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.arrays import Array
+from volery.core.clock import NS_PER_S
 
 
 @dataclass(frozen=True)
@@ -103,6 +105,13 @@ class FlightEvent:
     def is_contact(self) -> bool:
         """Whether a UAV hit an obstacle or another UAV."""
         return self.kind in {"impact", "collision"}
+
+
+def drawn_event(event: Any) -> FlightEvent:
+    """Returns an event of the engine as drawn in figures."""
+    x, y, z = (float(v) for v in event.position_map)
+    kind = str(getattr(event.kind, "value", event.kind))
+    return FlightEvent(event.time_ns / NS_PER_S, kind, event.describe(), (x, y, z))
 
 
 @dataclass(frozen=True)

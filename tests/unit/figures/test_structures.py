@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from volery.report.structures import seen_from_above
+from volery.figures.structures import seen_from_above
 from volery.world.city.buildings import extruded
 from volery.world.mesh import Mesh
 

@@ -14,11 +14,12 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from volery.report.flight_data import FlightData, Ground, Structures
-from volery.report.palette import uav_color
+from volery.figures.flight_data import FlightData, Ground, Structures, Trees
+from volery.figures.palette import uav_color
 
 _DPI = 110
 _WIDTH = 11.0
+_TOP_MARGIN_M = 35.0
 _NIGHT = "#10151b"
 _NIGHT_INK = "#c9d1d9"
 _GROUND = LinearSegmentedColormap.from_list("ground", ["#dfe5d3", "#f1eee0", "#e6d9c2"])
@@ -34,37 +35,24 @@ Box = tuple[float, float, float, float]
 
 
 def top_view(flight: FlightData) -> bytes:
+    """Draws terrain, solids, trees by the size of their crowns, and the paths; returns PNG."""
+    figure, axes = _map(_frame(flight, _TOP_MARGIN_M), "white")
+    draw_top_view(axes, flight)
+    return _png(figure)
+
+
+def draw_top_view(axes: Axes, flight: FlightData) -> None:
     """Draws terrain, solids, trees by the size of their crowns, and the paths."""
-    box = _frame(flight, margin_m=35.0)
-    figure, axes = _map(box, "white")
+    box = _frame(flight, _TOP_MARGIN_M)
+    _set_view(axes, box, "white")
     _draw_ground(axes, flight.ground, box)
     if flight.structures is not None:
         _draw_structures(axes, flight.structures, box)
     if flight.trees is not None:
-        foot = flight.trees.position_map
-        near = _inside(foot, box, 12.0)
-        crowns = 2.0 * flight.trees.crown_radius_m[near]
-        trunks = np.maximum(flight.trees.dbh_m[near], 0.15)
-        for widths, style in (
-            (crowns, {"facecolors": "#3f7d4a", "alpha": 0.28, "edgecolors": "#2c5c35"}),
-            (trunks, {"facecolors": "#4a3222", "alpha": 0.9, "edgecolors": "none"}),
-        ):
-            axes.add_collection(
-                EllipseCollection(
-                    widths,
-                    widths,
-                    0.0,
-                    units="xy",
-                    offsets=foot[near, :2],
-                    transOffset=axes.transData,
-                    linewidths=0.4,
-                    **style,
-                )
-            )
+        _draw_trees(axes, flight.trees, box)
     _draw_paths(axes, flight, outline="white")
     _draw_contacts(axes, flight)
     _scale_bar(axes, box, "#222222", "white")
-    return _png(figure)
 
 
 def lidar_view(flight: FlightData) -> bytes | None:
@@ -173,12 +161,16 @@ def _map(box: Box, background: str) -> tuple[Figure, Axes]:
     height = _WIDTH * (box[3] - box[1]) / (box[2] - box[0])
     figure = Figure(figsize=(_WIDTH, min(height, _WIDTH * 1.25)), facecolor=background)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    _set_view(axes, box, background)
+    return figure, axes
+
+
+def _set_view(axes: Axes, box: Box, background: str) -> None:
     axes.set_facecolor(background)
     axes.set_xlim(box[0], box[2])
     axes.set_ylim(box[1], box[3])
     axes.set_aspect("equal")
     axes.set_axis_off()
-    return figure, axes
 
 
 def _draw_ground(axes: Axes, ground: Ground, box: Box) -> None:
@@ -217,6 +209,29 @@ def _draw_structures(axes: Axes, structures: Structures, box: Box) -> None:
         PolyCollection(list(tops), facecolors="#b9b2a8", edgecolors="#b9b2a8", linewidths=0.3)
     )
     axes.add_collection(LineCollection(list(edges), colors="#6f675c", linewidths=0.7))
+
+
+def _draw_trees(axes: Axes, trees: Trees, box: Box) -> None:
+    foot = trees.position_map
+    near = _inside(foot, box, 12.0)
+    crowns = 2.0 * trees.crown_radius_m[near]
+    trunks = np.maximum(trees.dbh_m[near], 0.15)
+    for widths, style in (
+        (crowns, {"facecolors": "#3f7d4a", "alpha": 0.28, "edgecolors": "#2c5c35"}),
+        (trunks, {"facecolors": "#4a3222", "alpha": 0.9, "edgecolors": "none"}),
+    ):
+        axes.add_collection(
+            EllipseCollection(
+                widths,
+                widths,
+                0.0,
+                units="xy",
+                offsets=foot[near, :2],
+                transOffset=axes.transData,
+                linewidths=0.4,
+                **style,
+            )
+        )
 
 
 def _draw_paths(axes: Axes, flight: FlightData, outline: str) -> None:

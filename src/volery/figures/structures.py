@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.report.flight_data import Structures
+from volery.figures.flight_data import Structures
 from volery.world.mesh import Mesh
 
 _CORNER_M = 1e-3
