@@ -20,10 +20,10 @@ from volery.runtime.vehicles.flight_future import FlightFuture
 DEFAULT_TIMEOUT_S = 60.0
 CHECK_PERIOD_S = 0.01
 """Period of simulated time after which a condition in Python is checked."""
-_LOOK_S = 0.02
-"""Wall time between two looks at a run in another thread, s ..."""
-_IDLE_S = 2.0
-"""... which may pause between two calls of `run` for this long."""
+_POLL_PERIOD_S = 0.02
+"""Wall time between two checks of a run in another thread, s ..."""
+_MAX_IDLE_S = 2.0
+"""... which may spend this long, s, between two calls of `run`."""
 
 Awaited: TypeAlias = "Callable[[], bool] | FlightFuture | Iterable[FlightFuture] | EventKind | str"
 """What a run can wait for."""
@@ -135,16 +135,35 @@ class ConditionalRuns:
     def wait(self, is_done: Callable[[], bool], timeout_s: float) -> bool:
         """Waits for `is_done()`: advances the simulation, or waits for the thread that does.
 
-        Returns whether it became true within `timeout_s` of simulated time.
+        Returns whether it became true within `timeout_s` of simulated time. Raises `CommandError`
+        if the simulation is quit or does not advance.
         """
         _check_timeout(timeout_s)
-        if self._loop.owner == threading.get_ident():
-            return self.advance(is_done, timeout_s)
+        if self._loop.owner == threading.get_ident() or not self._has_owner():
+            is_over = self.advance(is_done, timeout_s)
+        else:
+            is_over = self._wait_for_thread(is_done, timeout_s)
+        if not is_over and self._loop.quitting:
+            raise CommandError(self._quit_text())
+        return is_over
+
+    def is_busy(self) -> bool:
+        """Returns whether another thread advances the simulation now."""
+        return self._loop.thread not in (None, threading.get_ident())
+
+    def _has_owner(self) -> bool:
+        """Returns whether the thread that last advanced the simulation still exists."""
+        return any(thread.ident == self._loop.owner for thread in threading.enumerate())
+
+    def _quit_text(self) -> str:
+        return f"the run was quit at {self.time_s:.2f} s"
+
+    def _wait_for_thread(self, is_done: Callable[[], bool], timeout_s: float) -> bool:
         end_s, idle_s = self.time_s + timeout_s, 0.0
-        while not is_done() and self.time_s < end_s:
-            time.sleep(_LOOK_S)
-            idle_s = 0.0 if self._loop.thread is not None else idle_s + _LOOK_S
-            if idle_s > _IDLE_S:
+        while not is_done() and self.time_s < end_s and not self._loop.quitting:
+            time.sleep(_POLL_PERIOD_S)
+            idle_s = 0.0 if self._loop.thread is not None else idle_s + _POLL_PERIOD_S
+            if idle_s > _MAX_IDLE_S:
                 raise CommandError(
                     "the simulation does not advance: its own thread must call run()"
                 )
@@ -193,7 +212,7 @@ class _Goal:
         if not self.condition():
             pending = [future for future in self._futures if not future.done()]
             if runs._loop.quitting:
-                raise CommandError(f"the run was quit at {runs.time_s:.2f} s")
+                raise CommandError(runs._quit_text())
             what = pending[0].pending_text() if pending else f"{self._name} did not happen"
             raise WaitTimeoutError(
                 f"{what} within {timeout_s:g} s, at {runs.time_s:.2f} s; pass a longer timeout_s?"

@@ -229,7 +229,11 @@ class VectorizedSimulation(BatchCommands):
             self._uavs = [self.uav(env, name) for env in range(self.num_envs) for name in names]
         return self._uavs
 
+    def _paths(self) -> Sequence[str]:
+        return [f"{env}/{name}" for env in range(self.num_envs) for name in self.uav_names]
+
     def _fleets(self) -> Sequence[tuple[Fleet, slice]]:
+        self._check_open()
         num_uavs = len(self._starts)
         return [
             (block.fleet, slice(first * num_uavs, (first + len(block.seeds)) * num_uavs))

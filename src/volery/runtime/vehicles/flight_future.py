@@ -22,7 +22,7 @@ from volery.core.errors import CommandError, FlightError, WaitTimeoutError
 
 
 @dataclass(frozen=True)
-class FlightResult:
+class CommandResult:
     """State of a UAV when a flight command was done."""
 
     time_ns: int
@@ -50,8 +50,8 @@ class FlightSource(Protocol):
     def describe(self, future: FlightFuture) -> str:
         """Returns mode and position of the UAV."""
 
-    def wait(self, is_done: Callable[[], bool], timeout_s: float) -> bool:
-        """Advances the simulation, or waits for it, until `is_done()`; returns whether it is."""
+    def wait(self, future: FlightFuture, timeout_s: float) -> bool:
+        """Advances the simulation, or waits for it, until the future is done; returns if it is."""
 
 
 class FlightFuture:
@@ -78,7 +78,7 @@ class FlightFuture:
         self.final = final
         """Flight mode after the command."""
         self._source = source
-        self._result: FlightResult | None = None
+        self._result: CommandResult | None = None
         self._error: FlightError | None = None
         self._callbacks: list[Callable[[FlightFuture], None]] = []
 
@@ -92,8 +92,11 @@ class FlightFuture:
         """Returns False: another command, such as `hold`, ends a flight command."""
         return False
 
-    def result(self) -> FlightResult:
-        """Returns the state at the end. Raises `FlightError` if it failed, or if it is not done."""
+    def result(self) -> CommandResult:
+        """Returns the state at the end.
+
+        Raises `FlightError` if the command failed, `CommandError` if it is not done yet.
+        """
         if not self.done():
             raise CommandError(f"{self.pending_text()}; call wait(), or await it")
         if self._error is not None:
@@ -107,14 +110,18 @@ class FlightFuture:
         return self._error
 
     def add_done_callback(self, callback: Callable[[FlightFuture], None]) -> None:
-        """Calls `callback(future)` in the simulation's thread when it is done; at once if it is."""
+        """Calls `callback(future)` when it is done, at once if it is.
+
+        The call comes from the thread that advances the UAV, within a tick: the callback may
+        command UAVs, and does not wait.
+        """
         if self.done():
             callback(self)
         else:
             self._callbacks.append(callback)
             self._source.watch(self)
 
-    def wait(self, timeout_s: float = 60.0) -> FlightResult:
+    def wait(self, timeout_s: float = 60.0) -> CommandResult:
         """Waits until the command is done and returns the state then.
 
         In the thread of the simulation, and outside of a run, it advances the simulation as fast
@@ -122,14 +129,14 @@ class FlightFuture:
         `math.inf` waits for as long as it takes. Raises `FlightError` if the command fails,
         `WaitTimeoutError` if it is not done in time, `CommandError` within a tick.
         """
-        if not self.done() and not self._source.wait(self.done, timeout_s):
+        if not self.done() and not self._source.wait(self, timeout_s):
             raise WaitTimeoutError(
                 f"{self.pending_text()} within {timeout_s:g} s; is the goal in reach, or the "
                 "timeout too short?"
             )
         return self.result()
 
-    def __await__(self) -> Generator[Any, None, FlightResult]:
+    def __await__(self) -> Generator[Any, None, CommandResult]:
         """Waits beside `Simulation.run_async`, which advances the simulation."""
         if not self.done():
             loop = asyncio.get_running_loop()
@@ -139,7 +146,10 @@ class FlightFuture:
                 if not waiter.done():
                     waiter.set_result(None)
 
-            self.add_done_callback(lambda _: loop.call_soon_threadsafe(wake))
+            def on_done(_future: FlightFuture) -> None:
+                loop.call_soon_threadsafe(wake)
+
+            self.add_done_callback(on_done)
             yield from waiter
         return self.result()
 
@@ -154,7 +164,7 @@ class FlightFuture:
         """Whether `complete` or `fail` was called."""
         return self._result is not None or self._error is not None
 
-    def complete(self, result: FlightResult) -> None:
+    def complete(self, result: CommandResult) -> None:
         """Sets the result and calls the callbacks."""
         if not self.is_settled:
             self._result = result

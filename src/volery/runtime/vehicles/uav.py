@@ -14,7 +14,7 @@ from volery.control.setpoints import MAX_COORDINATE, checked
 from volery.control.trajectory import Trajectory
 from volery.core.arrays import Array
 from volery.core.errors import CommandError
-from volery.runtime.vehicles.flight_future import FlightFuture, FlightResult
+from volery.runtime.vehicles.flight_future import CommandResult, FlightFuture
 from volery.runtime.vehicles.flight_futures import FlightFutures
 from volery.runtime.vehicles.uav_sensors import UavSensors
 from volery.scenario.schema import Flight
@@ -158,7 +158,7 @@ class Uav:
 
     # ------------------------------------------------------------------------------ flight modes
 
-    def wait(self, timeout_s: float = 60.0) -> FlightResult | None:
+    def wait(self, timeout_s: float = 60.0) -> CommandResult | None:
         """Waits for the present flight command, such as the take-off at the scenario's start.
 
         Returns its result, None if the UAV has no command to complete. See `FlightFuture.wait`.
