@@ -23,6 +23,7 @@ from volery.core.arrays import Array
 from volery.core.clock import s_from_ns
 from volery.core.geodesy import LocalFrame
 from volery.sensors.cameras.cloud import organised_points
+from volery.sensors.cameras.depth_units import millimetres
 from volery.sensors.cameras.model import CameraModel
 from volery.sensors.lidar_model import LidarModel
 from volery.sensors.mount import Mount
@@ -139,6 +140,13 @@ class CameraSample(_SensorSample):
     def distortion(self) -> Array:
         """(5,) coefficients k1, k2, p1, p2, k3 of OpenCV's lens model."""
         return np.array(self.model.distortion, dtype=np.float64)
+
+    def depth_mm(self) -> NDArray[np.uint16]:
+        """Returns the depth (H, W) in whole mm, 0 for unknown or beyond 65.535 m (REP 118).
+
+        The array is new; `PIL.Image.fromarray` and `cv2.imwrite` save it as a PNG of 16 bits.
+        """
+        return millimetres(self.depth)
 
     def points_optical(self) -> NDArray[np.float32]:
         """Returns the points of the pixels (H, W, 3), m, in the optical frame.

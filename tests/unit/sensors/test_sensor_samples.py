@@ -57,6 +57,8 @@ def test_points_of_a_camera_lie_on_the_ground(hovering):
     x = (points[12, 20, 0] / points[12, 20, 2]) * sample.intrinsics[0, 0] + sample.intrinsics[0, 2]
     assert x == pytest.approx(20.0, abs=0.01)
     assert sample.distortion.shape == (5,)
+    assert sample.depth_mm().dtype == np.uint16
+    assert np.median(sample.depth_mm()) == pytest.approx(2950, abs=50)
 
 
 def test_beams_have_directions_times_and_intensities(hovering):
