@@ -14,6 +14,7 @@ from volery.core.clock import NS_PER_S, s_from_ns
 from volery.core.errors import CommandError, WaitTimeoutError
 from volery.engine.engine import Engine
 from volery.engine.events import Event, EventKind
+from volery.runtime.checks import check_timeout
 from volery.runtime.run_loop import RunLoop
 from volery.runtime.vehicles.flight_future import FlightFuture
 
@@ -138,7 +139,7 @@ class ConditionalRuns:
         Returns whether it became true within `timeout_s` of simulated time. Raises `CommandError`
         if the simulation is quit or does not advance.
         """
-        _check_timeout(timeout_s)
+        check_timeout(timeout_s)
         if self._loop.owner == threading.get_ident() or not self._has_owner():
             is_over = self.advance(is_done, timeout_s)
         else:
@@ -170,7 +171,7 @@ class ConditionalRuns:
         return is_done()
 
     def _pieces(self, goal: _Goal, timeout_s: float, speed: float | None) -> Iterator[None]:
-        _check_timeout(timeout_s)
+        check_timeout(timeout_s)
         return self._loop.pieces_until(goal.condition, timeout_s, speed, self._look)
 
     def _check_possible(self) -> None:
@@ -255,11 +256,6 @@ def _futures_of(awaited: Any) -> tuple[FlightFuture, ...]:
 def _name_of(awaited: Any) -> str:
     name = getattr(awaited, "__name__", type(awaited).__name__)
     return "the condition" if name == "<lambda>" else f"the condition {name}()"
-
-
-def _check_timeout(timeout_s: Any) -> None:
-    if not isinstance(timeout_s, int | float) or math.isnan(timeout_s) or timeout_s < 0.0:
-        raise CommandError(f"timeout_s must be a number of seconds, not {timeout_s!r}")
 
 
 def _check_period(period_s: Any) -> None:

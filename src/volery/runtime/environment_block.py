@@ -89,6 +89,8 @@ class EnvironmentBlock:
         self._bank_of = {id(bank.sensors): k for k, bank in enumerate(banks)}
         self._places = _places(banks)
         self._latest: list[Samples | None] = [None] * len(banks)
+        self._bank_uavs = [np.array([sensor.uav for sensor in bank.sensors]) for bank in banks]
+        """By bank: (S,) row of the UAV of each sensor."""
         self._events: list[EnvironmentEvent] = []
         self._began_ns = np.zeros(num_envs, np.int64)
         self._mounts = {(f.id.uav_name, f.id.name): f.mount for f in self._fitted}
@@ -148,8 +150,9 @@ class EnvironmentBlock:
         self._stir_air(envs)
         self._engine.collisions.forget(rows)
         self._began_ns[envs] = self.time_ns
-        for path in self._paths_of(rows):
-            self.futures.fail(path, "the environment was reset")
+        if self.futures.has_pending:
+            for path in self._paths_of(rows):
+                self.futures.fail(path, "the environment was reset")
         self._mark_old(rows)
         keys = self._keys_of(envs)
         for samples, fresh in self._engine.restart_sensors(rows, keys):
@@ -278,8 +281,9 @@ class EnvironmentBlock:
         partner = event.partner.split("/")[-1]
         own = replace(event, uav=name, partner=partner)
         number = self._first + int(env)
-        other = f"{number}/{partner}" if "/" in event.partner else partner
-        self.futures.happened(replace(event, uav=f"{number}/{name}", partner=other))
+        if self.futures.has_pending:
+            other = f"{number}/{partner}" if "/" in event.partner else partner
+            self.futures.happened(replace(event, uav=f"{number}/{name}", partner=other))
         self._events.append(EnvironmentEvent(number, own))
 
     def deliver(self) -> None:
@@ -305,7 +309,7 @@ class EnvironmentBlock:
         for bank, sampled in enumerate(self._latest):
             if sampled is None:
                 continue
-            uavs = [sensor.uav for sensor in self._engine.banks[bank].sensors]
+            uavs = self._bank_uavs[bank]
             is_old = self._is_old.setdefault(bank, np.zeros(len(uavs), np.bool_))
             is_old |= np.isin(uavs, rows)
 

@@ -213,15 +213,15 @@ class Simulation:
         awaited: a function without arguments that returns whether to stop, which is called at each
         multiple of `check_period_s` since time 0; a `FlightFuture` (`uav.take_off()`), or several:
         until all are done; an `EventKind` or its name ("collision"): until the next such event.
-        `timeout_s` is simulated time, `math.inf` for no limit; the scenario's end does not end the
-        wait. `speed` is as for `run`. Raises `FlightError` if a flight command fails,
+        `timeout_s` is simulated time, s, `math.inf` for no limit; the scenario's end does not end
+        the wait. `speed` is as for `run`. Raises `FlightError` if a flight command fails,
         `WaitTimeoutError` after `timeout_s`, `CommandError` within a run or a tick.
         """
         with reported_failures(self.graph):
             return self._runs.run_until(awaited, timeout_s, speed, check_period_s)
 
     async def run_async(self, seconds: float | None = None, *, speed: float | None = None) -> None:
-        """Advances like `run` while other coroutines of the same thread run in between.
+        """Advances like `run`, by `seconds`, s, while other coroutines run in between.
 
         For notebooks and other asyncio programs: `task = asyncio.create_task(
         simulation.run_async(speed=1.0))`, then `await uav.go_to(...)`. Cancel the task to stop.
@@ -240,7 +240,10 @@ class Simulation:
         speed: float | None = None,
         check_period_s: float = CHECK_PERIOD_S,
     ) -> Event | None:
-        """Advances like `run_until` while other coroutines of the same thread run in between."""
+        """Advances like `run_until`, while other coroutines run in between.
+
+        The arguments are the same; `timeout_s` and `check_period_s` are simulated time, s.
+        """
         with reported_failures(self.graph):
             return await self._runs.run_until_async(awaited, timeout_s, speed, check_period_s)
 

@@ -32,7 +32,7 @@ from volery.core.errors import CommandError, ScenarioError
 from volery.core.plurals import counted
 from volery.runtime.build.fleet import place
 from volery.runtime.build.worlds import build_city, build_forest, build_scene, build_terrain
-from volery.runtime.checks import check_reset_seed, check_seconds, check_steps
+from volery.runtime.checks import check_reset_seed, check_seconds, check_steps, check_timeout
 from volery.runtime.environment_block import EnvironmentBlock, EnvironmentEvent, SampleArrays
 from volery.runtime.environment_sensors import EnvironmentSensors
 from volery.runtime.vehicles.batch_commands import BatchCommands, joined_states
@@ -95,6 +95,7 @@ class VectorizedSimulation(BatchCommands):
         """Sensors by UAV and name: `envs.sensors["uav1"]["imu"].latest`, arrays (K, ...)."""
         self._uavs: list[Uav] = []
         self._owed_ns = 0
+        self._is_stepping = False
         self._closed = False
         self._pool = ThreadPoolExecutor(len(self._blocks), thread_name_prefix="volery-envs")
 
@@ -139,10 +140,14 @@ class VectorizedSimulation(BatchCommands):
         self._check_open()
         check_steps(steps)
         target = self._blocks[0].step + steps
-        others = [self._pool.submit(block.advance_to, target) for block in self._blocks[1:]]
-        self._blocks[0].advance_to(target)
-        for other in others:
-            other.result()
+        self._is_stepping = True
+        try:
+            others = [self._pool.submit(block.advance_to, target) for block in self._blocks[1:]]
+            self._blocks[0].advance_to(target)
+            for other in others:
+                other.result()
+        finally:
+            self._is_stepping = False
 
     def run(self, seconds: float) -> None:
         """Advances by `seconds`; a remaining part of a step counts for the next call."""
@@ -248,6 +253,9 @@ class VectorizedSimulation(BatchCommands):
 
         For `FlightFuture.wait` of a UAV of one environment.
         """
+        check_timeout(timeout_s)
+        if self._is_stepping:
+            raise CommandError("the environments are advancing already: use add_done_callback()")
         period = max(1, 8_000_000 // self._blocks[0].dt_ns)
         end_s = self.time_s + timeout_s
         while not is_done() and self.time_s < end_s:

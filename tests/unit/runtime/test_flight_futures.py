@@ -311,4 +311,16 @@ def test_environments_wait_for_one_uav(flat_data):
         assert "the environment was reset" in str(future.exception())
         for done in envs.hold():
             done.wait()
+        with pytest.raises(CommandError, match="timeout_s must be a number"):
+            envs.uav(1, "uav1").land().wait(timeout_s=-1.0)
+        refused = []
+
+        def wait(landed):
+            with pytest.raises(CommandError, match="advancing already"):
+                envs.uav(1, "uav1").take_off().wait()
+            refused.append(landed.result().mode)
+
+        envs.uav(1, "uav1").pending_command.add_done_callback(wait)
+        envs.run(15.0)
+        assert refused == [FlightMode.LANDED]
         assert envs.uav(0, "uav1").mode is FlightMode.HOLD

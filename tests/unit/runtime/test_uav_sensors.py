@@ -203,6 +203,14 @@ def test_resets_snapshots_and_deleted_uavs(simulate, all_data):
     assert not simulation.uavs["uav1"].sensors["imu"].has_sample
 
 
+def test_environments_of_one_thread_are_read_without_copies(flat_data):
+    with VectorizedSimulation(parse_scenario(flat_data), 3, threads=1) as envs:
+        envs.run(0.1)
+        imu = envs.sensors["uav1"]["imu"]
+        assert np.shares_memory(imu.latest.specific_force, imu.latest.specific_force)
+        assert not imu.latest.specific_force.flags.writeable
+
+
 def test_environments_have_the_same_names(simulate, flat_data):
     flat_data["types"]["f450"]["sensors"].append({"kind": "lidar", "name": "horizontal"})
     flat_data["uavs"][0]["position_m"] = [0.0, 0.0, 2.0]

@@ -40,7 +40,7 @@ class BatchCommands(ABC):
     # ------------------------------------------------------------------------------ flight modes
 
     def take_off(self, altitude_m: float | None = None) -> list[FlightFuture]:
-        """Takes off with all UAVs on the ground; returns their futures, for `run_until`."""
+        """Takes off with all UAVs on the ground, by `altitude_m`, m; returns their futures."""
         modes = (FlightMode.LANDED,)
         return [uav.take_off(altitude_m) for uav in self._handles() if uav.mode in modes]
 

@@ -125,7 +125,7 @@ class FlightFuture:
         """Waits until the command is done and returns the state then.
 
         In the thread of the simulation, and outside of a run, it advances the simulation as fast
-        as possible; in another thread it waits for the run. `timeout_s` is simulated time;
+        as possible; in another thread it waits for the run. `timeout_s` is simulated time, s;
         `math.inf` waits for as long as it takes. Raises `FlightError` if the command fails,
         `WaitTimeoutError` if it is not done in time, `CommandError` within a tick.
         """

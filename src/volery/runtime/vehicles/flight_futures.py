@@ -98,6 +98,11 @@ class FlightFutures:
     # ------------------------------------------------------------------------------ what settles
 
     @property
+    def has_pending(self) -> bool:
+        """Whether any command has a future that is not settled."""
+        return bool(self._pending)
+
+    @property
     def needs_checks(self) -> bool:
         """Whether `check` has futures to check."""
         return bool(self._checked)

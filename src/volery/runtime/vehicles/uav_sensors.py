@@ -58,6 +58,7 @@ class UavSensor:
         self._runs = runs
         self._uav = uav
         self.name = name
+        """Name of the sensor, such as `imu`."""
 
     @property
     def latest(self) -> Any:
