@@ -118,11 +118,16 @@ def test_flight_modes_of_all_return_their_futures(simulate, three_data):
     assert vehicles.land() == vehicles.hold() == []
 
 
-def test_a_batch_replaces_flight_modes(simulate, three_data):
+def test_a_batch_replaces_flight_modes_of_the_uavs_that_it_reaches(simulate, three_data):
     simulation = simulate(three_data)
-    future = simulation.uavs["uav1"].go_to([2.0, 0.0, 3.0])
+    trajectory = Trajectory.from_samples([0.0, 3.0], [[0.0, 0.0, 3.0], [1.0, 0.0, 3.0]])
+    first = simulation.uavs["uav1"].follow_trajectory(trajectory)
+    climbing = simulation.uavs["uav2"].take_off(2.0)
+    simulation.vehicles.command_setpoint([4.0, 0.0, 3.0])
+    assert "command_setpoint replaced it" in str(first.exception())
+    assert not climbing.done()  # it takes off and ignores setpoints
     simulation.vehicles.command_rates([0.0, 0.0, 0.0], 15.0)
-    assert "its flight mode changed to LOW_LEVEL" in str(future.exception())
+    assert "command_rates replaced it" in str(climbing.exception())
 
 
 @pytest.mark.parametrize(

@@ -89,7 +89,7 @@ class BatchCommands(ABC):
         rates = limits.yaw_rates(self._flat("yaw rate", yaw_rate))
         for fleet, rows in self._fleets():
             fleet.command_velocities(velocities[rows], rates[rows])
-        self._check_futures()
+        self._replace_futures("command_velocity", FlightMode.VELOCITY)
 
     def command_velocity_map(
         self, velocity: ArrayLike, yaw_rate: ArrayLike = 0.0, *, yaw: ArrayLike | None = None
@@ -100,7 +100,7 @@ class BatchCommands(ABC):
         rates, yaws = limits.yaw_rates(self._flat("yaw rate", yaw_rate)), self._flat_yaw(yaw)
         for fleet, rows in self._fleets():
             fleet.command_map_velocities(velocities[rows], _of(yaws, rows), rates[rows])
-        self._check_futures()
+        self._replace_futures("command_velocity_map", FlightMode.VELOCITY)
 
     def command_acceleration(
         self, acceleration_map: ArrayLike, yaw: ArrayLike | None = None, yaw_rate: ArrayLike = 0.0
@@ -138,7 +138,7 @@ class BatchCommands(ABC):
         for fleet, rows in self._fleets():
             own = {name: values[rows] for name, values in setpoints.items()}
             fleet.command_setpoints(own, _of(yaws, rows), rates[rows])
-        self._check_futures()
+        self._replace_futures("command_setpoint", FlightMode.TRAJECTORY)
 
     def command_attitude(self, attitude: ArrayLike, thrust: ArrayLike) -> None:
         """Holds attitudes (n, 4), x y z w, with thrusts (n,), N, along the bodies' z axes."""
@@ -150,14 +150,14 @@ class BatchCommands(ABC):
             "thrust": thrusts,
             "yaw_rate": 0.0,
         }
-        self._command_all(ControlLevel.ATTITUDE, setpoints)
+        self._command_all("command_attitude", ControlLevel.ATTITUDE, setpoints)
 
     def command_rates(self, omega_body: ArrayLike, thrust: ArrayLike) -> None:
         """Turns at `omega_body` (n, 3), rad/s, with thrusts (n,), N, along the bodies' z axes."""
         limits = self._find_limits()
         rates = limits.rates(self._flat("rates", omega_body, (3,)))
         thrusts = limits.thrusts(self._flat("thrust", thrust))
-        self._command_all(ControlLevel.RATES, {"rates": rates, "thrust": thrusts})
+        self._command_all("command_rates", ControlLevel.RATES, {"rates": rates, "thrust": thrusts})
 
     def command_rotor_speeds(self, speeds: ArrayLike) -> None:
         """Turns the rotors at `speeds` (n, R), rad/s; R is the largest number of rotors.
@@ -166,7 +166,7 @@ class BatchCommands(ABC):
         """
         limits = self._find_limits()
         targets = limits.rotor_speeds(self._flat("rotor speeds", speeds, (limits.num_rotors,)))
-        self._command_all(ControlLevel.ROTORS, {"rotor_target": targets})
+        self._command_all("command_rotor_speeds", ControlLevel.ROTORS, {"rotor_target": targets})
 
     # -------------------------------------------------------------------------------- the fleets
 
@@ -201,18 +201,20 @@ class BatchCommands(ABC):
         """Returns the UAVs that guided commands reach, with their rows."""
         return [(i, uav) for i, uav in enumerate(self._handles()) if uav.mode not in _NOT_GUIDED]
 
-    def _check_futures(self) -> None:
+    def _replace_futures(self, command: str, mode: FlightMode) -> None:
         for futures in self._future_lists():
-            futures.check_all()
+            futures.replace_all(command, mode)
 
-    def _command_all(self, level: ControlLevel, setpoints: Mapping[str, Array | float]) -> None:
+    def _command_all(
+        self, command: str, level: ControlLevel, setpoints: Mapping[str, Array | float]
+    ) -> None:
         for fleet, rows in self._fleets():
             own = {
                 name: values[rows] if isinstance(values, np.ndarray) else values
                 for name, values in setpoints.items()
             }
             fleet.command_all(level, own)
-        self._check_futures()
+        self._replace_futures(command, FlightMode.LOW_LEVEL)
 
     def _find_limits(self) -> BatchLimits:
         """Returns the limits of all UAVs; computes them again when the fleets have changed."""

@@ -70,6 +70,13 @@ class FlightFutures:
         """Fails a UAV's pending future, because it has accepted another command."""
         self.fail(uav, f"{command} replaced it")
 
+    def replace_all(self, command: str, mode: FlightMode) -> None:
+        """Fails the pending futures of UAVs that a batch has just set to `mode`."""
+        for uav in tuple(self._pending):
+            fleet, row = self._fleet_row_of(uav)
+            if fleet.mode(row) is mode:
+                self.replace(uav, command)
+
     def fail(self, uav: str, reason: str) -> None:
         """Fails a UAV's pending future."""
         future = self._pending.pop(uav, None)
@@ -110,11 +117,6 @@ class FlightFutures:
     def check(self) -> None:
         """Settles what has ended without an event."""
         for future in tuple(self._checked.values()):
-            self.update(future)
-
-    def check_all(self) -> None:
-        """Settles the futures of UAVs that were commanded without their handles."""
-        for future in tuple(self._pending.values()):
             self.update(future)
 
     def happened(self, event: Event) -> None:
