@@ -140,7 +140,7 @@ class ConditionalRuns:
         if the simulation is quit or does not advance.
         """
         check_timeout(timeout_s)
-        if self._loop.owner == threading.get_ident() or not self._has_owner():
+        if self._is_own():
             is_over = self.advance(is_done, timeout_s)
         else:
             is_over = self._wait_for_thread(is_done, timeout_s)
@@ -148,13 +148,38 @@ class ConditionalRuns:
             raise CommandError(self._quit_text())
         return is_over
 
+    async def wait_async(self, is_done: Callable[[], bool]) -> None:
+        """Waits for `is_done()` like `wait`, and lets other coroutines run in between."""
+        await asyncio.sleep(0)  # a task that has just been created may advance the simulation
+        idle_s = 0.0
+        while not is_done():
+            if self._loop.quitting:
+                raise CommandError(self._quit_text())
+            if self._loop.thread == threading.get_ident():  # another coroutine advances it
+                await asyncio.sleep(0)
+            elif self._loop.thread is None and self._is_own():
+                pieces = self._loop.pieces_until(_AtEachTick(is_done), math.inf, None, self._look)
+                await self.drive(pieces)
+            else:
+                idle_s = self._check_idle(idle_s)
+                await asyncio.sleep(_POLL_PERIOD_S)
+
     def is_busy(self) -> bool:
         """Returns whether another thread advances the simulation now."""
         return self._loop.thread not in (None, threading.get_ident())
 
-    def _has_owner(self) -> bool:
-        """Returns whether the thread that last advanced the simulation still exists."""
-        return any(thread.ident == self._loop.owner for thread in threading.enumerate())
+    def _is_own(self) -> bool:
+        """Returns whether this thread advances the simulation; a thread that ended leaves it."""
+        owner = self._loop.owner
+        own = owner == threading.get_ident()
+        return own or all(thread.ident != owner for thread in threading.enumerate())
+
+    def _check_idle(self, idle_s: float) -> float:
+        """Returns for how long the other thread is idle; raises `CommandError` if too long."""
+        idle_s = 0.0 if self._loop.thread is not None else idle_s + _POLL_PERIOD_S
+        if idle_s > _MAX_IDLE_S:
+            raise CommandError("the simulation does not advance: its own thread must call run()")
+        return idle_s
 
     def _quit_text(self) -> str:
         return f"the run was quit at {self.time_s:.2f} s"
@@ -163,11 +188,7 @@ class ConditionalRuns:
         end_s, idle_s = self.time_s + timeout_s, 0.0
         while not is_done() and self.time_s < end_s and not self._loop.quitting:
             time.sleep(_POLL_PERIOD_S)
-            idle_s = 0.0 if self._loop.thread is not None else idle_s + _POLL_PERIOD_S
-            if idle_s > _MAX_IDLE_S:
-                raise CommandError(
-                    "the simulation does not advance: its own thread must call run()"
-                )
+            idle_s = self._check_idle(idle_s)
         return is_done()
 
     def _pieces(self, goal: _Goal, timeout_s: float, speed: float | None) -> Iterator[None]:

@@ -21,7 +21,7 @@ from volery.runtime.build.fleet import add_bodies, build_fleet
 from volery.runtime.build.placement import StartPose
 from volery.runtime.build.sensor_suites import SensorInstance, fit_sensors, refit
 from volery.runtime.build.sensors import build_banks
-from volery.runtime.vehicles.flight_futures import CHECK_PERIOD_S, FlightFutures, Wait
+from volery.runtime.vehicles.flight_futures import CHECK_PERIOD_S, FlightFutures, FlightRuns
 from volery.runtime.vehicles.sample_stream import SampleStream
 from volery.runtime.vehicles.uav import Uav
 from volery.runtime.vehicles.uav_sensors import UavSensors
@@ -48,7 +48,7 @@ class EnvironmentEvent:
 class EnvironmentBlock:
     """Runs the environments `first`, `first` + 1, ... of a scenario, one for each of `seeds`.
 
-    wait: advances all environments, for code that waits for a flight command.
+    runs: advances all environments, for code that waits for a flight command.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class EnvironmentBlock:
         scene: Scene,
         seeds: Sequence[int],
         first: int,
-        wait: Wait,
+        runs: FlightRuns,
     ) -> None:
         self.seeds = list(seeds)
         self._scenario = scenario
@@ -96,7 +96,7 @@ class EnvironmentBlock:
         self._mounts = {(f.id.uav_name, f.id.name): f.mount for f in self._fitted}
         self._is_old: dict[int, NDArray[np.bool_]] = {}
         """By bank: (S,) whether the last sample of a sensor is from before its reset."""
-        self.futures = futures = FlightFutures(self._fleet_row_of, wait)
+        self.futures = futures = FlightFutures(self._fleet_row_of, runs)
         self._engine.every(CHECK_PERIOD_S, futures.check, wanted=lambda: futures.needs_checks)
         self._stir_air(np.arange(num_envs))
         self._start_state = self.fleet.get_state()

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import bisect
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from types import MappingProxyType
 from typing import Any
@@ -32,8 +32,9 @@ from volery.core.errors import CommandError, ScenarioError
 from volery.core.plurals import counted
 from volery.runtime.build.fleet import place
 from volery.runtime.build.worlds import build_city, build_forest, build_scene, build_terrain
-from volery.runtime.checks import check_reset_seed, check_seconds, check_steps, check_timeout
+from volery.runtime.checks import check_reset_seed, check_seconds, check_steps
 from volery.runtime.environment_block import EnvironmentBlock, EnvironmentEvent, SampleArrays
+from volery.runtime.environment_runs import EnvironmentRuns
 from volery.runtime.environment_sensors import EnvironmentSensors
 from volery.runtime.vehicles.batch_commands import BatchCommands, joined_states
 from volery.runtime.vehicles.flight_futures import FlightFutures
@@ -82,9 +83,12 @@ class VectorizedSimulation(BatchCommands):
             self.scene = build_scene(scenario, self.terrain, self.forest, self.city)
         self._starts = place(scenario, self.scene, self.terrain)
         ends = np.linspace(0, num_envs, min(threads, num_envs) + 1).round().astype(int).tolist()
+        self._runs = EnvironmentRuns(
+            self.step, lambda: (self._blocks[0].step, self._blocks[0].dt_ns)
+        )
         self._blocks = [
             EnvironmentBlock(
-                scenario, self._starts, self.terrain, self.scene, seeds[a:b], a, self._wait
+                scenario, self._starts, self.terrain, self.scene, seeds[a:b], a, self._runs
             )
             for a, b in itertools.pairwise(ends)
         ]
@@ -95,7 +99,6 @@ class VectorizedSimulation(BatchCommands):
         """Sensors by UAV and name: `envs.sensors["uav1"]["imu"].latest`, arrays (K, ...)."""
         self._uavs: list[Uav] = []
         self._owed_ns = 0
-        self._is_stepping = False
         self._closed = False
         self._pool = ThreadPoolExecutor(len(self._blocks), thread_name_prefix="volery-envs")
 
@@ -140,14 +143,11 @@ class VectorizedSimulation(BatchCommands):
         self._check_open()
         check_steps(steps)
         target = self._blocks[0].step + steps
-        self._is_stepping = True
-        try:
+        with self._runs.stepping():
             others = [self._pool.submit(block.advance_to, target) for block in self._blocks[1:]]
             self._blocks[0].advance_to(target)
             for other in others:
                 other.result()
-        finally:
-            self._is_stepping = False
 
     def run(self, seconds: float) -> None:
         """Advances by `seconds`; a remaining part of a step counts for the next call."""
@@ -247,20 +247,6 @@ class VectorizedSimulation(BatchCommands):
 
     def _future_lists(self) -> Sequence[FlightFutures]:
         return [block.futures for block in self._blocks]
-
-    def _wait(self, is_done: Callable[[], bool], timeout_s: float) -> bool:
-        """Advances all environments until `is_done()`, checked every 8 ms; returns whether it is.
-
-        For `FlightFuture.wait` of a UAV of one environment.
-        """
-        check_timeout(timeout_s)
-        if self._is_stepping:
-            raise CommandError("the environments are advancing already: use add_done_callback()")
-        period = max(1, 8_000_000 // self._blocks[0].dt_ns)
-        end_s = self.time_s + timeout_s
-        while not is_done() and self.time_s < end_s:
-            self.step(period - self._blocks[0].step % period)
-        return is_done()
 
     def _check_open(self) -> None:
         if self._closed:

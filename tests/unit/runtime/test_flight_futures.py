@@ -300,6 +300,43 @@ def test_await_beside_run_async(flying):
     flying.run(0.1)  # the simulation is free again
 
 
+def test_await_alone_advances_the_simulation(simulate, flat_data):
+    flat_data["uavs"][0]["count"] = 2
+    simulation = simulate(flat_data)
+    first, second = simulation.uavs.values()
+
+    async def fly():
+        await first.take_off(2.0)
+        results = await asyncio.gather(first.go_to([2.0, 0.0, 2.0]), second.take_off(1.0))
+        assert {result.mode for result in results} == {FlightMode.HOLD}
+        task = asyncio.create_task(simulation.run_async(speed=50.0))
+        await first.land()  # the task has begun before: it advances the simulation
+        assert not task.done()
+        task.cancel()
+
+    asyncio.run(fly())
+    future = second.go_to([9.0, 0.0, 2.0])
+    simulation.clock.quit()
+
+    async def wait():
+        await future
+
+    with pytest.raises(CommandError, match="the run was quit"):
+        asyncio.run(wait())
+
+
+def test_await_waits_for_the_run_of_another_thread(flying):
+    future = flying.uavs["uav1"].go_to([1.0, 0.0, 2.0])
+    runner = threading.Thread(target=lambda: flying.run(5.0, speed=20.0))
+
+    async def wait():
+        runner.start()
+        return await future
+
+    assert asyncio.run(wait()).mode is FlightMode.HOLD
+    runner.join()
+
+
 def test_environments_wait_for_one_uav(flat_data):
     flat_data["uavs"][0]["on_start"] = "take_off"
     with VectorizedSimulation(parse_scenario(flat_data), 3, threads=2) as envs:
@@ -323,4 +360,9 @@ def test_environments_wait_for_one_uav(flat_data):
         envs.uav(1, "uav1").pending_command.add_done_callback(wait)
         envs.run(15.0)
         assert refused == [FlightMode.LANDED]
+
+        async def climb():
+            return await envs.uav(2, "uav1").go_to([0.0, 0.0, 4.0])
+
+        assert asyncio.run(climb()).mode is FlightMode.HOLD
         assert envs.uav(0, "uav1").mode is FlightMode.HOLD

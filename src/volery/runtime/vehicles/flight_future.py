@@ -4,14 +4,13 @@
     future = uav.go_to([5.0, 3.0, 2.0])
     simulation.run(3.0)
     print(future)                        # done, failed and why, or pending
-    await uav.land()                     # beside `simulation.run_async()`
+    await uav.land()                     # in notebooks, alone or beside `simulation.run_async()`
 
 The methods are those of `rclpy.task.Future`; `wait` and `await` are added.
 """
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -52,6 +51,9 @@ class FlightSource(Protocol):
 
     def wait(self, future: FlightFuture, timeout_s: float) -> bool:
         """Advances the simulation, or waits for it, until the future is done; returns if it is."""
+
+    async def wait_async(self, future: FlightFuture) -> None:
+        """Waits like `wait`, without a limit, and lets other coroutines run in between."""
 
 
 class FlightFuture:
@@ -137,20 +139,12 @@ class FlightFuture:
         return self.result()
 
     def __await__(self) -> Generator[Any, None, CommandResult]:
-        """Waits beside `Simulation.run_async`, which advances the simulation."""
+        """Waits while other coroutines run, without a limit of time.
+
+        Advances the simulation, unless `Simulation.run_async` or another thread does.
+        """
         if not self.done():
-            loop = asyncio.get_running_loop()
-            waiter: asyncio.Future[None] = loop.create_future()
-
-            def wake() -> None:
-                if not waiter.done():
-                    waiter.set_result(None)
-
-            def on_done(_future: FlightFuture) -> None:
-                loop.call_soon_threadsafe(wake)
-
-            self.add_done_callback(on_done)
-            yield from waiter
+            yield from self._source.wait_async(self).__await__()
         return self.result()
 
     def pending_text(self) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol
 
 from volery.control.fleet import Fleet
 from volery.control.flight_modes import FlightMode
@@ -13,8 +14,6 @@ from volery.runtime.vehicles.flight_future import CommandResult, FlightFuture
 
 FleetRow = tuple[Fleet, int]
 """Fleet and row of a UAV."""
-Wait = Callable[[Callable[[], bool], float], bool]
-"""Advances the simulation until a condition is true, by a time at most; see `ConditionalRuns`."""
 
 _CONTACTS = (EventKind.IMPACT, EventKind.COLLISION)
 _COMMANDS = {
@@ -28,22 +27,28 @@ CHECK_PERIOD_S = 0.02
 """Period of the checks for what ends without an event: braking, teleports."""
 
 
+class FlightRuns(Protocol):
+    """Advances the simulation for code that waits for flight commands."""
+
+    def is_busy(self) -> bool:
+        """Returns whether another thread advances the simulation now."""
+
+    def wait(self, is_done: Callable[[], bool], timeout_s: float) -> bool:
+        """Advances the simulation, or waits for it, until `is_done()`; returns whether it is."""
+
+    async def wait_async(self, is_done: Callable[[], bool]) -> None:
+        """Advances the simulation, or waits for it, and lets other coroutines run in between."""
+
+
 class FlightFutures:
     """Futures of the present flight commands of all UAVs, at most one of each.
 
     fleet_row_of: returns fleet and row of a UAV by name; raises `CommandError` once it is deleted.
-    is_busy: whether another thread advances the UAVs now.
     """
 
-    def __init__(
-        self,
-        fleet_row_of: Callable[[str], FleetRow],
-        wait: Wait,
-        is_busy: Callable[[], bool] = lambda: False,
-    ) -> None:
+    def __init__(self, fleet_row_of: Callable[[str], FleetRow], runs: FlightRuns) -> None:
         self._fleet_row_of = fleet_row_of
-        self._wait = wait
-        self._is_busy = is_busy
+        self._runs = runs
         self._has_new_events = False
         """Whether events of this tick may still be on their way to `happened`."""
         self._pending: dict[str, FlightFuture] = {}
@@ -117,7 +122,8 @@ class FlightFutures:
     def check(self) -> None:
         """Settles what has ended without an event."""
         for future in tuple(self._checked.values()):
-            self.update(future)
+            if not future.is_settled:
+                self._settle(future)
 
     def happened(self, event: Event) -> None:
         """Settles the futures of the event's UAVs, if the event ends their commands."""
@@ -137,7 +143,7 @@ class FlightFutures:
         Changes nothing while the state may be ahead of the events that explain it: in another
         thread than the run's, and between two events of a tick.
         """
-        if not (future.is_settled or self._has_new_events or self._is_busy()):
+        if not (future.is_settled or self._has_new_events or self._runs.is_busy()):
             self._settle(future)
 
     def _take(self, event: Event, future: FlightFuture, other: str) -> None:
@@ -175,7 +181,12 @@ class FlightFutures:
     def wait(self, future: FlightFuture, timeout_s: float) -> bool:
         """Advances the simulation, or waits for it, until the future is done; returns if it is."""
         self.watch(future)
-        return self._wait(future.done, timeout_s)
+        return self._runs.wait(future.done, timeout_s)
+
+    async def wait_async(self, future: FlightFuture) -> None:
+        """Waits like `wait`, without a limit, and lets other coroutines run in between."""
+        self.watch(future)
+        await self._runs.wait_async(future.done)
 
     # ----------------------------------------------------------------------------------- inside
 
