@@ -111,7 +111,7 @@ class FlightFutures:
 
     @property
     def has_pending(self) -> bool:
-        """Whether any command has a future that is not settled."""
+        """Whether any command has not ended."""
         return bool(self._pending)
 
     @property
