@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -65,6 +66,10 @@ class FleetCommands:
     def mode(self, i: int) -> FlightMode:
         """Returns the flight mode of UAV `i`."""
         return FlightMode(int(self._control_states["mode"][i]))
+
+    def is_braking(self, i: int) -> bool:
+        """Returns whether UAV `i` still brakes before it holds its position."""
+        return bool(self._control_states["braking"][i])
 
     @property
     def modes(self) -> NDArray[np.int64]:
@@ -148,6 +153,41 @@ class FleetCommands:
         rate = checked("yaw rate", yaw_rate, (len(self),), 100.0)
         batch_commands.command_velocities(
             self._bodies, self._control_states, self.step, velocity, rate
+        )
+
+    def command_all(self, level: ControlLevel, setpoints: Mapping[str, Array | float]) -> None:
+        """Sets setpoints of a level below guidance for all UAVs that have not crashed.
+
+        setpoints: arrays (N, ...), or one number for all, by field of `CONTROL_STATE`; the caller
+        has checked them with `BatchLimits`.
+        """
+        batch_commands.command_low_level(
+            self._bodies, self._control_states, self.step, level, setpoints
+        )
+
+    def command_map_velocities(self, velocity: Array, yaw: Array | None, yaw_rate: Array) -> None:
+        """Sets velocities (N, 3) m/s, map, with yaws (N,) rad, or yaw rates (N,) rad/s.
+
+        As `command_velocity_map` for each UAV, but UAVs on the ground, crashed or taking off are
+        skipped. The caller has checked the values with `BatchLimits`.
+        """
+        rows = self._enter_guided_all(FlightMode.VELOCITY)
+        batch_commands.command_map_velocities(
+            self._control_states, rows, self.step, velocity, yaw, yaw_rate
+        )
+
+    def command_setpoints(
+        self, setpoints: Mapping[str, Array], yaw: Array | None, yaw_rate: Array
+    ) -> None:
+        """Sets trajectory points as `command_setpoint` does for each UAV.
+
+        setpoints: `position_target`, `velocity_target`, `acceleration_target`, (N, 3) each. UAVs on
+        the ground, crashed or taking off are skipped. The caller has checked the values with
+        `BatchLimits`.
+        """
+        rows = self._enter_guided_all(FlightMode.TRAJECTORY)
+        batch_commands.command_setpoints(
+            self._control_states, rows, self.step, setpoints, yaw, yaw_rate
         )
 
     def command_velocity_map(
@@ -411,6 +451,11 @@ class FleetCommands:
         control_state["braking"] = False
         control_state["calm_ticks"] = 0
         return control_state
+
+    def _enter_guided_all(self, mode: FlightMode) -> NDArray[np.int64]:
+        return batch_commands.enter_guided(
+            self._bodies, self._control_states, self.step, mode, self._believed
+        )
 
     def _command_velocity(self, i: int, velocity: ArrayLike, *, in_heading: bool) -> None:
         velocity = checked("velocity", velocity, (3,), 1e3)

@@ -70,6 +70,18 @@ class CommandError(VoleryError):
     """A command is rejected: not finite, out of range, or impossible in the current mode."""
 
 
+class FlightError(VoleryError):
+    """A flight command did not complete: the UAV crashed, or another command replaced it."""
+
+
+class WaitTimeoutError(VoleryError, TimeoutError):
+    """What a run waited for did not happen within `timeout_s` of simulated time."""
+
+
+class SensorError(VoleryError):
+    """A sensor has no sample yet, or does not exist."""
+
+
 class DivergenceError(VoleryError):
     """The state of a UAV is not physical: not finite, too fast, too far away."""
 

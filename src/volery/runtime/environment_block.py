@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.control.fleet import Fleet
 from volery.core.clock import NS_PER_S
 from volery.core.errors import CommandError, DivergenceError
 from volery.engine.engine import Engine
@@ -20,10 +21,16 @@ from volery.runtime.build.fleet import add_bodies, build_fleet
 from volery.runtime.build.placement import StartPose
 from volery.runtime.build.sensor_suites import SensorInstance, fit_sensors, refit
 from volery.runtime.build.sensors import build_banks
+from volery.runtime.vehicles.flight_futures import CHECK_PERIOD_S, FlightFutures, FlightRuns
+from volery.runtime.vehicles.sample_stream import SampleStream
 from volery.runtime.vehicles.uav import Uav
+from volery.runtime.vehicles.uav_sensors import UavSensors
 from volery.scenario.schema import Scenario
 from volery.sensors.bank import Bank
+from volery.sensors.mount import Mount
+from volery.sensors.sample_rows import sample_of
 from volery.sensors.samples import Samples
+from volery.sensors.sensor_samples import SensorSample
 from volery.world.scene import Scene
 from volery.world.terrain import Terrain
 
@@ -39,7 +46,10 @@ class EnvironmentEvent:
 
 
 class EnvironmentBlock:
-    """Runs the environments `first`, `first` + 1, ... of a scenario, one for each of `seeds`."""
+    """Runs the environments `first`, `first` + 1, ... of a scenario, one for each of `seeds`.
+
+    runs: advances all environments, for code that waits for a flight command.
+    """
 
     def __init__(
         self,
@@ -49,6 +59,7 @@ class EnvironmentBlock:
         scene: Scene,
         seeds: Sequence[int],
         first: int,
+        runs: FlightRuns,
     ) -> None:
         self.seeds = list(seeds)
         self._scenario = scenario
@@ -78,8 +89,15 @@ class EnvironmentBlock:
         self._bank_of = {id(bank.sensors): k for k, bank in enumerate(banks)}
         self._places = _places(banks)
         self._latest: list[Samples | None] = [None] * len(banks)
+        self._bank_uavs = [np.array([sensor.uav for sensor in bank.sensors]) for bank in banks]
+        """By bank: (S,) row of the UAV of each sensor."""
         self._events: list[EnvironmentEvent] = []
         self._began_ns = np.zeros(num_envs, np.int64)
+        self._mounts = {(f.id.uav_name, f.id.name): f.mount for f in self._fitted}
+        self._is_old: dict[int, NDArray[np.bool_]] = {}
+        """By bank: (S,) whether the last sample of a sensor is from before its reset."""
+        self.futures = futures = FlightFutures(self._fleet_row_of, runs)
+        self._engine.every(CHECK_PERIOD_S, futures.check, wanted=lambda: futures.needs_checks)
         self._stir_air(np.arange(num_envs))
         self._start_state = self.fleet.get_state()
         self._take_off(np.arange(len(everyone)))
@@ -132,6 +150,10 @@ class EnvironmentBlock:
         self._stir_air(envs)
         self._engine.collisions.forget(rows)
         self._began_ns[envs] = self.time_ns
+        if self.futures.has_pending:
+            for path in self._paths_of(rows):
+                self.futures.fail(path, "the environment was reset")
+        self._mark_old(rows)
         keys = self._keys_of(envs)
         for samples, fresh in self._engine.restart_sensors(rows, keys):
             self._renew(samples, fresh)
@@ -146,6 +168,7 @@ class EnvironmentBlock:
         return {
             "engine": self._engine.get_state(),
             "latest": list(self._latest),
+            "is_old": {bank: rows.copy() for bank, rows in self._is_old.items()},
             "events": list(self._events),
             "began": self._began_ns.copy(),
             "seeds": list(self.seeds),
@@ -153,8 +176,10 @@ class EnvironmentBlock:
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Restores a state that `get_state` returned."""
+        self.futures.fail_all("another state was restored")
         self._engine.set_state(state["engine"])
         self._latest = list(state["latest"])
+        self._is_old = {bank: rows.copy() for bank, rows in state["is_old"].items()}
         self._events = list(state["events"])
         self._began_ns = state["began"].copy()
         self.seeds = list(state["seeds"])
@@ -166,7 +191,57 @@ class EnvironmentBlock:
         place = [start.name for start in self._starts].index(name)
         row = env * len(self._starts) + place
         flight = self._scenario.types[self._starts[place].type_name].flight
-        return Uav(self.fleet, row, name, flight)
+        path = f"{self._first + env}/{name}"
+        sensors = UavSensors(self, None, path)
+        return Uav(self.fleet, row, name, flight, sensors=sensors, futures=self.futures, path=path)
+
+    def latest_rows(
+        self, uav: str, sensor: str
+    ) -> tuple[Samples, NDArray[np.int64], NDArray[np.bool_]] | None:
+        """Returns the last batch with a sensor, its rows (num_envs,) and whether each is new.
+
+        A row is not new if its sample is from before the reset of its environment. None before the
+        first sample.
+        """
+        bank, rows = self._places[uav, sensor]
+        batch = self._latest[bank]
+        if batch is None:
+            return None
+        is_old = self._is_old.get(bank)
+        is_new = np.ones(len(rows), np.bool_) if is_old is None else ~is_old[rows]
+        return batch, rows, is_new
+
+    # ------------------------------------------------------- samples of one UAV of one environment
+
+    def names(self, uav: str) -> tuple[str, ...]:
+        """Returns the names of the sensors of a UAV, `ENV/NAME`."""
+        name = uav.rsplit("/", maxsplit=1)[-1]
+        return tuple(sensor for own, sensor in self._places if own == name)
+
+    def latest(self, uav: str, sensor: str) -> SensorSample | None:
+        """Returns the last sample of a sensor of a UAV, `ENV/NAME`, None before the first."""
+        env, name = uav.split("/")
+        found = self.latest_rows(name, sensor)
+        number = int(env) - self._first
+        if found is None or not found[2][number]:
+            return None
+        batch, rows, _ = found
+        return sample_of(batch, int(rows[number]), self._mounts[name, sensor])
+
+    def request(self, uav: str, sensor: str) -> None:
+        """Does nothing: all sensors of environments measure."""
+
+    def is_camera(self, uav: str, sensor: str) -> bool:  # noqa: ARG002 - as for all
+        """Returns False: cameras of environments render without a reader."""
+        return False
+
+    def open_stream(self, uav: str, sensor: str, **_options: Any) -> SampleStream:
+        """Raises `CommandError`: environments advance together."""
+        raise CommandError(f"sensor '{sensor}' of {uav}: environments have no streams; use latest")
+
+    def mount(self, uav: str, sensor: str) -> Mount:
+        """Returns the mount of a sensor."""
+        return self._mounts[uav, sensor]
 
     def sample(self, uav: str, sensor: str) -> SampleArrays | None:
         """Returns the last sample of one sensor of each environment; arrays are (num_envs, ...).
@@ -195,19 +270,48 @@ class EnvironmentBlock:
 
     def sampled(self, samples: Samples) -> None:
         """Stores the last samples of every bank."""
-        self._latest[self._bank_of[id(samples.sensors)]] = samples
+        bank = self._bank_of[id(samples.sensors)]
+        self._latest[bank] = samples
+        if self._is_old:
+            self._is_old.pop(bank, None)
 
     def happened(self, event: Event) -> None:
         """Stores an event under its environment."""
         env, name = event.uav.split("/")
         partner = event.partner.split("/")[-1]
         own = replace(event, uav=name, partner=partner)
-        self._events.append(EnvironmentEvent(self._first + int(env), own))
+        number = self._first + int(env)
+        if self.futures.has_pending:
+            other = f"{number}/{partner}" if "/" in event.partner else partner
+            self.futures.happened(replace(event, uav=f"{number}/{name}", partner=other))
+        self._events.append(EnvironmentEvent(number, own))
 
     def deliver(self) -> None:
         """Does nothing: there is no message queue."""
 
     # ------------------------------------------------------------------------------------- inside
+
+    def _fleet_row_of(self, path: str) -> tuple[Fleet, int]:
+        env, name = path.split("/")
+        names = [start.name for start in self._starts]
+        return self.fleet, (int(env) - self._first) * len(names) + names.index(name)
+
+    def _paths_of(self, rows: NDArray[np.int64]) -> list[str]:
+        """Returns `ENV/NAME` of the UAVs `rows`."""
+        envs, places = np.divmod(rows, len(self._starts))
+        return [
+            f"{self._first + env}/{self._starts[place].name}"
+            for env, place in zip(envs.tolist(), places.tolist(), strict=True)
+        ]
+
+    def _mark_old(self, rows: NDArray[np.int64]) -> None:
+        """Marks the samples of all sensors of the UAVs `rows`."""
+        for bank, sampled in enumerate(self._latest):
+            if sampled is None:
+                continue
+            uavs = self._bank_uavs[bank]
+            is_old = self._is_old.setdefault(bank, np.zeros(len(uavs), np.bool_))
+            is_old |= np.isin(uavs, rows)
 
     def _of_copy(self, error: DivergenceError) -> DivergenceError:
         """Returns the error with the environment's number among all, not in this block."""
@@ -225,7 +329,10 @@ class EnvironmentBlock:
             for name, array in _arrays(last).items():
                 changed[name] = array.copy()
                 changed[name][rows] = _arrays(samples)[name][rows]
+                changed[name].flags.writeable = False
             self._latest[bank] = replace(last, **changed)
+            if bank in self._is_old:
+                self._is_old[bank][rows] = False
 
     def _fit(self, env: int) -> list[SensorInstance]:
         return refit(self._fitted, self.seeds[env], env * len(self._starts))

@@ -4,12 +4,25 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Protocol
 
 from volery.core.clock import ns_from_s, s_from_ns
 from volery.engine.engine import Engine
 from volery.engine.pacing import Pacer
 from volery.runtime.monitoring.progress import Progress, ProgressPublisher
+
+
+class StopCondition(Protocol):
+    """Ends a run when it becomes true."""
+
+    def __call__(self) -> bool:
+        """Returns whether the run ends here; called after each tick."""
+
+    def next_check(self, step: int) -> int:
+        """Returns the next step, after `step`, at which a tick must end for the condition."""
 
 
 class RunLoop:
@@ -34,6 +47,27 @@ class RunLoop:
         """Whether runs continue past the scenario's end, until another state is restored."""
         self.replays = False
         """Whether recorded commands determine the end of the run."""
+        self.thread: int | None = None
+        """Thread that advances the simulation now; None: no run is in progress."""
+        self.owner = threading.get_ident()
+        """Thread that has made or last advanced the simulation."""
+
+    @contextmanager
+    def occupied(self) -> Iterator[None]:
+        """Records that the calling thread advances the simulation."""
+        before, self.thread = self.thread, threading.get_ident()
+        self.owner = self.thread
+        try:
+            yield
+        finally:
+            self.thread = before
+
+    @property
+    def remaining_s(self) -> float:
+        """Simulated time until the scenario's end, s; infinite where the run has none."""
+        if self._has_no_end:
+            return math.inf
+        return max(0.0, self._duration_s - s_from_ns(self._engine.time_ns))
 
     @property
     def finished(self) -> bool:
@@ -57,15 +91,58 @@ class RunLoop:
 
         look: called between two pieces and repeatedly while the run is held; changes nothing.
         """
+        with self.occupied():
+            for _ in self.pieces(seconds, speed, on_progress, look):
+                pass
+
+    def pieces(
+        self,
+        seconds: float | None,
+        speed: float | None,
+        on_progress: Callable[[Progress], None] | None,
+        look: Callable[[], None],
+    ) -> Iterator[None]:
+        """Runs like `run`, and yields after each piece and each moment of waiting."""
+        if seconds is None:
+            has_no_end = self._has_no_end
+            now_s = s_from_ns(self._engine.time_ns)
+            left = math.inf if has_no_end else self._duration_s - now_s
+            return self._pieces(left, self._last_step, self._ends_here, speed, on_progress, look)
+        end_step = self._engine.fleet.step + self._whole_steps(seconds)
+        return self._pieces(seconds, lambda: end_step, None, speed, on_progress, look)
+
+    def pieces_until(
+        self,
+        condition: StopCondition,
+        seconds: float,
+        speed: float | None,
+        look: Callable[[], None],
+    ) -> Iterator[None]:
+        """Runs until `condition()`, by `seconds` at most, and yields like `pieces`."""
+        engine = self._engine
+        steps = sys.maxsize if math.isinf(seconds) else -(-ns_from_s(seconds) // engine.dt_ns)
+        end_step = engine.fleet.step + steps
+
+        def next_end() -> int:
+            return min(end_step, condition.next_check(engine.fleet.step))
+
+        if condition():
+            return iter(())
+        return self._pieces(seconds, lambda: end_step, condition, speed, None, look, next_end)
+
+    def _pieces(
+        self,
+        left: float,
+        find_end: Callable[[], int],
+        until: Callable[[], bool] | None,
+        speed: float | None,
+        on_progress: Callable[[Progress], None] | None,
+        look: Callable[[], None],
+        next_end: Callable[[], int] | None = None,
+    ) -> Iterator[None]:
+        """Runs to step `find_end()`, each piece at most to `next_end()`."""
         engine, pacer = self._engine, self._pacer
         start_ns = engine.time_ns
-        if seconds is None:
-            left = math.inf if self._has_no_end else self._duration_s - s_from_ns(start_ns)
-            find_end, until = self._last_step, self._ends_here
-        else:
-            left, until = seconds, None
-            end_step = engine.fleet.step + self._whole_steps(seconds)
-            find_end = lambda: end_step  # noqa: E731
         pacer.begin(speed, start_ns)
         teller = ProgressPublisher(on_progress, left, pacer)
         over = engine.fleet.step >= find_end() or self.quitting
@@ -76,7 +153,7 @@ class RunLoop:
 
         engine.while_waiting = while_waiting
         while not over:
-            self._advance(find_end(), until)
+            self._advance((next_end or find_end)(), until)
             look()
             over = engine.fleet.step >= find_end() or (until is not None and until())
             over = over or self.quitting
@@ -87,7 +164,9 @@ class RunLoop:
                 if self.quitting:
                     over = True
                     break
+                yield
             teller.tell(s_from_ns(engine.time_ns) - s_from_ns(start_ns), last=over)
+            yield
         engine.state_check.look()
         if self.finished:
             pacer.drop_steps("the scenario has ended")

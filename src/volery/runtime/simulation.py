@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from volery.core.clock import s_from_ns
 from volery.core.errors import CommandError, ScenarioError
+from volery.engine.events import Event
 from volery.engine.lock_step import Partner
 from volery.engine.pacing import Pacer
 from volery.graph.graph import Graph
@@ -24,6 +25,12 @@ from volery.runtime.build.message_loading import learn_messages
 from volery.runtime.build.vehicles import build_vehicles
 from volery.runtime.build.worlds import build_world
 from volery.runtime.checks import check_reset_seed, check_seconds, check_steps
+from volery.runtime.conditional_runs import (
+    CHECK_PERIOD_S,
+    DEFAULT_TIMEOUT_S,
+    Awaited,
+    ConditionalRuns,
+)
 from volery.runtime.end_of_run import EndOfRun
 from volery.runtime.facets.clock import SimulationClock
 from volery.runtime.facets.diagnostics import SimulationDiagnostics
@@ -119,11 +126,14 @@ class Simulation:
         self.graph = graph = connected.graph
         self._loop = RunLoop(engine, pacer, scenario.duration_s, self._has_ended)
         self._end = EndOfRun(engine, pacer, self._loop)
+        self._runs = ConditionalRuns(
+            engine, self._loop, connected.outlet.events, self._look, self._check_open
+        )
         self.commands = CommandLog(graph, engine, self._end.refusal)
         tell_origin(graph, scenario)
         world_topic = WorldTopic(graph, lambda: self.geometry)
         grid_map = GridMapManager(scenario, engine, lambda: self.post(world_topic.tell))
-        self._manager = manager = build_vehicles(scenario, connected, world)
+        self._manager = manager = build_vehicles(scenario, connected, world, self._runs)
         self._snapshots = SnapshotManager(manager, self._loop, self._partners, grid_map)
         self.uavs = MappingProxyType(manager.uavs)
         self.operators = ControlAuthority(lambda: tuple(self.uavs))
@@ -172,7 +182,7 @@ class Simulation:
         """Advances by physics steps (1 ms each unless the scenario says otherwise)."""
         self._check_open()
         check_steps(steps)
-        with reported_failures(self.graph):
+        with reported_failures(self.graph), self._loop.occupied():
             self._engine.advance_to(self._engine.fleet.step + steps)
 
     def run(
@@ -200,6 +210,53 @@ class Simulation:
             return
         with reported_failures(self.graph):
             self._loop.run(seconds, speed, on_progress, self._monitor.look)
+
+    def run_until(
+        self,
+        awaited: Awaited,
+        timeout_s: float = DEFAULT_TIMEOUT_S,
+        *,
+        speed: float | None = None,
+        check_period_s: float = CHECK_PERIOD_S,
+    ) -> Event | None:
+        """Advances until something has happened; returns the event, if `awaited` is one.
+
+        awaited: a function without arguments that returns whether to stop, which is called at each
+        multiple of `check_period_s` since time 0; a `FlightFuture` (`uav.take_off()`), or several:
+        until all are done; an `EventKind` or its name ("collision"): until the next such event.
+        `timeout_s` is simulated time, s, `math.inf` for no limit; the scenario's end does not end
+        the wait. `speed` is as for `run`. Raises `FlightError` if a flight command fails,
+        `WaitTimeoutError` after `timeout_s`, `CommandError` within a run or a tick.
+        """
+        with reported_failures(self.graph):
+            return self._runs.run_until(awaited, timeout_s, speed, check_period_s)
+
+    async def run_async(self, seconds: float | None = None, *, speed: float | None = None) -> None:
+        """Advances like `run`, by `seconds`, s, while other coroutines run in between.
+
+        For notebooks and other asyncio programs: `task = asyncio.create_task(
+        simulation.run_async(speed=1.0))`, then `await uav.go_to(...)`. Cancel the task to stop.
+        """
+        self._check_open()
+        if seconds is not None:
+            check_seconds(seconds)
+        with reported_failures(self.graph):
+            await self._runs.drive(self._loop.pieces(seconds, speed, None, self._look))
+
+    async def run_until_async(
+        self,
+        awaited: Awaited,
+        timeout_s: float = DEFAULT_TIMEOUT_S,
+        *,
+        speed: float | None = None,
+        check_period_s: float = CHECK_PERIOD_S,
+    ) -> Event | None:
+        """Advances like `run_until`, while other coroutines run in between.
+
+        The arguments are the same; `timeout_s` and `check_period_s` are simulated time, s.
+        """
+        with reported_failures(self.graph):
+            return await self._runs.run_until_async(awaited, timeout_s, speed, check_period_s)
 
     def wait_at_end(self, on_wait: Callable[[], None]) -> None:
         """Stays paused at the end until clients reset the run, continue it or quit.
@@ -350,6 +407,7 @@ class Simulation:
             for partner in self._partners:
                 partner.leave()
             self._manager.end_nodes()
+            self._manager.futures.fail_all("the simulation was closed")
             self._engine.inbox.close("the simulation is closed")
             self.world.scene.close()
 
@@ -360,6 +418,9 @@ class Simulation:
         self.close()
 
     # -------------------------------------------------------------------------------------- inside
+
+    def _look(self) -> None:
+        self._monitor.look()
 
     def _status_sources(self) -> StatusSources:
         return StatusSources(

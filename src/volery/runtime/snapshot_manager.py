@@ -86,7 +86,7 @@ class SnapshotManager:
         if snapshot.starts != self._manager.starts:
             then = ", ".join(start.name for start in snapshot.starts)
             raise SnapshotError(f"UAVs were spawned or deleted since the snapshot of {then}")
-        self._put_back(snapshot.state)
+        self._put_back(snapshot.state, "another state was restored")
 
     def reset(self, seed: int) -> None:
         """Restores the start and its UAVs, with the random streams of `seed`."""
@@ -96,7 +96,7 @@ class SnapshotManager:
             self._manager.end_nodes()  # all, so that they start in the same order again
         if changed:
             self._manager.regroup(self._starts)
-        self._put_back(self._start)
+        self._put_back(self._start, "the simulation was reset")
         with self._graph.in_place_of(self._start["graph"]):
             self._manager.start_nodes()
         fleet = self._engine.fleet
@@ -121,6 +121,8 @@ class SnapshotManager:
         rows = np.array([row])
         fleet.restart(begun.fleet, rows, np.array([begun.row]))
         self._engine.collisions.forget(rows)
+        self._outlet.latest.forget(name)
+        self._manager.futures.fail(name, "the UAV was reset")
         self._restart_sensors(rows, [f for f in self._manager.fitted if f.id.uav == row])
         if without_state(self._nodes_of(name)):
             self._manager.restart_nodes(name)
@@ -151,13 +153,15 @@ class SnapshotManager:
             "nodes": keep_nodes(self._manager.nodes),
             "digest": None if digest is None else digest.get_state(),
             "events": list(self._outlet.events),
+            "latest": self._outlet.latest.get_state(),
             "owed_ns": self._loop.owed_ns,
             "past_end": self._loop.past_end,
             "grid_map": self._grid_map.get_state(),
             "radio": None if self._radio is None else self._radio.get_state(),
         }
 
-    def _put_back(self, state: dict[str, Any]) -> None:
+    def _put_back(self, state: dict[str, Any], reason: str) -> None:
+        self._manager.futures.fail_all(reason)
         self._manager.reseed(state["seed"])
         put_back_nodes(self._manager.nodes, state["nodes"])
         self._grid_map.set_state(state["grid_map"])
@@ -168,6 +172,7 @@ class SnapshotManager:
         if self._outlet.digest is not None:
             self._outlet.digest.set_state(state["digest"])
         self._outlet.events[:] = state["events"]
+        self._outlet.latest.set_state(state["latest"])
         self._loop.owed_ns = state["owed_ns"]
         self._loop.past_end = state["past_end"]
         if self._radio is not None:

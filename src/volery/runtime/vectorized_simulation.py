@@ -2,7 +2,7 @@
 
 All environments share the world and one clock. Each has its own UAVs, noise and wind, set by its
 own seed, and resets independently. Environments do not sense or touch one another. Each thread runs
-one block of environments; the UAVs of a block are rows of one fleet, which one kernel call moves.
+one block of environments; the UAVs of a block are rows of one fleet, which one compiled call moves.
 
     with VectorizedSimulation(load_scenario("hover"), 1024) as envs:
         envs.command_velocity(np.tile([1.0, 0.0, 0.0], (1024, 1, 1)))
@@ -19,11 +19,13 @@ import bisect
 import itertools
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from volery.control.fleet import Fleet
 from volery.core.arrays import Array
 from volery.core.clock import ns_from_s, s_from_ns
 from volery.core.errors import CommandError, ScenarioError
@@ -32,6 +34,10 @@ from volery.runtime.build.fleet import place
 from volery.runtime.build.worlds import build_city, build_forest, build_scene, build_terrain
 from volery.runtime.checks import check_reset_seed, check_seconds, check_steps
 from volery.runtime.environment_block import EnvironmentBlock, EnvironmentEvent, SampleArrays
+from volery.runtime.environment_runs import EnvironmentRuns
+from volery.runtime.environment_sensors import EnvironmentSensors
+from volery.runtime.vehicles.batch_commands import BatchCommands, joined_states
+from volery.runtime.vehicles.flight_futures import FlightFutures
 from volery.runtime.vehicles.uav import Uav
 from volery.runtime.warmup.parallel_compilation import compiled
 from volery.runtime.warmup.requirements import needs_of
@@ -39,8 +45,11 @@ from volery.scenario.schema import Scenario
 from volery.vehicle.fleet import FleetState
 
 
-class VectorizedSimulation:
+class VectorizedSimulation(BatchCommands):
     """Holds `num_envs` environments of `scenario`, each with `n` UAVs.
+
+    Commands (`command_velocity`, `command_rates`, `go_to`, ...) take arrays (K, n, ...) for all
+    environments.
 
     `seeds` has one seed per environment; the default is the scenario's seed and those after it.
     Results do not depend on the number of `threads`. All environments share the world that the
@@ -74,11 +83,21 @@ class VectorizedSimulation:
             self.scene = build_scene(scenario, self.terrain, self.forest, self.city)
         self._starts = place(scenario, self.scene, self.terrain)
         ends = np.linspace(0, num_envs, min(threads, num_envs) + 1).round().astype(int).tolist()
+        self._runs = EnvironmentRuns(
+            self.step, lambda: (self._blocks[0].step, self._blocks[0].dt_ns)
+        )
         self._blocks = [
-            EnvironmentBlock(scenario, self._starts, self.terrain, self.scene, seeds[a:b], a)
+            EnvironmentBlock(
+                scenario, self._starts, self.terrain, self.scene, seeds[a:b], a, self._runs
+            )
             for a, b in itertools.pairwise(ends)
         ]
         self._first: list[int] = ends[:-1]
+        self.sensors = MappingProxyType(
+            {start.name: EnvironmentSensors(self._blocks, start.name) for start in self._starts}
+        )
+        """Sensors by UAV and name: `envs.sensors["uav1"]["imu"].latest`, arrays (K, ...)."""
+        self._uavs: list[Uav] = []
         self._owed_ns = 0
         self._closed = False
         self._pool = ThreadPoolExecutor(len(self._blocks), thread_name_prefix="volery-envs")
@@ -124,10 +143,11 @@ class VectorizedSimulation:
         self._check_open()
         check_steps(steps)
         target = self._blocks[0].step + steps
-        others = [self._pool.submit(block.advance_to, target) for block in self._blocks[1:]]
-        self._blocks[0].advance_to(target)
-        for other in others:
-            other.result()
+        with self._runs.stepping():
+            others = [self._pool.submit(block.advance_to, target) for block in self._blocks[1:]]
+            self._blocks[0].advance_to(target)
+            for other in others:
+                other.result()
 
     def run(self, seconds: float) -> None:
         """Advances by `seconds`; a remaining part of a step counts for the next call."""
@@ -177,14 +197,7 @@ class VectorizedSimulation:
 
     def state(self) -> FleetState:
         """Returns copies of the present states of all UAVs; each array is (K, n, ...)."""
-        parts = [block.fleet.state for block in self._blocks]
-        shape = (self.num_envs, len(self._starts))
-        return FleetState(
-            *(
-                np.concatenate(arrays).reshape(*shape, *arrays[0].shape[1:])
-                for arrays in zip(*parts, strict=True)
-            )
-        )
+        return joined_states([block.fleet.state for block in self._blocks], self._batch_shape)
 
     def sample(self, uav: str, sensor: str) -> SampleArrays | None:
         """Returns the last sample of one sensor of each environment, None before the first.
@@ -209,22 +222,31 @@ class VectorizedSimulation:
         k = bisect.bisect_right(self._first, env) - 1
         return self._blocks[k].uav(env - self._first[k], name)
 
-    # --------------------------------------------------------------------------------- commands
+    # ----------------------------------------------------------------------------------- inside
 
-    def command_velocity(self, velocity: ArrayLike, yaw_rate: ArrayLike = 0.0) -> None:
-        """Flies all UAVs at `velocity` (K, n, 3), m/s, in their level heading frames (FLU).
+    @property
+    def _batch_shape(self) -> tuple[int, ...]:
+        return self.num_envs, len(self._starts)
 
-        They turn at `yaw_rate` (K, n), rad/s. UAVs that are landed, crashed or taking off ignore
-        the command. Raises `CommandError` if values are not finite or do not broadcast.
-        """
-        shape = (self.num_envs, len(self._starts))
-        velocity = _spread("velocity", velocity, (*shape, 3))
-        yaw_rate = _spread("yaw_rate", yaw_rate, shape)
-        for block, first in zip(self._blocks, self._first, strict=True):
-            rows = slice(first, first + len(block.seeds))
-            block.fleet.command_velocities(
-                velocity[rows].reshape(-1, 3), yaw_rate[rows].reshape(-1)
-            )
+    def _handles(self) -> Sequence[Uav]:
+        if not self._uavs:
+            names = self.uav_names
+            self._uavs = [self.uav(env, name) for env in range(self.num_envs) for name in names]
+        return self._uavs
+
+    def _paths(self) -> Sequence[str]:
+        return [f"{env}/{name}" for env in range(self.num_envs) for name in self.uav_names]
+
+    def _fleets(self) -> Sequence[tuple[Fleet, slice]]:
+        self._check_open()
+        num_uavs = len(self._starts)
+        return [
+            (block.fleet, slice(first * num_uavs, (first + len(block.seeds)) * num_uavs))
+            for block, first in zip(self._blocks, self._first, strict=True)
+        ]
+
+    def _future_lists(self) -> Sequence[FlightFutures]:
+        return [block.futures for block in self._blocks]
 
     def _check_open(self) -> None:
         if self._closed:
@@ -243,17 +265,6 @@ class VectorizedSimulation:
         if len(chosen) and not 0 <= chosen.min() <= chosen.max() < self.num_envs:
             raise CommandError(f"environments are numbered 0 to {self.num_envs - 1}")
         return chosen.astype(np.int64)
-
-
-def _spread(what: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
-    """Broadcasts finite numbers to `shape`. Raises `CommandError` if they do not fit."""
-    try:
-        spread = np.broadcast_to(np.asarray(values, dtype=np.float64), shape)
-    except (TypeError, ValueError):
-        raise CommandError(f"{what}: numbers that broadcast to {shape} are needed") from None
-    if not np.isfinite(spread).all():
-        raise CommandError(f"{what} must be finite")
-    return spread
 
 
 def _without_seeds(num_envs: int, seeds: int) -> str:

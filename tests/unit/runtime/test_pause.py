@@ -86,7 +86,7 @@ def test_a_paused_run_stands_still_does_what_is_posted_and_tells(simulate, flat_
     with InThread(simulation, 0.5, on_progress=on_progress):
         wait_for(lambda: len(told) >= 3)
         assert all(progress.paused and progress.time_s == 0.0 for progress in told)
-        assert simulation.post(lambda: uav.take_off(2.0)).result(timeout=60.0) is None
+        assert simulation.post(lambda: uav.take_off(2.0)).result(timeout=60.0).command == "take_off"
         assert simulation.time_ns == 0
         before, start = len(told), time.perf_counter()
         time.sleep(1.0)

@@ -180,7 +180,7 @@ def test_other_threads_post_their_commands(simulate, flat_data):
     assert cancelled.cancel()
     assert not done.done()
     simulation.run(1.0)
-    assert done.result() is None
+    assert done.result().command == "take_off"
     assert isinstance(refused.exception(), CommandError)
     assert isinstance(broken.exception(), ZeroDivisionError)
     assert uav.position_map[2] > 0.3

@@ -13,13 +13,14 @@ from volery.graph.graph import Graph
 from volery.runtime.build.engine import ConnectedEngine
 from volery.runtime.build.line_of_sight import LineOfSight
 from volery.runtime.build.worlds import BuiltWorld
+from volery.runtime.conditional_runs import ConditionalRuns
 from volery.runtime.vehicles.manager import VehicleManager
 from volery.scenario.schema import Scenario
 from volery.world.forest import Forest
 
 
 def build_vehicles(
-    scenario: Scenario, connected: ConnectedEngine, world: BuiltWorld
+    scenario: Scenario, connected: ConnectedEngine, world: BuiltWorld, runs: ConditionalRuns
 ) -> VehicleManager:
     """Returns the manager of the engine's vehicles, which are not on the graph yet."""
     engine, graph = connected.engine, connected.graph
@@ -33,6 +34,7 @@ def build_vehicles(
         FaultPlan(engine, radio),
         connected.starts,
         world.terrain,
+        runs,
         radio,
     )
 

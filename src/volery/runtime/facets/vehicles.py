@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from numpy.typing import ArrayLike
 
 from volery.comms.radio.network import RadioNetwork
+from volery.control.fleet import Fleet
 from volery.core.errors import CommandError
 from volery.graph.nodes.node import Node
 from volery.runtime.build.placement import StartPose
 from volery.runtime.build.sensor_suites import lidar_mounts
 from volery.runtime.snapshot_manager import SnapshotManager
+from volery.runtime.vehicles.batch_commands import BatchCommands, joined_states
+from volery.runtime.vehicles.flight_futures import FlightFutures
 from volery.runtime.vehicles.manager import VehicleManager
 from volery.runtime.vehicles.spawning import Spawner
 from volery.runtime.vehicles.teleport import Teleporter
 from volery.runtime.vehicles.uav import Uav
 from volery.scenario.schema import UavType
 from volery.sensors.mount import Mount
+from volery.vehicle.fleet import FleetState
 
 
-class SimulationVehicles:
-    """Changes the fleet of a simulation, and describes it.
+class SimulationVehicles(BatchCommands):
+    """Changes the fleet of a simulation, commands all its UAVs at once, and describes them.
 
     check_open: raises `CommandError` once the simulation is closed.
     """
@@ -83,6 +87,10 @@ class SimulationVehicles:
         """Mounts of the LIDARs that publish PointCloud2s, by topic."""
         return lidar_mounts(self._manager.fitted, planar=False)
 
+    def state(self) -> FleetState:
+        """Returns copies of the present states of all UAVs, in fleet order; arrays are (n, ...)."""
+        return joined_states([self._manager.engine.fleet.state], self._batch_shape)
+
     def spawn(
         self,
         name: str,
@@ -136,6 +144,24 @@ class SimulationVehicles:
         """
         self._check_open()
         self._snapshots.reset_uav(self.row_of(name))
+
+    @property
+    def _batch_shape(self) -> tuple[int, ...]:
+        return (len(self._manager.uavs),)
+
+    def _handles(self) -> Sequence[Uav]:
+        self._check_open()
+        return tuple(self._manager.uavs.values())
+
+    def _paths(self) -> Sequence[str]:
+        return tuple(self._manager.uavs)
+
+    def _fleets(self) -> Sequence[tuple[Fleet, slice]]:
+        self._check_open()
+        return [(self._manager.engine.fleet, slice(None))]
+
+    def _future_lists(self) -> Sequence[FlightFutures]:
+        return [self._manager.futures]
 
     def row_of(self, name: str) -> int:
         """Returns a UAV's row in fleet arrays. Raises `CommandError` for an unknown name."""

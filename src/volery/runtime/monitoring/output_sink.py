@@ -10,6 +10,7 @@ from volery.graph.graph import Graph
 from volery.graph.messages import Published
 from volery.publishing.graph_publisher import GraphPublisher
 from volery.runtime.monitoring.digest import Digest
+from volery.runtime.vehicles.latest_samples import LatestSamples
 from volery.sensors.samples import Samples
 
 NOT_OF_THE_WORLD = ("/volery/", "/ground_truth/tf", "/rosout")
@@ -26,6 +27,10 @@ class OutputSink:
         self._publisher = publisher
         self.events: list[Event] = []
         """All events so far, oldest first."""
+        self.latest = LatestSamples()
+        """The last sample of every sensor."""
+        self.on_event: Callable[[Event], None] | None = None
+        """Called with each event, before its message is published."""
         self.digest: Digest | None = None
         self.watch: Callable[[], None] | None = None
         """Callback after each call of the fused step, for measurements; it must change nothing."""
@@ -53,12 +58,15 @@ class OutputSink:
             self.watch()
 
     def sampled(self, samples: Samples) -> None:
-        """Publishes samples."""
+        """Holds and publishes samples."""
+        self.latest.sampled(samples)
         self._publisher.publish(samples)
 
     def happened(self, event: Event) -> None:
         """Stores and publishes an event."""
         self.events.append(event)
+        if self.on_event is not None:
+            self.on_event(event)
         self._publisher.publish_event(event)
 
     def deliver(self) -> None:

@@ -24,7 +24,7 @@ def offer_uav_services(graph: Graph, uav: Uav) -> list[Close]:
         ("arm", _TRIGGER, lambda _request: _arm(uav)),
         ("disarm", _TRIGGER, lambda _request: _disarm(uav)),
         ("kill", _TRIGGER, lambda _request: uav.stop_rotors()),
-        ("take_off_to", f"{_OURS}/TakeOffTo", lambda request: uav.take_off(request.altitude)),
+        ("take_off_to", f"{_OURS}/TakeOffTo", lambda request: _take_off(uav, request)),
         ("go_to", f"{_OURS}/GoTo", lambda request: _go_to(uav, request)),
         (
             "set_position_target",
@@ -66,6 +66,10 @@ def _disarm(uav: Uav) -> Fields:
     if uav.mode in (FlightMode.LANDED, FlightMode.CRASHED):
         return {"message": f"the rotors of {uav.name} do not turn"}
     raise CommandError(f"{uav.name} flies ({uav.mode.name}); land it, or kill it: it then falls")
+
+
+def _take_off(uav: Uav, request: Any) -> None:
+    uav.take_off(request.altitude)
 
 
 def _go_to(uav: Uav, request: Any) -> None:

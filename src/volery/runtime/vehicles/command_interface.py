@@ -73,7 +73,7 @@ def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> list[Clo
     for name, (message_class, take) in topics.items():
         topic = f"/{uav.name}/{name}"
         closes.append(graph.subscribe(topic, _careful(uav, take, topic), message_class).cancel)
-    actions: dict[str, Callable[[], None]] = {
+    actions: dict[str, Callable[[], object]] = {
         "take_off": uav.take_off,
         "hold": uav.hold,
         "land": uav.land,
@@ -125,5 +125,8 @@ def _careful(uav: Uav, take: Callable[[Any], None], topic: str) -> Callable[[Pub
     return receive
 
 
-def _without_request(action: Callable[[], None]) -> Callable[[Any], None]:
-    return lambda _request: action()
+def _without_request(action: Callable[[], object]) -> Callable[[Any], None]:
+    def handle(_request: Any) -> None:
+        action()
+
+    return handle

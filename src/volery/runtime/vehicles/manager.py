@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from volery.comms.radio.network import RadioNetwork
+from volery.control.fleet import Fleet
 from volery.core.arrays import Array
 from volery.core.errors import CommandError, PlacementError
 from volery.engine.engine import Engine
@@ -21,14 +22,19 @@ from volery.runtime.build.assembly import Assembly, assemble
 from volery.runtime.build.graph import announce_sensors, start_nodes, start_system_nodes
 from volery.runtime.build.placement import StartPose, check_room
 from volery.runtime.build.sensor_suites import SensorInstance, refit
+from volery.runtime.conditional_runs import ConditionalRuns
 from volery.runtime.monitoring.output_sink import OutputSink
 from volery.runtime.services.results import Close
 from volery.runtime.services.uav_services import offer_uav_services
 from volery.runtime.vehicles.command_interface import open_commands
 from volery.runtime.vehicles.external_odometry import ExternalOdometry
+from volery.runtime.vehicles.flight_futures import CHECK_PERIOD_S, FlightFutures
 from volery.runtime.vehicles.flight_states import FlightStates
 from volery.runtime.vehicles.uav import Uav
+from volery.runtime.vehicles.uav_sensors import UavSensors
 from volery.scenario.schema import Scenario, Sensor
+from volery.sensors.cameras.camera import EVERY_PART, Part
+from volery.sensors.samples import SensorId
 from volery.vehicle.airframe import Airframe
 from volery.world.terrain import Terrain
 
@@ -62,6 +68,8 @@ class VehicleManager:
     starts: tuple[StartPose, ...]
     """Start poses, in fleet order."""
     terrain: Terrain
+    runs: ConditionalRuns
+    """Runs for code that waits for flight commands and samples."""
     radio: RadioNetwork | None = None
     fitted: list[SensorInstance] = field(default_factory=list)
     uavs: dict[str, Uav] = field(default_factory=dict)
@@ -70,17 +78,23 @@ class VehicleManager:
     beginnings: dict[str, InitialState] = field(default_factory=dict)
     flight_states: FlightStates = field(init=False)
     pose_aids: ExternalOdometry = field(init=False)
+    futures: FlightFutures = field(init=False)
+    """Futures of the UAVs' flight commands."""
     _closes: dict[str, list[Close]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         origin = self.scenario.world.origin
         self.pose_aids = ExternalOdometry(self.graph, self.engine)
         self.flight_states = FlightStates(self.graph, self.engine, origin)
+        self.futures = FlightFutures(self._fleet_row_of, self.runs)
+        self.outlet.on_event = self.futures.happened
 
     def open(self, parts: Assembly) -> None:
         """Connects the engine's first UAVs to the graph."""
         self.flight_states.start(self.engine.every)
         self.pose_aids.start(self.engine.every)
+        futures = self.futures
+        self.engine.every(CHECK_PERIOD_S, futures.check, wanted=lambda: futures.needs_checks)
         self._take_over(parts, self.starts)
         self.start_nodes()
 
@@ -147,12 +161,11 @@ class VehicleManager:
         fresh = {start.name for start in new}
         announce_sensors(self.publisher, [f for f in self.fitted if f.id.uav_name in fresh])
         self.publisher.arrange(names)
+        self.outlet.latest.arrange(parts.banks, self.fitted)
         for bank in parts.banks:
             if bank.name == "camera":
                 cameras: Any = bank
-                cameras.bank.requested_parts = partial(
-                    self.publisher.cameras.subscribed_parts, bank.sensors
-                )
+                cameras.bank.requested_parts = partial(self._requested_parts, bank.sensors)
                 self.publisher.cameras.set_size(bank.sensors, cameras.bank.pixels)
         for row, start in enumerate(self.starts):
             if start.name in fresh:
@@ -167,8 +180,16 @@ class VehicleManager:
 
     def _enlist(self, start: StartPose, row: int) -> None:
         flight = self.scenario.types[start.type_name].flight
-        uav = Uav(self.engine.fleet, row, start.name, flight, start.type_name, self._check_goal)
-        self.uavs[start.name] = uav
+        uav = self.uavs[start.name] = Uav(
+            self.engine.fleet,
+            row,
+            start.name,
+            flight,
+            start.type_name,
+            self._check_goal,
+            sensors=UavSensors(self.outlet.latest, self.runs, start.name),
+            futures=self.futures,
+        )
         closes = self._closes[start.name] = [
             *open_commands(self.graph, uav, self._now_ns),
             *offer_uav_services(self.graph, uav),
@@ -177,6 +198,17 @@ class VehicleManager:
         ]
         if self.radio is not None and self.scenario.types[start.type_name].radio:
             closes.append(self.radio.join(start.name))
+
+    def _requested_parts(self, cameras: Sequence[SensorId]) -> Collection[Part]:
+        """Returns the parts of these cameras' images that have receivers."""
+        if self.outlet.latest.requests(cameras):
+            return EVERY_PART
+        return self.publisher.cameras.subscribed_parts(cameras)
+
+    def _fleet_row_of(self, name: str) -> tuple[Fleet, int]:
+        if name not in self.uavs:
+            raise CommandError(f"{name} was deleted")
+        return self.uavs[name].fleet_row
 
     def _check_goal(self, position: Array, airframe: Airframe) -> None:
         """Raises `CommandError` if a goal is below the ground or inside an obstacle."""
@@ -195,6 +227,8 @@ class VehicleManager:
         for close in self._closes.pop(name):
             close()
         self.publisher.retire(name)
+        self.outlet.latest.forget(name)
+        self.futures.fail(name, "the UAV was deleted")
         self.uavs.pop(name).move_to(None)
         del self.beginnings[name]
 

@@ -14,6 +14,9 @@ from volery.control.setpoints import MAX_COORDINATE, checked
 from volery.control.trajectory import Trajectory
 from volery.core.arrays import Array
 from volery.core.errors import CommandError
+from volery.runtime.vehicles.flight_future import CommandResult, FlightFuture
+from volery.runtime.vehicles.flight_futures import FlightFutures
+from volery.runtime.vehicles.uav_sensors import UavSensors
 from volery.scenario.schema import Flight
 from volery.vehicle.airframe import Airframe
 
@@ -22,7 +25,16 @@ CheckGoal = Callable[[Array, Airframe], None]
 
 
 class Uav:
-    """Reads the true state of a UAV and commands it; commands act from the next physics step."""
+    """Reads the true state of a UAV and its sensors, and commands it.
+
+    Commands act from the next physics step and raise `CommandError` if they are rejected. Flight
+    modes (`take_off`, `go_to`, ...) return a `FlightFuture`, which knows when the command is done,
+    or why it failed. Use it in the simulation's thread: between runs, in callbacks of the graph, or
+    in a function passed to `Simulation.post`.
+    """
+
+    sensors: UavSensors
+    """Sensors by name: `uav.sensors["imu"].latest`."""
 
     def __init__(
         self,
@@ -32,8 +44,16 @@ class Uav:
         flight: Flight,
         type_name: str = "",
         check_goal: CheckGoal | None = None,
+        *,
+        sensors: UavSensors,
+        futures: FlightFutures,
+        path: str = "",
     ) -> None:
         self._place: tuple[Fleet, int] | None = (fleet, row)
+        self.sensors = sensors
+        self._futures = futures
+        self._path = path or name
+        """Its name among those of all environments."""
         self._flight = flight
         self.name = name
         self.type_name = type_name
@@ -51,6 +71,11 @@ class Uav:
     @property
     def _row(self) -> int:
         return self._found()[1]
+
+    @property
+    def fleet_row(self) -> tuple[Fleet, int]:
+        """Its fleet and row. Raises `CommandError` if it was deleted."""
+        return self._found()
 
     def _found(self) -> tuple[Fleet, int]:
         if self._place is None:
@@ -133,17 +158,32 @@ class Uav:
 
     # ------------------------------------------------------------------------------ flight modes
 
-    def take_off(self, altitude_m: float | None = None) -> None:
-        """Climbs by `altitude_m` (default: the scenario's) and holds."""
+    def wait(self, timeout_s: float = 60.0) -> CommandResult | None:
+        """Waits for the present flight command, such as the take-off at the scenario's start.
+
+        Returns its result, None if the UAV has no command to complete. See `FlightFuture.wait`.
+        """
+        future = self.pending_command
+        return None if future is None else future.wait(timeout_s)
+
+    @property
+    def pending_command(self) -> FlightFuture | None:
+        """Future of the flight command that it carries out; None if all are done."""
+        return self._futures.pending(self._path)
+
+    def take_off(self, altitude_m: float | None = None) -> FlightFuture:
+        """Climbs by `altitude_m` (default: the scenario's) and holds; done when it holds."""
         altitude = self._flight.take_off_altitude_m if altitude_m is None else altitude_m
         self._fleet.take_off(self._row, float(checked("altitude", altitude, (), MAX_COORDINATE)))
+        return self._begun("take_off", (FlightMode.TAKE_OFF,))
 
-    def hold(self) -> None:
-        """Stops and holds the position."""
+    def hold(self) -> FlightFuture:
+        """Stops and holds the position; done when it has stopped."""
         self._fleet.hold(self._row)
+        return self._begun("hold", (FlightMode.HOLD,))
 
-    def go_to(self, position_map: ArrayLike, yaw: float | None = None) -> None:
-        """Flies to `position_map` (3,), m, in the map frame and holds there.
+    def go_to(self, position_map: ArrayLike, yaw: float | None = None) -> FlightFuture:
+        """Flies to `position_map` (3,), m, in the map frame and holds there; done on arrival.
 
         `yaw` is in rad; None keeps the heading. Raises `CommandError` if the position is below the
         ground or inside an obstacle.
@@ -151,14 +191,17 @@ class Uav:
         if self._check_goal is not None:
             self._check_goal(checked("position", position_map, (3,), MAX_COORDINATE), self.airframe)
         self._fleet.command_position(self._row, position_map, yaw)
+        return self._begun("go_to", (FlightMode.GO_TO,))
 
-    def follow_trajectory(self, trajectory: Trajectory) -> None:
-        """Flies along `trajectory`, whose time starts now, then holds at its end."""
+    def follow_trajectory(self, trajectory: Trajectory) -> FlightFuture:
+        """Flies along `trajectory`, whose time starts now, then holds; done at its end."""
         self._fleet.command_trajectory(self._row, trajectory)
+        return self._begun("follow_trajectory", (FlightMode.TRAJECTORY,))
 
-    def land(self) -> None:
-        """Descends at the present position and stops the rotors on the ground."""
+    def land(self) -> FlightFuture:
+        """Descends at the present position; done when the rotors have stopped on the ground."""
         self._fleet.land(self._row)
+        return self._begun("land", (FlightMode.LAND,), FlightMode.LANDED)
 
     def set_landing_speed(self, speed_m_s: float) -> None:
         """Sets the descent speed until touchdown, m/s, limited to that of the airframe.
@@ -169,9 +212,11 @@ class Uav:
             raise CommandError(f"landing speed = {speed_m_s} m/s is not finite")
         self._fleet.set_landing_speed(self._row, min(speed_m_s, self.airframe.limits.descent_m_s))
 
-    def return_home(self) -> None:
-        """Climbs, flies back to the take-off position and lands there."""
+    def return_home(self) -> FlightFuture:
+        """Climbs, flies back to the take-off position and lands there; done on the ground."""
         self._fleet.return_home(self._row, self._flight.return_altitude_m)
+        modes = (FlightMode.RETURN, FlightMode.LAND)
+        return self._begun("return_home", modes, FlightMode.LANDED)
 
     def set_command_timeout(self, seconds: float) -> None:
         """Sets the time (s, max 60) without velocity command or setpoint after which it holds."""
@@ -184,6 +229,19 @@ class Uav:
         """
         if self.mode not in (FlightMode.LANDED, FlightMode.CRASHED):
             self._fleet.stop_rotors(self._row)
+            self._replaced("stop_rotors")
+
+    def _begun(
+        self,
+        command: str,
+        active: tuple[FlightMode, ...],
+        final: FlightMode = FlightMode.HOLD,
+    ) -> FlightFuture:
+        return self._futures.begin(self._path, command, active, final)
+
+    def _replaced(self, command: str) -> None:
+        """Fails the future of the command before."""
+        self._futures.replace(self._path, command)
 
     # ------------------------------------------------------------------------ lower-level commands
 
@@ -193,18 +251,21 @@ class Uav:
         The UAV holds if no further command arrives within the scenario's `command_timeout_s`.
         """
         self._fleet.command_velocity_body(self._row, velocity, yaw_rate)
+        self._replaced("command_velocity")
 
     def command_velocity_map(
         self, velocity: ArrayLike, yaw_rate: float = 0.0, *, yaw: float | None = None
     ) -> None:
         """Flies at `velocity` (3,), m/s, in the map; `yaw_rate` in rad/s or `yaw` in rad."""
         self._fleet.command_velocity_map(self._row, velocity, yaw_rate, yaw=yaw)
+        self._replaced("command_velocity_map")
 
     def command_acceleration(
         self, acceleration_map: ArrayLike, yaw: float | None = None, yaw_rate: float = 0.0
     ) -> None:
         """Accelerates by (3,), m/s^2, in the map frame at `yaw`, rad (None keeps the heading)."""
         self._fleet.command_acceleration(self._row, acceleration_map, yaw=yaw, yaw_rate=yaw_rate)
+        self._replaced("command_acceleration")
 
     def command_setpoint(
         self,
@@ -223,6 +284,7 @@ class Uav:
         self._fleet.command_setpoint(
             self._row, position_map, velocity_map, acceleration_map, yaw, yaw_rate
         )
+        self._replaced("command_setpoint")
 
     def command_pose(
         self,
@@ -233,15 +295,19 @@ class Uav:
     ) -> None:
         """Sets the pose (m; x y z w, map from body) with the next step; kinematic UAVs only."""
         self._fleet.command_pose(self._row, position_map, attitude, velocity_map, omega_body)
+        self._replaced("command_pose")
 
     def command_attitude(self, attitude: ArrayLike, thrust: float) -> None:
         """Holds `attitude` (4,), x y z w, with a thrust in N along the body's z axis."""
         self._fleet.command_attitude(self._row, attitude, thrust)
+        self._replaced("command_attitude")
 
     def command_rates(self, omega_body: ArrayLike, thrust: float) -> None:
         """Turns at `omega_body` (3,), rad/s, with a thrust in N along the body's z axis."""
         self._fleet.command_rates(self._row, omega_body, thrust)
+        self._replaced("command_rates")
 
     def command_rotor_speeds(self, speeds: ArrayLike) -> None:
         """Turns the rotors at `speeds` (R,), rad/s."""
         self._fleet.command_rotor_speeds(self._row, speeds)
+        self._replaced("command_rotor_speeds")
