@@ -12,6 +12,8 @@ from volery.core.errors import VoleryError
 
 ROOT = Path(__file__).parents[3]
 EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+FOR_DEVELOPERS = {"test", "lint", "bench", "docs"}
+"""Extras that are not part of `all`: tools to change, measure and document Volery."""
 
 
 def loop_closures():
@@ -91,11 +93,18 @@ def test_what_lacks_a_package_says_which_command_installs_it(
     assert re.search(rf'needs? {package}: pip install "volery\[{extra}\]"', str(caught.value))
 
 
+def test_all_is_the_union_of_the_extras_for_users():
+    (union,) = EXTRAS["all"]
+    users = EXTRAS.keys() - FOR_DEVELOPERS - {"all"}
+    assert union == f"volery[{','.join(sorted(users))}]"
+
+
 @pytest.mark.parametrize("name", ["README.md", "docs/extras.md"])
 def test_readme_and_docs_list_all_extras(name):
     table = [line for line in (ROOT / name).read_text().splitlines() if line.startswith("| `")]
     listed = [each for line in table for each in re.findall(r"`(\w+)`", line.split("|")[1])]
-    assert sorted(set(listed) & set(EXTRAS)) == sorted(EXTRAS)
+    assert EXTRAS.keys() - {"all"} <= set(listed)
+    assert "volery[all]" in (ROOT / "docs/extras.md").read_text()
 
 
 def test_docs_name_only_extras_that_exist():
