@@ -131,11 +131,6 @@ def test_an_interrupt_while_the_command_loads_is_one_line(
     assert capsys.readouterr().err == "stopped\n"
 
 
-def test_version() -> None:
-    result = runner.invoke(app, ["--version"])
-    assert result.stdout == "volery 0.1.0\n"
-
-
 def test_list() -> None:
     lines = runner.invoke(app, ["list"]).stdout.splitlines()
     assert lines[0].split() == ["scenario", "UAVs", "duration", "what", "it", "is"]
