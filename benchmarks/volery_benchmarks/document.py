@@ -86,7 +86,8 @@ def read_results(path: Path) -> list[Result]:
         raise VoleryError(f"{path}: {error.strerror}") from None
     except json.JSONDecodeError as error:
         raise VoleryError(f"{path}: not JSON: {error}") from None
-    return [Result.from_dict(item) for item in (data if isinstance(data, list) else [data])]
+    found = data.get("results", data) if isinstance(data, dict) else data
+    return [Result.from_dict(item) for item in (found if isinstance(found, list) else [found])]
 
 
 if __name__ == "__main__":

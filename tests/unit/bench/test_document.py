@@ -1,7 +1,10 @@
 """The page of figures: several runs of a bench are told by their median and their span."""
 
-from volery_benchmarks.document import render
-from volery_benchmarks.registry import Result
+import re
+from pathlib import Path
+
+from volery_benchmarks.document import _HEAD, render
+from volery_benchmarks.registry import BENCHES, Result
 
 
 def run(rays, bench="lidar", machine="a"):
@@ -25,3 +28,14 @@ def test_runs_of_two_machines_are_not_mixed():
     assert "## lidar (machine 1)" in page
     assert "## lidar (machine 2)" in page
     assert "median of" not in page
+
+
+def test_benchmarks_page_has_the_columns_of_the_generator():
+    """The committed page is what `make docs-benchmarks` writes, not edited by hand."""
+    page = (Path(__file__).parents[3] / "docs/benchmarks.md").read_text()
+    assert page.startswith(_HEAD)
+    bounds = {bench.name: bench.bounds for bench in BENCHES.values()}
+    for name, section in re.findall(r"^## (\w+)\n(.*?)(?=^## |\Z)", page, re.DOTALL | re.MULTILINE):
+        for figure, bound in re.findall(r"^\| `(\w+)` \| .* \| (.*) \|$", section, re.MULTILINE):
+            limit = bounds[name].get(figure)
+            assert bound.removesuffix(" (missed)") == str(limit or "reported"), (name, figure)
