@@ -79,3 +79,8 @@ def test_options_exist():
     named = set(re.findall(r"`(?:[^`]* )?(--[a-z][\w-]*)", TEXT))
     assert len(named) > 10
     assert named <= known
+
+
+def test_citation_names_the_same_version():
+    text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert re.search(r"^version: (.*)$", text, re.MULTILINE)[1] == VERSION
