@@ -40,6 +40,12 @@ def mavlink():
     dialect.__wrapped__()
 
 
+def checksums():
+    from volery.mavlink.codec import _crc
+
+    _crc.__wrapped__()
+
+
 def identification():
     from volery.control.identification import identify
     from volery.vehicle.airframe import load_airframe
@@ -67,20 +73,31 @@ def browser():
         pass
 
 
-@pytest.mark.parametrize(
-    ("module", "package", "extra", "use"),
-    [
-        ("gtsam", "gtsam", "autonomy", loop_closures),
-        ("pyoctomap", "pyoctomap", "autonomy", mapping),
-        ("ompl", "ompl", "autonomy", planning),
-        ("pymavlink.dialects.v20", "pymavlink", "mavlink", mavlink),
-        ("scipy", "scipy", "identify", identification),
-        ("scipy.signal", "scipy", "identify", answers_of_loops),
-        ("cyclonedds", "cyclonedds", "ros2", ros2("dds")),
-        ("zenoh", "eclipse-zenoh", "ros2", ros2("zenoh")),
-        ("playwright.sync_api", "playwright", "bench", browser),
-    ],
-)
+USES = [
+    ("gtsam", "gtsam", "autonomy", loop_closures),
+    ("pyoctomap", "pyoctomap", "autonomy", mapping),
+    ("ompl", "ompl", "autonomy", planning),
+    ("pymavlink.dialects.v20", "pymavlink", "mavlink", mavlink),
+    ("fastcrc", "fastcrc", "mavlink", checksums),
+    ("scipy", "scipy", "identify", identification),
+    ("scipy.signal", "scipy", "identify", answers_of_loops),
+    ("cyclonedds", "cyclonedds", "ros2", ros2("dds")),
+    ("zenoh", "eclipse-zenoh", "ros2", ros2("zenoh")),
+    ("playwright.sync_api", "playwright", "bench", browser),
+]
+"""Modules, their packages and extras, and a use of each."""
+WORKS_WITHOUT = {"open3d"}
+"""Packages without which only a comparison is left out."""
+
+
+def test_every_package_of_an_extra_is_in_the_table():
+    extras = EXTRAS.keys() - {"all", "test", "lint", "docs"}
+    packages = {(re.match(r"[\w-]+", each)[0], extra) for extra in extras for each in EXTRAS[extra]}
+    listed = {(package, extra) for _, package, extra, _ in USES}
+    assert {pair for pair in packages if pair[0] not in WORKS_WITHOUT} == listed
+
+
+@pytest.mark.parametrize(("module", "package", "extra", "use"), USES)
 def test_what_lacks_a_package_says_which_command_installs_it(
     monkeypatch, module, package, extra, use
 ):
@@ -91,6 +108,7 @@ def test_what_lacks_a_package_says_which_command_installs_it(
     with pytest.raises(VoleryError) as caught:
         use()
     assert re.search(rf'needs? {package}: pip install "volery\[{extra}\]"', str(caught.value))
+    assert "\n" not in str(caught.value)
 
 
 def test_all_is_the_union_of_the_extras_for_users():
