@@ -36,7 +36,6 @@ def check_of(data: bytes) -> int:
 
 @cache
 def _crc() -> Callable[[bytes], int]:
-    dialect()
     try:
         from fastcrc import crc16
     except ImportError:
