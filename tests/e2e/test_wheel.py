@@ -125,6 +125,25 @@ def test_wheel_flies_with_its_page(environment, tmp_path):
             process.kill()
 
 
+@pytest.mark.parametrize(
+    ("extra", "words"),
+    [
+        ("autonomy", "run forest_search --seconds 1"),
+        ("identify", "identify f450 --out model.toml"),
+        ("mavlink", "run hover --seconds 1 --bridge mavlink"),
+        ("ros2", "run hover --seconds 1 --bridge ros2"),
+        ("bench", "bench page"),
+    ],
+)
+def test_wheel_names_the_command_for_a_missing_extra(environment, tmp_path, extra, words):
+    command = [str(environment / "volery"), *words.split()]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert f'pip install "volery[{extra}]"' in done.stderr
+    assert not any(tmp_path.iterdir())
+
+
 def address_of(process):
     for line in process.stderr:
         if found := re.search(r"http://\S+/", line):
