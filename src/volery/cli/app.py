@@ -26,24 +26,30 @@ app = typer.Typer(
 )
 
 
-def _version(wanted: bool) -> None:
-    if wanted:
-        from importlib.metadata import version
-
-        typer.echo(f"volery {version('volery')}")
-        raise typer.Exit
-
-
-@app.callback()
+@app.callback(invoke_without_command=True)
 def volery(
+    context: typer.Context,
     version: Annotated[
         bool,
         typer.Option(
-            "--version", callback=_version, is_eager=True, help="Print the version and exit."
+            "--version", help="Print version, commit, Python, platform and libraries; exit."
         ),
+    ] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="With --version: print one JSON object.")
     ] = False,
 ) -> None:
     """Simulate many UAVs with LIDARs, cameras and autopilots in lock step."""
+    if version:
+        from volery.cli.build_info import describe_build
+
+        build = describe_build()
+        typer.echo(build.to_json() if as_json else str(build))
+        raise typer.Exit
+    if as_json:
+        raise typer.BadParameter("needs --version", param_hint="--json")
+    if context.invoked_subcommand is None:
+        raise typer.BadParameter("name a command; `volery --help` lists them")
 
 
 app.command(cls=PageCommand)(run)
