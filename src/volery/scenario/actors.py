@@ -16,7 +16,7 @@ _UAV_NAME = re.compile(r"uav\d+")
 class WaypointActor(Data):
     """Moves along straight lines from waypoint to waypoint."""
 
-    kind: Literal["waypoints"]
+    kind: Literal["waypoints"] = "waypoints"
     waypoints_m: Annotated[
         tuple[Annotated[tuple[float, ...], Field(min_length=2, max_length=3)], ...],
         Field(min_length=2, max_length=10_000),
@@ -40,7 +40,7 @@ class WaypointActor(Data):
 class CircleActor(Data):
     """Circles at one height, banked like an aircraft."""
 
-    kind: Literal["circle"]
+    kind: Literal["circle"] = "circle"
     centre_m: Vector3
     radius_m: Annotated[float, Field(gt=0.0, le=10_000.0)]
     speed_m_s: Speed
@@ -52,7 +52,7 @@ class CircleActor(Data):
 class ExternalActor(Data):
     """Receives its pose from `/actors/NAME/pose` or `/set_entity_state`."""
 
-    kind: Literal["external", "outside"]
+    kind: Literal["external", "outside"] = "external"
     position_m: Annotated[tuple[float, ...], Field(min_length=2, max_length=3)]
     """Initial position: x, y (on the ground) or x, y, z."""
     yaw_deg: float = 0.0

@@ -22,7 +22,7 @@ class Stereo(Data):
 class CameraSensor(MountedSensor):
     """A camera of a named model; x of its frame is the optical axis, z is up."""
 
-    kind: Literal["camera"]
+    kind: Literal["camera"] = "camera"
     name: Name = "camera"
     model: str = "pinhole"
     rate_hz: Rate = 10.0

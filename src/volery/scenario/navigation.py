@@ -48,7 +48,7 @@ class _DeniedArea(Data):
 class DeniedBox(_DeniedArea):
     """A rectangle of the map without satellite signals."""
 
-    kind: Literal["box"]
+    kind: Literal["box"] = "box"
     region_m: tuple[float, float, float, float]
     """x_min, y_min, x_max, y_max."""
 
@@ -67,7 +67,7 @@ class DeniedBox(_DeniedArea):
 class DeniedPolygon(_DeniedArea):
     """A polygon of the map without satellite signals."""
 
-    kind: Literal["polygon"]
+    kind: Literal["polygon"] = "polygon"
     corners_m: Annotated[tuple[Vector2, ...], Field(min_length=3)]
     """Corners in order around; the last connects to the first."""
 
@@ -87,7 +87,7 @@ DeniedArea: TypeAlias = Annotated[DeniedBox | DeniedPolygon, Field(discriminator
 class GnssSensor(MountedSensor):
     """GNSS receiver; its antenna is at `position_m`."""
 
-    kind: Literal["gnss"]
+    kind: Literal["gnss"] = "gnss"
     name: Name = "fix"
     model: str = "gnss_m8"
     rate_hz: Rate = 5.0
@@ -96,7 +96,7 @@ class GnssSensor(MountedSensor):
 class BarometerSensor(MountedSensor):
     """Static pressure and temperature."""
 
-    kind: Literal["barometer"]
+    kind: Literal["barometer"] = "barometer"
     name: Name = "pressure"
     model: str = "barometer_px4"
     rate_hz: Rate = 50.0
@@ -105,7 +105,7 @@ class BarometerSensor(MountedSensor):
 class MagnetometerSensor(MountedSensor):
     """Three-axis magnetometer."""
 
-    kind: Literal["magnetometer"]
+    kind: Literal["magnetometer"] = "magnetometer"
     name: Name = "mag"
     model: str = "magnetometer_px4"
     rate_hz: Rate = 100.0

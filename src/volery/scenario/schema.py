@@ -1,16 +1,18 @@
 """The scenario: frozen data that defines a simulation, validated on construction.
 
 Keys contain their units (`_m`, `_deg`, `_hz`, ...). A TOML file maps onto `Scenario` one to one;
-docs/scenarios.md explains it and `Scenario.model_json_schema()` serves editors.
+docs/scenarios.md explains it; `volery schema` prints its JSON schema for editors.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 
+from volery.core.errors import ScenarioError, reason_of
 from volery.scenario.access import ScenarioAccess
 from volery.scenario.actors import Actors, check_actors
 from volery.scenario.base import (
@@ -29,12 +31,14 @@ from volery.scenario.base import (
 from volery.scenario.camera import CameraSensor, Daylight
 from volery.scenario.city import City
 from volery.scenario.faults import Fault
+from volery.scenario.file_names import moved
 from volery.scenario.former_parameters import former_parameters
 from volery.scenario.grid_map import GridMapWorld
-from volery.scenario.merging import merged
 from volery.scenario.navigation import DeniedArea, MagneticField, NavigationSensor, Origin
-from volery.scenario.node_names import NODE_PATTERN
+from volery.scenario.node_names import NODE_PATTERN, name_of_class
+from volery.scenario.python_changes import split_changes, with_keys, with_short_forms
 from volery.scenario.radio import Radio
+from volery.scenario.toml_writer import toml_text
 from volery.scenario.user_mesh import UserMesh
 from volery.scenario.validation import validated
 from volery.scenario.weather import Weather
@@ -54,7 +58,7 @@ class FlatTerrain(Data):
 class GridTerrain(Data):
     """A heightfield from a CSV grid: row k holds the elevations at y = k * spacing."""
 
-    kind: Literal["grid"]
+    kind: Literal["grid"] = "grid"
     file: str
     spacing_m: Positive
     origin_m: Vector2 = (0.0, 0.0)
@@ -63,7 +67,7 @@ class GridTerrain(Data):
 class InventoryForest(Data):
     """Trees at surveyed positions: CSV with `x_m,y_m[,dbh_cm,height_m,species]`."""
 
-    kind: Literal["inventory"]
+    kind: Literal["inventory"] = "inventory"
     file: str
     species: str
     """Species of trees without one in the inventory, or with one that is neither shipped nor
@@ -87,7 +91,7 @@ class InventoryForest(Data):
 class ProceduralForest(Data):
     """Trees at random positions with a minimum spacing."""
 
-    kind: Literal["procedural"]
+    kind: Literal["procedural"] = "procedural"
     region_m: tuple[float, float, float, float]
     trees: Annotated[int, Field(ge=0, le=200_000)]
     minimum_spacing_m: NonNegative = 1.0
@@ -144,7 +148,7 @@ class Nodding(Data):
 class LidarSensor(MountedSensor):
     """A LIDAR of a named model: planar, with many rings, or with a rosette."""
 
-    kind: Literal["lidar"]
+    kind: Literal["lidar"] = "lidar"
     name: Name = "horizontal"
     model: str = "utm_30lx"
     topic: Topic | None = None
@@ -157,7 +161,7 @@ class LidarSensor(MountedSensor):
 class ImuSensor(MountedSensor):
     """Accelerometer and gyroscope of a named model."""
 
-    kind: Literal["imu"]
+    kind: Literal["imu"] = "imu"
     name: Name = "imu"
     model: str = "adis16448"
     rate_hz: Rate = 200.0
@@ -166,7 +170,7 @@ class ImuSensor(MountedSensor):
 class SonarSensor(MountedSensor):
     """Downward ultrasonic range finder."""
 
-    kind: Literal["sonar"]
+    kind: Literal["sonar"] = "sonar"
     name: Name = "range"
     model: str = "downward_sonar"
     rate_hz: Rate = 10.0
@@ -175,7 +179,7 @@ class SonarSensor(MountedSensor):
 class OdometrySensor(SensorData):
     """Pose and velocity from an odometry source: true motion plus a modelled drift."""
 
-    kind: Literal["odometry"]
+    kind: Literal["odometry"] = "odometry"
     name: Literal["odom"] = "odom"
     noise: bool = True
     model: str = "visual_inertial"
@@ -200,7 +204,7 @@ class ExternalOdometrySource(Data):
 class EstimateSensor(SensorData):
     """Output of the UAV's estimator, as odometry; it needs an IMU."""
 
-    kind: Literal["estimate"]
+    kind: Literal["estimate"] = "estimate"
     name: Literal["odom"] = "odom"
     rate_hz: Rate = 50.0
     used_for_control: bool = True
@@ -216,7 +220,7 @@ class EstimateSensor(SensorData):
 class GroundTruthSensor(SensorData):
     """The true state, for reports and checks; autonomy must not read it."""
 
-    kind: Literal["ground_truth"]
+    kind: Literal["ground_truth"] = "ground_truth"
     name: Literal["ground_truth"] = "ground_truth"
     rate_hz: Rate = 50.0
 
@@ -224,7 +228,7 @@ class GroundTruthSensor(SensorData):
 class BatterySensor(SensorData):
     """Battery monitor: voltage, current and charge, if the airframe has a battery."""
 
-    kind: Literal["battery"]
+    kind: Literal["battery"] = "battery"
     name: Literal["battery"] = "battery"
     rate_hz: Rate = 1.0
 
@@ -282,10 +286,15 @@ class NodeEntry(Data):
     """A node that runs inside the simulation, in lock step: for one UAV, or for all of them."""
 
     node: Annotated[str, Field(pattern=NODE_PATTERN)]
-    """A registered name, such as `slam`, or `module:Class`, a `volery.graph.nodes.node.Node`."""
+    """A registered name, such as `slam`, or `module:Class`; in Python also a class of its own."""
     parameters: dict[str, Any] = Field(default_factory=dict)
     latency_s: Annotated[float, Field(ge=0.0, le=60.0)] = 0.0
     """Simulated time from a callback's input to its output; above 0 the node runs on a worker."""
+
+    @field_validator("node", mode="before")
+    @classmethod
+    def _name_the_class(cls, node: Any) -> Any:
+        return name_of_class(node) if isinstance(node, type) else node
 
     @field_validator("parameters")
     @classmethod
@@ -448,15 +457,54 @@ class Scenario(Data):
         world = self.world
         return world.seed is None and (world.forest is not None or world.city is not None)
 
-    def with_(self, **changes: Any) -> Scenario:
+    def with_(self, changes: Mapping[str, Any] | None = None, /, **keys: Any) -> Scenario:
         """Returns a copy with other values of its keys, validated like a file.
 
         Tables merge key by key, all else is replaced; `with_(seed=7, world={"seed": 1})` leaves the
-        rest of the world unchanged. Raises `ScenarioError`, naming key and allowed values, for
-        invalid values.
+        rest of the world unchanged. `changes` may also hold paths of keys:
+        `{"world.wind.turbulence": "light", "uavs[0].yaw_deg": 90.0, "types.*.airframe": "iris"}`.
+
+        Short forms: `uavs` (a number) resizes the only group; `wind` is a velocity (3,), m/s in
+        the map, or a table; `weather` is a table; `airframe` and `sensors` change all types.
+        `sensors` are sets ("lidar", "camera", "sonar", "navigation"), which are added or kept while
+        sensors of other sets are removed, or all sensors as tables or models. Raises
+        `ScenarioError`, naming key and allowed values, for invalid values.
         """
-        data = merged(self.model_dump(exclude_unset=True), changes)
-        return validated(data, Scenario, f"{self.name}: with_()").with_access(self.access)
+        where = f"{self.name}: with_()"
+        short, long = split_changes({**(changes or {}), **keys})
+        changed = validated(with_keys(self.data(), long, where), Scenario, where)
+        if short:
+            data = with_short_forms(changed.data(), short, where)
+            changed = validated(data, Scenario, where)
+        return changed.with_access(self.access)
+
+    def data(self) -> dict[str, Any]:
+        """Returns the given keys as plain data: tables, lists, numbers, texts and dates."""
+        return self.model_dump(exclude_unset=True)
+
+    def to_toml(self) -> str:
+        """Returns the given keys as TOML, which loads to an equal scenario.
+
+        Raises `ScenarioError` if a node's parameter is something that TOML does not have.
+        """
+        return toml_text(self.model_dump(exclude_unset=True, exclude_none=True))
+
+    def save(self, path: str | Path) -> None:
+        """Writes a TOML file, which `load_scenario` loads to an equal scenario.
+
+        Names of files in this scenario's folder become relative to the new file's folder. A saved
+        scenario of a log or an upload has, when it is loaded, the access of its new owner. Raises
+        `ScenarioError` if the file cannot be written.
+        """
+        path = Path(path)
+        if path.suffix != ".toml":
+            raise ScenarioError(f"{path}: a scenario is a .toml file; name it {path.name}.toml")
+        data = self.model_dump(exclude_unset=True, exclude_none=True)
+        text = toml_text(moved(data, self.access.folder, path.parent))
+        try:
+            path.write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise ScenarioError(f"{path}: cannot be written: {reason_of(error)}") from None
 
     @property
     def access(self) -> ScenarioAccess:

@@ -19,7 +19,7 @@ _Height = Annotated[float, Field(ge=0.1, le=304.8)]
 class LogProfile(Data):
     """Logarithmic growth of the steady wind with height above ground."""
 
-    kind: Literal["log"]
+    kind: Literal["log"] = "log"
     reference_height_m: _Height = 10.0
     """Height of velocity_m_s."""
     roughness_m: Annotated[float, Field(ge=1e-6, le=10.0)] = 0.03
@@ -34,7 +34,7 @@ class LogProfile(Data):
 class PowerProfile(Data):
     """Growth of the steady wind with a power of the height above ground."""
 
-    kind: Literal["power"]
+    kind: Literal["power"] = "power"
     reference_height_m: _Height = 10.0
     exponent: Annotated[float, Field(ge=0.0, le=1.0)] = 1.0 / 7.0
 
