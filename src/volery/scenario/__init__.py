@@ -44,33 +44,36 @@ if TYPE_CHECKING:
         Origin,
     )
     from volery.scenario.radio import Radio, RelayedTopic
-    from volery.scenario.schema import (
+    from volery.scenario.schema import Physics, Scenario
+    from volery.scenario.sensors import (
         BatterySensor,
         EstimateSensor,
         ExternalOdometrySource,
-        FlatTerrain,
-        Flight,
-        GridTerrain,
         GroundTruthSensor,
         ImuSensor,
-        InventoryForest,
-        KinematicMotion,
         LidarSensor,
         Nodding,
-        NodeEntry,
         OdometrySensor,
-        Physics,
-        ProceduralForest,
-        RotorWear,
-        Scenario,
         SonarSensor,
+    )
+    from volery.scenario.uavs import (
+        Flight,
+        KinematicMotion,
+        NodeEntry,
+        RotorWear,
         UavGroup,
         UavType,
-        World,
     )
     from volery.scenario.user_mesh import UserMesh
     from volery.scenario.weather import Weather
     from volery.scenario.wind import Gust, LogProfile, PowerProfile, Wind
+    from volery.scenario.world import (
+        FlatTerrain,
+        GridTerrain,
+        InventoryForest,
+        ProceduralForest,
+        World,
+    )
 
 _NAMES = {
     "actors": ("Actor", "CircleActor", "ExternalActor", "WaypointActor"),
@@ -97,33 +100,23 @@ _NAMES = {
         "Origin",
     ),
     "radio": ("Radio", "RelayedTopic"),
-    "schema": (
+    "schema": ("Physics", "Scenario"),
+    "sensors": (
         "BatterySensor",
         "EstimateSensor",
         "ExternalOdometrySource",
-        "FlatTerrain",
-        "Flight",
-        "GridTerrain",
         "GroundTruthSensor",
         "ImuSensor",
-        "InventoryForest",
-        "KinematicMotion",
         "LidarSensor",
-        "NodeEntry",
         "Nodding",
         "OdometrySensor",
-        "Physics",
-        "ProceduralForest",
-        "RotorWear",
-        "Scenario",
         "SonarSensor",
-        "UavGroup",
-        "UavType",
-        "World",
     ),
+    "uavs": ("Flight", "KinematicMotion", "NodeEntry", "RotorWear", "UavGroup", "UavType"),
     "user_mesh": ("UserMesh",),
     "weather": ("Weather",),
     "wind": ("Gust", "LogProfile", "PowerProfile", "Wind"),
+    "world": ("FlatTerrain", "GridTerrain", "InventoryForest", "ProceduralForest", "World"),
 }
 _MODULES = {name: f"volery.scenario.{module}" for module, names in _NAMES.items() for name in names}
 

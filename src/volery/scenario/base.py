@@ -182,7 +182,9 @@ class MountedSensor(SensorData):
     position_m: Vector3 = (0.0, 0.0, 0.0)
     """Position of the sensor frame in the body, FLU."""
     rpy_deg: Vector3 = (0.0, 0.0, 0.0)
+    """Roll, pitch and yaw of the sensor frame in the body, FLU."""
     noise: bool = True
+    """Whether samples have noise; false: they are exact."""
 
 
 def check_rectangle(region: tuple[float, float, float, float] | None) -> None:

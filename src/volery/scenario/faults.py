@@ -44,6 +44,7 @@ class MotorFault(_Passing):
     """A rotor produces part of its thrust, or none."""
 
     kind: Literal["motor"] = "motor"
+    """Loss of thrust of a rotor."""
     rotor: Annotated[int, Field(ge=0)]
     """Number of the rotor in the airframe's file, from 0."""
     thrust_factor: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
@@ -54,9 +55,11 @@ class SensorFault(_Passing):
     """A sensor sends nothing, repeats its last measurement, or has a bias."""
 
     kind: Literal["sensor"] = "sensor"
+    """Fault of a sensor."""
     sensor: str
     """Name of the sensor, such as `imu`."""
     effect: Literal["dropped", "stuck", "biased"]
+    """Effect: no samples, a repeated sample, or a bias."""
     bias: Annotated[tuple[float, ...], Field(min_length=1)] | None = None
     """Bias: a number for each measured component, in its unit."""
 
@@ -71,18 +74,21 @@ class GnssFault(_Passing):
     """No satellites are received."""
 
     kind: Literal["gnss_loss"] = "gnss_loss"
+    """Loss of satellite signals."""
 
 
 class RadioFault(_Passing):
     """A UAV's radio neither sends nor receives."""
 
     kind: Literal["radio"] = "radio"
+    """Loss of the radio."""
 
 
 class GustFault(_Fault):
     """A 1-cosine gust that reaches all positions at once."""
 
     kind: Literal["gust"] = "gust"
+    """A gust."""
     velocity_m_s: Vector3
     """Maximum wind of the gust, map."""
     rise_s: Annotated[float, Field(ge=0.01, le=60.0)] = 0.5
@@ -95,6 +101,7 @@ class DisplacementFault(_UavFault):
     """A UAV changes its position from one step to the next."""
 
     kind: Literal["displacement"] = "displacement"
+    """A sudden change of position."""
     offset_m: Vector3
     """Offset of the position, map."""
 
