@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, WithJsonSchema, field_validator, model_validator
 
 from volery.scenario.base import Data, Name, NonNegative, Vector3, warn_of_former_word
 
@@ -59,7 +59,10 @@ class CircleActor(Data):
 class ExternalActor(Data):
     """Receives its pose from `/actors/NAME/pose` or `/set_entity_state`."""
 
-    kind: Literal["external", "outside"] = "external"
+    kind: Annotated[
+        Literal["external", "outside"],
+        WithJsonSchema({"const": "external", "type": "string"}),
+    ] = "external"
     """Motion that an external program sets."""
     position_m: Annotated[tuple[float, ...], Field(min_length=2, max_length=3)]
     """Initial position: x, y (on the ground) or x, y, z."""

@@ -41,7 +41,7 @@ class City(Data):
     file: str
     """GeoJSON file of building outlines."""
     region_m: tuple[float, float, float, float] | None = None
-    """x_min, y_min, x_max, y_max; only buildings whose centre lies in it are used. None uses all.
+    """x_min, y_min, x_max, y_max; only buildings whose centre lies in it are used; None: all.
     """
     storey_m: Annotated[float, Field(ge=2.0, le=10.0)] = 3.2
     """Height of a storey where only the number of levels is known."""

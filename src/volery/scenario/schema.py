@@ -31,7 +31,7 @@ from volery.scenario.sensors import (
     Sensor,
     SonarSensor,
 )
-from volery.scenario.toml_writer import toml_text
+from volery.scenario.toml_writer import SCHEMA_DIRECTIVE, toml_text
 from volery.scenario.uavs import Flight, KinematicMotion, NodeEntry, RotorWear, UavGroup, UavType
 from volery.scenario.validation import validated
 from volery.scenario.world import FlatTerrain, GridTerrain, InventoryForest, ProceduralForest, World
@@ -169,7 +169,8 @@ class Scenario(Data):
     def save(self, path: str | Path) -> None:
         """Writes a TOML file, which `load_scenario` loads to an equal scenario.
 
-        Names of files in this scenario's folder become relative to the new file's folder. A saved
+        Its first line names `scenario.schema.json` for editors; `volery schema` writes that. Names
+        of files in this scenario's folder become relative to the new file's folder. A saved
         scenario of a log or an upload has, when it is loaded, the access of its new owner. Raises
         `ScenarioError` if the file cannot be written.
         """
@@ -179,9 +180,16 @@ class Scenario(Data):
         data = self.model_dump(exclude_unset=True, exclude_none=True)
         text = toml_text(moved(data, self.access.folder, path.parent))
         try:
-            path.write_text(text, encoding="utf-8")
+            path.write_text(f"{SCHEMA_DIRECTIVE}\n\n{text}", encoding="utf-8")
         except OSError as error:
             raise ScenarioError(f"{path}: cannot be written: {reason_of(error)}") from None
+
+    def __eq__(self, other: object) -> bool:
+        """Returns whether the other scenario has the same values; access does not count."""
+        return isinstance(other, Scenario) and self.__dict__ == other.__dict__
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.seed, self.uavs))
 
     @property
     def access(self) -> ScenarioAccess:

@@ -10,6 +10,10 @@ from typing import Any
 
 from volery.core.errors import ScenarioError
 
+SCHEMA_FILE = "scenario.schema.json"
+"""Name of the JSON schema to which scenario files refer, beside them; `volery schema` writes it."""
+SCHEMA_DIRECTIVE = f"#:schema ./{SCHEMA_FILE}"
+"""First line of a scenario file: editors complete and check the file by that schema."""
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _MAX_INLINE = 88
 """Characters of a line with a table in braces."""
@@ -21,6 +25,11 @@ def toml_text(data: Mapping[str, Any]) -> str:
     Raises `ScenarioError`, naming the key, for values that TOML does not have, such as None.
     """
     return "\n".join(_table(data, "", inside_list=False)).strip("\n") + "\n"
+
+
+def toml_value(value: Any) -> str:
+    """Returns a value in one line of TOML; raises `ScenarioError` as `toml_text`."""
+    return _value(value, "value")
 
 
 def _table(data: Mapping[str, Any], name: str, *, inside_list: bool) -> Iterator[str]:

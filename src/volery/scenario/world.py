@@ -61,7 +61,7 @@ class InventoryForest(Data):
     species_map: Annotated[dict[str, str], Field(max_length=10_000)] = Field(default_factory=dict)
     """Shipped species by the inventory's names of species."""
     region_m: tuple[float, float, float, float] | None = None
-    """x_min, y_min, x_max, y_max; only trees with x_min <= x < x_max (y alike) are used. None uses
+    """x_min, y_min, x_max, y_max; only trees with x_min <= x < x_max (y alike) are used; None:
     all."""
     fraction: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
     """Fraction of the trees, at random; a smaller fraction is a subset of a larger one."""

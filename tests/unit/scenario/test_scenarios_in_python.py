@@ -24,6 +24,7 @@ from volery.scenario import (
     grid,
     parse_scenario,
 )
+from volery.scenario.access import ScenarioAccess
 
 SCOUT = UavType(sensors=(LidarSensor(nodding=Nodding(period_s=1.0)), ImuSensor(rate_hz=100.0)))
 GROUP = UavGroup(type="scout", position_m=(1.0, 2.0))
@@ -71,6 +72,14 @@ def test_classes_and_tables_make_equal_scenarios():
     assert made == read
     assert made.data() == read.data()
     assert parse_scenario(made.data()) == made
+
+
+def test_equal_scenarios_have_equal_values_and_hashes():
+    read = parse_scenario(small().data(), access=ScenarioAccess(is_confined=True))
+    assert (read == small(), read.access == small().access) == (True, False)
+    assert len({read, small()}) == 1
+    assert read != small(seed=2)
+    assert read != read.data()
 
 
 def test_a_class_can_be_a_node():

@@ -34,12 +34,12 @@ def test_nan_is_written():
 @pytest.mark.parametrize("name", list_scenarios())
 def test_shipped_scenarios_load_again(name, tmp_path):
     scenario = load_scenario(name)
-    read = parse_scenario(tomllib.loads(scenario.to_toml()), access=scenario.access)
+    read = parse_scenario(tomllib.loads(scenario.to_toml()))
     assert read == scenario
     assert read.data() == scenario.data()
     path = tmp_path / "again.toml"
     scenario.save(path)
-    assert load_scenario(path).with_access(scenario.access) == scenario
+    assert load_scenario(path) == scenario
 
 
 def test_the_text_reads_like_a_shipped_file(flat_data):
