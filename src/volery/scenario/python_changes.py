@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import difflib
+import re
+from collections.abc import Callable, Collection, Mapping, Sequence
 from operator import index
 from typing import Any
 
@@ -16,10 +18,20 @@ from volery.scenario.sensor_sets import SENSOR_SETS, fit
 from volery.scenario.uav_types import with_airframe
 
 _Data = dict[str, Any]
+_FIRST = re.compile(r"[^.\[\]]+")
+"""First key of a path."""
 
 
-def split_changes(changes: Mapping[str, Any]) -> tuple[_Data, _Data]:
-    """Returns the short forms of changes, and the other changes."""
+def split_changes(
+    changes: Mapping[str, Any], known: Collection[str], where: str
+) -> tuple[_Data, _Data]:
+    """Returns the short forms of changes, and the other changes.
+
+    known: keys of a scenario. where: names the source in errors. Raises `ScenarioError` for a key
+    that is neither known, nor the beginning of a path, nor a short form.
+    """
+    for key in changes:
+        _check_key(key, known, where)
     short = {key: value for key, value in changes.items() if _is_short(key, value)}
     return short, {key: value for key, value in changes.items() if key not in short}
 
@@ -50,8 +62,22 @@ def with_short_forms(data: Mapping[str, Any], changes: Mapping[str, Any], where:
     return plain
 
 
+def _check_key(key: Any, known: Collection[str], where: str) -> None:
+    if not isinstance(key, str):
+        raise ScenarioError(f"{where}: a key is a text such as 'world.wind' (found {key!r})")
+    first = _FIRST.match(key)
+    if first is None or first[0] in known or key in _SHORT_FORMS:
+        return
+    if first[0] in ("wind", "weather"):
+        raise ScenarioError(f"{where}: unknown key '{key}'; write 'world.{key}'")
+    names = sorted({*known, *_SHORT_FORMS})
+    near = difflib.get_close_matches(first[0], names, n=1)
+    hint = f"; did you mean '{near[0]}'?" if near else "."
+    raise ScenarioError(f"{where}: unknown key '{key}'{hint} Allowed here: {', '.join(names)}")
+
+
 def _is_short(key: str, value: Any) -> bool:
-    return key in _SHORT_FORMS and (key != "uavs" or hasattr(value, "__index__"))
+    return key in _SHORT_FORMS and (key != "uavs" or not isinstance(value, list | tuple))
 
 
 def _plain(value: Any) -> Any:
@@ -64,6 +90,10 @@ def _plain(value: Any) -> Any:
 
 
 def _with_uavs(data: _Data, uavs: Any, where: str) -> _Data:
+    if isinstance(uavs, bool) or not hasattr(uavs, "__index__"):
+        raise ScenarioError(
+            f"{where}: key 'uavs': give a whole number or a list of groups (found {uavs!r})"
+        )
     groups = resized(data["uavs"], index(uavs), name=data.get("name", ""), where=where)
     return {**data, "uavs": groups}
 
@@ -84,6 +114,12 @@ def _with_airframe(data: _Data, airframe: str, _where: str) -> _Data:
 
 def _with_sensors(data: _Data, sensors: Any, where: str) -> _Data:
     chosen = _listed(_plain(sensors))
+    strange = [sensor for sensor in chosen if not isinstance(sensor, str | Mapping)]
+    if strange:
+        raise ScenarioError(
+            f"{where}: key 'sensors': give sets ({', '.join(SENSOR_SETS)}) or all sensors as "
+            f"tables or models (found {strange[0]!r})"
+        )
     names = [sensor for sensor in chosen if isinstance(sensor, str)]
     unknown = [name for name in names if name not in SENSOR_SETS]
     if unknown or 0 < len(names) < len(chosen):

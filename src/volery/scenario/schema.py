@@ -14,7 +14,7 @@ from pydantic import Field, PrivateAttr, model_validator
 
 from volery.core.errors import ScenarioError, reason_of
 from volery.scenario.access import ScenarioAccess
-from volery.scenario.base import Data, Name
+from volery.scenario.base import Data, Name, renamed
 from volery.scenario.faults import Fault
 from volery.scenario.file_names import moved
 from volery.scenario.python_changes import split_changes, with_keys, with_short_forms
@@ -148,7 +148,11 @@ class Scenario(Data):
         `ScenarioError`, naming key and allowed values, for invalid values.
         """
         where = f"{self.name}: with_()"
-        short, long = split_changes({**(changes or {}), **keys})
+        try:
+            named = renamed({**(changes or {}), **keys}, self.former_keys, "key")
+        except ValueError as error:
+            raise ScenarioError(f"{where}: {error}") from None
+        short, long = split_changes(named, type(self).model_fields, where)
         changed = validated(with_keys(self.data(), long, where), Scenario, where)
         if short:
             data = with_short_forms(changed.data(), short, where)

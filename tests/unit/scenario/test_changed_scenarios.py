@@ -46,6 +46,23 @@ def test_wrong_changes_are_refused_with_the_key(changes, message):
         load_scenario("hover").with_(**changes)
 
 
+def test_former_keys_are_accepted_with_a_warning_and_not_offered():
+    hover = load_scenario("hover")
+    with pytest.warns(DeprecationWarning, match="'messages' .* 'message_packages' now"):
+        assert hover.with_(messages=["px4_msgs"]).message_packages == ("px4_msgs",)
+    with pytest.raises(ScenarioError) as caught:
+        hover.with_(massages=[])
+    assert "'messages'" not in str(caught.value)
+    assert "messages," not in str(caught.value)
+    both = {"messages": [], "message_packages": []}
+    message = r"^hover: .*'messages' and 'message_packages' are the same"
+    with (
+        pytest.warns(DeprecationWarning, match="'messages'"),
+        pytest.raises(ScenarioError, match=message),
+    ):
+        hover.with_(both)
+
+
 # ---------------------------------------------------------------------------------- paths of keys
 
 
@@ -137,6 +154,12 @@ def test_sensors_as_models_and_tables_replace_all():
     ("changes", "message"),
     [
         ({"uavs": 0}, r"key 'uavs\[0\]\.count': .*greater than or equal to 1"),
+        ({"uavs": 2.5}, r"key 'uavs': give a whole number or a list of groups \(found 2\.5\)"),
+        ({"uavs": True}, r"key 'uavs': give a whole number .*found True"),
+        ({"winds": 3}, r"unknown key 'winds'; did you mean 'wind'\? Allowed here: airframe, "),
+        ({"wind.turbulence": "light"}, r"'wind\.turbulence'; write 'world\.wind\.turbulence'"),
+        ({3: "x"}, r"a key is a text such as 'world\.wind' \(found 3\)"),
+        ({"sensors": None}, r"key 'sensors': give sets \(lidar, .* \(found None\)"),
         ({"wind": 3.0}, r"key 'world\.wind\.velocity_m_s': a list is needed"),
         ({"airframe": 7}, r"key 'types\.f450\.airframe': .*string"),
         ({"sensors": "radar"}, r"key 'sensors': no set 'radar'; give sets \(lidar, camera"),
@@ -146,7 +169,7 @@ def test_sensors_as_models_and_tables_replace_all():
 )
 def test_wrong_short_forms_are_refused(changes, message):
     with pytest.raises(ScenarioError, match=r"^hover: with_\(\): .*" + message):
-        load_scenario("hover").with_(**changes)
+        load_scenario("hover").with_(changes)
 
 
 def test_groups_are_not_resized():
