@@ -1,7 +1,4 @@
-"""Writes the reference of scenarios' keys from the classes of their tables.
-
-Run as `python tools/site/scenario_reference.py > docs/reference/scenario.md`.
-"""
+"""Writes the reference of scenarios' keys from the classes of their tables."""
 
 from __future__ import annotations
 
@@ -20,7 +17,6 @@ from volery.scenario.schema import Scenario
 from volery.scenario.toml_writer import toml_value
 
 _HEAD = """\
-<!-- Written by `python tools/site/scenario_reference.py` from the classes; do not edit. -->
 # Keys of scenarios
 
 All tables of a scenario file with their keys. [Scenarios](../scenarios.md) explains them. In Python
@@ -77,8 +73,12 @@ EXAMPLES: dict[str, Any] = {
 """Examples of keys that have no default and that no shipped scenario uses."""
 
 
-def page() -> Iterator[str]:
-    """Yields the parts of the page."""
+def page() -> str:
+    """Returns the page."""
+    return "\n".join(_parts())
+
+
+def _parts() -> Iterator[str]:
     yield _HEAD
     schema, shipped, headers = scenario_schema(), _shipped_values(), _headers()
     for model in models():
@@ -220,4 +220,4 @@ def _shipped_values() -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    print("\n".join(page()), end="")
+    print(page(), end="")
