@@ -11,7 +11,7 @@ from volery.cli.flight_commands import launch, list_scenarios, play, px4, run, s
 from volery.cli.graph_commands import node, service_app, topic_app
 from volery.cli.log_commands import convert, info, recover, report, slam
 from volery.cli.machine_commands import bench, doctor
-from volery.cli.model_commands import export, identify, interfaces
+from volery.cli.model_commands import export, identify, interfaces, schema
 from volery.cli.node_logs import show_node_logs
 from volery.cli.options import PageCommand
 from volery.cli.radio_commands import comms, gcs
@@ -70,6 +70,7 @@ for _command in (
     identify,
     export,
     interfaces,
+    schema,
     bench,
     doctor,
 ):

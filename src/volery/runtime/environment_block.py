@@ -42,7 +42,9 @@ class EnvironmentEvent:
     """Describes an event of one environment (`env`)."""
 
     env: int
+    """Number of the environment."""
     event: Event
+    """Event of a UAV of the environment."""
 
 
 class EnvironmentBlock:

@@ -80,7 +80,9 @@ class Simulation:
     """
 
     scenario: Scenario
+    """Scenario that is simulated."""
     graph: Graph
+    """Topics and services."""
     gateway: Gateway
     """Joins clients of other threads to the graph."""
     uavs: Mapping[str, Uav]

@@ -43,6 +43,10 @@ from volery.runtime.warmup.parallel_compilation import compiled
 from volery.runtime.warmup.requirements import needs_of
 from volery.scenario.schema import Scenario
 from volery.vehicle.fleet import FleetState
+from volery.world.city import City
+from volery.world.forest import Forest
+from volery.world.scene import Scene
+from volery.world.terrain import Terrain
 
 
 class VectorizedSimulation(BatchCommands):
@@ -57,6 +61,17 @@ class VectorizedSimulation(BatchCommands):
     environment with seed s equals `Simulation(envs.scenario.with_(seed=s))`. Raises
     `ScenarioError` if the scenario cannot be built.
     """
+
+    scenario: Scenario
+    """The scenario, with `world.seed` fixed."""
+    terrain: Terrain
+    """Ground of all environments."""
+    city: City | None
+    """Buildings and streets of all environments; None: there are none."""
+    forest: Forest | None
+    """Trees of all environments; None: there are none."""
+    scene: Scene
+    """Surfaces of all environments, for rays and contacts."""
 
     def __init__(
         self,

@@ -56,6 +56,7 @@ class Uav:
         """Its name among those of all environments."""
         self._flight = flight
         self.name = name
+        """Its name, such as `uav1`."""
         self.type_name = type_name
         """Its type in the scenario."""
         self._check_goal = check_goal
@@ -293,7 +294,11 @@ class Uav:
         velocity_map: ArrayLike = (0.0, 0.0, 0.0),
         omega_body: ArrayLike = (0.0, 0.0, 0.0),
     ) -> None:
-        """Sets the pose (m; x y z w, map from body) with the next step; kinematic UAVs only."""
+        """Sets the pose with the next step; kinematic UAVs only.
+
+        Position (3,), m, velocity (3,), m/s, and attitude (4,), x y z w, are in the map; angular
+        velocity (3,), rad/s, is in the body frame (FLU).
+        """
         self._fleet.command_pose(self._row, position_map, attitude, velocity_map, omega_body)
         self._replaced("command_pose")
 
