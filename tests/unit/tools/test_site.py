@@ -1,0 +1,127 @@
+"""The documentation site: generated pages are current, links lead somewhere, quotes exist."""
+
+import ast
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.main import get_command
+
+from volery.cli.app import app
+
+ROOT = Path(__file__).parents[3]
+DOCS = ROOT / "docs"
+REFERENCE = DOCS / "reference"
+TOOLS = ROOT / "tools" / "site"
+PAGES = [*DOCS.rglob("*.md"), *ROOT.glob("*.md")]
+
+
+def written(name):
+    """The page that a generator writes now."""
+    done = subprocess.run(
+        [sys.executable, str(TOOLS / f"{name}_reference.py")],
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    return done.stdout
+
+
+@pytest.mark.parametrize("name", ["topics", "services", "messages"])
+def test_reference_is_current(name):
+    page = f"docs/reference/{name}.md"
+    now = written(name)
+    assert (ROOT / page).read_text(encoding="utf-8") == now, (
+        f"run: python tools/site/{name}_reference.py > {page}"
+    )
+
+
+def options_of(command, path=""):
+    """(command, option) of a command and those below it."""
+    for parameter in command.params:
+        names = [*parameter.opts, *parameter.secondary_opts]
+        yield from ((path, name) for name in names if name.startswith("--"))
+    for name, each in getattr(command, "commands", {}).items():
+        yield from options_of(each, f"{path} {name}".strip())
+
+
+def documented_options(text):
+    """(command, option) of the reference of the command line."""
+    for section in re.split(r"^#{2,} `volery ", text, flags=re.MULTILINE)[1:]:
+        path = section.partition("`")[0]
+        for line in re.findall(r"^\* `(--?[^`]*)`", section, flags=re.MULTILINE):
+            yield from ((path, name) for name in re.findall(r"--[a-z0-9-]+", line))
+
+
+def test_reference_of_the_command_line_is_current():
+    """Formats differ between versions of typer, commands and options do not."""
+    text = (REFERENCE / "cli.md").read_text(encoding="utf-8")
+    options = {pair for pair in options_of(get_command(app)) if pair[0]}
+    documented = {pair for pair in documented_options(text) if pair[1] != "--help"}
+    assert documented == {pair for pair in options if pair[1] != "--help"}, (
+        "run: python tools/site/cli_reference.py > docs/reference/cli.md"
+    )
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_relative_links_lead_somewhere(page):
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.S | re.M)
+    for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", text):
+        if "://" not in target and not target.startswith("mailto:"):
+            assert Path(os.path.normpath(page.parent / target)).exists(), target
+
+
+def test_every_page_is_in_the_navigation_once():
+    nav = (ROOT / "mkdocs.yml").read_text(encoding="utf-8").partition("\nnav:\n")[2]
+    named = re.findall(r"(\S+\.md)$", nav, flags=re.MULTILINE)
+    assert len(named) == len(set(named))
+    own = {page.relative_to(DOCS).as_posix() for page in DOCS.rglob("*.md")}
+    assert {name for name in named if not name.startswith("project/")} == own
+
+
+def test_site_asks_no_other_host():
+    """Styles, scripts and configuration load nothing from a network."""
+    config = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    assert "font: false" in config
+    assert "offline" in config
+    for file in [ROOT / "mkdocs.yml", *(DOCS / "assets").iterdir()]:
+        text = file.read_text(encoding="utf-8")
+        hosts = re.findall(r"https?://[^\s\"'`)]+", text)
+        assert {host for host in hosts if "www.w3.org" not in host} == set(), file.name
+
+
+def messages_in_sources():
+    """All texts of the sources; a hole stands for each inserted value."""
+    found = set()
+    for path in (ROOT / "src" / "volery").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.JoinedStr):
+                found.add(
+                    "".join(
+                        part.value if isinstance(part, ast.Constant) else "{}"
+                        for part in node.values
+                    )
+                )
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                found.add(node.value)
+    return found
+
+
+def quoted_messages():
+    text = (DOCS / "troubleshooting.md").read_text(encoding="utf-8")
+    found = re.findall(r"^### (`+)(.+)\1$", text, flags=re.MULTILINE)
+    return [message.strip() for _, message in found]
+
+
+def test_every_message_of_the_troubleshooting_page_is_in_the_sources():
+    sources = messages_in_sources()
+    for message in quoted_messages():
+        template = re.sub(r"<[^>]+>", "{}", message)
+        assert any(template in text for text in sources), message
+
+
+def test_troubleshooting_quotes_messages():
+    assert len(quoted_messages()) >= 15
