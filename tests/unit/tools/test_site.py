@@ -125,3 +125,18 @@ def test_every_message_of_the_troubleshooting_page_is_in_the_sources():
 
 def test_troubleshooting_quotes_messages():
     assert len(quoted_messages()) >= 15
+
+
+def test_every_public_name_is_in_the_reference_of_python():
+    import volery
+
+    named = "\n".join(page.read_text(encoding="utf-8") for page in (REFERENCE / "api").glob("*.md"))
+    shown = set(re.findall(r"^::: [\w.]*\b(\w+)$", named, flags=re.MULTILINE))
+    assert set(volery.__all__) <= shown
+
+
+def test_equations_are_tex_between_dollars():
+    """An odd dollar would show the rest of a page as an equation."""
+    for page in DOCS.rglob("*.md"):
+        text = re.sub(r"^```.*?^```|`[^`\n]*`", "", page.read_text("utf-8"), flags=re.S | re.M)
+        assert text.count("$") % 2 == 0, page.name
