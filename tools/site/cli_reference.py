@@ -1,7 +1,4 @@
-"""Writes the reference of the command line from its own description.
-
-Run as `python tools/site/cli_reference.py > docs/reference/cli.md`.
-"""
+"""Writes the reference of the command line from its own description."""
 
 from __future__ import annotations
 
@@ -15,7 +12,6 @@ from typer.main import get_command
 from volery.cli.app import app
 
 _HEAD = """\
-<!-- Written by `python tools/site/cli_reference.py` from the commands; do not edit. -->
 # Command line
 
 `volery COMMAND --help` prints the same in a terminal.

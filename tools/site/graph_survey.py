@@ -7,7 +7,6 @@ then has in addition is the part's. Names are those of `uav1`, written with `uav
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import entry_points
@@ -92,31 +91,37 @@ def base() -> Surveyed:
     return _survey(_plain())
 
 
-def sensors() -> Iterator[tuple[str, Surveyed]]:
-    """Yields each kind of sensor and what it adds."""
-    for kind in RESULT_OF:
-        entries = _SENSORS.get(kind, ({"kind": kind},))
-        others = [entry for entry in entries if entry["kind"] != kind]
-        yield kind, _survey(_plain(sensors=list(entries))).without(_survey(_plain(sensors=others)))
+@cache
+def sensors() -> tuple[tuple[str, Surveyed], ...]:
+    """Returns each kind of sensor and what it adds."""
+    return tuple((kind, _sensor(kind)) for kind in RESULT_OF)
 
 
-def worlds() -> Iterator[tuple[str, Surveyed]]:
-    """Yields each feature of a world and what it adds."""
-    for name, world in WORLDS.items():
-        yield name, _survey(_plain(world=world)).without(base())
+def _sensor(kind: str) -> Surveyed:
+    entries = _SENSORS.get(kind, ({"kind": kind},))
+    others = [entry for entry in entries if entry["kind"] != kind]
+    return _survey(_plain(sensors=list(entries))).without(_survey(_plain(sensors=others)))
 
 
-def nodes() -> Iterator[tuple[str, str, Surveyed]]:
-    """Yields each shipped node with a shipped scenario and what it adds to that scenario."""
+@cache
+def worlds() -> tuple[tuple[str, Surveyed], ...]:
+    """Returns each feature of a world and what it adds."""
+    return tuple((name, _survey(_plain(world)).without(base())) for name, world in WORLDS.items())
+
+
+@cache
+def nodes() -> tuple[tuple[str, str, Surveyed], ...]:
+    """Returns each shipped node with a shipped scenario and what it adds to that scenario."""
     examples = _examples()
-    for name in sorted(entry.name for entry in entry_points(group="volery.nodes")):
-        if name in examples:
-            scenario = examples[name]
-            alone = _survey(_only(scenario, name))
-            yield name, scenario.name, alone.without(_survey(_only(scenario, None)))
-        else:
-            added = _survey(_with_node(name)).without(_survey(_with_node(None)))
-            yield name, "", added
+    names = sorted(entry.name for entry in entry_points(group="volery.nodes"))
+    return tuple(_node(name, examples.get(name)) for name in names)
+
+
+def _node(name: str, example: Scenario | None) -> tuple[str, str, Surveyed]:
+    if example is None:
+        return name, "", _survey(_with_node(name)).without(_survey(_with_node(None)))
+    alone = _survey(_only(example, name))
+    return name, example.name, alone.without(_survey(_only(example, None)))
 
 
 def _plain(

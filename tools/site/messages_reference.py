@@ -1,7 +1,4 @@
-"""Writes the reference of message, service and action types from their definitions.
-
-Run as `python tools/site/messages_reference.py > docs/reference/messages.md`.
-"""
+"""Writes the reference of message, service and action types from their definitions."""
 
 from __future__ import annotations
 
@@ -13,7 +10,6 @@ from reference_links import DEFINITIONS, anchor
 from volery.graph.typestore import typestore
 
 _HEAD = """\
-<!-- Written by `python tools/site/messages_reference.py` from the definitions; do not edit. -->
 # Messages
 
 Volery has the message types of ROS 2 Jazzy's common interfaces and those below, defined in
@@ -24,8 +20,12 @@ _FORMS = {"msg": "Messages", "srv": "Services", "action": "Actions"}
 _FIRST = ("volery_interfaces", "simulation_interfaces")
 
 
-def page() -> Iterator[str]:
-    """Yields the parts of the page."""
+def page() -> str:
+    """Returns the page."""
+    return "\n".join(_parts())
+
+
+def _parts() -> Iterator[str]:
     yield _HEAD
     folders = sorted(path for path in DEFINITIONS.iterdir() if path.is_dir())
     for package in sorted(folders, key=_order):
@@ -66,4 +66,4 @@ def _standard_types() -> str:
 
 
 if __name__ == "__main__":
-    print("\n".join(page()), end="")
+    print(page(), end="")

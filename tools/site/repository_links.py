@@ -2,8 +2,8 @@
 
 Documents link to each other and to files of the repository by relative paths, as on the web pages
 of a git server. For each linked file outside `docs/` the site gets a page: Markdown as it is, other
-text as a listing, a folder as a list of its files. So no link of the site leads out of it, and it
-is complete without a network.
+text as a listing, a folder as a list of its files; pictures are copied. So no link of the site
+leads out of it, and it is complete without a network.
 """
 
 from __future__ import annotations
@@ -30,24 +30,29 @@ PROJECT = {
 }
 """Files of the repository's root that are pages of the site."""
 _LINK = re.compile(r"(\]\()([^)#\s]+)((?:#[^)]*)?\))")
+_PICTURES = (".jpg", ".png", ".svg")
 _LANGUAGES = {".py": "python", ".toml": "toml", ".xml": "xml", ".rviz": "yaml", ".yml": "yaml"}
 
 
 def on_files(files: Files, config: Any) -> Files:
     """Adds pages for the project's files and for all files that documents link to."""
     waiting = [ROOT / name for name in PROJECT if (ROOT / name).is_file()]
-    waiting += [path for page in sorted(DOCS.rglob("*.md")) for path in _linked(page)]
+    pages = [(file.src_uri, file.content_string) for file in files.documentation_pages()]
+    waiting += [path for page, text in sorted(pages) for path in _linked(DOCS / page, text)]
     added: set[Path] = set()
     while waiting:
         path = waiting.pop()
         if path in added or path.is_relative_to(DOCS):
             continue
         added.add(path)
+        if path.suffix in _PICTURES:
+            files.append(File.generated(config, page_of(path), abs_src_path=str(path)))
+            continue
         files.append(File.generated(config, page_of(path), content=_content(path)))
         if path.is_dir():
             waiting += _files_of(path)
         elif path.suffix == ".md":
-            waiting += _linked(path)
+            waiting += _linked(path, path.read_text(encoding="utf-8"))
     return files
 
 
@@ -74,7 +79,7 @@ def page_of(path: Path) -> str:
         return PROJECT[name]
     if path.is_dir():
         return f"source/{name}/index.md"
-    return f"source/{name}" if name.endswith(".md") else f"source/{name}.md"
+    return f"source/{name}" if path.suffix in (".md", *_PICTURES) else f"source/{name}.md"
 
 
 def _source_of(page: str) -> Path:
@@ -93,9 +98,8 @@ def _target(source: Path, link: str) -> Path | None:
     return path if path.exists() and path.is_relative_to(ROOT) else None
 
 
-def _linked(page: Path) -> list[Path]:
-    links = _LINK.findall(page.read_text(encoding="utf-8"))
-    targets = (_target(page, link) for _, link, _ in links)
+def _linked(page: Path, text: str) -> list[Path]:
+    targets = (_target(page, link) for _, link, _ in _LINK.findall(text))
     return [target for target in targets if target is not None and not target.is_relative_to(DOCS)]
 
 

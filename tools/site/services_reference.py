@@ -1,7 +1,4 @@
-"""Writes the reference of services from running simulations.
-
-Run as `python tools/site/services_reference.py > docs/reference/services.md`.
-"""
+"""Writes the reference of services from running simulations."""
 
 from __future__ import annotations
 
@@ -11,7 +8,6 @@ import graph_survey
 from reference_links import message_link
 
 _HEAD = """\
-<!-- Written by `python tools/site/services_reference.py` from running simulations; do not edit. -->
 # Services
 
 All services of a simulation with their types, found by building simulations part by part; `uavN`
@@ -22,8 +18,12 @@ In a run: `volery service list`, `volery service call /uav1/land`.
 """
 
 
-def page() -> Iterator[str]:
-    """Yields the parts of the page."""
+def page() -> str:
+    """Returns the page."""
+    return "\n".join(_parts())
+
+
+def _parts() -> Iterator[str]:
     yield _HEAD
     base = graph_survey.base().services
     standard, own, uavs = (
@@ -60,4 +60,4 @@ def _table(services: dict[str, str]) -> str:
 
 
 if __name__ == "__main__":
-    print("\n".join(page()), end="")
+    print(page(), end="")

@@ -1,7 +1,4 @@
-"""Writes the reference of topics from running simulations.
-
-Run as `python tools/site/topics_reference.py > docs/reference/topics.md`.
-"""
+"""Writes the reference of topics from running simulations."""
 
 from __future__ import annotations
 
@@ -12,7 +9,6 @@ from graph_survey import SurveyedTopic
 from reference_links import message_link
 
 _HEAD = """\
-<!-- Written by `python tools/site/topics_reference.py` from running simulations; do not edit. -->
 # Topics
 
 All topics of a simulation with their types, found by building simulations part by part. `uavN`
@@ -24,8 +20,12 @@ In a run: `volery topic list --types`, `volery topic echo TOPIC`, `volery topic 
 """
 
 
-def page() -> Iterator[str]:
-    """Yields the parts of the page."""
+def page() -> str:
+    """Returns the page."""
+    return "\n".join(_parts())
+
+
+def _parts() -> Iterator[str]:
     yield _HEAD
     yield "## Every simulation\n"
     base = graph_survey.base().topics
@@ -60,4 +60,4 @@ def _table(topics: dict[str, SurveyedTopic], into: str = "in", out: str = "out")
 
 
 if __name__ == "__main__":
-    print("\n".join(page()), end="")
+    print(page(), end="")
