@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 
 from volery.scenario import library
@@ -35,17 +34,15 @@ def _entry(scenario: Scenario) -> Iterator[str]:
     yield f"## {name}\n"
     yield f"![{name}]({_CARDS}/{name}.jpg)\n"
     yield f"{scenario.description} ([file]({_FILES}/{name}.toml))\n"
-    yield "| | |\n|---|---|"
-    yield f"| UAVs | {scenario.uav_count}, {_names(k.airframe for k in scenario.types.values())} |"
-    yield f"| duration | {scenario.duration_s:g} s |"
+    yield f"- UAVs: {scenario.uav_count}, {_names(k.airframe for k in scenario.types.values())}"
+    yield f"- duration: {scenario.duration_s:g} s"
     kinds = (sensor.kind for kind in scenario.types.values() for sensor in kind.sensors)
-    yield f"| sensors | {_names(kinds) or 'none'} |"
-    yield f"| nodes | {_names(entry.node for entry in scenario.node_entries) or 'none'} |\n"
+    yield f"- sensors: {_names(kinds) or 'none'}"
+    yield f"- nodes: {_names(entry.node for entry in scenario.node_entries) or 'none'}\n"
 
 
 def _names(found: Iterator[str]) -> str:
-    counted = Counter(found)
-    return ", ".join(f"`{name}`" for name in counted)
+    return ", ".join(f"`{name}`" for name in dict.fromkeys(found))
 
 
 if __name__ == "__main__":

@@ -42,7 +42,7 @@ def on_files(files: Files, config: Any) -> Files:
     added: set[Path] = set()
     while waiting:
         path = waiting.pop()
-        if path in added or path.is_relative_to(DOCS):
+        if path in added or _is_in_site(path):
             continue
         added.add(path)
         if path.suffix in _PICTURES:
@@ -72,7 +72,7 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 
 def page_of(path: Path) -> str:
     """Returns the address of a file of the repository among the sources of the site."""
-    if path.is_relative_to(DOCS):
+    if _is_in_site(path):
         return path.relative_to(DOCS).as_posix()
     name = path.relative_to(ROOT).as_posix()
     if name in PROJECT:
@@ -100,7 +100,12 @@ def _target(source: Path, link: str) -> Path | None:
 
 def _linked(page: Path, text: str) -> list[Path]:
     targets = (_target(page, link) for _, link, _ in _LINK.findall(text))
-    return [target for target in targets if target is not None and not target.is_relative_to(DOCS)]
+    return [target for target in targets if target is not None and not _is_in_site(target)]
+
+
+def _is_in_site(path: Path) -> bool:
+    """Returns whether MkDocs itself takes a file; scripts in `docs/` are excluded."""
+    return path.is_relative_to(DOCS) and path.suffix != ".py"
 
 
 def _files_of(folder: Path) -> list[Path]:

@@ -3,6 +3,7 @@
 import ast
 import os
 import re
+import shlex
 import subprocess
 import sys
 from functools import cache
@@ -193,3 +194,37 @@ def test_equations_are_tex_between_dollars():
     for page in DOCS.rglob("*.md"):
         text = re.sub(r"^```.*?^```|`[^`\n]*`", "", page.read_text("utf-8"), flags=re.S | re.M)
         assert text.count("$") % 2 == 0, page.name
+
+
+def commands_of(text):
+    """The commands of volery in a document, as words."""
+    text = text.replace("\\\n", " ")
+    lines = re.findall(r"`(volery [^`\n]+)`", text)
+    lines += re.findall(r"^\s*(?:\.venv/bin/)?(volery [^\n]+)$", text, flags=re.MULTILINE)
+    for line in lines:
+        yield shlex.split(line, comments=True)[1:]
+
+
+def unknown_parts(words):
+    """The words of a command that the command line does not know."""
+    command = get_command(app)
+    while words and words[0] in getattr(command, "commands", {}):
+        command, words = command.commands[words[0]], words[1:]
+    if hasattr(command, "commands") and words and not words[0].startswith("-"):
+        return [] if words[0].isupper() else [words[0]]  # upper case: `volery COMMAND --help`
+    known = {name for option in command.params for name in (*option.opts, *option.secondary_opts)}
+    options = {word.partition("=")[0] for word in words if word.startswith("--")}
+    return sorted(options - known - {"--help", "--traceback"})
+
+
+def test_commands_of_documents_exist():
+    found = [(page, words) for page in PAGES for words in commands_of(page.read_text("utf-8"))]
+    wrong = [(page.name, words) for page, words in found if unknown_parts(words)]
+    assert wrong == []
+    assert len(found) > 200
+
+
+def test_an_unknown_command_is_found():
+    (words,) = commands_of("Open it: `volery play flight.mcap --page`.")
+    assert unknown_parts(words) == ["--page"]
+    assert unknown_parts(["fly", "hover"]) == ["fly"]
