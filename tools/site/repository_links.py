@@ -25,7 +25,7 @@ PROJECT = {
     "LICENSE": "project/license.md",
     "NOTICE": "project/notice.md",
     "README.md": "project/readme.md",
-    "RELEASE.md": "project/release.md",
+    "RELEASING.md": "project/releasing.md",
     "SECURITY.md": "project/security.md",
 }
 """Files of the repository's root that are pages of the site."""
