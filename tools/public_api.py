@@ -28,7 +28,7 @@ from pydantic_core import PydanticUndefined
 
 from volery.core.attribute_docs import attribute_docs
 
-MODULES = ("volery", "volery.scenario")
+MODULES = ("volery", "volery.logs", "volery.results", "volery.scenario")
 HANDLES: dict[str, tuple[str, ...]] = {
     "volery.engine.events:Event": (),
     "volery.engine.events:EventKind": (),
@@ -40,14 +40,33 @@ HANDLES: dict[str, tuple[str, ...]] = {
         "topics",
     ),
     "volery.graph.messages:Published": (),
+    "volery.logs.topic_count:TopicCount": (),
     "volery.runtime.environment_block:EnvironmentEvent": (),
+    "volery.runtime.environment_sensors:EnvironmentSensor": (),
+    "volery.runtime.environment_sensors:EnvironmentSensors": (),
     "volery.runtime.facets.clock:SimulationClock": (),
     "volery.runtime.facets.diagnostics:SimulationDiagnostics": (),
     "volery.runtime.facets.faults:SimulationFaults": (),
     "volery.runtime.facets.vehicles:SimulationVehicles": (),
     "volery.runtime.facets.world:SimulationWorld": (),
+    "volery.runtime.flight_recorder:FlightRecorder": (),
     "volery.runtime.monitoring.progress:Progress": (),
+    "volery.runtime.vehicles.flight_future:CommandResult": (),
+    "volery.runtime.vehicles.flight_future:FlightFuture": (),
+    "volery.runtime.vehicles.sample_stream:SampleStream": (),
     "volery.runtime.vehicles.uav:Uav": (),
+    "volery.runtime.vehicles.uav_sensors:UavSensor": (),
+    "volery.runtime.vehicles.uav_sensors:UavSensors": (),
+    "volery.runtime.vehicles.uav_sensors:UnknownSensorError": (),
+    "volery.sensors.sensor_samples:BatterySample": (),
+    "volery.sensors.sensor_samples:CameraSample": (),
+    "volery.sensors.sensor_samples:GnssSample": (),
+    "volery.sensors.sensor_samples:ImuSample": (),
+    "volery.sensors.sensor_samples:LidarSample": (),
+    "volery.sensors.sensor_samples:MagneticSample": (),
+    "volery.sensors.sensor_samples:PoseSample": (),
+    "volery.sensors.sensor_samples:PressureSample": (),
+    "volery.sensors.sensor_samples:RangeSample": (),
     "volery.vehicle.fleet:FleetState": (),
 }
 """Classes of objects that users receive, and their public members; empty: all."""

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         DataFileError,
         DivergenceError,
         EstimatorError,
+        FlightError,
         GraphError,
         NodeError,
         PartnerError,
@@ -36,13 +37,16 @@ if TYPE_CHECKING:
         PlanError,
         RecordingError,
         ScenarioError,
+        SensorError,
         SnapshotError,
         SpawnError,
         SpawnFault,
         UnreachableError,
         VoleryError,
+        WaitTimeoutError,
     )
     from volery.graph.nodes.node import Node
+    from volery.logs import open_log
     from volery.runtime.simulation import Simulation
     from volery.runtime.simulation_factory import make
     from volery.runtime.vectorized_simulation import VectorizedSimulation
@@ -58,6 +62,7 @@ __all__ = [
     "DataFileError",
     "DivergenceError",
     "EstimatorError",
+    "FlightError",
     "FlightMode",
     "GraphError",
     "Node",
@@ -69,6 +74,7 @@ __all__ = [
     "RecordingError",
     "Scenario",
     "ScenarioError",
+    "SensorError",
     "Simulation",
     "SnapshotError",
     "SpawnError",
@@ -77,9 +83,11 @@ __all__ = [
     "UnreachableError",
     "VectorizedSimulation",
     "VoleryError",
+    "WaitTimeoutError",
     "list_scenarios",
     "load_scenario",
     "make",
+    "open_log",
 ]
 
 _MODULES = {
@@ -92,6 +100,7 @@ _MODULES = {
     "list_scenarios": "volery.scenario.load",
     "load_scenario": "volery.scenario.load",
     "make": "volery.runtime.simulation_factory",
+    "open_log": "volery.logs",
 }
 """Modules of the exported names; those of the errors are all in `_ERRORS`."""
 _ERRORS = "volery.core.errors"
