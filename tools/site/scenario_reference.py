@@ -93,15 +93,14 @@ def _section(
     yield f"## {model.__name__}\n\n{doc}\n"
     if headers:
         yield "In a file: " + ", ".join(f"`{header}`" for header in headers) + "\n"
-    yield "| key | type | default | unit | description | example |\n|---|---|---|---|---|---|"
+    yield "| key | type | default | description |\n|---|---|---|---|"
     for key, field in model.model_fields.items():
+        unit, example = unit_of(key), _example(model, key, field, shipped)
         cells = (
             f"`{key}`",
-            _type(node["properties"][key]),
+            _type(node["properties"][key]) + (f", in {unit}" if unit else ""),
             _default(key, field),
-            unit_of(key),
-            description_of(model, key),
-            _example(model, key, field, shipped),
+            description_of(model, key) + (f"<br>Example: {example}" if example else ""),
         )
         yield "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
     yield ""
@@ -183,9 +182,12 @@ def _plain(value: Any) -> Any:
 
 
 def _example(model: type[Data], key: str, field: FieldInfo, shipped: dict[str, Any]) -> str:
-    """Returns an example of a key: of a shipped scenario, of `EXAMPLES`, or its default."""
+    """Returns an example of a key: of a shipped scenario, of `EXAMPLES`, or its default.
+
+    Empty: the key holds tables, which have examples of their own.
+    """
     if any(True for _ in models_in(field.annotation)):
-        return "see its table"
+        return ""
     name = f"{model.__name__}.{key}"
     value = EXAMPLES.get(name, shipped.get(name))
     if value is None and not field.is_required():
