@@ -114,9 +114,9 @@ class LidarPublisher:
 def _scan_message(scans: LidarScans, pattern: PlanarScan, row: int) -> LaserScan:
     intensities = scans.intensities[row]
     return LaserScan(
-        *_head(scans, pattern, row),
-        scans.echoes[row, 0],
-        intensities[0] if len(intensities) else _NO_INTENSITIES,
+        **_head(scans, pattern, row),
+        ranges=scans.echoes[row, 0],
+        intensities=intensities[0] if len(intensities) else _NO_INTENSITIES,
     )
 
 
@@ -128,22 +128,29 @@ def _echo_message(scans: LidarScans, pattern: PlanarScan, row: int) -> MultiEcho
     for array in (ranges, intensities):
         array.flags.writeable = False
     return MultiEchoLaserScan(
-        *_head(scans, pattern, row),
-        [LaserEcho(beam[:n]) for beam, n in zip(ranges, count, strict=True)],
-        [LaserEcho(beam[:n]) for beam, n in zip(intensities, count, strict=True)]
+        **_head(scans, pattern, row),
+        ranges=[LaserEcho(beam[:n]) for beam, n in zip(ranges, count, strict=True)],
+        intensities=[LaserEcho(beam[:n]) for beam, n in zip(intensities, count, strict=True)]
         if intensities.size
         else [],
     )
 
 
-def _head(scans: LidarScans, pattern: PlanarScan, row: int) -> tuple[Any, ...]:
-    """Returns the fields of both messages up to the ranges."""
-    numbers = (
-        *(pattern.angle_min_rad, pattern.angle_max_rad, pattern.angle_increment_rad),
-        *(pattern.time_increment_s, 1.0 / pattern.rate_hz),
-        *(scans.model.range.min_m, scans.model.range.max_m),
-    )
-    return header(scans.stamp_ns, laser_frame(scans.sensors[row])), *map(single, numbers)
+def _head(scans: LidarScans, pattern: PlanarScan, row: int) -> dict[str, Any]:
+    """Returns the fields that both messages share."""
+    numbers = {
+        "angle_min": pattern.angle_min_rad,
+        "angle_max": pattern.angle_max_rad,
+        "angle_increment": pattern.angle_increment_rad,
+        "time_increment": pattern.time_increment_s,
+        "scan_time": 1.0 / pattern.rate_hz,
+        "range_min": scans.model.range.min_m,
+        "range_max": scans.model.range.max_m,
+    }
+    return {
+        "header": header(scans.stamp_ns, laser_frame(scans.sensors[row])),
+        **{name: single(number) for name, number in numbers.items()},
+    }
 
 
 def _cloud_message(stamped: Any, points: NDArray[Any]) -> PointCloud2:

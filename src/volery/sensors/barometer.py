@@ -25,7 +25,7 @@ from volery.sensors.samples import PressureSamples
 class BarometerModel(SensorModel):
     """Noise and drift in Pa; see the data files in `models/`."""
 
-    kind: ClassVar = "barometer"
+    sensor_kind: ClassVar = "barometer"
 
     name: str
     noise_pa: NonNegativeFloat

@@ -34,7 +34,7 @@ _LONGEST_DELAY_NS = KEPT_NS - 6_000_000
 class GnssModel(SensorModel):
     """Delay, noise and drift; see the data files in `models/`."""
 
-    kind: ClassVar = "GNSS"
+    sensor_kind: ClassVar = "GNSS"
 
     name: str
     delay_s: NonNegativeFloat

@@ -27,7 +27,7 @@ from volery.sensors.samples import ImuSamples
 class ImuModel(SensorModel):
     """Noise of an IMU; see the data files in `models/`."""
 
-    kind: ClassVar = "IMU"
+    sensor_kind: ClassVar = "IMU"
 
     name: str
     gyro_noise_density_rad_s_sqrt_hz: NonNegativeFloat

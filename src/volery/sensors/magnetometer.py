@@ -24,7 +24,7 @@ Row = tuple[float, float, float]
 class MagnetometerModel(SensorModel):
     """Iron and noise; see the data files in `models/`."""
 
-    kind: ClassVar = "magnetometer"
+    sensor_kind: ClassVar = "magnetometer"
 
     name: str
     noise_density_t_sqrt_hz: NonNegativeFloat

@@ -14,7 +14,7 @@ _SHIPPED = Path(__file__).parent / "models"
 class SensorModel(Bounded):
     """Parameters of a sensor, with the keys of its data file."""
 
-    kind: ClassVar[str]
+    sensor_kind: ClassVar[str]
     """Kind of sensor, for errors."""
 
     @classmethod
@@ -23,7 +23,7 @@ class SensorModel(Bounded):
 
         Raises `DataFileError`, naming file and key, for an invalid file.
         """
-        return read_model(find_model(name, cls.kind, folder), cls)
+        return read_model(find_model(name, cls.sensor_kind, folder), cls)
 
 
 Model = TypeVar("Model", bound=SensorModel)

@@ -23,7 +23,7 @@ _NUMBERS_A_SAMPLE = 10
 class OdometryModel(SensorModel):
     """Drift and noise; see the data files in `models/`."""
 
-    kind: ClassVar = "odometry"
+    sensor_kind: ClassVar = "odometry"
 
     name: str
     horizontal_drift_m_sqrt_m: NonNegativeFloat

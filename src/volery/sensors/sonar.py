@@ -23,7 +23,7 @@ _RINGS = ((0.0, 1), (0.5, 6), (1.0, 12))
 class SonarModel(SensorModel):
     """Range, cone and noise; see the data files in `models/`."""
 
-    kind: ClassVar = "sonar"
+    sensor_kind: ClassVar = "sonar"
 
     name: str
     range_min_m: NonNegativeFloat

@@ -30,7 +30,11 @@ class AutopilotParameter(NamedTuple):
 
 DEFAULTS = {
     name: AutopilotParameter(
-        row["default"], *row["range"], row["description"], row.get("fixed", False)
+        row["default"],
+        low=row["range"][0],
+        high=row["range"][1],
+        description=row["description"],
+        fixed=row.get("fixed", False),
     )
     for name, row in read_table(__file__, "parameters.toml").items()
 }

@@ -26,7 +26,7 @@ class CameraModel(SensorModel):
     OpenCV and ROS.
     """
 
-    kind: ClassVar = "camera"
+    sensor_kind: ClassVar = "camera"
 
     name: str = "pinhole"
     width: Side = 640
