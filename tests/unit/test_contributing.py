@@ -16,7 +16,7 @@ WRITTEN = ("runs/", "dist/", "docs/pictures/")
 NAMES_IN_FILES = {
     "src/volery/sensors/samples.py": ("Samples",),
     "src/volery/scenario/navigation.py": ("NavigationSensor",),
-    "src/volery/scenario/schema.py": ("Sensor",),
+    "src/volery/scenario/sensors.py": ("Sensor",),
     "src/volery/runtime/build/sensor_suites.py": ("RESULT_OF",),
     "src/volery/runtime/build/sensors.py": ("_Builder", "build"),
     "src/volery/publishing/navigation_messages.py": ("NAVIGATION_TOPICS",),

@@ -310,8 +310,8 @@ class Simulation:
     def record(self, rate_hz: float = DEFAULT_RATE_HZ) -> FlightRecorder:
         """Records the true states of all UAVs from now on; `result()` returns them as arrays.
 
-        rate_hz: samples per simulated second, at most one for each physics step. Recording changes
-        no results. Raises `CommandError` for an impossible rate.
+        rate_hz: samples per simulated second (Hz), at most one for each physics step. Recording
+        changes no results. Raises `CommandError` for an impossible rate.
         """
         self._check_open()
         return self._recorders.start(rate_hz)
@@ -327,7 +327,8 @@ class Simulation:
     ) -> FlightResult:
         """Advances as `run` does and returns the flight: trajectories as arrays, and events.
 
-        rate_hz: samples per simulated second. Raises `CommandError` for an impossible rate.
+        seconds, speed, on_progress and progress: those of `run`. rate_hz: samples per simulated
+        second (Hz). Raises `CommandError` for an impossible rate.
         """
         with self.record(rate_hz) as recorder:
             self.run(seconds, speed=speed, on_progress=on_progress, progress=progress)
