@@ -11,7 +11,7 @@ PAGE_SOURCES := web/index.html web/package.json web/tsconfig.json web/vite.confi
 	$(shell find web/src web/public -type f)
 
 .DEFAULT_GOAL := help
-.PHONY: help dev run serve web page test lint bench docs-benchmarks clean
+.PHONY: help dev run serve web page test lint docs bench docs-benchmarks package clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -33,6 +33,11 @@ $(VENV)/.installed-tests: $(VENV)/.installed pyproject.toml
 
 $(VENV)/.installed-bench: $(VENV)/.installed pyproject.toml
 	$(PIP) install --editable '.[bench]'
+	@touch $@
+
+$(VENV)/.installed-docs: $(VENV)/.installed pyproject.toml
+	@echo "installing what the documentation site is built with into $(VENV) ..."
+	$(PIP) install --editable '.[docs]'
 	@touch $@
 
 web/node_modules/.package-lock.json: web/package.json web/package-lock.json
@@ -75,14 +80,25 @@ test: lint page ## install what tests need, check everything, run the tests
 	$(BIN)/python -m volery.runtime.warmup
 	$(BIN)/pytest -n 2 --dist loadfile -m 'not slow' tests
 
+docs: $(VENV)/.installed-docs ## build the documentation site: build/site/index.html
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo "built: build/site/index.html"
+
 bench: $(VENV)/.installed-bench page ## measure this machine and its peers, rewrite docs/benchmarks.md and docs/bridge_latency.md
 	@mkdir -p runs
-	$(BIN)/volery bench all --out runs/bench.json
+	$(BIN)/volery bench --all --out runs/bench.json
 	$(BIN)/volery bench peers --out runs/peers.json
 	@.ci/install_browser
 	$(BIN)/volery bench page --out runs/page.json
-	$(BIN)/python -m volery_benchmarks.document runs/bench.json runs/page.json runs/peers.json > docs/benchmarks.md
+	@$(MAKE) --no-print-directory docs-benchmarks
+
+docs-benchmarks: $(VENV)/.installed ## write docs/benchmarks.md and docs/bridge_latency.md anew from what `make bench` measured
+	$(BIN)/python -m volery_benchmarks.document runs/bench.json runs/page.json runs/peers.json > runs/benchmarks.md
+	mv runs/benchmarks.md docs/benchmarks.md
 	$(BIN)/python -m volery_benchmarks.bridge.latency_page docs runs/bench.json
+
+package: $(VENV)/.installed-tests web ## build wheel and source distribution, with the page, into dist
+	$(BIN)/python -m build --outdir dist
 
 clean: ## remove what was built or flown here
 	rm -rf $(VENV) dist build runs .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -9,25 +9,14 @@ from PIL import Image
 from volery import Simulation, load_scenario
 
 file = sys.argv[1] if len(sys.argv) > 1 else "camera.png"
-seen = {}
-
-
-def keep(published):
-    message = published.message
-    kind, shape = {"rgb8": ("u1", (-1, 3)), "32FC1": ("<f4", (-1,))}[message.encoding]
-    numbers = np.frombuffer(message.data, kind)
-    seen[message.encoding] = numbers.reshape(message.height, *shape)
-
 
 with Simulation(load_scenario("forest_cameras")) as simulation:
     simulation.run(12.0)  # take-off and flight with the LIDARs
-    for name in ("image_raw", "depth"):  # the camera renders from here on
-        simulation.graph.subscribe(f"/uav1/front/{name}", keep)
-    simulation.run(0.1)
+    sample = simulation.uavs["uav1"].sensors["front"].next()  # renders one image
 
-depth = seen["32FC1"]  # m along the optical axis, inf for sky
+depth = sample.depth  # m along the optical axis, inf for sky
 near = 1.0 - np.log(np.clip(depth, 1.0, 100.0)) / np.log(100.0)
 coloured = (255 * matplotlib.colormaps["magma"](near)[..., :3]).astype(np.uint8)
-Image.fromarray(np.hstack([seen["rgb8"], coloured])).save(file)
+Image.fromarray(np.hstack([sample.image, coloured])).save(file)
 height, width = depth.shape
 print(f"{width} x {height} pixels in {file}, the nearest thing is {depth.min():.1f} m away")

@@ -2,10 +2,9 @@
 
 import math
 
-from volery import Simulation, load_scenario
-from volery.scenario.overrides import apply
+import volery
 
-with Simulation(apply(load_scenario("forest_search"), uavs=1)) as simulation:
+with volery.make("forest_search", uavs=1) as simulation:
     uav = simulation.uavs["uav1"]
     errors = []
 

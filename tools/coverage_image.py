@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from volery.autonomy.coverage.plan import CoveragePlan, plan_coverage
 from volery.core.plurals import counted
-from volery.report.palette import uav_color
+from volery.figures.palette import uav_color
 from volery.world.grid_maps.parsing import read_cells
 
 _MAP = Path(__file__).parent.parent / "world/data/gridmaps/random-32-32-10.map"

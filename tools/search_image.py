@@ -14,9 +14,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
-from volery.report.collect import trees_of
-from volery.report.flight_data import Trees
-from volery.report.palette import uav_color
+from volery.figures.flight_data import Trees
+from volery.figures.palette import uav_color
+from volery.figures.trees import trees_of
 from volery.runtime import Simulation
 from volery.scenario.load import load_scenario
 from volery.scenario.schema import Scenario

@@ -94,7 +94,7 @@ class Result:
 class Bench:
     """Describes a bench: a module to measure with and the bounds of its figures.
 
-    `in_all`: whether `volery bench all` runs it. `apart`: prefix of figures that have a page of
+    `in_all`: whether `volery bench --all` runs it. `apart`: prefix of figures that have a page of
     their own. `has_quick`: whether `measure` takes `quick`.
     """
 

@@ -1,36 +1,121 @@
 """Volery: many UAVs with LIDARs in lock step.
 
-from volery import Simulation, load_scenario
+import volery
 
-with Simulation(load_scenario("hover")) as simulation:
+with volery.make("hover", uavs=4, wind=(3.0, 0.0, 0.0)) as simulation:
     simulation.run(5.0)
     print(simulation.uavs["uav1"].position_map)
+
+docs/api_stability.md names the public modules and how they may change.
 """
 
 from __future__ import annotations
 
 from importlib import import_module
-from importlib.metadata import version
-from typing import TYPE_CHECKING, Any
+
+TYPE_CHECKING = False
+"""As in `typing`, whose import takes longer than the rest of this module."""
 
 if TYPE_CHECKING:
-    from volery.runtime import Simulation, VectorizedSimulation
-    from volery.scenario.load import load_scenario
+    from typing import Any
+
+    from volery.control.flight_modes import FlightMode
+    from volery.control.trajectory import Trajectory
+    from volery.core.errors import (
+        BridgeError,
+        CommandError,
+        CommsError,
+        DataFileError,
+        DivergenceError,
+        EstimatorError,
+        FlightError,
+        GraphError,
+        NodeError,
+        PartnerError,
+        PatternError,
+        PlacementError,
+        PlanError,
+        RecordingError,
+        ScenarioError,
+        SensorError,
+        SnapshotError,
+        SpawnError,
+        SpawnFault,
+        UnreachableError,
+        VoleryError,
+        WaitTimeoutError,
+    )
+    from volery.graph.nodes.node import Node
+    from volery.logs import open_log
+    from volery.runtime.simulation import Simulation
+    from volery.runtime.simulation_factory import make
+    from volery.runtime.vectorized_simulation import VectorizedSimulation
+    from volery.scenario.load import list_scenarios, load_scenario
     from volery.scenario.schema import Scenario
 
-__all__ = ["Scenario", "Simulation", "VectorizedSimulation", "load_scenario"]
-__version__ = version("volery")
+    __version__: str
 
-_HOMES = {
-    "VectorizedSimulation": "volery.runtime",
+__all__ = [
+    "BridgeError",
+    "CommandError",
+    "CommsError",
+    "DataFileError",
+    "DivergenceError",
+    "EstimatorError",
+    "FlightError",
+    "FlightMode",
+    "GraphError",
+    "Node",
+    "NodeError",
+    "PartnerError",
+    "PatternError",
+    "PlacementError",
+    "PlanError",
+    "RecordingError",
+    "Scenario",
+    "ScenarioError",
+    "SensorError",
+    "Simulation",
+    "SnapshotError",
+    "SpawnError",
+    "SpawnFault",
+    "Trajectory",
+    "UnreachableError",
+    "VectorizedSimulation",
+    "VoleryError",
+    "WaitTimeoutError",
+    "list_scenarios",
+    "load_scenario",
+    "make",
+    "open_log",
+]
+
+_MODULES = {
+    "FlightMode": "volery.control.flight_modes",
+    "Node": "volery.graph.nodes.node",
     "Scenario": "volery.scenario.schema",
-    "Simulation": "volery.runtime",
+    "Simulation": "volery.runtime.simulation",
+    "Trajectory": "volery.control.trajectory",
+    "VectorizedSimulation": "volery.runtime.vectorized_simulation",
+    "list_scenarios": "volery.scenario.load",
     "load_scenario": "volery.scenario.load",
+    "make": "volery.runtime.simulation_factory",
+    "open_log": "volery.logs",
 }
+"""Modules of the exported names; those of the errors are all in `_ERRORS`."""
+_ERRORS = "volery.core.errors"
 
 
 def __getattr__(name: str) -> Any:
-    """Import what is asked for, when it is asked for: `import volery` stays fast."""
-    if name in _HOMES:
-        return getattr(import_module(_HOMES[name]), name)
+    """Imports a name when it is used: `import volery` itself imports nothing."""
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("volery")
+    if name in __all__:
+        return getattr(import_module(_MODULES.get(name, _ERRORS)), name)
     raise AttributeError(f"module 'volery' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__, "__version__"})

@@ -1,8 +1,10 @@
-"""Logs: MCAP files and ROS 1 bags as other programs, damage and crashes leave them."""
+"""Logs: MCAP files, ROS 1 bags and ULogs as other programs, damage and crashes leave them."""
 
 from __future__ import annotations
 
 import contextlib
+import struct
+from collections import Counter
 from functools import cache
 
 from file_place import path_of
@@ -17,6 +19,8 @@ from volery.core.errors import GraphError, RecordingError
 from volery.graph.codecs.cdr import encode_cdr
 from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.messages import String, Twist, Vector3
+from volery.logs.ulog_source import UlogSource
+from volery.mavlink.autopilot.ulog import UlogTopic, header, logged_text, text_info
 
 STRING = "std_msgs/msg/String"
 TWIST = "geometry_msgs/msg/Twist"
@@ -83,6 +87,39 @@ def mcap(mutator):
 def bag(mutator):
     """ROS 1 bags."""
     return _read(mutator, _bags(), "x.bag")
+
+
+@cache
+def _ulogs():
+    nested = UlogTopic(3, "status", "uint64_t timestamp; bool on; float[2] x")
+    plain = UlogTopic(4, "plain", "uint8_t n; uint64_t timestamp; double d")
+    report = ulog_message("F", b"report:uint64_t timestamp;status[2] inner;uint8_t[3] _padding0;")
+    head = [header(5), report, nested.definition(), nested.subscription()]
+    head += [plain.definition(), plain.subscription(), text_info("sys_name", "fuzz")]
+    head.append(ulog_message("A", b"\x01\x05\x00report"))
+    data = []
+    for k in range(6):
+        data += [nested.sample((k, True, 1.0, 2.0)), plain.sample((k, 10 * k, 0.5))]
+        data.append(ulog_message("D", b"\x05\x00" + bytes(8 + 2 * 17)))
+        data.append(logged_text(4, k, "text"))
+    whole = b"".join(head + data)
+    return [whole, whole[:-5]]
+
+
+def ulog_message(kind, payload):
+    return struct.pack("<HB", len(payload), ord(kind)) + payload
+
+
+def ulog(mutator):
+    """Logs of PX4."""
+    path, seeds = path_of("x.ulg"), _ulogs()
+    path.write_bytes(seeds[0][:16] + mutator.bytes(seeds)[16:])
+    with contextlib.suppress(RecordingError):
+        source = UlogSource(path)
+        records = source.records(source.topics.keys(), 0, 1 << 62)
+        found = Counter(record.topic.topic for record in records)
+        assert found == {name: topic.messages for name, topic in source.topics.items()}
+    return 1
 
 
 def _read(mutator, seeds, name):

@@ -48,6 +48,7 @@ TARGETS = {
     "ros2_attachments": ros2_targets.attachments,
     "mcap": log_targets.mcap,
     "bag": log_targets.bag,
+    "ulog": log_targets.ulog,
     "damaged_mcap": damaged_log_targets.damaged_mcap,
     "damaged_bag": damaged_log_targets.damaged_bag,
     "damaged_db3": damaged_log_targets.damaged_db3,

@@ -20,7 +20,7 @@ from volery.cli.app import app
 from volery.core.errors import DataFileError, GraphError, ScenarioError, VoleryError
 from volery.runtime import Simulation
 from volery.scenario.load import load_scenario, parse_scenario
-from volery.sensors.imu import load_imu_model
+from volery.sensors.imu import ImuModel
 from volery.vehicle.airframe import load_airframe
 from volery.vehicle.identified import load_identified
 from volery.world.mesh_files import read_mesh
@@ -88,7 +88,7 @@ def test_sensor_models_with_absurd_numbers_are_refused(tmp_path):
     key = "gyro_noise_density_rad_s_sqrt_hz"
     path = changed(tmp_path, "sensors/models/adis16448.toml", key, "1e300")
     with pytest.raises(DataFileError, match=key):
-        load_imu_model(str(path))
+        ImuModel.load(str(path))
 
 
 def test_a_model_too_stiff_for_the_step_is_refused_before_the_flight(tmp_path, flat_data):

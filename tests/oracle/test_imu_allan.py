@@ -11,7 +11,9 @@ import pytest
 
 from volery.control.fleet import Fleet
 from volery.core.clock import Schedule
-from volery.sensors.imu import ImuBank, load_imu_model
+from volery.sensors.bank import SensorGroup
+from volery.sensors.imu import ImuBank, ImuModel
+from volery.sensors.mount import make_mount
 from volery.sensors.samples import SensorId
 from volery.vehicle.airframe import load_airframe
 
@@ -23,20 +25,16 @@ def fleet():
 
 
 def bank_of(model, count, rate_hz=RATE_HZ):
-    return ImuBank(
-        model,
-        Schedule.from_hz(rate_hz),
-        tuple(SensorId(0, f"u{i}", "imu") for i in range(count)),
-        np.zeros((count, 3)),
-        np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)),
-        np.arange(count, dtype=np.uint64) + np.uint64(7),
-    )
+    sensors = tuple(SensorId(0, f"u{i}", "imu") for i in range(count))
+    keys = np.arange(count, dtype=np.uint64) + np.uint64(7)
+    mounts = (make_mount(),) * count
+    return ImuBank(model, SensorGroup(Schedule.from_hz(rate_hz), sensors, mounts, keys))
 
 
 @pytest.fixture(scope="module")
 def second_means():
     """Means over each second, (seconds, sensors, 6), of IMUs that rest."""
-    bank, still, per_second = bank_of(load_imu_model("adis16448"), SENSORS), fleet(), int(RATE_HZ)
+    bank, still, per_second = bank_of(ImuModel.load("adis16448"), SENSORS), fleet(), int(RATE_HZ)
     means = np.zeros((SECONDS, SENSORS, 6))
     for k in range(SECONDS * per_second):
         reading = bank.sample(k, 0, still)
@@ -53,7 +51,7 @@ def allan_variance(second_means, tau):
 
 
 def expected(tau):
-    model = load_imu_model("adis16448")
+    model = ImuModel.load("adis16448")
     white = [model.gyro_noise_density_rad_s_sqrt_hz, model.accel_noise_density_m_s2_sqrt_hz]
     walk = [model.gyro_random_walk_rad_s2_sqrt_hz, model.accel_random_walk_m_s3_sqrt_hz]
     return np.repeat(np.square(white) / tau + np.square(walk) * tau / 3.0, 3)
@@ -70,7 +68,7 @@ def test_allan_variance_is_that_of_the_model(second_means, tau):
 
 def test_white_noise_alone_reads_its_density_at_one_second(second_means):
     """With the walk's share taken off: N itself, within a percent."""
-    model = load_imu_model("adis16448")
+    model = ImuModel.load("adis16448")
     variance, _ = allan_variance(second_means, 1)
     walk = np.repeat(
         [model.gyro_random_walk_rad_s2_sqrt_hz, model.accel_random_walk_m_s3_sqrt_hz], 3
@@ -89,7 +87,7 @@ def test_slopes_are_those_of_white_noise_and_of_a_walk(second_means):
 
 
 def test_a_cold_imu_warms_up():
-    model = load_imu_model("adis16448").model_copy(
+    model = ImuModel.load("adis16448").model_copy(
         update={
             "gyro_turn_on_bias_rad_s": 0.0,
             "gyro_random_walk_rad_s2_sqrt_hz": 0.0,

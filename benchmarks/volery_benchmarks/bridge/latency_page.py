@@ -193,9 +193,12 @@ def _bytes(size: int) -> str:
 
 
 def main() -> None:
-    """Runs the command line."""
+    """Runs the command line; an unreadable file ends it with one line."""
     docs, *files = map(Path, sys.argv[1:])
-    write(docs, bridge_results(files))
+    try:
+        write(docs, bridge_results(files))
+    except VoleryError as error:
+        sys.exit(f"error: {error}")
 
 
 if __name__ == "__main__":

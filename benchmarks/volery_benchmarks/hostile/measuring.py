@@ -23,6 +23,7 @@ import numpy as np
 from volery.core.errors import VoleryError
 from volery.mavlink.codec import dialect
 from volery.mavlink.links import ports
+from volery_benchmarks.ending import end
 from volery_benchmarks.hostile.attackers import ATTACKS, MAVLINK_ATTACKS
 from volery_benchmarks.hostile.witness import PERIOD_S
 from volery_benchmarks.registry import Measured
@@ -35,7 +36,6 @@ _LEAD_S = 1.0
 """Lead of an attack before the witness measures, s."""
 _SETTLE_S = 1.0
 _START_S = 120.0
-_ENDING_S = 20.0
 _NOT_ANSWERED_S = 10.0
 """Delay that counts for calls without a response, s."""
 
@@ -133,12 +133,7 @@ def _victim(*, with_mavlink: bool) -> Iterator[tuple[int, int, tuple[int, int]]]
         _wait_until_open(process, rosbridge)
         yield process.pid, rosbridge, attacked
     finally:
-        process.terminate()
-        try:
-            process.wait(_ENDING_S)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait(_ENDING_S)
+        end(process)
 
 
 def _wait_until_open(process: subprocess.Popen[bytes], port: int) -> None:

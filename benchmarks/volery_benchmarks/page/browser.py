@@ -43,7 +43,7 @@ def open_browser(*flags: str) -> Iterator[Browser]:
     try:
         from playwright.sync_api import sync_playwright
     except ModuleNotFoundError:
-        raise VoleryError(missing_package("this", "playwright", "bench")) from None
+        raise VoleryError(missing_package("bench page", "playwright", "bench")) from None
     path = browser_path()
     if path is None:
         raise VoleryError("this needs a Chromium: apt-get install chromium, or VOLERY_BROWSER")

@@ -14,6 +14,7 @@ from contextlib import suppress
 from typing import Any
 
 from volery.core.errors import VoleryError
+from volery_benchmarks.ending import end
 
 _STARTING_S = 600.0
 """Max start time, s: the first start compiles, and the machine may be busy."""
@@ -86,12 +87,7 @@ class PageProcess:
         process, self._process = self._process, None
         if process is None:
             return
-        process.terminate()
-        try:
-            process.wait(_ENDING_S)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait(_ENDING_S)
+        end(process)
         self._reader.join(_ENDING_S)
         if process.stdout is not None:
             process.stdout.close()

@@ -10,9 +10,8 @@ All code of a bridge runs in the thread of `BridgeHost` and accesses the simulat
 
 from __future__ import annotations
 
-import asyncio
 import logging
-from collections.abc import Callable, Coroutine
+from collections.abc import Coroutine
 from typing import Any, TypeVar
 
 from volery.bridges.loop_thread import LoopThread
@@ -73,15 +72,3 @@ class BridgeHost:
 
     def __exit__(self, *_exception: object) -> None:
         self.close()
-
-
-def wake_of(loop: asyncio.AbstractEventLoop, callback: Callable[[], object]) -> Callable[[], None]:
-    """Returns a `graph.session.Wake` that runs `callback` in `loop`, if the loop is still open."""
-
-    def wake() -> None:
-        try:
-            loop.call_soon_threadsafe(callback)
-        except RuntimeError:  # the loop has ended
-            return
-
-    return wake

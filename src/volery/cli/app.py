@@ -11,7 +11,7 @@ from volery.cli.flight_commands import launch, list_scenarios, play, px4, run, s
 from volery.cli.graph_commands import node, service_app, topic_app
 from volery.cli.log_commands import convert, info, recover, report, slam
 from volery.cli.machine_commands import bench, doctor
-from volery.cli.model_commands import export, identify, interfaces
+from volery.cli.model_commands import export, identify, interfaces, schema
 from volery.cli.node_logs import show_node_logs
 from volery.cli.options import PageCommand
 from volery.cli.radio_commands import comms, gcs
@@ -26,24 +26,30 @@ app = typer.Typer(
 )
 
 
-def _version(wanted: bool) -> None:
-    if wanted:
-        from importlib.metadata import version
-
-        typer.echo(f"volery {version('volery')}")
-        raise typer.Exit
-
-
-@app.callback()
+@app.callback(invoke_without_command=True)
 def volery(
+    context: typer.Context,
     version: Annotated[
         bool,
         typer.Option(
-            "--version", callback=_version, is_eager=True, help="Print the version and exit."
+            "--version", help="Print version, commit, Python, platform and libraries; exit."
         ),
+    ] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="With --version: print one JSON object.")
     ] = False,
 ) -> None:
     """Simulate many UAVs with LIDARs, cameras and autopilots in lock step."""
+    if version:
+        from volery.cli.build_info import describe_build
+
+        build = describe_build()
+        typer.echo(build.to_json() if as_json else str(build))
+        raise typer.Exit
+    if as_json:
+        raise typer.BadParameter("needs --version", param_hint="--json")
+    if context.invoked_subcommand is None:
+        raise typer.BadParameter("name a command; `volery --help` lists them")
 
 
 app.command(cls=PageCommand)(run)
@@ -64,6 +70,7 @@ for _command in (
     identify,
     export,
     interfaces,
+    schema,
     bench,
     doctor,
 ):

@@ -6,12 +6,16 @@ import json
 import logging
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import asdict
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import typer
 
+from volery.cli.build_info import describe_build
 from volery.cli.tables import print_table
 from volery.core.errors import VoleryError
 from volery_benchmarks.document import render
@@ -32,17 +36,25 @@ def measure_and_show(
             results = [_in_own_process(each) for each, bench in BENCHES.items() if bench.in_all]
         else:
             results = [find(name).run(quick=quick)]
-    for result in results:
-        if as_json:
-            typer.echo(result.to_json())
-        else:
+    document = _document(results) if name == "all" else results[0].as_dict()
+    if as_json:
+        typer.echo(json.dumps(document))
+    else:
+        for result in results:
             _show(result)
     if out is not None:
-        plain = [result.as_dict() for result in results]
-        text = json.dumps(plain if name == "all" else plain[0], indent=2)
-        out.write_text(text + "\n", encoding="utf-8")
+        out.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
     if markdown is not None:
         markdown.write_text(render(results), encoding="utf-8")
+
+
+def _document(results: Sequence[Result]) -> dict[str, Any]:
+    """Returns all results with the build and the date; each result names its machine."""
+    return {
+        "build": asdict(describe_build()),
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "results": [result.as_dict() for result in results],
+    }
 
 
 @contextmanager

@@ -18,9 +18,12 @@ _QUICK = "forest_search, load, hostile"
 
 @guarded
 def bench(
-    name: Annotated[str, typer.Argument(help=f"Benchmark: all, {_BENCHES}.")],
+    name: Annotated[str, typer.Argument(help=f"Benchmark: all, {_BENCHES}.")] = "",
+    all_benches: Annotated[
+        bool, typer.Option("--all", help="Run all that take minutes and need no extra.")
+    ] = False,
     json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object per benchmark.")
+        bool, typer.Option("--json", help="Print one JSON object with machine and versions.")
     ] = False,
     out: Annotated[Path | None, typer.Option(help="Write the JSON to this file.")] = None,
     markdown: Annotated[
@@ -33,6 +36,9 @@ def bench(
     """Measure how fast Volery is on this machine."""
     from volery.cli.bench import measure_and_show
 
+    if all_benches == bool(name):
+        raise typer.BadParameter(f"name one benchmark or say --all: {_BENCHES}")
+    name = name or "all"
     measure_and_show(name, as_json=json, out=out, markdown=markdown, quick=quick)
 
 

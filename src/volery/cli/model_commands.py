@@ -1,4 +1,4 @@
-"""Commands that write data for other programs: identify, export, interfaces."""
+"""Commands that write data for other programs: identify, export, interfaces, schema."""
 
 from __future__ import annotations
 
@@ -76,3 +76,20 @@ def interfaces(
     from volery.cli.interfaces import write_and_report
 
     write_and_report(folder, package or [], overwrite=overwrite, ros1=ros1)
+
+
+@guarded
+def schema(
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Write this file, such as scenario.schema.json beside a scenario."),
+    ] = None,
+) -> None:
+    """Print or write the JSON schema of scenarios, for completion and checks in editors."""
+    from volery.scenario.json_schema import schema_text, write_schema
+
+    if out is None:
+        typer.echo(schema_text(), nl=False)
+        return
+    write_schema(out)
+    typer.echo(str(out))

@@ -1,16 +1,4 @@
-"""Addresses: stations by batch and plane, batches, all stations.
-
-An address is a u16:
-
-| address | meaning |
-|---|---|
-| 0 .. 0x7EFF | the station with this linear id, group_size x batch + plane |
-| 0x7F00 .. 0x7FFF | ground stations, which belong to no batch |
-| 0x8000 + b | all stations of batch b, b up to 0x3FFF |
-| 0xC000 | all ground stations |
-| 0xFFFE | the server itself |
-| 0xFFFF | all stations |
-"""
+"""Addresses, u16: stations by batch and plane, batches, all stations; see docs/comms.md."""
 
 from __future__ import annotations
 

@@ -1,23 +1,7 @@
-"""Payloads of the control frames between stations and server.
+"""Payloads of the control frames between stations and server; docs/comms.md defines their fields.
 
-Numbers are little-endian and packed; `text` is a u8 length and so many bytes of UTF-8.
-
-HELLO (1), station to server, its first frame: u16 batch · u16 plane · u16 group_size · text
-name · text token. The head's source is the linear id, its session that of all messages to come.
-
-WELCOME (2): u32 boot, drawn by the server when it started · u32 last, the highest sequence that it
-has of this session · then u32 each: those up to `last` that are not settled yet.
-
-REFUSAL (3): u8 reason, see `Reason` · u32 sequence of the refused message, 0: the connection itself
-· the rest is a UTF-8 text for users.
-
-RECEIVED (4), station to server: 10 bytes each: u16 source · u32 session · u32 sequence: all
-messages of this source up to this sequence have arrived.
-
-SETTLED (5), server to station: u32 each: sequences of settled messages: every addressed station has
-acknowledged them, or a rule has dropped them.
-
-PING (6) and PONG (7): empty.
+Numbers are little-endian and packed; `text` is a u8 length and so many bytes of UTF-8. In HELLO the
+head's source is the linear id, and its session that of all messages to come.
 """
 
 from __future__ import annotations

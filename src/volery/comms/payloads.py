@@ -1,17 +1,9 @@
 """Payloads of messages between stations: a named message of the graph.
 
 Payload of COMMAND and SENSING: text name · text type · CDR with its four bytes of header; `text` is
-a u8 length and so many bytes of UTF-8. The name is the topic or service name below the UAV's:
-
-| kind | name | type | meaning |
-|---|---|---|---|
-| SENSING | `state` | `volery_interfaces/msg/VehicleState` | state of a UAV |
-| SENSING | `mission` | `volery_interfaces/msg/MissionStatus` | status of its mission |
-| SENSING | `slam` | `std_msgs/msg/String` | status of its SLAM, JSON |
-| SENSING | `reply` | `std_msgs/msg/String` | result of a command, as text |
-| COMMAND | one of `COMMANDS` | the service's request | call that service of the UAV |
-
-Programs may send any other message of the graph under another name.
+a u8 length and so many bytes of UTF-8. The name is the topic or service name below the UAV's; those
+of Volery's stations are in docs/comms.md. Programs may send any other message of the graph under
+another name.
 """
 
 from __future__ import annotations

@@ -1,23 +1,6 @@
 """Encodes and parses the frames of the radio network, without sockets.
 
-All numbers are little-endian and packed without padding:
-
-| offset | bytes | type | field |
-|---|---|---|---|
-| 0 | 4 | | sync word `AA 56 43 4D` |
-| 4 | 1 | u8 | version of the protocol, 1 |
-| 5 | 1 | u8 | kind, see `StationFrameKind` |
-| 6 | 2 | u16 | source, an address |
-| 8 | 2 | u16 | destination, an address |
-| 10 | 2 | u16 | n, bytes of payload, at most 16,384 |
-| 12 | 4 | u32 | session: drawn by the source when it starts |
-| 16 | 4 | u32 | sequence: 1, 2, ... over all messages of the source in this session; else 0 |
-| 20 | 8 | i64 | send time by the source's clock, ns |
-| 28 | 2 | u16 | CRC of bytes 4 to 27 |
-| 30 | n | | payload, see `control_payloads` and `payloads` |
-| 30 + n | 2 | u16 | CRC of all bytes from 4 to 29 + n |
-
-CRC and synchronization are those of `core.framing`; for addresses see `addresses`.
+docs/comms.md defines them. CRC and synchronization are those of `core.framing`.
 """
 
 from __future__ import annotations

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.control.estimated_state import EstimatedState
 from volery.control.flight_modes import FlightMode
 from volery.control.setpoints import ControlLevel
 from volery.core import rotations
@@ -51,25 +52,128 @@ def command_velocities(
     control_states["yaw_rate_target"][hears] = yaw_rate[hears]
 
 
-def enter_low_level(
+def command_low_level(
     bodies: NDArray[np.void],
     control_states: NDArray[np.void],
     step: int,
     level: ControlLevel,
-    setpoints: Mapping[str, Array],
+    setpoints: Mapping[str, Array | float],
 ) -> None:
-    """Sets low-level setpoints (N, ...) by field of all UAVs, except those that have crashed.
+    """Sets low-level setpoints by field, (N, ...) or one for all, of all UAVs not crashed.
 
-    The batch form of the commands of single UAVs to rotors, rates and attitudes.
+    As the commands of single UAVs to rotors, rates and attitudes do.
     """
-    chosen = control_states["mode"] != FlightMode.CRASHED
-    rests = chosen & (bodies["on_ground"] | bodies["asleep"])
+    rows = np.flatnonzero(control_states["mode"] != FlightMode.CRASHED)
+    _wake(bodies, rows, step)
+    control_states["mode"][rows] = FlightMode.LOW_LEVEL
+    control_states["level"][rows] = level
+    _set_fields(control_states, rows, setpoints)
+
+
+def guided_rows(control_states: NDArray[np.void]) -> NDArray[np.int64]:
+    """Returns the rows of UAVs that guided commands reach: not landed, taking off or crashed."""
+    return np.flatnonzero(~np.isin(control_states["mode"], [int(mode) for mode in _DEAF]))
+
+
+def enter_guided(
+    bodies: NDArray[np.void],
+    control_states: NDArray[np.void],
+    step: int,
+    mode: FlightMode,
+    motion_of: Callable[[NDArray[np.int64]], EstimatedState],
+) -> NDArray[np.int64]:
+    """Sets a guided flight mode of all UAVs that guided commands reach; returns their rows.
+
+    motion_of: returns the motion that the controllers of some rows use.
+    """
+    rows = guided_rows(control_states)
+    _wake(bodies, rows, step)
+    fresh = rows[control_states["level"][rows] != ControlLevel.GUIDED]
+    if len(fresh):
+        motion = motion_of(fresh)
+        yaw = rotations.yaw_of(motion.attitude)
+        heading = np.column_stack([np.cos(yaw), np.sin(yaw)])
+        control_states["level"][fresh] = ControlLevel.GUIDED
+        control_states["position"][fresh] = motion.position
+        control_states["velocity"][fresh] = motion.velocity
+        control_states["acceleration"][fresh] = 0.0
+        control_states["velocity_integral"][fresh] = 0.0
+        control_states["heading"][fresh] = control_states["heading_target"][fresh] = heading
+    if mode is not FlightMode.VELOCITY:
+        turning = rows[control_states["turning"][rows]]
+        control_states["heading_target"][turning] = control_states["heading"][turning]
+        control_states["turning"][turning] = False
+    control_states["mode"][rows] = mode
+    control_states["braking"][rows] = False
+    control_states["calm_ticks"][rows] = 0
+    return rows
+
+
+def command_map_velocities(
+    control_states: NDArray[np.void],
+    rows: NDArray[np.int64],
+    step: int,
+    velocity: Array,
+    yaw: Array | None,
+    yaw_rate: Array,
+) -> None:
+    """Sets velocities (N, 3) m/s, map, of the guided `rows`, with yaws or yaw rates (N,)."""
+    stops = ~velocity[rows].any(axis=1) & control_states["velocity_target"][rows].any(axis=1)
+    control_states["hurried"][rows] |= stops
+    control_states["velocity_target"][rows] = velocity[rows]
+    control_states["velocity_in_heading"][rows] = False
+    control_states["deadline_step"][rows] = step + control_states["timeout_steps"][rows]
+    if yaw is None:
+        control_states["turning"][rows] = True
+        control_states["yaw_rate_target"][rows] = yaw_rate[rows]
+    else:
+        _face(control_states, rows, yaw)
+
+
+def command_setpoints(
+    control_states: NDArray[np.void],
+    rows: NDArray[np.int64],
+    step: int,
+    setpoints: Mapping[str, Array],
+    yaw: Array | None,
+    yaw_rate: Array,
+) -> None:
+    """Sets trajectory points by field, (N, 3) each, of the guided `rows`."""
+    control_states["path_last"][rows] = -1
+    control_states["start_step"][rows] = step
+    control_states["deadline_step"][rows] = step + control_states["timeout_steps"][rows]
+    _set_fields(control_states, rows, setpoints)
+    control_states["yaw_rate_target"][rows] = yaw_rate[rows]
+    if yaw is None:
+        control_states["turning"][rows[yaw_rate[rows] != 0.0]] = True
+    else:
+        _face(control_states, rows, yaw)
+
+
+def _wake(bodies: NDArray[np.void], rows: NDArray[np.int64], step: int) -> None:
+    rests = rows[bodies["on_ground"][rows] | bodies["asleep"][rows]]
     bodies["last_contact_step"][rests] = step
-    bodies["asleep"][chosen] = False
-    bodies["still_steps"][chosen] = 0
-    bodies["ground_budget"][chosen] = 0.0
-    bodies["downwash_budget"][chosen] = 0.0
-    control_states["mode"][chosen] = FlightMode.LOW_LEVEL
-    control_states["level"][chosen] = level
+    bodies["asleep"][rows] = False
+    bodies["still_steps"][rows] = 0
+    bodies["ground_budget"][rows] = 0.0
+    bodies["downwash_budget"][rows] = 0.0
+
+
+def _face(control_states: NDArray[np.void], rows: NDArray[np.int64], yaw: Array) -> None:
+    control_states["turning"][rows] = False
+    control_states["heading_target"][rows, 0] = np.cos(yaw[rows])
+    control_states["heading_target"][rows, 1] = np.sin(yaw[rows])
+
+
+def _set_fields(
+    control_states: NDArray[np.void],
+    rows: NDArray[np.int64],
+    setpoints: Mapping[str, Array | float],
+) -> None:
     for name, values in setpoints.items():
-        control_states[name][chosen] = values[chosen]
+        if not isinstance(values, np.ndarray):
+            control_states[name][rows] = values
+        elif values.ndim == 1:
+            control_states[name][rows] = values[rows]
+        else:
+            control_states[name][rows, : values.shape[1]] = values[rows]

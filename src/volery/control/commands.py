@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -154,43 +155,40 @@ class FleetCommands:
             self._bodies, self._control_states, self.step, velocity, rate
         )
 
-    def command_all_rotor_speeds(self, speeds: Array) -> None:
-        """Sets rotor speeds (N, R) rad/s of all UAVs that have not crashed.
+    def command_all(self, level: ControlLevel, setpoints: Mapping[str, Array | float]) -> None:
+        """Sets setpoints of a level below guidance for all UAVs that have not crashed.
 
-        R is the largest number of rotors; columns beyond a UAV's rotors are ignored.
+        setpoints: arrays (N, ...), or one number for all, by field of `CONTROL_STATE`; the caller
+        has checked them with `BatchLimits`.
         """
-        self._refuse_any("rotor speeds", IdentifiedModel, Kinematic)
-        counts = np.array([len(airframe.rotors.places) for airframe in self.airframes])
-        top = np.array([airframe.rotors.max_speed_rad_s for airframe in self.airframes])
-        speeds = checked("rotor speeds", speeds, (len(self), int(counts.max())), math.inf)
-        target = np.zeros_like(self._control_states["rotor_target"])
-        target[:, : speeds.shape[1]] = speeds
-        target[np.arange(target.shape[1]) >= counts[:, None]] = 0.0
-        self._check_range("rotor speeds", target, np.zeros_like(top), top)
-        self._enter_all(ControlLevel.ROTORS, {"rotor_target": target})
+        batch_commands.command_low_level(
+            self._bodies, self._control_states, self.step, level, setpoints
+        )
 
-    def command_all_rates(self, omega_body: Array, thrust: Array) -> None:
-        """Sets body rates (N, 3) rad/s, FLU, and thrusts (N,) N of all UAVs not crashed."""
-        self._refuse_any("rates", IdentifiedModel, Kinematic)
-        omega_body = checked("rates", omega_body, (len(self), 3), math.inf)
-        limits = (math.radians(airframe.limits.rate_deg_s) for airframe in self.airframes)
-        limit = 4.0 * np.fromiter(limits, np.float64)
-        self._check_range("rates", omega_body, -limit, limit)
-        thrust = self._checked_thrusts(thrust)
-        self._enter_all(ControlLevel.RATES, {"rates": omega_body, "thrust": thrust})
+    def command_map_velocities(self, velocity: Array, yaw: Array | None, yaw_rate: Array) -> None:
+        """Sets velocities (N, 3) m/s, map, with yaws (N,) rad, or yaw rates (N,) rad/s.
 
-    def command_all_attitudes(self, attitude: Array, thrust: Array) -> None:
-        """Sets attitudes (N, 4), map from body, and thrusts (N,) N of all UAVs not crashed."""
-        self._refuse_any("attitudes", Kinematic)
-        attitude = checked("attitude", attitude, (len(self), 4), 1.1)
-        length = np.linalg.norm(attitude, axis=1, keepdims=True)
-        self._check_range("length of attitude", length, *np.full((2, len(self)), [[0.9], [1.1]]))
-        setpoints = {
-            "attitude": attitude / length,
-            "thrust": self._checked_thrusts(thrust),
-            "yaw_rate": np.zeros(len(self)),
-        }
-        self._enter_all(ControlLevel.ATTITUDE, setpoints)
+        As `command_velocity_map` for each UAV, but UAVs on the ground, crashed or taking off are
+        skipped. The caller has checked the values with `BatchLimits`.
+        """
+        rows = self._enter_guided_all(FlightMode.VELOCITY)
+        batch_commands.command_map_velocities(
+            self._control_states, rows, self.step, velocity, yaw, yaw_rate
+        )
+
+    def command_setpoints(
+        self, setpoints: Mapping[str, Array], yaw: Array | None, yaw_rate: Array
+    ) -> None:
+        """Sets trajectory points as `command_setpoint` does for each UAV.
+
+        setpoints: `position_target`, `velocity_target`, `acceleration_target`, (N, 3) each. UAVs on
+        the ground, crashed or taking off are skipped. The caller has checked the values with
+        `BatchLimits`.
+        """
+        rows = self._enter_guided_all(FlightMode.TRAJECTORY)
+        batch_commands.command_setpoints(
+            self._control_states, rows, self.step, setpoints, yaw, yaw_rate
+        )
 
     def command_velocity_map(
         self, i: int, velocity: ArrayLike, yaw_rate: float = 0.0, *, yaw: float | None = None
@@ -391,33 +389,6 @@ class FleetCommands:
             kind = type(self.plants[i]).__name__
             raise CommandError(f"{self.names[i]} does not accept {what}: its plant is a {kind}")
 
-    def _refuse_any(self, what: str, *plants: type[Plant]) -> None:
-        for name, plant in zip(self.names, self.plants, strict=True):
-            if isinstance(plant, plants):
-                kind = type(plant).__name__
-                raise CommandError(f"{name} does not accept {what}: its plant is a {kind}")
-
-    def _check_range(self, what: str, values: Array, low: Array, high: Array) -> None:
-        """Raises `CommandError` for the first UAV with `values` (N, k) beyond its limits (N,)."""
-        wrong = ((values < low[:, None]) | (values > high[:, None])).any(axis=1)
-        if wrong.any():
-            i = int(np.flatnonzero(wrong)[0])
-            raise CommandError(
-                f"{what} = {values[i].tolist()} of {self.names[i]} is out of range; "
-                f"from {low[i]:.6g} to {high[i]:.6g} is allowed"
-            )
-
-    def _checked_thrusts(self, thrust: Array) -> Array:
-        thrust = checked("thrust", thrust, (len(self),), math.inf)
-        most = np.array([len(a.rotors.places) * a.max_rotor_thrust for a in self.airframes])
-        self._check_range("thrust", thrust[:, None], np.zeros_like(most), most)
-        return thrust
-
-    def _enter_all(self, level: ControlLevel, setpoints: dict[str, Array]) -> None:
-        batch_commands.enter_low_level(
-            self._bodies, self._control_states, self.step, level, setpoints
-        )
-
     def _checked_thrust(self, i: int, thrust: float) -> float:
         airframe = self.airframes[i]
         most = len(airframe.rotors.places) * airframe.max_rotor_thrust
@@ -480,6 +451,11 @@ class FleetCommands:
         control_state["braking"] = False
         control_state["calm_ticks"] = 0
         return control_state
+
+    def _enter_guided_all(self, mode: FlightMode) -> NDArray[np.int64]:
+        return batch_commands.enter_guided(
+            self._bodies, self._control_states, self.step, mode, self._believed
+        )
 
     def _command_velocity(self, i: int, velocity: ArrayLike, *, in_heading: bool) -> None:
         velocity = checked("velocity", velocity, (3,), 1e3)

@@ -327,30 +327,22 @@ class Fleet(FleetCommands):
         restitution: float = 0.3,
         friction: float = 0.5,
         *,
+        other: int | None = None,
         point_map: ArrayLike | None = None,
     ) -> float:
-        """Applies the impulse of a contact with a fixed object to UAV `i`; returns its size, N s.
+        """Applies the impulse of a contact to UAV `i`; returns its size, N s.
 
-        normal_map: (3,) unit vector out of the object. point_map: (3,) m, the contact; None: the
-        impulse acts at the centre of mass. The impulse is 0 if the two already separate.
+        normal_map: (3,) unit vector out of the fixed object, or out of the `other` UAV, which gets
+        the opposite impulse. point_map: (3,) m, the contact; None: the impulse acts at the centre
+        of mass. The impulse is 0 if the two already separate.
         """
-        return self._collide(i, None, normal_map, restitution, friction, point_map)
-
-    def strike_pair(
-        self,
-        i: int,
-        j: int,
-        normal_map: ArrayLike,
-        restitution: float = 0.3,
-        friction: float = 0.5,
-        *,
-        point_map: ArrayLike | None = None,
-    ) -> float:
-        """Applies opposite impulses to UAVs `i` and `j`; normal_map (3,) points from j to i.
-
-        Returns the size, N s; see `strike`.
-        """
-        return self._collide(i, j, normal_map, restitution, friction, point_map)
+        size = impulses.collide(
+            self.airframes, self.state, i, other, normal_map, restitution, friction, point_map
+        )
+        if size > 0.0:
+            for row in (i,) if other is None else (i, other):
+                self._wake(row)
+        return size
 
     # ------------------------------------------------------------------------------ snapshot
 
@@ -487,10 +479,3 @@ class Fleet(FleetCommands):
         control_state = self._enter_guided(i, FlightMode.HOLD, from_ground=True)
         control_state["thrust"] = airframe.weight
         control_state["position_target"] = self._bodies["position_map"][i]
-
-    def _collide(self, i: int, j: int | None, normal_map: ArrayLike, *how: Any) -> float:
-        size = impulses.collide(self.airframes, self.state, i, j, normal_map, *how)
-        if size > 0.0:
-            for row in (i,) if j is None else (i, j):
-                self._wake(row)
-        return size

@@ -41,7 +41,8 @@ class Trajectory:
     """Polynomial segments of degree up to five, consecutive in time."""
 
     segments: Array
-    """(S, `trajectory_kernels.SEGMENT_COLUMNS`)."""
+    """(S, 26): begin and end, s; then six coefficients each, in rising powers of the segment's
+    time, of x, y and z, m, in the map, and of yaw, rad."""
     faces: bool
     """Whether the trajectory has headings; otherwise a UAV's heading is unchanged."""
 
@@ -139,7 +140,10 @@ class Trajectory:
         return self._in_segment(max(row, 0), min(max(time, self.begin_s), self.end_s))
 
     def led_in_from(self, position: Array, velocity: Array, yaw: float) -> Trajectory:
-        """Returns the trajectory with a leading segment from a motion (map, SI) at time 0."""
+        """Returns the trajectory with a leading segment from a motion at time 0.
+
+        position: (3,) m, map; velocity: (3,) m/s, map; yaw: rad.
+        """
         if self.begin_s <= 0.0:
             return self
         first = self.at(self.begin_s)

@@ -22,8 +22,11 @@ class SpawnFault(Enum):
     """Which argument of a new UAV is invalid."""
 
     NAME = "name"
+    """The name has characters that topics cannot have."""
     NAME_TAKEN = "name taken"
+    """Another UAV or actor has the name."""
     TYPE = "type"
+    """There is no such type of UAV."""
 
 
 class SpawnError(VoleryError):
@@ -32,6 +35,7 @@ class SpawnError(VoleryError):
     def __init__(self, fault: SpawnFault, message: str) -> None:
         super().__init__(message)
         self.fault = fault
+        """Argument that is invalid."""
 
 
 class PlacementError(ScenarioError):
@@ -61,7 +65,9 @@ class NodeError(VoleryError):
         """Creates the error with the node's full name and the time of its failure, if known."""
         super().__init__(text)
         self.node = node
+        """Full name of the node; empty: unknown."""
         self.time_ns = time_ns
+        """Simulated time of the failure, ns; 0: unknown."""
         self.is_reported = False
         """Whether the error has been logged as the node's failure."""
 
@@ -88,7 +94,9 @@ class DivergenceError(VoleryError):
     def __init__(self, uav: str, time_s: float, message: str) -> None:
         super().__init__(message)
         self.uav = uav
+        """Name of the UAV."""
         self.time_s = time_s
+        """Simulated time, s."""
 
 
 class PatternError(VoleryError):

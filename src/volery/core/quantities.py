@@ -11,6 +11,8 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
+from volery.core.data_tables import read_table
+
 
 class Quantity(NamedTuple):
     """Limits of the numbers of a quantity."""
@@ -27,61 +29,10 @@ class Quantity(NamedTuple):
 
 
 _LARGEST_INT = 2**63
-_MM = {"mm": 1e-3}
 _NUMBER = Quantity("", 1e9, 1e-12)
 """Limits of keys without a unit."""
-_QUANTITIES: dict[str, Quantity] = {
-    # space
-    "m": Quantity("m", 1e6, 1e-9, _MM),
-    "cm": Quantity("cm", 1e5, 1e-3, {"mm": 0.1}),
-    **dict.fromkeys(("radius_m", "range_m"), Quantity("m", 1e6, 1e-9, _MM, 0.0)),
-    "m2": Quantity("m2", 1e10, 1e-9, {"mm2": 1e-6}),
-    "drag_area_m2": Quantity("m2", 100.0, 1e-9, {"mm2": 1e-6, "cm2": 1e-4}),
-    "per_m": Quantity("1/m", 100.0),
-    "per_ha": Quantity("1/ha", 1e9),
-    "deg": Quantity("deg", 36_000.0, 1e-6),
-    "rad": Quantity("rad", 100.0, 1e-9, {"deg": math.pi / 180.0}),
-    # time
-    "s": Quantity("s", 1e7, 1e-9, {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}, 0.0),
-    "hz": Quantity("Hz", 1e6, 1e-4),
-    "mhz": Quantity("MHz", 1e6, 1e-6, {"Hz": 1e-6}),
-    "mbit_s": Quantity("Mbit/s", 1e6, 1e-6, {"bit/s": 1e-6}),
-    "rpm": Quantity("rpm", 1e6),
-    # motion
-    "m_s": Quantity("m/s", 1000.0, 1e-6, {"mm/s": 1e-3}),
-    "deceleration_m_s2": Quantity("m/s^2", 1000.0, 1e-6, {"mm/s^2": 1e-3}, 0.0),
-    "m_s2": Quantity("m/s^2", 1000.0, 1e-6, {"mm/s^2": 1e-3}),
-    "rad_s": Quantity("rad/s", 1e5, 1e-6, {"deg/s": math.pi / 180.0}),
-    "deg_s": Quantity("deg/s", 1e5, 1e-3),
-    "1_s": Quantity("1/s", 1000.0),
-    # vehicles
-    "kg": Quantity("kg", 1000.0, 1e-5, {"g": 1e-3, "mg": 1e-6}),
-    "kg_m2": Quantity("kg m2", 1e4, 1e-11, {"kg mm2": 1e-6, "g mm2": 1e-9}),
-    "thrust_n_s2": Quantity("N s2", 10.0, 1e-13),
-    "drag_n_s2_m": Quantity("N s2/m", 1.0),
-    "rolling_n_s2": Quantity("N s2", 1.0),
-    "torque_m": Quantity("m", 10.0, 1e-7, _MM),
-    "ah": Quantity("Ah", 1e4, 1e-4, {"mAh": 1e-3}),
-    "v": Quantity("V", 1e4, 1e-3, {"mV": 1e-3}),
-    "ohm": Quantity("ohm", 1000.0, 0.0, {"mohm": 1e-3}),
-    "w": Quantity("W", 1e5, 0.0, {"mW": 1e-3}),
-    "seed": Quantity("", float(_LARGEST_INT), low=0.0),
-    "fraction": Quantity("", 1.0, low=0.0),
-    "share": Quantity("", 1.0, low=0.0),
-    "damping": Quantity("", 100.0, 1e-3),
-    # measurements of sensors, and their noise
-    "pa": Quantity("Pa", 1e4, 0.0, {"mPa": 1e-3}),
-    "t": Quantity("T", 1.0, 0.0, {"uT": 1e-6, "nT": 1e-9}),
-    "ut": Quantity("uT", 1e6, 1e-6),
-    "rad_s_sqrt_hz": Quantity("rad/s/sqrt(Hz)", 10.0, 1e-12),
-    "rad_s2_sqrt_hz": Quantity("rad/s^2/sqrt(Hz)", 10.0),
-    "m_s2_sqrt_hz": Quantity("m/s^2/sqrt(Hz)", 100.0, 1e-12),
-    "m_s3_sqrt_hz": Quantity("m/s^3/sqrt(Hz)", 100.0),
-    "t_sqrt_hz": Quantity("T/sqrt(Hz)", 1.0),
-    "t_s_sqrt_hz": Quantity("T/s/sqrt(Hz)", 1.0),
-    "m_sqrt_m": Quantity("m/sqrt(m)", 100.0),
-    "rad_sqrt_m": Quantity("rad/sqrt(m)", 10.0),
-    "m_sqrt_s": Quantity("m/sqrt(s)", 100.0),
+_QUANTITIES = {
+    ending: Quantity(**fields) for ending, fields in read_table(__file__, "quantities.toml").items()
 }
 
 

@@ -207,7 +207,7 @@ class Collisions:
             self._report(i, approach, self._names[j], time_ns)
             self._report(j, approach, self._names[i], time_ns)
         if approach > 0.0:
-            self._fleet.strike_pair(i, j, normal, self._response.restitution, _FRICTION)
+            self._fleet.strike(i, normal, self._response.restitution, _FRICTION, other=j)
 
     # ------------------------------------------------------------------------------------- actors
 

@@ -12,6 +12,7 @@ class EventKind(StrEnum):
     """Kinds of events."""
 
     TOUCH_DOWN = "touch_down"
+    """Touched the ground as a landing does."""
     IMPACT = "impact"
     """Hit the ground harder than a landing allows."""
     COLLISION = "collision"
@@ -34,12 +35,19 @@ class Event:
     """
 
     time_ns: int
+    """Simulated time, ns."""
     uav: str
+    """Name of the UAV; empty: the event is of no UAV."""
     kind: EventKind
+    """Kind of the event."""
     position_map: tuple[float, float, float]
+    """Position of the UAV, x, y, z, m, in the map."""
     speed_m_s: float
+    """Speed just before a contact, m/s; 0: no contact."""
     partner: str = ""
+    """Name of the object of a contact."""
     detail: str = ""
+    """Other information, such as the new flight mode."""
 
     def describe(self) -> str:
         """Returns one line for users."""

@@ -128,10 +128,13 @@ class Published:
     """One message on one topic. Its arrays are read-only; its encodings are cached on demand."""
 
     topic: str
+    """Full name of the topic."""
     msgtype: str
+    """ROS 2 name of the message's type."""
     time_ns: int
     """Simulated time of publication."""
     message: Any
+    """The message, a dataclass with numpy arrays."""
 
     @cached_property
     def cdr(self) -> bytes:

@@ -116,11 +116,6 @@ class _Count:
                 "send several messages"
             ) from None
 
-    @property
-    def position(self) -> int:
-        """Current position, bytes after the header."""
-        return self._position
-
     def _walk(self, plan: _Plan) -> None:
         for step in plan.steps:
             if isinstance(step, _Fixed):

@@ -43,8 +43,8 @@ class Draws:
     ) -> Array:
         """Returns uniform numbers (R, *shape) between `low` and `high`, which broadcast to it."""
         numbers = self._unit(rows, shape)
-        low = np.asarray(low, np.float64)
-        return np.asarray(low + (np.asarray(high, np.float64) - low) * numbers)
+        bottom = np.asarray(low, np.float64)
+        return np.asarray(bottom + (np.asarray(high, np.float64) - bottom) * numbers)
 
     def normal(
         self, rows: NDArray[np.int64], sigma: ArrayLike = 1.0, shape: tuple[int, ...] = ()

@@ -178,7 +178,7 @@ def check_action(action: Any, shape: tuple[int, ...], choices: int | None) -> Ar
         where = np.argwhere(~np.isfinite(array))[0].tolist()
         raise CommandError(f"action {where} is {array[tuple(where)]}; actions must be finite")
     if choices is None:
-        return np.clip(array, -1.0, 1.0)
+        return np.asarray(np.clip(array, -1.0, 1.0))
     if ((array < 0) | (array >= choices) | (array != np.floor(array))).any():
         raise CommandError(f"actions must be whole numbers from 0 to {choices - 1}")
     return array

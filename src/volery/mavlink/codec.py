@@ -36,8 +36,10 @@ def check_of(data: bytes) -> int:
 
 @cache
 def _crc() -> Callable[[bytes], int]:
-    dialect()
-    from fastcrc import crc16
+    try:
+        from fastcrc import crc16
+    except ImportError:
+        raise BridgeError(missing_package("MAVLink", "fastcrc", "mavlink")) from None
 
     check: Callable[[bytes], int] = crc16.mcrf4xx
     return check

@@ -28,6 +28,7 @@ from volery.graph.messages import (
 from volery.publishing import image_codecs as codecs
 from volery.scenario.camera import CameraSensor
 from volery.sensors.cameras.cloud import COLOURED, organised_points
+from volery.sensors.cameras.depth_units import millimetres
 from volery.sensors.samples import CameraFrames, SensorId
 
 OPTICAL_ATTITUDE = np.array([-0.5, 0.5, -0.5, 0.5])
@@ -72,7 +73,7 @@ def compressed(frames: CameraFrames, row: int, camera: Camera) -> CompressedImag
 def depth(frames: CameraFrames, row: int, camera: Camera) -> Image:
     """Returns the depth image, `32FC1` or `16UC1`."""
     encoding, seen = camera.settings.depth_encoding, frames.depth[row]
-    image = seen if encoding == "32FC1" else codecs.millimetres(seen)
+    image = seen if encoding == "32FC1" else millimetres(seen)
     return _image(_header(frames, camera), image, encoding)
 
 
@@ -82,7 +83,7 @@ def compressed_depth(frames: CameraFrames, row: int, camera: Camera) -> Compress
     data = (
         codecs.packed_metres(seen, frames.model.far_m)
         if encoding == "32FC1"
-        else codecs.packed_millimetres(codecs.millimetres(seen))
+        else codecs.packed_millimetres(millimetres(seen))
     )
     text = f"{encoding}; compressedDepth png"
     return CompressedImage(_header(frames, camera), text, read_only(data))

@@ -62,9 +62,6 @@ from volery.sensors.samples import (
 )
 from volery.vehicle.battery import BatteryLevel
 
-SENSOR_TOPICS: dict[type[Any], tuple[SensorTopic, ...]] = {**NAVIGATION_TOPICS}
-"""Topics of each kind of samples with one message per row."""
-
 _NO_EFFORT = np.zeros(0)
 _UNKNOWN_ORIENTATION = np.full(9, 0.0)
 _UNKNOWN_ORIENTATION[0] = -1.0
@@ -92,12 +89,9 @@ class GraphPublisher:
         self._by_kind: dict[type[Any], Callable[[Any], None]] = {
             LidarScans: self._lidars.publish,
             CameraFrames: self.cameras.publish,
-            ImuSamples: self._imus,
-            RangeSamples: self._ranges,
             OdometrySamples: self._odometry,
             JointAngles: self._joints,
             **dict.fromkeys(SENSOR_TOPICS, self._by_topic),
-            BatterySamples: self._batteries,
         }
 
     def announce(
@@ -117,16 +111,11 @@ class GraphPublisher:
             self._advertise(_odometry_topic(sensor), Odometry)
             if sensor.name == "odom" and in_map:
                 self._static.append(_fixed_frame("map", f"{sensor.uav_name}/odom"))
-        elif kind is BatterySamples:
-            self._advertise(f"/{sensor.uav_name}/{sensor.name}", BatteryState)
         else:
-            if kind in SENSOR_TOPICS:
-                for topic in SENSOR_TOPICS[kind]:
-                    self._advertise(topic.name_of(sensor), topic.message_class)
-            else:
-                message_class = Imu if kind is ImuSamples else Range
-                self._advertise(f"/{sensor.uav_name}/{sensor.name}", message_class)
-            self._static.append(_mount_transform(base, sensor.path, mount))
+            for topic in SENSOR_TOPICS[kind]:
+                self._advertise(topic.name_of(sensor), topic.message_class)
+            if kind is not BatterySamples:
+                self._static.append(_mount_transform(base, sensor.path, mount))
 
     def announce_camera(self, camera: Camera, mount: Mount) -> None:
         """Advertises a camera's topics, and adds the static transforms of its two frames."""
@@ -197,42 +186,6 @@ class GraphPublisher:
             self._tf_static.publish(TFMessage(list(self._static)))
 
     # ---------------------------------------------------------------------------------- by kind
-
-    def _imus(self, readings: ImuSamples) -> None:
-        rate_covariance = _diagonal(readings.angular_velocity_variance)
-        force_covariance = _diagonal(readings.specific_force_variance)
-        for i, sensor in enumerate(readings.sensors):
-            publisher = self._publishers[f"/{sensor.uav_name}/{sensor.name}"]
-            if not publisher.has_subscribers:
-                continue
-            publisher.publish(
-                Imu(
-                    header(readings.stamp_ns, f"{sensor.uav_name}/{sensor.name}"),
-                    _IDENTITY,
-                    _UNKNOWN_ORIENTATION,
-                    Vector3(*readings.angular_velocity[i].tolist()),
-                    rate_covariance,
-                    Vector3(*readings.specific_force[i].tolist()),
-                    force_covariance,
-                )
-            )
-
-    def _ranges(self, readings: RangeSamples) -> None:
-        for i, sensor in enumerate(readings.sensors):
-            publisher = self._publishers[f"/{sensor.uav_name}/{sensor.name}"]
-            if not publisher.has_subscribers:
-                continue
-            publisher.publish(
-                Range(
-                    header(readings.stamp_ns, f"{sensor.uav_name}/{sensor.name}"),
-                    Range.ULTRASOUND,
-                    single(readings.field_of_view_rad),
-                    single(readings.range_min_m),
-                    single(readings.range_max_m),
-                    single(readings.ranges[i]),
-                    0.0,
-                )
-            )
 
     def _odometry(self, readings: OdometrySamples) -> None:
         transforms = []
@@ -307,15 +260,35 @@ class GraphPublisher:
                     if message is not None:
                         publisher.publish(message)
 
-    def _batteries(self, readings: BatterySamples) -> None:
-        for i, sensor in enumerate(readings.sensors):
-            publisher = self._publishers[f"/{sensor.uav_name}/{sensor.name}"]
-            if publisher.has_subscribers:
-                publisher.publish(_battery_state(readings, i))
-
     def _advertise(self, topic: str, message_class: type[Any]) -> None:
         if topic not in self._publishers:
             self._publishers[topic] = self._graph.advertise(topic, message_class)
+
+
+def _imu(readings: ImuSamples, row: int) -> Imu:
+    sensor = readings.sensors[row]
+    return Imu(
+        header(readings.stamp_ns, f"{sensor.uav_name}/{sensor.name}"),
+        _IDENTITY,
+        _UNKNOWN_ORIENTATION,
+        Vector3(*readings.angular_velocity[row].tolist()),
+        _diagonal(readings.angular_velocity_variance),
+        Vector3(*readings.specific_force[row].tolist()),
+        _diagonal(readings.specific_force_variance),
+    )
+
+
+def _range(readings: RangeSamples, row: int) -> Range:
+    sensor = readings.sensors[row]
+    return Range(
+        header(readings.stamp_ns, f"{sensor.uav_name}/{sensor.name}"),
+        Range.ULTRASOUND,
+        single(readings.field_of_view_rad),
+        single(readings.range_min_m),
+        single(readings.range_max_m),
+        single(readings.ranges[row]),
+        0.0,
+    )
 
 
 def _battery_state(readings: BatterySamples, i: int) -> BatteryState:
@@ -348,6 +321,15 @@ def _same(count: int, value: float) -> NDArray[np.float32]:
     array = np.full(count, value, dtype=np.float32)
     array.flags.writeable = False
     return array
+
+
+SENSOR_TOPICS: dict[type[Any], tuple[SensorTopic, ...]] = {
+    ImuSamples: (SensorTopic("", Imu, _imu),),
+    RangeSamples: (SensorTopic("", Range, _range),),
+    BatterySamples: (SensorTopic("", BatteryState, _battery_state),),
+    **NAVIGATION_TOPICS,
+}
+"""Topics of each kind of samples with one message per row."""
 
 
 def _odometry_topic(sensor: SensorId) -> str:

@@ -33,14 +33,6 @@ def png(image: NDArray[Any]) -> NDArray[np.uint8]:
     return _encoded(image, format="PNG", compress_level=_PNG_LEVEL)
 
 
-def millimetres(depth: NDArray[np.float32]) -> NDArray[np.uint16]:
-    """Converts depth (height, width), m, to mm (REP 118); 0: unknown, or beyond 65.535 m."""
-    with np.errstate(invalid="ignore"):
-        scaled = np.rint(depth * np.float32(1000.0))
-        known = (scaled > 0.0) & (scaled <= _MOST)
-    return np.where(known, scaled, 0.0).astype(np.uint16)
-
-
 def packed_millimetres(depth: NDArray[np.uint16]) -> NDArray[np.uint8]:
     """Encodes depth (height, width), mm, as lossless `compressedDepth`."""
     return _with_header(0.0, 0.0, depth)

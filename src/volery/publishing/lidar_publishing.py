@@ -114,16 +114,9 @@ class LidarPublisher:
 def _scan_message(scans: LidarScans, pattern: PlanarScan, row: int) -> LaserScan:
     intensities = scans.intensities[row]
     return LaserScan(
-        header(scans.stamp_ns, laser_frame(scans.sensors[row])),
-        single(pattern.angle_min_rad),
-        single(pattern.angle_max_rad),
-        single(pattern.angle_increment_rad),
-        single(pattern.time_increment_s),
-        single(1.0 / pattern.rate_hz),
-        single(scans.model.range.min_m),
-        single(scans.model.range.max_m),
-        scans.echoes[row, 0],
-        intensities[0] if len(intensities) else _NO_INTENSITIES,
+        **_head(scans, pattern, row),
+        ranges=scans.echoes[row, 0],
+        intensities=intensities[0] if len(intensities) else _NO_INTENSITIES,
     )
 
 
@@ -135,19 +128,29 @@ def _echo_message(scans: LidarScans, pattern: PlanarScan, row: int) -> MultiEcho
     for array in (ranges, intensities):
         array.flags.writeable = False
     return MultiEchoLaserScan(
-        header(scans.stamp_ns, laser_frame(scans.sensors[row])),
-        single(pattern.angle_min_rad),
-        single(pattern.angle_max_rad),
-        single(pattern.angle_increment_rad),
-        single(pattern.time_increment_s),
-        single(1.0 / pattern.rate_hz),
-        single(scans.model.range.min_m),
-        single(scans.model.range.max_m),
-        [LaserEcho(beam[:n]) for beam, n in zip(ranges, count, strict=True)],
-        [LaserEcho(beam[:n]) for beam, n in zip(intensities, count, strict=True)]
+        **_head(scans, pattern, row),
+        ranges=[LaserEcho(beam[:n]) for beam, n in zip(ranges, count, strict=True)],
+        intensities=[LaserEcho(beam[:n]) for beam, n in zip(intensities, count, strict=True)]
         if intensities.size
         else [],
     )
+
+
+def _head(scans: LidarScans, pattern: PlanarScan, row: int) -> dict[str, Any]:
+    """Returns the fields that both messages share."""
+    numbers = {
+        "angle_min": pattern.angle_min_rad,
+        "angle_max": pattern.angle_max_rad,
+        "angle_increment": pattern.angle_increment_rad,
+        "time_increment": pattern.time_increment_s,
+        "scan_time": 1.0 / pattern.rate_hz,
+        "range_min": scans.model.range.min_m,
+        "range_max": scans.model.range.max_m,
+    }
+    return {
+        "header": header(scans.stamp_ns, laser_frame(scans.sensors[row])),
+        **{name: single(number) for name, number in numbers.items()},
+    }
 
 
 def _cloud_message(stamped: Any, points: NDArray[Any]) -> PointCloud2:

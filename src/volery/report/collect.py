@@ -18,17 +18,17 @@ from numpy.typing import NDArray
 
 from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
-from volery.graph.messages import stamp_of
-from volery.report.flight_data import (
+from volery.figures.flight_data import (
     FlightData,
-    FlightEvent,
     Ground,
     LidarMap,
-    Trees,
     UavTrack,
+    drawn_event,
 )
+from volery.figures.structures import seen_from_above
+from volery.figures.trees import trees_of
+from volery.graph.messages import stamp_of
 from volery.report.scan_placing import end_ns, scan_points
-from volery.report.structures import seen_from_above
 from volery.report.voxels import VoxelSet
 
 if TYPE_CHECKING:
@@ -158,7 +158,7 @@ class FlightCollector:
             trees=trees_of(simulation.world.forest),
             structures=seen_from_above(solid.mesh for solid in simulation.world.scene.solids),
             lidar=self._lidar_map(),
-            events=tuple(_event(event) for event in simulation.diagnostics.events),
+            events=tuple(drawn_event(event) for event in simulation.diagnostics.events),
             stage_seconds=dict(simulation.diagnostics.stage_seconds),
             clearance_reach_m=CLEARANCE_REACH_M,
             digest=digest,
@@ -204,31 +204,3 @@ class FlightCollector:
             return None
         height = points[:, 2] - self._ground(points)
         return LidarMap(points, height.astype(np.float32), self._voxels.voxel_m, self._scans)
-
-
-def _event(event: Any) -> FlightEvent:
-    x, y, z = (float(v) for v in event.position_map)
-    kind = str(getattr(event.kind, "value", event.kind))
-    return FlightEvent(event.time_ns / NS_PER_S, kind, event.describe(), (x, y, z))
-
-
-def trees_of(forest: Any) -> Trees | None:
-    """Returns the drawn properties of a forest; None without trees."""
-    if forest is None or not len(forest.position_map):
-        return None
-    crowns = np.array([_crown_radius(model) for model in forest.models])
-    stretch = np.asarray(forest.scale)[:, :2].mean(axis=1)
-    return Trees(
-        position_map=np.asarray(forest.position_map, dtype=np.float64),
-        crown_radius_m=crowns[np.asarray(forest.model_index)] * stretch,
-        dbh_m=np.asarray(forest.dbh_m, dtype=np.float64),
-    )
-
-
-def _crown_radius(model: Any) -> float:
-    """Returns the radius of nine tenths of the crown's vertices; of the wood if it is bare."""
-    level = min(model.levels.values(), key=lambda tree: len(tree.leaves.vertices))
-    vertices = level.leaves.vertices if len(level.leaves.vertices) else level.wood.vertices
-    if not len(vertices):
-        return 0.0
-    return float(np.quantile(np.hypot(vertices[:, 0], vertices[:, 1]), 0.9))

@@ -10,9 +10,9 @@ from pathlib import Path
 
 from volery.core.errors import VoleryError
 from volery.core.plurals import counted
-from volery.report import charts, maps
-from volery.report.flight_data import FlightData, UavTrack
-from volery.report.palette import uav_color
+from volery.figures import charts, maps
+from volery.figures.flight_data import FlightData, UavTrack
+from volery.figures.palette import uav_color
 
 _EVENTS_SHOWN = 60
 _STYLE = Path(__file__).with_name("report.css")

@@ -11,8 +11,8 @@ import numpy as np
 from matplotlib.collections import EllipseCollection
 
 from volery.core.arrays import Array
-from volery.report.charts import as_svg, new_axes
-from volery.report.palette import FAINT, INK, UAV_COLORS
+from volery.figures.charts import as_svg, new_axes
+from volery.figures.palette import FAINT, INK, UAV_COLORS
 from volery.report.true_trunks import TrueTrunks
 
 _MAP_SIZE = (7.2, 6.4)

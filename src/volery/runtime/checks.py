@@ -24,6 +24,16 @@ def check_seconds(seconds: Any) -> None:
         raise CommandError(f"seconds must be finite and not negative, not {seconds!r}")
 
 
+def check_timeout(timeout_s: Any) -> None:
+    """Raises `CommandError` if `timeout_s` is not a number or is negative; infinity is allowed."""
+    number = isinstance(timeout_s, int | float | np.number) and not isinstance(timeout_s, bool)
+    if not (number and timeout_s >= 0.0):
+        raise CommandError(
+            f"timeout_s must be a number of seconds, not negative, not {timeout_s!r}; "
+            "math.inf waits without limit"
+        )
+
+
 def check_reset_seed(scenario: Scenario, seed: Any) -> None:
     """Raises `CommandError` if a reset to `seed` would differ from a fresh run with it.
 

@@ -14,16 +14,17 @@ from volery.core.clock import NS_PER_S, s_from_ns
 from volery.core.errors import CommandError, WaitTimeoutError
 from volery.engine.engine import Engine
 from volery.engine.events import Event, EventKind
+from volery.runtime.checks import check_timeout
 from volery.runtime.run_loop import RunLoop
 from volery.runtime.vehicles.flight_future import FlightFuture
 
 DEFAULT_TIMEOUT_S = 60.0
 CHECK_PERIOD_S = 0.01
 """Period of simulated time after which a condition in Python is checked."""
-_LOOK_S = 0.02
-"""Wall time between two looks at a run in another thread, s ..."""
-_IDLE_S = 2.0
-"""... which may pause between two calls of `run` for this long."""
+_POLL_PERIOD_S = 0.02
+"""Wall time between two checks of a run in another thread, s ..."""
+_MAX_IDLE_S = 2.0
+"""... which may spend this long, s, between two calls of `run`."""
 
 Awaited: TypeAlias = "Callable[[], bool] | FlightFuture | Iterable[FlightFuture] | EventKind | str"
 """What a run can wait for."""
@@ -135,23 +136,63 @@ class ConditionalRuns:
     def wait(self, is_done: Callable[[], bool], timeout_s: float) -> bool:
         """Waits for `is_done()`: advances the simulation, or waits for the thread that does.
 
-        Returns whether it became true within `timeout_s` of simulated time.
+        Returns whether it became true within `timeout_s` of simulated time. Raises `CommandError`
+        if the simulation is quit or does not advance.
         """
-        _check_timeout(timeout_s)
-        if self._loop.owner == threading.get_ident():
-            return self.advance(is_done, timeout_s)
+        check_timeout(timeout_s)
+        if self._is_own():
+            is_over = self.advance(is_done, timeout_s)
+        else:
+            is_over = self._wait_for_thread(is_done, timeout_s)
+        if not is_over and self._loop.quitting:
+            raise CommandError(self._quit_text())
+        return is_over
+
+    async def wait_async(self, is_done: Callable[[], bool]) -> None:
+        """Waits for `is_done()` like `wait`, and lets other coroutines run in between."""
+        await asyncio.sleep(0)  # a task that has just been created may advance the simulation
+        idle_s = 0.0
+        while not is_done():
+            if self._loop.quitting:
+                raise CommandError(self._quit_text())
+            if self._loop.thread == threading.get_ident():  # another coroutine advances it
+                await asyncio.sleep(0)
+            elif self._loop.thread is None and self._is_own():
+                pieces = self._loop.pieces_until(_AtEachTick(is_done), math.inf, None, self._look)
+                await self.drive(pieces)
+            else:
+                idle_s = self._check_idle(idle_s)
+                await asyncio.sleep(_POLL_PERIOD_S)
+
+    def is_busy(self) -> bool:
+        """Returns whether another thread advances the simulation now."""
+        return self._loop.thread not in (None, threading.get_ident())
+
+    def _is_own(self) -> bool:
+        """Returns whether this thread advances the simulation; a thread that ended leaves it."""
+        owner = self._loop.owner
+        own = owner == threading.get_ident()
+        return own or all(thread.ident != owner for thread in threading.enumerate())
+
+    def _check_idle(self, idle_s: float) -> float:
+        """Returns for how long the other thread is idle; raises `CommandError` if too long."""
+        idle_s = 0.0 if self._loop.thread is not None else idle_s + _POLL_PERIOD_S
+        if idle_s > _MAX_IDLE_S:
+            raise CommandError("the simulation does not advance: its own thread must call run()")
+        return idle_s
+
+    def _quit_text(self) -> str:
+        return f"the run was quit at {self.time_s:.2f} s"
+
+    def _wait_for_thread(self, is_done: Callable[[], bool], timeout_s: float) -> bool:
         end_s, idle_s = self.time_s + timeout_s, 0.0
-        while not is_done() and self.time_s < end_s:
-            time.sleep(_LOOK_S)
-            idle_s = 0.0 if self._loop.thread is not None else idle_s + _LOOK_S
-            if idle_s > _IDLE_S:
-                raise CommandError(
-                    "the simulation does not advance: its own thread must call run()"
-                )
+        while not is_done() and self.time_s < end_s and not self._loop.quitting:
+            time.sleep(_POLL_PERIOD_S)
+            idle_s = self._check_idle(idle_s)
         return is_done()
 
     def _pieces(self, goal: _Goal, timeout_s: float, speed: float | None) -> Iterator[None]:
-        _check_timeout(timeout_s)
+        check_timeout(timeout_s)
         return self._loop.pieces_until(goal.condition, timeout_s, speed, self._look)
 
     def _check_possible(self) -> None:
@@ -193,7 +234,7 @@ class _Goal:
         if not self.condition():
             pending = [future for future in self._futures if not future.done()]
             if runs._loop.quitting:
-                raise CommandError(f"the run was quit at {runs.time_s:.2f} s")
+                raise CommandError(runs._quit_text())
             what = pending[0].pending_text() if pending else f"{self._name} did not happen"
             raise WaitTimeoutError(
                 f"{what} within {timeout_s:g} s, at {runs.time_s:.2f} s; pass a longer timeout_s?"
@@ -236,11 +277,6 @@ def _futures_of(awaited: Any) -> tuple[FlightFuture, ...]:
 def _name_of(awaited: Any) -> str:
     name = getattr(awaited, "__name__", type(awaited).__name__)
     return "the condition" if name == "<lambda>" else f"the condition {name}()"
-
-
-def _check_timeout(timeout_s: Any) -> None:
-    if not isinstance(timeout_s, int | float) or math.isnan(timeout_s) or timeout_s < 0.0:
-        raise CommandError(f"timeout_s must be a number of seconds, not {timeout_s!r}")
 
 
 def _check_period(period_s: Any) -> None:

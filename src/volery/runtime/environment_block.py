@@ -24,7 +24,7 @@ from volery.runtime.build.placement import StartPose
 from volery.runtime.build.sensor_suites import SensorInstance, fit_sensors, refit
 from volery.runtime.build.sensors import build_banks
 from volery.runtime.environment_streams import EnvironmentStreams
-from volery.runtime.vehicles.flight_futures import CHECK_PERIOD_S, FlightFutures, Wait
+from volery.runtime.vehicles.flight_futures import CHECK_PERIOD_S, FlightFutures, FlightRuns
 from volery.runtime.vehicles.sample_stream import SampleStream
 from volery.runtime.vehicles.uav import Uav
 from volery.runtime.vehicles.uav_sensors import UavSensors
@@ -46,13 +46,15 @@ class EnvironmentEvent:
     """Describes an event of one environment (`env`)."""
 
     env: int
+    """Number of the environment."""
     event: Event
+    """Event of a UAV of the environment."""
 
 
 class EnvironmentBlock:
     """Runs the environments `first`, `first` + 1, ... of a scenario, one for each of `seeds`.
 
-    wait: advances all environments, for code that waits for a flight command.
+    runs: advances all environments, for code that waits for a flight command.
     """
 
     def __init__(
@@ -63,7 +65,7 @@ class EnvironmentBlock:
         scene: Scene,
         seeds: Sequence[int],
         first: int,
-        wait: Wait,
+        runs: FlightRuns,
     ) -> None:
         self.seeds = list(seeds)
         self._scenario = scenario
@@ -93,12 +95,14 @@ class EnvironmentBlock:
         self._bank_of = {id(bank.sensors): k for k, bank in enumerate(banks)}
         self._places = _places(banks)
         self._latest: list[Samples | None] = [None] * len(banks)
+        self._bank_uavs = [np.array([sensor.uav for sensor in bank.sensors]) for bank in banks]
+        """By bank: (S,) row of the UAV of each sensor."""
         self._events: list[EnvironmentEvent] = []
         self._began_ns = np.zeros(num_envs, np.int64)
         self._mounts = {(f.id.uav_name, f.id.name): f.mount for f in self._fitted}
         self._is_old: dict[int, NDArray[np.bool_]] = {}
         """By bank: (S,) whether the last sample of a sensor is from before its reset."""
-        self.futures = futures = FlightFutures(self._fleet_row_of, wait)
+        self.futures = futures = FlightFutures(self._fleet_row_of, runs)
         self._engine.every(CHECK_PERIOD_S, futures.check, wanted=lambda: futures.needs_checks)
         self._streams = EnvironmentStreams(self._fitted, len(self._starts), banks, self.seeds)
         self._stir_air(np.arange(num_envs))
@@ -301,8 +305,9 @@ class EnvironmentBlock:
         partner = event.partner.split("/")[-1]
         own = replace(event, uav=name, partner=partner)
         number = self._first + int(env)
-        other = f"{number}/{partner}" if "/" in event.partner else partner
-        self.futures.happened(replace(event, uav=f"{number}/{name}", partner=other))
+        if self.futures.has_pending:
+            other = f"{number}/{partner}" if "/" in event.partner else partner
+            self.futures.happened(replace(event, uav=f"{number}/{name}", partner=other))
         self._events.append(EnvironmentEvent(number, own))
 
     def deliver(self) -> None:
@@ -328,7 +333,7 @@ class EnvironmentBlock:
         for bank, sampled in enumerate(self._latest):
             if sampled is None:
                 continue
-            uavs = [sensor.uav for sensor in self._engine.banks[bank].sensors]
+            uavs = self._bank_uavs[bank]
             is_old = self._is_old.setdefault(bank, np.zeros(len(uavs), np.bool_))
             is_old |= np.isin(uavs, rows)
 

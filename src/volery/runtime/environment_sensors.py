@@ -24,12 +24,13 @@ class EnvironmentSensor:
         self._blocks = blocks
         self._uav = uav
         self.name = name
+        """Name of the sensor, such as `imu`."""
 
     @property
     def latest(self) -> Any:
         """The last sample of each environment: a `LidarSample`, `ImuSample`, ...
 
-        All arrays have a first axis of K environments and are new and read-only; numbers are arrays
+        All arrays have a first axis of K environments and are read-only; numbers are arrays
         (K,). In environments without a sample since their reset (see `has_sample`) numbers are nan,
         whole numbers 0. Raises `SensorError` before the first sample of all.
         """

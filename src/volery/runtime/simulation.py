@@ -37,9 +37,12 @@ from volery.runtime.facets.diagnostics import SimulationDiagnostics
 from volery.runtime.facets.faults import SimulationFaults
 from volery.runtime.facets.vehicles import SimulationVehicles
 from volery.runtime.facets.world import SimulationWorld
+from volery.runtime.flight_recorder import DEFAULT_RATE_HZ, FlightRecorder
+from volery.runtime.flight_recorders import FlightRecorders
 from volery.runtime.grid_map_manager import GridMapManager
 from volery.runtime.monitoring.monitor import Monitor
 from volery.runtime.monitoring.progress import Progress
+from volery.runtime.monitoring.progress_bar import progress_bar
 from volery.runtime.monitoring.status import StatusSources
 from volery.runtime.replay.command_log import CommandLog
 from volery.runtime.replay.command_replay import CommandReplay
@@ -62,6 +65,7 @@ from volery.world.ground_cover import BARE_GROUND
 if TYPE_CHECKING:
     from volery.bridges.logs.recorded_flight import RecordedFlight
     from volery.bridges.logs.replay import Replay
+    from volery.results import FlightResult
 
 
 class Simulation:
@@ -76,7 +80,9 @@ class Simulation:
     """
 
     scenario: Scenario
+    """Scenario that is simulated."""
     graph: Graph
+    """Topics and services."""
     gateway: Gateway
     """Joins clients of other threads to the graph."""
     uavs: Mapping[str, Uav]
@@ -146,6 +152,7 @@ class Simulation:
         self.world = SimulationWorld(
             scenario.world, world, grid_map, engine, graph, self._check_open
         )
+        self._recorders = FlightRecorders(manager, self.world)
         manager.open(connected.assembly)
         plan_faults(manager.faults, scenario)
         open_services(
@@ -186,17 +193,23 @@ class Simulation:
         *,
         speed: float | None = None,
         on_progress: Callable[[Progress], None] | None = None,
+        progress: bool = False,
     ) -> None:
         """Advances by `seconds`, or to the scenario's end.
 
         `speed` is the real-time factor; None runs as fast as possible. `clock` changes it from
         another thread or from `on_progress`, which is called about ten times a second of wall time,
-        also while paused. The next call makes up for parts of a physics step, so that many short
-        runs come as far as a long one.
+        also while paused. `progress` shows a bar of tqdm, on a terminal or in a notebook. The next
+        call makes up for parts of a physics step, so that many short runs come as far as a long
+        one.
         """
         self._check_open()
         if seconds is not None:
             check_seconds(seconds)
+        if progress:
+            with progress_bar(self.scenario.name, on_progress) as update:
+                self.run(seconds, speed=speed, on_progress=update)
+            return
         with reported_failures(self.graph):
             self._loop.run(seconds, speed, on_progress, self._monitor.look)
 
@@ -213,15 +226,15 @@ class Simulation:
         awaited: a function without arguments that returns whether to stop, which is called at each
         multiple of `check_period_s` since time 0; a `FlightFuture` (`uav.take_off()`), or several:
         until all are done; an `EventKind` or its name ("collision"): until the next such event.
-        `timeout_s` is simulated time, `math.inf` for no limit; the scenario's end does not end the
-        wait. `speed` is as for `run`. Raises `FlightError` if a flight command fails,
+        `timeout_s` is simulated time, s, `math.inf` for no limit; the scenario's end does not end
+        the wait. `speed` is as for `run`. Raises `FlightError` if a flight command fails,
         `WaitTimeoutError` after `timeout_s`, `CommandError` within a run or a tick.
         """
         with reported_failures(self.graph):
             return self._runs.run_until(awaited, timeout_s, speed, check_period_s)
 
     async def run_async(self, seconds: float | None = None, *, speed: float | None = None) -> None:
-        """Advances like `run` while other coroutines of the same thread run in between.
+        """Advances like `run`, by `seconds`, s, while other coroutines run in between.
 
         For notebooks and other asyncio programs: `task = asyncio.create_task(
         simulation.run_async(speed=1.0))`, then `await uav.go_to(...)`. Cancel the task to stop.
@@ -240,7 +253,10 @@ class Simulation:
         speed: float | None = None,
         check_period_s: float = CHECK_PERIOD_S,
     ) -> Event | None:
-        """Advances like `run_until` while other coroutines of the same thread run in between."""
+        """Advances like `run_until`, while other coroutines run in between.
+
+        The arguments are the same; `timeout_s` and `check_period_s` are simulated time, s.
+        """
         with reported_failures(self.graph):
             return await self._runs.run_until_async(awaited, timeout_s, speed, check_period_s)
 
@@ -289,11 +305,54 @@ class Simulation:
         self._engine.process_commands(math.inf)
         self._monitor.look()
 
+    # ------------------------------------------------------------------------------------- results
+
+    def record(self, rate_hz: float = DEFAULT_RATE_HZ) -> FlightRecorder:
+        """Records the true states of all UAVs from now on; `result()` returns them as arrays.
+
+        rate_hz: samples per simulated second (Hz), at most one for each physics step. Recording
+        changes no results. Raises `CommandError` for an impossible rate.
+        """
+        self._check_open()
+        return self._recorders.start(rate_hz)
+
+    def fly(
+        self,
+        seconds: float | None = None,
+        *,
+        rate_hz: float = DEFAULT_RATE_HZ,
+        speed: float | None = None,
+        on_progress: Callable[[Progress], None] | None = None,
+        progress: bool = False,
+    ) -> FlightResult:
+        """Advances as `run` does and returns the flight: trajectories as arrays, and events.
+
+        seconds, speed, on_progress and progress: those of `run`. rate_hz: samples per simulated
+        second (Hz). Raises `CommandError` for an impossible rate.
+        """
+        with self.record(rate_hz) as recorder:
+            self.run(seconds, speed=speed, on_progress=on_progress, progress=progress)
+        return recorder.result()
+
+    def _repr_html_(self) -> str:
+        """Returns time, UAVs and a map with the recorded paths, for notebooks."""
+        from volery.runtime.notebook_view import simulation_html
+
+        flight = self._recorders.present()
+        return simulation_html(self.scenario, self.time_s, self.uavs.values(), flight)
+
     # ---------------------------------------------------------------------------------------- logs
 
-    def replay_log(self, replay: Replay) -> None:
-        """Publishes a recorded log into the graph from now on, in simulated time."""
+    def replay_log(self, replay: Replay | str | Path) -> None:
+        """Publishes a recorded log, or the log at a path, into the graph in simulated time.
+
+        The first message appears now. Raises `RecordingError` if there is no log at the path.
+        """
         self._check_open()
+        if isinstance(replay, (str, Path)):
+            from volery.bridges.logs.replay import Replay
+
+            replay = Replay(replay)
         replay.start(self.graph, self._engine, lambda: self.time_ns)
         self._replays.append(replay)
 
@@ -351,6 +410,7 @@ class Simulation:
             for partner in self._partners:
                 partner.leave()
             self._manager.end_nodes()
+            self._manager.futures.fail_all("the simulation was closed")
             self._engine.inbox.close("the simulation is closed")
             self.world.scene.close()
 
@@ -383,6 +443,7 @@ class Simulation:
         self._pacer.drop_steps(reason)
         self._pacer.jumped(self.time_ns)
         self._monitor.jumped()
+        self._recorders.jumped()
         self._end.left()
 
     def _has_ended(self) -> bool:

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import bisect
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from types import MappingProxyType
 from typing import Any
@@ -34,6 +34,7 @@ from volery.runtime.build.fleet import place
 from volery.runtime.build.worlds import build_city, build_forest, build_scene, build_terrain
 from volery.runtime.checks import check_reset_seed, check_seconds, check_steps
 from volery.runtime.environment_block import EnvironmentBlock, EnvironmentEvent, SampleArrays
+from volery.runtime.environment_runs import EnvironmentRuns
 from volery.runtime.environment_sensors import EnvironmentSensors
 from volery.runtime.environment_start import EnvironmentStart
 from volery.runtime.vehicles.batch_commands import BatchCommands, joined_states
@@ -44,6 +45,10 @@ from volery.runtime.warmup.requirements import needs_of
 from volery.scenario.schema import Scenario
 from volery.vehicle.airframe import Airframe
 from volery.vehicle.fleet import FleetState
+from volery.world.city import City
+from volery.world.forest import Forest
+from volery.world.scene import Scene
+from volery.world.terrain import Terrain
 
 
 class VectorizedSimulation(BatchCommands):
@@ -58,6 +63,17 @@ class VectorizedSimulation(BatchCommands):
     environment with seed s equals `Simulation(envs.scenario.with_(seed=s))`. Raises
     `ScenarioError` if the scenario cannot be built.
     """
+
+    scenario: Scenario
+    """The scenario, with `world.seed` fixed."""
+    terrain: Terrain
+    """Ground of all environments."""
+    city: City | None
+    """Buildings and streets of all environments; None: there are none."""
+    forest: Forest | None
+    """Trees of all environments; None: there are none."""
+    scene: Scene
+    """Surfaces of all environments, for rays and contacts."""
 
     def __init__(
         self,
@@ -84,9 +100,12 @@ class VectorizedSimulation(BatchCommands):
             self.scene = build_scene(scenario, self.terrain, self.forest, self.city)
         self._starts = place(scenario, self.scene, self.terrain)
         ends = np.linspace(0, num_envs, min(threads, num_envs) + 1).round().astype(int).tolist()
+        self._runs = EnvironmentRuns(
+            self.step, lambda: (self._blocks[0].step, self._blocks[0].dt_ns)
+        )
         self._blocks = [
             EnvironmentBlock(
-                scenario, self._starts, self.terrain, self.scene, seeds[a:b], a, self._wait
+                scenario, self._starts, self.terrain, self.scene, seeds[a:b], a, self._runs
             )
             for a, b in itertools.pairwise(ends)
         ]
@@ -151,10 +170,11 @@ class VectorizedSimulation(BatchCommands):
         self._check_open()
         check_steps(steps)
         target = self._blocks[0].step + steps
-        others = [self._pool.submit(block.advance_to, target) for block in self._blocks[1:]]
-        self._blocks[0].advance_to(target)
-        for other in others:
-            other.result()
+        with self._runs.stepping():
+            others = [self._pool.submit(block.advance_to, target) for block in self._blocks[1:]]
+            self._blocks[0].advance_to(target)
+            for other in others:
+                other.result()
 
     def run(self, seconds: float) -> None:
         """Advances by `seconds`; a remaining part of a step counts for the next call."""
@@ -255,7 +275,11 @@ class VectorizedSimulation(BatchCommands):
             self._uavs = [self.uav(env, name) for env in range(self.num_envs) for name in names]
         return self._uavs
 
+    def _paths(self) -> Sequence[str]:
+        return [f"{env}/{name}" for env in range(self.num_envs) for name in self.uav_names]
+
     def _fleets(self) -> Sequence[tuple[Fleet, slice]]:
+        self._check_open()
         num_uavs = len(self._starts)
         return [
             (block.fleet, slice(first * num_uavs, (first + len(block.seeds)) * num_uavs))
@@ -264,17 +288,6 @@ class VectorizedSimulation(BatchCommands):
 
     def _future_lists(self) -> Sequence[FlightFutures]:
         return [block.futures for block in self._blocks]
-
-    def _wait(self, is_done: Callable[[], bool], timeout_s: float) -> bool:
-        """Advances all environments until `is_done()`, checked every 8 ms; returns whether it is.
-
-        For `FlightFuture.wait` of a UAV of one environment.
-        """
-        period = max(1, 8_000_000 // self._blocks[0].dt_ns)
-        end_s = self.time_s + timeout_s
-        while not is_done() and self.time_s < end_s:
-            self.step(period - self._blocks[0].step % period)
-        return is_done()
 
     def _check_open(self) -> None:
         if self._closed:

@@ -5,19 +5,22 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping
 from functools import cache
-from typing import Annotated, Any, ClassVar, get_args
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, get_args
 
 from annotated_types import Ge, Gt
 from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
+    ValidationError,
     ValidationInfo,
     field_validator,
     model_validator,
 )
 
+from volery.core.errors import ScenarioError
 from volery.core.quantities import Quantity, fault_in
+from volery.scenario.validation import describe_validation_error
 
 Vector2 = tuple[float, float]
 Vector3 = tuple[float, float, float]
@@ -95,7 +98,11 @@ def _metadata(annotation: Any) -> list[Any]:
 
 
 class Data(Bounded):
-    """A table of a scenario."""
+    """A table of a scenario, made from a file or in Python.
+
+    In Python, arrays and lists may stand for tuples; the constructor raises `ScenarioError`, naming
+    key and allowed values, for invalid values.
+    """
 
     model_config = ConfigDict(str_strip_whitespace=True)
 
@@ -103,10 +110,40 @@ class Data(Bounded):
     """Former keys, which recorded logs contain, with present names; each raises a
     DeprecationWarning."""
 
+    if not TYPE_CHECKING:  # type checkers read the parameters from the fields
+
+        def __init__(self, /, **data: Any) -> None:
+            try:
+                super().__init__(**data)
+            except ValidationError as error:
+                model = type(self)
+                text = describe_validation_error(error, model.__name__, model, data)
+                raise ScenarioError(text) from None
+
+        # Marks the constructor as pydantic's own: validation of nested tables does not call it.
+        __init__.__pydantic_base_init__ = True
+
+    def model_post_init(self, _context: Any, /) -> None:
+        """Counts `kind` as given: it says which table this is, in a file too."""
+        if "kind" in type(self).model_fields:
+            self.model_fields_set.add("kind")
+
     @model_validator(mode="before")
     @classmethod
     def _rename_former_keys(cls, data: Any) -> Any:
-        return renamed(data, cls.former_keys, "key") if isinstance(data, Mapping) else data
+        if not isinstance(data, Mapping):
+            return data
+        lists = {key: _without_arrays(value) for key, value in data.items()}
+        return renamed(lists, cls.former_keys, "key")
+
+
+def _without_arrays(value: Any, depth: int = 8) -> Any:
+    """Returns arrays and their numbers as lists and numbers, in lists and tables too."""
+    if depth and isinstance(value, list | tuple):
+        return [_without_arrays(item, depth - 1) for item in value]
+    if depth and isinstance(value, Mapping):
+        return {key: _without_arrays(item, depth - 1) for key, item in value.items()}
+    return value.tolist() if hasattr(value, "tolist") else value
 
 
 def renamed(data: Mapping[str, Any], former: Mapping[str, str], what: str) -> dict[str, Any]:
@@ -145,7 +182,9 @@ class MountedSensor(SensorData):
     position_m: Vector3 = (0.0, 0.0, 0.0)
     """Position of the sensor frame in the body, FLU."""
     rpy_deg: Vector3 = (0.0, 0.0, 0.0)
+    """Roll, pitch and yaw of the sensor frame in the body, FLU."""
     noise: bool = True
+    """Whether samples have noise; false: they are exact."""
 
 
 def check_rectangle(region: tuple[float, float, float, float] | None) -> None:

@@ -22,15 +22,22 @@ class Stereo(Data):
 class CameraSensor(MountedSensor):
     """A camera of a named model; x of its frame is the optical axis, z is up."""
 
-    kind: Literal["camera"]
+    kind: Literal["camera"] = "camera"
+    """A camera for colour and depth."""
     name: Name = "camera"
+    """Name of the sensor in frames and topics."""
     model: str = "pinhole"
+    """Shipped model, or path of a .toml file."""
     rate_hz: Rate = 10.0
+    """Rate of images."""
     width: Side | None = None
     """Pixels; this key and the following override the model's."""
     height: Side | None = None
+    """Pixels; None: the model's."""
     horizontal_fov_deg: Annotated[float, Field(gt=0.0, lt=180.0)] | None = None
+    """Horizontal field of view; None: the model's."""
     samples: Literal[1, 4] | None = None
+    """Rays per pixel; None: the model's."""
     depth_encoding: Literal["32FC1", "16UC1"] = "32FC1"
     """Encoding of the depth image: metres, or millimetres with 0 for unknown (REP 118)."""
     compressed: Literal["jpeg", "png", "none"] = "jpeg"
@@ -47,6 +54,7 @@ class Daylight(Data):
     """Sun, by its angles or by the hour, and clearness of the air."""
 
     sun_elevation_deg: Annotated[float, Field(ge=-90.0, le=90.0)] = 50.0
+    """Elevation of the sun above the horizon."""
     sun_azimuth_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 135.0
     """Azimuth clockwise from north."""
     hour_of_day: Annotated[float, Field(ge=0.0, le=24.0)] | None = None

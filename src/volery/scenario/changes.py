@@ -12,14 +12,14 @@ from pydantic import Field, ValidationError
 
 from volery.core.errors import ScenarioError
 from volery.scenario.base import Data, NonNegative
+from volery.scenario.fleet_size import resized
 from volery.scenario.load import parse_scenario
 from volery.scenario.schema import InventoryForest, ProceduralForest, Scenario
 from volery.scenario.sensor_sets import SensorSet, fit
+from volery.scenario.uav_types import with_airframe
 from volery.scenario.validation import describe_validation_error
 
 _WHERE = "changes"
-_APART_M = 3.0
-"""Distance between UAVs that are added to a scenario of one, which separates their rotors' air."""
 _M2_A_HA = 1e4
 
 
@@ -84,46 +84,20 @@ def apply(scenario: Scenario, changes: Changes) -> Scenario:
     if changes.seed is not None:
         data["seed"] = changes.seed
     if changes.uavs is not None:
-        data["uavs"] = _groups(scenario, data["uavs"], changes.uavs)
-    data["types"] = {
-        name: _type(scenario, name, kind, changes) for name, kind in data["types"].items()
-    }
+        data["uavs"] = resized(data["uavs"], changes.uavs, name=scenario.name, where=_WHERE)
+    data["types"] = {name: _type(kind, changes) for name, kind in data["types"].items()}
     forest = _forest(scenario, changes)
     if forest:
         data["world"]["forest"] = {**data["world"]["forest"], **forest}
     return parse_scenario(data, where=scenario.name, access=scenario.access)
 
 
-def _groups(scenario: Scenario, groups: Any, uavs: int) -> list[Any]:
-    """Returns the only group with another count.
-
-    Additional UAVs on the ground are placed on the existing line, each at the nearest free
-    position; in the air, on a new line.
-    """
-    if uavs == scenario.uav_count:
-        return list(groups)
-    if len(groups) > 1:
-        raise ScenarioError(
-            f"{_WHERE}: key 'uavs': scenario '{scenario.name}' has {len(groups)} groups of UAVs, "
-            f"{scenario.uav_count} in all, whose numbers are fixed"
-        )
-    group, first = {**groups[0], "count": uavs}, scenario.uavs[0]
-    if uavs < first.count or uavs == 1:
-        return [group]
-    in_air = len(first.position_m) == len("xyz")
-    if in_air or first.last_position_m is None:
-        x, y = first.position_m[:2]
-        group["last_position_m"] = [x, y + _APART_M * (uavs - 1)]
-    return [group if in_air else {**group, "placement": "nearest_free"}]
-
-
-def _type(scenario: Scenario, name: str, data: Any, changes: Changes) -> dict[str, Any]:
+def _type(data: Any, changes: Changes) -> dict[str, Any]:
     changed = dict(data)
-    if changes.airframe is not None and changes.airframe != scenario.types[name].airframe:
-        changed["airframe"] = changes.airframe
-        changed.pop("wear", None)  # the wear of the previous airframe's rotors
+    if changes.airframe is not None:
+        changed = with_airframe(changed, changes.airframe)
     if changes.sensors is not None:
-        changed["sensors"] = fit(scenario.types[name], data, changes.sensors)
+        changed["sensors"] = fit(data.get("sensors", ()), changes.sensors)
     return changed
 
 

@@ -27,6 +27,7 @@ class Streets(Data):
     tree_fraction: Share = 0.6
     """Fraction of the tree positions that have a tree."""
     tree_species: str = "broadleaf"
+    """Species of the street trees."""
 
     former_keys: ClassVar[Mapping[str, str]] = {
         "widest_m": "max_width_m",
@@ -38,14 +39,16 @@ class City(Data):
     """Buildings from the outlines of a GeoJSON file, around `world.origin`."""
 
     file: str
+    """GeoJSON file of building outlines."""
     region_m: tuple[float, float, float, float] | None = None
-    """x_min, y_min, x_max, y_max; only buildings whose centre lies in it are used. None uses all.
+    """x_min, y_min, x_max, y_max; only buildings whose centre lies in it are used; None: all.
     """
     storey_m: Annotated[float, Field(ge=2.0, le=10.0)] = 3.2
     """Height of a storey where only the number of levels is known."""
     default_height_m: Length = 16.0
     """Height of buildings without data in the file: five storeys."""
     streets: Streets = Streets()
+    """Streets between the buildings."""
 
     @model_validator(mode="after")
     def _region_is_a_rectangle(self) -> Self:

@@ -43,7 +43,8 @@ class _Passing(_UavFault):
 class MotorFault(_Passing):
     """A rotor produces part of its thrust, or none."""
 
-    kind: Literal["motor"]
+    kind: Literal["motor"] = "motor"
+    """Loss of thrust of a rotor."""
     rotor: Annotated[int, Field(ge=0)]
     """Number of the rotor in the airframe's file, from 0."""
     thrust_factor: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
@@ -53,10 +54,12 @@ class MotorFault(_Passing):
 class SensorFault(_Passing):
     """A sensor sends nothing, repeats its last measurement, or has a bias."""
 
-    kind: Literal["sensor"]
+    kind: Literal["sensor"] = "sensor"
+    """Fault of a sensor."""
     sensor: str
     """Name of the sensor, such as `imu`."""
     effect: Literal["dropped", "stuck", "biased"]
+    """Effect: no samples, a repeated sample, or a bias."""
     bias: Annotated[tuple[float, ...], Field(min_length=1)] | None = None
     """Bias: a number for each measured component, in its unit."""
 
@@ -70,19 +73,22 @@ class SensorFault(_Passing):
 class GnssFault(_Passing):
     """No satellites are received."""
 
-    kind: Literal["gnss_loss"]
+    kind: Literal["gnss_loss"] = "gnss_loss"
+    """Loss of satellite signals."""
 
 
 class RadioFault(_Passing):
     """A UAV's radio neither sends nor receives."""
 
-    kind: Literal["radio"]
+    kind: Literal["radio"] = "radio"
+    """Loss of the radio."""
 
 
 class GustFault(_Fault):
     """A 1-cosine gust that reaches all positions at once."""
 
-    kind: Literal["gust"]
+    kind: Literal["gust"] = "gust"
+    """A gust."""
     velocity_m_s: Vector3
     """Maximum wind of the gust, map."""
     rise_s: Annotated[float, Field(ge=0.01, le=60.0)] = 0.5
@@ -94,7 +100,8 @@ class GustFault(_Fault):
 class DisplacementFault(_UavFault):
     """A UAV changes its position from one step to the next."""
 
-    kind: Literal["displacement"]
+    kind: Literal["displacement"] = "displacement"
+    """A sudden change of position."""
     offset_m: Vector3
     """Offset of the position, map."""
 

@@ -19,6 +19,7 @@ class GridMapFile(Data):
     """A map in a file: .csv, .txt (0 and 1), .png (dark is blocked) or .map (movingai.com)."""
 
     file: str
+    """File of the matrix."""
     name: MapName | None = None
     """Name of the map; None: the file's name without its suffix."""
     threshold: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
@@ -44,7 +45,9 @@ class GridMapWorld(Data):
     map: str | None = None
     """Name of the map at the start; None: the first."""
     cell_size_m: Side = 1.0
+    """Side of a cell."""
     block_height_m: Side = 5.0
+    """Height of the blocks above the ground."""
     origin_m: Vector2 = (0.0, 0.0)
     """Lower left corner of a file's map."""
     unknown_is_blocked: bool = False

@@ -37,6 +37,11 @@ def load_scenario(
     return parse_scenario(data, where=str(path), access=access)
 
 
+def list_scenarios() -> list[str]:
+    """Returns the names of the shipped scenarios, sorted; `load_scenario` loads each of them."""
+    return library.names()
+
+
 def parse_scenario(
     data: dict[str, Any],
     *,

@@ -18,7 +18,9 @@ class Origin(Data):
     """
 
     latitude_deg: Annotated[float, Field(ge=-90.0, le=90.0)] = 47.397742
+    """Geodetic latitude, north positive."""
     longitude_deg: Annotated[float, Field(ge=-180.0, le=180.0)] = 8.545594
+    """Longitude, east positive."""
     altitude_m: Annotated[float, Field(ge=-500.0, le=9000.0)] = 488.0
     """Height above the ellipsoid and above sea level: the geoid is ignored."""
 
@@ -48,7 +50,8 @@ class _DeniedArea(Data):
 class DeniedBox(_DeniedArea):
     """A rectangle of the map without satellite signals."""
 
-    kind: Literal["box"]
+    kind: Literal["box"] = "box"
+    """A rectangle of the map."""
     region_m: tuple[float, float, float, float]
     """x_min, y_min, x_max, y_max."""
 
@@ -67,7 +70,8 @@ class DeniedBox(_DeniedArea):
 class DeniedPolygon(_DeniedArea):
     """A polygon of the map without satellite signals."""
 
-    kind: Literal["polygon"]
+    kind: Literal["polygon"] = "polygon"
+    """A polygon of the map."""
     corners_m: Annotated[tuple[Vector2, ...], Field(min_length=3)]
     """Corners in order around; the last connects to the first."""
 
@@ -87,28 +91,40 @@ DeniedArea: TypeAlias = Annotated[DeniedBox | DeniedPolygon, Field(discriminator
 class GnssSensor(MountedSensor):
     """GNSS receiver; its antenna is at `position_m`."""
 
-    kind: Literal["gnss"]
+    kind: Literal["gnss"] = "gnss"
+    """A GNSS receiver."""
     name: Name = "fix"
+    """Name of the sensor in frames and topics."""
     model: str = "gnss_m8"
+    """Shipped model, or path of a .toml file."""
     rate_hz: Rate = 5.0
+    """Rate of samples."""
 
 
 class BarometerSensor(MountedSensor):
     """Static pressure and temperature."""
 
-    kind: Literal["barometer"]
+    kind: Literal["barometer"] = "barometer"
+    """A barometer."""
     name: Name = "pressure"
+    """Name of the sensor in frames and topics."""
     model: str = "barometer_px4"
+    """Shipped model, or path of a .toml file."""
     rate_hz: Rate = 50.0
+    """Rate of samples."""
 
 
 class MagnetometerSensor(MountedSensor):
     """Three-axis magnetometer."""
 
-    kind: Literal["magnetometer"]
+    kind: Literal["magnetometer"] = "magnetometer"
+    """A magnetometer."""
     name: Name = "mag"
+    """Name of the sensor in frames and topics."""
     model: str = "magnetometer_px4"
+    """Shipped model, or path of a .toml file."""
     rate_hz: Rate = 100.0
+    """Rate of samples."""
 
 
 NavigationSensor: TypeAlias = GnssSensor | BarometerSensor | MagnetometerSensor

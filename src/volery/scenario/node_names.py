@@ -64,6 +64,16 @@ def node_path(node: str) -> str:
     return path
 
 
+def name_of_class(node: type) -> str:
+    """Returns the `module:Class` of a class; raises `ValueError` if a module cannot name it."""
+    if "." in node.__qualname__:
+        raise ValueError(
+            f"class {node.__qualname__} is inside a function or a class; a node is a class at the "
+            "top level of a module"
+        )
+    return f"{node.__module__}:{node.__qualname__}"
+
+
 def name_of_former_path(path: str) -> str:
     """Returns the registered name of a node's former path; other names are returned as they are."""
     return _FORMER_PATHS.get(path, path)

@@ -31,14 +31,19 @@ class Radio(Data):
     links: Literal["modelled", "ideal"] = "modelled"
     """Ideal links lose nothing and have no latency."""
     topics: tuple[RelayedTopic, ...] = ()
+    """Topics that the radios carry."""
     frequency_mhz: Annotated[float, Field(ge=100.0, le=6000.0)] = 2437.0
     """Channel 6 of IEEE 802.11."""
     power_dbm: Annotated[float, Field(ge=-30.0, le=50.0)] = 20.0
+    """Power of the transmitter."""
     antenna_gain_dbi: Annotated[float, Field(ge=-20.0, le=30.0)] = 2.0
     """Gain of each antenna, the same in all directions."""
     bandwidth_mhz: Positive = 20.0
+    """Bandwidth of the channel."""
     noise_figure_db: _Decibels = 6.0
+    """Noise figure of the receiver."""
     bit_rate_mbit_s: Positive = 6.0
+    """Rate of the bits on the air."""
     exponent: Annotated[float, Field(ge=1.0, le=6.0)] = 2.0
     """Exponent of the path loss over distance; 2: free space."""
     shadowing_db: _Decibels = 3.0
@@ -48,6 +53,7 @@ class Radio(Data):
     vegetation: Literal["p833", "weissberger", "none"] = "p833"
     """Model of the loss in foliage."""
     trunk_loss_db: _Decibels = 3.0
+    """Loss per trunk that the line of sight crosses."""
     wall_loss_db: _Decibels = 12.0
     """Loss per surface of a solid that the line of sight crosses."""
     ground_loss_db: _Decibels = 40.0

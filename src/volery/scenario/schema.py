@@ -1,421 +1,107 @@
 """The scenario: frozen data that defines a simulation, validated on construction.
 
 Keys contain their units (`_m`, `_deg`, `_hz`, ...). A TOML file maps onto `Scenario` one to one;
-docs/scenarios.md explains it and `Scenario.model_json_schema()` serves editors.
+docs/scenarios.md explains it; `volery schema` prints its JSON schema for editors.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
+from volery.core.errors import ScenarioError, reason_of
 from volery.scenario.access import ScenarioAccess
-from volery.scenario.actors import Actors, check_actors
-from volery.scenario.base import (
-    Data,
-    MountedSensor,
-    Name,
-    NonNegative,
-    Positive,
-    Rate,
-    SensorData,
-    Topic,
-    Vector2,
-    check_rectangle,
-    renamed,
-)
-from volery.scenario.camera import CameraSensor, Daylight
-from volery.scenario.city import City
+from volery.scenario.base import Data, Name, renamed
 from volery.scenario.faults import Fault
-from volery.scenario.former_parameters import former_parameters
-from volery.scenario.grid_map import GridMapWorld
-from volery.scenario.merging import merged
-from volery.scenario.navigation import DeniedArea, MagneticField, NavigationSensor, Origin
-from volery.scenario.node_names import NODE_PATTERN
+from volery.scenario.file_names import moved
+from volery.scenario.python_changes import split_changes, with_keys, with_short_forms
 from volery.scenario.radio import Radio
-from volery.scenario.user_mesh import UserMesh
-from volery.scenario.validation import validated
-from volery.scenario.weather import Weather
-from volery.scenario.wind import Wind
-
-# ------------------------------------------------------------------------------------------ world
-
-
-class FlatTerrain(Data):
-    """Horizontal ground from -extent_m to extent_m in x and y."""
-
-    kind: Literal["flat"] = "flat"
-    extent_m: Positive = 500.0
-    height_m: float = 0.0
-
-
-class GridTerrain(Data):
-    """A heightfield from a CSV grid: row k holds the elevations at y = k * spacing."""
-
-    kind: Literal["grid"]
-    file: str
-    spacing_m: Positive
-    origin_m: Vector2 = (0.0, 0.0)
-
-
-class InventoryForest(Data):
-    """Trees at surveyed positions: CSV with `x_m,y_m[,dbh_cm,height_m,species]`."""
-
-    kind: Literal["inventory"]
-    file: str
-    species: str
-    """Species of trees without one in the inventory, or with one that is neither shipped nor
-    mapped."""
-    species_map: Annotated[dict[str, str], Field(max_length=10_000)] = Field(default_factory=dict)
-    """Shipped species by the inventory's names of species."""
-    region_m: tuple[float, float, float, float] | None = None
-    """x_min, y_min, x_max, y_max; only trees with x_min <= x < x_max (y alike) are used. None uses
-    all."""
-    fraction: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
-    """Fraction of the trees, at random; a smaller fraction is a subset of a larger one."""
-
-    former_keys: ClassVar[Mapping[str, str]] = {"share": "fraction"}
-
-    @model_validator(mode="after")
-    def _region_is_a_rectangle(self) -> Self:
-        check_rectangle(self.region_m)
-        return self
-
-
-class ProceduralForest(Data):
-    """Trees at random positions with a minimum spacing."""
-
-    kind: Literal["procedural"]
-    region_m: tuple[float, float, float, float]
-    trees: Annotated[int, Field(ge=0, le=200_000)]
-    minimum_spacing_m: NonNegative = 1.0
-    species: Annotated[dict[str, Positive], Field(min_length=1)]
-    """Fractions by species; they are normalised."""
-
-    @model_validator(mode="after")
-    def _region_is_a_rectangle(self) -> Self:
-        check_rectangle(self.region_m)
-        return self
-
-
-class World(Data):
-    """Ground, trees, buildings, actors, air."""
-
-    former_keys: ClassVar[Mapping[str, str]] = {"things": "actors"}
-
-    seed: Annotated[int, Field(ge=0, lt=2**63)] | None = None
-    """Seed of the world alone; None: the scenario's seed is used."""
-    terrain: Annotated[FlatTerrain | GridTerrain, Field(discriminator="kind")] = FlatTerrain()
-    forest: Annotated[InventoryForest | ProceduralForest | None, Field(discriminator="kind")] = None
-    city: City | None = None
-    grid_map: GridMapWorld | None = None
-    meshes: Annotated[tuple[UserMesh, ...], Field(max_length=1000)] = ()
-    """Mesh files of the user."""
-    actors: Actors = ()
-    wind: Wind = Wind()
-    weather: Weather = Weather()
-    light: Daylight = Daylight()
-    origin: Origin = Origin()
-    magnetic_field: MagneticField = MagneticField()
-    gnss_denied: bool = False
-    """Whether satellite signals are denied everywhere, for the whole run."""
-    gnss_denied_areas: tuple[DeniedArea, ...] = ()
-
-    @model_validator(mode="after")
-    def _actors_have_names(self) -> Self:
-        check_actors(self.actors)
-        return self
-
-
-# ------------------------------------------------------------------------------- sensors and UAVs
-
-
-class Nodding(Data):
-    """Sinusoidal tilt of a mount about the sensor's y axis (positive tilts downward)."""
-
-    amplitude_deg: Annotated[float, Field(gt=0.0, le=90.0)] = 45.0
-    period_s: Annotated[float, Field(ge=0.1, le=60.0)] = 2.0
-    offset_deg: Annotated[float, Field(ge=-90.0, le=90.0)] = 0.0
-    phase_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 0.0
-
-
-class LidarSensor(MountedSensor):
-    """A LIDAR of a named model: planar, with many rings, or with a rosette."""
-
-    kind: Literal["lidar"]
-    name: Name = "horizontal"
-    model: str = "utm_30lx"
-    topic: Topic | None = None
-    """Topic below the UAV's name; None: `laser/NAME/scan` for a planar scanner, else `points`."""
-    intensities: bool | None = None
-    """Whether echoes have intensities; None: the model's default."""
-    nodding: Nodding | None = None
-
-
-class ImuSensor(MountedSensor):
-    """Accelerometer and gyroscope of a named model."""
-
-    kind: Literal["imu"]
-    name: Name = "imu"
-    model: str = "adis16448"
-    rate_hz: Rate = 200.0
-
-
-class SonarSensor(MountedSensor):
-    """Downward ultrasonic range finder."""
-
-    kind: Literal["sonar"]
-    name: Name = "range"
-    model: str = "downward_sonar"
-    rate_hz: Rate = 10.0
-
-
-class OdometrySensor(SensorData):
-    """Pose and velocity from an odometry source: true motion plus a modelled drift."""
-
-    kind: Literal["odometry"]
-    name: Literal["odom"] = "odom"
-    noise: bool = True
-    model: str = "visual_inertial"
-    rate_hz: Rate = 50.0
-
-
-class ExternalOdometrySource(Data):
-    """Odometry of a node, such as a SLAM's, that aids an estimator; assumed to be in the map frame.
-
-    Covariances of such odometry state its drift from the map. The UAV flies in the frame of the
-    odometry, where its errors are those of one pose relative to the next: `sigma_m`, `sigma_deg`.
-    """
-
-    topic: Topic
-    """Topic of type nav_msgs/Odometry, below the UAV's name."""
-    sigma_m: Annotated[float, Field(gt=0.0, le=100.0)] = 0.05
-    sigma_deg: Annotated[float, Field(gt=0.0, le=180.0)] = 1.0
-    rate_hz: Rate = 10.0
-    """Maximum rate of poses: closer ones repeat each other's errors."""
-
-
-class EstimateSensor(SensorData):
-    """Output of the UAV's estimator, as odometry; it needs an IMU."""
-
-    kind: Literal["estimate"]
-    name: Literal["odom"] = "odom"
-    rate_hz: Rate = 50.0
-    used_for_control: bool = True
-    """Whether the UAV's controllers use the estimate; false: ground truth."""
-    external_odometry: ExternalOdometrySource | None = None
-
-    former_keys: ClassVar[Mapping[str, str]] = {
-        "flies": "used_for_control",
-        "pose": "external_odometry",
-    }
-
-
-class GroundTruthSensor(SensorData):
-    """The true state, for reports and checks; autonomy must not read it."""
-
-    kind: Literal["ground_truth"]
-    name: Literal["ground_truth"] = "ground_truth"
-    rate_hz: Rate = 50.0
-
-
-class BatterySensor(SensorData):
-    """Battery monitor: voltage, current and charge, if the airframe has a battery."""
-
-    kind: Literal["battery"]
-    name: Literal["battery"] = "battery"
-    rate_hz: Rate = 1.0
-
-
-Sensor = Annotated[
-    LidarSensor
-    | ImuSensor
-    | SonarSensor
-    | OdometrySensor
-    | EstimateSensor
-    | GroundTruthSensor
-    | CameraSensor
-    | NavigationSensor
-    | BatterySensor,
-    Field(discriminator="kind"),
-]
-
-
-_TAKEN_NAMES = (
-    "base_link",
-    "battery",
-    "cmd_vel",
-    "flight_state",
-    "goal_pose",
-    "ground_truth",
-    "hold",
-    "joint_states",
-    "land",
-    "mavlink",
-    "mavros",
-    "odom",
-    "radio",
-    "return_home",
-    "rotor_speeds",
-    "setpoint_raw",
-    "take_off",
-    "trajectory",
+from volery.scenario.sensors import (
+    BatterySensor,
+    EstimateSensor,
+    ExternalOdometrySource,
+    GroundTruthSensor,
+    ImuSensor,
+    LidarSensor,
+    Nodding,
+    OdometrySensor,
+    Sensor,
+    SonarSensor,
 )
-"""Frames, topics and services of a UAV that sensors cannot use as names ..."""
-_OWN_NAMES = ("lidar", "odometry", "estimate", "ground_truth", "battery")
-"""... except for kinds with a fixed name, and LIDARs, whose topics have a prefix."""
+from volery.scenario.toml_writer import SCHEMA_DIRECTIVE, toml_text
+from volery.scenario.uavs import Flight, KinematicMotion, NodeEntry, RotorWear, UavGroup, UavType
+from volery.scenario.validation import validated
+from volery.scenario.world import FlatTerrain, GridTerrain, InventoryForest, ProceduralForest, World
 
-
-class Flight(Data):
-    """Parameters of the flight modes of this type of UAV."""
-
-    take_off_altitude_m: Annotated[float, Field(ge=0.3, le=500.0)] = 2.5
-    """Height above the take-off position."""
-    return_altitude_m: Annotated[float, Field(ge=0.3, le=500.0)] = 10.0
-    command_timeout_s: Annotated[float, Field(ge=0.05, le=60.0)] = 0.5
-    """Time without a velocity command after which the UAV holds its position."""
-
-
-class NodeEntry(Data):
-    """A node that runs inside the simulation, in lock step: for one UAV, or for all of them."""
-
-    node: Annotated[str, Field(pattern=NODE_PATTERN)]
-    """A registered name, such as `slam`, or `module:Class`, a `volery.graph.nodes.node.Node`."""
-    parameters: dict[str, Any] = Field(default_factory=dict)
-    latency_s: Annotated[float, Field(ge=0.0, le=60.0)] = 0.0
-    """Simulated time from a callback's input to its output; above 0 the node runs on a worker."""
-
-    @field_validator("parameters")
-    @classmethod
-    def _rename_former_parameters(
-        cls, parameters: dict[str, Any], info: ValidationInfo
-    ) -> dict[str, Any]:
-        node = info.data.get("node", "")
-        return renamed(parameters, former_parameters(node), f"{node}: parameter")
-
-
-class RotorWear(Data):
-    """Wear of a rotor and its motor, as factors of a new one's numbers."""
-
-    thrust: Annotated[float, Field(ge=0.0, le=1.0)] = 1.0
-    """Thrust; 0: a failed motor, which is stopped."""
-    torque: Annotated[float, Field(ge=0.1, le=10.0)] = 1.0
-    """Reaction torque, and so the power."""
-    lag: Annotated[float, Field(ge=0.1, le=10.0)] = 1.0
-    """Times of speeding up and slowing down."""
-
-
-class KinematicMotion(Data):
-    """Response of a kinematic UAV to velocity commands."""
-
-    time_constant_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.0
-    """First-order lag of velocity and yaw rate; 0: at once."""
-    limited: bool = False
-    """Whether the airframe's limits of speed, climb, descent and yaw rate apply."""
-
-
-class UavType(Data):
-    """A type of UAV: airframe, plant, sensors and nodes."""
-
-    airframe: str = "f450"
-    plant: Literal["rigid_body", "identified", "kinematic"] = "rigid_body"
-    """Model of motion; the airframe defines size and limits for all of them."""
-    identified_model: str | None = None
-    """Model of an identified plant: a shipped name or a .toml path; None: the airframe's name."""
-    kinematic: KinematicMotion = KinematicMotion()
-    wear: tuple[RotorWear, ...] = ()
-    """One entry per rotor, in the order of the airframe; empty: all are new."""
-    battery_charge: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
-    """Fraction of the capacity at the start, if the airframe has a battery."""
-    flight: Flight = Flight()
-    sensors: tuple[Sensor, ...] = ()
-    nodes: tuple[NodeEntry, ...] = ()
-    radio: bool = True
-    """Whether the UAV has a radio, if the scenario has `[radio]`."""
-
-    @model_validator(mode="after")
-    def _settings_are_of_the_plant(self) -> Self:
-        if self.identified_model is not None and self.plant != "identified":
-            raise ValueError(f"identified_model needs plant = \"identified\", not '{self.plant}'")
-        if self.kinematic != KinematicMotion() and self.plant != "kinematic":
-            raise ValueError(f"[kinematic] needs plant = \"kinematic\", not '{self.plant}'")
-        return self
-
-    @model_validator(mode="after")
-    def _estimates_have_an_imu(self) -> Self:
-        kinds = [sensor.kind for sensor in self.sensors]
-        if "estimate" in kinds and "imu" not in kinds:
-            raise ValueError('a sensor of kind "estimate" needs one of kind "imu"')
-        return self
-
-    @model_validator(mode="after")
-    def _sensor_names_are_unique(self) -> Self:
-        names = [s.name for s in self.sensors]
-        names += [f"{s.name}_velocity" for s in self.sensors if s.kind == "gnss"]
-        twice = sorted({n for n in names if names.count(n) > 1})
-        if twice:
-            raise ValueError(f"sensor names must differ; used twice: {', '.join(twice)}")
-        for sensor in self.sensors:
-            taken = sensor.name in _TAKEN_NAMES or sensor.name.startswith("laser")
-            if sensor.kind not in _OWN_NAMES and taken:
-                raise ValueError(
-                    f"'{sensor.name}' is no name for a sensor of kind {sensor.kind}: names that "
-                    f"begin with laser are reserved, and {', '.join(_TAKEN_NAMES)}"
-                )
-        return self
-
-
-class UavGroup(Data):
-    """One UAV, or `count` of them evenly spaced from `position_m` to `last_position_m`."""
-
-    type: str
-    count: Annotated[int, Field(ge=1, le=10_000)] = 1
-    position_m: Annotated[tuple[float, ...], Field(min_length=2, max_length=3)]
-    """x, y (on the ground) or x, y, z in the map."""
-    last_position_m: Vector2 | None = None
-    yaw_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 0.0
-    placement: Literal["exact", "nearest_free"] = "exact"
-    """`nearest_free` searches around each position for one with free space to take off."""
-    on_start: Literal["wait", "take_off"] = "wait"
-
-    @model_validator(mode="after")
-    def _many_need_a_line(self) -> Self:
-        if self.count > 1 and self.last_position_m is None:
-            raise ValueError("last_position_m is needed when count is larger than 1")
-        return self
-
-
-# --------------------------------------------------------------------------------------- the whole
+__all__ = [
+    "BatterySensor",
+    "EstimateSensor",
+    "ExternalOdometrySource",
+    "FlatTerrain",
+    "Flight",
+    "GridTerrain",
+    "GroundTruthSensor",
+    "ImuSensor",
+    "InventoryForest",
+    "KinematicMotion",
+    "LidarSensor",
+    "Nodding",
+    "NodeEntry",
+    "OdometrySensor",
+    "Physics",
+    "ProceduralForest",
+    "RotorWear",
+    "Scenario",
+    "Sensor",
+    "SonarSensor",
+    "UavGroup",
+    "UavType",
+    "World",
+]
 
 
 class Physics(Data):
     """Physics step and effect of contacts."""
 
     rate_hz: Annotated[int, Field(ge=200, le=4000)] = 1000
+    """Rate of physics steps; it divides 1e9."""
     guidance_rate_hz: Annotated[int, Field(ge=25, le=1000)] = 125
     """Rate of flight modes and outer loop, in whole physics steps; attitude control runs at 250 Hz
     or at this rate, if higher."""
     on_contact: Literal["crash", "bounce"] = "crash"
+    """Effect of a hard contact: the UAV crashes, or it bounces and flies on."""
 
 
 class Scenario(Data):
     """A complete simulation, as data."""
 
     name: Name
+    """Name of the scenario, in lower case."""
     description: str = ""
+    """Description in one line; `volery list` shows it."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
+    """Seed of all random streams."""
     duration_s: Annotated[float, Field(gt=0.0, le=1_000_000.0)] = 60.0
+    """Simulated time after which the run ends."""
     ends_when: Literal["time_is_up", "all_landed"] = "time_is_up"
+    """End of the run: after `duration_s`, or earlier, when all UAVs have landed."""
     physics: Physics = Physics()
+    """Physics step and effect of contacts."""
     world: World = World()
+    """Ground, trees, buildings, actors, air."""
     radio: Radio | None = None
+    """Packet radio of the UAVs; None: they have none."""
     types: Annotated[dict[Name, UavType], Field(min_length=1)]
+    """Types of UAVs by name."""
     uavs: Annotated[tuple[UavGroup, ...], Field(min_length=1)]
+    """Groups of UAVs, which are named uav1, uav2, ... in this order."""
     nodes: tuple[NodeEntry, ...] = ()
     """Nodes of the whole system, one of each; their relative names start at the root."""
     faults: tuple[Fault, ...] = ()
+    """Faults at set times."""
     message_packages: tuple[str, ...] = ()
     """Folders of ROS packages whose `.msg`, `.srv` and `.action` files the nodes use."""
 
@@ -448,15 +134,66 @@ class Scenario(Data):
         world = self.world
         return world.seed is None and (world.forest is not None or world.city is not None)
 
-    def with_(self, **changes: Any) -> Scenario:
+    def with_(self, changes: Mapping[str, Any] | None = None, /, **keys: Any) -> Scenario:
         """Returns a copy with other values of its keys, validated like a file.
 
         Tables merge key by key, all else is replaced; `with_(seed=7, world={"seed": 1})` leaves the
-        rest of the world unchanged. Raises `ScenarioError`, naming key and allowed values, for
-        invalid values.
+        rest of the world unchanged. `changes` may also hold paths of keys:
+        `{"world.wind.turbulence": "light", "uavs[0].yaw_deg": 90.0, "types.*.airframe": "iris"}`.
+
+        Short forms: `uavs` (a number) resizes the only group; `wind` is a velocity (3,), m/s in
+        the map, or a table; `weather` is a table; `airframe` and `sensors` change all types.
+        `sensors` are sets ("lidar", "camera", "sonar", "navigation"), which are added or kept while
+        sensors of other sets are removed, or all sensors as tables or models. Raises
+        `ScenarioError`, naming key and allowed values, for invalid values.
         """
-        data = merged(self.model_dump(exclude_unset=True), changes)
-        return validated(data, Scenario, f"{self.name}: with_()").with_access(self.access)
+        where = f"{self.name}: with_()"
+        try:
+            named = renamed({**(changes or {}), **keys}, self.former_keys, "key")
+        except ValueError as error:
+            raise ScenarioError(f"{where}: {error}") from None
+        short, long = split_changes(named, type(self).model_fields, where)
+        changed = validated(with_keys(self.data(), long, where), Scenario, where)
+        if short:
+            data = with_short_forms(changed.data(), short, where)
+            changed = validated(data, Scenario, where)
+        return changed.with_access(self.access)
+
+    def data(self) -> dict[str, Any]:
+        """Returns the given keys as plain data: tables, lists, numbers, texts and dates."""
+        return self.model_dump(exclude_unset=True)
+
+    def to_toml(self) -> str:
+        """Returns the given keys as TOML, which loads to an equal scenario.
+
+        Raises `ScenarioError` if a node's parameter is something that TOML does not have.
+        """
+        return toml_text(self.model_dump(exclude_unset=True, exclude_none=True))
+
+    def save(self, path: str | Path) -> None:
+        """Writes a TOML file, which `load_scenario` loads to an equal scenario.
+
+        Its first line names `scenario.schema.json` for editors; `volery schema` writes that. Names
+        of files in this scenario's folder become relative to the new file's folder. A saved
+        scenario of a log or an upload has, when it is loaded, the access of its new owner. Raises
+        `ScenarioError` if the file cannot be written.
+        """
+        path = Path(path)
+        if path.suffix != ".toml":
+            raise ScenarioError(f"{path}: a scenario is a .toml file; name it {path.name}.toml")
+        data = self.model_dump(exclude_unset=True, exclude_none=True)
+        text = toml_text(moved(data, self.access.folder, path.parent))
+        try:
+            path.write_text(f"{SCHEMA_DIRECTIVE}\n\n{text}", encoding="utf-8")
+        except OSError as error:
+            raise ScenarioError(f"{path}: cannot be written: {reason_of(error)}") from None
+
+    def __eq__(self, other: object) -> bool:
+        """Returns whether the other scenario has the same values; access does not count."""
+        return isinstance(other, Scenario) and self.__dict__ == other.__dict__
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.seed, self.uavs))
 
     @property
     def access(self) -> ScenarioAccess:

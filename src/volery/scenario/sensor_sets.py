@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any, Literal, Protocol, get_args
 
-from volery.scenario.schema import UavType
+from volery.core.data_tables import read_table
 
 SensorSet = Literal["lidar", "camera", "sonar", "navigation"]
 SENSOR_SETS: tuple[SensorSet, ...] = get_args(SensorSet)
@@ -25,40 +25,9 @@ class _Set:
         return {sensor["kind"] for sensor in self.sensors}
 
 
-# Positions of the shipped scenarios on an F450: a horizontal scanner on top, the others below.
-_SETS: dict[SensorSet, _Set] = {
-    "lidar": _Set(
-        "a horizontal and a nodding UTM-30LX LIDAR",
-        (
-            {"kind": "lidar", "name": "horizontal", "position_m": [0.0, 0.0, 0.18]},
-            {
-                "kind": "lidar",
-                "name": "nodding",
-                "position_m": [0.10, 0.0, -0.08],
-                "nodding": {"amplitude_deg": 45.0, "period_s": 1.0},
-            },
-        ),
-    ),
-    "camera": _Set(
-        "a camera that looks ahead, colour and depth, 320 x 240 at 10 Hz",
-        (
-            {
-                "kind": "camera",
-                "name": "camera",
-                "position_m": [0.12, 0.0, 0.06],
-                "width": 320,
-                "height": 240,
-            },
-        ),
-    ),
-    "sonar": _Set(
-        "a sonar that looks down",
-        ({"kind": "sonar", "position_m": [0.0, 0.0, -0.05], "rpy_deg": [0.0, 90.0, 0.0]},),
-    ),
-    "navigation": _Set(
-        "satellite navigation, barometer and magnetometer",
-        ({"kind": "gnss"}, {"kind": "barometer"}, {"kind": "magnetometer"}),
-    ),
+_SETS = {
+    name: _Set(row["description"], tuple(row["sensors"]))
+    for name, row in read_table(__file__, "sensor_sets.toml").items()
 }
 
 
@@ -67,26 +36,42 @@ def describe(name: SensorSet) -> str:
     return _SETS[name].description
 
 
-def sets_of(kind: UavType) -> tuple[SensorSet, ...]:
+class _Sensor(Protocol):
+    kind: Any
+
+
+class _TypeWithSensors(Protocol):
+    """What the sets need of a `UavType`."""
+
+    @property
+    def sensors(self) -> Sequence[_Sensor]: ...
+
+
+def sets_of(kind: _TypeWithSensors) -> tuple[SensorSet, ...]:
     """Returns the sets that a type of UAV has sensors of."""
-    present = {sensor.kind for sensor in kind.sensors}
-    return tuple(name for name in SENSOR_SETS if _SETS[name].kinds & present)
+    return _sets_with({sensor.kind for sensor in kind.sensors})
 
 
-def fit(kind: UavType, data: dict[str, Any], chosen: Collection[SensorSet]) -> list[dict[str, Any]]:
+def _sets_with(kinds: set[str]) -> tuple[SensorSet, ...]:
+    return tuple(name for name in SENSOR_SETS if _SETS[name].kinds & kinds)
+
+
+def fit(
+    sensors: Collection[Mapping[str, Any]], chosen: Collection[SensorSet]
+) -> list[dict[str, Any]]:
     """Returns the sensors of a type, as plain data, with the `chosen` sets.
 
-    The type is given as `kind` and as `data`. Sensors of chosen sets remain, and missing chosen
-    sets are added; sensors of other sets are removed. Sensors outside all sets remain, and so do
-    those that the type's estimator needs.
+    Sensors of chosen sets remain, and missing chosen sets are added; sensors of other sets are
+    removed. Sensors outside all sets remain, and so do those that the type's estimator needs.
     """
-    present = set(sets_of(kind))
+    kinds = {sensor["kind"] for sensor in sensors}
+    present = set(_sets_with(kinds))
     wanted = set(chosen)
-    if any(sensor.kind == "estimate" for sensor in kind.sensors):
+    if "estimate" in kinds:
         wanted |= present & {"navigation"}
     gone = {sensor for name in SENSOR_SETS if name not in wanted for sensor in _SETS[name].kinds}
-    kept = [dict(sensor) for sensor in data.get("sensors", ()) if sensor["kind"] not in gone]
+    remaining = [dict(sensor) for sensor in sensors if sensor["kind"] not in gone]
     new = [
         sensor for name in SENSOR_SETS if name in wanted - present for sensor in _SETS[name].sensors
     ]
-    return [*kept, *new]
+    return [*remaining, *new]

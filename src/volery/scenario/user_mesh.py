@@ -15,6 +15,7 @@ class UserMesh(Data):
     """A glTF, OBJ or STL file as an object in the world."""
 
     file: str
+    """File of the mesh: .glb, .gltf, .obj or .stl."""
     name: Annotated[str, Field(min_length=1, max_length=80)] | None = None
     """Name in messages; None: the file's name without its suffix."""
     position_m: Vector3 = (0.0, 0.0, 0.0)

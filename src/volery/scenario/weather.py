@@ -21,6 +21,7 @@ class Weather(Data):
     """Rain, snow, fog and dust; uniform, and constant until changed."""
 
     rain_mm_h: Annotated[float, Field(ge=0.0, le=MAX_RAIN_MM_H)] = 0.0
+    """Rate of rain; 0: none."""
     snow_mm_h: Annotated[float, Field(ge=0.0, le=MAX_SNOW_MM_H)] = 0.0
     """Rate as water."""
     fog_visibility_m: _Visibility | None = None

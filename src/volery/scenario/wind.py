@@ -19,10 +19,12 @@ _Height = Annotated[float, Field(ge=0.1, le=304.8)]
 class LogProfile(Data):
     """Logarithmic growth of the steady wind with height above ground."""
 
-    kind: Literal["log"]
+    kind: Literal["log"] = "log"
+    """Logarithmic growth with height."""
     reference_height_m: _Height = 10.0
     """Height of velocity_m_s."""
     roughness_m: Annotated[float, Field(ge=1e-6, le=10.0)] = 0.03
+    """Roughness length of the ground."""
 
     @model_validator(mode="after")
     def _reference_is_above_roughness(self) -> Self:
@@ -34,17 +36,23 @@ class LogProfile(Data):
 class PowerProfile(Data):
     """Growth of the steady wind with a power of the height above ground."""
 
-    kind: Literal["power"]
+    kind: Literal["power"] = "power"
+    """Growth with a power of the height."""
     reference_height_m: _Height = 10.0
+    """Height of velocity_m_s."""
     exponent: Annotated[float, Field(ge=0.0, le=1.0)] = 1.0 / 7.0
+    """Exponent of the power; 1/7: open country."""
 
 
 class Gust(Data):
     """A 1-cosine gust that rises, holds, and falls to its end."""
 
     amplitude_m_s: Vector3
+    """Maximum wind of the gust, map."""
     start_s: Annotated[float, Field(ge=0.0, le=1e6)]
+    """Simulated time at which the gust begins."""
     rise_s: Annotated[float, Field(ge=1e-3, le=1e6)] | None = None
+    """Time from zero to the full gust, and back; the gust reaches all positions at once."""
     rise_m: Annotated[float, Field(ge=1.0, le=1e5)] | None = None
     """Instead of rise_s: length of the rise in a front that moves with the steady wind."""
     end_s: Positive | None = None
@@ -66,12 +74,15 @@ class Wind(Data):
     velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
     """Steady wind."""
     profile: Annotated[LogProfile | PowerProfile | None, Field(discriminator="kind")] = None
+    """Growth of the steady wind with height; None: it is uniform."""
     field: str | None = None
     """A .csv or .npz file of velocities on a regular grid, instead of the steady wind."""
     turbulence: Literal["none", "light", "moderate", "severe"] = "none"
+    """Intensity of the turbulence (Dryden)."""
     w20_m_s: Annotated[float, Field(ge=0.0, le=MAX_WIND_M_S)] | None = None
     """Instead of turbulence: the mean wind at 20 ft (6.1 m) that sets its intensity."""
     gusts: Annotated[tuple[Gust, ...], Field(max_length=MAX_GUSTS)] = ()
+    """Gusts at set times."""
 
     @model_validator(mode="after")
     def _is_flyable(self) -> Self:

@@ -3,15 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
+from volery.core.arrays import Array
 from volery.core.clock import Schedule
+from volery.sensors.mount import Mount
 from volery.sensors.noise import NoiseStreams
 from volery.sensors.samples import Samples, SensorId
+
+
+class SensorGroup(NamedTuple):
+    """S sensors of one kind, model, rate and phase, which a bank samples together."""
+
+    schedule: Schedule
+    sensors: tuple[SensorId, ...]
+    mounts: tuple[Mount, ...]
+    """Their mounts on the UAVs."""
+    keys: NDArray[np.uint64] | None = None
+    """(S,) noise streams; None for sensors without noise."""
+
+    @property
+    def position_body(self) -> Array:
+        """Positions of the sensor frames in the body frame (FLU), (S, 3) m."""
+        return np.array([mount.position_body for mount in self.mounts])
+
+    @property
+    def attitude_body(self) -> Array:
+        """Attitudes of the sensor frames in the body frame, (S, 4)."""
+        return np.array([mount.attitude_body for mount in self.mounts])
 
 
 class Bank(Protocol):
@@ -73,6 +96,11 @@ class Bank(Protocol):
 class Memoryless:
     """A bank whose measurements depend on the fleet's state alone: without state of its own."""
 
+    def __init__(self, group: SensorGroup) -> None:
+        self.schedule = group.schedule
+        self.sensors = group.sensors
+        self._rows = uav_rows(group.sensors)
+
     def get_state(self) -> dict[str, Any]:
         """Returns an empty state."""
         return {}
@@ -93,27 +121,19 @@ class Memoryless:
 class NoisyBank:
     """A bank whose sensors have noise streams, and may have state between measurements.
 
-    `keys` (S,) are the streams, or None for sensors without noise; `NoiseStreams` explains
-    `at_start` and `per_measurement`. State is held in arrays (S, ...), attributes that a subclass
-    names in `_SAVED` and resets in `_switch_on`; saving, restoring and resetting follow from these.
+    `NoiseStreams` explains `at_start` and `per_measurement`. State is held in arrays (S, ...),
+    attributes that a subclass names in `_SAVED` and resets in `_switch_on`; saving, restoring and
+    resetting follow from these.
     """
 
     _SAVED: ClassVar[tuple[str, ...]] = ()
 
-    def __init__(
-        self,
-        schedule: Schedule,
-        sensors: tuple[SensorId, ...],
-        keys: NDArray[np.uint64] | None,
-        *,
-        at_start: int = 0,
-        per_measurement: int = 0,
-    ) -> None:
-        self.schedule = schedule
-        self.sensors = sensors
-        self._rows = uav_rows(sensors)
+    def __init__(self, group: SensorGroup, *, at_start: int = 0, per_measurement: int = 0) -> None:
+        self.schedule = group.schedule
+        self.sensors = group.sensors
+        self._rows = uav_rows(group.sensors)
         self._noise = NoiseStreams(
-            keys, len(sensors), at_start=at_start, per_measurement=per_measurement
+            group.keys, len(group.sensors), at_start=at_start, per_measurement=per_measurement
         )
 
     def _switch_on(self, rows: NDArray[np.int64], time_ns: int) -> None:

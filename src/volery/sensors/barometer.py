@@ -6,7 +6,7 @@ sea level is that of the scenario's origin plus z.
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,16 +14,18 @@ from pydantic import NonNegativeFloat, PositiveFloat
 
 from volery.control.fleet import Fleet
 from volery.core import atmosphere, rotations
-from volery.core.arrays import Array, read_only
-from volery.core.clock import NS_PER_S, Schedule
-from volery.sensors.bank import NoisyBank
-from volery.sensors.model import SensorModel, load_model
+from volery.core.arrays import read_only
+from volery.core.clock import NS_PER_S
+from volery.sensors.bank import NoisyBank, SensorGroup
+from volery.sensors.model import SensorModel
 from volery.sensors.noise import gauss_markov_of_sigma
-from volery.sensors.samples import PressureSamples, SensorId
+from volery.sensors.samples import PressureSamples
 
 
 class BarometerModel(SensorModel):
     """Noise and drift in Pa; see the data files in `models/`."""
+
+    sensor_kind: ClassVar = "barometer"
 
     name: str
     noise_pa: NonNegativeFloat
@@ -32,17 +34,10 @@ class BarometerModel(SensorModel):
     drift_correlation_s: PositiveFloat
 
 
-def load_barometer_model(name: str, folder: Path | None = None) -> BarometerModel:
-    """Returns the model by shipped name or `.toml` path, also relative to `folder`."""
-    return load_model(BarometerModel, "barometer", name, folder)
-
-
 class BarometerBank(NoisyBank):
     """All barometers of one model, rate and phase.
 
-    `position_body` (S, 3) m is each sensor's position in the body frame (FLU); `keys` (S,) are the
-    noise streams, or None for sensors without noise; `origin_altitude_m` is the map's height above
-    sea level.
+    `origin_altitude_m` is the map's height above sea level.
     """
 
     name = "barometer"
@@ -52,18 +47,15 @@ class BarometerBank(NoisyBank):
     def __init__(
         self,
         model: BarometerModel,
-        schedule: Schedule,
-        sensors: tuple[SensorId, ...],
-        position_body: Array,
-        keys: NDArray[np.uint64] | None,
+        group: SensorGroup,
         origin_altitude_m: float,
     ) -> None:
-        super().__init__(schedule, sensors, keys, at_start=1, per_measurement=2)
+        super().__init__(group, at_start=1, per_measurement=2)
         self._model = model
-        self._position_body = position_body
+        self._position_body = group.position_body
         self._origin_altitude = origin_altitude_m
         self._wander = gauss_markov_of_sigma(
-            model.drift_pa, model.drift_correlation_s, schedule.period_ns / NS_PER_S
+            model.drift_pa, model.drift_correlation_s, group.schedule.period_ns / NS_PER_S
         )
         self._drift = self._wander.sigma * self._noise.start()[:, 0]
 

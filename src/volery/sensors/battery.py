@@ -6,10 +6,9 @@ import numpy as np
 
 from volery.control.fleet import Fleet
 from volery.core.arrays import read_only
-from volery.core.clock import Schedule
 from volery.core.errors import DataFileError
-from volery.sensors.bank import Memoryless, uav_rows
-from volery.sensors.samples import BatterySamples, SensorId
+from volery.sensors.bank import Memoryless, SensorGroup
+from volery.sensors.samples import BatterySamples
 
 
 class BatteryBank(Memoryless):
@@ -21,10 +20,8 @@ class BatteryBank(Memoryless):
     name = "battery"
     lag_ns = 0
 
-    def __init__(self, schedule: Schedule, sensors: tuple[SensorId, ...], fleet: Fleet) -> None:
-        self.schedule = schedule
-        self.sensors = sensors
-        self._rows = uav_rows(sensors)
+    def __init__(self, group: SensorGroup, fleet: Fleet) -> None:
+        super().__init__(group)
         packs = []
         for row in self._rows:
             airframe = fleet.airframes[row]

@@ -10,10 +10,9 @@ from volery.control.estimator.estimator import Estimator
 from volery.control.fleet import Fleet
 from volery.core import rotations
 from volery.core.arrays import Array, read_only
-from volery.core.clock import Schedule
 from volery.core.rows import in_one_piece
-from volery.sensors.bank import Memoryless
-from volery.sensors.samples import OdometrySamples, SensorId
+from volery.sensors.bank import Memoryless, SensorGroup
+from volery.sensors.samples import OdometrySamples
 
 
 class EstimateBank(Memoryless):
@@ -28,14 +27,12 @@ class EstimateBank(Memoryless):
 
     def __init__(
         self,
-        schedule: Schedule,
-        sensors: tuple[SensorId, ...],
+        group: SensorGroup,
         estimator: Estimator,
         rows: NDArray[np.int64],
         gyro_variance: Array,
     ) -> None:
-        self.schedule = schedule
-        self.sensors = sensors
+        super().__init__(group)
         self._estimator = estimator
         self._rows = rows
         self._taken = in_one_piece(rows)

@@ -6,7 +6,7 @@ PX4's Gazebo classic. The drift continues while a fix is lost.
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,14 +15,14 @@ from pydantic import NonNegativeFloat, PositiveFloat
 from volery.control.fleet import Fleet
 from volery.core import rotations
 from volery.core.arrays import Array, read_only
-from volery.core.clock import NS_PER_S, Schedule, ns_from_s
+from volery.core.clock import NS_PER_S, ns_from_s
 from volery.core.errors import CommandError, DataFileError
 from volery.core.geodesy import LocalFrame
-from volery.sensors.bank import NoisyBank, rows_of
+from volery.sensors.bank import NoisyBank, SensorGroup, rows_of
 from volery.sensors.gnss_denial import NOWHERE, GnssDenial
-from volery.sensors.model import SensorModel, load_model
+from volery.sensors.model import SensorModel
 from volery.sensors.noise import gauss_markov_of_sigma
-from volery.sensors.samples import GnssSamples, SensorId
+from volery.sensors.samples import GnssSamples
 from volery.vehicle.pose_history import KEPT_NS, PoseHistory, pose_at
 
 FOREVER_NS = np.iinfo(np.int64).max
@@ -33,6 +33,8 @@ _LONGEST_DELAY_NS = KEPT_NS - 6_000_000
 
 class GnssModel(SensorModel):
     """Delay, noise and drift; see the data files in `models/`."""
+
+    sensor_kind: ClassVar = "GNSS"
 
     name: str
     delay_s: NonNegativeFloat
@@ -48,17 +50,10 @@ class GnssModel(SensorModel):
     """Time from the return of the signals to the next fix."""
 
 
-def load_gnss_model(name: str, folder: Path | None = None) -> GnssModel:
-    """Returns the model by shipped name or `.toml` path, also relative to `folder`."""
-    return load_model(GnssModel, "GNSS", name, folder)
-
-
 class GnssBank(NoisyBank):
     """All receivers of one model, rate and phase.
 
-    `position_body` (S, 3) m is each antenna's position in the body frame (FLU); `keys` (S,) are the
-    noise streams, or None for receivers without noise. A fix is sampled `lag_ns` after its time,
-    from the fleet's pose history, and carries that time.
+    A fix is sampled `lag_ns` after its time, from the fleet's pose history, and carries that time.
 
     Raises `DataFileError` if the model's delay exceeds the pose history.
     """
@@ -69,14 +64,11 @@ class GnssBank(NoisyBank):
     def __init__(
         self,
         model: GnssModel,
-        schedule: Schedule,
-        sensors: tuple[SensorId, ...],
-        position_body: Array,
-        keys: NDArray[np.uint64] | None,
+        group: SensorGroup,
         frame: LocalFrame,
         denial: GnssDenial = NOWHERE,
     ) -> None:
-        super().__init__(schedule, sensors, keys, at_start=3, per_measurement=9)
+        super().__init__(group, at_start=3, per_measurement=9)
         self.lag_ns = ns_from_s(model.delay_s)
         if self.lag_ns > _LONGEST_DELAY_NS:
             raise DataFileError(
@@ -85,7 +77,7 @@ class GnssBank(NoisyBank):
             )
         self._frame = frame
         self._denial = denial
-        self._lever_body = position_body
+        self._lever_body = group.position_body
         self._reacquisition_ns = ns_from_s(model.reacquisition_s)
         self._white = _east_north_up(model.horizontal_noise_m, model.vertical_noise_m)
         self._velocity_noise = _east_north_up(
@@ -94,12 +86,12 @@ class GnssBank(NoisyBank):
         self._wander = gauss_markov_of_sigma(
             _east_north_up(model.horizontal_drift_m, model.vertical_drift_m),
             model.drift_correlation_s,
-            schedule.period_ns / NS_PER_S,
+            group.schedule.period_ns / NS_PER_S,
         )
         self._drift = self._wander.sigma * self._noise.start()
-        self._fix_from_ns = np.zeros(len(sensors), np.int64)
-        self._denied_from_ns = np.full(len(sensors), FOREVER_NS)
-        self._denied_until_ns = np.full(len(sensors), FOREVER_NS)
+        self._fix_from_ns = np.zeros(len(group.sensors), np.int64)
+        self._denied_from_ns = np.full(len(group.sensors), FOREVER_NS)
+        self._denied_until_ns = np.full(len(group.sensors), FOREVER_NS)
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> GnssSamples:
         """Returns fix number `k` of all receivers, in the map frame; see `Bank`."""

@@ -8,7 +8,7 @@ constant. A sensor may also warm up: a bias drawn once that decays as exp(-t / t
 from __future__ import annotations
 
 import math
-from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,16 +16,18 @@ from pydantic import NonNegativeFloat, PositiveFloat
 
 from volery.control.fleet import Fleet
 from volery.core.arrays import Array, read_only
-from volery.core.clock import NS_PER_S, Schedule
-from volery.sensors.bank import NoisyBank
+from volery.core.clock import NS_PER_S
+from volery.sensors.bank import NoisyBank, SensorGroup
 from volery.sensors.inertial_kernels import feel_motion
-from volery.sensors.model import SensorModel, load_model
+from volery.sensors.model import SensorModel
 from volery.sensors.noise import gauss_markov
-from volery.sensors.samples import ImuSamples, SensorId
+from volery.sensors.samples import ImuSamples
 
 
 class ImuModel(SensorModel):
     """Noise of an IMU; see the data files in `models/`."""
+
+    sensor_kind: ClassVar = "IMU"
 
     name: str
     gyro_noise_density_rad_s_sqrt_hz: NonNegativeFloat
@@ -42,35 +44,18 @@ class ImuModel(SensorModel):
     warm_up_time_constant_s: PositiveFloat = 60.0
 
 
-def load_imu_model(name: str, folder: Path | None = None) -> ImuModel:
-    """Returns the model by shipped name or `.toml` path, also relative to `folder`."""
-    return load_model(ImuModel, "IMU", name, folder)
-
-
 class ImuBank(NoisyBank):
-    """All IMUs of one model, rate and phase.
-
-    `position_body` (S, 3) m and `attitude_body` (S, 4) are the poses of the sensor frames in the
-    body frame (FLU); `keys` (S,) are the noise streams, or None for sensors without noise.
-    """
+    """All IMUs of one model, rate and phase."""
 
     name = "imu"
     lag_ns = 0
     _SAVED = ("_bias", "_turn_on_bias", "_warm_up_bias", "_start_ns")
 
-    def __init__(
-        self,
-        model: ImuModel,
-        schedule: Schedule,
-        sensors: tuple[SensorId, ...],
-        position_body: Array,
-        attitude_body: Array,
-        keys: NDArray[np.uint64] | None,
-    ) -> None:
-        super().__init__(schedule, sensors, keys, at_start=12, per_measurement=12)
-        self._position_body = position_body
-        self._body_from_sensor = attitude_body
-        dt = schedule.period_ns / NS_PER_S
+    def __init__(self, model: ImuModel, group: SensorGroup) -> None:
+        super().__init__(group, at_start=12, per_measurement=12)
+        self._position_body = group.position_body
+        self._body_from_sensor = group.attitude_body
+        count, dt = len(group.sensors), group.schedule.period_ns / NS_PER_S
         self._white = _axes(
             model.gyro_noise_density_rad_s_sqrt_hz, model.accel_noise_density_m_s2_sqrt_hz
         ) / math.sqrt(dt)
@@ -82,11 +67,11 @@ class ImuBank(NoisyBank):
         self._turn_on = _axes(model.gyro_turn_on_bias_rad_s, model.accel_turn_on_bias_m_s2)
         self._cold = _axes(model.gyro_warm_up_bias_rad_s, model.accel_warm_up_bias_m_s2)
         self._warm_up_s = model.warm_up_time_constant_s
-        self._bias = np.zeros((len(sensors), 6))
-        self._turn_on_bias = np.zeros((len(sensors), 6))
-        self._warm_up_bias = np.zeros((len(sensors), 6))
-        self._start_ns = np.zeros(len(sensors), np.int64)
-        self._switch_on(np.arange(len(sensors)), 0)
+        self._bias = np.zeros((count, 6))
+        self._turn_on_bias = np.zeros((count, 6))
+        self._warm_up_bias = np.zeros((count, 6))
+        self._start_ns = np.zeros(count, np.int64)
+        self._switch_on(np.arange(count), 0)
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> ImuSamples:
         """Returns rates (rad/s) and specific forces (m/s^2), (S, 3) each, in the sensor frames.

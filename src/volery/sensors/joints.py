@@ -7,7 +7,7 @@ import numpy as np
 from volery.control.fleet import Fleet
 from volery.core.arrays import read_only
 from volery.core.clock import NS_PER_S, Schedule
-from volery.sensors.bank import Memoryless
+from volery.sensors.bank import Memoryless, SensorGroup
 from volery.sensors.mount import Mount, nodding_angle_at
 from volery.sensors.samples import JointAngles, SensorId
 
@@ -22,8 +22,7 @@ class JointBank(Memoryless):
     lag_ns = 0
 
     def __init__(self, sensors: tuple[SensorId, ...], mounts: tuple[Mount, ...]) -> None:
-        self.schedule = Schedule.from_hz(_RATE_HZ)
-        self.sensors = sensors
+        super().__init__(SensorGroup(Schedule.from_hz(_RATE_HZ), sensors, mounts))
         self._mounts = mounts
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> JointAngles:  # noqa: ARG002

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
 from volery.core.arrays import read_only
-from volery.core.clock import Schedule
 from volery.core.errors import DataFileError
-from volery.sensors.bank import NoisyBank
+from volery.sensors.bank import NoisyBank, SensorGroup
 from volery.sensors.lidar import make_batch, sample_echoes, stack_mounts
 from volery.sensors.lidar_model import LidarModel
-from volery.sensors.mount import Mount
 from volery.sensors.particle_echoes import ParticleTable, particle_table
-from volery.sensors.samples import LidarScans, SensorId
+from volery.sensors.samples import LidarScans
 from volery.vehicle.pose_history import KEPT_NS
 from volery.world.scene import Scene
 from volery.world.weather import CLEAR_AIR, Particles
@@ -25,10 +22,9 @@ _LONGEST_SWEEP_NS = KEPT_NS - 10_000_000
 class LidarBank(NoisyBank):
     """Sweeps all LIDARs of one model and phase in one batch of rays.
 
-    `keys` (S,) are the noise streams, or None for exact LIDARs. A scan is sampled `lag_ns` after
-    its first beam, when its sweep has ended, from the fleet's pose history. Noise depends on the
-    number of a LIDAR's scan since its start; warm-up and the pattern of a rosette, which never
-    repeats, depend on the clock.
+    A scan is sampled `lag_ns` after its first beam, when its sweep has ended, from the fleet's pose
+    history. Noise depends on the number of a LIDAR's scan since its start; warm-up and the pattern
+    of a rosette, which never repeats, depend on the clock.
 
     Raises `DataFileError` if a sweep takes longer than the pose history reaches.
     """
@@ -36,27 +32,19 @@ class LidarBank(NoisyBank):
     name = "lidar"
 
     def __init__(
-        self,
-        model: LidarModel,
-        schedule: Schedule,
-        sensors: tuple[SensorId, ...],
-        mounts: tuple[Mount, ...],
-        keys: NDArray[np.uint64] | None,
-        scene: Scene,
-        *,
-        intensities: bool = False,
+        self, model: LidarModel, group: SensorGroup, scene: Scene, *, intensities: bool = False
     ) -> None:
         if model.sweep_duration_ns > _LONGEST_SWEEP_NS:
             raise DataFileError(
                 f"LIDAR model '{model.name}': a sweep may take "
                 f"{_LONGEST_SWEEP_NS / 1e9} s at most, not {model.sweep_duration_ns / 1e9}"
             )
-        super().__init__(schedule, sensors, keys)
+        super().__init__(group)
         self.lag_ns = model.sweep_duration_ns
-        self._model = model if keys is not None else model.without_noise()
+        self._model = model if group.keys is not None else model.without_noise()
         self._scene = scene
         self._intensities = intensities
-        self._mounts = stack_mounts(mounts)
+        self._mounts = stack_mounts(group.mounts)
         self._particles: Particles = CLEAR_AIR
         self._air: ParticleTable | None = None
 

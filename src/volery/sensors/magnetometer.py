@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,18 +11,20 @@ from pydantic import NonNegativeFloat, PositiveFloat
 
 from volery.control.fleet import Fleet
 from volery.core.arrays import Array, read_only
-from volery.core.clock import NS_PER_S, Schedule
-from volery.sensors.bank import NoisyBank
+from volery.core.clock import NS_PER_S
+from volery.sensors.bank import NoisyBank, SensorGroup
 from volery.sensors.inertial_kernels import feel_vector
-from volery.sensors.model import SensorModel, load_model
+from volery.sensors.model import SensorModel
 from volery.sensors.noise import gauss_markov
-from volery.sensors.samples import MagneticSamples, SensorId
+from volery.sensors.samples import MagneticSamples
 
 Row = tuple[float, float, float]
 
 
 class MagnetometerModel(SensorModel):
     """Iron and noise; see the data files in `models/`."""
+
+    sensor_kind: ClassVar = "magnetometer"
 
     name: str
     noise_density_t_sqrt_hz: NonNegativeFloat
@@ -34,41 +36,26 @@ class MagnetometerModel(SensorModel):
     """Distortion of the outer field by magnetisable parts, in the sensor frame."""
 
 
-def load_magnetometer_model(name: str, folder: Path | None = None) -> MagnetometerModel:
-    """Returns the model by shipped name or `.toml` path, also relative to `folder`."""
-    return load_model(MagnetometerModel, "magnetometer", name, folder)
-
-
 class MagnetometerBank(NoisyBank):
     """All magnetometers of one model, rate and phase.
 
-    `attitude_body` (S, 4) is the rotation of each sensor frame in the body frame (FLU); `keys` (S,)
-    are the noise streams, or None for sensors without noise; `field_map` (3,) T is the uniform
-    field in the map frame.
+    `field_map` (3,) T is the uniform field in the map frame.
     """
 
     name = "magnetometer"
     lag_ns = 0
     _SAVED = ("_bias",)
 
-    def __init__(
-        self,
-        model: MagnetometerModel,
-        schedule: Schedule,
-        sensors: tuple[SensorId, ...],
-        attitude_body: Array,
-        keys: NDArray[np.uint64] | None,
-        field_map: Array,
-    ) -> None:
-        super().__init__(schedule, sensors, keys, per_measurement=6)
-        self._body_from_sensor = attitude_body
+    def __init__(self, model: MagnetometerModel, group: SensorGroup, field_map: Array) -> None:
+        super().__init__(group, per_measurement=6)
+        self._body_from_sensor = group.attitude_body
         self._field_map = field_map
         self._hard_iron = np.array(model.hard_iron_t)
         self._soft_iron = np.array(model.soft_iron)
-        dt = schedule.period_ns / NS_PER_S
+        dt = group.schedule.period_ns / NS_PER_S
         self._white = model.noise_density_t_sqrt_hz / math.sqrt(dt)
         self._wander = gauss_markov(model.random_walk_t_s_sqrt_hz, model.bias_correlation_s, dt)
-        self._bias = np.zeros((len(sensors), 3))
+        self._bias = np.zeros((len(group.sensors), 3))
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> MagneticSamples:
         """Returns fields (S, 3) T in the sensor frames, of measurement `k`; see `Bank`."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,18 +11,19 @@ from pydantic import NonNegativeFloat
 from volery.control.fleet import Fleet
 from volery.core import rotations
 from volery.core.arrays import Array, read_only
-from volery.core.clock import Schedule
 from volery.core.rows import in_one_piece
-from volery.sensors.bank import Memoryless, NoisyBank, uav_rows
+from volery.sensors.bank import Memoryless, NoisyBank, SensorGroup
 from volery.sensors.inertial_kernels import body_twists
-from volery.sensors.model import SensorModel, load_model
-from volery.sensors.samples import OdometrySamples, SensorId
+from volery.sensors.model import SensorModel
+from volery.sensors.samples import OdometrySamples
 
 _NUMBERS_A_SAMPLE = 10
 
 
 class OdometryModel(SensorModel):
     """Drift and noise; see the data files in `models/`."""
+
+    sensor_kind: ClassVar = "odometry"
 
     name: str
     horizontal_drift_m_sqrt_m: NonNegativeFloat
@@ -32,41 +33,28 @@ class OdometryModel(SensorModel):
     rate_noise_rad_s: NonNegativeFloat
 
 
-def load_odometry_model(name: str, folder: Path | None = None) -> OdometryModel:
-    """Returns the model by shipped name or `.toml` path, also relative to `folder`."""
-    return load_model(OdometryModel, "odometry", name, folder)
-
-
 class OdometryBank(NoisyBank):
     """All odometry sources of one model, rate and phase.
 
     Each displacement is integrated as the source measures it: rotated by its yaw error so far, plus
     a random part. Both errors are random walks over the distance flown; the odometry frame
-    coincides with the map at the start and at every reset. `keys` (S,) are the noise streams, or
-    None for perfect odometry.
+    coincides with the map at the start and at every reset. Without noise it is perfect.
     """
 
     name = "odometry"
     lag_ns = 0
     _SAVED = ("_position_odom", "_yaw_error", "_flown", "_last_position")
 
-    def __init__(
-        self,
-        model: OdometryModel,
-        schedule: Schedule,
-        sensors: tuple[SensorId, ...],
-        keys: NDArray[np.uint64] | None,
-        fleet: Fleet,
-    ) -> None:
-        super().__init__(schedule, sensors, keys, per_measurement=_NUMBERS_A_SAMPLE)
+    def __init__(self, model: OdometryModel, group: SensorGroup, fleet: Fleet) -> None:
+        super().__init__(group, per_measurement=_NUMBERS_A_SAMPLE)
         self._taken = in_one_piece(self._rows)
         self._fleet = fleet
         horizontal, vertical = model.horizontal_drift_m_sqrt_m, model.vertical_drift_m_sqrt_m
         self._drift = np.array([horizontal, horizontal, vertical, model.yaw_drift_rad_sqrt_m])
         self._twist_noise = np.repeat([model.velocity_noise_m_s, model.rate_noise_rad_s], 3)
         self._position_odom = fleet.state.position_map[self._rows].copy()
-        self._yaw_error = np.zeros(len(sensors))
-        self._flown = np.zeros(len(sensors))
+        self._yaw_error = np.zeros(len(group.sensors))
+        self._flown = np.zeros(len(group.sensors))
         self._last_position = self._position_odom.copy()
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> OdometrySamples:
@@ -122,10 +110,8 @@ class GroundTruthBank(Memoryless):
     name = "ground_truth"
     lag_ns = 0
 
-    def __init__(self, schedule: Schedule, sensors: tuple[SensorId, ...]) -> None:
-        self.schedule = schedule
-        self.sensors = sensors
-        self._rows = uav_rows(sensors)
+    def __init__(self, group: SensorGroup) -> None:
+        super().__init__(group)
         self._taken = in_one_piece(self._rows)
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> OdometrySamples:  # noqa: ARG002

@@ -37,7 +37,13 @@ def sample_of(batch: Samples, row: Row, mount: Mount) -> SensorSample:
 
 
 def joined(parts: Sequence[tuple[Samples, NDArray[np.int64]]]) -> Samples:
-    """Returns one batch of the given rows of batches of equal kind and time; its arrays are new."""
+    """Returns one batch of the given rows of batches of equal kind and time.
+
+    Its arrays are read-only, and new unless the rows are one whole batch.
+    """
+    first, rows = parts[0]
+    if len(parts) == 1 and np.array_equal(rows, np.arange(len(first.sensors))):
+        return first
     arrays = {
         name: read_only(np.concatenate([getattr(batch, name)[rows] for batch, rows in parts]))
         for name, value in vars(parts[0][0]).items()

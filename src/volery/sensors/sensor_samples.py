@@ -23,6 +23,7 @@ from volery.core.arrays import Array
 from volery.core.clock import s_from_ns
 from volery.core.geodesy import LocalFrame
 from volery.sensors.cameras.cloud import organised_points
+from volery.sensors.cameras.depth_units import millimetres
 from volery.sensors.cameras.model import CameraModel
 from volery.sensors.lidar_model import LidarModel
 from volery.sensors.mount import Mount
@@ -49,50 +50,51 @@ class _SensorSample:
 
 @dataclass(frozen=True, eq=False)
 class LidarSample(_SensorSample):
-    """One sweep of a LIDAR; `stamp_ns` is the time of the first beam."""
+    """One sweep of a LIDAR with N beams; `stamp_ns` is the time of the first beam."""
 
     echoes: NDArray[np.float32]
-    """(E, beams) m, nearest first; +inf no echo, -inf below the minimum range (REP-117)."""
+    """(E, N) m, nearest first; +inf: no echo, -inf: below the minimum range (REP-117)."""
     echo_intensities: NDArray[np.float32]
-    """(E, beams), 0 without an echo; (0, beams) if the LIDAR measures none."""
+    """(E, N) numbers, 0 without an echo; (0, N) if the LIDAR measures none."""
     model: LidarModel
+    """Model of the LIDAR: scan pattern, range, noise."""
     number: int
     """Number of the sweep, counted from 0."""
 
     @property
     def ranges(self) -> NDArray[np.float32]:
-        """(beams,) ranges of the first echoes, m; +inf no echo, -inf below the minimum range."""
+        """(N,) ranges of the first echoes, m; +inf no echo, -inf below the minimum range."""
         return self.echoes[..., 0, :]
 
     @property
     def intensities(self) -> NDArray[np.float32]:
-        """(beams,) intensities of the first echoes; empty if the LIDAR measures none."""
+        """(N,) intensities of the first echoes, numbers; empty if the LIDAR measures none."""
         if not self.echo_intensities.shape[-2]:
             return self.echo_intensities.reshape(*self.echo_intensities.shape[:-2], -1)
         return self.echo_intensities[..., 0, :]
 
     @property
     def directions(self) -> Array:
-        """(beams, 3) unit vectors of the beams in the sensor's frame, x forward, y left, z up."""
+        """(N, 3) directions of the beams, 1 m long, in the sensor's frame (FLU)."""
         return self.model.scan.directions(self.number).T
 
     @property
     def beam_times_ns(self) -> NDArray[np.int64]:
-        """(beams,) times of the beams after `stamp_ns`, ns."""
+        """(N,) times of the beams after `stamp_ns`, ns."""
         return self.model.scan.time_ns
 
     def points_sensor(self) -> Array:
-        """Returns the first echoes as points (N, 3), m, in the sensor's frame, in order of beams.
+        """Returns the first echoes as points (M, 3), m, in the sensor's frame, in order of beams.
 
-        In vectorized environments (K, beams, 3), nan for beams without an echo.
+        In vectorized environments (K, N, 3), nan for beams without an echo.
         """
         return _with_echo(self._all_points())
 
     def points_base(self) -> Array:
-        """Returns the first echoes as points (N, 3), m, in `base_link` (FLU), in order of beams.
+        """Returns the first echoes as points (M, 3), m, in `base_link` (FLU), in order of beams.
 
         A nodding mount is corrected for each beam's own time, the UAV's motion during the sweep is
-        not. In vectorized environments (K, beams, 3), nan for beams without an echo.
+        not. In vectorized environments (K, N, 3), nan for beams without an echo.
         """
         points = self._all_points()
         if self.mount.nods:
@@ -129,16 +131,24 @@ class CameraSample(_SensorSample):
     material: NDArray[np.uint8]
     """(H, W) `world.materials.Material`."""
     model: CameraModel
+    """Model of the camera: size, lens, noise."""
 
     @property
     def intrinsics(self) -> Array:
-        """(3, 3) camera matrix K, pixels; pixel centres are at integer coordinates."""
+        """(3, 3) camera matrix K, numbers of pixels; pixel centres are at integer coordinates."""
         return self.model.matrix
 
     @property
     def distortion(self) -> Array:
         """(5,) coefficients k1, k2, p1, p2, k3 of OpenCV's lens model."""
         return np.array(self.model.distortion, dtype=np.float64)
+
+    def depth_mm(self) -> NDArray[np.uint16]:
+        """Returns the depth (H, W) in whole mm, 0 for unknown or beyond 65.535 m (REP 118).
+
+        The array is new; `PIL.Image.fromarray` and `cv2.imwrite` save it as a PNG of 16 bits.
+        """
+        return millimetres(self.depth)
 
     def points_optical(self) -> NDArray[np.float32]:
         """Returns the points of the pixels (H, W, 3), m, in the optical frame.
@@ -168,6 +178,7 @@ class RangeSample(_SensorSample):
     range: Number
     """Distance, m; +inf nothing in range, -inf below the minimum range (REP-117)."""
     field_of_view_rad: float
+    """Full angle of the cone, rad."""
     min_m: float
     """Minimum range, m."""
     max_m: float
@@ -194,6 +205,7 @@ class PoseSample(_SensorSample):
     twist_variance: Array
     """(6,) linear (m/s)^2 and angular (rad/s)^2, body frame."""
     is_ground_truth: bool
+    """Whether it is the true motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,7 +213,7 @@ class GnssSample(_SensorSample):
     """Fix of a GNSS receiver; `stamp_ns` is the time of the position, before the delay."""
 
     has_fix: bool | NDArray[np.bool_]
-    """Whether the receiver has a fix."""
+    """Whether the receiver has a fix; in vectorized environments a mask (K,)."""
     position_map: Array
     """(3,) m; nan without a fix."""
     velocity_map: Array
@@ -250,7 +262,7 @@ class BatterySample(_SensorSample):
     capacity_ah: Number
     """Capacity, A h."""
     cells: int | NDArray[np.int64]
-    """Cells in series."""
+    """Number of cells in series; in vectorized environments numbers (K,)."""
     level: BatteryLevel | NDArray[np.int64]
     """Battery level; in vectorized environments its numbers (K,)."""
 

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from volery.control.fleet import Fleet
 from volery.core import rotations
 from volery.core.arrays import Array, read_only
-from volery.core.clock import Schedule
-from volery.sensors.bank import NoisyBank
-from volery.sensors.model import SensorModel, load_model
-from volery.sensors.samples import RangeSamples, SensorId
+from volery.sensors.bank import NoisyBank, SensorGroup
+from volery.sensors.model import SensorModel
+from volery.sensors.samples import RangeSamples
 from volery.world.scene import Scene
 
 _RINGS = ((0.0, 1), (0.5, 6), (1.0, 12))
@@ -25,6 +23,8 @@ _RINGS = ((0.0, 1), (0.5, 6), (1.0, 12))
 class SonarModel(SensorModel):
     """Range, cone and noise; see the data files in `models/`."""
 
+    sensor_kind: ClassVar = "sonar"
+
     name: str
     range_min_m: NonNegativeFloat
     range_max_m: PositiveFloat
@@ -33,36 +33,18 @@ class SonarModel(SensorModel):
     noise_m: NonNegativeFloat
 
 
-def load_sonar_model(name: str, folder: Path | None = None) -> SonarModel:
-    """Returns the model by shipped name or `.toml` path, also relative to `folder`."""
-    return load_model(SonarModel, "sonar", name, folder)
-
-
 class SonarBank(NoisyBank):
-    """All sonars of one model, rate and phase, aimed along their frame's x axis.
-
-    `position_body` (S, 3) m and `attitude_body` (S, 4) are the poses of the sensor frames in the
-    body frame (FLU); `keys` (S,) are the noise streams, or None for sensors without noise.
-    """
+    """All sonars of one model, rate and phase, aimed along their frame's x axis."""
 
     name = "sonar"
     lag_ns = 0
 
-    def __init__(
-        self,
-        model: SonarModel,
-        schedule: Schedule,
-        sensors: tuple[SensorId, ...],
-        position_body: Array,
-        attitude_body: Array,
-        keys: NDArray[np.uint64] | None,
-        scene: Scene,
-    ) -> None:
-        super().__init__(schedule, sensors, keys, per_measurement=1)
+    def __init__(self, model: SonarModel, group: SensorGroup, scene: Scene) -> None:
+        super().__init__(group, per_measurement=1)
         self._model = model
         self._scene = scene
-        self._position_body = position_body
-        self._body_from_sensor = attitude_body
+        self._position_body = group.position_body
+        self._body_from_sensor = group.attitude_body
         rounding = model.resolution_m**2 / 12.0
         self._variance = model.noise_m**2 + rounding if self._noise.enabled else 0.0
         self._cone = _cone_directions(math.radians(model.field_of_view_deg) / 2.0)

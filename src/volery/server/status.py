@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from importlib.metadata import version
 from typing import Any
 
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
-from volery import __version__
 from volery.server.auth import Role
 from volery.server.server_state import ServerActivity, ServerState
 
@@ -20,7 +20,11 @@ async def status(request: Request) -> Response:
 
 
 def _status(site: ServerState, role: Role | None) -> dict[str, Any]:
-    told: dict[str, Any] = {"version": __version__, "role": role, "token_needed": role is None}
+    told: dict[str, Any] = {
+        "version": version("volery"),
+        "role": role,
+        "token_needed": role is None,
+    }
     if role is None:
         nothing = {"state": None, "scenario": None, "description": "", "message": "", "world": None}
         return nothing | told

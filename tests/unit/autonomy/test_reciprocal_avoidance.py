@@ -10,7 +10,6 @@ from volery.autonomy.planning.reciprocal_avoidance import (
     HalfPlane,
     Neighbour,
     Separation,
-    avoiding_velocity,
     half_planes,
     violation,
 )
@@ -22,6 +21,48 @@ SEPARATION = Separation(radius_m=2.0, horizon_s=4.0)
 
 def at(x, y, vx=0.0, vy=0.0, z=0.0, time_ns=0):
     return Neighbour(np.array([x, y, z]), np.array([vx, vy, 0.0]), time_ns)
+
+
+def avoiding_velocity(planes, preferred, top_speed):
+    """Returns the allowed velocity (2,) nearest to the preferred one; else the least violation.
+
+    With few constraints the optimum lies at the preferred velocity, at its projection on one of the
+    lines or on the circle of `top_speed`, or at an intersection of two of them: all are tried. If
+    no velocity is allowed, the fastest one out of each half plane is tried as well.
+    """
+    tries = [preferred, np.zeros(2)]
+    tries += [plane.point + _along(plane) * _foot(plane, preferred) for plane in planes]
+    for k, plane in enumerate(planes):
+        tries += [top_speed * plane.normal, *_on_circle(plane, top_speed)]
+        for other in planes[:k]:
+            across = float(_along(plane) @ other.normal)
+            if abs(across) > 1e-9:
+                share = float((other.point - plane.point) @ other.normal) / across
+                tries.append(plane.point + _along(plane) * share)
+    speed = np.linalg.norm(preferred)
+    if speed > 1e-9:
+        tries.append(preferred * min(1.0, top_speed / speed))
+    velocities = np.array([v for v in tries if np.linalg.norm(v) <= top_speed + 1e-9])
+    worst = np.maximum(violation(planes, velocities), 1e-9)
+    away = np.linalg.norm(velocities - preferred, axis=1)
+    return np.asarray(velocities[np.lexsort((away, np.round(worst, 9)))[0]])
+
+
+def _along(plane):
+    return np.array([plane.normal[1], -plane.normal[0]])
+
+
+def _foot(plane, velocity):
+    return float((velocity - plane.point) @ _along(plane))
+
+
+def _on_circle(plane, radius):
+    along = _along(plane)
+    half, rest = float(plane.point @ along), float(plane.point @ plane.point) - radius * radius
+    root = half * half - rest
+    if root < 0.0:
+        return []
+    return [plane.point + along * (-half + sign * math.sqrt(root)) for sign in (-1.0, 1.0)]
 
 
 def step(places, velocities, goals, seconds=0.2, speed=2.0):

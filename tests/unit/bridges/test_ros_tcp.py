@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import json
+import re
 import time
+from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -207,6 +210,25 @@ def test_claims_cost_no_memory():
     for parser in parsers:
         parser.feed(slow_number(2) + b"/a" + slow_number(64 << 20) + bytes(20))
     assert resident_bytes() - before < 32 << 20
+
+
+def test_large_payloads_need_no_huge_pages():
+    """The system compacts memory for each of them, and no other client is served meanwhile."""
+    (frame,) = RosTcpFrameParser().feed(ros_tcp.frame("/a", bytes(range(256)) * (32 << 12)))
+    assert huge_page_bytes(frame.payload) == 0
+    assert bytes(frame.payload[-256:]) == bytes(range(256))
+
+
+def huge_page_bytes(memory):
+    """Returns the bytes of huge pages in the mapping that holds the middle of `memory`."""
+    address = np.frombuffer(memory, np.uint8).ctypes.data + len(memory) // 2
+    inside = False
+    for line in Path("/proc/self/smaps").read_text().splitlines():
+        if bounds := re.match("([0-9a-f]+)-([0-9a-f]+) ", line):
+            inside = int(bounds[1], 16) <= address < int(bounds[2], 16)
+        elif inside and line.startswith("AnonHugePages:"):
+            return 1024 * int(line.split()[1])
+    raise AssertionError("no mapping holds the memory")
 
 
 def resident_bytes():

@@ -4,6 +4,7 @@ import json
 import logging
 import subprocess
 import sys
+from datetime import datetime, timedelta
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,7 +14,7 @@ from fake_simulation import FakeSimulation
 from typer.testing import CliRunner
 
 from volery.bridges.logs.log_writer import open_log
-from volery.cli import doctor, start
+from volery.cli import bench, doctor, start
 from volery.cli.app import app
 from volery.cli.error_reporting import guarded, word_logs
 from volery.core.errors import VoleryError
@@ -129,11 +130,6 @@ def test_an_interrupt_while_the_command_loads_is_one_line(
         start.main()
     assert ended.value.code == 130
     assert capsys.readouterr().err == "stopped\n"
-
-
-def test_version() -> None:
-    result = runner.invoke(app, ["--version"])
-    assert result.stdout == "volery 0.1.0\n"
 
 
 def test_list() -> None:
@@ -260,6 +256,39 @@ def test_bench(tmp_path: Path) -> None:
     assert "| `other` | 3 | reported |" in text
     table = runner.invoke(app, ["bench", "dynamics"]).stdout
     assert "missed" in table
+
+
+def test_all_benches_make_one_document_with_build_machine_and_versions(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = {**describe_machine(), **describe_versions()}
+    asked: list[str] = []
+
+    def measure(name: str) -> Result:
+        asked.append(name)
+        return Result(name, here, {"figure": 1.0})
+
+    monkeypatch.setattr(bench, "_in_own_process", measure)
+    out = tmp_path / "bench.json"
+    result = runner.invoke(app, ["bench", "--all", "--json", "--out", str(out)])
+    assert result.exit_code == 0, result.stderr
+    assert asked == [name for name, each in registry.BENCHES.items() if each.in_all]
+    document = json.loads(result.stdout)
+    assert json.loads(out.read_text()) == document
+    assert list(document) == ["build", "date", "results"]
+    assert document["build"]["libraries"].items() <= here.items()
+    assert datetime.fromisoformat(document["date"]).utcoffset() == timedelta(0)
+    assert [each["bench"] for each in document["results"]] == asked
+    assert read_results(out) == [Result(name, here, {"figure": 1.0}) for name in asked]
+    assert render(read_results(out)).count("| `figure` | 1 | reported |") == len(asked)
+
+
+@pytest.mark.usefixtures("quick_bench")
+@pytest.mark.parametrize("words", [[], ["lidar", "--all"]])
+def test_a_bench_is_named_or_all(words: list[str]) -> None:
+    result = runner.invoke(app, ["bench", *words])
+    assert result.exit_code == 2
+    assert "--all" in result.stderr
 
 
 def test_bench_mistakes(tmp_path: Path) -> None:

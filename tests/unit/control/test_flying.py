@@ -320,7 +320,7 @@ def test_pair_strike_keeps_momentum():
     masses = np.array([[F450.body.mass_kg], [3.0]])
     fleet.state.velocity_map[:] = [[8, 1, 0], [-4, 0, 1]]
     before = (masses * fleet.state.velocity_map).sum(axis=0)
-    fleet.strike_pair(0, 1, (-1, 0, 0), 0.3, 0.5)
+    fleet.strike(0, (-1, 0, 0), 0.3, 0.5, other=1)
     after = (masses * fleet.state.velocity_map).sum(axis=0)
     np.testing.assert_allclose(after, before, atol=1e-12)
     parting = fleet.state.velocity_map[1, 0] - fleet.state.velocity_map[0, 0]

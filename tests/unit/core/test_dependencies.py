@@ -2,6 +2,7 @@
 
 import ast
 import re
+import subprocess
 import sys
 import tomllib
 from importlib.metadata import packages_distributions
@@ -95,3 +96,14 @@ def test_what_comes_from_elsewhere_is_still_imported():
 def test_late_imports_and_names_in_strings_count():
     code = "def f(): import a.b; import_module(f'c.{x}'); u.find_spec('d')\nfrom e import g"
     assert sorted(module_names(ast.parse(code))) == ["a.b", "c.", "d", "e"]
+
+
+def test_a_flight_loads_only_what_its_scenario_uses():
+    code = (
+        "import sys, volery\n"
+        "with volery.Simulation(volery.load_scenario('hover')) as simulation:\n"
+        "    simulation.run(0.01)\n"
+        "unused = {'matplotlib', 'shapely', 'trimesh', 'PIL', 'starlette'} & set(sys.modules)\n"
+        "assert not unused, unused\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

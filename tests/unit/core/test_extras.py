@@ -12,6 +12,8 @@ from volery.core.errors import VoleryError
 
 ROOT = Path(__file__).parents[3]
 EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+FOR_DEVELOPERS = {"test", "lint", "bench", "docs"}
+"""Extras that are not part of `all`: tools to change, measure and document Volery."""
 
 
 def loop_closures():
@@ -38,6 +40,12 @@ def mavlink():
     dialect.__wrapped__()
 
 
+def checksums():
+    from volery.mavlink.codec import _crc
+
+    _crc.__wrapped__()
+
+
 def identification():
     from volery.control.identification import identify
     from volery.vehicle.airframe import load_airframe
@@ -58,6 +66,19 @@ def ros2(middleware):
     return lambda: join_ros2(Ros2Environment(middleware))
 
 
+def tables():
+    from volery.core.data_frames import data_frame
+
+    data_frame({})
+
+
+def progress_bars():
+    from volery.runtime.monitoring.progress_bar import progress_bar
+
+    with progress_bar("hover"):
+        pass
+
+
 def browser():
     from volery_benchmarks.page.browser import open_browser
 
@@ -65,20 +86,33 @@ def browser():
         pass
 
 
-@pytest.mark.parametrize(
-    ("module", "package", "extra", "use"),
-    [
-        ("gtsam", "gtsam", "autonomy", loop_closures),
-        ("pyoctomap", "pyoctomap", "autonomy", mapping),
-        ("ompl", "ompl", "autonomy", planning),
-        ("pymavlink.dialects.v20", "pymavlink", "mavlink", mavlink),
-        ("scipy", "scipy", "identify", identification),
-        ("scipy.signal", "scipy", "identify", answers_of_loops),
-        ("cyclonedds", "cyclonedds", "ros2", ros2("dds")),
-        ("zenoh", "eclipse-zenoh", "ros2", ros2("zenoh")),
-        ("playwright.sync_api", "playwright", "bench", browser),
-    ],
-)
+USES = [
+    ("gtsam", "gtsam", "autonomy", loop_closures),
+    ("pyoctomap", "pyoctomap", "autonomy", mapping),
+    ("ompl", "ompl", "autonomy", planning),
+    ("pymavlink.dialects.v20", "pymavlink", "mavlink", mavlink),
+    ("fastcrc", "fastcrc", "mavlink", checksums),
+    ("scipy", "scipy", "identify", identification),
+    ("scipy.signal", "scipy", "identify", answers_of_loops),
+    ("cyclonedds", "cyclonedds", "ros2", ros2("dds")),
+    ("zenoh", "eclipse-zenoh", "ros2", ros2("zenoh")),
+    ("pandas", "pandas", "pandas", tables),
+    ("tqdm.auto", "tqdm", "progress", progress_bars),
+    ("playwright.sync_api", "playwright", "bench", browser),
+]
+"""Modules, their packages and extras, and a use of each."""
+WORKS_WITHOUT = {"open3d"}
+"""Packages without which only a comparison is left out."""
+
+
+def test_every_package_of_an_extra_is_in_the_table():
+    extras = EXTRAS.keys() - {"all", "test", "lint", "docs"}
+    packages = {(re.match(r"[\w-]+", each)[0], extra) for extra in extras for each in EXTRAS[extra]}
+    listed = {(package, extra) for _, package, extra, _ in USES}
+    assert {pair for pair in packages if pair[0] not in WORKS_WITHOUT} == listed
+
+
+@pytest.mark.parametrize(("module", "package", "extra", "use"), USES)
 def test_what_lacks_a_package_says_which_command_installs_it(
     monkeypatch, module, package, extra, use
 ):
@@ -89,13 +123,21 @@ def test_what_lacks_a_package_says_which_command_installs_it(
     with pytest.raises(VoleryError) as caught:
         use()
     assert re.search(rf'needs? {package}: pip install "volery\[{extra}\]"', str(caught.value))
+    assert "\n" not in str(caught.value)
+
+
+def test_all_is_the_union_of_the_extras_for_users():
+    (union,) = EXTRAS["all"]
+    users = EXTRAS.keys() - FOR_DEVELOPERS - {"all"}
+    assert union == f"volery[{','.join(sorted(users))}]"
 
 
 @pytest.mark.parametrize("name", ["README.md", "docs/extras.md"])
 def test_readme_and_docs_list_all_extras(name):
     table = [line for line in (ROOT / name).read_text().splitlines() if line.startswith("| `")]
     listed = [each for line in table for each in re.findall(r"`(\w+)`", line.split("|")[1])]
-    assert sorted(set(listed) & set(EXTRAS)) == sorted(EXTRAS)
+    assert EXTRAS.keys() - {"all"} <= set(listed)
+    assert "volery[all]" in (ROOT / "docs/extras.md").read_text()
 
 
 def test_docs_name_only_extras_that_exist():

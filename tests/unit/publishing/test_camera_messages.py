@@ -9,6 +9,7 @@ import pytest
 from volery.core.errors import ScenarioError
 from volery.publishing import image_codecs
 from volery.scenario.load import parse_scenario
+from volery.sensors.cameras.depth_units import millimetres
 from volery.sensors.cameras.model import CameraModel
 
 TYPES = {"rgb8": ("u1", 3), "bgr8": ("u1", 3), "mono8": ("u1", 1), "32FC1": ("f4", 1),
@@ -85,7 +86,7 @@ def test_depth_in_millimetres(look):
 
 def test_millimetres_of_what_is_not_known_are_zero():
     depth = np.array([[np.nan, np.inf, -np.inf, 65.535, 65.536, 1.0004]], np.float32)
-    np.testing.assert_array_equal(image_codecs.millimetres(depth), [[0, 0, 0, 65535, 0, 1000]])
+    np.testing.assert_array_equal(millimetres(depth), [[0, 0, 0, 65535, 0, 1000]])
 
 
 def test_jpeg_is_the_picture_within_its_loss(look):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from volery.report.flight_data import FlightData, FlightEvent, Ground, LidarMap, Trees, UavTrack
+from volery.figures.flight_data import FlightData, FlightEvent, Ground, LidarMap, Trees, UavTrack
 
 FORESTS = Path(__file__).parents[3] / "src/volery/world/data/forests"
 

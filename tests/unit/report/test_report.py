@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from report_sample import sample_flight
 
-from volery.report import charts, maps
-from volery.report.flight_data import FlightData, Ground
+from volery.figures import charts, maps
+from volery.figures.flight_data import FlightData, Ground
 from volery.report.page import ReportError, check_folder, page, write_report
 from volery.report.voxels import VoxelSet
 

@@ -204,7 +204,7 @@ def test_collects_a_flight(tmp_path: Path) -> None:
 
 
 def test_trees_are_sized_by_their_crowns() -> None:
-    from volery.report.collect import trees_of
+    from volery.figures.trees import trees_of
 
     ring = np.array([[2.0, 0, 3], [0, 2.0, 3], [-2.0, 0, 3]], np.float32)
     leaves = SimpleNamespace(vertices=ring)

@@ -53,12 +53,12 @@ def test_a_run_settles_futures_and_calls_back(flying):
     assert not future.done()
     assert not future.cancelled()
     assert uav.pending_command is future
-    with pytest.raises(CommandError, match="go_to of uav1 is not done: GO_TO at .*call wait"):
+    with pytest.raises(CommandError, match=r"go_to of uav1 is not done: GO_TO at .*call wait"):
         future.result()
     flying.run(10.0)
     assert future.done()
     assert called == [(future, future.result().time_ns)]
-    future.add_done_callback(lambda done: called.append(done))
+    future.add_done_callback(called.append)
     assert called[-1] is future
     assert "is done at" in repr(future)
 
@@ -71,15 +71,14 @@ def test_the_end_does_not_depend_on_how_the_run_is_divided(simulate, flat_data):
         while pieces and not future.done():
             simulation.run(pieces)
         times.append(future.wait().time_ns)
-        hold = simulation.uavs["uav1"].go_to([3.0, 0.0, 2.0])
-        simulation.run_until(lambda at=simulation: at.time_s >= 6.0)
-        assert not hold.done()
-        hold = simulation.uavs["uav1"].hold()
-        while pieces and not hold.done():
+        simulation.run_until(lambda at=simulation: at.time_s >= 4.0)
+        future = simulation.uavs["uav1"].go_to([3.0, 0.0, 2.0])
+        simulation.run_until(lambda at=simulation: at.uavs["uav1"].position_map[0] > 0.5)
+        times.append(simulation.time_ns)
+        while pieces and not future.done():
             simulation.run(pieces)
-        hold.wait()
-        times.append(simulation.uavs["uav1"].mode)
-    assert times[:2] * 3 == times
+        times.append(future.wait().time_ns)
+    assert times[:3] * 3 == times
 
 
 @pytest.mark.parametrize(
@@ -115,7 +114,7 @@ def test_a_rejected_command_leaves_the_present_one(flying):
 
 def test_services_and_topics_replace_it_too(flying):
     future = flying.uavs["uav1"].go_to([5.0, 0.0, 2.0])
-    response = flying.graph.call("/uav1/land", "std_srvs/srv/Trigger", None)
+    response = flying.graph.call("/uav1/land")
     assert response.success
     assert "land replaced it" in str(future.exception())
 
@@ -187,9 +186,9 @@ def test_run_until_conditions_events_and_several_commands(simulate, flat_data):
     event = simulation.run_until("touch_down")
     assert event.kind is EventKind.TOUCH_DOWN
     assert event.time_ns == simulation.time_ns
-    with pytest.raises(WaitTimeoutError, match="event 'collision' did not happen within 0.1 s"):
+    with pytest.raises(WaitTimeoutError, match=r"event 'collision' did not happen within 0.1 s"):
         simulation.run_until(EventKind.COLLISION, 0.1)
-    with pytest.raises(WaitTimeoutError, match="the condition did not happen within 0.1 s"):
+    with pytest.raises(WaitTimeoutError, match=r"the condition did not happen within 0.1 s"):
         simulation.run_until(lambda: False, 0.1)
     for wrong, reason in (("boom", "no event 'boom'"), (3, "takes a function"), ([1], "takes a")):
         with pytest.raises(CommandError, match=reason):
@@ -206,7 +205,7 @@ def test_one_failure_of_several_ends_the_wait(simulate, flat_data):
     simulation = simulate(flat_data)
     futures = simulation.vehicles.take_off(3.0)
     simulation.uavs["uav2"].stop_rotors()
-    with pytest.raises(FlightError, match="take_off of uav2 .* stop_rotors replaced it"):
+    with pytest.raises(FlightError, match=r"take_off of uav2 .* stop_rotors replaced it"):
         simulation.run_until(futures)
 
 
@@ -216,7 +215,7 @@ def test_within_a_tick_nothing_waits_but_callbacks_work(flying):
 
     def on_timer():
         future = uav.go_to([1.0, 0.0, 2.0])
-        with pytest.raises(CommandError, match="advancing already.*add_done_callback"):
+        with pytest.raises(CommandError, match=r"advancing already.*add_done_callback"):
             future.wait()
         with pytest.raises(CommandError, match="advancing already"):
             flying.run_until(future)
@@ -242,6 +241,40 @@ def test_another_thread_waits_for_the_run(flying):
     assert results[0].mode is FlightMode.HOLD
 
 
+def test_a_thread_sees_the_run_of_another_one_that_is_paused_or_has_ended(flying):
+    uav = flying.uavs["uav1"]
+    future = uav.go_to([1.0, 0.0, 2.0])
+    flying.clock.pause()
+    runner = threading.Thread(target=lambda: flying.run(10.0, speed=50.0))
+    runner.start()
+    with pytest.raises(WaitTimeoutError, match="within 0 s"):
+        future.wait(timeout_s=0.0)  # does not advance the simulation of the other thread
+    assert not future.done()
+    flying.clock.resume()
+    assert future.wait().mode is FlightMode.HOLD
+    runner.join()
+    assert uav.land().wait().mode is FlightMode.LANDED  # its thread has ended: this one advances it
+
+
+def test_a_run_that_quits_or_closes_ends_the_wait(flying):
+    uav = flying.uavs["uav1"]
+    future = uav.go_to([9.0, 0.0, 2.0])
+    flying.post(lambda: flying._engine.at(flying.time_ns + 100_000_000, flying.clock.quit))
+    with pytest.raises(CommandError, match=r"the run was quit at \d+\.\d\d s"):
+        future.wait()
+    with pytest.raises(CommandError, match="the run was quit"):
+        flying.run_until(future)
+    flying.close()
+    assert "the simulation was closed" in str(future.exception())
+
+
+def test_callbacks_command_the_next_mode(flying):
+    uav, futures = flying.uavs["uav1"], []
+    uav.go_to([1.0, 0.0, 2.0]).add_done_callback(lambda _: futures.append(uav.land()))
+    flying.run_until("touch_down")
+    assert futures[0].wait().mode is FlightMode.LANDED
+
+
 def test_await_beside_run_async(flying):
     uav = flying.uavs["uav1"]
 
@@ -251,9 +284,9 @@ def test_await_beside_run_async(flying):
         with pytest.raises(CommandError, match="await"):
             uav.hold().wait()
         result = await uav.go_to([1.0, 0.0, 2.0])
+        future = uav.go_to([3.0, 0.0, 2.0])
+        uav.land()
         with pytest.raises(FlightError, match="land replaced it"):
-            future = uav.go_to([3.0, 0.0, 2.0])
-            uav.land()
             await future
         task.cancel()
         with pytest.raises(asyncio.CancelledError):
@@ -267,6 +300,43 @@ def test_await_beside_run_async(flying):
     flying.run(0.1)  # the simulation is free again
 
 
+def test_await_alone_advances_the_simulation(simulate, flat_data):
+    flat_data["uavs"][0]["count"] = 2
+    simulation = simulate(flat_data)
+    first, second = simulation.uavs.values()
+
+    async def fly():
+        await first.take_off(2.0)
+        results = await asyncio.gather(first.go_to([2.0, 0.0, 2.0]), second.take_off(1.0))
+        assert {result.mode for result in results} == {FlightMode.HOLD}
+        task = asyncio.create_task(simulation.run_async(speed=50.0))
+        await first.land()  # the task has begun before: it advances the simulation
+        assert not task.done()
+        task.cancel()
+
+    asyncio.run(fly())
+    future = second.go_to([9.0, 0.0, 2.0])
+    simulation.clock.quit()
+
+    async def wait():
+        await future
+
+    with pytest.raises(CommandError, match="the run was quit"):
+        asyncio.run(wait())
+
+
+def test_await_waits_for_the_run_of_another_thread(flying):
+    future = flying.uavs["uav1"].go_to([1.0, 0.0, 2.0])
+    runner = threading.Thread(target=lambda: flying.run(5.0, speed=20.0))
+
+    async def wait():
+        runner.start()
+        return await future
+
+    assert asyncio.run(wait()).mode is FlightMode.HOLD
+    runner.join()
+
+
 def test_environments_wait_for_one_uav(flat_data):
     flat_data["uavs"][0]["on_start"] = "take_off"
     with VectorizedSimulation(parse_scenario(flat_data), 3, threads=2) as envs:
@@ -278,4 +348,21 @@ def test_environments_wait_for_one_uav(flat_data):
         assert "the environment was reset" in str(future.exception())
         for done in envs.hold():
             done.wait()
+        with pytest.raises(CommandError, match="timeout_s must be a number"):
+            envs.uav(1, "uav1").land().wait(timeout_s=-1.0)
+        refused = []
+
+        def wait(landed):
+            with pytest.raises(CommandError, match="advancing already"):
+                envs.uav(1, "uav1").take_off().wait()
+            refused.append(landed.result().mode)
+
+        envs.uav(1, "uav1").pending_command.add_done_callback(wait)
+        envs.run(15.0)
+        assert refused == [FlightMode.LANDED]
+
+        async def climb():
+            return await envs.uav(2, "uav1").go_to([0.0, 0.0, 4.0])
+
+        assert asyncio.run(climb()).mode is FlightMode.HOLD
         assert envs.uav(0, "uav1").mode is FlightMode.HOLD

@@ -12,13 +12,14 @@ from volery.runtime.build.worlds import build_forest, build_terrain
 from volery.scenario import library
 from volery.scenario.changes import Changes, WorldRequest, apply
 from volery.scenario.load import load_scenario
+from volery.vehicle.airframe import airframe_names
 
 
 def test_what_can_be_chosen(simulate, flat_data):
     told = ask(simulate(flat_data), "/volery/get_scenario_options")
     assert told.success
     assert list(told.scenarios) == library.names()
-    assert set(told.airframes) == {"crazyflie", "f450", "hummingbird", "iris"}
+    assert tuple(told.airframes) == airframe_names()
     assert list(told.sensor_sets) == ["lidar", "camera", "sonar", "navigation"]
     assert len(told.sensor_set_descriptions) == 4
     schema = json.loads(told.changes_schema)

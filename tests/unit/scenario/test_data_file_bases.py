@@ -3,7 +3,7 @@ import pytest
 from volery.core.errors import DataFileError
 from volery.runtime.build.fleet import add_bodies
 from volery.runtime.build.placement import StartPose
-from volery.sensors.imu import load_imu_model
+from volery.sensors.imu import ImuModel
 from volery.sensors.lidar_model import load_lidar
 from volery.vehicle.airframe import load_airframe
 from volery.vehicle.identified import load_identified
@@ -68,8 +68,8 @@ def test_airframes_identified_models_and_other_sensors_have_bases_too(write):
     slow = load_identified(str(write("slow.toml", 'base = "f450"\ndrag_1_s = [0.5, 0.5, 0.5]\n')))
     assert slow.drag_1_s == (0.5, 0.5, 0.5)
     assert slow.source.endswith(", changed in slow.toml")
-    imu = load_imu_model(str(write("imu.toml", 'base = "adis16448"\n')))
-    same = load_imu_model("adis16448").model_dump(exclude={"name"})
+    imu = ImuModel.load(str(write("imu.toml", 'base = "adis16448"\n')))
+    same = ImuModel.load("adis16448").model_dump(exclude={"name"})
     assert imu.model_dump(exclude={"name"}) == same
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from volery.core.errors import ScenarioError
 from volery.scenario.city import Streets
-from volery.scenario.former_parameters import FORMER_PARAMETERS
+from volery.scenario.former_parameters import all_former_parameters
 from volery.scenario.load import parse_scenario
 from volery.scenario.node_names import node_path
 from volery.scenario.schema import NodeEntry
@@ -66,7 +66,11 @@ def test_streets_had_other_keys(old, new):
 
 @pytest.mark.parametrize(
     ("node", "old", "new"),
-    [(node, *names) for node, former in FORMER_PARAMETERS.items() for names in former.items()],
+    [
+        (node, *names)
+        for node, former in all_former_parameters().items()
+        for names in former.items()
+    ],
 )
 def test_nodes_had_other_parameters(node, old, new):
     with pytest.warns(DeprecationWarning, match=f"{node}: parameter '{old}' .* '{new}'"):

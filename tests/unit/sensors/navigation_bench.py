@@ -5,8 +5,10 @@ import numpy as np
 from volery.control.fleet import Fleet
 from volery.core.clock import Schedule
 from volery.core.geodesy import LocalFrame
-from volery.sensors.gnss import GnssBank, load_gnss_model
+from volery.sensors.bank import SensorGroup
+from volery.sensors.gnss import GnssBank, GnssModel
 from volery.sensors.gnss_denial import NOWHERE
+from volery.sensors.mount import make_mount
 from volery.sensors.samples import SensorId
 from volery.vehicle.airframe import load_airframe
 
@@ -36,13 +38,12 @@ def keys_of(count, first=11):
     return np.arange(first, first + count, dtype=np.uint64)
 
 
+def group_of(count, name, rate_hz, keys, **mount):
+    mounts = (make_mount(**mount),) * count
+    return SensorGroup(Schedule.from_hz(rate_hz), sensors_of(count, name), mounts, keys)
+
+
 def gnss_bank(count=1, *, noise=False, denial=NOWHERE, lever=(0.0, 0.0, 0.0), **changes):
-    return GnssBank(
-        load_gnss_model("gnss_m8").model_copy(update=changes),
-        Schedule.from_hz(5.0),
-        sensors_of(count),
-        np.tile(np.array(lever), (count, 1)),
-        keys_of(count) if noise else None,
-        ZURICH,
-        denial,
-    )
+    model = GnssModel.load("gnss_m8").model_copy(update=changes)
+    keys = keys_of(count) if noise else None
+    return GnssBank(model, group_of(count, "fix", 5.0, keys, position_body=lever), ZURICH, denial)

@@ -4,37 +4,28 @@ import math
 
 import numpy as np
 import pytest
-from navigation_bench import LEVEL, fleet_of, keys_of, put, sensors_of
+from navigation_bench import LEVEL, fleet_of, group_of, keys_of, put
 
 from volery.core import rotations
-from volery.core.clock import Schedule
-from volery.sensors.barometer import BarometerBank, load_barometer_model
-from volery.sensors.magnetometer import MagnetometerBank, load_magnetometer_model
+from volery.sensors.barometer import BarometerBank, BarometerModel
+from volery.sensors.magnetometer import MagnetometerBank, MagnetometerModel
 from volery.world.magnetic_field import field_of_angles
 
 FIELD = np.array([1.3e-6, 21.5e-6, -43.2e-6])
 
 
 def barometers(count=1, *, noise=False, altitude=488.0, lever=(0.0, 0.0, 0.0), **changes):
-    return BarometerBank(
-        load_barometer_model("barometer_px4").model_copy(update=changes),
-        Schedule.from_hz(50.0),
-        sensors_of(count, "pressure"),
-        np.tile(np.array(lever), (count, 1)),
-        keys_of(count) if noise else None,
-        altitude,
-    )
+    model = BarometerModel.load("barometer_px4").model_copy(update=changes)
+    keys = keys_of(count) if noise else None
+    group = group_of(count, "pressure", 50.0, keys, position_body=lever)
+    return BarometerBank(model, group, altitude)
 
 
 def magnetometers(count=1, *, noise=False, turn=LEVEL, field=FIELD, **changes):
-    return MagnetometerBank(
-        load_magnetometer_model("magnetometer_px4").model_copy(update=changes),
-        Schedule.from_hz(100.0),
-        sensors_of(count, "mag"),
-        np.tile(np.array(turn), (count, 1)),
-        keys_of(count) if noise else None,
-        field,
-    )
+    model = MagnetometerModel.load("magnetometer_px4").model_copy(update=changes)
+    keys = keys_of(count) if noise else None
+    group = group_of(count, "mag", 100.0, keys, attitude_body=turn)
+    return MagnetometerBank(model, group, field)
 
 
 @pytest.mark.parametrize(
@@ -56,7 +47,7 @@ def test_pressure_is_felt_where_the_sensor_sits():
 
 
 def test_barometer_noise_and_drift():
-    model, fleet = load_barometer_model("barometer_px4"), fleet_of()
+    model, fleet = BarometerModel.load("barometer_px4"), fleet_of()
     bank, truth = barometers(4000, noise=True), barometers().sample(0, 0, fleet).pressure[0]
     readings = [bank.sample(k, 0, fleet) for k in range(40)]
     error = np.array([r.pressure for r in readings]) - truth
@@ -121,7 +112,7 @@ def test_iron_distorts():
 
 
 def test_magnetometer_noise_and_walk():
-    model, fleet, seconds = load_magnetometer_model("magnetometer_px4"), fleet_of(), 4
+    model, fleet, seconds = MagnetometerModel.load("magnetometer_px4"), fleet_of(), 4
     bank = magnetometers(2000, noise=True)
     readings = [bank.sample(k, 0, fleet) for k in range(100 * seconds)]
     white = model.noise_density_t_sqrt_hz * math.sqrt(100.0)

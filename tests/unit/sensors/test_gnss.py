@@ -9,7 +9,7 @@ from navigation_bench import NS, ZURICH, fleet_of, gnss_bank, keys_of, put
 from volery.core import rotations
 from volery.core.errors import CommandError, DataFileError, ScenarioError
 from volery.scenario.load import parse_scenario
-from volery.sensors.gnss import load_gnss_model
+from volery.sensors.gnss import GnssModel
 from volery.sensors.gnss_denial import GnssDenial, Prism
 
 PERIOD = NS // 5
@@ -100,7 +100,7 @@ def test_velocity_is_that_of_the_antenna():
 
 @pytest.mark.parametrize("name", ["gnss_m8", "gnss_gazebo_classic"])
 def test_noise_and_drift_are_as_the_model_says(name):
-    model, count, fleet = load_gnss_model(name), 4000, fleet_of()
+    model, count, fleet = GnssModel.load(name), 4000, fleet_of()
     bank = gnss_bank(count, noise=True, **model.model_dump())
     readings = [bank.sample(k, k * PERIOD, fleet) for k in range(61)]
     error = np.array([r.position_map for r in readings]) - fleet.state.position_map[0]
@@ -215,7 +215,7 @@ def test_an_area_of_the_scenario_denies(simulate, flat_data):
 
 def test_fix_tells_its_covariance_and_service(simulate, flat_data):
     fixes, velocities, _ = fly(simulate, flat_data, gnss={})
-    model, fix = load_gnss_model("gnss_m8"), fixes[3].message
+    model, fix = GnssModel.load("gnss_m8"), fixes[3].message
     assert (fix.status.status, fix.status.service, fix.position_covariance_type) == (0, 1, 2)
     diagonal = fix.position_covariance.reshape(3, 3).diagonal()
     np.testing.assert_allclose(diagonal[2], model.vertical_drift_m**2, rtol=1e-4)

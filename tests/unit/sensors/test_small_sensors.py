@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from volery.core import rotations
-from volery.sensors.imu import load_imu_model
-from volery.sensors.odometry import load_odometry_model
+from volery.sensors.imu import ImuModel
+from volery.sensors.odometry import OdometryModel
 
 G = 9.80665
 
@@ -81,7 +81,7 @@ def test_imu_lever_arm_feels_centripetal_acceleration(simulate, flat_data):
 
 
 def test_imu_noise_is_as_its_model_says(simulate, flat_data):
-    model = load_imu_model("adis16448")
+    model = ImuModel.load("adis16448")
     flat_data["types"]["f450"]["sensors"] = [{"kind": "imu"}]
     flat_data["uavs"][0]["count"] = 5
     simulation = simulate(flat_data)
@@ -110,19 +110,16 @@ def simulation_variance(message):
 
 def test_imu_random_walk_grows_as_its_model_says():
     from volery.core.clock import Schedule
+    from volery.sensors.bank import SensorGroup
     from volery.sensors.imu import ImuBank
+    from volery.sensors.mount import make_mount
     from volery.sensors.samples import SensorId
 
-    model = load_imu_model("adis16448").model_copy(update={"gyro_turn_on_bias_rad_s": 0.0})
+    model = ImuModel.load("adis16448").model_copy(update={"gyro_turn_on_bias_rad_s": 0.0})
     count = 400
-    bank = ImuBank(
-        model,
-        Schedule.from_hz(200.0),
-        tuple(SensorId(0, f"u{i}", "imu") for i in range(count)),
-        np.zeros((count, 3)),
-        np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)),
-        np.arange(count, dtype=np.uint64),
-    )
+    sensors = tuple(SensorId(0, f"u{i}", "imu") for i in range(count))
+    keys, mounts = np.arange(count, dtype=np.uint64), (make_mount(),) * count
+    bank = ImuBank(model, SensorGroup(Schedule.from_hz(200.0), sensors, mounts, keys))
     state = still_fleet()
     seconds = 5.0
     for k in range(int(200 * seconds)):
@@ -185,15 +182,18 @@ def test_odometry_without_noise_is_the_truth(simulate, flat_data):
 
 def test_odometry_drifts_with_distance_and_says_so():
     from volery.core.clock import Schedule
+    from volery.sensors.bank import SensorGroup
+    from volery.sensors.mount import make_mount
     from volery.sensors.odometry import OdometryBank
     from volery.sensors.samples import SensorId
 
     count, distance = 500, 100.0
-    model = load_odometry_model("visual_inertial")
+    model = OdometryModel.load("visual_inertial")
     fleet = still_fleet()
     sensors = tuple(SensorId(0, f"u{i}", "odom") for i in range(count))
     keys = np.arange(count, dtype=np.uint64)
-    bank = OdometryBank(model, Schedule.from_hz(50.0), sensors, keys, fleet)
+    group = SensorGroup(Schedule.from_hz(50.0), sensors, (make_mount(),) * count, keys)
+    bank = OdometryBank(model, group, fleet)
     start = fleet.state.position_map[0].copy()
     for k in range(200):
         fleet.state.position_map[0, 0] = start[0] + distance * (k + 1) / 200

@@ -7,7 +7,6 @@ leaves the field of view, the UAV first turns towards it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -41,13 +40,10 @@ class DepthAvoidance(DepthCourse):
 
     STATE = (*DepthCourse.STATE, "_obstacles", "_steering")
 
-    @classmethod
-    def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Returns the tasks that compile the kernels of this node."""
-        from volery.autonomy.avoidance.warmup import gaps
-        from volery.autonomy.perception import warmup
-
-        return warmup.depth_points, gaps
+    WARMUP_TASKS = (
+        "volery.autonomy.perception.warmup:depth_points",
+        "volery.autonomy.avoidance.warmup:gaps",
+    )
 
     def __init__(self, **options: Any) -> None:
         super().__init__("depth_avoidance", **options)

@@ -10,7 +10,6 @@ returns are removed: rain, snow, fog. Sonar and slope control the height above g
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -59,13 +58,11 @@ class GapFlight(SavedAttributes, Node):
     )
     """Names of the attributes that a snapshot stores."""
 
-    @classmethod
-    def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Returns the tasks that compile the kernels of this node."""
-        from volery.autonomy.avoidance.warmup import gaps
-        from volery.autonomy.perception import warmup
-
-        return warmup.scan_points, warmup.ground, gaps
+    WARMUP_TASKS = (
+        "volery.autonomy.perception.warmup:scan_points",
+        "volery.autonomy.perception.warmup:ground",
+        "volery.autonomy.avoidance.warmup:gaps",
+    )
 
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)

@@ -7,7 +7,6 @@ or makes no progress, it divides the uncovered cells again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -64,12 +63,7 @@ class CoveragePlanner(SavedAttributes, Node):
 
     STATE = ("_field", "_flights", "_plan", "_covered", "_refused", "_ticks", "_published_covered")
 
-    @classmethod
-    def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Returns the tasks that compile the kernels of this node."""
-        from volery.autonomy.coverage import warmup
-
-        return (warmup.coverage_plans,)
+    WARMUP_TASKS = ("volery.autonomy.coverage.warmup:coverage_plans",)
 
     def __init__(self, **options: Any) -> None:
         super().__init__("coverage", **options)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -31,7 +30,6 @@ from volery.graph.messages import (
     Odometry,
     Range,
     String,
-    stamp_of,
 )
 from volery.graph.nodes.node import Node
 
@@ -69,20 +67,14 @@ class Mapping(SavedAttributes, Node):
     PARTS = ("_octree", "_grid", "_frame")
     STATE = ("_motion", "_nod", "_intakes", "_ground", "_range", "_last_status", "_slab_z")
 
-    @classmethod
-    def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Returns the tasks that compile the kernels of this node."""
-        from volery.autonomy.mapping import warmup
-        from volery.autonomy.perception import warmup as seeing
-
-        return (
-            warmup.growing_map,
-            warmup.read_maps,
-            seeing.scan_returns,
-            seeing.scan_repeats,
-            seeing.scan_rays,
-            seeing.ground,
-        )
+    WARMUP_TASKS = (
+        "volery.autonomy.mapping.warmup:growing_map",
+        "volery.autonomy.mapping.warmup:read_maps",
+        "volery.autonomy.perception.warmup:scan_returns",
+        "volery.autonomy.perception.warmup:scan_repeats",
+        "volery.autonomy.perception.warmup:scan_rays",
+        "volery.autonomy.perception.warmup:ground",
+    )
 
     def __init__(self, **options: Any) -> None:
         super().__init__("mapping", **options)
@@ -150,9 +142,7 @@ class Mapping(SavedAttributes, Node):
         self._intakes[name].add(scan)
 
     def _on_joint(self, message: JointState) -> None:
-        if len(message.name) and message.name[0] == "laser_nodding" and len(message.velocity):
-            angle, rate = float(message.position[0]), float(message.velocity[0])
-            self._nod.add(stamp_of(message), angle, rate)
+        self._nod.add_message(message)
 
     def _on_range(self, message: Range) -> None:
         if math.isfinite(message.range):

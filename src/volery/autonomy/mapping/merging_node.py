@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -36,12 +36,10 @@ class MapMerging(SavedAttributes, Node):
 
     STATE = ("_maps", "_placements", "_changed", "_last_status", "_reasons")
 
-    @classmethod
-    def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Returns the tasks that compile the kernels of this node."""
-        from volery.autonomy.mapping import warmup
-
-        return warmup.read_maps, warmup.merged_maps
+    WARMUP_TASKS = (
+        "volery.autonomy.mapping.warmup:read_maps",
+        "volery.autonomy.mapping.warmup:merged_maps",
+    )
 
     def __init__(self, **options: Any) -> None:
         super().__init__("map_merging", **options)

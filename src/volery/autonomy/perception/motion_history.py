@@ -13,6 +13,7 @@ from volery.core import rotations
 from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.vectors import norm
+from volery.graph.messages import JointState, stamp_of
 
 _KEPT = 64
 """Number of stored poses and angles: more than a second of each."""
@@ -115,6 +116,11 @@ class NodHistory:
         self._angles.append((angle, rate))
         del self._times[:-_KEPT], self._angles[:-_KEPT]
         return True
+
+    def add_message(self, message: JointState) -> None:
+        """Adds the angle in a message of the nodding mount; ignores those of other joints."""
+        if len(message.name) and message.name[0] == "laser_nodding" and len(message.velocity):
+            self.add(stamp_of(message), float(message.position[0]), float(message.velocity[0]))
 
     def at(self, time_ns: int, ahead_s: float = 0.25) -> float | None:
         """Returns the angle at `time_ns`: interpolated, or extrapolated by at most `ahead_s`."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Sequence
 from enum import StrEnum
 from typing import Any
 
@@ -93,12 +92,7 @@ class Exploration(SavedAttributes, Node):
         "_sent",
     )
 
-    @classmethod
-    def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Returns the tasks that compile the kernels of this node."""
-        from volery.autonomy.planning import warmup
-
-        return (warmup.searched_area,)
+    WARMUP_TASKS = ("volery.autonomy.planning.warmup:searched_area",)
 
     def __init__(self, **options: Any) -> None:
         super().__init__("exploration", **options)

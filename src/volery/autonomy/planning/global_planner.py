@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -72,13 +71,10 @@ class GlobalPlanner(SavedAttributes, Node):
         "_map",
     )
 
-    @classmethod
-    def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Returns the tasks that compile the kernels of this node."""
-        from volery.autonomy.mapping import warmup as mapping
-        from volery.autonomy.planning import warmup
-
-        return warmup.ways, mapping.read_maps
+    WARMUP_TASKS = (
+        "volery.autonomy.planning.warmup:ways",
+        "volery.autonomy.mapping.warmup:read_maps",
+    )
 
     def __init__(self, **options: Any) -> None:
         super().__init__("global_planner", **options)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -85,13 +85,12 @@ class LocalPlanner(SavedAttributes, Node):
         "_paused",
     )
 
-    @classmethod
-    def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Returns the tasks that compile the kernels of this node."""
-        from volery.autonomy.perception import warmup as seeing
-        from volery.autonomy.planning import warmup
-
-        return warmup.plans, seeing.scan_repeats, seeing.scan_rays, seeing.ground
+    WARMUP_TASKS = (
+        "volery.autonomy.planning.warmup:plans",
+        "volery.autonomy.perception.warmup:scan_repeats",
+        "volery.autonomy.perception.warmup:scan_rays",
+        "volery.autonomy.perception.warmup:ground",
+    )
 
     def __init__(self, **options: Any) -> None:
         super().__init__("local_planner", **options)

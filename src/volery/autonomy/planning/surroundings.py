@@ -66,9 +66,7 @@ class Surroundings(SavedAttributes):
 
     def on_joint(self, message: JointState) -> None:
         """Stores the angle of the nodding mount."""
-        if len(message.name) and message.name[0] == "laser_nodding" and len(message.velocity):
-            angle, rate = float(message.position[0]), float(message.velocity[0])
-            self._nod.add(stamp_of(message), angle, rate)
+        self._nod.add_message(message)
 
     def on_range(self, message: Range, now_ns: int) -> None:
         """Stores the range to the ground below."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -83,12 +82,7 @@ class CooperativeSearch(TeamFlight):
         "_pending_calls",
     )
 
-    @classmethod
-    def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Returns the tasks that compile the kernels of this node."""
-        from volery.autonomy.search import warmup
-
-        return (warmup.colours,)
+    WARMUP_TASKS = ("volery.autonomy.search.warmup:colours",)
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)

@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from volery.autonomy.slam.ground_kernels import GROUND_CELLS
-from volery.autonomy.slam.upright_kernels import CELLS, LAYERS
+from volery.autonomy.slam.ground_kernels import GROUND_CELLS, Keys
+from volery.autonomy.slam.upright_kernels import CELLS, LAYERS, Cells
+from volery.core.arrays import Array
 
 
-class Submaps:
+class Submaps(NamedTuple):
     """Holds both maps as tables that kernels fill, in the frame of the odometry."""
 
-    def __init__(self) -> None:
-        self.upright_keys = np.full((CELLS, CELLS, LAYERS), -1, np.int64)
-        self.cells = np.zeros((CELLS, CELLS, LAYERS, 6), np.float32)
-        self.ground_keys = np.full((GROUND_CELLS, GROUND_CELLS), -1, np.int64)
-        self.sums = np.zeros((GROUND_CELLS, GROUND_CELLS, 9))
+    upright_keys: Keys
+    cells: Cells
+    ground_keys: Keys
+    sums: Array
+
+    @classmethod
+    def empty(cls) -> Submaps:
+        """Returns maps without returns."""
+        return cls(
+            np.full((CELLS, CELLS, LAYERS), -1, np.int64),
+            np.zeros((CELLS, CELLS, LAYERS, 6), np.float32),
+            np.full((GROUND_CELLS, GROUND_CELLS), -1, np.int64),
+            np.zeros((GROUND_CELLS, GROUND_CELLS, 9)),
+        )

@@ -79,7 +79,7 @@ class LoopCloser:
 
     def __init__(self, matching: ScanMatching) -> None:
         self._matching = matching
-        self._maps = Submaps()
+        self._maps = Submaps.empty()
         self._image = np.zeros((_PICTURE, _PICTURE), np.uint8)
 
     def match(
@@ -155,15 +155,11 @@ class LoopCloser:
         self, pose: Array, pair: _Pair, rows: tuple[int, int], margin: float
     ) -> LoopClosure | None:
         maps, m = self._maps, self._matching
-        draw_maps(
-            np.ascontiguousarray(pair.known), pair.known_kinds, maps.upright_keys, maps.cells,
-            maps.ground_keys, maps.sums,
-        )  # fmt: skip
+        draw_maps(np.ascontiguousarray(pair.known), pair.known_kinds, maps)
         information, sums = np.zeros((4, 4)), np.zeros(4)
         done = refine(
-            pose, np.ascontiguousarray(pair.query), pair.query_kinds, maps.upright_keys,
-            maps.cells, maps.ground_keys, maps.sums, m.upright_sigma_m**2, m.ground_sigma_m**2,
-            _ROUNDS, information, sums,
+            pose, np.ascontiguousarray(pair.query), pair.query_kinds, maps,
+            m.upright_sigma_m**2, m.ground_sigma_m**2, _ROUNDS, information, sums,
         )  # fmt: skip
         weakest = float(np.linalg.eigvalsh(information[:2, :2])[0])
         if not done or weakest < _LEAST_INFORMATION:

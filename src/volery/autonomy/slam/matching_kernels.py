@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from volery.autonomy.slam.ground_kernels import Keys, add_ground, plane_at
 from volery.autonomy.slam.inertial_kernels import STATES, P, Q, add_error, rotation_matrix
 from volery.autonomy.slam.linear import eliminate
-from volery.autonomy.slam.upright_kernels import Cells, add_upright, nearest_upright
+from volery.autonomy.slam.local_maps import Submaps
+from volery.autonomy.slam.upright_kernels import add_upright, nearest_upright
 from volery.core.arrays import Array
 from volery.core.compiled import inner_kernel, kernel, owning_kernel
 from volery.core.rotation_kernels import quaternion_product, rotate_vector
@@ -119,8 +120,7 @@ def gather(
     points: Array,
     kinds: Kinds,
     planes: Array,
-    upright_keys: Keys,
-    cells: Cells,
+    maps: Submaps,
     upright_variance: float,
     ground_variance: float,
     information: Array,
@@ -148,7 +148,7 @@ def gather(
             sums[2] += 1.0
             continue
         sums[1] += 1.0
-        if not nearest_upright(upright_keys, cells, x, y, z, _GATE_M, found):
+        if not nearest_upright(maps.upright_keys, maps.cells, x, y, z, _GATE_M, found):
             continue
         dx, dy = x - found[0], y - found[1]
         cxx, cxy, cyy = found[2] + upright_variance, found[3], found[4] + upright_variance
@@ -190,8 +190,7 @@ def update(
     points: Array,
     kinds: Kinds,
     planes: Array,
-    upright_keys: Keys,
-    cells: Cells,
+    maps: Submaps,
     upright_variance: float,
     ground_variance: float,
     trust: float,
@@ -211,8 +210,7 @@ def update(
             points,
             kinds,
             planes,
-            upright_keys,
-            cells,
+            maps,
             upright_variance,
             ground_variance,
             information,
@@ -266,16 +264,7 @@ def _shrink(covariance: Array, information: Array, trust: float) -> bool:
 
 
 @kernel
-def insert(
-    points: Array,
-    kinds: Kinds,
-    state: Array,
-    is_upright: bool,
-    upright_keys: Keys,
-    cells: Cells,
-    ground_keys: Keys,
-    sums: Array,
-) -> None:
+def insert(points: Array, kinds: Kinds, state: Array, is_upright: bool, maps: Submaps) -> None:
     """Inserts classified returns into the maps; uprights only if `is_upright`."""
     turn = np.empty((3, 3))
     rotation_matrix(state, turn)
@@ -285,9 +274,9 @@ def insert(
             continue
         x, y, z = _placed(state, turn, points[n])
         if kind == UPRIGHT:
-            add_upright(upright_keys, cells, x, y, z)
+            add_upright(maps.upright_keys, maps.cells, x, y, z)
         else:
-            add_ground(ground_keys, sums, x, y, z)
+            add_ground(maps.ground_keys, maps.sums, x, y, z)
 
 
 @kernel

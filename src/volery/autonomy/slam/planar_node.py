@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -70,12 +69,10 @@ class PlanarSlam(SavedAttributes, Node):
         "_joints",
     )
 
-    @classmethod
-    def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Returns the tasks that compile the kernels of this node."""
-        from volery.autonomy.slam.planar import warmup
-
-        return warmup.walls, warmup.place_recognition
+    WARMUP_TASKS = (
+        "volery.autonomy.slam.planar.warmup:walls",
+        "volery.autonomy.slam.planar.warmup:place_recognition",
+    )
 
     def __init__(self, **options: Any) -> None:
         super().__init__("slam", **options)

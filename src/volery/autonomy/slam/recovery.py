@@ -118,9 +118,7 @@ class Recovery:
         tried = state.copy()
         if self.is_aslant(covariance):
             few = np.ascontiguousarray(body[:: max(len(body) // _TRIED, 1)])
-            share = find_attitude(
-                tried, few, maps.ground_keys, maps.sums, maps.upright_keys, maps.cells, _TRIED_RAD
-            )
+            share = find_attitude(tried, few, maps, _TRIED_RAD)
             if share < _ATTITUDE_SHARE:
                 return False
         if not _find_place(tried, covariance, maps, body):
@@ -142,7 +140,7 @@ def _find_place(state: Array, covariance: Array, maps: Submaps, body: Array) -> 
     found = np.zeros(5)
     find_place(
         rotations.rotate(state[Q : Q + 4], body) + state[:3],
-        state[P : P + 3].copy(), maps.ground_keys, maps.sums, maps.upright_keys, maps.cells,
+        state[P : P + 3].copy(), maps,
         min(max(spread, _LEAST_M), _MOST_M), min(max(turn, _LEAST_RAD), _MOST_RAD), found,
     )  # fmt: skip
     if found[3] < _PLACE_SHARE or found[4] > _ELSEWHERE * found[3]:

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
-from volery.autonomy.slam.ground_kernels import GROUND_CELL_M, GROUND_CELLS, Keys, key_of
+from volery.autonomy.slam.ground_kernels import GROUND_CELL_M, GROUND_CELLS, key_of
 from volery.autonomy.slam.inertial_kernels import P, rotation_matrix, turn_left
-from volery.autonomy.slam.upright_kernels import CELL_M, CELLS, LAYER_M, LAYERS, LEAST, Cells
+from volery.autonomy.slam.local_maps import Submaps
+from volery.autonomy.slam.upright_kernels import CELL_M, CELLS, LAYER_M, LAYERS, LEAST
 from volery.core.arrays import Array
 from volery.core.compiled import inner_kernel, kernel, owning_kernel
 
@@ -24,15 +25,7 @@ _APART_M, _APART_RAD = 0.8, 0.2
 
 
 @kernel
-def find_attitude(
-    state: Array,
-    points: Array,
-    ground_keys: Keys,
-    sums: Array,
-    upright_keys: Keys,
-    cells: Cells,
-    reach: float,
-) -> float:
+def find_attitude(state: Array, points: Array, maps: Submaps, reach: float) -> float:
     """Rotates the attitude in `state` (19,) so that returns (K, 3) of the body fit the map.
 
     It tries rotations of up to `reach` rad about each axis, in steps of a sixth of it, then of a
@@ -48,7 +41,7 @@ def find_attitude(
                     tried = state.copy()
                     x, y, z = middle[0] + i * step, middle[1] + j * step, middle[2] + k * step
                     turn_left(tried, x, y, z)
-                    fits = _share(tried, points, ground_keys, sums, upright_keys, cells)
+                    fits = _share(tried, points, maps)
                     worth = fits - _PER_RAD2 * (x * x + y * y + z * z)
                     if fits > 0.0 and worth > most:
                         most, share = worth, fits
@@ -59,9 +52,7 @@ def find_attitude(
 
 
 @owning_kernel
-def _share(
-    state: Array, points: Array, ground_keys: Keys, sums: Array, upright_keys: Keys, cells: Cells
-) -> float:
+def _share(state: Array, points: Array, maps: Submaps) -> float:
     turn, fits, told = np.empty((3, 3)), 0, 0
     rotation_matrix(state, turn)
     for n in range(points.shape[0]):
@@ -69,41 +60,39 @@ def _share(
         x = state[P] + turn[0, 0] * bx + turn[0, 1] * by + turn[0, 2] * bz
         y = state[P + 1] + turn[1, 0] * bx + turn[1, 1] * by + turn[1, 2] * bz
         z = state[P + 2] + turn[2, 0] * bx + turn[2, 1] * by + turn[2, 2] * bz
-        over = _over_ground(ground_keys, sums, x, y, z)
+        over = _over_ground(maps, x, y, z)
         if math.isnan(over):
             continue
         told += 1
         on_ground = abs(over) < _ON_GROUND_M
-        if on_ground or (over > _OVER_GROUND_M and _stands(upright_keys, cells, x, y, z)):
+        if on_ground or (over > _OVER_GROUND_M and _stands(maps, x, y, z)):
             fits += 1
     return fits / told if told >= _FEWEST_GROUND else 0.0
 
 
 @inner_kernel
-def _over_ground(keys: Keys, sums: Array, x: float, y: float, z: float) -> float:
+def _over_ground(maps: Submaps, x: float, y: float, z: float) -> float:
     """Returns the height over the mean ground of a cell; nan if unknown."""
     i, j = math.floor(x / GROUND_CELL_M), math.floor(y / GROUND_CELL_M)
     a, b = i % GROUND_CELLS, j % GROUND_CELLS
-    if keys[a, b] != key_of(i, j, 0):
+    if maps.ground_keys[a, b] != key_of(i, j, 0):
         return math.nan
-    return float(z - sums[a, b, 3] / sums[a, b, 0])
+    return float(z - maps.sums[a, b, 3] / maps.sums[a, b, 0])
 
 
 @inner_kernel
-def _stands(keys: Keys, cells: Cells, x: float, y: float, z: float) -> bool:
+def _stands(maps: Submaps, x: float, y: float, z: float) -> bool:
     i, j, k = math.floor(x / CELL_M), math.floor(y / CELL_M), math.floor(z / LAYER_M)
     a, b, c = i % CELLS, j % CELLS, k % LAYERS
-    return bool(keys[a, b, c] == key_of(i, j, k) and cells[a, b, c, 0] >= LEAST)
+    is_known = maps.upright_keys[a, b, c] == key_of(i, j, k)
+    return bool(is_known and maps.cells[a, b, c, 0] >= LEAST)
 
 
 @kernel
 def find_place(
     points: Array,
     middle: Array,
-    ground_keys: Keys,
-    sums: Array,
-    upright_keys: Keys,
-    cells: Cells,
+    maps: Submaps,
     reach_m: float,
     reach_rad: float,
     found: Array,
@@ -117,7 +106,7 @@ def find_place(
     found[:] = 0.0
     uprights, count = np.empty_like(points), 0
     for n in range(points.shape[0]):
-        over = _over_ground(ground_keys, sums, points[n, 0], points[n, 1], points[n, 2])
+        over = _over_ground(maps, points[n, 0], points[n, 1], points[n, 2])
         if over > _OVER_GROUND_M:  # leaves out nan
             for axis in range(3):
                 uprights[count, axis] = points[n, axis] - middle[axis]
@@ -135,7 +124,7 @@ def find_place(
             for i in range(wide):
                 for j in range(wide):
                     dx, dy = (i - steps) * _STEP_M, (j - steps) * _STEP_M
-                    if _stands(upright_keys, cells, x + dx, y + dy, z):
+                    if _stands(maps, x + dx, y + dy, z):
                         shares[k, i, j] += 1.0 / count
     _take_best(shares, steps, turns, found)
 

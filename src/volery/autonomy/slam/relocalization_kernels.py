@@ -7,11 +7,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.autonomy.slam.ground_kernels import Keys, add_ground, plane_at
+from volery.autonomy.slam.ground_kernels import add_ground, plane_at
 from volery.autonomy.slam.inertial_kernels import STATE_NUMBERS, P, Q
 from volery.autonomy.slam.linear import eliminate
+from volery.autonomy.slam.local_maps import Submaps
 from volery.autonomy.slam.matching_kernels import GROUND, UPRIGHT, gather
-from volery.autonomy.slam.upright_kernels import Cells, add_upright
+from volery.autonomy.slam.upright_kernels import add_upright
 from volery.core.arrays import Array
 from volery.core.compiled import inner_kernel, kernel
 
@@ -119,22 +120,15 @@ def search(
 
 
 @kernel
-def draw_maps(
-    points: Array,
-    kinds: NDArray[np.int8],
-    upright_keys: Keys,
-    cells: Cells,
-    ground_keys: Keys,
-    sums: Array,
-) -> None:
+def draw_maps(points: Array, kinds: NDArray[np.int8], maps: Submaps) -> None:
     """Replaces the maps by points (K, 3)."""
-    upright_keys[:] = -1
-    ground_keys[:] = -1
+    maps.upright_keys[:] = -1
+    maps.ground_keys[:] = -1
     for k in range(points.shape[0]):
         if kinds[k] == UPRIGHT:
-            add_upright(upright_keys, cells, points[k, 0], points[k, 1], points[k, 2])
+            add_upright(maps.upright_keys, maps.cells, points[k, 0], points[k, 1], points[k, 2])
         elif kinds[k] == GROUND:
-            add_ground(ground_keys, sums, points[k, 0], points[k, 1], points[k, 2])
+            add_ground(maps.ground_keys, maps.sums, points[k, 0], points[k, 1], points[k, 2])
 
 
 @kernel
@@ -142,10 +136,7 @@ def refine(
     pose: Array,
     points: Array,
     kinds: NDArray[np.int8],
-    upright_keys: Keys,
-    cells: Cells,
-    ground_keys: Keys,
-    sums: Array,
+    maps: Submaps,
     upright_variance: float,
     ground_variance: float,
     rounds: int,
@@ -171,7 +162,7 @@ def refine(
                 continue
             x = pose[0] + c * points[k, 0] - s * points[k, 1]
             y = pose[1] + s * points[k, 0] + c * points[k, 1]
-            known = plane_at(ground_keys, sums, x, y, 1, flat, plane)
+            known = plane_at(maps.ground_keys, maps.sums, x, y, 1, flat, plane)
             now[k] = GROUND if known >= 4 else 0
             planes[k, 0] = plane[0] - plane[1] * x - plane[2] * y
             planes[k, 1], planes[k, 2] = plane[1], plane[2]
@@ -180,8 +171,7 @@ def refine(
             points,
             now,
             planes,
-            upright_keys,
-            cells,
+            maps,
             upright_variance,
             ground_variance,
             all_six,

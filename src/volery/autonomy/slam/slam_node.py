@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -82,19 +81,13 @@ class Slam(SavedAttributes, Node):
         "_shown",
     )
 
-    @classmethod
-    def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Returns the tasks that compile the kernels of this node."""
-        from volery.autonomy.perception import warmup as seeing
-        from volery.autonomy.slam import warmup
-
-        return (
-            warmup.motion,
-            warmup.known_places,
-            warmup.lost_motion,
-            warmup.sight,
-            seeing.scan_returns,
-        )
+    WARMUP_TASKS = (
+        "volery.autonomy.slam.warmup:motion",
+        "volery.autonomy.slam.warmup:known_places",
+        "volery.autonomy.slam.warmup:lost_motion",
+        "volery.autonomy.slam.warmup:sight",
+        "volery.autonomy.perception.warmup:scan_returns",
+    )
 
     def __init__(self, **options: Any) -> None:
         super().__init__("slam", **options)
@@ -194,9 +187,7 @@ class Slam(SavedAttributes, Node):
             self._lose(*_UNKNOWN)
 
     def _on_joint(self, message: JointState) -> None:
-        if len(message.name) and message.name[0] == "laser_nodding" and len(message.velocity):
-            angle, rate = float(message.position[0]), float(message.velocity[0])
-            self._nod.add(stamp_of(message), angle, rate)
+        self._nod.add_message(message)
 
     def _on_range(self, message: Range) -> None:
         self._tracker.add_range(stamp_of(message), float(message.range))

@@ -88,7 +88,7 @@ class Tracker(SavedAttributes):
         self._imu: tuple[int, Array, Array] | None = None
         self.recovery = Recovery()
         self._waiting: deque[Sweep] = deque()
-        self._maps = Submaps()
+        self._maps = Submaps.empty()
         self._inserted: dict[str, tuple[int, Array, float]] = {}
         self._rest = StationaryDetector()
         self.settling = rotations.IDENTITY.copy()
@@ -248,7 +248,7 @@ class Tracker(SavedAttributes):
         sums, information = np.zeros(4), np.zeros((6, 6))
         before = self.state.copy()
         update(
-            self.state, self.covariance, points, kinds, planes, maps.upright_keys, maps.cells,
+            self.state, self.covariance, points, kinds, planes, maps,
             m.upright_sigma_m**2, m.ground_sigma_m**2, m.trust, m.rounds, information, sums,
         )  # fmt: skip
         carry_along(self._states, before, self.state)
@@ -266,7 +266,7 @@ class Tracker(SavedAttributes):
 
     def _draw(self, sweep: Sweep, points: Array, kinds: NDArray[np.int8]) -> bool:
         """Inserts returns into the map; uprights only from a new pose, or after a while."""
-        m, maps, yaw = self.matching, self._maps, float(rotations.yaw_of(self.state[Q : Q + 4]))
+        m, yaw = self.matching, float(rotations.yaw_of(self.state[Q : Q + 4]))
         last = self._inserted.get(sweep.name)
         is_new = (
             last is None
@@ -278,10 +278,7 @@ class Tracker(SavedAttributes):
         is_new = is_new and self.match[sweep.name].fits and self.sigma_m < _DRAWN_M
         if is_new:
             self._inserted[sweep.name] = (self.time_ns, self.state[:3].copy(), yaw)
-        insert(
-            points, kinds, self.state, is_new, maps.upright_keys, maps.cells, maps.ground_keys,
-            maps.sums,
-        )  # fmt: skip
+        insert(points, kinds, self.state, is_new, self._maps)
         return is_new
 
     def _seed_below(self, distance: float) -> None:
@@ -308,7 +305,7 @@ class Tracker(SavedAttributes):
         `speed_sigma`, m/s, and `turn_sigma`, rad about each axis, are the standard deviations of
         velocity and attitude by now.
         """
-        self._maps = Submaps()
+        self._maps = Submaps.empty()
         self._inserted, self.match, self.sight = {}, {}, KidnappingDetector()
         self.covariance[:3] = self.covariance[:, :3] = 0.0
         self.covariance[np.arange(3), np.arange(3)] = 1e-4

@@ -66,7 +66,7 @@ def sight() -> None:
 
 def lost_motion() -> None:
     """Compiles the kernels that recover attitude and position."""
-    recovery, maps, points = Recovery(), Submaps(), np.ones((1, 3))
+    recovery, maps, points = Recovery(), Submaps.empty(), np.ones((1, 3))
     state, states = np.zeros(19), np.zeros((2, 19))
     state[9] = 1.0
     aslant = np.eye(STATES)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -61,12 +60,7 @@ class TargetDetection(SavedAttributes, Node):
     STATE = ("_mates", "_frame", "_pose", "_range", "_intrinsics", "_tracks")
     """Names of the attributes that a snapshot stores."""
 
-    @classmethod
-    def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
-        """Returns the tasks that compile the kernels of this node."""
-        from volery.autonomy.search import warmup
-
-        return (warmup.colours,)
+    WARMUP_TASKS = ("volery.autonomy.search.warmup:colours",)
 
     def __init__(self, **options: Any) -> None:
         super().__init__("target_detection", **options)

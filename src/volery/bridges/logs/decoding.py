@@ -65,7 +65,9 @@ def _type_of(topic: LogTopic) -> str | GraphError:
     """Returns the type of a topic's messages, or the error that prevents decoding."""
     try:
         if topic.encoding not in ("ros1", "cdr"):
-            raise GraphError(f"messages encoded as '{topic.encoding}' cannot be read")
+            raise GraphError(
+                f"messages encoded as '{topic.encoding}' are not decoded, only cdr and ros1"
+            )
         name = ros2_name(topic.msgtype) if topic.encoding == "ros1" else topic.msgtype
         if name not in typestore().types:
             _learn(name, topic)

@@ -16,7 +16,7 @@ import socket
 from collections import deque
 from typing import Any
 
-from volery.bridges.bridge_host import wake_of
+from volery.bridges.loop_waker import wake_of
 from volery.bridges.remote_client import RemoteClient
 from volery.bridges.ros_tcp import wire as ros_tcp
 from volery.bridges.ros_tcp.client_outbox import ClientOutbox

@@ -16,7 +16,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from volery.bridges.bridge_host import wake_of
+from volery.bridges.loop_waker import wake_of
 from volery.bridges.ros_tcp import wire as ros_tcp
 from volery.bridges.ros_tcp.connect import FIRST_PAUSE_S, KEEPALIVE_S, LONGEST_PAUSE_S, dial
 from volery.bridges.ros_tcp.connection import RosTcpConnection

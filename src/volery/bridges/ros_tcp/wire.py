@@ -13,6 +13,7 @@ Source: ROS-TCP-Connector and ROS-TCP-Endpoint v0.7.0, `ROSConnection.cs`, `SysC
 from __future__ import annotations
 
 import json
+import mmap
 from collections.abc import Sequence
 from struct import Struct
 from typing import Any, Literal, NamedTuple
@@ -40,6 +41,9 @@ _LENGTH = Struct("<I")
 _SCRATCH_BYTES = 64 << 10
 _APART_BYTES = 16 << 10
 """Size above which an incomplete payload is received into its own memory, without a copy."""
+_HUGE_PAGES_BYTES = 4 << 20
+"""Size from which numpy requests huge pages, for which the system compacts memory: up to 30 ms per
+page, in which no other client is served."""
 
 
 class RosTcpFrame(NamedTuple):
@@ -157,8 +161,7 @@ class RosTcpFrameParser:
         return part
 
     def _begin_apart(self, length: int) -> None:
-        # numpy does not touch, hence not use, memory before bytes arrive
-        self._apart = np.empty(length, np.uint8).data
+        self._apart = _memory(length)
         self._filled = self._end - self._start
         self._apart[: self._filled] = self._scratch[self._start : self._end]
         self._start = self._end
@@ -177,6 +180,13 @@ class RosTcpFrameParser:
         if self._start and left:
             self._scratch[:left] = bytes(self._scratch[self._start : self._end])
         self._start, self._end = 0, left
+
+
+def _memory(length: int) -> memoryview:
+    """Returns memory that the system provides as it is written."""
+    if length < _HUGE_PAGES_BYTES:
+        return np.empty(length, np.uint8).data
+    return memoryview(mmap.mmap(-1, length))
 
 
 def head(destination: str, payload_bytes: int) -> bytes:

@@ -19,7 +19,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import InvalidURI, WebSocketException
 from websockets.uri import parse_uri
 
-from volery.bridges.bridge_host import wake_of
+from volery.bridges.loop_waker import wake_of
 from volery.bridges.remote_client import RemoteClient
 from volery.bridges.rosbridge.client_state import ClientState
 from volery.bridges.rosbridge.message_encoder import Generation

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from typing import Any, Protocol
 
-from volery.bridges.bridge_host import wake_of
+from volery.bridges.loop_waker import wake_of
 from volery.bridges.rosbridge.bulk_turns import TURN_S, BulkTurns, Writer
 from volery.bridges.rosbridge.protocol import RosbridgePeer
 from volery.bridges.rosbridge.token_check import TokenCheck

@@ -14,7 +14,7 @@ import asyncio
 import contextlib
 from collections import deque
 
-from volery.bridges.bridge_host import wake_of
+from volery.bridges.loop_waker import wake_of
 from volery.bridges.ros_tcp.incoming_queue import IncomingQueue
 from volery.bridges.sensor_link.commands import COMMAND_TOPICS
 from volery.bridges.sensor_link.payloads import (

@@ -1,37 +1,6 @@
 """Payloads of the sensor link: ROS messages as packed bytes, and back.
 
-All numbers are little-endian, without padding. `text` is a u8 length and so many bytes of UTF-8.
-Every payload of a sensor ends with two texts: its `name`, which is its topic below the UAV's
-(`laser/horizontal/scan`; the frame's head has the UAV's number), and the `frame_id` of its header.
-Distances are in metres, angles in radians, quaternions x y z w. The stamp is in the head.
-
-LASER_SCAN (1), `sensor_msgs/LaserScan`: 7 x f32 `angle_min`, `angle_max`, `angle_increment` (rad,
-counter-clockwise from above), `time_increment`, `scan_time` (s), `range_min`, `range_max` (m) ·
-u32 r · u32 i · r x f32 `ranges` (m; +inf: no return, -inf: too close) · i x f32
-`intensities` (i is 0 or r) · text name · text frame_id
-
-POSE (2), `nav_msgs/Odometry`: 3 x f64 position (m, ENU, in frame_id) · 4 x f64 attitude, body to
-frame_id · 3 x f64 velocity (m/s, body, FLU) · 3 x f64 angular velocity (rad/s, body) · 6 x f64
-variances of the pose (x, y, z in m2; about x, y, z in rad2) · 6 x f64 variances of the velocities ·
-text name · text frame_id · text child_frame_id
-
-IMU (3), `sensor_msgs/Imu`: 4 x f64 attitude · 3 x f64 angular velocity (rad/s, FLU) · 3 x f64
-specific force (m/s2, FLU) · 3 x f64 variances of each of the three; the first is -1 where the
-attitude is not known · text name · text frame_id
-
-SONAR (4), `sensor_msgs/Range`: u8 radiation type (0 ultrasound, 1 infrared) · 5 x f32 field of view
-(rad), `min_range`, `max_range`, `range` (m; +inf no return, -inf too close), variance (m2) ·
-text name · text frame_id
-
-IMAGE (5), `sensor_msgs/Image`: u32 height · u32 width (pixels) · u32 step (bytes a row) · u8
-big-endian (0 or 1) · u32 n · n bytes of pixels · text encoding (`rgb8`, `32FC1` in metres...) ·
-text name · text frame_id
-
-NOTICE (127), to the sender of an invalid frame: the rest is UTF-8 text.
-
-POSE_COMMAND (128) and GOAL_POSE (129), `geometry_msgs/PoseStamped`: 3 x f64 position (m, ENU, in
-frame_id, which is `map` or empty) · 4 x f64 attitude; all zeros in a goal keep the heading · text
-frame_id. The first teleports a UAV with the kinematic plant, the second sends any UAV there.
+docs/sensor_link.md defines the fields. Numbers are little-endian, without padding.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
-from volery.bridges.bridge_host import wake_of
+from volery.bridges.loop_waker import wake_of
 from volery.bridges.sensor_link.payloads import PAYLOADS, encode_payload
 from volery.bridges.sensor_link.wire import (
     SensorLinkKind,

@@ -1,23 +1,7 @@
 """Encodes and parses the sensor link's frames, without a socket.
 
-The environment (the simulation) listens, the ROS side connects; both send frames of one form. All
-numbers are little-endian and packed without padding:
-
-| offset | bytes | type | field |
-|---|---|---|---|
-| 0 | 4 | | sync word `AA 56 4C 59` |
-| 4 | 1 | u8 | version of the protocol, 1 |
-| 5 | 1 | u8 | type of the payload, see `SensorLinkKind` |
-| 6 | 2 | u16 | number of the UAV, from 1; 0: none |
-| 8 | 4 | u32 | n, bytes of payload, at most `limit_of(kind)` |
-| 12 | 4 | u32 | sequence: one more with each frame of this type, UAV and sensor, modulo 2**32 |
-| 16 | 8 | i64 | stamp of the message, ns of simulated time |
-| 24 | 2 | u16 | CRC of bytes 4 to 23: a damaged length is detected before a reader waits for it |
-| 26 | n | | payload, see `payloads` |
-| 26 + n | 2 | u16 | CRC of all bytes from 4 to 25 + n |
-
-The CRC is that of `core.framing`. A gap in the sequence is the number of frames that a slow
-reader has missed.
+The environment (the simulation) listens, the ROS side connects; both send frames of one form, which
+docs/sensor_link.md defines. The CRC is that of `core.framing`.
 """
 
 from __future__ import annotations

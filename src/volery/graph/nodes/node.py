@@ -17,10 +17,11 @@ as `rclpy.node.Node`: see `graph.nodes.imports`.
 from __future__ import annotations
 
 import logging
+import pkgutil
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 from volery.core.errors import GraphError, NodeError, VoleryError
 from volery.graph.graph import check_period
@@ -51,6 +52,9 @@ class Node(ParameterMethods):
     on; the other arguments are those of rclpy. Only `enable_rosout`, `allow_undeclared_parameters`
     and `automatically_declare_parameters_from_overrides` have an effect.
     """
+
+    WARMUP_TASKS: ClassVar[tuple[str, ...]] = ()
+    """Functions that compile the node's numba code, as `module:function`; see `warmup_tasks`."""
 
     def __init__(
         self,
@@ -113,14 +117,13 @@ class Node(ParameterMethods):
     def warmup_tasks(cls) -> Sequence[Callable[[], None]]:
         """Returns functions that compile the numba code that the node calls, each a part of it.
 
-        A node with numba code overrides this method. The functions belong to a module (no closures)
-        and call the node's kernels with synthetic input whose arrays have the types and layouts of
-        the real ones. They run before the clock of a run starts, in any order and possibly in
-        another process, because later compilation would stall the flight. Those of Volery's own
-        nodes run once after an installation, because the result is cached on disk; others run at
-        each start.
+        A node with numba code names them in `WARMUP_TASKS`. The functions call the node's kernels
+        with synthetic input whose arrays have the types and layouts of the real ones. They run
+        before the clock of a run starts, in any order and possibly in another process, because
+        later compilation would stall the flight. Those of Volery's own nodes run once after an
+        installation, because the result is cached on disk; others run at each start.
         """
-        return ()
+        return tuple(map(pkgutil.resolve_name, cls.WARMUP_TASKS))
 
     def get_name(self) -> str:
         """Returns the name without namespace."""

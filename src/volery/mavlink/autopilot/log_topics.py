@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
+from volery.core.data_tables import read_table
 from volery.core.frames import frd_of_flu, ned_of_enu, q_ned_frd_of_enu_flu
 from volery.mavlink.autopilot import motion
 from volery.mavlink.autopilot.context import AutopilotContext
@@ -157,61 +158,25 @@ def _rates_setpoint(context: AutopilotContext) -> Values | None:
     return motion.us(context), *frd_of_flu(target.rates), 0.0, 0.0, -target.thrust
 
 
-_TIMES = "uint64_t timestamp; uint64_t timestamp_sample"
-_LOCAL_POSITION = (
-    "bool xy_valid; bool z_valid; bool v_xy_valid; bool v_z_valid; float x; float y; float z;"
-    "float vx; float vy; float vz; float z_deriv; float ax; float ay; float az; float heading;"
-    "bool heading_good_for_control; bool xy_global; bool z_global; uint64_t ref_timestamp;"
-    "double ref_lat; double ref_lon; float ref_alt"
-)
-_STATUS = (
-    "uint64_t timestamp; uint64_t armed_time; uint8_t arming_state;"
-    "uint8_t nav_state_user_intention; uint8_t nav_state; uint8_t vehicle_type; bool failsafe;"
-    "uint8_t system_type; uint8_t system_id; uint8_t component_id"
-)
-_BATTERY = (
-    "uint64_t timestamp; uint8_t id; bool connected; float voltage_v; float current_a;"
-    "float discharged_mah; float remaining; uint8_t warning; uint8_t cell_count"
-)
-_TRAJECTORY = (
-    "uint64_t timestamp; float[3] position; float[3] velocity; float[3] acceleration;"
-    "float[3] jerk; float yaw; float yawspeed"
-)
-_DESCRIBED: tuple[tuple[str, str, int, Callable[[AutopilotContext], Values | None]], ...] = (
-    ("vehicle_attitude", f"{_TIMES}; float[4] q", 50, _attitude),
-    ("vehicle_angular_velocity", f"{_TIMES}; float[3] xyz", 20, _angular_velocity),
-    ("vehicle_acceleration", f"{_TIMES}; float[3] xyz", 50, _acceleration),
-    ("vehicle_local_position", f"{_TIMES}; {_LOCAL_POSITION}", 100, _local_position),
-    (
-        "vehicle_global_position",
-        f"{_TIMES}; double lat; double lon; float alt; bool lat_lon_valid; bool alt_valid",
-        200,
-        _global_position,
-    ),
-    ("vehicle_status", _STATUS, 200, _status),
-    ("vehicle_land_detected", "uint64_t timestamp; bool landed", 200, _land_detected),
-    ("battery_status", _BATTERY, 200, _battery),
-    (
-        "actuator_motors",
-        f"{_TIMES}; uint16_t reversible_flags; float[12] control",
-        100,
-        _motors,
-    ),
-    ("trajectory_setpoint", _TRAJECTORY, 100, _trajectory_setpoint),
-    (
-        "vehicle_attitude_setpoint",
-        "uint64_t timestamp; float yaw_sp_move_rate; float[4] q_d; float[3] thrust_body",
-        50,
-        _attitude_setpoint,
-    ),
-    (
-        "vehicle_rates_setpoint",
-        "uint64_t timestamp; float roll; float pitch; float yaw; float[3] thrust_body",
-        20,
-        _rates_setpoint,
-    ),
-)
+_VALUES: dict[str, Callable[[AutopilotContext], Values | None]] = {
+    "vehicle_attitude": _attitude,
+    "vehicle_angular_velocity": _angular_velocity,
+    "vehicle_acceleration": _acceleration,
+    "vehicle_local_position": _local_position,
+    "vehicle_global_position": _global_position,
+    "vehicle_status": _status,
+    "vehicle_land_detected": _land_detected,
+    "battery_status": _battery,
+    "actuator_motors": _motors,
+    "trajectory_setpoint": _trajectory_setpoint,
+    "vehicle_attitude_setpoint": _attitude_setpoint,
+    "vehicle_rates_setpoint": _rates_setpoint,
+}
 TOPICS = tuple(
-    LoggedTopic(UlogTopic(number, name, fields), period_ms * 1_000_000, values)
-    for number, (name, fields, period_ms, values) in enumerate(_DESCRIBED)
+    LoggedTopic(
+        UlogTopic(number, name, ";".join(row["fields"])),
+        row["period_ms"] * 1_000_000,
+        _VALUES[name],
+    )
+    for number, (name, row) in enumerate(read_table(__file__, "log_topics.toml").items())
 )

@@ -12,9 +12,9 @@ from volery.control.fleet import Fleet
 from volery.core import rotations
 from volery.runtime.build.geo_reference import magnetic_field_map
 from volery.scenario.schema import FlatTerrain, Scenario
-from volery.sensors.gnss import GnssModel, load_gnss_model
-from volery.sensors.imu import load_imu_model
-from volery.sensors.sonar import load_sonar_model
+from volery.sensors.gnss import GnssModel
+from volery.sensors.imu import ImuModel
+from volery.sensors.sonar import SonarModel
 
 if TYPE_CHECKING:
     from volery.control.estimator.settings import EstimatorSettings, Mounting
@@ -104,7 +104,7 @@ class _Knowledge:
         from volery.control.estimator.settings import EstimatorSettings
 
         keys = set(EstimatorSettings.model_fields)
-        imu = load_imu_model(self._model(aids["imu"].spec.model)).model_dump()
+        imu = ImuModel.load(self._model(aids["imu"].spec.model)).model_dump()
         values: dict[str, Any] = {key: value for key, value in imu.items() if key in keys}
         values["imu_rate_hz"] = aids["imu"].spec.rate_hz
         values["magnetic_field_map"] = self._field
@@ -112,7 +112,7 @@ class _Knowledge:
             values["gnss_offset_sigma_m"] = self._drift(aids)
             values["gnss_offset_correlation_s"] = self._receiver(aids).drift_correlation_s
         if "sonar" in aids:
-            cone = load_sonar_model(self._model(aids["sonar"].spec.model)).field_of_view_deg
+            cone = SonarModel.load(self._model(aids["sonar"].spec.model)).field_of_view_deg
             values["range_half_cone_rad"] = math.radians(cone / 2.0)
         return EstimatorSettings(**values)
 
@@ -125,7 +125,7 @@ class _Knowledge:
     def _receiver(self, aids: Mapping[str, SensorInstance]) -> GnssModel:
         name = aids["gnss"].spec.model
         if name not in self._gnss:
-            self._gnss[name] = load_gnss_model(self._model(name))
+            self._gnss[name] = GnssModel.load(self._model(name))
         return self._gnss[name]
 
 

@@ -13,11 +13,13 @@ from volery.control.gains import ControlRates
 from volery.core.errors import CommandError, DataFileError, ScenarioError
 from volery.core.plurals import counted
 from volery.runtime.build.placement import StartPose, place_uavs
-from volery.runtime.build.plant import plant_of_type
 from volery.runtime.build.worlds import build_weather
 from volery.scenario.schema import Scenario
 from volery.vehicle.airframe import Airframe, load_airframe
 from volery.vehicle.body_shape import body_shape
+from volery.vehicle.identified import load_identified
+from volery.vehicle.kinematic import Kinematic
+from volery.vehicle.plant_types import Plant, RigidBody
 from volery.world.scene import Scene
 from volery.world.terrain import Terrain
 
@@ -109,3 +111,17 @@ def add_bodies(scene: Scene, starts: Sequence[StartPose], *, num_envs: int = 1) 
         [kinds.index(start.airframe) for start in starts],
         num_envs=num_envs,
     )
+
+
+def plant_of_type(scenario: Scenario, type_name: str, airframe: Airframe) -> Plant:
+    """Returns the plant of a type. Raises `DataFileError` if its model is missing or invalid."""
+    kind = scenario.types[type_name]
+    if kind.plant == "rigid_body":
+        return RigidBody()
+    if kind.plant == "kinematic":
+        return Kinematic(kind.kinematic.time_constant_s, kind.kinematic.limited)
+    try:
+        return load_identified(scenario.access.find_model(kind.identified_model or airframe.name))
+    except DataFileError as error:
+        key = f"{scenario.name}: types.{type_name}.identified_model"
+        raise DataFileError(f"{key}: {error}") from None

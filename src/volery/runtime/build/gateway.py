@@ -8,9 +8,9 @@ from volery.engine.engine import Engine
 from volery.engine.lock_step import Partner
 from volery.engine.pacing import Pacer
 from volery.graph.graph import Graph
+from volery.graph.rotor_layout import RotorLayout, RotorPosition
 from volery.graph.session import Gateway
 from volery.runtime.replay.command_log import CommandLog
-from volery.runtime.vehicles.rotor_layouts import rotor_layouts
 from volery.runtime.vehicles.uav import Uav
 
 
@@ -34,6 +34,17 @@ def build_gateway(
         open_queue=lambda: engine.inbox.open_queue().post,
         is_busy=is_busy,
         is_late=lambda: pacer.speed is not None and is_busy(),
-        rotor_layouts=lambda: rotor_layouts(uavs),
+        rotor_layouts=lambda: _rotor_layouts(uavs),
         reduce_latency=pacer.use_low_latency,
     )
+
+
+def _rotor_layouts(uavs: Mapping[str, Uav]) -> dict[str, RotorLayout]:
+    """Returns the rotors of each UAV by its name; thread-safe."""
+    return {
+        name: [
+            RotorPosition(rotor.position_m[0], rotor.position_m[1], rotor.direction)
+            for rotor in uav.airframe.rotors.places
+        ]
+        for name, uav in dict(uavs).items()
+    }

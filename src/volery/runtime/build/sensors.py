@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
 from volery.core.clock import Schedule, ns_from_s
@@ -17,23 +16,22 @@ from volery.runtime.build.geo_reference import denial, local_frame, magnetic_fie
 from volery.runtime.build.sensor_suites import PICTURE, RESULT_OF, SensorInstance
 from volery.runtime.build.worlds import light_of
 from volery.scenario import schema
-from volery.sensors.bank import Bank
-from volery.sensors.barometer import BarometerBank, load_barometer_model
+from volery.sensors.bank import Bank, SensorGroup
+from volery.sensors.barometer import BarometerBank, BarometerModel
 from volery.sensors.battery import BatteryBank
 from volery.sensors.faults import FaultableBank
-from volery.sensors.gnss import GnssBank, load_gnss_model
-from volery.sensors.imu import ImuBank, load_imu_model
+from volery.sensors.gnss import GnssBank, GnssModel
+from volery.sensors.imu import ImuBank, ImuModel
 from volery.sensors.joints import JointBank
 from volery.sensors.lidar_bank import LidarBank
 from volery.sensors.lidar_model import LidarModel
-from volery.sensors.magnetometer import MagnetometerBank, load_magnetometer_model
-from volery.sensors.odometry import GroundTruthBank, OdometryBank, load_odometry_model
+from volery.sensors.magnetometer import MagnetometerBank, MagnetometerModel
+from volery.sensors.odometry import GroundTruthBank, OdometryBank, OdometryModel
 from volery.sensors.samples import (
     JointAngles,
-    SensorId,
 )
 from volery.sensors.scan_patterns import PlanarScan
-from volery.sensors.sonar import SonarBank, load_sonar_model
+from volery.sensors.sonar import SonarBank, SonarModel
 from volery.world.scene import Scene
 
 if TYPE_CHECKING:
@@ -74,113 +72,74 @@ class _Builder:
         self._estimation = estimation
         self._scenario = scenario.name
         self._world = scenario.world
-        self._model = scenario.access.find_model
+        self._find_model = scenario.access.find_model
         self._fleet = fleet
         self._scene = scene
 
-    def build(self, group: list[SensorInstance]) -> Bank:
-        by_kind: dict[str, Callable[[list[SensorInstance]], Bank]] = {
+    def build(self, instances: list[SensorInstance]) -> Bank:
+        """Returns the bank of sensors that are sampled together."""
+        first = instances[0]
+        group = _group_of(instances)
+        by_kind: dict[str, Callable[[SensorInstance, SensorGroup], Bank]] = {
             "lidar": self._lidar,
             "camera": self._camera,
-            "imu": self._imu,
+            "imu": lambda one, group: ImuBank(ImuModel.load(self._model(one)), group),
             "sonar": self._sonar,
             "odometry": self._odometry,
             "estimate": self._estimate,
-            "ground_truth": self._ground_truth,
+            "ground_truth": lambda _, group: GroundTruthBank(group),
             "gnss": self._gnss,
             "barometer": self._barometer,
             "magnetometer": self._magnetometer,
-            "battery": self._battery,
+            "battery": lambda _, group: BatteryBank(group, self._fleet),
         }
         try:
-            return by_kind[group[0].spec.kind](group)
+            return by_kind[first.spec.kind](first, group)
         except DataFileError as error:
-            name = group[0].id.name
-            raise DataFileError(f"{self._scenario}: sensor '{name}': {error}") from None
+            raise DataFileError(f"{self._scenario}: sensor '{first.id.name}': {error}") from None
 
-    def _lidar(self, group: list[SensorInstance]) -> Bank:
-        model = group[0].lidar
-        assert model is not None
-        return LidarBank(
-            model,
-            Schedule.from_hz(model.scan.rate_hz, _phase_ns(group)),
-            _ids(group),
-            tuple(s.mount for s in group),
-            _keys(group),
-            self._scene,
-            intensities=_wants_intensities(group[0].spec, model),
-        )
+    def _model(self, one: SensorInstance) -> str:
+        return self._find_model(one.spec.model)
 
-    def _camera(self, group: list[SensorInstance]) -> Bank:
+    def _lidar(self, one: SensorInstance, group: SensorGroup) -> Bank:
+        assert one.lidar is not None
+        intensities = _wants_intensities(one.spec, one.lidar)
+        return LidarBank(one.lidar, group, self._scene, intensities=intensities)
+
+    def _camera(self, one: SensorInstance, group: SensorGroup) -> Bank:
         from volery.sensors.cameras.bank import CameraBank
-        from volery.sensors.cameras.model import load_camera
+        from volery.sensors.cameras.model import CameraModel
 
-        spec = group[0].spec
+        spec = one.spec
         own = {name: getattr(spec, name) for name in PICTURE if getattr(spec, name) is not None}
-        return CameraBank(
-            load_camera(self._model(spec.model)).model_copy(update=own),
-            _schedule(group),
-            _ids(group),
-            tuple(s.mount for s in group),
-            _keys(group),
-            self._scene,
-            light_of(self._world),
-        )
+        model = CameraModel.load(self._model(one)).model_copy(update=own)
+        return CameraBank(model, group, self._scene, light_of(self._world))
 
-    def _imu(self, group: list[SensorInstance]) -> Bank:
-        spec = group[0].spec
-        model = load_imu_model(self._model(spec.model))
-        return ImuBank(model, _schedule(group), _ids(group), *_places(group), _keys(group))
+    def _sonar(self, one: SensorInstance, group: SensorGroup) -> Bank:
+        return SonarBank(SonarModel.load(self._model(one)), group, self._scene)
 
-    def _sonar(self, group: list[SensorInstance]) -> Bank:
-        model = load_sonar_model(self._model(group[0].spec.model))
-        return SonarBank(
-            model, _schedule(group), _ids(group), *_places(group), _keys(group), self._scene
-        )
+    def _odometry(self, one: SensorInstance, group: SensorGroup) -> Bank:
+        return OdometryBank(OdometryModel.load(self._model(one)), group, self._fleet)
 
-    def _odometry(self, group: list[SensorInstance]) -> Bank:
-        model = load_odometry_model(self._model(group[0].spec.model))
-        return OdometryBank(model, _schedule(group), _ids(group), _keys(group), self._fleet)
-
-    def _estimate(self, group: list[SensorInstance]) -> Bank:
+    def _estimate(self, _one: SensorInstance, group: SensorGroup) -> Bank:
         from volery.sensors.estimate import EstimateBank
 
         assert self._estimation is not None
-        rows = self._estimation.rows_of(np.array([sensor.id.uav for sensor in group]))
+        rows = self._estimation.rows_of(np.array([sensor.uav for sensor in group.sensors]))
         variance = self._estimation.gyro_variance[rows]
-        estimator = self._estimation.estimator
-        return EstimateBank(_schedule(group), _ids(group), estimator, rows, variance)
+        return EstimateBank(group, self._estimation.estimator, rows, variance)
 
-    def _ground_truth(self, group: list[SensorInstance]) -> Bank:
-        return GroundTruthBank(_schedule(group), _ids(group))
+    def _gnss(self, one: SensorInstance, group: SensorGroup) -> Bank:
+        model = GnssModel.load(self._model(one))
+        return GnssBank(model, group, local_frame(self._world), denial(self._world))
 
-    def _gnss(self, group: list[SensorInstance]) -> Bank:
-        model = load_gnss_model(self._model(group[0].spec.model))
-        places, _ = _places(group)
-        return GnssBank(
-            model,
-            _schedule(group),
-            _ids(group),
-            places,
-            _keys(group),
-            local_frame(self._world),
-            denial(self._world),
-        )
+    def _barometer(self, one: SensorInstance, group: SensorGroup) -> Bank:
+        model = BarometerModel.load(self._model(one))
+        return BarometerBank(model, group, self._world.origin.altitude_m)
 
-    def _barometer(self, group: list[SensorInstance]) -> Bank:
-        model = load_barometer_model(self._model(group[0].spec.model))
-        places, _ = _places(group)
-        altitude = self._world.origin.altitude_m
-        return BarometerBank(model, _schedule(group), _ids(group), places, _keys(group), altitude)
-
-    def _magnetometer(self, group: list[SensorInstance]) -> Bank:
-        model = load_magnetometer_model(self._model(group[0].spec.model))
-        _, turns = _places(group)
-        field = magnetic_field_map(self._world)
-        return MagnetometerBank(model, _schedule(group), _ids(group), turns, _keys(group), field)
-
-    def _battery(self, group: list[SensorInstance]) -> Bank:
-        return BatteryBank(_schedule(group), _ids(group), self._fleet)
+    def _magnetometer(self, one: SensorInstance, group: SensorGroup) -> Bank:
+        model = MagnetometerModel.load(self._model(one))
+        return MagnetometerBank(model, group, magnetic_field_map(self._world))
 
 
 def _wants_intensities(spec: schema.LidarSensor, model: LidarModel) -> bool:
@@ -193,24 +152,12 @@ def _wants_intensities(spec: schema.LidarSensor, model: LidarModel) -> bool:
     return spec.intensities or model.intensity.published
 
 
-def _ids(group: list[SensorInstance]) -> tuple[SensorId, ...]:
-    return tuple(sensor.id for sensor in group)
-
-
-def _places(group: list[SensorInstance]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    return (
-        np.array([s.mount.position_body for s in group]),
-        np.array([s.mount.attitude_body for s in group]),
+def _group_of(instances: list[SensorInstance]) -> SensorGroup:
+    first = instances[0]
+    rate_hz = first.spec.rate_hz if first.lidar is None else first.lidar.scan.rate_hz
+    return SensorGroup(
+        Schedule.from_hz(rate_hz, ns_from_s(first.spec.phase_s)),
+        tuple(one.id for one in instances),
+        tuple(one.mount for one in instances),
+        np.array([one.key for one in instances]) if getattr(first.spec, "noise", False) else None,
     )
-
-
-def _keys(group: list[SensorInstance]) -> NDArray[np.uint64] | None:
-    return np.array([s.key for s in group]) if group[0].spec.noise else None
-
-
-def _phase_ns(group: list[SensorInstance]) -> int:
-    return ns_from_s(group[0].spec.phase_s)
-
-
-def _schedule(group: list[SensorInstance]) -> Schedule:
-    return Schedule.from_hz(group[0].spec.rate_hz, _phase_ns(group))

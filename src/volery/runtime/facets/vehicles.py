@@ -153,6 +153,9 @@ class SimulationVehicles(BatchCommands):
         self._check_open()
         return tuple(self._manager.uavs.values())
 
+    def _paths(self) -> Sequence[str]:
+        return tuple(self._manager.uavs)
+
     def _fleets(self) -> Sequence[tuple[Fleet, slice]]:
         self._check_open()
         return [(self._manager.engine.fleet, slice(None))]

@@ -17,6 +17,10 @@ from volery.runtime.grid_map_manager import GridMapManager
 from volery.runtime.services.weather_messages import WeatherTopics
 from volery.scenario.schema import World
 from volery.world.actors import MovingActors
+from volery.world.city import City
+from volery.world.forest import Forest
+from volery.world.scene import Scene
+from volery.world.terrain import Terrain
 from volery.world.weather import Weather
 
 _MAX_POSITION_M, _MAX_SPEED_M_S = 1e5, 100.0
@@ -29,6 +33,15 @@ class SimulationWorld:
     settings: the world of the scenario. check_open: raises `CommandError` once the simulation is
     closed.
     """
+
+    terrain: Terrain
+    """Ground."""
+    city: City | None
+    """Buildings and streets; None: there are none."""
+    forest: Forest | None
+    """Trees; None: there are none."""
+    scene: Scene
+    """Surfaces that rays hit and UAVs touch."""
 
     def __init__(
         self,

@@ -18,9 +18,11 @@ class Progress:
     time_s: float
     """Simulated time since the run began, or since the last reset, s."""
     duration_s: float
+    """Simulated time at which the run ends, s."""
     wall_s: float
     """Wall time since the run began, without pauses, s."""
     paused: bool = False
+    """Whether the run is paused."""
     before_s: float = 0.0
     """Simulated time before the last reset, summed over all resets, s."""
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from itertools import zip_longest
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from volery.control.batch_limits import BatchLimits
 from volery.control.fleet import Fleet
 from volery.control.flight_modes import FlightMode
+from volery.control.setpoints import ControlLevel
 from volery.control.trajectory import Trajectory
 from volery.core.arrays import Array
 from volery.core.errors import CommandError
@@ -31,10 +34,13 @@ class BatchCommands(ABC):
     broadcast, are not finite or are out of range, and for plants that lack a command.
     """
 
+    _checked_fleets: tuple[Fleet, ...] = ()
+    _limits: BatchLimits | None = None
+
     # ------------------------------------------------------------------------------ flight modes
 
     def take_off(self, altitude_m: float | None = None) -> list[FlightFuture]:
-        """Takes off with all UAVs on the ground; returns their futures, for `run_until`."""
+        """Takes off with all UAVs on the ground, by `altitude_m`, m; returns their futures."""
         modes = (FlightMode.LANDED,)
         return [uav.take_off(altitude_m) for uav in self._handles() if uav.mode in modes]
 
@@ -52,9 +58,13 @@ class BatchCommands(ABC):
         Returns the futures of the UAVs that fly. Raises `CommandError` at the first position that
         is below the ground or inside an obstacle: UAVs before it in fleet order fly already.
         """
-        goals = self._flat("position", position_map, (3,))
-        yaws = self._yaws(yaw)
-        return [uav.go_to(goals[i], yaws[i]) for i, uav in self._guided()]
+        limits = self._find_limits()
+        goals = limits.positions(self._flat("position", position_map, (3,)))
+        yaws = self._flat_yaw(yaw)
+        return [
+            uav.go_to(goals[i], None if yaws is None else float(yaws[i]))
+            for i, uav in self._guided()
+        ]
 
     def follow_trajectory(
         self, trajectories: Trajectory | Sequence[Trajectory]
@@ -74,28 +84,34 @@ class BatchCommands(ABC):
 
     def command_velocity(self, velocity: ArrayLike, yaw_rate: ArrayLike = 0.0) -> None:
         """Flies at `velocity` (n, 3), m/s, in level heading frames (FLU), `yaw_rate` (n,) rad/s."""
-        velocities, rates = self._flat("velocity", velocity, (3,)), self._flat("yaw_rate", yaw_rate)
+        limits = self._find_limits()
+        velocities = limits.velocities(self._flat("velocity", velocity, (3,)))
+        rates = limits.yaw_rates(self._flat("yaw rate", yaw_rate))
         for fleet, rows in self._fleets():
             fleet.command_velocities(velocities[rows], rates[rows])
-        self._check_futures()
+        self._replace_futures("command_velocity", FlightMode.VELOCITY)
 
     def command_velocity_map(
         self, velocity: ArrayLike, yaw_rate: ArrayLike = 0.0, *, yaw: ArrayLike | None = None
     ) -> None:
         """Flies at `velocity` (n, 3), m/s, in the map; `yaw_rate` (n,) rad/s or `yaw` (n,) rad."""
-        velocities, rates = self._flat("velocity", velocity, (3,)), self._flat("yaw_rate", yaw_rate)
-        yaws = self._yaws(yaw)
-        for i, uav in self._guided():
-            uav.command_velocity_map(velocities[i], float(rates[i]), yaw=yaws[i])
+        limits = self._find_limits()
+        velocities = limits.velocities(self._flat("velocity", velocity, (3,)))
+        rates, yaws = limits.yaw_rates(self._flat("yaw rate", yaw_rate)), self._flat_yaw(yaw)
+        for fleet, rows in self._fleets():
+            fleet.command_map_velocities(velocities[rows], _of(yaws, rows), rates[rows])
+        self._replace_futures("command_velocity_map", FlightMode.VELOCITY)
 
     def command_acceleration(
         self, acceleration_map: ArrayLike, yaw: ArrayLike | None = None, yaw_rate: ArrayLike = 0.0
     ) -> None:
         """Accelerates by (n, 3), m/s^2, in the map frame at `yaw` (n,), rad (None: unchanged)."""
-        accelerations = self._flat("acceleration", acceleration_map, (3,))
-        yaws, rates = self._yaws(yaw), self._flat("yaw_rate", yaw_rate)
+        limits = self._find_limits()
+        accelerations = limits.accelerations(self._flat("acceleration", acceleration_map, (3,)))
+        rates, yaws = limits.yaw_rates(self._flat("yaw rate", yaw_rate)), self._flat_yaw(yaw)
         for i, uav in self._guided():
-            uav.command_acceleration(accelerations[i], yaws[i], float(rates[i]))
+            angle = None if yaws is None else float(yaws[i])
+            uav.command_acceleration(accelerations[i], angle, float(rates[i]))
 
     def command_setpoint(
         self,
@@ -105,42 +121,52 @@ class BatchCommands(ABC):
         yaw: ArrayLike | None = None,
         yaw_rate: ArrayLike = 0.0,
     ) -> None:
-        """Commands points of trajectories: positions (n, 3) m, velocities, accelerations, map."""
-        positions = self._flat("position", position_map, (3,))
-        velocities = self._flat("velocity", velocity_map, (3,))
-        accelerations = self._flat("acceleration", acceleration_map, (3,))
-        yaws, rates = self._yaws(yaw), self._flat("yaw_rate", yaw_rate)
-        for i, uav in self._guided():
-            uav.command_setpoint(
-                positions[i], velocities[i], accelerations[i], yaws[i], float(rates[i])
-            )
+        """Commands points of trajectories (n, 3): positions m, velocities m/s, accelerations m/s^2.
+
+        In the map frame, with headings `yaw` (n,), rad (None: unchanged), that turn at `yaw_rate`
+        (n,), rad/s.
+        """
+        limits = self._find_limits()
+        setpoints = {
+            "position_target": limits.positions(self._flat("position", position_map, (3,))),
+            "velocity_target": limits.velocities(self._flat("velocity", velocity_map, (3,))),
+            "acceleration_target": limits.accelerations(
+                self._flat("acceleration", acceleration_map, (3,))
+            ),
+        }
+        rates, yaws = limits.yaw_rates(self._flat("yaw rate", yaw_rate)), self._flat_yaw(yaw)
+        for fleet, rows in self._fleets():
+            own = {name: values[rows] for name, values in setpoints.items()}
+            fleet.command_setpoints(own, _of(yaws, rows), rates[rows])
+        self._replace_futures("command_setpoint", FlightMode.TRAJECTORY)
 
     def command_attitude(self, attitude: ArrayLike, thrust: ArrayLike) -> None:
         """Holds attitudes (n, 4), x y z w, with thrusts (n,), N, along the bodies' z axes."""
-        attitudes, thrusts = self._flat("attitude", attitude, (4,)), self._flat("thrust", thrust)
-        for fleet, rows in self._fleets():
-            fleet.command_all_attitudes(attitudes[rows], thrusts[rows])
-        self._check_futures()
+        limits = self._find_limits()
+        attitudes = limits.attitudes(self._flat("attitude", attitude, (4,)))
+        thrusts = limits.thrusts(self._flat("thrust", thrust))
+        setpoints: dict[str, Array | float] = {
+            "attitude": attitudes,
+            "thrust": thrusts,
+            "yaw_rate": 0.0,
+        }
+        self._command_all("command_attitude", ControlLevel.ATTITUDE, setpoints)
 
     def command_rates(self, omega_body: ArrayLike, thrust: ArrayLike) -> None:
         """Turns at `omega_body` (n, 3), rad/s, with thrusts (n,), N, along the bodies' z axes."""
-        rates, thrusts = self._flat("rates", omega_body, (3,)), self._flat("thrust", thrust)
-        for fleet, rows in self._fleets():
-            fleet.command_all_rates(rates[rows], thrusts[rows])
-        self._check_futures()
+        limits = self._find_limits()
+        rates = limits.rates(self._flat("rates", omega_body, (3,)))
+        thrusts = limits.thrusts(self._flat("thrust", thrust))
+        self._command_all("command_rates", ControlLevel.RATES, {"rates": rates, "thrust": thrusts})
 
     def command_rotor_speeds(self, speeds: ArrayLike) -> None:
         """Turns the rotors at `speeds` (n, R), rad/s; R is the largest number of rotors.
 
         Columns beyond a UAV's rotors are ignored.
         """
-        fleets = self._fleets()
-        airframes = [airframe for fleet, _ in fleets for airframe in fleet.airframes]
-        rotors = max(len(airframe.rotors.places) for airframe in airframes)
-        targets = self._flat("rotor speeds", speeds, (rotors,))
-        for fleet, rows in fleets:
-            fleet.command_all_rotor_speeds(targets[rows])
-        self._check_futures()
+        limits = self._find_limits()
+        targets = limits.rotor_speeds(self._flat("rotor speeds", speeds, (limits.num_rotors,)))
+        self._command_all("command_rotor_speeds", ControlLevel.ROTORS, {"rotor_target": targets})
 
     # -------------------------------------------------------------------------------- the fleets
 
@@ -152,6 +178,10 @@ class BatchCommands(ABC):
     @abstractmethod
     def _handles(self) -> Sequence[Uav]:
         """Returns the handles of all UAVs, in the order of the flattened arrays."""
+
+    @abstractmethod
+    def _paths(self) -> Sequence[str]:
+        """Returns the names of all UAVs, in the order of the flattened arrays, for errors."""
 
     @abstractmethod
     def _fleets(self) -> Sequence[tuple[Fleet, slice]]:
@@ -171,26 +201,56 @@ class BatchCommands(ABC):
         """Returns the UAVs that guided commands reach, with their rows."""
         return [(i, uav) for i, uav in enumerate(self._handles()) if uav.mode not in _NOT_GUIDED]
 
-    def _check_futures(self) -> None:
+    def _replace_futures(self, command: str, mode: FlightMode) -> None:
         for futures in self._future_lists():
-            futures.check_all()
+            futures.replace_all(command, mode)
 
-    def _yaws(self, yaw: ArrayLike | None) -> Sequence[float | None]:
-        if yaw is None:
-            return [None] * int(np.prod(self._batch_shape))
-        yaws: list[float | None] = self._flat("yaw", yaw).tolist()
-        return yaws
+    def _command_all(
+        self, command: str, level: ControlLevel, setpoints: Mapping[str, Array | float]
+    ) -> None:
+        for fleet, rows in self._fleets():
+            own = {
+                name: values[rows] if isinstance(values, np.ndarray) else values
+                for name, values in setpoints.items()
+            }
+            fleet.command_all(level, own)
+        self._replace_futures(command, FlightMode.LOW_LEVEL)
+
+    def _find_limits(self) -> BatchLimits:
+        """Returns the limits of all UAVs; computes them again when the fleets have changed."""
+        fleets = tuple(fleet for fleet, _ in self._fleets())
+        if self._limits is None or any(
+            one is not other for one, other in zip_longest(fleets, self._checked_fleets)
+        ):
+            airframes = [airframe for fleet in fleets for airframe in fleet.airframes]
+            plants = [plant for fleet in fleets for plant in fleet.plants]
+            self._limits = BatchLimits(airframes, plants, self._paths())
+            self._checked_fleets = fleets
+        return self._limits
+
+    def _flat_yaw(self, yaw: ArrayLike | None) -> Array | None:
+        """Returns headings (N,), rad, or None."""
+        return None if yaw is None else self._find_limits().yaws(self._flat("yaw", yaw))
 
     def _flat(self, what: str, values: ArrayLike, tail: tuple[int, ...] = ()) -> Array:
-        """Broadcasts finite numbers to all UAVs and flattens them to (N, ...)."""
+        """Broadcasts numbers to all UAVs and flattens them to (N, ...)."""
         shape = (*self._batch_shape, *tail)
         try:
-            spread = np.broadcast_to(np.asarray(values, dtype=np.float64), shape)
+            array = np.asarray(values, dtype=np.float64)
         except (TypeError, ValueError):
-            raise CommandError(f"{what}: numbers that broadcast to {shape} are needed") from None
-        if not np.isfinite(spread).all():
-            raise CommandError(f"{what} must be finite")
-        return spread.reshape(-1, *tail)
+            raise CommandError(f"{what}: numbers of shape {shape} are needed") from None
+        if array.shape != shape:
+            try:
+                array = np.broadcast_to(array, shape)
+            except ValueError:
+                raise CommandError(
+                    f"{what} of shape {array.shape} does not broadcast to {shape}"
+                ) from None
+        return array.reshape(-1, *tail)
+
+
+def _of(yaws: Array | None, rows: slice) -> Array | None:
+    return None if yaws is None else yaws[rows]
 
 
 def joined_states(states: Sequence[FleetState], shape: tuple[int, ...]) -> FleetState:

@@ -4,14 +4,13 @@
     future = uav.go_to([5.0, 3.0, 2.0])
     simulation.run(3.0)
     print(future)                        # done, failed and why, or pending
-    await uav.land()                     # beside `simulation.run_async()`
+    await uav.land()                     # in notebooks, alone or beside `simulation.run_async()`
 
 The methods are those of `rclpy.task.Future`; `wait` and `await` are added.
 """
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -22,7 +21,7 @@ from volery.core.errors import CommandError, FlightError, WaitTimeoutError
 
 
 @dataclass(frozen=True)
-class FlightResult:
+class CommandResult:
     """State of a UAV when a flight command was done."""
 
     time_ns: int
@@ -50,8 +49,11 @@ class FlightSource(Protocol):
     def describe(self, future: FlightFuture) -> str:
         """Returns mode and position of the UAV."""
 
-    def wait(self, is_done: Callable[[], bool], timeout_s: float) -> bool:
-        """Advances the simulation, or waits for it, until `is_done()`; returns whether it is."""
+    def wait(self, future: FlightFuture, timeout_s: float) -> bool:
+        """Advances the simulation, or waits for it, until the future is done; returns if it is."""
+
+    async def wait_async(self, future: FlightFuture) -> None:
+        """Waits like `wait`, without a limit, and lets other coroutines run in between."""
 
 
 class FlightFuture:
@@ -78,7 +80,7 @@ class FlightFuture:
         self.final = final
         """Flight mode after the command."""
         self._source = source
-        self._result: FlightResult | None = None
+        self._result: CommandResult | None = None
         self._error: FlightError | None = None
         self._callbacks: list[Callable[[FlightFuture], None]] = []
 
@@ -92,8 +94,11 @@ class FlightFuture:
         """Returns False: another command, such as `hold`, ends a flight command."""
         return False
 
-    def result(self) -> FlightResult:
-        """Returns the state at the end. Raises `FlightError` if it failed, or if it is not done."""
+    def result(self) -> CommandResult:
+        """Returns the state at the end.
+
+        Raises `FlightError` if the command failed, `CommandError` if it is not done yet.
+        """
         if not self.done():
             raise CommandError(f"{self.pending_text()}; call wait(), or await it")
         if self._error is not None:
@@ -107,40 +112,39 @@ class FlightFuture:
         return self._error
 
     def add_done_callback(self, callback: Callable[[FlightFuture], None]) -> None:
-        """Calls `callback(future)` in the simulation's thread when it is done; at once if it is."""
+        """Calls `callback(future)` when it is done, at once if it is.
+
+        The call comes from the thread that advances the UAV, within a tick: the callback may
+        command UAVs, and does not wait.
+        """
         if self.done():
             callback(self)
         else:
             self._callbacks.append(callback)
             self._source.watch(self)
 
-    def wait(self, timeout_s: float = 60.0) -> FlightResult:
+    def wait(self, timeout_s: float = 60.0) -> CommandResult:
         """Waits until the command is done and returns the state then.
 
         In the thread of the simulation, and outside of a run, it advances the simulation as fast
-        as possible; in another thread it waits for the run. `timeout_s` is simulated time;
+        as possible; in another thread it waits for the run. `timeout_s` is simulated time, s;
         `math.inf` waits for as long as it takes. Raises `FlightError` if the command fails,
         `WaitTimeoutError` if it is not done in time, `CommandError` within a tick.
         """
-        if not self.done() and not self._source.wait(self.done, timeout_s):
+        if not self.done() and not self._source.wait(self, timeout_s):
             raise WaitTimeoutError(
                 f"{self.pending_text()} within {timeout_s:g} s; is the goal in reach, or the "
                 "timeout too short?"
             )
         return self.result()
 
-    def __await__(self) -> Generator[Any, None, FlightResult]:
-        """Waits beside `Simulation.run_async`, which advances the simulation."""
+    def __await__(self) -> Generator[Any, None, CommandResult]:
+        """Waits while other coroutines run, without a limit of time.
+
+        Advances the simulation, unless `Simulation.run_async` or another thread does.
+        """
         if not self.done():
-            loop = asyncio.get_running_loop()
-            waiter: asyncio.Future[None] = loop.create_future()
-
-            def wake() -> None:
-                if not waiter.done():
-                    waiter.set_result(None)
-
-            self.add_done_callback(lambda _: loop.call_soon_threadsafe(wake))
-            yield from waiter
+            yield from self._source.wait_async(self).__await__()
         return self.result()
 
     def pending_text(self) -> str:
@@ -154,7 +158,7 @@ class FlightFuture:
         """Whether `complete` or `fail` was called."""
         return self._result is not None or self._error is not None
 
-    def complete(self, result: FlightResult) -> None:
+    def complete(self, result: CommandResult) -> None:
         """Sets the result and calls the callbacks."""
         if not self.is_settled:
             self._result = result

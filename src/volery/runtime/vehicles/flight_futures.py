@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol
 
 from volery.control.fleet import Fleet
 from volery.control.flight_modes import FlightMode
 from volery.core.clock import s_from_ns
 from volery.core.errors import CommandError
 from volery.engine.events import Event, EventKind
-from volery.runtime.vehicles.flight_future import FlightFuture, FlightResult
+from volery.runtime.vehicles.flight_future import CommandResult, FlightFuture
 
-Place = tuple[Fleet, int]
+FleetRow = tuple[Fleet, int]
 """Fleet and row of a UAV."""
-Wait = Callable[[Callable[[], bool], float], bool]
-"""Advances the simulation until a condition is true, by a time at most; see `ConditionalRuns`."""
 
 _CONTACTS = (EventKind.IMPACT, EventKind.COLLISION)
 _COMMANDS = {
@@ -28,15 +27,30 @@ CHECK_PERIOD_S = 0.02
 """Period of the checks for what ends without an event: braking, teleports."""
 
 
+class FlightRuns(Protocol):
+    """Advances the simulation for code that waits for flight commands."""
+
+    def is_busy(self) -> bool:
+        """Returns whether another thread advances the simulation now."""
+
+    def wait(self, is_done: Callable[[], bool], timeout_s: float) -> bool:
+        """Advances the simulation, or waits for it, until `is_done()`; returns whether it is."""
+
+    async def wait_async(self, is_done: Callable[[], bool]) -> None:
+        """Advances the simulation, or waits for it, and lets other coroutines run in between."""
+
+
 class FlightFutures:
     """Futures of the present flight commands of all UAVs, at most one of each.
 
-    place_of: returns fleet and row of a UAV by its name; raises `CommandError` once it is deleted.
+    fleet_row_of: returns fleet and row of a UAV by name; raises `CommandError` once it is deleted.
     """
 
-    def __init__(self, place_of: Callable[[str], Place], wait: Wait) -> None:
-        self._place_of = place_of
-        self._wait = wait
+    def __init__(self, fleet_row_of: Callable[[str], FleetRow], runs: FlightRuns) -> None:
+        self._fleet_row_of = fleet_row_of
+        self._runs = runs
+        self._has_new_events = False
+        """Whether events of this tick may still be on their way to `happened`."""
         self._pending: dict[str, FlightFuture] = {}
         self._checked: dict[str, FlightFuture] = {}
         """Pending futures that may end without an event while code waits for their callbacks."""
@@ -54,11 +68,19 @@ class FlightFutures:
 
     def watch(self, future: FlightFuture) -> None:
         """Checks a future in each period, because code waits for its callbacks."""
-        self._checked[future.uav] = future
+        if not future.is_settled:
+            self._checked[future.uav] = future
 
     def replace(self, uav: str, command: str) -> None:
         """Fails a UAV's pending future, because it has accepted another command."""
         self.fail(uav, f"{command} replaced it")
+
+    def replace_all(self, command: str, mode: FlightMode) -> None:
+        """Fails the pending futures of UAVs that a batch has just set to `mode`."""
+        for uav in tuple(self._pending):
+            fleet, row = self._fleet_row_of(uav)
+            if fleet.mode(row) is mode:
+                self.replace(uav, command)
 
     def fail(self, uav: str, reason: str) -> None:
         """Fails a UAV's pending future."""
@@ -80,7 +102,7 @@ class FlightFutures:
         """
         future = self._pending.get(uav)
         if future is None or future.done():
-            fleet, row = self._place_of(uav)
+            fleet, row = self._fleet_row_of(uav)
             mode = fleet.mode(row)
             return self.begin(uav, *_COMMANDS[mode]) if mode in _COMMANDS else None
         return future
@@ -100,35 +122,44 @@ class FlightFutures:
     def check(self) -> None:
         """Settles what has ended without an event."""
         for future in tuple(self._checked.values()):
-            self.update(future)
-
-    def check_all(self) -> None:
-        """Settles the futures of UAVs that were commanded without their handles."""
-        for future in tuple(self._pending.values()):
-            self.update(future)
+            if not future.is_settled:
+                self._settle(future)
 
     def happened(self, event: Event) -> None:
-        """Settles the future of the event's UAV, if the event ends its command."""
-        for uav in (event.uav, event.partner):
-            future = self._pending.get(uav)
-            if future is None:
-                continue
-            fleet, row = self._place_of(uav)
-            mode = fleet.mode(row)
-            if mode is FlightMode.CRASHED and event.kind in _CONTACTS:
-                other = event.partner if uav == event.uav else event.uav
-                self.fail(uav, f"it hit {other} at {event.speed_m_s:.2f} m/s and crashed")
-            elif event.kind is EventKind.MODE and mode is future.final:
-                self._complete(future, event.time_ns)
-            else:
-                self.update(future)
+        """Settles the futures of the event's UAVs, if the event ends their commands."""
+        if not self._pending:
+            return
+        self._has_new_events = True
+        try:
+            for uav, other in ((event.uav, event.partner), (event.partner, event.uav)):
+                if uav in self._pending:
+                    self._take(event, self._pending[uav], other)
+        finally:
+            self._has_new_events = False
 
     def update(self, future: FlightFuture) -> None:
-        """Settles the future if its UAV brakes no more, has crashed or has left its modes."""
-        if future.is_settled:
-            return
+        """Settles the future if its UAV brakes no more, has crashed or has left its modes.
+
+        Changes nothing while the state may be ahead of the events that explain it: in another
+        thread than the run's, and between two events of a tick.
+        """
+        if not (future.is_settled or self._has_new_events or self._runs.is_busy()):
+            self._settle(future)
+
+    def _take(self, event: Event, future: FlightFuture, other: str) -> None:
+        fleet, row = self._fleet_row_of(future.uav)
+        mode = fleet.mode(row)
+        if mode is FlightMode.CRASHED and event.kind in _CONTACTS:
+            self.fail(future.uav, f"it hit {other} at {event.speed_m_s:.2f} m/s and crashed")
+        elif event.kind is EventKind.MODE and event.uav == future.uav:
+            if mode is future.final and future.command != "hold":
+                self._complete(future, event.time_ns)
+            else:
+                self._settle(future)
+
+    def _settle(self, future: FlightFuture) -> None:
         try:
-            fleet, row = self._place_of(future.uav)
+            fleet, row = self._fleet_row_of(future.uav)
         except CommandError as error:
             self.fail(future.uav, str(error))
             return
@@ -143,25 +174,31 @@ class FlightFutures:
 
     def describe(self, future: FlightFuture) -> str:
         """Returns mode and position of a future's UAV."""
-        fleet, row = self._place_of(future.uav)
+        fleet, row = self._fleet_row_of(future.uav)
         x, y, z = fleet.state.position_map[row].tolist()
         return f"{fleet.mode(row).name} at ({x:.2f}, {y:.2f}, {z:.2f}) m"
 
-    def wait(self, is_done: Callable[[], bool], timeout_s: float) -> bool:
-        """Advances the simulation, or waits for it, until `is_done()`; returns whether it is."""
-        return self._wait(is_done, timeout_s)
+    def wait(self, future: FlightFuture, timeout_s: float) -> bool:
+        """Advances the simulation, or waits for it, until the future is done; returns if it is."""
+        self.watch(future)
+        return self._runs.wait(future.done, timeout_s)
+
+    async def wait_async(self, future: FlightFuture) -> None:
+        """Waits like `wait`, without a limit, and lets other coroutines run in between."""
+        self.watch(future)
+        await self._runs.wait_async(future.done)
 
     # ----------------------------------------------------------------------------------- inside
 
     def _complete(self, future: FlightFuture, time_ns: int) -> None:
         self._pending.pop(future.uav, None)
         self._checked.pop(future.uav, None)
-        fleet, row = self._place_of(future.uav)
+        fleet, row = self._fleet_row_of(future.uav)
         x, y, z = fleet.state.position_map[row].tolist()
-        future.complete(FlightResult(time_ns, (x, y, z), fleet.mode(row)))
+        future.complete(CommandResult(time_ns, (x, y, z), fleet.mode(row)))
 
     def _time_s(self, future: FlightFuture) -> float:
         try:
-            return s_from_ns(self._place_of(future.uav)[0].time_ns)
+            return s_from_ns(self._fleet_row_of(future.uav)[0].time_ns)
         except CommandError:
             return 0.0

@@ -6,7 +6,6 @@ import weakref
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from volery.core.errors import SensorError
 from volery.engine.engine import SensorBank
 from volery.runtime.build.sensor_suites import SensorInstance
 from volery.runtime.vehicles.sample_stream import SampleStream
@@ -53,7 +52,8 @@ class LatestSamples:
         }
         self._batches = {}
         self._single = {path: before[path] for path in self._places if before.get(path) is not None}
-        self._mounts, names = {}, {}
+        self._mounts = {}
+        names: dict[str, list[str]] = {}
         for sensor in fitted:
             self._mounts[sensor.id.path] = sensor.mount
             names.setdefault(sensor.id.uav_name, []).append(sensor.id.name)
@@ -116,13 +116,8 @@ class LatestSamples:
         return any(camera.path in paths for camera in cameras)
 
     def open_stream(self, uav: str, sensor: str, **options: Any) -> SampleStream:
-        """Returns a queue of a sensor's samples from now on. Raises `SensorError`."""
-        path = f"{uav}/{sensor}"
-        if path not in self._places:
-            raise SensorError(
-                f"{uav} has no sensor '{sensor}'; known: {', '.join(self.names(uav))}"
-            )
-        stream = SampleStream(path, self._streams.discard, **options)
+        """Returns a queue of a sensor's samples from now on."""
+        stream = SampleStream(f"{uav}/{sensor}", self._streams.discard, **options)
         self._streams.add(stream)
         return stream
 

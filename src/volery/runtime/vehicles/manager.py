@@ -87,7 +87,7 @@ class VehicleManager:
         origin = self.scenario.world.origin
         self.pose_aids = ExternalOdometry(self.graph, self.engine)
         self.flight_states = FlightStates(self.graph, self.engine, origin)
-        self.futures = FlightFutures(self._fleet_row_of, self.runs.wait)
+        self.futures = FlightFutures(self._fleet_row_of, self.runs)
         self.outlet.on_event = self.futures.happened
 
     def open(self, parts: Assembly) -> None:

@@ -14,7 +14,7 @@ from volery.control.setpoints import MAX_COORDINATE, checked
 from volery.control.trajectory import Trajectory
 from volery.core.arrays import Array
 from volery.core.errors import CommandError
-from volery.runtime.vehicles.flight_future import FlightFuture, FlightResult
+from volery.runtime.vehicles.flight_future import CommandResult, FlightFuture
 from volery.runtime.vehicles.flight_futures import FlightFutures
 from volery.runtime.vehicles.uav_sensors import UavSensors
 from volery.scenario.schema import Flight
@@ -56,6 +56,7 @@ class Uav:
         """Its name among those of all environments."""
         self._flight = flight
         self.name = name
+        """Its name, such as `uav1`."""
         self.type_name = type_name
         """Its type in the scenario."""
         self._check_goal = check_goal
@@ -158,7 +159,7 @@ class Uav:
 
     # ------------------------------------------------------------------------------ flight modes
 
-    def wait(self, timeout_s: float = 60.0) -> FlightResult | None:
+    def wait(self, timeout_s: float = 60.0) -> CommandResult | None:
         """Waits for the present flight command, such as the take-off at the scenario's start.
 
         Returns its result, None if the UAV has no command to complete. See `FlightFuture.wait`.
@@ -293,7 +294,11 @@ class Uav:
         velocity_map: ArrayLike = (0.0, 0.0, 0.0),
         omega_body: ArrayLike = (0.0, 0.0, 0.0),
     ) -> None:
-        """Sets the pose (m; x y z w, map from body) with the next step; kinematic UAVs only."""
+        """Sets the pose with the next step; kinematic UAVs only.
+
+        Position (3,), m, velocity (3,), m/s, and attitude (4,), x y z w, are in the map; angular
+        velocity (3,), rad/s, is in the body frame (FLU).
+        """
         self._fleet.command_pose(self._row, position_map, attitude, velocity_map, omega_body)
         self._replaced("command_pose")
 

@@ -58,6 +58,7 @@ class UavSensor:
         self._runs = runs
         self._uav = uav
         self.name = name
+        """Name of the sensor, such as `imu`."""
 
     @property
     def latest(self) -> Any:
@@ -67,6 +68,7 @@ class UavSensor:
         A camera renders for readers from the first reading on. Raises `SensorError` before the
         first sample; `has_sample` asks first.
         """
+        _check_exists(self._source, self._uav, self.name)
         self._source.request(self._uav, self.name)
         sample = self._source.latest(self._uav, self.name)
         if sample is None:
@@ -81,6 +83,7 @@ class UavSensor:
     @property
     def has_sample(self) -> bool:
         """Whether there is a `latest` sample."""
+        _check_exists(self._source, self._uav, self.name)
         return self._source.latest(self._uav, self.name) is not None
 
     def next(self, timeout_s: float = 10.0) -> Any:
@@ -113,6 +116,7 @@ class UavSensor:
                 "environments advance together; call run() of the VectorizedSimulation and "
                 "read `latest`"
             )
+        _check_exists(self._source, self._uav, self.name)
         if depth is not None and depth < 1:
             raise CommandError(f"depth must be at least 1, not {depth}")
         if seconds is not None:
@@ -139,10 +143,7 @@ class UavSensors(Mapping[str, UavSensor]):
 
     def __getitem__(self, name: str) -> UavSensor:
         """Returns a sensor. Raises `UnknownSensorError`, a `KeyError`."""
-        names = self._source.names(self._uav)
-        if name not in names:
-            known = ", ".join(names) or "none"
-            raise UnknownSensorError(f"{self._uav} has no sensor '{name}'; known: {known}")
+        _check_exists(self._source, self._uav, name)
         return UavSensor(self._source, self._runs, self._uav, name)
 
     def __iter__(self) -> Iterator[str]:
@@ -153,3 +154,11 @@ class UavSensors(Mapping[str, UavSensor]):
 
     def __repr__(self) -> str:
         return f"<sensors of {self._uav}: {', '.join(self)}>"
+
+
+def _check_exists(source: SampleSource, uav: str, name: str) -> None:
+    """Raises `UnknownSensorError` if a UAV has no such sensor, or was deleted."""
+    names = source.names(uav)
+    if name not in names:
+        known = ", ".join(names) or "none"
+        raise UnknownSensorError(f"{uav} has no sensor '{name}'; known: {known}")

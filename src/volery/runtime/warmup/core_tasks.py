@@ -12,17 +12,18 @@ from volery.core.geodesy import LocalFrame
 from volery.engine.collisions import BOUNCE, Collisions
 from volery.runtime.build.worlds import light_of
 from volery.scenario.schema import World
-from volery.sensors.gnss import GnssBank, load_gnss_model
-from volery.sensors.imu import ImuBank, load_imu_model
+from volery.sensors.bank import SensorGroup
+from volery.sensors.gnss import GnssBank, GnssModel
+from volery.sensors.imu import ImuBank, ImuModel
 from volery.sensors.joints import JointBank
 from volery.sensors.lidar_bank import LidarBank
 from volery.sensors.lidar_model import load_lidar
-from volery.sensors.magnetometer import MagnetometerBank, load_magnetometer_model
-from volery.sensors.mount import make_mount
+from volery.sensors.magnetometer import MagnetometerBank, MagnetometerModel
+from volery.sensors.mount import Mount, make_mount
 from volery.sensors.odometry import GroundTruthBank
 from volery.sensors.point_cloud import PointMaker
 from volery.sensors.samples import SensorId
-from volery.sensors.sonar import SonarBank, load_sonar_model
+from volery.sensors.sonar import SonarBank, SonarModel
 from volery.vehicle.airframe import load_airframe
 from volery.vehicle.body_shape import body_shape
 from volery.vehicle.kinematic import Kinematic
@@ -50,18 +51,16 @@ def _look_and_measure(count: int) -> None:
     scene.clearance(np.zeros((1, 3)), 1.0, include_terrain=False)
     scene.enclosing(np.zeros((1, 3)))
     scene.set_bodies([body_shape(fleet.airframes[0])], [0] * count)
-    sensors, place, turn = _sensors(count), np.zeros((count, 3)), _level(count)
-    schedule, mounts = Schedule.from_hz(40.0), (make_mount(amplitude_rad=0.5, period_s=2.0),)
-    keys = np.zeros(count, dtype=np.uint64)
+    group = _group(count, make_mount(amplitude_rad=0.5, period_s=2.0))
     for bank in (
-        LidarBank(load_lidar(), schedule, sensors, count * mounts, keys, scene),
-        SonarBank(load_sonar_model("downward_sonar"), schedule, sensors, place, turn, keys, scene),
-        ImuBank(load_imu_model("adis16448"), schedule, sensors, place, turn, keys),
-        GroundTruthBank(schedule, sensors),
-        JointBank(sensors, count * mounts),
+        LidarBank(load_lidar(), group, scene),
+        SonarBank(SonarModel.load("downward_sonar"), group, scene),
+        ImuBank(ImuModel.load("adis16448"), group),
+        GroundTruthBank(group),
+        JointBank(group.sensors, group.mounts),
     ):
         bank.sample(0, 0, fleet)
-    names = tuple(sensor.uav_name for sensor in sensors)
+    names = tuple(sensor.uav_name for sensor in group.sensors)
     Collisions(fleet, scene, names, BOUNCE, lambda _event: None).resolve(0)
     scene.close()
 
@@ -97,14 +96,12 @@ _RAIN = Weather(particles=Particles(rain_mm_h=1.0))
 def _render_images(weather: Weather) -> None:
     from volery.sensors.cameras.bank import CameraBank
     from volery.sensors.cameras.cloud import organised_points
-    from volery.sensors.cameras.model import load_camera
+    from volery.sensors.cameras.model import CameraModel
 
-    scene, fleet, sensors = _scene(), _fleet(), _sensors()
+    scene, fleet = _scene(), _fleet()
     fleet.set_weather(weather)
-    model = load_camera().model_copy(update={"width": 8, "height": 8})
-    schedule, keys = Schedule.from_hz(10.0), np.zeros(2, dtype=np.uint64)
-    mounts = 2 * (make_mount(),)
-    bank = CameraBank(model, schedule, sensors, mounts, keys, scene, light_of(World()))
+    model = CameraModel.load("pinhole").model_copy(update={"width": 8, "height": 8})
+    bank = CameraBank(model, _group(), scene, light_of(World()))
     frames = bank.sample(0, 0, fleet)
     organised_points(model, frames.depth[0], frames.colour[0])
     scene.close()
@@ -112,21 +109,14 @@ def _render_images(weather: Weather) -> None:
 
 def fixes() -> None:
     """Compiles GNSS."""
-    gnss, schedule, keys = (
-        load_gnss_model("gnss_m8"),
-        Schedule.from_hz(10.0),
-        np.zeros(2, np.uint64),
-    )
-    place = np.zeros((2, 3))
-    GnssBank(gnss, schedule, _sensors(), place, keys, LocalFrame(0, 0, 0)).sample(0, 0, _fleet())
+    bank = GnssBank(GnssModel.load("gnss_m8"), _group(), LocalFrame(0, 0, 0))
+    bank.sample(0, 0, _fleet())
 
 
 def magnetic_fields() -> None:
     """Compiles magnetometers."""
-    compass, schedule = load_magnetometer_model("magnetometer_px4"), Schedule.from_hz(10.0)
-    keys = np.zeros(2, np.uint64)
-    bank = MagnetometerBank(compass, schedule, _sensors(), _level(), keys, np.zeros(3))
-    bank.sample(0, 0, _fleet())
+    compass = MagnetometerModel.load("magnetometer_px4")
+    MagnetometerBank(compass, _group(), np.zeros(3)).sample(0, 0, _fleet())
 
 
 def estimates() -> None:
@@ -148,17 +138,17 @@ def other_plants() -> None:
 
 
 def _clouds(scene: Scene) -> LidarBank:
-    schedule, mounts = Schedule.from_hz(10.0), 2 * (make_mount(),)
-    keys = np.zeros(2, dtype=np.uint64)
-    return LidarBank(load_lidar("vlp_16"), schedule, _sensors(), mounts, keys, scene)
+    return LidarBank(load_lidar("vlp_16"), _group(), scene)
 
 
 def _scene() -> Scene:
     return Scene(Terrain.flat(extent_m=10.0), None)
 
 
-def _sensors(count: int = 2) -> tuple[SensorId, ...]:
-    return tuple(SensorId(row, f"uav{row + 1}", "sensor") for row in range(count))
+def _group(count: int = 2, mount: Mount | None = None) -> SensorGroup:
+    sensors = tuple(SensorId(row, f"uav{row + 1}", "sensor") for row in range(count))
+    keys = np.zeros(count, dtype=np.uint64)
+    return SensorGroup(Schedule.from_hz(10.0), sensors, count * (mount or make_mount(),), keys)
 
 
 def _level(count: int = 2) -> NDArray[np.float64]:

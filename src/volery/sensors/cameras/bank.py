@@ -6,20 +6,17 @@ from collections.abc import Callable, Collection
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from volery.control.fleet import Fleet
 from volery.core.arrays import read_only
-from volery.core.clock import Schedule
 from volery.core.errors import DataFileError
-from volery.sensors.bank import NoisyBank
+from volery.sensors.bank import NoisyBank, SensorGroup
 from volery.sensors.cameras.camera import EVERY_PART, Images, Part, take
 from volery.sensors.cameras.light import Light
 from volery.sensors.cameras.model import CameraModel
 from volery.sensors.cameras.precipitation import falling_in
 from volery.sensors.lidar import make_batch, stack_mounts
-from volery.sensors.mount import Mount
-from volery.sensors.samples import CameraFrames, SensorId
+from volery.sensors.samples import CameraFrames
 from volery.vehicle.pose_history import KEPT_NS
 from volery.world.scene import Scene
 from volery.world.weather import Weather
@@ -30,9 +27,9 @@ _LONGEST_READOUT_NS = KEPT_NS - 10_000_000
 class CameraBank(NoisyBank):
     """Renders the images of all cameras of one model and phase together.
 
-    `keys` (S,) are the noise streams, or None for cameras without noise. An image is available when
-    its last row has been read out. Only the parts that `requested_parts()` returns are rendered;
-    the choice does not affect later images. `light_in` returns the light in a weather.
+    An image is available when its last row has been read out. Only the parts that
+    `requested_parts()` returns are rendered; the choice does not affect later images. `light_in`
+    returns the light in a weather.
 
     Raises `DataFileError` if the model's readout takes longer than the pose history reaches.
     """
@@ -42,10 +39,7 @@ class CameraBank(NoisyBank):
     def __init__(
         self,
         model: CameraModel,
-        schedule: Schedule,
-        sensors: tuple[SensorId, ...],
-        mounts: tuple[Mount, ...],
-        keys: NDArray[np.uint64] | None,
+        group: SensorGroup,
         scene: Scene,
         light_in: Callable[[Weather], Light],
     ) -> None:
@@ -54,14 +48,14 @@ class CameraBank(NoisyBank):
                 f"camera '{model.name}': readout_s = {model.readout_s} is too long; "
                 f"{_LONGEST_READOUT_NS / 1e9} at most"
             )
-        super().__init__(schedule, sensors, keys)
+        super().__init__(group)
         self.lag_ns = model.readout_ns
         self.requested_parts: Callable[[], Collection[Part]] = lambda: EVERY_PART
         """Returns the parts of the images that have receivers now."""
-        self._model = model if keys is not None else model.without_noise()
+        self._model = model if group.keys is not None else model.without_noise()
         self._scene = scene
         self._light_in = light_in
-        self._mounts = stack_mounts(mounts)
+        self._mounts = stack_mounts(group.mounts)
 
     @property
     def pixels(self) -> int:

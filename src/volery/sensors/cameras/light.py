@@ -7,12 +7,13 @@ numbers here are modelling choices for a clear day unless a source is named.
 from __future__ import annotations
 
 import math
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from volery.world.materials import Material
+from volery.world.materials import PROPERTIES, Material
 
 CODES = 4096
 """Entries of the table from linear light to a byte."""
@@ -51,30 +52,6 @@ class Light(NamedTuple):
     """(CODES,) bytes of linear light from 0 to 1."""
 
 
-_SURFACES = {
-    #                     colour               second colour      1/m  through
-    Material.NONE: ((0.50, 0.50, 0.50), (0.50, 0.50, 0.50), 1.0, 0.0),
-    Material.GROUND: ((0.17, 0.14, 0.08), (0.10, 0.13, 0.04), 1.3, 0.0),
-    Material.WOOD: ((0.19, 0.13, 0.08), (0.09, 0.065, 0.045), 6.0, 0.0),
-    Material.LEAF: ((0.05, 0.14, 0.03), (0.09, 0.20, 0.04), 0.7, 0.4),
-    Material.UAV_BODY: ((0.60, 0.60, 0.62), (0.45, 0.05, 0.04), 9.0, 0.0),
-    Material.ROTOR: ((0.05, 0.05, 0.05), (0.08, 0.08, 0.08), 20.0, 0.5),
-    Material.WALL: ((0.55, 0.51, 0.44), (0.45, 0.41, 0.36), 0.8, 0.0),
-    Material.BLOCK: ((0.55, 0.05, 0.04), (0.45, 0.04, 0.03), 0.5, 0.0),
-    Material.CLOTHES: ((0.10, 0.16, 0.40), (0.07, 0.10, 0.28), 6.0, 0.0),
-    Material.SKIN: ((0.55, 0.34, 0.24), (0.48, 0.29, 0.20), 9.0, 0.0),
-    Material.CAR_PAINT: ((0.05, 0.12, 0.35), (0.05, 0.11, 0.32), 2.0, 0.0),
-    Material.RUBBER: ((0.02, 0.02, 0.02), (0.03, 0.03, 0.03), 9.0, 0.0),
-    Material.PLUMAGE: ((0.16, 0.11, 0.07), (0.09, 0.06, 0.04), 20.0, 0.0),
-    Material.FACADE: ((0.50, 0.50, 0.50), (0.43, 0.43, 0.43), 0.6, 0.0),
-    Material.ROOF: ((0.20, 0.16, 0.13), (0.25, 0.14, 0.10), 0.2, 0.0),
-    Material.ASPHALT: ((0.095, 0.095, 0.10), (0.07, 0.07, 0.075), 1.5, 0.0),
-    Material.PAVING: ((0.27, 0.255, 0.235), (0.22, 0.21, 0.20), 2.5, 0.0),
-    Material.METAL: ((0.10, 0.11, 0.11), (0.07, 0.08, 0.08), 8.0, 0.0),
-    Material.PAINTED: ((1.0, 1.0, 1.0), (0.9, 0.9, 0.9), 1.0, 0.0),
-}
-
-
 def make_light(
     sun_elevation_deg: float = 50.0, sun_azimuth_deg: float = 135.0, visibility_m: float = 20_000.0
 ) -> Light:
@@ -110,12 +87,15 @@ def base_colours() -> dict[Material, tuple[float, float, float]]:
     rows = _surface_table()
     return {
         material: (float(r), float(g), float(b))
-        for material, (r, g, b) in zip(_SURFACES, 0.5 * (rows[:, :3] + rows[:, 3:6]), strict=True)
+        for material, (r, g, b) in zip(Material, 0.5 * (rows[:, :3] + rows[:, 3:6]), strict=True)
     }
 
 
 def _surface_table() -> NDArray[np.float32]:
-    rows = [[*first, *second, size, through] for first, second, size, through in _SURFACES.values()]
+    rows = [
+        [*chain(*surface["colours"]), surface["grain_1_m"], surface["transmission"]]
+        for surface in PROPERTIES.values()
+    ]
     return np.array(rows, dtype=np.float32)
 
 

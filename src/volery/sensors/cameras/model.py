@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from functools import cached_property
-from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +14,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 from volery.core.arrays import Array
 from volery.sensors.cameras.lens import distort, undistort
 from volery.sensors.cameras.pixel_table import PixelTable, make_table
-from volery.sensors.model import SensorModel, load_model
+from volery.sensors.model import SensorModel
 
 Side = Annotated[int, Field(ge=1, le=8192)]
 
@@ -26,6 +25,8 @@ class CameraModel(SensorModel):
     Pixel (column u, row v) covers u - .5 to u + .5: its centre has integer coordinates, as in
     OpenCV and ROS.
     """
+
+    sensor_kind: ClassVar = "camera"
 
     name: str = "pinhole"
     width: Side = 640
@@ -135,8 +136,3 @@ class CameraModel(SensorModel):
         ahead = np.where(p[..., 2] > 0.0, p[..., 2], np.nan)
         pixels = distort(p[..., :2] / ahead[..., None], self.distortion)
         return np.asarray(pixels * self.focal_px + np.array(self.centre_px))
-
-
-def load_camera(name: str | Path = "pinhole", folder: Path | None = None) -> CameraModel:
-    """Returns the model by shipped name or `.toml` path, also relative to `folder`."""
-    return load_model(CameraModel, "camera", name, folder)

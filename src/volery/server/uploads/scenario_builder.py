@@ -60,7 +60,8 @@ def toml_of(kind: str, path: Path, name: str, called: str) -> str:
         )
     extent = max(_LEAST_EXTENT_M, math.ceil(part.extent_m + _MARGIN_M))
     shown = "".join(c if c.isascii() and c.isprintable() else "?" for c in called)[:80]
-    return _SCENARIO.format(
+    template = Path(__file__).with_name("scenario_template.txt").read_text(encoding="utf-8")
+    return template.format(
         name=name,
         description=json.dumps(f"Two F450s and the content of {shown}."),
         extent=float(extent),
@@ -150,40 +151,3 @@ _MAKERS: dict[str, Callable[[Path], _Part]] = {
     "mesh": _mesh,
     "forest": _forest,
 }
-
-_SCENARIO = """\
-name = "{name}"
-description = {description}
-duration_s = 3600.0
-
-[world.terrain]
-kind = "flat"
-extent_m = {extent}
-{world}
-[types.visitor]
-airframe = "f450"
-
-[[types.visitor.sensors]]
-kind = "lidar"
-name = "horizontal"
-position_m = [0.0, 0.0, 0.18]
-[[types.visitor.sensors]]
-kind = "imu"
-[[types.visitor.sensors]]
-kind = "sonar"
-position_m = [0.0, 0.0, -0.05]
-rpy_deg = [0.0, 90.0, 0.0]
-[[types.visitor.sensors]]
-kind = "odometry"
-[[types.visitor.sensors]]
-kind = "ground_truth"
-[[types.visitor.sensors]]
-kind = "battery"
-
-[[uavs]]
-type = "visitor"
-count = 2
-position_m = {first}
-last_position_m = {last}
-placement = "nearest_free"
-"""

@@ -8,7 +8,7 @@ from volery.core.workers import Workers
 from volery.sensors.cameras.camera import take
 from volery.sensors.cameras.lens import undistort
 from volery.sensors.cameras.light import make_light
-from volery.sensors.cameras.model import CameraModel, load_camera
+from volery.sensors.cameras.model import CameraModel
 from volery.sensors.lidar import make_batch, stack_mounts
 from volery.sensors.mount import make_mount
 from volery.vehicle.airframe import load_airframe
@@ -268,13 +268,13 @@ def test_noisy_depth_is_a_depth(picture):
 
 
 def test_the_shipped_camera_loads():
-    assert load_camera().without_noise() == CameraModel(name="pinhole camera")
+    assert CameraModel.load("pinhole").without_noise() == CameraModel(name="pinhole camera")
 
 
 @pytest.mark.parametrize(("name", "far_m"), [("f450_front", 1300.0), ("f450_down", 100.0)])
 def test_the_cameras_of_the_f450_load(name, far_m):
     """The edge of a picture with a field of view of 1 rad is half a radian off the axis."""
-    model = load_camera(name)
+    model = CameraModel.load(name)
     assert (model.width, model.height, model.far_m) == (640, 480, far_m)
     edge = model.project([np.tan(0.5), 0.0, 1.0])
     np.testing.assert_allclose(edge, [639.5, 239.5], atol=1e-9)

@@ -10,7 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.pub import DataWriter
@@ -44,25 +44,69 @@ _MOST_WAITING = 1000
 """Open requests of one client; beyond, the oldest fails."""
 
 
-class DdsTopicName:
+class DdsTopicName(NamedTuple):
     """Context of endpoints: the participant, its reader thread and its record."""
 
-    def __init__(
-        self, participant: DomainParticipant, ear: ReaderThread, record: DiscoveryInfo
-    ) -> None:
-        self.participant = participant
-        self.ear = ear
-        self.record = record
+    participant: DomainParticipant
+    ear: ReaderThread
+    record: DiscoveryInfo
 
 
-class DdsWriter:
+class _Endpoint:
+    """An endpoint, whose entities are created and deleted together."""
+
+    def __init__(self, place: DdsTopicName, node: NodeName) -> None:
+        self._place = place
+        self._node = node
+        self._entities: list[tuple[Any, bool]] = []
+        self._topics: list[Any] = []
+        self._listened: list[int] = []
+
+    def _add_writer(self, topic: Topic, qos: Any) -> Any:
+        """Adds a writer of the node."""
+        return self._add(topic, DataWriter(self._place.participant, topic, qos=qos), writes=True)
+
+    def _add_reader(self, topic: Topic, qos: Any, take: Callable[[bytes, int], None]) -> Any:
+        """Adds a reader of the node.
+
+        `take` receives the bytes of each sample and its writer's handle.
+        """
+        reader = DataReader(self._place.participant, topic, qos=qos)
+
+        def take_all(samples: list[Any]) -> None:
+            for sample in samples:
+                if sample.sample_info.valid_data:  # else it only reports that a writer has left
+                    take(sample.cdr, sample.sample_info.publication_handle)
+
+        self._listened.append(self._place.ear.listen(reader, take_all))
+        return self._add(topic, reader, writes=False)
+
+    def _add(self, topic: Topic, entity: Any, *, writes: bool) -> Any:
+        self._topics.append(topic)
+        self._entities.append((entity, writes))
+        self._place.record.add(self._node, entity, writes=writes)
+        return entity
+
+    def close(self) -> None:
+        """Deletes the entities; further calls do nothing."""
+        while self._listened:
+            self._place.ear.forget(self._listened.pop())
+        while self._entities:
+            entity, writes = self._entities.pop()
+            self._place.record.remove(self._node, entity, writes=writes)
+            library.delete(entity)
+        while self._topics:
+            library.delete(self._topics.pop())
+
+
+class DdsWriter(_Endpoint):
     """A publisher."""
 
     def __init__(self, place: DdsTopicName, spec: TopicSpec) -> None:
+        super().__init__(place, spec.node)
         user_data = f"typehash={message_hash(spec.msgtype)};".encode()
         topic = Topic(place.participant, dds_topic(spec.topic), message_struct(spec.msgtype))
-        self._half = _Half(place, spec.node)
-        self._writer = self._half.writer(topic, qos_of(spec.profile, user_data))
+        self._writer = self._add_writer(topic, qos_of(spec.profile, user_data))
 
     @property
     def matched(self) -> bool:
@@ -73,43 +117,31 @@ class DdsWriter:
         """Sends one message."""
         library.write(self._writer, cdr)
 
-    def close(self) -> None:
-        """Ends the publication."""
-        self._half.close()
 
-
-class DdsReader:
+class DdsReader(_Endpoint):
     """A subscription."""
 
     def __init__(self, place: DdsTopicName, spec: TopicSpec, take: TakeMessage) -> None:
+        super().__init__(place, spec.node)
         user_data = f"typehash={message_hash(spec.msgtype)};".encode()
         topic = Topic(place.participant, dds_topic(spec.topic), message_struct(spec.msgtype))
-        self._half = _Half(place, spec.node)
-        self._half.reader(topic, qos_of(spec.profile, user_data), lambda data, _writer: take(data))
-
-    def close(self) -> None:
-        """Ends the subscription."""
-        self._half.close()
+        self._add_reader(topic, qos_of(spec.profile, user_data), lambda data, _writer: take(data))
 
 
-class DdsServer:
+class DdsServer(_Endpoint):
     """A service server."""
 
     def __init__(self, place: DdsTopicName, spec: ServiceSpec, take: TakeRequest) -> None:
+        super().__init__(place, spec.node)
         requests, replies = _topics(place, spec)
-        self._half = _Half(place, spec.node)
         qos = qos_of(SERVICES, _identity(SERVER))
-        self._writer = self._half.writer(replies, qos)
+        self._writer = self._add_writer(replies, qos)
         self._name, self._srvtype = spec.service, spec.srvtype
         self._take = take
         self._missed = (0, 0)
         self._warnings = WarningFilter()
-        self._reader = self._half.reader(requests, qos, self._on_request)
+        self._reader = self._add_reader(requests, qos, self._on_request)
         self._clients = ServicePeers(CLIENT, partial(matched_writer, self._reader))
-
-    def close(self) -> None:
-        """Destroys the service."""
-        self._half.close()
 
     def look_at(self, foreign: Mapping[str, str]) -> None:
         """Warns if clients that cannot be answered call the service; foreign: reasons, by service.
@@ -157,19 +189,19 @@ class DdsServer:
         return library.subscriptions(self._writer), library.publications(self._reader)
 
 
-class DdsCaller:
+class DdsCaller(_Endpoint):
     """A client of a service."""
 
     def __init__(self, place: DdsTopicName, spec: ServiceSpec) -> None:
+        super().__init__(place, spec.node)
         requests, replies = _topics(place, spec)
-        self._half = _Half(place, spec.node)
         qos = qos_of(SERVICES, _identity(CLIENT))
-        self._writer = self._half.writer(requests, qos)
+        self._writer = self._add_writer(requests, qos)
         self._guid = random.SystemRandom().getrandbits(64)
         self._numbers = itertools.count(1)
         self._waiting: dict[int, tuple[TakeMessage, Callable[[], None]]] = {}
         self._lock = threading.Lock()
-        self._reader = self._half.reader(replies, qos, self._on_reply)
+        self._reader = self._add_reader(replies, qos, self._on_reply)
         self._servers = ServicePeers(SERVER, partial(matched_reader, self._writer))
 
     @property
@@ -207,7 +239,7 @@ class DdsCaller:
 
     def close(self) -> None:
         """Destroys the client."""
-        self._half.close()
+        super().close()
         with self._lock:
             waiting, self._waiting = tuple(self._waiting.values()), {}
         for _, on_loss in waiting:
@@ -221,53 +253,6 @@ class DdsCaller:
             waiting = self._waiting.pop(number, None)
         if waiting is not None:
             waiting[0](_without_header(data))
-
-
-class _Half:
-    """The entities of one endpoint, which are created and deleted together."""
-
-    def __init__(self, place: DdsTopicName, node: NodeName) -> None:
-        self._place = place
-        self._node = node
-        self._entities: list[tuple[Any, bool]] = []
-        self._topics: list[Any] = []
-        self._numbers: list[int] = []
-
-    def writer(self, topic: Topic, qos: Any) -> Any:
-        """Adds a writer of the node."""
-        return self._add(topic, DataWriter(self._place.participant, topic, qos=qos), writes=True)
-
-    def reader(self, topic: Topic, qos: Any, take: Callable[[bytes, int], None]) -> Any:
-        """Adds a reader of the node.
-
-        `take` receives the bytes of each sample and its writer's handle.
-        """
-        reader = DataReader(self._place.participant, topic, qos=qos)
-
-        def take_all(samples: list[Any]) -> None:
-            for sample in samples:
-                if sample.sample_info.valid_data:  # else it only reports that a writer has left
-                    take(sample.cdr, sample.sample_info.publication_handle)
-
-        self._numbers.append(self._place.ear.listen(reader, take_all))
-        return self._add(topic, reader, writes=False)
-
-    def _add(self, topic: Topic, entity: Any, *, writes: bool) -> Any:
-        self._topics.append(topic)
-        self._entities.append((entity, writes))
-        self._place.record.add(self._node, entity, writes=writes)
-        return entity
-
-    def close(self) -> None:
-        """Deletes the entities; further calls do nothing."""
-        while self._numbers:
-            self._place.ear.forget(self._numbers.pop())
-        while self._entities:
-            entity, writes = self._entities.pop()
-            self._place.record.remove(self._node, entity, writes=writes)
-            library.delete(entity)
-        while self._topics:
-            library.delete(self._topics.pop())
 
 
 def _topics(place: DdsTopicName, spec: ServiceSpec) -> tuple[Topic, Topic]:

@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 from volery.bridges.logs.decoding import LogDecoder
 from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.records import LogWalk, log_format
+from volery.bridges.logs.ros2_bags import BagWalk, bag_topics
 from volery.bridges.logs.text_layout import TextLayout
 from volery.bridges.logs.text_scans import TextScans
 from volery.core.errors import GraphError, RecordingError
 from volery.core.plurals import counted
-from volery.runtime.replay.slam.ros2_bags import BagWalk, bag_topics
 
 
 class SlamInput(NamedTuple):

@@ -1,0 +1,21 @@
+"""Makes tables of pandas, which is imported at the first use."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from volery.core.errors import VoleryError
+from volery.core.extras import missing_package
+
+if TYPE_CHECKING:
+    import pandas
+
+
+def data_frame(columns: Mapping[str, Any], what: str = "to_pandas()") -> pandas.DataFrame:
+    """Returns columns as a table. Raises `VoleryError` without pandas; `what` names the caller."""
+    try:
+        import pandas
+    except ImportError:
+        raise VoleryError(missing_package(what, "pandas", "pandas")) from None
+    return pandas.DataFrame(dict(columns))
