@@ -72,9 +72,9 @@ class Draws:
         return unit.reshape(len(rows), *shape)
 
     def _next(self, rows: NDArray[np.int64], numbers: int) -> NDArray[np.uint64]:
-        counters = self._counters[rows][:, None] + np.arange(numbers, dtype=np.uint64)
+        counters = np.add.outer(self._counters[rows], np.arange(numbers, dtype=np.uint64))
         self._counters[rows] += np.uint64(numbers)
-        return _bits(self._keys[rows][:, None], counters)
+        return _bits(self._keys[rows][:, None], counters.astype(np.uint64))
 
 
 def _bits(keys: NDArray[np.uint64], counters: NDArray[np.uint64]) -> NDArray[np.uint64]:

@@ -145,7 +145,7 @@ class Episodes:
         """Returns the action that takes effect now."""
         if not len(self._delayed):
             return action
-        now = self._delayed[0].copy()
+        now: Array = self._delayed[0].copy()
         self._delayed[:-1] = self._delayed[1:]
         self._delayed[-1] = action
         return now

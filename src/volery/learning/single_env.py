@@ -21,7 +21,7 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], Array]):
     def __init__(self, task: Task) -> None:
         self.task = task
         self.metadata = {"render_modes": [], "render_fps": round(task.decision_rate_hz)}
-        self.observation_space = observation_space(task)
+        self.observation_space = observation_space(task)  # type: ignore[assignment]
         self.action_space = action_space(task)  # type: ignore[assignment]
         self._many = TaskVectorEnv(task, 1, autoreset_mode=AutoresetMode.DISABLED, threads=1)
 

@@ -15,7 +15,7 @@ def observation_space(task: Task) -> Box:
     return Box(-high, high, dtype=np.float32)
 
 
-def action_space(task: Task) -> Space[np.ndarray] | Space[np.int64]:  # type: ignore[type-arg]
+def action_space(task: Task) -> Space[np.ndarray] | Space[np.int64]:
     """Returns the space of actions: (A,) from -1 to 1, or choices."""
     if task.action.choices is not None:
         return Discrete(task.action.choices)

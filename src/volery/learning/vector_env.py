@@ -21,7 +21,7 @@ _NO_REST = np.zeros(1, np.bool_)
 _NEEDS_RESET = "the episodes of environments {} have ended; reset them"
 
 
-class TaskVectorEnv(VectorEnv[Observations, Array, Array]):
+class TaskVectorEnv(VectorEnv[Observations, Array, Any]):
     """Steps `num_envs` environments of a task with one UAV each in compiled calls.
 
     autoreset_mode: "SameStep" (the default: a step that ends an episode returns the first
