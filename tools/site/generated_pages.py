@@ -13,7 +13,7 @@ from typing import Any
 
 from mkdocs.structure.files import File, Files
 
-GENERATED = ("cli", "gallery", "messages", "services", "topics")
+GENERATED = ("cli", "gallery", "messages", "scenario", "services", "topics")
 _SCRIPTS = {name: import_module(f"{name}_reference") for name in GENERATED}
 
 
