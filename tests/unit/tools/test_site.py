@@ -37,13 +37,13 @@ GENERATED_PAGES = {f"reference/{name}.md" for name in GENERATED}
 @cache
 def generated(name):
     """The text of a generated page."""
-    done = subprocess.run(
-        [sys.executable, "-c", f"import {name}_reference as one; print(one.page(), end='')"],
-        check=True,
-        capture_output=True,
-        text=True,
-        env={**os.environ, "PYTHONPATH": str(TOOLS)},
+    lines = (
+        f"import sys; sys.path.insert(0, {str(TOOLS)!r})",
+        f"import {name}_reference as script",
+        "print(script.page(), end='')",
     )
+    command = [sys.executable, "-c", "\n".join(lines)]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
     return done.stdout
 
 
