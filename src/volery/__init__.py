@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     )
     from volery.graph.nodes.node import Node
     from volery.logs import open_log
+    from volery.runtime.environment_start import EnvironmentStart
     from volery.runtime.simulation import Simulation
     from volery.runtime.simulation_factory import make
     from volery.runtime.vectorized_simulation import VectorizedSimulation
@@ -61,6 +62,7 @@ __all__ = [
     "CommsError",
     "DataFileError",
     "DivergenceError",
+    "EnvironmentStart",
     "EstimatorError",
     "FlightError",
     "FlightMode",
@@ -91,6 +93,7 @@ __all__ = [
 ]
 
 _MODULES = {
+    "EnvironmentStart": "volery.runtime.environment_start",
     "FlightMode": "volery.control.flight_modes",
     "Node": "volery.graph.nodes.node",
     "Scenario": "volery.scenario.schema",

@@ -79,6 +79,14 @@ def progress_bars():
         pass
 
 
+def environments():
+    import importlib
+
+    import volery.learning
+
+    importlib.reload(volery.learning)
+
+
 def browser():
     from volery_benchmarks.page.browser import open_browser
 
@@ -98,6 +106,7 @@ USES = [
     ("zenoh", "eclipse-zenoh", "ros2", ros2("zenoh")),
     ("pandas", "pandas", "pandas", tables),
     ("tqdm.auto", "tqdm", "progress", progress_bars),
+    ("gymnasium", "gymnasium", "learning", environments),
     ("playwright.sync_api", "playwright", "bench", browser),
 ]
 """Modules, their packages and extras, and a use of each."""
