@@ -193,7 +193,7 @@ def test_the_count_ends_where_messages_end():
             check_objects(data, msgtype, form)
             count = object_count._Count(data, form)
             count._walk(object_count._plan_of(msgtype, form))
-            end = count.position + (4 if form == CDR else 0)
+            end = count._position + (4 if form == CDR else 0)
             assert end <= len(data) <= end + (3 if form == CDR else 0), (msgtype, form)
             looked_at += 1
     assert looked_at > 100

@@ -47,9 +47,10 @@ def _table(data: Mapping[str, Any], name: str, *, inside_list: bool) -> Iterator
             below.append((full, value))
     for full, value in below:
         if isinstance(value, Mapping):
-            if not value or not all(_has_header(item) for item in value.values()):
+            lines = list(_table(value, full, inside_list=inside_list))
+            if not lines or lines[0]:  # it has values of its own, before the tables below it
                 yield from ("", f"[{full}]")
-            yield from _table(value, full, inside_list=inside_list)
+            yield from lines
             continue
         for item in value:
             yield from ("", f"[[{full}]]")

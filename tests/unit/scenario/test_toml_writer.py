@@ -5,7 +5,7 @@ import math
 import tomllib
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from volery.core.errors import ScenarioError
@@ -23,6 +23,8 @@ VALUES = st.recursive(
 
 
 @given(st.dictionaries(TEXTS, VALUES, max_size=5))
+@example({"list": [{"outer": {"inner": {}}}]})
+@example({"list": [{"a": [], "b": {"c": {}}}]})
 def test_plain_data_loads_again(data):
     assert tomllib.loads(toml_text(data)) == data
 
