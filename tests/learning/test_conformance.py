@@ -174,9 +174,12 @@ def test_a_state_is_restored_to_the_byte(make, name):
 
 def test_impossible_actions_are_refused(make):
     env = make("hover")
-    with pytest.raises(CommandError, match=r"environments \[0, 1, 2\] have ended; reset them"):
+    with pytest.raises(CommandError, match=r"call reset\(\) before the first step"):
         env.step(env.action_space.sample())
     env.reset(seed=0)
+    for seed in (-1, "x"):
+        with pytest.raises(CommandError, match="a whole number from 0 on is needed"):
+            env.reset(seed=seed)
     with pytest.raises(CommandError, match=r"actions have shape \(3, 4\), not \(2, 4\)"):
         env.step(np.zeros((2, 4)))
     with pytest.raises(CommandError, match=r"action \[1, 2\] is nan; actions must be finite"):
@@ -193,6 +196,15 @@ def test_impossible_actions_are_refused(make):
         homing.step(np.array([0, 7, 1]))
     with pytest.raises(ScenarioError, match="unknown task 'fly'; known: hover, homing"):
         load_task("fly")
+
+
+def test_closed_environments_say_so():
+    env = TaskVectorEnv(load_task("homing"), 2)
+    env.reset(seed=0)
+    env.close()
+    for use in (env.reset, lambda: env.step([0, 0])):
+        with pytest.raises(CommandError, match="the environments are closed; make new ones"):
+            use()
 
 
 def test_the_zero_action_keeps_a_level_uav_at_its_height(make):

@@ -50,10 +50,11 @@ class TaskVectorEnv(VectorEnv[Observations, Array, Any]):
         if self.episodes.flight.num_uavs != 1:
             self.episodes.close()
             raise ScenarioError(
-                f"task '{task.name}' has {self.episodes.flight.num_uavs} UAVs; use its "
-                "ParallelEnv: volery.learning.parallel_env"
+                f"task '{task.name}' has {self.episodes.flight.num_uavs} UAVs; environments of "
+                "Gymnasium have one"
             )
         self._is_over = np.ones(num_envs, np.bool_)
+        self._has_begun = False
         self._observation = np.zeros((num_envs, task.observation_size), np.float32)
 
     def reset(
@@ -67,10 +68,12 @@ class TaskVectorEnv(VectorEnv[Observations, Array, Any]):
         seed: of environment 0; environment k has `seed + k`. None continues the random streams.
         options: `reset_mask` (K,) chooses the environments; the others keep their observations.
         """
+        self._check_open()
         chosen = self._chosen(options)
         self._seed(seed, chosen)
         self.episodes.begin(chosen)
         self._is_over[chosen] = False
+        self._has_begun = True
         self._renew(chosen)
         return self._observation.copy(), {}
 
@@ -84,6 +87,9 @@ class TaskVectorEnv(VectorEnv[Observations, Array, Any]):
         the mask `_episode` (K,) says which they are. Raises `CommandError` for an action of a wrong
         shape or one that is not finite, and for an environment that needs a reset.
         """
+        self._check_open()
+        if not self._has_begun:
+            raise CommandError("call reset() before the first step")
         action = self._checked(actions)
         resting = self._is_over if self.autoreset_mode == AutoresetMode.NEXT_STEP else _NO_REST
         if resting is _NO_REST and self._is_over.any():
@@ -136,6 +142,10 @@ class TaskVectorEnv(VectorEnv[Observations, Array, Any]):
             "_reward_terms": over,
         }
 
+    def _check_open(self) -> None:
+        if self.closed:
+            raise CommandError("the environments are closed; make new ones")
+
     def _checked(self, actions: ArrayLike) -> Array:
         choices = self.task.action.choices
         size = self.task.action.size
@@ -154,7 +164,11 @@ class TaskVectorEnv(VectorEnv[Observations, Array, Any]):
     def _seed(self, seed: int | Sequence[int | None] | None, chosen: NDArray[np.int64]) -> None:
         if seed is None:
             return
-        seeds = range(seed, seed + self.num_envs) if isinstance(seed, int) else list(seed)
+        if isinstance(seed, str) or (isinstance(seed, int | np.integer) and seed < 0):
+            raise CommandError(f"seed = {seed!r}: a whole number from 0 on is needed")
+        seeds = (
+            range(seed, seed + self.num_envs) if isinstance(seed, int | np.integer) else list(seed)
+        )
         if len(seeds) != self.num_envs:
             raise CommandError(f"{len(seeds)} seeds for {self.num_envs} environments")
         rows = np.array([k for k in chosen.tolist() if seeds[k] is not None], np.int64)

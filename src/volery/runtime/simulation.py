@@ -410,7 +410,7 @@ class Simulation:
             for partner in self._partners:
                 partner.leave()
             self._manager.end_nodes()
-            self._manager.futures.fail_all("the simulation was closed")
+            self._manager.futures.close()
             self._engine.inbox.close("the simulation is closed")
             self.world.scene.close()
 

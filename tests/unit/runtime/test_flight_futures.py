@@ -154,11 +154,25 @@ def test_a_crash_fails_it_with_the_obstacle(flying):
     assert uav.crashed
 
 
+def test_a_closed_simulation_takes_no_commands(flying):
+    pending = flying.uavs["uav1"].go_to([9.0, 0.0, 2.0])
+    flying.close()
+    with pytest.raises(FlightError, match="the simulation was closed"):
+        pending.wait()
+    with pytest.raises(CommandError, match="the simulation is closed; make a new one"):
+        flying.uavs["uav1"].go_to([1.0, 0.0, 2.0])
+
+
+def test_positions_are_no_trajectory(flying):
+    with pytest.raises(CommandError, match=r"needed, not list; Trajectory.from_samples makes one"):
+        flying.uavs["uav1"].follow_trajectory([[0.0, 0.0, 3.0], [1.0, 0.0, 3.0]])
+
+
 def test_timeouts(flying):
     future = flying.uavs["uav1"].go_to([9.0, 0.0, 2.0])
     before = flying.time_s
     with pytest.raises(
-        WaitTimeoutError, match=r"go_to of uav1 is not done: GO_TO at .* within 0.5 s"
+        WaitTimeoutError, match=r"go_to of uav1 is not done within 0.5 s; it goes on: GO_TO at "
     ):
         future.wait(timeout_s=0.5)
     assert flying.time_s == pytest.approx(before + 0.5)

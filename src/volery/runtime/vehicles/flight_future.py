@@ -133,8 +133,8 @@ class FlightFuture:
         """
         if not self.done() and not self._source.wait(self, timeout_s):
             raise WaitTimeoutError(
-                f"{self.pending_text()} within {timeout_s:g} s; is the goal in reach, or the "
-                "timeout too short?"
+                f"{self.command} of {self.uav} is not done within {timeout_s:g} s; it goes on: "
+                f"{self._source.describe(self)}"
             )
         return self.result()
 

@@ -54,11 +54,17 @@ class FlightFutures:
         self._pending: dict[str, FlightFuture] = {}
         self._checked: dict[str, FlightFuture] = {}
         """Pending futures that may end without an event while code waits for their callbacks."""
+        self._is_closed = False
 
     def begin(
         self, uav: str, command: str, active: tuple[FlightMode, ...], final: FlightMode
     ) -> FlightFuture:
-        """Returns the future of a command that a UAV has just accepted."""
+        """Returns the future of a command that a UAV has just accepted.
+
+        Raises `CommandError` if the simulation is closed.
+        """
+        if self._is_closed:
+            raise CommandError("the simulation is closed; make a new one")
         self.replace(uav, command)
         future = FlightFuture(self, uav, command, active, final)
         self._pending[uav] = future
@@ -93,6 +99,11 @@ class FlightFutures:
         """Fails all pending futures."""
         for uav in tuple(self._pending):
             self.fail(uav, reason)
+
+    def close(self) -> None:
+        """Fails all pending futures; no command begins any more."""
+        self.fail_all("the simulation was closed")
+        self._is_closed = True
 
     def pending(self, uav: str) -> FlightFuture | None:
         """Returns the future of a UAV's present command, None without one.

@@ -196,6 +196,11 @@ class Uav:
 
     def follow_trajectory(self, trajectory: Trajectory) -> FlightFuture:
         """Flies along `trajectory`, whose time starts now, then holds; done at its end."""
+        if not isinstance(trajectory, Trajectory):
+            raise CommandError(
+                f"a Trajectory is needed, not {type(trajectory).__name__}; Trajectory.from_samples "
+                "makes one of positions"
+            )
         self._fleet.command_trajectory(self._row, trajectory)
         return self._begun("follow_trajectory", (FlightMode.TRAJECTORY,))
 
