@@ -164,7 +164,9 @@ class TaskVectorEnv(VectorEnv[Observations, Array, Any]):
     def _seed(self, seed: int | Sequence[int | None] | None, chosen: NDArray[np.int64]) -> None:
         if seed is None:
             return
-        if isinstance(seed, str) or (isinstance(seed, int | np.integer) and seed < 0):
+        if not isinstance(seed, list | tuple) and not (
+            isinstance(seed, int | np.integer) and seed >= 0
+        ):
             raise CommandError(f"seed = {seed!r}: a whole number from 0 on is needed")
         seeds = (
             range(seed, seed + self.num_envs) if isinstance(seed, int | np.integer) else list(seed)
