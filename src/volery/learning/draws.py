@@ -53,10 +53,6 @@ class Draws:
         radius = np.sqrt(-2.0 * np.log(self._unit(rows, shape)))
         return np.asarray(sigma * radius * np.cos(2.0 * np.pi * self._unit(rows, shape)))
 
-    def choice(self, rows: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-        """Returns whole numbers (R,) from 0 to `count` - 1."""
-        return (count * self._unit(rows, ())).astype(np.int64)
-
     def get_state(self) -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
         """Returns copies of keys and counters, for `set_state`."""
         return self._keys.copy(), self._counters.copy()

@@ -17,7 +17,6 @@ from volery.learning.spaces import action_space, observation_space
 from volery.learning.task import Task
 
 Observations = NDArray[np.float32]
-_NO_REST = np.zeros(1, np.bool_)
 _NEEDS_RESET = "the episodes of environments {} have ended; reset them"
 
 
@@ -91,8 +90,8 @@ class TaskVectorEnv(VectorEnv[Observations, Array, Any]):
         if not self._has_begun:
             raise CommandError("call reset() before the first step")
         action = self._checked(actions)
-        resting = self._is_over if self.autoreset_mode == AutoresetMode.NEXT_STEP else _NO_REST
-        if resting is _NO_REST and self._is_over.any():
+        resting = self._is_over
+        if resting.any() and self.autoreset_mode != AutoresetMode.NEXT_STEP:
             raise CommandError(_NEEDS_RESET.format(np.flatnonzero(self._is_over).tolist()))
         outcome = self.episodes.decide(action)
         reward = outcome.reward[:, 0]
