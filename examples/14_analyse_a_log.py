@@ -5,7 +5,7 @@ import sys
 import matplotlib
 
 from volery import Simulation, load_scenario
-from volery.bridges.logs.log_writer import open_log as create_log
+from volery.bridges.logs.log_writer import create_log
 from volery.logs import open_log
 
 matplotlib.use("Agg")  # the plot goes to a file

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.graph.messages import Odometry
 from volery.runtime import Simulation
 from volery.scenario.load import load_scenario
@@ -34,7 +34,7 @@ def lines_of(script: str) -> int:
 def recorded(tmp_path_factory) -> Path:
     """The log of a short flight."""
     path = tmp_path_factory.mktemp("recorded") / "flight.mcap"
-    log = open_log(path)
+    log = create_log(path)
     with Simulation(load_scenario("hover")) as simulation:
         simulation.graph.subscribe_all(log.write, lambda topic: topic == "/uav1/odom")
         simulation.run(3.0)

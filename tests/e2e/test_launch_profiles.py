@@ -11,7 +11,7 @@ import pytest
 
 from volery import Simulation
 from volery.bridges.bridge_host import BridgeHost
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.replay import Replay
 from volery.bridges.nodes.host import NodeHost
@@ -93,7 +93,7 @@ def listen(simulation: Any) -> Said:
 def _inside(tmp_path_factory: pytest.TempPathFactory) -> tuple[Said, Path]:
     """What nodes inside the simulation say, and a log of all that was said."""
     path = tmp_path_factory.mktemp("profiles") / "flight.mcap"
-    with Simulation(scenario_of(NODES)) as simulation, closing(open_log(path)) as log:
+    with Simulation(scenario_of(NODES)) as simulation, closing(create_log(path)) as log:
         said = listen(simulation)
         simulation.graph.subscribe_all(log.write)
         simulation.run(SECONDS)

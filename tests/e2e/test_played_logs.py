@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.bridges.rosbridge.client import RosbridgeClient
 from volery.graph.codecs.zero import zero_message
 from volery.graph.connection import call_and_wait
@@ -22,7 +22,7 @@ PLAY = [sys.executable, "-m", "volery.cli", "play"]
 
 @pytest.fixture
 def flight(tmp_path):
-    log = open_log(tmp_path / "flight.mcap")
+    log = create_log(tmp_path / "flight.mcap")
     with Simulation(load_scenario("hover"), threads=1) as simulation:
         simulation.graph.subscribe_all(log.write)
         simulation.run(2.0)
@@ -67,7 +67,7 @@ def test_a_log_is_played_to_a_client(flight):
 
 def test_what_cannot_be_played_is_told_in_a_line(tmp_path):
     path = tmp_path / "nothing.mcap"
-    open_log(path).close()
+    create_log(path).close()
     for words, reason in (
         ((path,), "no readable message"),
         ((tmp_path / "none.bag",), "cannot read"),

@@ -5,7 +5,7 @@ import time
 import pytest
 
 from volery import Simulation, load_scenario
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.recorded_topics import recorded_topics
 from volery.publishing.camera_publishing import CameraPublisher
@@ -38,7 +38,7 @@ def test_each_picture_is_recorded_once_and_cheaply(tmp_path, monkeypatch):
     path = tmp_path / "flight.mcap"
     with Simulation(load_scenario("forest_cameras")) as simulation:
         matches = recorded_topics(simulation.graph)
-        log = open_log(path)
+        log = create_log(path)
         simulation.graph.subscribe_all(timer.of(log.write), matches)
         begun_s = time.process_time()
         simulation.run(1.0)

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from volery.bridges.bridge_host import BridgeHost
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.bridges.logs.recorded_flight import read_flight
 from volery.bridges.logs.records import LogWalk
 from volery.bridges.rosbridge.client import RosbridgeClient
@@ -207,7 +207,7 @@ def nodes(tmp_path, monkeypatch):
 
 def recorded(path, speed, seed):
     """Digest of a flight disturbed at moments that `seed` chooses."""
-    log = open_log(path)
+    log = create_log(path)
     with Simulation(parse_scenario(DATA), threads=1) as simulation:
         simulation.diagnostics.enable_digest()
         simulation.graph.subscribe_all(log.write)
@@ -252,7 +252,7 @@ def repeated(path, again=None, **options):
     with Simulation(parse_scenario(flight.origin.content), threads=1) as simulation:
         simulation.diagnostics.enable_digest()
         simulation.replay_commands(flight)
-        log = None if again is None else open_log(again)
+        log = None if again is None else create_log(again)
         if log is not None:
             simulation.graph.subscribe_all(log.write)
         simulation.run(**options)
@@ -353,7 +353,7 @@ def test_a_flight_of_the_command_line_is_repeated(tmp_path):
     assert "of a flight of 'hover', not of 'longleaf'" in again(scenario="longleaf").stderr
     assert "--seed" in again("--seed", "3").stderr
     other = tmp_path / "none.mcap"
-    open_log(other).close()
+    create_log(other).close()
     assert "no scenario" in again("--replay-commands", other).stderr
 
 
@@ -387,7 +387,7 @@ def test_a_recording_begun_late_holds_what_came_before(tmp_path):
 
 def test_nobody_changes_a_flight_that_is_repeated(tmp_path):
     path = tmp_path / "flight.mcap"
-    log = open_log(path)
+    log = create_log(path)
     with Simulation(parse_scenario(DATA), threads=1) as simulation:
         simulation.graph.subscribe_all(log.write)
         simulation.run(0.3)
@@ -419,7 +419,7 @@ def finish(simulation, log):
 def test_a_lock_step_partner_is_met_again(tmp_path):
     """What it answered, meeting by meeting, and that it left."""
     path = tmp_path / "flight.mcap"
-    log = open_log(path)
+    log = create_log(path)
     data = {**DATA, "duration_s": 1.0}
     clock = "rosgraph_msgs/msg/Clock"
     with Simulation(parse_scenario(data), threads=1) as simulation:
@@ -484,7 +484,7 @@ class Asker(Node):
 def test_what_a_service_outside_answered_is_answered_again(tmp_path):
     (tmp_path / "repeated_askers.py").write_text(ASKER)
     path = tmp_path / "flight.mcap"
-    log = open_log(path)
+    log = create_log(path)
     kind = {"sensors": SENSORS[1:], "nodes": [{"node": "repeated_askers:Asker"}]}
     data = {**DATA, "duration_s": 1.5, "types": {"f450": kind}}
     response = message_type("std_srvs/srv/Trigger_Response")
@@ -518,7 +518,7 @@ def test_what_a_service_outside_answered_is_answered_again(tmp_path):
 
 def test_a_flight_past_its_scenarios_end_is_repeated(tmp_path):
     path = tmp_path / "flight.mcap"
-    log = open_log(path)
+    log = create_log(path)
     with Simulation(parse_scenario({**DATA, "duration_s": 0.2}), threads=1) as simulation:
         simulation.diagnostics.enable_digest()
         simulation.graph.subscribe_all(log.write)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from test_mapped_flights import FOREST
 
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.replay import Replay
 from volery.graph.messages import stamp_of
@@ -66,7 +66,7 @@ def replayed(path):
 @pytest.mark.slow
 def test_it_follows_a_flight_and_says_the_same_on_its_log_in_another_process(tmp_path):
     path = tmp_path / "flight.mcap"
-    with Simulation(scenario_of(blind=False)) as simulation, closing(open_log(path)) as log:
+    with Simulation(scenario_of(blind=False)) as simulation, closing(create_log(path)) as log:
         said, truth = listen(simulation), []
         simulation.graph.subscribe("/uav1/ground_truth/odom", truth.append)
         simulation.graph.subscribe_all(log.write)

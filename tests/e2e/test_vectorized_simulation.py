@@ -146,7 +146,7 @@ def test_mass_command_is_the_same_as_single_ones(pair_data):
 
 
 def test_impossible_requests_are_refused(flat_data):
-    with pytest.raises(ScenarioError, match="at least 1 environment"):
+    with pytest.raises(ScenarioError, match="num_envs = 0: at least 1"):
         make(flat_data, 0)
     with pytest.raises(ScenarioError, match="2 environments with 1 seed: each needs one"):
         make(flat_data, 2, seeds=[1])

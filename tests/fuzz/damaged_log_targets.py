@@ -19,7 +19,7 @@ from rosbags.rosbag2 import Writer as Ros2Writer
 
 from volery.bridges.logs.bag_writer import bag_writer
 from volery.bridges.logs.decoding import LogDecoder
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.bridges.logs.playback import Playback
 from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.recorded_flight import ORIGIN_TOPIC, read_flight
@@ -72,7 +72,7 @@ def _logs(suffix):
     found = []
     for compression in ("lz4", "none", *(("zstd",) * (suffix == ".mcap"))):
         path = path_of(f"whole{suffix}")
-        log = open_log(path, overwrite=True, compression=compression)
+        log = create_log(path, overwrite=True, compression=compression)
         for number, message in enumerate(_messages()):
             log.write(message)
             if number % 80 == 79:

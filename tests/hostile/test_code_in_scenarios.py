@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner, Result
 
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.bridges.logs.recorded_flight import RecordedScenario
 from volery.cli import trust
 from volery.cli.app import app
@@ -73,7 +73,7 @@ class Trap:
         """A log beside it that tells of the scenario and of its folder."""
         told = {"name": "stranger", "seed": 1, "version": "0", "folder": str(self.folder)}
         path = self.folder / "stranger.mcap"
-        with closing(open_log(path)) as log:
+        with closing(create_log(path)) as log:
             text = json.dumps(told | {"content": self.content})
             log.write(m.Published("/volery/scenario", "std_msgs/msg/String", 0, m.String(text)))
         return path

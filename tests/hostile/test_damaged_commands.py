@@ -8,7 +8,7 @@ from contextlib import closing
 
 import pytest
 
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.bridges.logs.recorded_flight import ORIGIN_TOPIC, read_flight
 from volery.graph import command_records
 from volery.graph.codecs.zero import zero_message
@@ -25,7 +25,7 @@ def damaged_log(path):
     """A log in which a command's content belongs to a channel that nothing describes."""
     command = zero_message(RECORD)
     command.kind, command.name, command.type, command.follows = "publish", "/x", STRING, True
-    with closing(open_log(path, compression="none")) as log:
+    with closing(create_log(path, compression="none")) as log:
         log.write(Published(ORIGIN_TOPIC, STRING, 0, String(json.dumps(ORIGIN))))
         log.write(Published(command_records.TOPIC, RECORD, 0, command))
         log.write(Published("/x", STRING, 0, String(MARK)))

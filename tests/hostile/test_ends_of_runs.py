@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 
 from volery.bridges.logs.file_lock import locked_for_reading
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.recovery import recover
 from volery.core.errors import RecordingError
@@ -78,7 +78,7 @@ def ended(process):
 
 
 def write(path, messages=50, size=2000):
-    log = open_log(path, compression="none")
+    log = create_log(path, compression="none")
     for k in range(messages):
         log.write(Published("/text", "std_msgs/msg/String", k, String("x" * size)))
     log.close()
@@ -221,21 +221,21 @@ NOWHERE = "ros-tcp://127.0.0.1:9"
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_a_log_has_one_writer(tmp_path, suffix):
     path = tmp_path / f"flight{suffix}"
-    first = open_log(path)
+    first = create_log(path)
     with pytest.raises(RecordingError, match="is being written or recovered by another process"):
-        open_log(path, overwrite=True)
+        create_log(path, overwrite=True)
     with pytest.raises(RecordingError, match="is being written by another process; end that first"):
         recover(path, tmp_path / f"other{suffix}")
     first.close()
     assert summarize(path).problem == ""
-    open_log(path, overwrite=True).close()
+    create_log(path, overwrite=True).close()
     assert [entry.name for entry in tmp_path.iterdir()] == [path.name]
 
 
 def test_a_log_that_is_recovered_is_not_overwritten(tmp_path):
     path = write(tmp_path / "flight.mcap")
     with locked_for_reading(path), pytest.raises(RecordingError, match="another process"):
-        open_log(path, overwrite=True)
+        create_log(path, overwrite=True)
     assert summarize(path).messages == 50
 
 
@@ -278,7 +278,7 @@ def small_disk(size):
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_recover_on_a_full_disk_leaves_nothing(tmp_path, suffix):
     path = tmp_path / f"flight{suffix}"
-    log = open_log(path, compression="none")
+    log = create_log(path, compression="none")
     for k in range(60):
         log.write(Published("/text", "std_msgs/msg/String", k, String(os.urandom(20_000).hex())))
     log.abort()
@@ -311,7 +311,7 @@ def test_recover_that_is_stopped_leaves_nothing(tmp_path, monkeypatch, suffix):
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_a_log_that_cannot_be_begun_leaves_nothing(tmp_path, suffix):
     with small_disk(10), pytest.raises(RecordingError, match="File too large"):
-        open_log(tmp_path / f"flight{suffix}")
+        create_log(tmp_path / f"flight{suffix}")
     assert list(tmp_path.iterdir()) == []
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.bridges.logs.recorded_flight import RecordedScenario, read_flight
 from volery.core.errors import DataFileError, GraphError, RecordingError, ScenarioError, VoleryError
 from volery.graph import messages as m
@@ -40,7 +40,7 @@ def content(world: dict[str, Any], **more: Any) -> dict[str, Any]:
 def foreign_log(path: Path, told: dict[str, Any], folder: str | None = "/") -> Path:
     """A log that tells of a scenario, and of a folder that is not its own."""
     origin = {"name": told["name"], "seed": 1, "version": "0", "folder": folder, "content": told}
-    with closing(open_log(path)) as log:
+    with closing(create_log(path)) as log:
         publish(log, "/volery/scenario", 0, m.String(json.dumps(origin)))
         publish(log, "/clock", 1_000_000_000, m.Clock(m.time_from_ns(1_000_000_000)))
     return path
@@ -248,7 +248,7 @@ def test_a_log_of_an_upload_finds_its_files(tmp_path: Path) -> None:
 def test_a_log_does_not_tell_where_files_lie(tmp_path: Path) -> None:
     """Logs are passed on; folders of one's own machine concern nobody else."""
     with Simulation(load_scenario("hover"), threads=1) as simulation:
-        log = open_log(tmp_path / "flight.mcap")
+        log = create_log(tmp_path / "flight.mcap")
         simulation.graph.subscribe_all(log.write)
         simulation.run(0.1)
         log.close()

@@ -18,7 +18,7 @@ import zstandard
 
 from volery.bridges.logs import budgets, content, mcap_format, recordings_quota, unpacking
 from volery.bridges.logs.decoding import LogDecoder
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.bridges.logs.playback import Playback
 from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.recorded_flight import read_flight
@@ -286,7 +286,7 @@ def test_a_ros2_bag_that_others_would_unpack_is_refused(tmp_path, line):
 def test_logs_are_looked_into_in_a_process_that_ends(tmp_path, monkeypatch):
     """Past its memory or its time it ends; the page's process only says so."""
     path = tmp_path / "flight.mcap"
-    log = open_log(path)
+    log = create_log(path)
     log.write(Published("/text", "std_msgs/msg/String", 7, String("hello")))
     log.close()
     (tmp_path / "bad.bag").write_bytes(b"no log")

@@ -11,7 +11,7 @@ import itertools
 import pytest
 from whole_world import offer_rosapi, whole_data
 
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.graph.service_reply import ServiceReply
 from volery.runtime.replay.log_player import LogPlayer
 from volery.server.read_only import READ_ONLY_SERVICES
@@ -70,7 +70,7 @@ def test_a_simulation_charges_what_viewers_call(simulate, tmp_path):
 @pytest.fixture
 def log(simulate, tmp_path):
     path = tmp_path / "short.mcap"
-    simulation, recording = simulate(FLAT), open_log(path)
+    simulation, recording = simulate(FLAT), create_log(path)
     simulation.graph.subscribe_all(recording.write)
     simulation.run(0.5)
     recording.close()

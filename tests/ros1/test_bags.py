@@ -9,7 +9,7 @@ import pytest
 from filling import filled
 from ros1_bench import HERE, SYSTEM_PYTHON, Program, peer, require_ros1, shared_master, tool
 
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.bridges.logs.recovery import recover
 from volery.graph.messages import Published, String, Time, message_type
 from volery.graph.typestore import typestore
@@ -26,7 +26,7 @@ TEXT = "the same words again and again, so that blocks of LZ4 refer to earlier o
 
 def record(path, messages, *, whole=True):
     """Writes a bag; whole: with its index."""
-    log = open_log(path)
+    log = create_log(path)
     for k, (topic, msgtype, message) in enumerate(messages):
         log.write(Published(topic, msgtype, 10**9 + k * 10**6, message))
     log.flush()

@@ -113,12 +113,12 @@ class CommandLineFlight:
 
             self._collector = FlightCollector(simulation)
         if options.record is not None:
-            from volery.bridges.logs.log_writer import open_log
+            from volery.bridges.logs.log_writer import create_log
             from volery.bridges.logs.recorded_topics import recorded_topics
 
             matches = recorded_topics(simulation.graph, options.topics, options.exclude)
             warn_of_size(simulation.diagnostics.image_rates, matches)
-            self._log = open_log(options.record, overwrite=options.overwrite)
+            self._log = create_log(options.record, overwrite=options.overwrite)
             self._recorded = simulation.graph.subscribe_all(self._log.write, matches)
 
     def fly(self) -> int:

@@ -56,7 +56,7 @@ def recover_log(path: Path, out: Path | None) -> None:
 
 def convert_log(path: Path, out: Path, layout: Path, *, overwrite: bool) -> None:
     """Converts a text log of scans to a log of messages and prints the counts."""
-    from volery.bridges.logs.log_writer import check_target, open_log
+    from volery.bridges.logs.log_writer import check_target, create_log
     from volery.bridges.logs.text_layout import TextLayout
     from volery.bridges.logs.text_scans import TextScans
     from volery.scenario.data_files import load_data_file
@@ -64,7 +64,7 @@ def convert_log(path: Path, out: Path, layout: Path, *, overwrite: bool) -> None
     check_target(out, overwrite=overwrite)
     scans = TextScans(path, load_data_file(layout, TextLayout))
     made = out.with_name(f".{out.stem}.part{out.suffix}")
-    log = open_log(made, overwrite=True)
+    log = create_log(made, overwrite=True)
     try:
         scans.write_to(log)
         log.close()

@@ -41,6 +41,8 @@ class FlightProgress:
                 total=self._duration_s,
                 state="building the world; a first run compiles its kernels",
             )
+        elif not _has_kernels():
+            typer.echo(f"{self._name}: compiling; later runs start at once")
         return self
 
     def __exit__(self, *_exception: object) -> None:
@@ -75,3 +77,10 @@ class FlightProgress:
         if self._bar is not None:
             self._bar.stop()
             self._bar = None
+
+
+def _has_kernels() -> bool:
+    """Returns whether an earlier run compiled kernels."""
+    from volery.core.compiled import cache_dir
+
+    return any(cache_dir().rglob("*.nbc"))

@@ -309,6 +309,8 @@ class FleetCommands:
 
     def land(self, i: int) -> None:
         """Stops UAV `i`, lands it straight below and stops its rotors on the ground."""
+        if self.mode(i) is FlightMode.LANDED:
+            raise CommandError(f"{self.names[i]} is on the ground already")
         control_state = self._enter_guided(i, FlightMode.LAND)
         control_state["braking"] = True
         control_state["sink"] = 0.0

@@ -46,6 +46,10 @@ class RecordingError(VoleryError):
     """A log cannot be written (disk full, no permission) or read."""
 
 
+class LogWarning(UserWarning):
+    """A log is read as far as possible; the message names its damage."""
+
+
 class GraphError(VoleryError):
     """A topic, service or message does not fit: wrong type, unknown name, invalid rate."""
 

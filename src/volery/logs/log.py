@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping
 from html import escape
 from pathlib import Path
@@ -14,7 +15,7 @@ from volery.bridges.logs.decoding import LogDecoder
 from volery.bridges.topic_patterns import topic_filter
 from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
-from volery.core.errors import GraphError, VoleryError
+from volery.core.errors import GraphError, LogWarning, VoleryError
 from volery.core.plurals import counted
 from volery.logs.sources import LogSource, open_source
 from volery.logs.topic_count import TopicCount
@@ -35,11 +36,15 @@ _CLOSEST = 3
 def open_log(path: str | Path) -> Log:
     """Opens a log as data: MCAP, a ROS 1 bag, a ROS 2 bag (folder or .db3 file), or PX4's ULog.
 
-    Truncated and damaged files are read as far as possible; `Log.problem` describes the damage.
-    Raises `RecordingError` if the file is missing, no log, or exceeds the limits of logs.
+    Truncated and damaged files are read as far as possible: a `LogWarning` and `Log.problem`
+    describe the damage. Raises `RecordingError` if the file is missing, no log, or exceeds the
+    limits of logs.
     """
     path = Path(path)
-    return Log(path, open_source(path), WHOLE_NS)
+    log = Log(path, open_source(path), WHOLE_NS)
+    if log.problem:
+        warnings.warn(f"{path}: {log.problem}", LogWarning, stacklevel=2)
+    return log
 
 
 class Log:

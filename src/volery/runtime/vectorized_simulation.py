@@ -83,10 +83,9 @@ class VectorizedSimulation(BatchCommands):
         seeds: Sequence[int] | None = None,
         threads: int = 2,
     ) -> None:
-        if num_envs < 1 or threads < 1:
-            raise ScenarioError(
-                f"at least 1 environment and 1 thread (found {num_envs} and {threads})"
-            )
+        for what, number in (("num_envs", num_envs), ("threads", threads)):
+            if number < 1:
+                raise ScenarioError(f"{what} = {number}: at least 1 is needed")
         if seeds is None:
             seeds = range(scenario.seed, scenario.seed + num_envs)
         if len(seeds) != num_envs:

@@ -134,6 +134,13 @@ class Scenario(Data):
         world = self.world
         return world.seed is None and (world.forest is not None or world.city is not None)
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in type(self).model_fields:
+            raise ScenarioError(
+                f"{name}: scenarios do not change; with_({name}=...) returns a copy"
+            )
+        super().__setattr__(name, value)
+
     def with_(self, changes: Mapping[str, Any] | None = None, /, **keys: Any) -> Scenario:
         """Returns a copy with other values of its keys, validated like a file.
 
@@ -147,7 +154,7 @@ class Scenario(Data):
         sensors of other sets are removed, or all sensors as tables or models. Raises
         `ScenarioError`, naming key and allowed values, for invalid values.
         """
-        where = f"{self.name}: with_()"
+        where = self.name
         try:
             named = renamed({**(changes or {}), **keys}, self.former_keys, "key")
         except ValueError as error:
@@ -170,17 +177,19 @@ class Scenario(Data):
         """
         return toml_text(self.model_dump(exclude_unset=True, exclude_none=True))
 
-    def save(self, path: str | Path) -> None:
+    def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Writes a TOML file, which `load_scenario` loads to an equal scenario.
 
         Its first line names `scenario.schema.json` for editors; `volery schema` writes that. Names
         of files in this scenario's folder become relative to the new file's folder. A saved
         scenario of a log or an upload has, when it is loaded, the access of its new owner. Raises
-        `ScenarioError` if the file cannot be written.
+        `ScenarioError` if the file exists, unless `overwrite` is set, or cannot be written.
         """
         path = Path(path)
         if path.suffix != ".toml":
             raise ScenarioError(f"{path}: a scenario is a .toml file; name it {path.name}.toml")
+        if path.exists() and not overwrite:
+            raise ScenarioError(f"{path}: the file exists; overwrite=True replaces it")
         data = self.model_dump(exclude_unset=True, exclude_none=True)
         text = toml_text(moved(data, self.access.folder, path.parent))
         try:

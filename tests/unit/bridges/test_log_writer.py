@@ -20,7 +20,7 @@ from rosbags.rosbag1 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from volery.bridges.logs import log_writer
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.bridges.logs.reader import summarize
 from volery.core.errors import RecordingError
 from volery.graph.messages import Published
@@ -31,7 +31,7 @@ FORMATS = [".mcap", ".bag"]
 
 
 def record(path: Path, messages: list[Published]) -> None:
-    log = open_log(path)
+    log = create_log(path)
     for message in messages:
         log.write(message)
     log.close()
@@ -159,7 +159,7 @@ def test_empty_run_gives_a_whole_log(tmp_path: Path, suffix: str) -> None:
 @pytest.mark.parametrize("name", ["flight.txt", "flight", "flight.db3"])
 def test_unknown_suffix(tmp_path: Path, name: str) -> None:
     with pytest.raises(RecordingError, match=r"\.mcap .*\.bag"):
-        open_log(tmp_path / name)
+        create_log(tmp_path / name)
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
@@ -167,9 +167,9 @@ def test_existing_file_is_kept(tmp_path: Path, flight: Flight, suffix: str) -> N
     path = tmp_path / f"flight{suffix}"
     path.write_bytes(b"precious")
     with pytest.raises(RecordingError, match="exists already"):
-        open_log(path)
+        create_log(path)
     assert path.read_bytes() == b"precious"
-    open_log(path, overwrite=True).close()
+    create_log(path, overwrite=True).close()
     assert summarize(path).messages == 0
 
 
@@ -177,10 +177,10 @@ def test_existing_file_is_kept(tmp_path: Path, flight: Flight, suffix: str) -> N
 def test_folder_that_cannot_be_made(tmp_path: Path, suffix: str) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(RecordingError, match="cannot create the log"):
-        open_log(tmp_path / "file" / f"flight{suffix}")
+        create_log(tmp_path / "file" / f"flight{suffix}")
     (tmp_path / f"folder{suffix}").mkdir()
     with pytest.raises(RecordingError, match="folder"):
-        open_log(tmp_path / f"folder{suffix}")
+        create_log(tmp_path / f"folder{suffix}")
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
@@ -188,7 +188,7 @@ def test_unfinished_log_is_readable_up_to_its_last_chunk(
     tmp_path: Path, flight: Flight, suffix: str
 ) -> None:
     path = tmp_path / f"flight{suffix}"
-    log = open_log(path)
+    log = create_log(path)
     messages = flight(2.0)
     for message in messages[:400]:
         log.write(message)
@@ -206,7 +206,7 @@ def test_a_chunk_is_closed_after_a_while(
     tmp_path: Path, flight: Flight, suffix: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / f"flight{suffix}"
-    log = open_log(path)
+    log = create_log(path)
     first, second = flight(0.1)[:2]
     log.write(first)
     before = path.stat().st_size
@@ -223,7 +223,7 @@ def test_full_disk(
     tmp_path: Path, flight: Flight, suffix: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / f"flight{suffix}"
-    log = open_log(path)
+    log = create_log(path)
     messages = flight(1.0)
     for message in messages[:200]:
         log.write(message)
@@ -251,7 +251,7 @@ def test_file_size_limit_stops_the_run_with_one_error(
     tmp_path: Path, flight: Flight, suffix: str
 ) -> None:
     path = tmp_path / f"flight{suffix}"
-    log = open_log(path)
+    log = create_log(path)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1_500_000, hard))
@@ -276,7 +276,7 @@ def test_messages_are_those_that_can_be_read(
     tmp_path: Path, flight: Flight, suffix: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("volery.bridges.logs.log_writer.CHUNK_WALL_S", float("inf"))
-    log = open_log(tmp_path / f"flight{suffix}")
+    log = create_log(tmp_path / f"flight{suffix}")
     counts = []
     for message in flight(10.0):
         log.write(message)
@@ -291,8 +291,8 @@ KILLED = """
 import sys, time
 sys.path.insert(0, sys.argv[2])
 from conftest import make_flight
-from volery.bridges.logs.log_writer import open_log
-log = open_log(sys.argv[1])
+from volery.bridges.logs.log_writer import create_log
+log = create_log(sys.argv[1])
 messages = make_flight(20.0)
 for message in messages:
     log.write(message)

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ros_tcp_client import Loop
 
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.recording import Recorder
 from volery.bridges.topic_patterns import renamer, topic_filter
@@ -43,7 +43,7 @@ def bench():
 
 @pytest.mark.parametrize("suffix", [".mcap", ".bag"])
 def test_what_matches_while_it_runs(bench, tmp_path, suffix):
-    log = open_log(tmp_path / f"flight{suffix}")
+    log = create_log(tmp_path / f"flight{suffix}")
     patterns, exclude = ("/uav*/laser/**", "/late"), ("/**/nodding/*",)
     recorder = Recorder(bench.graph, log, patterns, exclude)
     for topic in TOPICS:
@@ -75,7 +75,7 @@ def camera(bench, base, *ends):
 
 def recorded(bench, path, **options):
     """Topics that are recorded of two cameras, the second without compressed pictures."""
-    recorder = Recorder(bench.graph, open_log(path), **options)
+    recorder = Recorder(bench.graph, create_log(path), **options)
     recorder.start()
     ends = ("/camera_info", "/image_raw", "/depth", "/points", "/labels/instance")
     both = ("/image_raw/compressed", "/depth/compressedDepth")
@@ -114,13 +114,13 @@ def test_topics_are_left_out(bench, tmp_path):
     assert not {topic for topic in found | wanted if "labels" in topic or "depth" in topic}
     assert "/uav1/front/image_raw/compressed" in found
     with pytest.raises(GraphError, match="is not a topic pattern"):
-        Recorder(bench.graph, open_log(tmp_path / "b.mcap"), exclude=["labels"])
+        Recorder(bench.graph, create_log(tmp_path / "b.mcap"), exclude=["labels"])
 
 
 def test_what_was_latched_comes_first(bench, tmp_path):
     bench.graph.advertise("/map", String, latched=True).publish(String("kept"))
     bench.graph.deliver()
-    log = open_log(tmp_path / "flight.mcap")
+    log = create_log(tmp_path / "flight.mcap")
     recorder = Recorder(bench.graph, log)
     bench.now_ns = 77_000_000
     recorder.start()
@@ -132,7 +132,7 @@ def test_what_was_latched_comes_first(bench, tmp_path):
 
 def test_from_another_thread(tmp_path):
     loop = Loop()
-    log = open_log(tmp_path / "flight.mcap")
+    log = create_log(tmp_path / "flight.mcap")
     recorder = Recorder(loop.graph, log)
     loop.gateway.post(recorder.start).result(5.0)
     publisher = loop.graph.advertise("/x", String)
@@ -144,7 +144,7 @@ def test_from_another_thread(tmp_path):
 
 
 def test_a_full_disk_ends_the_recording_and_nothing_else(bench, tmp_path, monkeypatch):
-    log = open_log(tmp_path / "flight.mcap")
+    log = create_log(tmp_path / "flight.mcap")
     recorder = Recorder(bench.graph, log)
     recorder.start()
     heard = []
@@ -165,7 +165,7 @@ def test_a_full_disk_ends_the_recording_and_nothing_else(bench, tmp_path, monkey
 
 
 def test_one_recorder_records_once(bench, tmp_path):
-    recorder = Recorder(bench.graph, open_log(tmp_path / "flight.mcap"))
+    recorder = Recorder(bench.graph, create_log(tmp_path / "flight.mcap"))
     recorder.start()
     with pytest.raises(RecordingError, match="before"):
         recorder.start()

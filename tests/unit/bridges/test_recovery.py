@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from rosbags.highlevel import AnyReader
 
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.records import LogWalk
 from volery.bridges.logs.recovery import recover, recovered_name
@@ -22,7 +22,7 @@ FORMATS = [".mcap", ".bag"]
 
 def cut(path: Path, messages: list[Published], keep: float) -> int:
     """Record, then keep only a fraction of the file's bytes; returns the number recorded."""
-    log = open_log(path, compression="none")
+    log = create_log(path, compression="none")
     for k, message in enumerate(messages):
         log.write(message)
         if k % 100 == 99:
@@ -78,7 +78,7 @@ def test_every_cut_is_survived(tmp_path: Path, flight: Flight, suffix: str) -> N
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_damaged_chunk_is_left_out(tmp_path: Path, flight: Flight, suffix: str) -> None:
     path = tmp_path / f"flight{suffix}"
-    log = open_log(path)
+    log = create_log(path)
     sizes = []
     for k, message in enumerate(flight(1.0)):
         log.write(message)

@@ -13,7 +13,7 @@ from mcap.writer import CompressionType, Writer
 from rosbags.rosbag1 import Writer as BagWriter
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.bridges.logs.recording import Recorder
 from volery.bridges.logs.replay import Replay
 from volery.core.errors import GraphError, RecordingError
@@ -70,7 +70,7 @@ def told(messages):
 
 
 def write(path, messages):
-    log = open_log(path)
+    log = create_log(path)
     for message in messages:
         log.write(message)
     log.close()
@@ -103,7 +103,7 @@ def test_a_recorded_flight_played_into_a_fresh_graph_is_the_same(tmp_path, suffi
     """Recorded as it flies, read back: topics, types, times, bytes and order."""
     path = tmp_path / f"hover{suffix}"
     with Simulation(load_scenario("hover"), threads=1) as simulation:
-        recorder = Recorder(simulation.graph, open_log(path))
+        recorder = Recorder(simulation.graph, create_log(path))
         recorder.start()
         simulation.run(0.5)
         recorder.stop()

@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from volery.bridges.logs.decoding import LogDecoder
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.bridges.logs.records import LogWalk
 from volery.bridges.logs.text_layout import TextLayout
 from volery.bridges.logs.text_scans import TextScans
@@ -151,7 +151,7 @@ def test_what_was_begun_and_failed_leaves_an_old_log_alone(tmp_path):
     source, layout, out = tmp_path / "a.txt", tmp_path / "a.toml", tmp_path / "out.mcap"
     source.write_text("1 2 3\n")
     layout.write_text(TOML)
-    open_log(out).close()
+    create_log(out).close()
     before = out.read_bytes()
     assert convert(source, out, "--layout", layout, "--overwrite").exit_code == 2
     assert out.read_bytes() == before

@@ -14,7 +14,7 @@ from rosbags.rosbag1 import Writer as BagWriter
 
 from volery.bridges.logs import log_writer as bag_module
 from volery.bridges.logs.log_formats import open_chunks
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.bridges.logs.records import LogWalk
 from volery.bridges.logs.timeline import Timeline, TimelinePosition
 from volery.core.errors import RecordingError
@@ -26,7 +26,7 @@ FORMATS = [".mcap", ".bag"]
 
 def write(path, entries, chunk_every=7, end=True):
     """A log of (topic, ms) with a chunk each so many messages."""
-    log = open_log(path, overwrite=True)
+    log = create_log(path, overwrite=True)
     for k, (topic, ms) in enumerate(entries):
         log.write(m.Published(topic, "std_msgs/msg/String", ms * 1_000_000, m.String(f"no {k}")))
         if k % chunk_every == chunk_every - 1:
@@ -211,7 +211,7 @@ def test_what_is_no_log(tmp_path):
 def test_a_long_log_is_open_everywhere_at_once(tmp_path, monkeypatch):
     """64 MB in chunks of 1 MB: each leap reads a chunk or two."""
     monkeypatch.setattr(bag_module, "CHUNK_WALL_S", 1e9)
-    log = open_log(tmp_path / "long.mcap", compression="none")
+    log = create_log(tmp_path / "long.mcap", compression="none")
     noise = np.random.default_rng(1).integers(0, 256, 8192, dtype=np.uint8).tobytes().hex()
     for k in range(4000):
         log.write(m.Published("/a", "std_msgs/msg/String", k * 10_000_000, m.String(noise)))

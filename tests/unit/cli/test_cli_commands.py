@@ -13,7 +13,7 @@ import typer
 from fake_simulation import FakeSimulation
 from typer.testing import CliRunner
 
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.cli import bench, doctor, start
 from volery.cli.app import app
 from volery.cli.error_reporting import guarded, word_logs
@@ -141,7 +141,7 @@ def test_list() -> None:
 
 def make_log(path: Path, *, whole: bool) -> None:
     simulation = FakeSimulation(load_scenario("hover"))
-    log = open_log(path)
+    log = create_log(path)
     simulation.graph.subscribe_all(log.write)
     simulation.run()
     log.close() if whole else log.abort()

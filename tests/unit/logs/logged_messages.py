@@ -79,7 +79,7 @@ def published() -> list[m.Published]:
 
 def write_log(path: Path) -> Path:
     """Writes the messages to a .mcap or .bag file."""
-    log = log_writer.open_log(path)
+    log = log_writer.create_log(path)
     for message in published():
         log.write(message)
     log.close()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from pyulog import ULog
 
-from volery.core.errors import RecordingError
+from volery.core.errors import LogWarning, RecordingError
 from volery.logs import open_log
 
 MAGIC = b"ULog\x01\x12\x35\x01"
@@ -96,7 +96,8 @@ def test_ranges_of_time_and_tables(path):
 
 def test_a_truncated_log(path, whole):
     path.write_bytes(whole[:-700])
-    log = open_log(path)
+    with pytest.warns(LogWarning, match=r"px4\.ulg: "):
+        log = open_log(path)
     assert log.problem.startswith("cut off in the middle of a message at byte ")
     assert 20 < len(log["/odd"]) < 50
     assert log["/odd"]["step"].tolist() == [-k for k in range(len(log["/odd"]))]
@@ -105,7 +106,8 @@ def test_a_truncated_log(path, whole):
 def test_a_damaged_log(path, whole):
     middle = whole.index(samples()[60])
     path.write_bytes(whole[:middle] + b"\x01\x00\x00" + whole[middle:])
-    log = open_log(path)
+    with pytest.warns(LogWarning, match=r"px4\.ulg: "):
+        log = open_log(path)
     assert log.problem == f"damaged at byte {middle}: the rest is not read"
     assert len(log["/odd"]) == 20
 
@@ -142,7 +144,8 @@ def test_an_invalid_topic_is_left_out(path, whole, text, problem):
     added.append(message("D", struct.pack("<HQ", 99, 0) + bytes(50)))
     at = len(MAGIC) + 8 + len(flags())
     path.write_bytes(whole[:at] + b"".join(added) + whole[at:])
-    log = open_log(path)
+    with pytest.warns(LogWarning, match=r"px4\.ulg: "):
+        log = open_log(path)
     assert problem in log.problem
     assert len(log["/odd"]) == 50
     assert "/bad" not in log

@@ -3,7 +3,7 @@
 import numpy as np
 from flying_bench import Station, fly, scenario
 
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.bridges.logs.recorded_flight import read_flight
 from volery.mavlink.scenario_setup import NODE, with_autopilots
 from volery.runtime import Simulation
@@ -67,7 +67,7 @@ def test_autopilots_are_part_of_what_is_flown():
 def test_a_recorded_flight_is_repeated(tmp_path):
     path = tmp_path / "flight.mcap"
     simulation = Simulation(scenario(), threads=1)
-    log = open_log(path)
+    log = create_log(path)
     with simulation:
         simulation.diagnostics.enable_digest()
         simulation.graph.subscribe_all(log.write)

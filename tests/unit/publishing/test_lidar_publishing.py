@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.core.errors import DataFileError, ScenarioError
 from volery.graph.typestore import typestore
 from volery.sensors.lidar_model import load_lidar
@@ -141,7 +141,7 @@ def test_logs_carry_clouds_and_echoes(flown, tmp_path, suffix):
     _, found = flown({"name": "a", "model": "vlp_16"}, {"name": "ew", "model": "utm_30lx_ew"})
     topics = ("/uav1/points", "/uav1/laser/ew/echoes")
     sent = [m for topic in topics for m in found[topic]]
-    log = open_log(tmp_path / f"flight{suffix}")
+    log = create_log(tmp_path / f"flight{suffix}")
     for message in sent:
         log.write(message)
     log.close()

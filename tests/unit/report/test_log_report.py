@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.core import rotations
 from volery.core.errors import VoleryError
 from volery.graph import messages as m
@@ -57,7 +57,7 @@ def scan_at(time_ns: int, place: np.ndarray) -> Any:
 def _log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A minute of uav1, whose estimate is half a metre off."""
     path = tmp_path_factory.mktemp("logs") / "flight.mcap"
-    with closing(open_log(path)) as log:
+    with closing(create_log(path)) as log:
         for k in range(0, 1200):
             time_ns = k * S // 20
             place = place_at(k / 20.0)
@@ -112,7 +112,7 @@ def test_a_uav_that_is_not_there_is_told(log: Path, tmp_path: Path) -> None:
 
 def test_the_scenario_is_named(log: Path, tmp_path: Path) -> None:
     told, path = {"name": "glade", "content": {"name": "glade"}}, tmp_path / "flight.mcap"
-    with closing(open_log(path)) as out:
+    with closing(create_log(path)) as out:
         write(out, "/volery/scenario", 0, m.String(json.dumps(told)))
         write(out, "/uav1/odom", 0, odometry(0, place_at(0.0)))
         write(out, "/uav2/odom", 4 * S, odometry(4 * S, place_at(4.0)))
@@ -126,7 +126,7 @@ def test_the_scenario_is_named(log: Path, tmp_path: Path) -> None:
 def told_log(path: Path, content: dict[str, Any], trees: Path | None = None) -> Path:
     """The same minute, of a scenario that the log tells."""
     told = {"name": "glade", "seed": 1, "version": "0", "folder": trees and str(trees)}
-    with closing(open_log(path)) as out:
+    with closing(create_log(path)) as out:
         write(out, "/volery/scenario", 0, m.String(json.dumps(told | {"content": content})))
         for k in range(0, 1200):
             time_ns = k * S // 20
@@ -193,7 +193,7 @@ def test_a_topic_to_compare_needs_a_log(log: Path, tmp_path: Path) -> None:
 def test_a_similar_flight_is_told(log: Path, tmp_path: Path) -> None:
     """As another UAV flies on a mission that begins alike."""
     real = tmp_path / "real.mcap"
-    with closing(open_log(real)) as out:
+    with closing(create_log(real)) as out:
         for k in range(1200):
             t, time_ns = k / 20.0, k * S // 20
             place = place_at(t) + np.array([0.0, 0.35 * np.sin(1.1 * t), 0.0])
@@ -207,7 +207,7 @@ def test_a_similar_flight_is_told(log: Path, tmp_path: Path) -> None:
 def test_times_of_day_are_told_as_such(log: Path, tmp_path: Path) -> None:
     """Of a real log over a simulated one, and over itself."""
     real, begin_s = tmp_path / "real.mcap", 1_700_000_000
-    with closing(open_log(real)) as out:
+    with closing(create_log(real)) as out:
         for k in range(1000):
             time_ns = begin_s * S + k * S // 20
             write(out, "/uav1/odom", time_ns, odometry(time_ns, place_at((k + 100) / 20.0)))
@@ -220,7 +220,7 @@ def test_times_of_day_are_told_as_such(log: Path, tmp_path: Path) -> None:
 
 def test_where_it_should_be_is_not_where_it_was(tmp_path: Path) -> None:
     path = tmp_path / "real.mcap"
-    with closing(open_log(path)) as out:
+    with closing(create_log(path)) as out:
         for topic in ("/mavros/local_position/pose", "/mavros/setpoint_position/local", "/goal"):
             pose = zero_message("geometry_msgs/msg/PoseStamped")
             pose.header = m.header(S, "map")
@@ -238,7 +238,7 @@ def test_where_it_should_be_is_not_where_it_was(tmp_path: Path) -> None:
 def test_a_flight_that_is_another_one_is_told(log: Path, tmp_path: Path) -> None:
     real, random = tmp_path / "real.mcap", np.random.default_rng(3)
     way = np.cumsum(random.normal(0.0, 0.3, (600, 3)), axis=0)
-    with closing(open_log(real)) as out:
+    with closing(create_log(real)) as out:
         for k, place in enumerate(way):
             write(out, "/odom", (k + 1) * S // 20, odometry((k + 1) * S // 20, place))
     written = write_log_report(log, tmp_path / "out", compare=real)
@@ -256,7 +256,7 @@ def test_a_real_flight_is_laid_over_it(log: Path, tmp_path: Path) -> None:
     """The same way, elsewhere, turned, at another hour, with noise of 0.1 m."""
     real, turn = tmp_path / "real.bag", rotations.matrix(rotations.from_rpy(0.0, 0.0, 1.1))
     noise = np.random.default_rng(2).normal(0.0, 0.1, (1000, 3))
-    with closing(open_log(real)) as out:
+    with closing(create_log(real)) as out:
         for k in range(1000):
             time_ns = (k + 5000) * S // 20
             place = (place_at((k + 100) / 20.0) + noise[k]) @ turn.T + [40.0, 7.0, 1.0]
@@ -278,7 +278,7 @@ def test_a_real_flight_is_laid_over_it(log: Path, tmp_path: Path) -> None:
 def test_a_clock_that_was_set_in_flight_is_told(log: Path, tmp_path: Path) -> None:
     """As that of a computer without a battery for it, until it hears of the time."""
     real = tmp_path / "real.bag"
-    with closing(open_log(real)) as out:
+    with closing(create_log(real)) as out:
         for k in range(1000):
             time_ns = k * S // 20 + (k > 500) * 1_700_000_000 * S
             write(out, "/mavros/odom", time_ns, odometry(time_ns, place_at(k / 20.0)))
@@ -288,7 +288,7 @@ def test_a_clock_that_was_set_in_flight_is_told(log: Path, tmp_path: Path) -> No
 
 def test_a_log_without_uavs(tmp_path: Path) -> None:
     path = tmp_path / "empty.mcap"
-    with closing(open_log(path)) as log:
+    with closing(create_log(path)) as log:
         write(log, "/talk", 0, m.String("x"))
     with pytest.raises(VoleryError, match="the log holds no UAV's poses"):
         read_flight(path)
@@ -299,7 +299,7 @@ def test_a_log_without_uavs(tmp_path: Path) -> None:
 def test_poses_that_are_no_numbers_are_left_out(tmp_path: Path) -> None:
     """As filters tell that have lost their way."""
     path = tmp_path / "lost.mcap"
-    with closing(open_log(path)) as log:
+    with closing(create_log(path)) as log:
         for k in range(20):
             pose = zero_message("geometry_msgs/msg/PoseStamped")
             pose.header = m.header((k + 1) * 100_000_000, "map")
@@ -314,7 +314,7 @@ def test_poses_that_are_no_numbers_are_left_out(tmp_path: Path) -> None:
 def test_what_slam_tells_is_the_estimate(tmp_path: Path) -> None:
     """Where it is recorded, in the place of the odometry."""
     path = tmp_path / "flight.mcap"
-    with closing(open_log(path)) as log:
+    with closing(create_log(path)) as log:
         for k in range(100):
             time_ns, place = (k + 1) * S // 10, place_at(k / 10.0)
             write(log, "/uav1/ground_truth/odom", time_ns, odometry(time_ns, place))

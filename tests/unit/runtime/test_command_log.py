@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.bridges.logs.recorded_flight import RecordedScenario, read_flight
 from volery.bridges.logs.recording import Recorder
 from volery.core.errors import RecordingError
@@ -123,7 +123,7 @@ def large_map(cells=100):
 
 
 def test_a_large_message_is_logged_once(tmp_path, flying):
-    log = open_log(tmp_path / "x.mcap")
+    log = create_log(tmp_path / "x.mcap")
     flying.graph.subscribe_all(log.write)
     session = flying.gateway.open("mapper")
     session.advertise("/large", "nav_msgs/msg/OccupancyGrid", latched=True)
@@ -143,7 +143,7 @@ def test_a_large_message_is_logged_once(tmp_path, flying):
 
 
 def test_a_log_without_what_follows_is_refused(tmp_path, flying):
-    recorder = Recorder(flying.graph, open_log(tmp_path / "x.mcap"), topics=("/volery/**",))
+    recorder = Recorder(flying.graph, create_log(tmp_path / "x.mcap"), topics=("/volery/**",))
     recorder.start()
     session = flying.gateway.open("mapper")
     session.advertise("/large", "nav_msgs/msg/OccupancyGrid")
@@ -173,7 +173,7 @@ def test_what_is_kept_has_a_bound(tmp_path, flying, monkeypatch):
     for _ in range(100):
         session.publish("/uav1/cmd_vel", TWIST)
     flying.process_commands()
-    log = open_log(tmp_path / "x.mcap")
+    log = create_log(tmp_path / "x.mcap")
     for earlier in flying.commands.earlier():
         log.write(earlier)
     flying.graph.subscribe_all(log.write)

@@ -8,7 +8,7 @@ import pytest
 from fake_wall_clock import FakeWallClock
 
 from volery.bridges.logs.decoding import LogDecoder
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.bridges.logs.records import LogWalk
 from volery.core.errors import CommandError, RecordingError
 from volery.graph import messages as m
@@ -28,7 +28,7 @@ def flights(tmp_path_factory):
     """A hovering UAV for 5 s, as MCAP and bag."""
     folder = tmp_path_factory.mktemp("flights")
     paths = {suffix: folder / f"flight{suffix}" for suffix in FORMATS}
-    logs = [open_log(path) for path in paths.values()]
+    logs = [create_log(path) for path in paths.values()]
     with Simulation(load_scenario("hover"), threads=1) as simulation:
         for log in logs:
             simulation.graph.subscribe_all(log.write)
@@ -250,7 +250,7 @@ def test_round_and_round(tmp_path):
 
 
 def strings(path, times_ms, end=True):
-    log = open_log(path)
+    log = create_log(path)
     for k, t in enumerate(times_ms):
         log.write(m.Published("/a", "std_msgs/msg/String", t * 1_000_000, m.String(str(k))))
     log.flush()
@@ -292,7 +292,7 @@ def test_what_cannot_be_played(tmp_path):
     path = tmp_path / "x.mcap"
     with pytest.raises(RecordingError, match="cannot read"):
         LogPlayer(path)
-    open_log(path).close()
+    create_log(path).close()
     with pytest.raises(RecordingError, match="no readable message"):
         LogPlayer(path)
     path.write_bytes(b"nonsense in a file")

@@ -12,7 +12,7 @@ from slam_bench import LEVEL, NODDING, Flight, S, messages, nod_angle, trunks
 from typer.testing import CliRunner
 
 from volery.autonomy.slam.slam_node import Slam
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.cli.app import app
 from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import (
@@ -80,7 +80,7 @@ class Flown:
 
     def write(self, path, *, tells, others=(), truth=None, later_s=0.0):
         """A log in which `/tf_static`, `/tf`, the scenario or nothing tells of the nodding one."""
-        with closing(open_log(path)) as log:
+        with closing(create_log(path)) as log:
 
             def put(topic, when, message):
                 log.write(Published(topic, message.__msgtype__, when, message))
@@ -167,7 +167,7 @@ def test_a_log_of_a_scenario_that_cannot_be_built_begins_at_the_origin(tmp_path,
     flown.write(tmp_path / "flight.mcap", tells="scenario")
     lost = {**ORIGIN, "folder": str(tmp_path / "gone")}
     lost["content"] = {**CONTENT, "world": {"terrain": {"kind": "grid", "file": "no.csv"}}}
-    with closing(open_log(tmp_path / "lost.mcap")) as log:
+    with closing(create_log(tmp_path / "lost.mcap")) as log:
         text = String(json.dumps(lost))
         log.write(Published("/volery/scenario", text.__msgtype__, 0, text))
         for _, topic, message in flown.told[:50]:

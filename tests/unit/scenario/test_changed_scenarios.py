@@ -35,8 +35,8 @@ def test_lists_models_and_tables_of_another_kind_replace():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"sed": 7}, r"^hover: with_\(\): unknown key 'sed'; did you mean 'seed'\?"),
-        ({"seed": -1}, r"^hover: with_\(\): key 'seed': .* \(found -1\)$"),
+        ({"sed": 7}, r"^hover: unknown key 'sed'; did you mean 'seed'\?"),
+        ({"seed": -1}, r"^hover: key 'seed': .* \(found -1\)$"),
         ({"world": {"wind": {"turbulence": "mild"}}}, r"key 'world\.wind\.turbulence': .*'light'"),
         ({"world": {"forest": {}}}, r"key 'world\.forest'"),
     ],
@@ -114,8 +114,22 @@ def test_paths_go_on_into_models():
     ],
 )
 def test_wrong_paths_are_refused(path, message):
-    with pytest.raises(ScenarioError, match=r"^hover: with_\(\): .*" + message):
+    with pytest.raises(ScenarioError, match=r"^hover: .*" + message):
         load_scenario("hover").with_({path: 1})
+
+
+def test_an_assignment_is_refused():
+    with pytest.raises(ScenarioError, match=r"do not change; with_\(seed=\.\.\.\) returns a copy"):
+        load_scenario("hover").seed = 3
+
+
+def test_a_file_is_replaced_only_on_request(tmp_path):
+    scenario = load_scenario("hover")
+    scenario.save(tmp_path / "mine.toml")
+    with pytest.raises(ScenarioError, match="the file exists; overwrite=True replaces it"):
+        scenario.save(tmp_path / "mine.toml")
+    scenario.with_(seed=3).save(tmp_path / "mine.toml", overwrite=True)
+    assert load_scenario(tmp_path / "mine.toml").seed == 3
 
 
 # ------------------------------------------------------------------------------------ short forms
@@ -168,7 +182,7 @@ def test_sensors_as_models_and_tables_replace_all():
     ],
 )
 def test_wrong_short_forms_are_refused(changes, message):
-    with pytest.raises(ScenarioError, match=r"^hover: with_\(\): .*" + message):
+    with pytest.raises(ScenarioError, match=r"^hover: .*" + message):
         load_scenario("hover").with_(changes)
 
 

@@ -5,7 +5,7 @@ import os
 import pytest
 from page_bench import ask, serving
 
-from volery.bridges.logs.log_writer import open_log
+from volery.bridges.logs.log_writer import create_log
 from volery.graph import messages as m
 
 
@@ -23,7 +23,7 @@ def server(folder):
 
 
 def write(path, seconds=2):
-    log = open_log(path)
+    log = create_log(path)
     for k in range(seconds + 1):
         time_ns = k * 1_000_000_000
         log.write(

@@ -4,7 +4,7 @@ Both formats are written in chunks of about a megabyte, closed at least every tw
 time and written to the disk as a whole: a killed run loses only the messages after its last chunk.
 The tail of such a file (its index) is missing; `volery.bridges.logs.recovery` writes it.
 
-    log = open_log("flight.mcap")
+    log = create_log("flight.mcap")
     graph.subscribe_all(log.write)
     ...
     log.close()
@@ -35,7 +35,7 @@ LIBRARY = "volery"
 Compression = Literal["lz4", "zstd", "none"]
 
 
-def open_log(
+def create_log(
     path: str | Path, *, overwrite: bool = False, compression: Compression = "lz4"
 ) -> LogWriter:
     """Creates a log; the suffix selects the format.
@@ -80,7 +80,7 @@ def _begin(kind: type[McapLog] | type[BagLog], path: Path, compression: Compress
 
 
 def check_target(path: Path, *, overwrite: bool = False) -> type[McapLog] | type[BagLog]:
-    """Returns the kind of log that `open_log` creates.
+    """Returns the kind of log that `create_log` creates.
 
     Raises `RecordingError` if it would refuse to.
     """

@@ -1,6 +1,6 @@
 """Records topics of the graph by patterns, started and stopped during a run.
 
-    recorder = Recorder(graph, open_log("scans.mcap"), topics=("/uav*/laser/**",))
+    recorder = Recorder(graph, create_log("scans.mcap"), topics=("/uav*/laser/**",))
     gateway.post(recorder.start).result()
     ...
     gateway.post(recorder.stop).result()

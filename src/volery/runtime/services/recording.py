@@ -6,7 +6,7 @@ import contextlib
 from pathlib import Path
 from typing import Any
 
-from volery.bridges.logs.log_writer import LogWriter, open_log
+from volery.bridges.logs.log_writer import LogWriter, create_log
 from volery.bridges.logs.recorded_topics import recorded_topics
 from volery.bridges.logs.recording import Recorder
 from volery.bridges.logs.recordings_quota import room_left
@@ -56,7 +56,7 @@ class RecordingServices:
         topics, exclude = request.topics, request.exclude
         matches = recorded_topics(self._graph, topics, exclude)
         room = room_left(path.parent if self._folder is None else self._folder)
-        self._recorder = Recorder(self._graph, open_log(path), topics, exclude, room)
+        self._recorder = Recorder(self._graph, create_log(path), topics, exclude, room)
         for earlier in self._commands.earlier():
             if matches(earlier.topic):
                 self._recorder.log.write(earlier)

@@ -33,6 +33,7 @@ from volery.runtime.vehicles.flight_futures import CHECK_PERIOD_S, FlightFutures
 from volery.runtime.vehicles.flight_states import FlightStates
 from volery.runtime.vehicles.uav import Uav
 from volery.runtime.vehicles.uav_sensors import UavSensors
+from volery.runtime.vehicles.uav_table import UavTable
 from volery.scenario.schema import Scenario, Sensor
 from volery.sensors.cameras.camera import EVERY_PART, Part
 from volery.sensors.samples import SensorId
@@ -73,7 +74,7 @@ class VehicleManager:
     """Runs for code that waits for flight commands and samples."""
     radio: RadioNetwork | None = None
     fitted: list[SensorInstance] = field(default_factory=list)
-    uavs: dict[str, Uav] = field(default_factory=dict)
+    uavs: UavTable = field(default_factory=UavTable)
     nodes: list[Node] = field(default_factory=list)
     """Nodes in fleet order, then those of the whole system."""
     beginnings: dict[str, InitialState] = field(default_factory=dict)
