@@ -57,6 +57,7 @@ VIEWS = {
     "longleaf": CardView(10.0, (-3.5, 1.2, 1.0), 70.0),
     "obstacle_field": CardView(10.0, (-4.0, -2.0, 1.6), 70.0),
     "plug_in": CardView(10.0, (-6.0, -5.0, 4.0), 70.0),
+    "servoing": CardView(2.3, (-1.7, -1.1, 1.5), 65.0),
     "swarm_100": CardView(8.0, (-2.2, -2.2, 0.9), 70.0),
 }
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import importlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -95,7 +95,8 @@ class Bench:
     """Describes a bench: a module to measure with and the bounds of its figures.
 
     `in_all`: whether `volery bench --all` runs it. `apart`: prefix of figures that have a page of
-    their own. `has_quick`: whether `measure` takes `quick`.
+    their own. `has_quick`: whether `measure` takes `quick`. `has_parts`: whether it takes `only`,
+    the names of parts.
     """
 
     name: str
@@ -104,13 +105,18 @@ class Bench:
     in_all: bool = True
     apart: str = ""
     has_quick: bool = False
+    has_parts: bool = False
 
-    def run(self, *, quick: bool = False) -> Result:
-        """Measures; `quick` measures less. Raises `VoleryError` if the bench has no `quick`."""
+    def run(self, *, quick: bool = False, only: Sequence[str] = ()) -> Result:
+        """Measures; `quick` less, `only` the parts. Raises `VoleryError` if there are none."""
         module = importlib.import_module(f"volery_benchmarks.{self.name}")
         if quick and not self.has_quick:
             raise VoleryError(f"bench {self.name} has no --quick")
-        options = {"quick": True} if quick else {}
+        if only and not self.has_parts:
+            raise VoleryError(f"bench {self.name} has no parts for --only")
+        options: dict[str, Any] = {"quick": True} if quick else {}
+        if only:
+            options["only"] = tuple(only)
         found: Measured | dict[str, float] = module.measure(**options)
         measured = found if isinstance(found, Measured) else Measured(found)
         machine = {**describe_machine(), **describe_versions()}
@@ -325,6 +331,44 @@ BENCHES: dict[str, Bench] = {
             },
             in_all=False,  # nothing else can be measured beside it
             has_quick=True,
+        ),
+        Bench(
+            "cluster",
+            "Studies of many runs: `hover` for 5 s, 1,000 seeds; runs per second of CPU time of "
+            "driver and worker, without the start of the processes; each run a simulation of its "
+            "own, or together as environments; beside a bare loop over the same runs; "
+            "`killed_and_resumed`: 1 if the table of a study of 2,000 runs, whose driver was "
+            "killed five times, equals that of an uninterrupted one",
+            {
+                "sweep_runs_per_s_core": Bound(20.0),
+                "sweep_runs_per_s_core_vectorized": Bound(500.0),
+                "sweep_overhead": Bound(0.03, at_most=True),
+                "killed_and_resumed": Bound(1.0),
+            },
+            in_all=False,  # it needs the extra "sweep"
+            has_quick=True,
+        ),
+        Bench(
+            "learning",
+            "Learning: decisions per second of 1,024 environments (128 with depth images) on two "
+            "threads, rewards, ends and automatic resets included; trainings with the shipped "
+            "configurations, median of five seeds; shipped policies in 200 episodes never trained "
+            "on, and in the full simulation (`transfer`: estimator, sensor noise, 20 ms latency)",
+            {
+                "env_steps_per_s_state": Bound(300e3),
+                "env_steps_per_s_rotor": Bound(500e3),
+                "env_steps_per_s_lidar": Bound(60e3),
+                "env_steps_per_s_depth": Bound(5e3),
+                "reset_ms_1024": Bound(5.0, at_most=True),
+                "train_s_hover": Bound(30.0, at_most=True),
+                "train_success_hover_least": Bound(0.99),
+                "train_s_homing": Bound(10.0, at_most=True),
+                "train_success_homing_least": Bound(0.98),
+                "success_servoing": Bound(0.95),
+                "success_forest": Bound(0.95),
+            },
+            in_all=False,  # it needs the extra "train"
+            has_parts=True,
         ),
         Bench(
             "peers",

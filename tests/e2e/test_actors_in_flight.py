@@ -116,6 +116,14 @@ def meet(simulate, data, **change):
     return simulation, [e for e in simulation.diagnostics.events if e.kind is EventKind.COLLISION]
 
 
+def test_a_uav_rests_on_a_tag_without_a_contact(simulate, actors_data):
+    tag = {"name": "pad", "shape": "tag", "tag": {"id": 3}, "motion": outside()["motion"]}
+    actors_data["world"]["actors"] = [tag]
+    actors_data["uavs"][0]["position_m"] = [6.0, 0.0]
+    _simulation, hits = meet(simulate, actors_data)
+    assert not hits
+
+
 def test_what_drives_into_a_hovering_uav_hits_it(simulate, actors_data):
     drive = {
         "kind": "waypoints",

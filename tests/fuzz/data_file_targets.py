@@ -30,6 +30,7 @@ _KIND_OF_MODEL = {
     "barometer_px4": "barometer",
     "downward_sonar": "sonar",
     "gnss_gazebo_classic": "gnss",
+    "gnss_f9p_rtk": "gnss",
     "gnss_m8": "gnss",
     "magnetometer_px4": "magnetometer",
     "visual_inertial": "odometry",

@@ -49,6 +49,11 @@ motion = {kind = "circle", centre_m = [20.0, 0.0, 8.0], radius_m = 5.0, speed_m_
 name = "car"
 shape = "car"
 motion = {kind = "waypoints", waypoints_m = [[30.0, 0.0], [30.0, 20.0]], speed_m_s = 5.0}
+[[world.actors]]
+name = "pad"
+shape = "tag"
+tag = {id = 7, size_m = 0.5}
+motion = {kind = "attached", actor = "car", position_m = [-0.4, 0.0, 1.45], yaw_deg = 10.0}
 [types.f450]
 airframe = "f450"
 battery_charge = 0.9

@@ -52,10 +52,12 @@ NODES = {
     "local_planner": {},
     "planar_slam": {},
     "slam": {},
+    "tag_detection": {},
     "target_detection": {"camera": "camera"},
     "task_manager": {"area_m": AREA, "sector_m": 20.0},
     "radio": {"topics": ["odom nav_msgs/msg/Odometry"], "station_id": 1},
     "mavlink_autopilot": {},
+    "policy": {"goal": [3.0, 1.0, 4.0]},
 }
 """Nodes and their parameters."""
 OF_THE_WORLD = (

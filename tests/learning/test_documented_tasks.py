@@ -1,18 +1,27 @@
-"""The code of docs/learning.md runs."""
+"""The code of the documents on learning runs."""
 
 import re
 from pathlib import Path
 
 import pytest
 
-TEXT = (Path(__file__).parents[2] / "docs" / "learning.md").read_text(encoding="utf-8")
-BLOCKS = re.findall(r"^```python\n(.*?)^```", TEXT, re.MULTILINE | re.DOTALL)
+DOCS = Path(__file__).parents[2] / "docs"
+BLOCKS = [
+    (name, block)
+    for name in ("learning", "learning_environments")
+    for block in re.findall(
+        r"^```python\n(.*?)^```",
+        (DOCS / f"{name}.md").read_text(encoding="utf-8"),
+        re.MULTILINE | re.DOTALL,
+    )
+]
 
 
 @pytest.mark.parametrize("number", range(len(BLOCKS)))
 def test_the_code_runs(number):
-    exec(compile(BLOCKS[number], f"docs/learning.md, block {number}", "exec"), {})
+    name, block = BLOCKS[number]
+    exec(compile(block, f"docs/{name}.md, block {number}", "exec"), {})
 
 
 def test_there_is_code():
-    assert len(BLOCKS) == 2
+    assert len(BLOCKS) >= 4

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from volery.core import rng, rotations
-from volery.learning.actions import AttitudeThrust, RatesThrust, Velocity
+from volery.core.errors import ScenarioError
+from volery.learning.actions import AttitudeThrust, Choices, Position, RatesThrust, Velocity
 from volery.learning.draws import Draws
 from volery.learning.episodes import Episodes
 from volery.learning.tasks import load_task
@@ -32,7 +33,7 @@ def fly():
         episodes.close()
 
 
-@pytest.mark.parametrize("action", [Velocity(), AttitudeThrust(), RatesThrust()])
+@pytest.mark.parametrize("action", [Velocity(), Position(), AttitudeThrust(), RatesThrust()])
 def test_zero_keeps_the_height(fly, action):
     state = fly(action, np.zeros(4), 100)
     np.testing.assert_allclose(state.position_map[:, 0], [[0.0, 0.0, 10.0]] * 2, atol=0.05)
@@ -41,6 +42,29 @@ def test_zero_keeps_the_height(fly, action):
 def test_a_velocity_is_flown(fly):
     state = fly(Velocity(speed_m_s=2.0), [0.5, 0.0, 0.0, 0.0], 300)
     np.testing.assert_allclose(state.velocity_map[:, 0], [[1.0, 0.0, 0.0]] * 2, atol=0.1)
+
+
+def test_a_position_ahead_moves_the_uav_and_stops_it(fly):
+    state = fly(Position(range_m=2.0), [0.5, 0.0, 0.0, 0.0], 1)
+    assert 0.0 < state.position_map[0, 0, 0] < 0.5
+    state = fly(Position(range_m=2.0), [0.0, 0.25, 0.0, 0.0], 200)
+    assert (state.velocity_map[:, 0, 1] > 0.2).all()
+    state = fly(Position(range_m=2.0, yaw_rate_rad_s=1.0), [0.0, 0.0, 0.0, 0.5], 100)
+    np.testing.assert_allclose(state.omega_body[:, 0, 2], 0.5, atol=0.1)
+    np.testing.assert_allclose(state.position_map[:, 0], [[0.0, 0.0, 10.0]] * 2, atol=0.05)
+
+
+def test_choices_are_rows_of_another_action(fly):
+    table = ((0.0, 0.0, 0.0, 0.0), (0.0, -1.0, 0.0, 0.0))
+    action = Choices(Velocity(speed_m_s=1.5), table)
+    assert (action.choices, action.size, action.of) == (2, 1, "velocity")
+    state = fly(action, [1.0], 300)
+    np.testing.assert_allclose(state.velocity_map[:, 0], [[0.0, -1.5, 0.0]] * 2, atol=0.1)
+    for wrong in (((0.0,) * 4,), ((0.0,) * 3,) * 2, ((2.0,) * 4,) * 2):
+        with pytest.raises(ScenarioError, match="at least two rows of 4 numbers"):
+            Choices(Velocity(), wrong)
+    with pytest.raises(ScenarioError, match="of a continuous action"):
+        Choices(action, table)
 
 
 def test_an_attitude_is_held(fly):

@@ -25,6 +25,8 @@ the same as a JSON schema, [for editors](../scenarios.md#editors).
 """
 EXAMPLES: dict[str, Any] = {
     "Actor.name": "walker",
+    "AttachedActor.actor": "van",
+    "AttachedActor.position_m": [-0.4, 0.0, 1.45],
     "CameraSensor.horizontal_fov_deg": 90.0,
     "CameraSensor.samples": 4,
     "City.region_m": [-200.0, -200.0, 200.0, 200.0],

@@ -9,12 +9,14 @@ import typer
 from volery.cli.error_reporting import word_logs
 from volery.cli.flight_commands import launch, list_scenarios, play, px4, run, serve
 from volery.cli.graph_commands import node, service_app, topic_app
+from volery.cli.learning_commands import evaluate, export_policy, train
 from volery.cli.log_commands import convert, info, recover, report, slam
 from volery.cli.machine_commands import bench, doctor
 from volery.cli.model_commands import export, identify, interfaces, schema
 from volery.cli.node_logs import show_node_logs
 from volery.cli.options import PageCommand
 from volery.cli.radio_commands import comms, gcs
+from volery.cli.study_commands import sweep
 
 app = typer.Typer(
     name="volery",
@@ -57,6 +59,7 @@ app.command("list")(list_scenarios)
 for _command in (
     serve,
     play,
+    sweep,
     info,
     report,
     slam,
@@ -68,6 +71,9 @@ for _command in (
     comms,
     gcs,
     identify,
+    train,
+    evaluate,
+    export_policy,
     export,
     interfaces,
     schema,

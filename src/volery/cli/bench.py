@@ -23,7 +23,13 @@ from volery_benchmarks.registry import BENCHES, Result, find
 
 
 def measure_and_show(
-    name: str, *, as_json: bool, out: Path | None, markdown: Path | None, quick: bool = False
+    name: str,
+    *,
+    as_json: bool,
+    out: Path | None,
+    markdown: Path | None,
+    quick: bool = False,
+    only: Sequence[str] = (),
 ) -> None:
     """Measures one bench, or all of them, each in its own process."""
     for path in (out, markdown):
@@ -31,11 +37,13 @@ def measure_and_show(
             raise VoleryError(f"{path}: folder {path.parent} does not exist")
     with _with_progress():
         if name == "all" and quick:
-            raise VoleryError("--quick is for one bench: forest_search, load or hostile")
+            raise VoleryError("--quick is for one bench: forest_search, load, hostile or cluster")
+        if name == "all" and only:
+            raise VoleryError("--only is for one bench: learning")
         if name == "all":
             results = [_in_own_process(each) for each, bench in BENCHES.items() if bench.in_all]
         else:
-            results = [find(name).run(quick=quick)]
+            results = [find(name).run(quick=quick, only=only)]
     document = _document(results) if name == "all" else results[0].as_dict()
     if as_json:
         typer.echo(json.dumps(document))

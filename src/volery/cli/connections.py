@@ -18,7 +18,9 @@ if TYPE_CHECKING:
 
 
 DEFAULT_VIA = "rosbridge://127.0.0.1:9090"
-WAYS = "rosbridge://HOST:PORT, ros-tcp://HOST:PORT, ros1, ros2, ros2-zenoh or rclpy"
+WAYS = (
+    "rosbridge://HOST:PORT, ros-tcp://HOST:PORT, ros1, ros2, ros2-zenoh, rclpy or mavlink://ADDRESS"
+)
 ROS2_WAYS = ("ros2", "ros2-zenoh", "rclpy")
 _ROS_TCP_PORT = 10000
 TIMEOUT_S = 30.0
@@ -50,6 +52,13 @@ def open_link(via: str, name: str) -> GraphConnection:
         from volery.bridges.ros2.client import Ros2Client
 
         return Ros2Client(_ros2_terms(via), f"/{_own_name(name)}")
+    if scheme == "mavlink":
+        from volery.mavlink.offboard.connection import OffboardConnection
+
+        address, _, option = rest.partition("?")
+        if not address or option not in ("", "engage"):
+            raise BridgeError(f"'{via}': the form is mavlink://udpin:HOST:PORT, or with ?engage")
+        return OffboardConnection(address, name, engages=option == "engage")
     raise _no_way(via)
 
 

@@ -151,6 +151,12 @@ def serve(
     recordings_dir: Annotated[
         Path, typer.Option(help="Set the folder of recordings; uploads go to its folder uploads.")
     ] = Path("runs/recordings"),
+    tensorboard: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="Show TensorBoard inside the page, for trainings in this folder."
+        ),
+    ] = None,
     uavs: Annotated[
         int | None, typer.Option(help="Set the number of UAVs of the first scenario.")
     ] = None,
@@ -196,6 +202,7 @@ def serve(
                 origins=tuple(origin or ()),
                 recordings=recordings_dir,
                 uploads=recordings_dir / "uploads",
+                tensorboard=tensorboard,
             ),
         )
     )

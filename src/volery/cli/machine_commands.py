@@ -11,9 +11,9 @@ from volery.cli.error_reporting import guarded
 
 _BENCHES = (
     "lidar, fleet, camera, dynamics, reset, start, bridge, ros2, coverage, avoidance, search, "
-    "mavlink, comms, page, forest_search, load, hostile, peers"
+    "mavlink, comms, page, forest_search, load, hostile, cluster, learning, peers"
 )
-_QUICK = "forest_search, load, hostile"
+_QUICK = "forest_search, load, hostile, cluster"
 
 
 @guarded
@@ -32,6 +32,9 @@ def bench(
     quick: Annotated[
         bool, typer.Option("--quick", help=f"Run the short version of {_QUICK}.")
     ] = False,
+    only: Annotated[
+        str, typer.Option(help="Measure these parts of `learning`, separated by commas.")
+    ] = "",
 ) -> None:
     """Measure how fast Volery is on this machine."""
     from volery.cli.bench import measure_and_show
@@ -39,7 +42,8 @@ def bench(
     if all_benches == bool(name):
         raise typer.BadParameter(f"name one benchmark or say --all: {_BENCHES}")
     name = name or "all"
-    measure_and_show(name, as_json=json, out=out, markdown=markdown, quick=quick)
+    parts = tuple(part.strip() for part in only.split(",") if part.strip())
+    measure_and_show(name, as_json=json, out=out, markdown=markdown, quick=quick, only=parts)
 
 
 @guarded

@@ -50,6 +50,14 @@ def may_run_local_nodes(file: Path, nodes: Iterable[str], access: ScenarioAccess
 
     named = dict.fromkeys(node_module(node) for node in nodes)
     modules = [module for module in named if module is not None and is_local(module, access)]
+    return may_run_local_code(file, modules)
+
+
+def may_run_local_code(file: Path, modules: list[str]) -> bool:
+    """Returns whether a file names `modules` beside it and the user trusts them.
+
+    Asks at a terminal if no answer is saved. Raises `ScenarioError` if they may not run.
+    """
     if not modules:
         return False
     if not set(modules) <= _trusted(file):

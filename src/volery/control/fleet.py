@@ -7,6 +7,7 @@ UAVs: it computes clearances, fills the budgets and calls `strike`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, Literal
 
@@ -24,7 +25,9 @@ from volery.control.fleet_rows import (
     new_uavs,
     one_each,
     restarted_rows,
+    shifted_rows,
 )
+from volery.control.fleet_variation import FleetParameters, FleetVariation
 from volery.control.flight_modes import FlightMode
 from volery.control.flying_start import FlyingStart, set_motion
 from volery.control.fused_step import EVENT, EVENTS_A_STEP, advance_fleet
@@ -49,6 +52,7 @@ from volery.core.errors import CommandError
 from volery.core.rows import Rows
 from volery.scenario.schema import RotorWear
 from volery.vehicle.airframe import Airframe, hover_thrusts
+from volery.vehicle.battery import GUIDANCE_TICKS as BATTERY_TICKS
 from volery.vehicle.contact import steepest_cosine
 from volery.vehicle.downwash import new_jets
 from volery.vehicle.fleet import (
@@ -122,6 +126,7 @@ class Fleet(FleetCommands):
         charge = checked_within("battery_charge", one_each(battery_charge, count), (count,), 1.0)
         dt = dt_ns / NS_PER_S
         self._models, rows = model_table(airframes, plants, worn, dt, control)
+        self._shared_models = self._models
         uavs = new_uavs(position, attitude, rows, copies, seed, names)
         super().__init__(tuple(airframes), plants, names, uavs, dt)
         self._jets = new_jets(count)
@@ -140,6 +145,7 @@ class Fleet(FleetCommands):
         self._weather = weather
         self._air = air_of(weather)
         self._air_nodes = nodes_of(weather.field)
+        self._variation: FleetVariation | None = None
         self.state: FleetState = state_of(self._bodies)
         self.history: PoseHistory = new_history(position, attitude, self._dt_ns)
         self.set_command_timeout(DEFAULT_TIMEOUT_S)
@@ -155,6 +161,13 @@ class Fleet(FleetCommands):
     def guidance_period_ns(self) -> int:
         """Period of updates of the air, a multiple of the guidance tick, ns."""
         return self._periods[2] * self._dt_ns
+
+    @property
+    def common_period_ns(self) -> int:
+        """Period after which control, air and batteries are updated together again, ns."""
+        has_battery = any(airframe.battery is not None for airframe in self.airframes)
+        batteries = self._periods[0] * (BATTERY_TICKS if has_battery else 1)
+        return math.lcm(*self._periods, batteries) * self._dt_ns
 
     @property
     def time_ns(self) -> int:
@@ -211,6 +224,11 @@ class Fleet(FleetCommands):
             if spent or done >= steps or (event_ends and written):
                 return done
 
+    @property
+    def has_events(self) -> bool:
+        """Whether there are events since the last `drain_events`."""
+        return bool(self._drained)
+
     def drain_events(self) -> list[FleetEvent]:
         """Returns the events since the last call, in order of step, then row."""
         events, self._drained = self._drained, []
@@ -239,8 +257,8 @@ class Fleet(FleetCommands):
         """Sets the weather from the next guidance tick on (125 Hz)."""
         if weather.field is not self._weather.field:
             self._air_nodes = nodes_of(weather.field)
-        self._air = air_of(weather)
         self._weather = weather
+        self._refresh_air()
 
     def add_gust(self, gust: Gust) -> None:
         """Adds a gust to the weather."""
@@ -261,6 +279,40 @@ class Fleet(FleetCommands):
         health[rotor] = checked_within("rotor health", factor, (), 1.0)
         fit_rotors(self._bodies[i], self._models["plant"][self._uavs["model"][i]], health)
         self._bodies["ground_budget"][i] = 0.0
+
+    def vary(self, rows: NDArray[np.int64], parameters: FleetParameters) -> None:
+        """Changes physical parameters of the UAVs `rows` (K,).
+
+        Winds change at the next update of the air, models at the next step, rotor thrusts at the
+        next restart. Raises `CommandError` for models that are no rigid bodies.
+        """
+        variation = self._own_variation()
+        if parameters.changes_model:
+            variation.set_models(self._own_models(), rows, parameters)
+        if parameters.changes_air:
+            had_air = variation.has_air
+            variation.set_air(rows, parameters)
+            if had_air:
+                variation.write_air(self._air, rows)
+            else:
+                self._refresh_air()
+
+    def _own_variation(self) -> FleetVariation:
+        if self._variation is None:
+            self._variation = FleetVariation(self.airframes, self._uavs, self._dt)
+        return self._variation
+
+    def _own_models(self) -> NDArray[np.void]:
+        """Returns the table of models with a row for each UAV."""
+        if self._models is self._shared_models:
+            self._models = self._shared_models[self._uavs["model"]]
+            self._uavs["model"] = np.arange(len(self))
+        return self._models
+
+    def _refresh_air(self) -> None:
+        self._air = air_of(self._weather)
+        if self._variation is not None and self._variation.has_air:
+            self._air = self._variation.air_of(self._air)
 
     def set_estimation_error(self, rows: Rows | slice, error: EstimationError) -> None:
         """Sets the estimation errors with which the controllers of the UAVs `rows` fly."""
@@ -357,6 +409,8 @@ class Fleet(FleetCommands):
             "paths": self._paths.get_state(),
             "weather": self._weather,
             "events": list(self._drained),
+            "variation": None if self._variation is None else self._variation.get_state(),
+            "models": None if self._models is self._shared_models else self._models.copy(),
         }
 
     def set_state(self, state: dict[str, Any]) -> None:
@@ -367,8 +421,43 @@ class Fleet(FleetCommands):
         self._references[...] = state["references"]
         self._paths.set_state(state["paths"])
         self.step = state["step"]
+        self._set_variation(state)
         self.set_weather(state["weather"])
         self._drained = list(state["events"])
+
+    def restore(self, state: dict[str, Any], rows: NDArray[np.int64]) -> None:
+        """Restores the UAVs `rows` (K,) alone from a `get_state` of this fleet.
+
+        Their times shift to the present step. Raises `CommandError` if one followed a trajectory.
+        """
+        if (state["uavs"]["control_state"]["path_last"][rows] >= 0).any():
+            raise CommandError("UAVs that follow trajectories are restored with the whole fleet")
+        shift = self.step - state["step"]
+        fresh = shifted_rows(state["uavs"], rows, shift, shift // self._periods[2])
+        fresh["model"] = self._uavs["model"][rows]
+        as_bytes(self._uavs)[rows] = as_bytes(fresh)
+        for ring, saved in (
+            (self.history.position, state["position"]),
+            (self.history.attitude, state["attitude"]),
+        ):
+            ring[:, rows] = np.roll(saved, shift, axis=0)[:, rows]
+        if len(self._references) == len(self):
+            self._references[rows] = np.roll(state["references"], shift, axis=1)[rows]
+        self._restore_variation(state, rows)
+
+    def _restore_variation(self, state: dict[str, Any], rows: NDArray[np.int64]) -> None:
+        kept, models = state["variation"], state["models"]
+        if self._variation is None and kept is None:
+            return
+        if models is not None or self._models is not self._shared_models:
+            own = (
+                self._shared_models[state["uavs"]["model"][rows]]
+                if models is None
+                else models[rows]
+            )
+            self._own_models()[rows] = own
+        self._own_variation().restore(kept, rows)
+        self._refresh_air()
 
     def seed_turbulence(self, seed: int, rows: NDArray[np.int64], names: Sequence[str]) -> None:
         """Gives the UAVs `rows` the turbulence of UAVs with `names` in a run with `seed`."""
@@ -400,6 +489,8 @@ class Fleet(FleetCommands):
         self.history.attitude[:, rows] = start["attitude"][0, start_rows]
         if len(self._references) == len(self):
             self._references[rows, :] = start["references"][start_rows, :1]
+        if self._variation is not None:
+            self._variation.fit(self._models, rows)
 
     def restart_in_flight(
         self, start: dict[str, Any], rows: NDArray[np.int64], motion: FlyingStart
@@ -437,6 +528,15 @@ class Fleet(FleetCommands):
             copy_references(other._references[theirs], self._references, own, self.step)
 
     # -------------------------------------------------------------------------------- inside
+
+    def _set_variation(self, state: dict[str, Any]) -> None:
+        """Restores the differences between UAVs; a state may be from before the first."""
+        kept, models = state.get("variation"), state.get("models")
+        self._models = self._shared_models if models is None else models.copy()
+        if kept is None:
+            self._variation = None
+            return
+        self._own_variation().set_state(kept)
 
     def _fit_out(self, worn: Sequence[tuple[RotorWear, ...]], charge: Array) -> None:
         """Applies the wear of rotors and the charge of batteries."""

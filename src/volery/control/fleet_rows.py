@@ -76,10 +76,19 @@ def restarted_rows(
 
     air_tick: number of the air update at which their turbulence begins.
     """
-    fresh: NDArray[np.void] = as_bytes(start)[rows].view(start.dtype)
+    fresh = shifted_rows(start, rows, step, 0)
     fresh["turbulence"]["first_tick"] = air_tick
+    return fresh
+
+
+def shifted_rows(
+    saved: NDArray[np.void], rows: NDArray[np.int64], steps: int, air_ticks: int
+) -> NDArray[np.void]:
+    """Returns copies of the rows `rows` (K,) of `saved`, `steps` and `air_ticks` later."""
+    fresh: NDArray[np.void] = as_bytes(saved)[rows].view(saved.dtype)
+    fresh["turbulence"]["first_tick"] += air_ticks
     for name in ("deadline_step", "start_step"):
-        fresh["control_state"][name] += step
+        fresh["control_state"][name] += steps
     touched = fresh["body"]["last_contact_step"] > NEVER
-    fresh["body"]["last_contact_step"][touched] += step
+    fresh["body"]["last_contact_step"][touched] += steps
     return fresh

@@ -114,7 +114,8 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
     paths: segments of trajectories, see `control.trajectory_kernels`. references: None if all
     plants are rigid bodies: the other plants are then not compiled at all. Otherwise (N, L, 6),
     commands of the last L steps where identified plants have dead times, or of any size. jets:
-    memory for the search of neighbours (`new_jets`).
+    memory for the search of neighbours (`new_jets`). air: the weather, one row for all or one for
+    each.
 
     A UAV with a new stop command is guided in the first step, without waiting for a tick. The call
     ends early after a step in which a budget ran out, the event buffer grew full or, with
@@ -162,9 +163,10 @@ def advance_fleet(  # noqa: PLR0912, PLR0915
                 turn_rotors(body, plant, guidance_steps * dt)
             if airing and not body.asleep:
                 tick, period = step // air_steps, air_steps * dt
-                refresh_air(uavs[i], jets[i].downwash, air[0], air_nodes, grid, tick, period)
-                if air[0].rain_water > 0.0 and model.kind != KINEMATIC_MOTION:
-                    feel_rain(body, plant, air[0], period)
+                own = air[i if air.shape[0] > 1 else 0]
+                refresh_air(uavs[i], jets[i].downwash, own, air_nodes, grid, tick, period)
+                if own.rain_water > 0.0 and model.kind != KINEMATIC_MOTION:
+                    feel_rain(body, plant, own, period)
             for now in range(step, step + together):
                 guided = guiding or control_state.hurried
                 control_state.hurried = False

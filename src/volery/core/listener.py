@@ -142,6 +142,14 @@ class Listener(socket.socket):
             self._reserve = None
         super().close()
 
+    def close_connections(self) -> None:
+        """Closes all accepted connections, also one that no server object holds.
+
+        `loop.sock_accept` loses a connection that it accepts just as its task is cancelled.
+        """
+        for accepted in tuple(self._open.values()):
+            accepted.close()
+
     # ---------------------------------------------------------------------------------- internal
 
     def _next_accepted(self) -> tuple[socket.socket, Any] | None:

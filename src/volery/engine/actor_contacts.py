@@ -73,7 +73,8 @@ class ActorContacts:
         self._looks = looks
         self._touch = touch
         self._radius = np.array([a.body.collision_radius_m for a in fleet.airframes])
-        self._reach = np.array([shape.radius for shape in actors.shapes])
+        reach = np.array([shape.radius for shape in actors.shapes])
+        self._reach = np.where(actors.is_flat, -np.inf, reach)
         self._touching = np.zeros((len(self._radius), len(actors)), dtype=bool)
         self._next_ns = np.zeros(len(self._radius), dtype=np.int64)
         """Time of the latest next check of each UAV, ns."""

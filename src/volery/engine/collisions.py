@@ -23,7 +23,7 @@ from volery.core.compiled import brief_kernel
 from volery.core.vectors import norm
 from volery.engine.actor_contacts import ActorContacts, ActorShapes
 from volery.engine.events import Event, EventKind
-from volery.world.scene import Scene
+from volery.world.scene import Clearance, Scene
 
 _LOOK_REACH_M = 8.0
 """Maximum distance of a query, which is repeated after that distance."""
@@ -99,6 +99,25 @@ class Collisions:
         if self._actors is not None:
             self._actors.resolve(used_up, time_ns)
 
+    def refill(self) -> bool:
+        """Queries around the UAVs whose contact budgets are used up; returns whether all are free.
+
+        If a UAV is in contact, or another budget is used up, nothing changes: call `resolve`.
+        """
+        state = self._fleet.state
+        if self._actors is not None or state.separation_budget.min() <= 0.0:
+            return False
+        rows = np.flatnonzero(state.contact_budget <= 0.0)
+        if not len(rows):
+            return True
+        found = self._query(rows)
+        gaps = found.distance - self._radius[rows]
+        if gaps.min() <= 0.0:
+            return False
+        self._touched_solid[rows[gaps > _RELEASE_M]] = -1
+        state.contact_budget[rows] = np.maximum(gaps, _LEAST_BUDGET_M)
+        return True
+
     def get_state(self) -> dict[str, Any]:
         """Returns the contacts, for a snapshot; the fleet saves the budgets."""
         actors = None if self._actors is None else self._actors.get_state()
@@ -152,26 +171,28 @@ class Collisions:
 
     def _resolve_solids(self, rows: NDArray[np.int64], time_ns: int) -> None:
         state = self._fleet.state
-        found = self._scene.clearance(
-            state.position_map[rows], _LOOK_REACH_M, include_terrain=False
-        )
+        found = self._query(rows)
         gaps = found.distance - self._radius[rows]
-        for k, i in enumerate(rows):
-            if gaps[k] <= 0.0:
-                away = state.position_map[i] - found.nearest[k]
-                if found.distance[k] < 0.0:  # inside
-                    away = -away
-                self._touch_solid(int(i), away, int(found.instance[k]), time_ns)
-            elif gaps[k] > _RELEASE_M:
-                self._touched_solid[i] = -1
+        for k in np.flatnonzero(gaps <= 0.0).tolist():
+            i = int(rows[k])
+            away = state.position_map[i] - found.nearest[k]
+            if found.distance[k] < 0.0:  # inside
+                away = -away
+            self._touch_solid(i, away, int(found.instance[k]), time_ns)
+        self._touched_solid[rows[gaps > _RELEASE_M]] = -1
         state.contact_budget[rows] = np.maximum(gaps, _LEAST_BUDGET_M)
+
+    def _query(self, rows: NDArray[np.int64]) -> Clearance:
+        """Returns the nearest points of trees and solids to the UAVs `rows`."""
+        position = self._fleet.state.position_map[rows]
+        return self._scene.clearance(position, _LOOK_REACH_M, include_terrain=False, uavs=rows)
 
     def _touch_solid(self, i: int, away: Array, instance: int, time_ns: int) -> None:
         normal = _unit(away)
         approach = -float(normal @ self._fleet.state.velocity_map[i])
         if self._touched_solid[i] != instance:
             self._touched_solid[i] = instance
-            self._report(i, approach, self._scene.instance_name(instance), time_ns)
+            self._report(i, approach, self._scene.instance_name(instance, i), time_ns)
         if approach > 0.0:
             self._fleet.strike(i, normal, self._response.restitution, _FRICTION)
 

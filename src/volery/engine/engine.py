@@ -87,6 +87,7 @@ class Engine:
         num_envs: int = 1,
         estimation: Estimation | None = None,
         inbox: CommandQueue | None = None,
+        fuses_ticks: bool = False,
     ) -> None:
         self.fleet = fleet
         self.scene = scene
@@ -94,6 +95,9 @@ class Engine:
         self.terrain = terrain.grid
         self.sink = sink
         self.inbox = inbox or CommandQueue()
+        self.fuses_ticks = fuses_ticks
+        """Whether a tick goes on after distance queries that find no contact: states are the same,
+        but `until` of a run is asked less often."""
         self.while_waiting: Callable[[], bool] = lambda: True
         """Called repeatedly while waiting for a lock-step partner; returns whether the run
         continues."""

@@ -61,6 +61,8 @@ def restart_sensors(
         if not len(rows):
             continue
         k, measures_now = agenda.next_after(bank, fleet.step)
+        if measures_now and bank.lag_ns > 0:  # what has just ended, such as a sweep, began before
+            k += 1
         time_ns = bank.schedule.instant_ns(k)
         before = bank.get_state()
         bank.reset(uavs, streams.of(bank, rows), time_ns, k)

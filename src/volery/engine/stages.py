@@ -37,13 +37,16 @@ def take_commands(engine: Engine, _tick: Tick) -> None:
 
 def advance_vehicles(engine: Engine, tick: Tick) -> None:
     """Runs control and dynamics, fused, until the horizon, an event or a distance query."""
-    first = engine.fleet.step
-    steps = engine.horizon(tick.last_step) - first
-    if steps > 0:
-        engine.fleet.advance(steps, engine.terrain, event_ends=True)
+    first, fleet = engine.fleet.step, engine.fleet
+    last = engine.horizon(tick.last_step)
+    while fleet.step < last:
+        fleet.advance(last - fleet.step, engine.terrain, event_ends=True)
+        if not engine.fuses_ticks or fleet.has_events or not engine.collisions.refill():
+            break
+    if fleet.step > first:
         engine.turn = 0
         engine.state_check.advanced()
-        engine.sink.advanced(first + 1, engine.fleet.step)
+        engine.sink.advanced(first + 1, fleet.step)
 
 
 def resolve_contacts(engine: Engine, _tick: Tick) -> None:

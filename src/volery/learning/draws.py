@@ -57,9 +57,14 @@ class Draws:
         """Returns copies of keys and counters, for `set_state`."""
         return self._keys.copy(), self._counters.copy()
 
-    def set_state(self, state: tuple[NDArray[np.uint64], NDArray[np.uint64]]) -> None:
-        """Restores a state of `get_state`."""
-        self._keys[:], self._counters[:] = state
+    def set_state(
+        self,
+        state: tuple[NDArray[np.uint64], NDArray[np.uint64]],
+        envs: NDArray[np.int64] | slice = slice(None),
+    ) -> None:
+        """Restores a state of `get_state`, of the environments `envs` alone."""
+        keys, counters = state
+        self._keys[envs], self._counters[envs] = keys[envs], counters[envs]
 
     def _unit(self, rows: NDArray[np.int64], shape: tuple[int, ...]) -> Array:
         """Returns uniform numbers (R, *shape) in (0, 1)."""

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+from typing import Any, Literal
+
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.autonomy.policy import observation_terms
 from volery.core import rotations
 from volery.core.arrays import Array
+from volery.core.clock import NS_PER_S
 from volery.learning.draws import Draws
+from volery.learning.estimate import estimated_state
+from volery.runtime.environment_block import SampleArrays
 from volery.runtime.vectorized_simulation import VectorizedSimulation
 from volery.vehicle.fleet import FleetState
 
@@ -36,19 +44,79 @@ class Flight:
         """(K, n, A) actions before those."""
         self.decisions: NDArray[np.int64] = np.zeros(self.num_envs, np.int64)
         """(K,) decisions since the start of the episode."""
+        self.parameters: dict[str, Array] = {}
+        """Parameters (K,) of the present episodes, by name: those of the task or its curriculum."""
+        self.varied: dict[str, Array] = {}
+        """Numbers (K, n, size) that the task's randomization drew, by name."""
         self._state: FleetState | None = None
+        self._estimate: FleetState | None = None
+        self._is_estimated = False
         self._attitude_inverse: Array | None = None
+        self._samples: dict[str, SampleArrays | None] = {}
+        self._has_sample: dict[str, NDArray[np.bool_]] = {}
 
     def refresh(self) -> None:
         """Marks the state as changed."""
-        self._state = self._attitude_inverse = None
+        self._state = self._estimate = self._attitude_inverse = None
+        self._samples.clear()
+        self._has_sample.clear()
 
     @property
     def state(self) -> FleetState:
-        """State of all UAVs, arrays (K, n, ...); see `FleetState` for units and frames."""
+        """State of all UAVs, arrays (K, n, ...); see `FleetState` for units and frames.
+
+        In observations of the source "estimate" pose, velocity and rates are the estimated ones.
+        """
         if self._state is None:
             self._state = self.envs.state()
-        return self._state
+        if not self._is_estimated:
+            return self._state
+        if self._estimate is None:
+            self._estimate = estimated_state(self.envs, self._state)
+        return self._estimate
+
+    def seen_from(
+        self, source: Literal["truth", "estimate"], function: Callable[[Flight], Array]
+    ) -> Array:
+        """Returns `function(self)` with `state` from ground truth or from the estimate."""
+        if source == "truth":
+            return function(self)
+        self._is_estimated, self._attitude_inverse = True, None
+        try:
+            return function(self)
+        finally:
+            self._is_estimated, self._attitude_inverse = False, None
+
+    def sample(self, sensor: str) -> SampleArrays | None:
+        """Returns the last samples of a sensor of all UAVs, None before the first of all.
+
+        Arrays are (K, n, ...), with the field names of `sensors.samples`: `sample["echoes"]`. Rows
+        of UAVs without a sample in this episode, see `has_sample`, hold older ones.
+        """
+        if sensor not in self._samples:
+            found = [self.envs.sample(uav, sensor) for uav in self.envs.uav_names]
+            parts = [part for part in found if part is not None]
+            self._samples[sensor] = _stacked(parts) if len(parts) == self.num_uavs else None
+        return self._samples[sensor]
+
+    def has_sample(self, sensor: str) -> NDArray[np.bool_]:
+        """Returns whether each UAV has a sample of a sensor in this episode (K, n)."""
+        if sensor not in self._has_sample:
+            sensors = [self.envs.sensors[uav][sensor] for uav in self.envs.uav_names]
+            self._has_sample[sensor] = np.stack([one.has_sample for one in sensors], axis=1)
+        return self._has_sample[sensor]
+
+    def sample_age_s(self, sensor: str) -> float:
+        """Returns the time since the last measurement of a sensor, s; inf before the first.
+
+        That of a LIDAR is its first beam, that of a camera the exposure of its first row.
+        """
+        stamp_ns = self.envs.sensors[self.envs.uav_names[0]][sensor].stamp_ns
+        return math.inf if stamp_ns is None else (self.envs.time_ns - stamp_ns) / NS_PER_S
+
+    def sensor_model(self, sensor: str) -> Any:
+        """Returns the model of a LIDAR or camera. Raises `SensorError` before the first sample."""
+        return self.envs.sensors[self.envs.uav_names[0]][sensor].model
 
     def to_body(self, vectors_map: Array) -> Array:
         """Returns vectors (K, n, 3) of the map frame in the body frames (FLU)."""
@@ -58,7 +126,11 @@ class Flight:
 
     def to_heading(self, vectors_map: Array) -> Array:
         """Returns vectors (K, n, 3) of the map frame in the level heading frames."""
-        yaw = rotations.yaw_of(self.state.attitude)
-        c, s = np.cos(yaw), np.sin(yaw)
-        x, y, z = np.moveaxis(vectors_map, -1, 0)
-        return np.stack([c * x + s * y, c * y - s * x, z], axis=-1)
+        return observation_terms.to_heading(self.state.attitude, vectors_map)
+
+
+def _stacked(parts: list[SampleArrays]) -> SampleArrays:
+    """Returns the samples of n UAVs, (K, ...) each, as arrays (K, n, ...)."""
+    if len(parts) == 1:
+        return {name: array[:, None] for name, array in parts[0].items()}
+    return {name: np.stack([part[name] for part in parts], axis=1) for name in parts[0]}

@@ -1,4 +1,7 @@
-"""Registers the tasks with Gymnasium: `gymnasium.make("volery/Hover-v0")` and `make_vec`."""
+"""Registers the tasks with Gymnasium: `gymnasium.make("volery/Hover-v0")` and `make_vec`.
+
+Tasks for teams have `make_vec` only, with a row for each UAV; see also `team_env.parallel_env`.
+"""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from volery.learning.task import Task
 
 def observation_space(task: Task) -> Box:
     """Returns the space of observations (D,): each part within its limit."""
-    limits = [np.full(part.size, part.limit, np.float32) for part in task.observations]
+    limits = [np.full(part.numbers, part.limit, np.float32) for part in task.observations]
     high = np.concatenate(limits)
     return Box(-high, high, dtype=np.float32)
 

@@ -72,15 +72,20 @@ def page(flight: FlightData) -> str:
     )
 
 
-def html_page(title: str, parts: Iterable[str], more_style: str = "") -> str:
-    """Returns an HTML file of a report from its parts; empty ones are left out."""
+def html_page(
+    title: str, parts: Iterable[str], more_style: str = "", *, kind: str = "flight report"
+) -> str:
+    """Returns an HTML file of a report from its parts; empty ones are left out.
+
+    kind: what follows the title in the browser's tab.
+    """
     style = f"\n{_STYLE.read_text(encoding='utf-8')}{more_style}"
     head = (
         "<!doctype html>",
         '<html lang="en"><head><meta charset="utf-8">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
         '<meta name="color-scheme" content="light dark">',
-        f"<title>{escape(title)} · flight report</title>",
+        f"<title>{escape(title)} · {escape(kind)}</title>",
         f"<style>{style}</style></head><body><main>",
     )
     return "\n".join(part for part in (*head, *parts, "</main></body></html>") if part) + "\n"

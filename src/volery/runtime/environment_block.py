@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, TypeAlias
@@ -14,29 +14,32 @@ from numpy.typing import NDArray
 from volery.control.fleet import Fleet
 from volery.control.flying_start import FlyingStart
 from volery.core.clock import NS_PER_S
-from volery.core.errors import CommandError, DivergenceError
+from volery.core.errors import CommandError, DivergenceError, SensorError
 from volery.core.rng import stream_key
 from volery.engine.engine import Engine
 from volery.engine.events import Event
 from volery.runtime.build.estimation import build_estimation
 from volery.runtime.build.fleet import add_bodies, build_fleet
-from volery.runtime.build.placement import StartPose
 from volery.runtime.build.sensor_suites import SensorInstance, fit_sensors, refit
 from volery.runtime.build.sensors import build_banks
+from volery.runtime.environment_parameters import rows_of_environments
 from volery.runtime.environment_streams import EnvironmentStreams
+from volery.runtime.environment_worlds import EnvironmentWorlds, take_off
+from volery.runtime.saved_samples import restored_samples, saved_samples
 from volery.runtime.vehicles.flight_futures import CHECK_PERIOD_S, FlightFutures, FlightRuns
 from volery.runtime.vehicles.sample_stream import SampleStream
 from volery.runtime.vehicles.uav import Uav
 from volery.runtime.vehicles.uav_sensors import UavSensors
 from volery.scenario.schema import Scenario
 from volery.sensors.bank import Bank
+from volery.sensors.cameras.bank import CameraBank
+from volery.sensors.cameras.camera import EVERY_PART, Part
 from volery.sensors.mount import Mount
 from volery.sensors.sample_rows import sample_of
 from volery.sensors.samples import Samples
 from volery.sensors.sensor_samples import SensorSample
-from volery.world.scene import Scene
-from volery.world.terrain import Terrain
 from volery.world.weather.dryden import turbulence_stream
+from volery.world.world_scenes import WorldScenes
 
 SampleArrays: TypeAlias = dict[str, NDArray[Any]]
 
@@ -60,36 +63,41 @@ class EnvironmentBlock:
     def __init__(
         self,
         scenario: Scenario,
-        starts: Sequence[StartPose],
-        terrain: Terrain,
-        scene: Scene,
+        worlds: EnvironmentWorlds,
         seeds: Sequence[int],
         first: int,
         runs: FlightRuns,
     ) -> None:
         self.seeds = list(seeds)
         self._scenario = scenario
-        self._starts = tuple(starts)
+        self._worlds = worlds
+        self._starts = worlds.world(0).starts
         self._first = first
         num_envs = len(self.seeds)
-        everyone = self._starts * num_envs
+        begun = worlds.dealt(first, num_envs)
+        everyone = tuple(start for world in begun.tolist() for start in worlds.world(world).starts)
         names = tuple(f"{k}/{start.name}" for k in range(num_envs) for start in self._starts)
         self.fleet = build_fleet(scenario, everyone, names, num_envs=num_envs)
-        self._scene = scene.twin()
+        self._scene = worlds.scene.twin()
         add_bodies(self._scene, everyone, num_envs=num_envs)
+        self.world = begun.copy()
+        """(num_envs,) number of the world of each environment."""
+        self._begun = begun
+        self._enter(np.arange(num_envs), begun)
         self._fitted = fit_sensors(scenario, self._starts)
         fitted = [f for k in range(num_envs) for f in self._fit(k)]
         estimation = build_estimation(scenario, fitted, self.fleet)
         self._engine = Engine(
             self.fleet,
             self._scene,
-            terrain,
+            worlds.terrain,
             build_banks(scenario, fitted, self.fleet, self._scene, estimation),
             names,
             self,
             crash_on_contact=scenario.physics.on_contact == "crash",
             estimation=estimation,
             num_envs=num_envs,
+            fuses_ticks=True,
         )
         banks = self._engine.banks
         self._bank_of = {id(bank.sensors): k for k, bank in enumerate(banks)}
@@ -131,8 +139,8 @@ class EnvironmentBlock:
 
     @property
     def common_period_s(self) -> float:
-        """Period after which guidance and all sensors fire together again, s."""
-        periods = [Fraction(self.fleet.guidance_period_ns, NS_PER_S)]
+        """Period after which control, batteries and all sensors fire together again, s."""
+        periods = [Fraction(self.fleet.common_period_ns, NS_PER_S)]
         periods += [1 / bank.schedule.rate_hz for bank in self._engine.banks]
         down = math.lcm(*(p.denominator for p in periods))
         return math.lcm(*(int(p * down) for p in periods)) / down
@@ -154,16 +162,19 @@ class EnvironmentBlock:
         envs: NDArray[np.int64],
         seeds: Sequence[int] | None,
         motion: FlyingStart | None = None,
+        worlds: NDArray[np.int64] | None = None,
     ) -> None:
         """Resets the environments `envs` (R,), numbered within the block.
 
         seeds: (R,) new ones, None for the present ones. motion: of the R * n UAVs, which then start
-        in the air, None for the scenario's start.
+        in the air, None for the scenario's start. worlds: (R,) numbers of the worlds that they move
+        to, None for the present ones.
         """
-        num_uavs = len(self._starts)
-        rows = (envs[:, None] * num_uavs + np.arange(num_uavs)).ravel()
+        if worlds is not None:
+            self._enter(envs, worlds)
+        rows = rows_of_environments(envs, len(self._starts))
         if motion is None:
-            self.fleet.restart(self._start_state, rows)
+            self._restart_on_ground(envs, rows)
         else:
             self.fleet.restart_in_flight(self._in_flight(), rows, motion)
         if seeds is not None:
@@ -190,23 +201,47 @@ class EnvironmentBlock:
             raise self._of_copy(error) from None
         return {
             "engine": self._engine.get_state(),
-            "latest": list(self._latest),
+            "latest": [saved_samples(samples) for samples in self._latest],
             "is_old": {bank: rows.copy() for bank, rows in self._is_old.items()},
             "events": list(self._events),
             "began": self._began_ns.copy(),
             "seeds": list(self.seeds),
+            "world": self.world.copy(),
         }
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Restores a state that `get_state` returned."""
         self.futures.fail_all("another state was restored")
         self._engine.set_state(state["engine"])
-        self._latest = list(state["latest"])
+        pairs = zip(self._engine.banks, state["latest"], strict=True)
+        self._latest = [restored_samples(bank, samples) for bank, samples in pairs]
         self._is_old = {bank: rows.copy() for bank, rows in state["is_old"].items()}
         self._events = list(state["events"])
         self._began_ns = state["began"].copy()
         self.seeds[:] = state["seeds"]
+        self._enter(np.arange(len(self.seeds)), state["world"])
         self._streams.renew(np.arange(len(self.seeds)))
+
+    def restore(self, envs: NDArray[np.int64], state: dict[str, Any]) -> None:
+        """Restores the environments `envs` (R,) alone; see `VectorizedSimulation.set_state`.
+
+        Raises `CommandError` for environments with sensors.
+        """
+        if self._engine.banks:
+            raise CommandError("environments with sensors are restored all together")
+        self._enter(envs, state["world"][envs])
+        rows = rows_of_environments(envs, len(self._starts))
+        fleet = state["engine"]["fleet"]
+        self.fleet.restore(fleet, rows)
+        self._engine.collisions.forget(rows)
+        saved_ns = fleet["step"] * self.dt_ns
+        self._began_ns[envs] = self.time_ns - (saved_ns - state["began"][envs])
+        for env in envs.tolist():
+            self.seeds[env] = state["seeds"][env]
+        self._streams.renew(envs)
+        if self.futures.has_pending:
+            for path in self._paths_of(rows):
+                self.futures.fail(path, "another state was restored")
 
     # -------------------------------------------------------------------------------- observations
 
@@ -258,6 +293,16 @@ class EnvironmentBlock:
     def is_camera(self, uav: str, sensor: str) -> bool:  # noqa: ARG002 - as for all
         """Returns False: cameras of environments render without a reader."""
         return False
+
+    def request_parts(self, uav: str, sensor: str, parts: Collection[Part]) -> None:
+        """Renders only `parts` of a camera's images; see `EnvironmentSensor.request_parts`."""
+        bank = getattr(self._engine.banks[self._places[uav, sensor][0]], "bank", None)
+        wanted = tuple(parts)
+        if not isinstance(bank, CameraBank):
+            raise SensorError(f"sensor '{sensor}' of {uav} is no camera: it has no parts of images")
+        if not wanted or not set(wanted) <= set(EVERY_PART):
+            raise SensorError(f"parts of images: some of {', '.join(EVERY_PART)}, not {parts!r}")
+        bank.requested_parts = lambda: wanted
 
     def open_stream(self, uav: str, sensor: str, **_options: Any) -> SampleStream:
         """Raises `CommandError`: environments advance together."""
@@ -366,8 +411,28 @@ class EnvironmentBlock:
         for row in rows.tolist():
             start = self._starts[row % len(self._starts)]
             if start.takes_off:
-                flight = self._scenario.types[start.type_name].flight
-                self.fleet.take_off(row, flight.take_off_altitude_m)
+                take_off(self.fleet, row, start, self._scenario)
+
+    def _enter(self, envs: NDArray[np.int64], worlds: NDArray[np.int64]) -> None:
+        """Moves the environments `envs` (R,) to the worlds number `worlds` (R,)."""
+        self.world[envs] = worlds
+        if isinstance(self._scene, WorldScenes):
+            self._scene.set_worlds(envs, worlds)
+
+    def _restart_on_ground(self, envs: NDArray[np.int64], rows: NDArray[np.int64]) -> None:
+        """Resets the UAVs `rows` of the environments `envs` to the start of their worlds."""
+        own, begun = self.world[envs], self._begun[envs]
+        used = np.union1d(own, begun).tolist()
+        elsewhere = [world for world in used if self._worlds.has_own_start(world)]
+        moved = (own != begun) & (np.isin(begun, elsewhere) | np.isin(own, elsewhere))
+        num_uavs = len(self._starts)
+        by_env = rows.reshape(len(envs), num_uavs)
+        if not moved.all():
+            self.fleet.restart(self._start_state, by_env[~moved].ravel())
+        for world in np.unique(own[moved]).tolist():
+            some = by_env[moved & (own == world)].ravel()
+            state = self._worlds.start_state(world, takes_off=not self._is_estimated)
+            self.fleet.restart(state, some, some % num_uavs)
 
     def _in_flight(self) -> dict[str, Any]:
         """Returns the state at step 0 in which all UAVs hold in the air."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,6 +13,7 @@ from volery.core.arrays import read_only
 from volery.core.errors import SensorError
 from volery.runtime.environment_block import EnvironmentBlock
 from volery.runtime.vehicles.uav_sensors import UnknownSensorError
+from volery.sensors.cameras.camera import Part
 from volery.sensors.sample_rows import joined, sample_of
 from volery.sensors.samples import Samples
 
@@ -37,11 +38,35 @@ class EnvironmentSensor:
         found = [block.latest_rows(self._uav, self.name) for block in self._blocks]
         parts = [(part[0], part[1]) for part in found if part is not None]
         if len(parts) < len(self._blocks):
-            raise SensorError(
-                f"sensor '{self.name}' of {self._uav} has no sample yet: run the environments first"
-            )
+            raise SensorError(self._without_sample())
         mount = self._blocks[0].mount(self._uav, self.name)
         return sample_of(_without_old(joined(parts), self.has_sample), slice(None), mount)
+
+    @property
+    def stamp_ns(self) -> int | None:
+        """Time of the last measurement, ns; None before the first."""
+        batch = self._batch()
+        return None if batch is None else batch.stamp_ns
+
+    @property
+    def model(self) -> Any:
+        """Model of a LIDAR or camera, that of its samples. Raises `SensorError` before the first.
+
+        Other sensors have none.
+        """
+        batch = self._batch()
+        if batch is None:
+            raise SensorError(self._without_sample())
+        return getattr(batch, "model", None)
+
+    def request_parts(self, parts: Collection[Part]) -> None:
+        """Renders only `parts` of the images of a camera from now on: colour, depth, labels.
+
+        All cameras of the same model, rate and phase render the same parts; others have no pixels.
+        Images do not depend on the choice. Raises `SensorError` if the sensor is no camera.
+        """
+        for block in self._blocks:
+            block.request_parts(self._uav, self.name, parts)
 
     @property
     def has_sample(self) -> NDArray[np.bool_]:
@@ -52,6 +77,13 @@ class EnvironmentSensor:
             for part, block in zip(found, self._blocks, strict=True)
         ]
         return np.concatenate(flags)
+
+    def _batch(self) -> Samples | None:
+        found = self._blocks[0].latest_rows(self._uav, self.name)
+        return None if found is None else found[0]
+
+    def _without_sample(self) -> str:
+        return f"sensor '{self.name}' of {self._uav} has no sample yet: run the environments first"
 
     def __repr__(self) -> str:
         return f"<sensor '{self.name}' of {self._uav} in all environments>"

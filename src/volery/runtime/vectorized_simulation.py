@@ -1,8 +1,9 @@
 """Steps many independent environments of one scenario together, for learning and Monte Carlo.
 
-All environments share the world and one clock. Each has its own UAVs, noise and wind, set by its
-own seed, and resets independently. Environments do not sense or touch one another. Each thread runs
-one block of environments; the UAVs of a block are rows of one fleet, which one compiled call moves.
+All environments share one clock and a world, or a few worlds. Each has its own UAVs, noise and
+wind, set by its own seed, and resets independently. Environments do not sense or touch one another.
+Each thread runs one block of environments; the UAVs of a block are rows of one fleet, which one
+compiled call moves.
 
     with VectorizedSimulation(load_scenario("hover"), 1024) as envs:
         envs.command_velocity(np.tile([1.0, 0.0, 0.0], (1024, 1, 1)))
@@ -30,13 +31,13 @@ from volery.core.arrays import Array
 from volery.core.clock import ns_from_s, s_from_ns
 from volery.core.errors import CommandError, ScenarioError
 from volery.core.plurals import counted
-from volery.runtime.build.fleet import place
-from volery.runtime.build.worlds import build_city, build_forest, build_scene, build_terrain
 from volery.runtime.checks import check_reset_seed, check_seconds, check_steps
 from volery.runtime.environment_block import EnvironmentBlock, EnvironmentEvent, SampleArrays
+from volery.runtime.environment_parameters import EnvironmentParameters, rows_of_environments
 from volery.runtime.environment_runs import EnvironmentRuns
 from volery.runtime.environment_sensors import EnvironmentSensors
 from volery.runtime.environment_start import EnvironmentStart
+from volery.runtime.environment_worlds import EnvironmentWorlds
 from volery.runtime.vehicles.batch_commands import BatchCommands, joined_states
 from volery.runtime.vehicles.flight_futures import FlightFutures
 from volery.runtime.vehicles.uav import Uav
@@ -58,22 +59,26 @@ class VectorizedSimulation(BatchCommands):
     environments.
 
     `seeds` has one seed per environment; the default is the scenario's seed and those after it.
-    Results do not depend on the number of `threads`. All environments share the world that the
-    scenario's seed generates: the attribute `scenario` has that world fixed (`world.seed`), and an
-    environment with seed s equals `Simulation(envs.scenario.with_(seed=s))`. Raises
-    `ScenarioError` if the scenario cannot be built.
+    Results do not depend on the number of `threads`. By default all environments share the world
+    that the scenario's seed generates: the attribute `scenario` has that world fixed
+    (`world.seed`), and an environment with seed s equals `Simulation(envs.scenario.with_(seed=s))`.
+
+    `worlds` has the seeds of several worlds, such as forests. Environment k starts in world number
+    k modulo their number, and resets may move it to another. With seed s in the world with seed w
+    it equals `Simulation(scenario.with_(seed=s, world={"seed": w}))`. Raises `ScenarioError` if the
+    scenario, or one of the worlds, cannot be built.
     """
 
     scenario: Scenario
-    """The scenario, with `world.seed` fixed."""
+    """The scenario, with `world.seed` fixed to that of the first world."""
     terrain: Terrain
     """Ground of all environments."""
     city: City | None
-    """Buildings and streets of all environments; None: there are none."""
+    """Buildings and streets of the first world; None: there are none."""
     forest: Forest | None
-    """Trees of all environments; None: there are none."""
+    """Trees of the first world; None: there are none."""
     scene: Scene
-    """Surfaces of all environments, for rays and contacts."""
+    """Surfaces of all worlds, for rays and contacts."""
 
     def __init__(
         self,
@@ -82,6 +87,7 @@ class VectorizedSimulation(BatchCommands):
         *,
         seeds: Sequence[int] | None = None,
         threads: int = 2,
+        worlds: Sequence[int] | None = None,
     ) -> None:
         for what, number in (("num_envs", num_envs), ("threads", threads)):
             if number < 1:
@@ -90,22 +96,21 @@ class VectorizedSimulation(BatchCommands):
             seeds = range(scenario.seed, scenario.seed + num_envs)
         if len(seeds) != num_envs:
             raise ScenarioError(_without_seeds(num_envs, len(seeds)))
-        scenario = scenario.with_(world={"seed": scenario.world_seed})
+        scenario = scenario.with_(world={"seed": worlds[0] if worlds else scenario.world_seed})
         self.scenario = scenario
+        self.worlds = (scenario.world_seed,) if worlds is None else tuple(worlds)
+        """Seeds of the worlds that environments can be in."""
         with compiled(needs_of(scenario, nodes=False)):
-            self.terrain = build_terrain(scenario)
-            self.city = build_city(scenario, self.terrain)
-            self.forest = build_forest(scenario, self.terrain, self.city)
-            self.scene = build_scene(scenario, self.terrain, self.forest, self.city)
-        self._starts = place(scenario, self.scene, self.terrain)
+            built = EnvironmentWorlds(scenario, self.worlds)
+        first = built.world(0)
+        self.terrain, self.city, self.forest = built.terrain, first.city, first.forest
+        self.scene, self._starts = built.scene, first.starts
         ends = np.linspace(0, num_envs, min(threads, num_envs) + 1).round().astype(int).tolist()
         self._runs = EnvironmentRuns(
             self.step, lambda: (self._blocks[0].step, self._blocks[0].dt_ns)
         )
         self._blocks = [
-            EnvironmentBlock(
-                scenario, self._starts, self.terrain, self.scene, seeds[a:b], a, self._runs
-            )
+            EnvironmentBlock(scenario, built, seeds[a:b], a, self._runs)
             for a, b in itertools.pairwise(ends)
         ]
         self._first: list[int] = ends[:-1]
@@ -156,11 +161,16 @@ class VectorizedSimulation(BatchCommands):
         return np.concatenate([block.age_s() for block in self._blocks])
 
     @property
+    def world(self) -> NDArray[np.int64]:
+        """World (K,) of each environment: whole numbers, among `worlds`."""
+        return np.concatenate([block.world for block in self._blocks])
+
+    @property
     def common_period_s(self) -> float:
-        """Period, s, after which guidance and all sensors fire together.
+        """Period, s, after which control, batteries and all sensors fire together.
 
         A reset at a multiple of this period is exact. At another time, state and noise equal those
-        of a fresh environment too, but guidance and sensors keep the phase common to all.
+        of a fresh environment too, but control, batteries and sensors keep the phase common to all.
         """
         return self._blocks[0].common_period_s
 
@@ -189,11 +199,14 @@ class VectorizedSimulation(BatchCommands):
         seeds: Sequence[int] | None = None,
         *,
         start: EnvironmentStart | None = None,
+        worlds: ArrayLike | None = None,
     ) -> None:
         """Resets `envs` (default: all), by numbers or mask (K,), optionally with new `seeds`.
 
-        start: motion of their UAVs, which then start in the air; None for the scenario's start.
-        Positions inside obstacles are not refused: the first step reports the collision.
+        worlds: (R,) numbers of worlds among `self.worlds`, which the R environments move to; None
+        for their present worlds. start: motion of their UAVs, which then start in the air; None for
+        the scenario's start. Positions inside obstacles are not refused: the first step reports the
+        collision.
         """
         chosen = self._chosen(envs)
         num_uavs = len(self._starts)
@@ -202,20 +215,51 @@ class VectorizedSimulation(BatchCommands):
             check_reset_seed(self.scenario, seed)
         if seeds is not None and len(seeds) != len(chosen):
             raise CommandError(_without_seeds(len(chosen), len(seeds)))
+        moved = None if worlds is None else self._checked_worlds(worlds, len(chosen))
         for block, first in zip(self._blocks, self._first, strict=True):
             here = np.flatnonzero((chosen >= first) & (chosen < first + len(block.seeds)))
             if len(here):
                 own = None if seeds is None else [seeds[k] for k in here.tolist()]
                 rows = (here[:, None] * num_uavs + np.arange(num_uavs)).ravel()
                 part = None if motion is None else motion.rows(rows)
-                block.reset(chosen[here] - first, own, part)
+                there = None if moved is None else moved[here]
+                block.reset(chosen[here] - first, own, part, there)
+
+    def set_parameters(self, envs: ArrayLike | None, parameters: EnvironmentParameters) -> None:
+        """Sets physical parameters of `envs` (R,), numbers or a mask (None: all).
+
+        The fields of `parameters` name their units; resets do not change them.
+
+        Call it before the reset at which they begin. An environment then equals a `Simulation`
+        whose scenario has these values. Raises `CommandError` for values out of range.
+        """
+        chosen = self._chosen(envs)
+        num_uavs = len(self._starts)
+        every = parameters.spread(len(chosen), num_uavs)
+        for block, first in zip(self._blocks, self._first, strict=True):
+            here = np.flatnonzero((chosen >= first) & (chosen < first + len(block.seeds)))
+            if len(here):
+                own = every.rows(rows_of_environments(here, num_uavs))
+                block.fleet.vary(rows_of_environments(chosen[here] - first, num_uavs), own)
 
     def get_state(self) -> list[Any]:
         """Returns the present state of all environments, for `set_state`."""
         return [self._owed_ns, *(block.get_state() for block in self._blocks)]
 
-    def set_state(self, state: Sequence[Any]) -> None:
-        """Restores a state that `get_state` of this object returned."""
+    def set_state(self, state: Sequence[Any], envs: ArrayLike | None = None) -> None:
+        """Restores a state that `get_state` of this object returned.
+
+        envs: numbers or mask (K,) of the environments that are restored, while time and the others
+        go on; None: all, and the time. A part is restored exactly if the time since the state is a
+        multiple of `common_period_s`. Raises `CommandError` for a part if there are sensors.
+        """
+        if envs is not None:
+            chosen = self._chosen(envs)
+            for block, first, kept in zip(self._blocks, self._first, state[1:], strict=True):
+                here = chosen[(chosen >= first) & (chosen < first + len(block.seeds))]
+                if len(here):
+                    block.restore(here - first, kept)
+            return
         self._owed_ns = state[0]
         for block, kept in zip(self._blocks, state[1:], strict=True):
             block.set_state(kept)
@@ -238,6 +282,12 @@ class VectorizedSimulation(BatchCommands):
     def state(self) -> FleetState:
         """Returns copies of the present states of all UAVs; each array is (K, n, ...)."""
         return joined_states([block.fleet.state for block in self._blocks], self._batch_shape)
+
+    @property
+    def modes(self) -> NDArray[np.int64]:
+        """Flight modes (K, n) of all UAVs, numbers of `FlightMode`."""
+        modes = [block.fleet.modes for block in self._blocks]
+        return np.concatenate(modes).reshape(self._batch_shape)
 
     def sample(self, uav: str, sensor: str) -> SampleArrays | None:
         """Returns the last sample of one sensor of each environment, None before the first.
@@ -287,6 +337,16 @@ class VectorizedSimulation(BatchCommands):
 
     def _future_lists(self) -> Sequence[FlightFutures]:
         return [block.futures for block in self._blocks]
+
+    def _checked_worlds(self, worlds: ArrayLike, count: int) -> NDArray[np.int64]:
+        """Returns numbers of worlds (count,)."""
+        numbers = np.atleast_1d(np.asarray(worlds))
+        wanted = f"{counted(count, 'environment')} need as many numbers of worlds"
+        if numbers.shape != (count,) or not np.issubdtype(numbers.dtype, np.integer):
+            raise CommandError(f"worlds: {wanted}, not {worlds!r}")
+        if count and not 0 <= numbers.min() <= numbers.max() < len(self.worlds):
+            raise CommandError(f"worlds are numbered 0 to {len(self.worlds) - 1}")
+        return numbers.astype(np.int64)
 
     def _check_open(self) -> None:
         if self._closed:

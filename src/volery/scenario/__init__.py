@@ -20,7 +20,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from volery.scenario.actors import Actor, CircleActor, ExternalActor, WaypointActor
+    from volery.scenario.actors import (
+        Actor,
+        AprilTag,
+        AttachedActor,
+        CircleActor,
+        ExternalActor,
+        WaypointActor,
+    )
     from volery.scenario.camera import CameraSensor, Daylight, Stereo
     from volery.scenario.city import City, Streets
     from volery.scenario.faults import (
@@ -76,7 +83,14 @@ if TYPE_CHECKING:
     )
 
 _NAMES = {
-    "actors": ("Actor", "CircleActor", "ExternalActor", "WaypointActor"),
+    "actors": (
+        "Actor",
+        "AprilTag",
+        "AttachedActor",
+        "CircleActor",
+        "ExternalActor",
+        "WaypointActor",
+    ),
     "camera": ("CameraSensor", "Daylight", "Stereo"),
     "city": ("City", "Streets"),
     "faults": (
@@ -122,6 +136,8 @@ _MODULES = {name: f"volery.scenario.{module}" for module, names in _NAMES.items(
 
 __all__ = [
     "Actor",
+    "AprilTag",
+    "AttachedActor",
     "BarometerSensor",
     "BatterySensor",
     "CameraSensor",

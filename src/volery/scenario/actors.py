@@ -77,15 +77,43 @@ class ExternalActor(Data):
         return "external"
 
 
+class AttachedActor(Data):
+    """Moves with another actor."""
+
+    kind: Literal["attached"] = "attached"
+    """Motion with another actor."""
+    actor: Name
+    """Name of the other actor."""
+    position_m: Vector3
+    """Position in the frame of the other actor: x forward, y left, z up."""
+    yaw_deg: float = 0.0
+    """Heading in the frame of the other actor, counter-clockwise from its x."""
+
+
+class AprilTag(Data):
+    """The print of an AprilTag."""
+
+    family: Literal["36h11"] = "36h11"
+    """Family of the tag."""
+    id: Annotated[int, Field(ge=0, le=586)] = 0
+    """Number of the tag in its family."""
+    size_m: Annotated[float, Field(ge=0.01, le=20.0)] = 0.5
+    """Outer side of the black border; the white border around it adds a quarter."""
+
+
 class Actor(Data):
-    """A moving body: every sensor sees it, and UAVs can hit it."""
+    """A moving body: every sensor sees it, and UAVs can hit it, but for a flat tag."""
 
     name: Name
     """Name of the actor in frames, topics and messages."""
-    shape: Literal["person", "car", "bird"]
+    shape: Literal["person", "car", "bird", "tag"]
     """Body of the actor."""
-    motion: Annotated[WaypointActor | CircleActor | ExternalActor, Field(discriminator="kind")]
-    """Motion of the actor."""
+    motion: Annotated[
+        WaypointActor | CircleActor | ExternalActor | AttachedActor, Field(discriminator="kind")
+    ]
+    """Motion of the actor; only tags can be attached to another actor."""
+    tag: AprilTag | None = None
+    """Print of an actor of shape tag."""
 
     @model_validator(mode="after")
     def _is_no_uav(self) -> Self:
@@ -93,13 +121,29 @@ class Actor(Data):
             raise ValueError(f"'{self.name}' is a UAV's name; give the actor another name")
         return self
 
+    @model_validator(mode="after")
+    def _tag_has_a_print(self) -> Self:
+        if (self.shape == "tag") != (self.tag is not None):
+            raise ValueError('shape = "tag" and a table tag = { id = 0 } belong together')
+        if isinstance(self.motion, AttachedActor) and self.shape != "tag":
+            raise ValueError("only actors of shape tag can be attached to another actor")
+        return self
+
 
 Actors = Annotated[tuple[Actor, ...], Field(max_length=1000)]
 
 
 def check_actors(actors: tuple[Actor, ...]) -> None:
-    """Raises `ValueError` if two actors have the same name."""
+    """Raises `ValueError` if two actors have one name, or one is attached to no other actor."""
     names = [actor.name for actor in actors]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise ValueError(f"names of actors must differ; used twice: {', '.join(twice)}")
+    bodies = {actor.name for actor in actors if actor.shape != "tag"}
+    for actor in actors:
+        if isinstance(actor.motion, AttachedActor) and actor.motion.actor not in bodies:
+            known = ", ".join(sorted(bodies)) or "none"
+            raise ValueError(
+                f"{actor.name} is attached to '{actor.motion.actor}', which is no actor other than "
+                f"a tag; known: {known}"
+            )

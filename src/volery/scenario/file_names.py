@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,30 @@ def moved(data: Mapping[str, Any], old: Path | None, new: Path) -> dict[str, Any
     if folder == new.resolve():
         return dict(data)
     return {key: _moved(key, value, folder, new.resolve()) for key, value in data.items()}
+
+
+def named_files(data: Mapping[str, Any], folder: Path | None) -> Iterator[Path]:
+    """Yields the existing files that a scenario's plain data name, shipped ones excluded.
+
+    folder: base folder of relative names; None: the working folder.
+    """
+    base = Path() if folder is None else folder
+    for key, value in data.items():
+        if key != "parameters":  # of nodes, which find files by themselves
+            yield from _named(key, value, base)
+
+
+def _named(key: str, value: Any, base: Path) -> Iterator[Path]:
+    if isinstance(value, Mapping):
+        yield from named_files(value, base)
+    elif isinstance(value, list | tuple):
+        for item in value:
+            yield from _named(key, item, base)
+    elif key in _KEYS and isinstance(value, str):
+        for path in (base / value, Path(value)):
+            if path.is_file():
+                yield path
+                return
 
 
 def _moved(key: str, value: Any, old: Path, new: Path) -> Any:

@@ -41,7 +41,8 @@ class LidarBank(NoisyBank):
             )
         super().__init__(group)
         self.lag_ns = model.sweep_duration_ns
-        self._model = model if group.keys is not None else model.without_noise()
+        self.model = model if group.keys is not None else model.without_noise()
+        """Model of the LIDARs; an exact one without noise."""
         self._scene = scene
         self._intensities = intensities
         self._mounts = stack_mounts(group.mounts)
@@ -50,13 +51,13 @@ class LidarBank(NoisyBank):
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> LidarScans:
         """Returns scan number `k` of all LIDARs; `time_ns` is the time of the first beam."""
-        numbers = k - self._noise.first_k if self._model.scan.is_fixed else k
+        numbers = k - self._noise.first_k if self.model.scan.is_fixed else k
         batch = make_batch(
             self._rows, np.arange(len(self._rows)), time_ns, self._noise.keys, numbers, self._mounts
         )
         echoes = sample_echoes(
             self._scene,
-            self._model,
+            self.model,
             batch,
             fleet.history,
             intensities=self._intensities,
@@ -65,7 +66,7 @@ class LidarBank(NoisyBank):
         return LidarScans(
             self.sensors,
             time_ns,
-            self._model,
+            self.model,
             k,
             read_only(echoes.ranges),
             read_only(echoes.intensities),
@@ -75,6 +76,6 @@ class LidarBank(NoisyBank):
         """Returns the particle table of this model, rebuilt when the particles change."""
         if particles != self._particles:
             clear = particles == CLEAR_AIR
-            self._air = None if clear else particle_table(self._model, particles)
+            self._air = None if clear else particle_table(self.model, particles)
             self._particles = particles
         return self._air

@@ -18,6 +18,7 @@ from volery.sensors.measurement_kernels import measure
 from volery.vehicle.pose_history import PoseHistory
 from volery.world.embree import DIRECTION, FAR, LANES, NORMAL, PACKET_ROWS
 from volery.world.scene_kernels import RayBlock, SceneHandle, cast_block, near_bodies
+from volery.world.world_kernels import own_world
 
 PIECE = 2048 // LANES
 """Packets of a piece."""
@@ -50,6 +51,22 @@ def _near_scan(
         near,
     )
     return count
+
+
+@inner_kernel
+def _cast_piece(
+    scene: SceneHandle,
+    lidar: LidarConstants,
+    batch: RayBatch,
+    scan: int,
+    history: PoseHistory,
+    count: int,
+    block: RayBlock,
+) -> None:
+    """Casts the block's first `count` rays of a scan into the world of its UAV."""
+    own_scene = own_world(scene, batch.uav[scan])
+    near_count = _near_scan(own_scene, lidar, batch, scan, history, block.near)
+    cast_block(own_scene, block, count, lidar.range_max, near_count)
 
 
 @inner_kernel
@@ -148,14 +165,13 @@ def scan_batch(
         first = (number % pieces) * PIECE
         own = min(PIECE, packets - first)
         count = min(own * LANES, total - first * LANES)
-        near_count = _near_scan(scene, lidar, batch, scan, history, block.near)
         aim_packets(table, batch, scan, history, first, own, block.rays)
         seen_ns = table.seen_ns[first:]
         for p in range(own):
             time = batch.sweep_start_ns[scan] + seen_ns[p]
             fraction = (time - bodies_start_ns) / interval
             block.fraction[p] = min(max(fraction, 0.0), 1.0)
-        cast_block(scene, block, count, lidar.range_max, near_count)
+        _cast_piece(scene, lidar, batch, scan, history, count, block)
         _note(block, table, first, own, scan if pieces > 1 else 0, surfaces)
         if pieces == 1:
             _measure(lidar, batch, scan, 0, surfaces, echoes)

@@ -21,6 +21,7 @@ from volery.server.rosbridge_route import serve_rosbridge
 from volery.server.scenarios import card_image, scenarios
 from volery.server.server_state import ServerState
 from volery.server.status import status
+from volery.server.tensorboard.route import TensorBoardRoute
 from volery.server.uploads.route import upload
 from volery.server.world_files import WorldFiles
 from volery.server.world_route import world_glb
@@ -33,6 +34,7 @@ def make_app(
     guard = Middleware(
         AuthMiddleware, tokens=tokens, origins=origins, cookie=cookie, only_loopback=only_loopback
     )
+    tensorboard = TensorBoardRoute()
     app = Starlette(
         routes=[
             Route("/", index),
@@ -46,6 +48,8 @@ def make_app(
             Route("/api/recordings", bring_recording, methods=["POST"]),
             Route("/api/recordings/{name}", recording),
             WebSocketRoute("/rosbridge", serve_rosbridge),
+            Route("/tensorboard", tensorboard),
+            Route("/tensorboard/{path:path}", tensorboard),
             Mount("/", PageFiles()),
         ],
         middleware=[guard],

@@ -46,7 +46,7 @@ _WRONG_TOKEN_S = 0.5
 _GONE_S = 0.2
 """Time for a refused WebSocket to close."""
 _HARMLESS = {"GET", "HEAD", "OPTIONS"}
-_GUARDED = ("/api/", "/rosbridge")
+_GUARDED = ("/api/", "/rosbridge", "/tensorboard")
 _FOR_ALL = "/api/status"
 
 

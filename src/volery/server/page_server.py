@@ -31,6 +31,7 @@ from volery.server.auth import check_rights
 from volery.server.http_protocol import HEAD_TIMEOUT_S, http_protocol
 from volery.server.server_state import ServerActivity, ServerSituation, ServerState, World
 from volery.server.settings import PageSettings
+from volery.server.tensorboard.process import TensorBoardProcess, tensorboard_command
 from volery.server.websocket_protocol import PageWebSocket
 
 _KEEPALIVE_S = 20.0
@@ -77,11 +78,18 @@ class PageServer:
         BridgeError
             The address is in use, not this machine's, or beyond loopback without permission and
             token.
+        VoleryError
+            TensorBoard is asked for and cannot be started.
 
         """
         settings = self._settings
         check_rights(settings.host, settings.tokens, anywhere=settings.anywhere)
+        folder = settings.tensorboard
+        command = None if folder is None else tensorboard_command(folder)
         self._socket = _listen(settings.host, settings.port)
+        if command is not None:
+            self._site.tensorboard = TensorBoardProcess(command)
+            self._site.tensorboard.start()
         app = make_app(
             self._site,
             tokens=settings.tokens,
@@ -150,6 +158,8 @@ class PageServer:
         elif self._socket is not None:
             self._socket.close()
         self._thread.end()
+        if self._site.tensorboard is not None:
+            self._site.tensorboard.stop()
 
     def __enter__(self) -> PageServer:
         """Starts the server."""

@@ -24,6 +24,7 @@ from volery.runtime.vehicles.control_authority import ControlAuthority
 from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.schema import Scenario
 from volery.server.operator_names import OperatorNames
+from volery.server.tensorboard.process import TensorBoardProcess
 
 _FAREWELL_S = 1.0
 """Time for a client to receive the close frame."""
@@ -132,6 +133,8 @@ class ServerState:
     """Folder of logs; None: no recordings."""
     shelf: ScenarioCatalog = field(default_factory=ScenarioCatalog)
     """Scenarios that can be loaded; its folder is that of uploads."""
+    tensorboard: TensorBoardProcess | None = None
+    """TensorBoard inside the page; None: there is none."""
     situation: ServerSituation = field(default_factory=ServerSituation)
     world: JoinedWorld | None = None
     clients: set[Client] = field(default_factory=set)

@@ -26,3 +26,5 @@ class PageSettings:
     """Folder of recorded and uploaded logs; None: no recordings."""
     uploads: Path | None = None
     """Folder of uploaded scenarios; None: no uploads."""
+    tensorboard: Path | None = None
+    """Folder of event files that TensorBoard shows; None: no TensorBoard."""

@@ -27,7 +27,7 @@ def _status(site: ServerState, role: Role | None) -> dict[str, Any]:
     }
     if role is None:
         nothing = {"state": None, "scenario": None, "description": "", "message": "", "world": None}
-        return nothing | told
+        return nothing | {"tensorboard": False} | told
     now, world = site.situation, site.world
     geometry = None if world is None else world.geometry
     return {
@@ -36,5 +36,6 @@ def _status(site: ServerState, role: Role | None) -> dict[str, Any]:
         "description": now.description,
         "message": now.message,
         "world": None if geometry is None else geometry.id,
+        "tensorboard": site.tensorboard is not None,
         **told,
     }

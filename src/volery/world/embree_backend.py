@@ -9,10 +9,15 @@ from numpy.typing import NDArray
 
 from volery.core.workers import Workers, new_counter
 from volery.world import embree
-from volery.world.point_query import callback_address, nearest_points, new_query_memory
+from volery.world.point_query import (
+    callback_address,
+    nearest_points,
+    query_memory,
+    world_row,
+)
 from volery.world.scene_content import MATERIALS, BodyShape, SceneContent
 from volery.world.scene_kernels import CHUNK, cast_rays, find_enclosing, find_occluded
-from volery.world.scene_memory import BodyTable, SceneHandle, thread_block
+from volery.world.scene_memory import ONE_WORLD, BodyTable, SceneHandle, thread_block
 
 FEW_RAYS = 5000
 """Maximum size of a batch that the calling thread casts alone: waking others costs more."""
@@ -71,6 +76,7 @@ class EmbreeBackend:
 
     def _attach_solids(self, first: int) -> None:
         both = [self._static, self._obstacles]
+        self._query_row = world_row(self._content.table, self._content.trees)
         for number in range(first, self._content.instances):
             part = self._content.solid_part(number)
             if len(part.triangles):  # numbered behind the trees' crowns, see `instance_of`
@@ -167,10 +173,16 @@ class EmbreeBackend:
         out: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]],
     ) -> None:
         """Fills distance (P,), nearest (P, 3), instance (P,) of `Scene.clearance`."""
+        scenes, tables = self.query_rows(include_terrain)
+        memory = query_memory()
+        nearest_points(
+            scenes, callback_address(), tables, ONE_WORLD.world, points, reach, memory, *out
+        )
+
+    def query_rows(self, include_terrain: bool) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Returns scenes (1,) and tables (1, 5) of this world for `nearest_points`."""
         scene = self._static if include_terrain else self._obstacles
-        table, memory = self._content.table, new_query_memory()
-        trees = self._content.trees
-        nearest_points(scene, callback_address(), table, trees, points, reach, memory, *out)
+        return np.array([scene], np.int64), self._query_row[None]
 
     def enclosing(self, points: NDArray[np.float64], out: NDArray[np.int32]) -> None:
         """Fills `out` (P,) with the closed solid around each point (P, 3), -1 for none."""

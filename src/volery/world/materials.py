@@ -34,6 +34,8 @@ class Material(IntEnum):
     METAL = 17
     PAINTED = 18
     """Paint in the colour of its solid."""
+    PRINT_WHITE = 19
+    PRINT_BLACK = 20
 
 
 _TABLE = read_table(__file__, "materials.toml")

@@ -7,6 +7,7 @@ therefore exact for trees with different scales of height and width, too.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -64,6 +65,17 @@ class QueryMemory(NamedTuple):
     context: NDArray[np.uint32]
     state: NDArray[np.float64]
     user: NDArray[np.int64]
+
+
+_own = threading.local()
+
+
+def query_memory() -> QueryMemory:
+    """Returns the calling thread's memory for queries, reused between calls."""
+    memory: QueryMemory | None = _own.__dict__.get("memory")
+    if memory is None:
+        memory = _own.memory = new_query_memory()
+    return memory
 
 
 def new_query_memory() -> QueryMemory:
@@ -232,12 +244,21 @@ def callback_address() -> int:
     return int(_compiled[0].address)
 
 
+def world_row(table: TriangleTable, trees: int) -> NDArray[np.int64]:
+    """Returns the row (5,) of a world with `trees` trees for `nearest_points`.
+
+    It holds addresses of the table's arrays, which must be kept.
+    """
+    arrays = table.vertices, table.triangles, table.first_part, table.transform
+    return np.array([*(array.ctypes.data for array in arrays), trees], np.int64)
+
+
 @kernel
 def nearest_points(
-    scene: int,
+    scenes: NDArray[np.int64],
     callback: int,
-    table: TriangleTable,
-    trees: int,
+    tables: NDArray[np.int64],
+    worlds: NDArray[np.int32],
     points: NDArray[np.float64],
     reach: float,
     memory: QueryMemory,
@@ -245,18 +266,14 @@ def nearest_points(
     nearest: NDArray[np.float64],
     instance: NDArray[np.int32],
 ) -> None:
-    """Finds the nearest point of the Embree scene to each of `points` (P, 3) within `reach` m, map.
+    """Finds the nearest point of an Embree scene to each of `points` (P, 3) within `reach` m, map.
 
-    Fills `distance` (P,), `nearest` (P, 3) and `instance` (P,), with `reach`, the point itself and
-    -1 where nothing is within reach.
+    scenes, tables: (W,) Embree scenes of W worlds and (W, 5) their `world_row`s. worlds: (P,) the
+    world of each point; (0,): the first for all. Fills `distance` (P,), `nearest` (P, 3) and
+    `instance` (P,), with `reach`, the point itself and -1 where nothing is within reach.
     """
     query, context, state, user = memory
     user[0] = state.ctypes.data
-    user[1] = table.vertices.ctypes.data
-    user[2] = table.triangles.ctypes.data
-    user[3] = table.first_part.ctypes.data
-    user[4] = table.transform.ctypes.data
-    user[5] = trees
     limit = min(reach, _FAR_AWAY_M)
     for i in range(points.shape[0]):
         for j in range(3):
@@ -271,7 +288,12 @@ def nearest_points(
         context[CONTEXT_INSTANCE] = _INVALID
         context[CONTEXT_INSTANCE_PRIMITIVE] = _INVALID
         context[CONTEXT_STACK_SIZE] = 0
-        point_query(scene, query.ctypes.data, context.ctypes.data, callback, user.ctypes.data)
+        world = worlds[i] if worlds.shape[0] > 0 else 0
+        for j in range(5):
+            user[1 + j] = tables[world, j]
+        point_query(
+            scenes[world], query.ctypes.data, context.ctypes.data, callback, user.ctypes.data
+        )
         instance[i] = int(state[_INSTANCE])
         distance[i] = np.sqrt(state[_SQUARED]) if instance[i] >= 0 else reach
         for j in range(3):

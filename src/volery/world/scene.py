@@ -136,8 +136,11 @@ class Scene:
         self.backend.replace_solids(self._content, first)
         return first
 
-    def instance_name(self, instance: int) -> str:
-        """Returns an instance's name: "ground", "tree 17", a solid's or actor's name, "uav3"."""
+    def instance_name(self, instance: int, uav: int = 0) -> str:  # noqa: ARG002
+        """Returns an instance's name: "ground", "tree 17", a solid's or actor's name, "uav3".
+
+        uav: row of a UAV in the instance's world, for a `WorldScenes`.
+        """
         if instance < 0:
             return "nothing"
         if instance == 0:
@@ -257,13 +260,19 @@ class Scene:
         return result
 
     def clearance(
-        self, points: ArrayLike, reach_m: float, include_terrain: bool = True
+        self,
+        points: ArrayLike,
+        reach_m: float,
+        include_terrain: bool = True,
+        *,
+        uavs: NDArray[np.int64] | None = None,
     ) -> Clearance:
         """Returns the nearest point of the static world to each point (P, 3), m, map.
 
         The static world consists of trees, solids and, unless excluded, the terrain; `reach_m` is
-        the maximum distance. `Solid` defines the inside of a solid. Raises `ValueError` if points
-        are not finite or the reach is negative.
+        the maximum distance. `Solid` defines the inside of a solid. uavs: (P,) rows of the UAVs at
+        the points, whose worlds a `WorldScenes` asks. Raises `ValueError` if points are not finite
+        or the reach is negative.
         """
         p = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
         if not np.isfinite(p).all():
@@ -273,13 +282,24 @@ class Scene:
         result = Clearance(
             np.empty(len(p)), np.empty((len(p), 3)), np.empty(len(p), dtype=np.int32)
         )
-        self.backend.clearance(p, float(reach_m), include_terrain, result)
+        self._nearest(p, float(reach_m), include_terrain, uavs, result)
+        return result
+
+    def _nearest(
+        self,
+        p: NDArray[np.float64],
+        reach_m: float,
+        include_terrain: bool,
+        uavs: NDArray[np.int64] | None,  # noqa: ARG002 - for subclasses
+        result: Clearance,
+    ) -> None:
+        """Fills `result` of `clearance`."""
+        self.backend.clearance(p, reach_m, include_terrain, result)
         if self.solids:
             enclosing = self.enclosing(p)
             inside = enclosing >= 0
             result.distance[inside] *= -1.0
             result.instance[inside] = enclosing[inside]
-        return result
 
     def enclosing(self, points: ArrayLike) -> NDArray[np.int32]:
         """Returns the solid's instance (P,) around each of the points (P, 3), m, map; -1: none."""

@@ -41,8 +41,37 @@ class BodyTable(NamedTuple):
     """Number of actors, the last rows: people, vehicles, birds. All rays see them."""
 
 
+class WorldTable(NamedTuple):
+    """The W worlds of a scene whose environments are in different ones; see `world_kernels`."""
+
+    world: NDArray[np.int32]
+    """(E,) number of the world of each environment; (0,) in a scene of one world."""
+    static: NDArray[np.int64]
+    """(W,) `SceneHandle.static` of each world; so are the next three."""
+    obstacles: NDArray[np.int64]
+    steepest: NDArray[np.float64]
+    trees: NDArray[np.int64]
+    first: NDArray[np.int64]
+    """(W + 1,) first row of each world in the scene's tables of instances."""
+
+
+ONE_WORLD = WorldTable(
+    np.zeros(0, np.int32),
+    np.zeros(0, np.int64),
+    np.zeros(0, np.int64),
+    np.zeros(0),
+    np.zeros(0, np.int64),
+    np.zeros(1, np.int64),
+)
+"""Table of a scene of one world."""
+
+
 class SceneHandle(NamedTuple):
-    """A scene for kernels; valid until the scene is closed."""
+    """A scene for kernels; valid until the scene is closed.
+
+    A scene of several worlds has their tables one after the other, and the numbers of the first
+    world; `world_kernels.own_world` returns the handle of the world of a UAV.
+    """
 
     static: int
     """Embree scene of terrain, trees and solids."""
@@ -63,6 +92,7 @@ class SceneHandle(NamedTuple):
     """(instances, 6) rows of `scene_content.Look`."""
     cover: GroundCover
     bodies: BodyTable
+    worlds: WorldTable = ONE_WORLD
 
 
 class RayBlock(NamedTuple):

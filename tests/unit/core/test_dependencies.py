@@ -20,6 +20,7 @@ FROM_ELSEWHERE = {
     **dict.fromkeys(("genmsg", "genpy", "rosgraph", "rospkg", "rospy"), "a sourced ROS 1"),
     **dict.fromkeys(("rclpy", "sensor_msgs"), "a sourced ROS"),
     "netifaces": "a sourced ROS 1, which works without it",
+    "tensordict": "rsl-rl, which its users install themselves",
     **dict.fromkeys(
         ("PyFlyt", "crazyflow", "jax", "multiRobotPathPlanner", "pybullet"),
         "environments of their own, made for `volery bench peers`",

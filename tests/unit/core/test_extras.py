@@ -87,6 +87,65 @@ def environments():
     importlib.reload(volery.learning)
 
 
+def team_environments():
+    import importlib
+
+    pytest.importorskip("gymnasium")
+    import volery.learning.team_env
+
+    importlib.reload(volery.learning.team_env)
+
+
+def tags():
+    from volery.autonomy.perception.tags.detector import TagDetector
+
+    TagDetector()
+
+
+def training(module):
+    def use():
+        for other in {"gymnasium", "torch", "tensorboard", "stable_baselines3"} - {module}:
+            pytest.importorskip(other)
+        from volery.learning.training.packages import require_training
+
+        require_training()
+
+    return use
+
+
+def tensorboard_page():
+    from volery.server.tensorboard.process import tensorboard_command
+
+    tensorboard_command(ROOT)
+
+
+def onnx_models():
+    for package in ("gymnasium", "torch", "tensorboard", "stable_baselines3"):
+        pytest.importorskip(package)
+    from volery.learning.training.onnx_export import export_onnx
+
+    export_onnx("hover", Path("hover.onnx"))
+
+
+def tables_of_runs():
+    from volery.cluster.table import arrow_module
+
+    arrow_module("`volery sweep`")
+
+
+def intervals():
+    from volery.cluster.confidence import estimate_mean
+
+    estimate_mean([1.0, 2.5])
+
+
+def hypercubes():
+    from volery.cluster.sampling import draw
+    from volery.cluster.study import StudySampling
+
+    draw([], StudySampling(method="latin_hypercube", samples=2))
+
+
 def browser():
     from volery_benchmarks.page.browser import open_browser
 
@@ -107,6 +166,16 @@ USES = [
     ("pandas", "pandas", "pandas", tables),
     ("tqdm.auto", "tqdm", "progress", progress_bars),
     ("gymnasium", "gymnasium", "learning", environments),
+    ("pettingzoo", "pettingzoo", "learning", team_environments),
+    ("cv2", "opencv-python-headless", "vision", tags),
+    ("torch", "torch", "train", training("torch")),
+    ("tensorboard", "tensorboard", "train", training("tensorboard")),
+    ("tensorboard", "tensorboard", "train", tensorboard_page),
+    ("stable_baselines3", "stable-baselines3", "train", training("stable_baselines3")),
+    ("onnx", "onnx", "train", onnx_models),
+    ("pyarrow", "pyarrow", "sweep", tables_of_runs),
+    ("scipy.special", "scipy", "sweep", intervals),
+    ("scipy.stats", "scipy", "sweep", hypercubes),
     ("playwright.sync_api", "playwright", "bench", browser),
 ]
 """Modules, their packages and extras, and a use of each."""
@@ -118,7 +187,8 @@ def test_every_package_of_an_extra_is_in_the_table():
     extras = EXTRAS.keys() - {"all", "test", "lint", "docs"}
     packages = {(re.match(r"[\w-]+", each)[0], extra) for extra in extras for each in EXTRAS[extra]}
     listed = {(package, extra) for _, package, extra, _ in USES}
-    assert {pair for pair in packages if pair[0] not in WORKS_WITHOUT} == listed
+    others = WORKS_WITHOUT | {"volery"}  # an extra may include another one
+    assert {pair for pair in packages if pair[0] not in others} == listed
 
 
 @pytest.mark.parametrize(("module", "package", "extra", "use"), USES)

@@ -1,7 +1,8 @@
 import { ActionIcon, Group, Loader, Title, Tooltip } from "@mantine/core";
 import { Columns2, X } from "lucide-react";
 import { Suspense, type CSSProperties, type ReactNode } from "react";
-import { PANELS, type PanelEntry } from "../panels/registry.ts";
+import type { PanelEntry } from "../panels/registry.ts";
+import { useOfferedPanels } from "../panels/useOfferedPanels.ts";
 import { closePanel, putPanel, useLayout, type Dock, type Slot } from "../state/layout.ts";
 import { useNarrow } from "../state/useNarrow.ts";
 import { DockEdge } from "./DockEdge.tsx";
@@ -121,5 +122,5 @@ function SplitButton({ panel }: { panel: PanelEntry }) {
 
 function usePanel(slot: Slot): PanelEntry | undefined {
   const open = useLayout((layout) => layout[slot]);
-  return PANELS.find(({ id }) => id === open);
+  return useOfferedPanels().find(({ id }) => id === open);
 }

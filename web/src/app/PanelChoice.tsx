@@ -1,10 +1,12 @@
 import { Menu, Title, UnstyledButton } from "@mantine/core";
 import { ChevronDown } from "lucide-react";
-import { PANELS, type PanelEntry } from "../panels/registry.ts";
+import type { PanelEntry } from "../panels/registry.ts";
+import { useOfferedPanels } from "../panels/useOfferedPanels.ts";
 import { putPanel } from "../state/layout.ts";
 
 /** The title of a bottom panel: a press lists the others that may take its half. */
 export function PanelChoice({ slot, panel }: { slot: "bottom" | "second"; panel: PanelEntry }) {
+  const panels = useOfferedPanels();
   return (
     <Menu position="top-start" width={190}>
       <Menu.Target>
@@ -16,13 +18,13 @@ export function PanelChoice({ slot, panel }: { slot: "bottom" | "second"; panel:
         </UnstyledButton>
       </Menu.Target>
       <Menu.Dropdown>
-        {PANELS.filter(({ dock, id }) => dock === "bottom" && id !== panel.id).map(
-          ({ id, title, icon: Icon }) => (
+        {panels
+          .filter(({ dock, id }) => dock === "bottom" && id !== panel.id)
+          .map(({ id, title, icon: Icon }) => (
             <Menu.Item key={id} leftSection={<Icon size={16} />} onClick={() => putPanel(slot, id)}>
               {title}
             </Menu.Item>
-          ),
-        )}
+          ))}
       </Menu.Dropdown>
     </Menu>
   );

@@ -1,6 +1,6 @@
 import { ActionIcon, Stack, Tooltip } from "@mantine/core";
 import { Gamepad2, Move3d } from "lucide-react";
-import { PANELS } from "../panels/registry.ts";
+import { useOfferedPanels } from "../panels/useOfferedPanels.ts";
 import { toggleControls, useFlying } from "../state/flying.ts";
 import { slotOf, togglePanel, useLayout } from "../state/layout.ts";
 import { useWhyNot } from "../state/rights.ts";
@@ -10,9 +10,10 @@ import { useVehicles } from "../state/vehicles.ts";
 /** The column of buttons that open panels, and the tools of the hand. */
 export function Rail() {
   const layout = useLayout();
+  const panels = useOfferedPanels();
   return (
     <Stack component="nav" className="rail" gap={4} p={6} aria-label="Panels">
-      {PANELS.map(({ id, title, icon: Icon, dock }) => (
+      {panels.map(({ id, title, icon: Icon, dock }) => (
         <Tooltip key={id} label={title} position="right">
           <ActionIcon
             size="lg"

@@ -1,5 +1,7 @@
 import {
+  Brain,
   ChartLine,
+  ChartSpline,
   CloudSun,
   Disc,
   List,
@@ -72,6 +74,20 @@ export const PANELS: readonly PanelEntry[] = [
     icon: ScrollText,
     dock: "bottom",
     view: lazy(() => import("./log/Log.tsx")),
+  },
+  {
+    id: "policy",
+    title: "Policy",
+    icon: Brain,
+    dock: "bottom",
+    view: lazy(() => import("./policy/Policy.tsx")),
+  },
+  {
+    id: "tensorboard",
+    title: "TensorBoard",
+    icon: ChartSpline,
+    dock: "bottom",
+    view: lazy(() => import("./tensorboard/TensorBoard.tsx")),
   },
   {
     id: "faults",

@@ -14,6 +14,8 @@ export interface ServerStatus {
   version: string;
   role: "operator" | "viewer";
   token_needed: boolean;
+  /** Whether `./tensorboard/` shows trainings; other servers do not say. */
+  tensorboard?: boolean;
 }
 
 interface SimulationState {

@@ -108,11 +108,12 @@ class RosTcpEndpoint:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         self._tasks = []
-        if self._listener is not None:
-            self._listener.close()
-            self._listener = None
         for client in tuple(self._clients):
             client.stream.close("the bridge was closed")
+        if self._listener is not None:
+            self._listener.close()
+            self._listener.close_connections()
+            self._listener = None
 
     async def _accept(self, gateway: Gateway, listener: Listener) -> None:
         loop = asyncio.get_running_loop()

@@ -10,6 +10,7 @@ import inspect
 from collections.abc import Callable, Mapping
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from volery.graph.graph import Graph
@@ -36,6 +37,8 @@ class Context:
     """Remapped topics and services: absolute name in the node to absolute name in the graph."""
     allows_folder: Callable[[str], bool] = _allows_every_folder
     """Returns whether the node may write into a folder of this name."""
+    find_file: Callable[[str], Path] = Path
+    """Returns the path of a file that the node may read; raises `VoleryError` for others."""
 
 
 @dataclass(frozen=True)

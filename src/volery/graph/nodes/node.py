@@ -21,6 +21,7 @@ import pkgutil
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any, ClassVar
 
 from volery.core.errors import GraphError, NodeError, VoleryError
@@ -289,6 +290,14 @@ class Node(ParameterMethods):
                 "only name folders below the working folder"
             )
         return folder
+
+    def find_file(self, name: str) -> Path:
+        """Returns the path of a file that a parameter names, relative to the scenario's folder.
+
+        Raises `VoleryError` if there is none that the node may read: scenarios from logs and
+        uploads read only below their own folder.
+        """
+        return self._context.find_file(name)
 
     def destroy_timer(self, timer: Timer) -> bool:
         """Destroys a timer; returns whether it belonged to the node."""

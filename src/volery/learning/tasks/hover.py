@@ -37,7 +37,8 @@ def hover() -> Task:
         ),
         rewards=(
             rewards.nearness(1.0, 0.7),
-            rewards.distance(-0.1),
+            rewards.alive(0.2),  # an early end must not pay
+            rewards.speed(-0.05),
             rewards.tilt(-0.2),
             rewards.spin(-0.02),
             rewards.action_change(-0.05),

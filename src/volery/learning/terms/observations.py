@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from volery.core import rotations
+from volery.autonomy.policy import observation_terms
 from volery.core.arrays import Array
 from volery.learning.flight import Flight
 from volery.learning.task import Observation
@@ -69,9 +67,7 @@ def _velocity_heading(flight: Flight) -> Array:
 
 
 def _rotation(flight: Flight) -> Array:
-    columns = [rotations.rotate(flight.state.attitude, axis) for axis in np.eye(3)]
-    matrix = np.stack(columns, axis=-1)
-    return matrix.reshape(*matrix.shape[:-2], 9)
+    return observation_terms.rotation_rows(flight.state.attitude)
 
 
 def _rates(flight: Flight) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 from volery.control.flight_modes import FlightMode
 from volery.core import rotations
@@ -93,6 +94,7 @@ def _context(
         now_ns,
         ns_from_s(entry.latency_s),
         allows_folder=scenario.access.allows_work_folder,
+        find_file=partial(scenario.access.find_file, shipped=None),
     )
 
 

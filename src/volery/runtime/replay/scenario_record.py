@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,13 @@ def tell_origin(graph: Graph, scenario: Scenario) -> None:
 def origin_of_scenario(scenario: Scenario) -> RecordedScenario:
     """Returns the record of a scenario for a log."""
     content = scenario.model_dump(exclude_unset=True)
-    return RecordedScenario(scenario.name, scenario.seed, version("volery"), content)
+    return RecordedScenario(scenario.name, scenario.seed, _version(), content)
+
+
+@cache
+def _version() -> str:
+    """Returns the version of Volery; finding it takes a millisecond, much of a short run."""
+    return version("volery")
 
 
 def scenario_of(

@@ -73,7 +73,7 @@ def entities_of_actors(actors: MovingActors | None, time_ns: int) -> Iterator[En
             name=actor.name,
             category=_CATEGORIES.get(actor.kind, Category.DYNAMIC_OBJECT),
             description=f"actor of kind {actor.kind}",
-            tags=("actor", actor.kind),
+            tags=("actor", actor.kind, *actor.tags),
             make_shape=partial(_shape_of, actor),
             radius_m=actor.shape.radius,
             position=poses[row, :3],

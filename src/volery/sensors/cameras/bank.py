@@ -52,7 +52,8 @@ class CameraBank(NoisyBank):
         self.lag_ns = model.readout_ns
         self.requested_parts: Callable[[], Collection[Part]] = lambda: EVERY_PART
         """Returns the parts of the images that have receivers now."""
-        self._model = model if group.keys is not None else model.without_noise()
+        self.model = model if group.keys is not None else model.without_noise()
+        """Model of the cameras."""
         self._scene = scene
         self._light_in = light_in
         self._mounts = stack_mounts(group.mounts)
@@ -60,7 +61,7 @@ class CameraBank(NoisyBank):
     @property
     def pixels(self) -> int:
         """Pixels of an image."""
-        return self._model.width * self._model.height
+        return self.model.width * self.model.height
 
     def is_wanted(self) -> bool:
         """Returns whether any part of the images has a receiver."""
@@ -84,7 +85,7 @@ class CameraBank(NoisyBank):
         light = self._light_in(fleet.weather)
         images = take(
             self._scene,
-            self._model,
+            self.model,
             light,
             batch,
             fleet.history,
@@ -92,7 +93,7 @@ class CameraBank(NoisyBank):
             parts=parts,
             falling=falling_in(fleet.weather, light),
         )
-        return CameraFrames(self.sensors, time_ns, self._model, **_arrays(images))
+        return CameraFrames(self.sensors, time_ns, self.model, **_arrays(images))
 
 
 def _arrays(images: Images) -> dict[str, Any]:

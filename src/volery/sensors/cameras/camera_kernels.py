@@ -11,7 +11,7 @@ from volery.core.compiled import inner_kernel, kernel
 from volery.core.rng import random_bits
 from volery.core.workers import fetch_add
 from volery.sensors.aim_kernels import RayBatch, sensor_frame
-from volery.sensors.cameras.hit_kernels import new_scratch, note_hits
+from volery.sensors.cameras.hit_kernels import Scratch, new_scratch, note_hits
 from volery.sensors.cameras.light import CODES, Light
 from volery.sensors.cameras.pixel_table import PIECE, PixelTable
 from volery.sensors.cameras.shade_kernels import shade
@@ -20,6 +20,7 @@ from volery.vehicle.pose_history import PoseHistory
 from volery.world.body_kernels import body_sphere
 from volery.world.embree import DIRECTION, FAR, LANES, ORIGIN
 from volery.world.scene_kernels import RayBlock, SceneHandle, cast_block, near_bodies
+from volery.world.world_kernels import own_world
 
 NORMALS = 4096
 """Size of the table of normal numbers; the largest is 3.7 standard deviations."""
@@ -234,6 +235,42 @@ def _write_colour(
                 out[pixel, 2] = codes[int(colour[2, k])]
 
 
+@inner_kernel
+def _render_piece(
+    scene: SceneHandle,
+    table: PixelTable,
+    optics: Optics,
+    light: Light,
+    batch: RayBatch,
+    shot: int,
+    piece: int,
+    history: PoseHistory,
+    interval: tuple[int, int],
+    block: RayBlock,
+    scratch: Scratch,
+    frames: Frames,
+) -> None:
+    """Renders a piece of an image; `interval` is that in which the bodies move, ns."""
+    own_scene = own_world(scene, batch.uav[shot])
+    first = piece * PIECE
+    own = min(PIECE, table.direction.shape[0] - first)
+    near_count = _near(own_scene, table, batch, shot, piece, history, optics, block.near)
+    _aim(table, batch, shot, history, first, own, block)
+    length = max(interval[1] - interval[0], 1)
+    for p in range(own):
+        time = batch.sweep_start_ns[shot] + table.after_ns[first + p]
+        fraction = (time - interval[0]) / length
+        block.fraction[p] = min(max(fraction, 0.0), 1.0)
+    cast_block(own_scene, block, own * LANES, optics.reach_m, near_count)
+    _write_geometry(table, optics, batch, block, first, own, shot, frames)
+    if frames.colour.shape[1] > 0:
+        note_hits(block, own, scratch)
+        near_count = shading_bodies(own_scene, batch.uav[shot], light, scratch, own, block.near)
+        find_shadows(own_scene, block, own, near_count, light, scratch)
+        shade(own_scene, block, own, light, scratch)
+        _write_colour(table, optics, light, batch, first, own, shot, scratch.colour, frames)
+
+
 @kernel
 def render_images(
     scene: SceneHandle,
@@ -257,28 +294,25 @@ def render_images(
     """
     packets = table.direction.shape[0]
     pieces = (packets + PIECE - 1) // PIECE
-    interval = max(bodies_end_ns - bodies_start_ns, 1)
-    wants_colour = frames.colour.shape[1] > 0
-    scratch = new_scratch(PIECE if wants_colour else 0)
+    interval = bodies_start_ns, bodies_end_ns
+    scratch = new_scratch(PIECE if frames.colour.shape[1] > 0 else 0)
     while True:
         number = fetch_add(counter.ctypes.data)
         shot = number // pieces
         if shot >= batch.uav.shape[0]:
             return
         piece = number % pieces
-        first = piece * PIECE
-        own = min(PIECE, packets - first)
-        near_count = _near(scene, table, batch, shot, piece, history, optics, block.near)
-        _aim(table, batch, shot, history, first, own, block)
-        for p in range(own):
-            time = batch.sweep_start_ns[shot] + table.after_ns[first + p]
-            fraction = (time - bodies_start_ns) / interval
-            block.fraction[p] = min(max(fraction, 0.0), 1.0)
-        cast_block(scene, block, own * LANES, optics.reach_m, near_count)
-        _write_geometry(table, optics, batch, block, first, own, shot, frames)
-        if wants_colour:
-            note_hits(block, own, scratch)
-            near_count = shading_bodies(scene, batch.uav[shot], light, scratch, own, block.near)
-            find_shadows(scene, block, own, near_count, light, scratch)
-            shade(scene, block, own, light, scratch)
-            _write_colour(table, optics, light, batch, first, own, shot, scratch.colour, frames)
+        _render_piece(
+            scene,
+            table,
+            optics,
+            light,
+            batch,
+            shot,
+            piece,
+            history,
+            interval,
+            block,
+            scratch,
+            frames,
+        )

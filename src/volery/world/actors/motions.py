@@ -13,6 +13,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from volery.core import rotations
 from volery.core.arrays import Array
 
 HeightAt = Callable[[float, float], float]
@@ -174,3 +175,22 @@ class GivenMotion:
         """Restores a state of `get_state`."""
         assert isinstance(state, tuple)
         self._poses = state
+
+
+class AttachedMotion:
+    """Moves with another actor: `offset` is the pose (7,) in the frame of that actor."""
+
+    def __init__(self, base: ActorMotion, offset: ArrayLike) -> None:
+        self._base = base
+        self._offset = np.array(offset, dtype=np.float64)
+
+    @property
+    def speed_m_s(self) -> float:
+        """Maximum speed of the origin of the other actor, m/s."""
+        return self._base.speed_m_s
+
+    def pose_at(self, time_s: float) -> Array:
+        """Returns the pose (7,) at a time; see `ActorMotion`."""
+        base, offset = self._base.pose_at(time_s), self._offset
+        position = base[:3] + rotations.rotate(base[3:], offset[:3])
+        return np.concatenate([position, rotations.multiply(base[3:], offset[3:])])

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from volery.core.arrays import Array
 from volery.core.clock import s_from_ns
@@ -25,6 +25,10 @@ class MovingActor:
     kind: str
     shape: BodyShape
     motion: ActorMotion
+    is_flat: bool = False
+    """Whether UAVs may land on it: it lies on what is below, and has no contacts."""
+    tags: tuple[str, ...] = ()
+    """More about the actor, for the page and other clients."""
 
 
 class MovingActors:
@@ -50,6 +54,11 @@ class MovingActors:
     def shapes(self) -> tuple[BodyShape, ...]:
         """One entry per actor, in order."""
         return tuple(actor.shape for actor in self._actors)
+
+    @property
+    def is_flat(self) -> NDArray[np.bool_]:
+        """(T,) whether UAVs may land on each actor, without a contact."""
+        return np.array([actor.is_flat for actor in self._actors], np.bool_)
 
     @property
     def speeds_m_s(self) -> Array:

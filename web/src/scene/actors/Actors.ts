@@ -6,13 +6,14 @@ import type { Moment, Part } from "../stage/part.ts";
 import { putMatrix, rotationOf } from "../stage/poses.ts";
 import { shown } from "../stage/shown.ts";
 import { bodyOfActor } from "./bodies.ts";
-import { kindOf, KINDS, kindsVersion, type ActorKind } from "./kinds.ts";
+import { kindOf, kindsVersion, tagPrintOf, type ActorKind } from "./kinds.ts";
+import type { TagPrint } from "./tagPrint.ts";
 
 /** Wings beat: the whole bird is tilted a little to and fro. */
 const BEAT_RAD_S = 9;
 const rotation = new Float64Array(9);
 
-/** Actors (people, cars and birds): frames of the simulation's own that belong to no UAV. */
+/** Actors (people, cars, birds and tags): frames of the simulation's own that belong to no UAV. */
 export class Actors implements Part {
   readonly object = new Group();
   private version = "";
@@ -44,19 +45,23 @@ export class Actors implements Part {
   private rebuild(): void {
     this.dispose();
     if (!useConnection.getState().volery) return; // a robot's frames are parts of itself
-    const rows = new Map<ActorKind, number[]>(KINDS.map((kind) => [kind, []]));
+    const bodies = new Map<string, { kind: ActorKind; print: TagPrint | null; rows: number[] }>();
     link.frames.names.forEach((name, row) => {
-      if (!name.includes("/") && name !== "map" && name !== "base_link")
-        rows.get(kindOf(name))!.push(row);
+      if (name.includes("/") || name === "map" || name === "base_link") return;
+      const kind = kindOf(name);
+      const print = tagPrintOf(name);
+      const key = print === null ? kind : `${kind} ${print.code} ${print.sizeM}`;
+      const body = bodies.get(key) ?? { kind, print, rows: [] };
+      body.rows.push(row);
+      bodies.set(key, body);
     });
-    for (const [kind, those] of rows) {
-      if (those.length === 0) continue;
-      const mesh = new InstancedMesh(bodyOfActor(kind), this.material, those.length);
+    for (const { kind, print, rows } of bodies.values()) {
+      const mesh = new InstancedMesh(bodyOfActor(kind, print), this.material, rows.length);
       mesh.instanceMatrix.setUsage(DynamicDrawUsage);
       mesh.castShadow = mesh.receiveShadow = true;
       mesh.frustumCulled = false;
       this.object.add(mesh);
-      this.kinds.push({ mesh, rows: those, kind });
+      this.kinds.push({ mesh, rows, kind });
     }
   }
 }

@@ -6,6 +6,7 @@ import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
 import { bar, box, cylinder, painted } from "../uavs/airframeGeometry.ts";
 import { Vector3 } from "three";
 import type { ActorKind } from "./kinds.ts";
+import { blackPlates, boardSide, type TagPrint } from "./tagPrint.ts";
 
 const CLOTHES = "#2f4f8f";
 const TROUSERS = "#2a2d36";
@@ -14,8 +15,19 @@ const PAINT = "#1f4e8c";
 const GLASS = "#10141a";
 const TYRE = "#0b0b0c";
 
-export function bodyOfActor(kind: ActorKind): BufferGeometry {
-  return mergeGeometries(PIECES[kind]());
+export function bodyOfActor(kind: ActorKind, print: TagPrint | null = null): BufferGeometry {
+  return mergeGeometries(print === null ? PIECES[kind]() : printed(print));
+}
+
+/** A tag: a white board with black cells; shades are those of the cameras' materials. */
+function printed(print: TagPrint): BufferGeometry[] {
+  const side = boardSide(print);
+  return [
+    box([side, side, 0.003], [0, 0, 0.0015], "#c4c4c4"),
+    ...blackPlates(print).map(({ x, y, along, across }) =>
+      box([along, across, 0.002], [x, y, 0.004], "#303030"),
+    ),
+  ];
 }
 
 const PIECES: Record<ActorKind, () => BufferGeometry[]> = {
@@ -51,6 +63,7 @@ const PIECES: Record<ActorKind, () => BufferGeometry[]> = {
     wing(-1),
     box([0.16, 0.14, 0.015], [-0.3, 0, 0.01], "#c9ccd0"),
   ],
+  tag: () => [box([0.6, 0.6, 0.005], [0, 0, 0.0025], "#c4c4c4")],
   thing: () => [box([0.5, 0.5, 0.5], [0, 0, 0.25], "#c58a2c")],
 };
 

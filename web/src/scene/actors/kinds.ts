@@ -1,8 +1,9 @@
 // The kind of an actor: from its tags (simulation_interfaces), else its name.
 
 import { link } from "../../link/link.ts";
+import { printOf, type TagPrint } from "./tagPrint.ts";
 
-export const KINDS = ["person", "car", "bird", "thing"] as const;
+export const KINDS = ["person", "car", "bird", "tag", "thing"] as const;
 export type ActorKind = (typeof KINDS)[number];
 
 const NAMES: readonly (readonly [ActorKind, RegExp])[] = [
@@ -11,6 +12,7 @@ const NAMES: readonly (readonly [ActorKind, RegExp])[] = [
   ["bird", /bird|gull|crow|pigeon|hawk|eagle/i],
 ];
 
+const prints = new Map<string, TagPrint>();
 const received = new Map<string, ActorKind>();
 const asked = new Set<string>();
 
@@ -19,6 +21,11 @@ export function kindOf(name: string): ActorKind {
   if (known !== undefined) return known;
   ask(name);
   return NAMES.find(([, pattern]) => pattern.test(name))?.[0] ?? "thing";
+}
+
+/** The print of an actor of kind tag; null as long as it is not known. */
+export function tagPrintOf(name: string): TagPrint | null {
+  return prints.get(name) ?? null;
 }
 
 /** Grows with each received kind. */
@@ -33,6 +40,8 @@ function ask(name: string): void {
       const kind = KINDS.find((kind) => info.tags.includes(kind));
       if (kind === undefined) return;
       received.set(name, kind);
+      const print = printOf(info.tags);
+      if (print !== null) prints.set(name, print);
       kindsVersion++;
     })
     .catch(() => undefined); // other graphs have no such service: the name must do

@@ -1,0 +1,1 @@
+"""AprilTags in camera images: detection by OpenCV and poses (extra `vision`)."""

@@ -1,0 +1,147 @@
+"""One local worker process, as its pool sees it."""
+
+from __future__ import annotations
+
+import os
+import queue
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections import deque
+from pathlib import Path
+from typing import Any
+
+from volery.cluster.batches import RunBatch, StudyJob
+from volery.cluster.errors import StudyError
+from volery.cluster.executor import WorkerState
+from volery.cluster.worker_messages import read_message, write_message
+from volery.core.errors import reason_of
+
+_THREADS = ("OMP", "OPENBLAS", "MKL", "NUMBA")
+_LOG_LINES = 3
+_FAREWELL_S = 2.0
+
+Reply = tuple["WorkerHandle", Any]
+"""A worker and its message; None: its output has ended."""
+
+
+class WorkerHandle:
+    """Starts a worker; its messages go to `replies` from a thread of its own.
+
+    log: file for its standard error. Raises `StudyError` if the process cannot start.
+    """
+
+    def __init__(self, number: int, log: Path, replies: queue.SimpleQueue[Reply]) -> None:
+        self.name = f"worker {number}"
+        self.batches: deque[RunBatch] = deque()
+        """Batches that it has, the present one first."""
+        self.has_greeted = False
+        """Whether it has said which version it has."""
+        self.is_ready = False
+        """Whether it has prepared."""
+        self.ending = ""
+        """Why the pool ends it; empty: it does not."""
+        self._log_path = log
+        self._runs = 0
+        self._began = time.monotonic()
+        threads = {f"{name}_NUM_THREADS": "1" for name in _THREADS}
+        try:
+            with log.open("wb") as errors:
+                self._process = subprocess.Popen(
+                    [sys.executable, "-P", "-m", "volery.cluster.worker_process"],
+                    env={**os.environ, **threads},
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    stderr=errors,
+                    start_new_session=True,  # Ctrl-C is the driver's
+                )
+        except OSError as error:
+            raise StudyError(f"a worker cannot start: {reason_of(error)}") from None
+        threading.Thread(target=self._listen, args=(replies,), daemon=True).start()
+
+    @property
+    def pid(self) -> int:
+        """Number of the process."""
+        return self._process.pid
+
+    @property
+    def busy_s(self) -> float:
+        """Wall time since its present batch began, s; 0 without one."""
+        return time.monotonic() - self._began if self.batches else 0.0
+
+    def send_job(self, job: StudyJob) -> None:
+        """Hands over the study."""
+        self._send(job)
+
+    def send(self, batch: RunBatch) -> None:
+        """Hands over a batch."""
+        if not self.batches:
+            self._began = time.monotonic()
+        self.batches.append(batch)
+        self._send(batch)
+
+    def finished(self) -> RunBatch:
+        """Removes and returns the present batch, which has ended."""
+        batch = self.batches.popleft()
+        self._runs += len(batch.runs)
+        self._began = time.monotonic()
+        return batch
+
+    def state(self) -> WorkerState:
+        """Returns its state for displays."""
+        word = "busy" if self.batches else "idle" if self.is_ready else "starting"
+        runs = len(self.batches[0].runs) if self.batches else 0
+        return WorkerState(self.name, word, self._runs, runs)
+
+    def end(self, reason: str) -> None:
+        """Kills the process; its output ends soon."""
+        self.ending = reason
+        self._process.kill()
+
+    def how_it_ended(self) -> str:
+        """Waits for the end of the process and returns how it ended, as text."""
+        try:
+            code = self._process.wait(_FAREWELL_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            code = self._process.wait()
+        if self.ending:
+            return self.ending
+        if code < 0:
+            return f"was killed by signal {-code} ({signal.Signals(-code).name})"
+        return f"ended with exit code {code}{self._last_words()}"
+
+    def close(self) -> None:
+        """Ends the process and waits for it."""
+        self._process.kill()
+        self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                try:
+                    pipe.close()
+                except OSError:
+                    continue  # what was not flushed has no reader
+
+    def _send(self, message: object) -> None:
+        if self._process.stdin is not None:
+            try:
+                write_message(self._process.stdin, message)
+            except OSError:
+                return  # it has ended: its listener reports that
+
+    def _listen(self, replies: queue.SimpleQueue[Reply]) -> None:
+        output = self._process.stdout
+        try:
+            while output is not None:
+                replies.put((self, read_message(output)))
+        except (EOFError, OSError, ValueError):
+            replies.put((self, None))
+
+    def _last_words(self) -> str:
+        try:
+            lines = self._log_path.read_text(encoding="utf-8", errors="replace").splitlines()
+        except OSError:
+            return ""
+        return f": {' | '.join(lines[-_LOG_LINES:])}" if lines else ""

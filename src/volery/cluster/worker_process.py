@@ -1,0 +1,68 @@
+"""The program of a local worker: `python -m volery.cluster.worker_process`.
+
+It reads a `StudyJob` and then batches from its standard input, and writes a `Preparation` and
+results to its standard output. It ends when its input does, even within a run: that is when the
+driver has ended. Prints of the user's code go to standard error.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import queue
+import sys
+import threading
+from pathlib import Path
+from typing import IO, Any
+
+from volery.cluster.batches import Preparation, StudyJob
+from volery.cluster.runs import code_version
+from volery.cluster.worker_messages import read_message, write_message
+
+
+def main() -> None:
+    """Serves one driver until it ends."""
+    replies = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    messages: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    threading.Thread(target=_receive, args=(sys.stdin.buffer, messages), daemon=True).start()
+    write_message(replies, Preparation(code_version()))
+    _serve(messages, replies)
+
+
+def _receive(requests: IO[bytes], messages: queue.SimpleQueue[Any]) -> None:
+    """Passes messages on; ends the process with the driver, whatever it is doing."""
+    try:
+        while True:
+            messages.put(read_message(requests))
+    except (EOFError, OSError):
+        os._exit(0)
+
+
+def _serve(messages: queue.SimpleQueue[Any], replies: IO[bytes]) -> None:
+    from volery.cluster.run_worker import DiskFullError, RunWorker
+    from volery.core.errors import VoleryError
+
+    job: StudyJob = messages.get()
+    if job.is_trusted:  # metrics may import modules beside them when they are called
+        sys.path += [str(job.folder), str(Path().resolve())]
+    try:
+        worker = RunWorker(job)
+        prepared = worker.prepare()
+    except VoleryError as error:
+        text = " ".join(str(error).split())
+        write_message(replies, Preparation(code_version(), error=text))
+        return
+    write_message(replies, prepared)
+    gc.collect()
+    gc.freeze()  # modules and compiled code outlive all runs
+    while True:
+        batch = messages.get()
+        try:
+            write_message(replies, worker.fly(batch))
+        except DiskFullError as error:
+            write_message(replies, error)
+
+
+if __name__ == "__main__":
+    main()

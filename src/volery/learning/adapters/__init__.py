@@ -1,0 +1,1 @@
+"""Adapters of the vectorized environments to training libraries."""

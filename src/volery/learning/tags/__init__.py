@@ -1,0 +1,1 @@
+"""Detections of AprilTags in environments: by geometry, or in rendered images."""

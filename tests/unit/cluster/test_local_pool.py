@@ -1,0 +1,103 @@
+"""Worker processes: other versions, killed workers, timeouts, killed drivers."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from studies import TINY, study_file
+
+from volery.cluster import StudyError, load_study, run_study
+from volery.cluster.batches import StudyJob
+from volery.cluster.local_pool import LocalPool
+
+pytest.importorskip("pyarrow")
+pytest.importorskip("scipy")
+
+
+def test_a_worker_with_another_version_is_refused(tmp_path, monkeypatch):
+    loaded = load_study(TINY)
+    monkeypatch.setattr("volery.cluster.local_pool.code_version", lambda: "0.0.9+older")
+    job = StudyJob(loaded.study, "study", tmp_path, False, loaded.points[0], tmp_path)
+    pool = LocalPool(job, 1, tmp_path)
+    try:
+        with pytest.raises(StudyError, match=r"worker 1 has Volery .*, this driver 0.0.9\+older"):
+            pool.prepare()
+    finally:
+        pool.close()
+
+
+def test_a_worker_that_cannot_start_is_named(tmp_path, monkeypatch):
+    loaded = load_study(TINY)
+    monkeypatch.setattr(sys, "executable", "/no/python")
+    job = StudyJob(loaded.study, "study", tmp_path, False, loaded.points[0], tmp_path)
+    with pytest.raises(StudyError, match="a worker cannot start: No such file"):
+        LocalPool(job, 1, tmp_path).prepare()
+
+
+MINE = """
+import os, signal, time
+
+def height_m(flight):
+    if flight.seed == 2:
+        os.kill(os.getpid(), signal.SIGKILL)
+    if flight.seed == 3:
+        time.sleep(60.0)
+    print("words of the user")  # must not disturb the pipe
+    return float(flight.position_map[0, -1, 2])
+"""
+
+
+@pytest.mark.slow
+def test_killed_and_stuck_workers_cost_only_their_runs(tmp_path):
+    (tmp_path / "mine.py").write_text(MINE)
+    text = "repetitions = 4\nrun_timeout_s = 2.0\nmetrics = ['mine.py:height_m']\n"
+    path = study_file(tmp_path, text)
+    table = run_study(path, tmp_path / "out", workers=1, trust=True)
+    assert table["status"] == ["done", "failed", "failed", "done"]
+    assert table["error"][1] == "its worker was killed by signal 9 (SIGKILL)"
+    assert table["error"][2] == "its worker exceeded run_timeout_s = 2"
+    words = [log.read_text() for log in (tmp_path / "out" / "workers").iterdir()]
+    assert any("words of the user" in each for each in words)
+
+
+def running_children(pid):
+    listed = subprocess.run(
+        ["ps", "-o", "pid=", "--ppid", str(pid)], capture_output=True, text=True, check=False
+    )
+    return [int(word) for word in listed.stdout.split()]
+
+
+def is_alive(pid):
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    with open(f"/proc/{pid}/stat") as file:
+        return file.read().rpartition(")")[2].split()[0] != "Z"
+
+
+@pytest.mark.slow
+def test_a_killed_study_continues_to_the_table_of_an_uninterrupted_one(tmp_path):
+    path = study_file(tmp_path, "repetitions = 60\nvectorized = false\n")
+    out = tmp_path / "cut"
+    command = [sys.executable, "-m", "volery.cli", "sweep", str(path), "--workers", "1"]
+    with subprocess.Popen([*command, "--out", str(out)], stdout=subprocess.DEVNULL) as driver:
+        while len(list(out.glob("runs/*/*.json"))) < 5:
+            assert driver.poll() is None
+            time.sleep(0.01)
+        workers = running_children(driver.pid)
+        driver.send_signal(signal.SIGKILL)
+    found = len(list(out.glob("runs/*/*.json")))
+    assert found < 60
+    assert workers
+    until = time.monotonic() + 60.0
+    while any(is_alive(pid) for pid in workers):  # they end with their driver
+        assert time.monotonic() < until
+        time.sleep(0.05)
+    resumed = run_study(path, out, workers=0)
+    whole = run_study(path, tmp_path / "whole", workers=0)
+    assert resumed.repeatable == whole.repeatable
+    assert len(whole) == 60
