@@ -11,7 +11,7 @@ PAGE_SOURCES := web/index.html web/package.json web/tsconfig.json web/vite.confi
 	$(shell find web/src web/public -type f)
 
 .DEFAULT_GOAL := help
-.PHONY: help dev run serve web page test lint docs bench docs-benchmarks package clean
+.PHONY: help dev run serve web page test test-installation test-page-units lint docs bench docs-benchmarks package clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -73,12 +73,16 @@ lint: $(VENV)/.installed-tests ## style, types, layers
 	@if .ci/node_fits; then $(MAKE) --no-print-directory web/node_modules/.package-lock.json \
 		&& cd web && npm run --silent check; fi
 
-test: lint page ## install what tests need, check everything, run the tests
+test-installation: $(VENV)/.installed-tests page # whatever the tests need
 	@.ci/install_ros1
 	@.ci/install_browser
+
+test-page-units:
 	@if .ci/node_fits; then cd web && npm test --silent; fi
+
+test: lint test-installation test-page-units ## install what tests need, check everything, run the tests; failed ones once more
 	$(BIN)/python -m volery.runtime.warmup
-	$(BIN)/pytest -n 2 --dist loadfile -m 'not slow' tests
+	$(BIN)/pytest --cache-clear -n 2 --dist loadfile -m 'not slow' tests || { [ $$? -eq 1 ] && .ci/second_run; }
 
 docs: $(VENV)/.installed-docs ## build the documentation site: build/site/index.html
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet

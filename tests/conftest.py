@@ -2,6 +2,7 @@
 
 import copy
 import sys
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -11,6 +12,36 @@ from volery.scenario.load import parse_scenario
 
 settings.register_profile("volery", deadline=None)  # busy machines stall for longer than 200 ms
 settings.load_profile("volery")
+
+# Tests without sockets, child processes, browsers or a wall clock, marked `pure`: in CI they get no
+# second run.
+PURE = (
+    "e2e/test_determinism.py",
+    "e2e/test_equal_flights.py",
+    "fuzz/",
+    "golden/",
+    "oracle/",
+    "property/",
+    "unit/control/",
+    "unit/figures/",
+    "unit/logs/",
+    "unit/publishing/",
+    "unit/report/",
+    "unit/results/",
+    "unit/scenario/",
+    "unit/sensors/",
+    "unit/vehicle/",
+    "unit/world/",
+)
+
+
+def pytest_collection_modifyitems(items):
+    """Marks pure tests by their files."""
+    tests = Path(__file__).parent
+    for item in items:
+        if item.path.relative_to(tests).as_posix().startswith(PURE):
+            item.add_marker("pure")
+
 
 LIDARS = [
     {"kind": "lidar", "name": "horizontal", "position_m": [0.0, 0.0, 0.18]},
