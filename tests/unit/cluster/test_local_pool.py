@@ -79,25 +79,42 @@ def is_alive(pid):
         return file.read().rpartition(")")[2].split()[0] != "Z"
 
 
+WAITING = """
+import os, time
+
+def height_m(flight):
+    while flight.seed >= 150 and not os.path.exists({opened!r}):
+        time.sleep(0.01)
+    return float(flight.position_map[0, -1, 2])
+"""
+
+
 @pytest.mark.slow
 def test_a_killed_study_continues_to_the_table_of_an_uninterrupted_one(tmp_path):
-    path = study_file(tmp_path, "repetitions = 60\nvectorized = false\n")
+    opened = tmp_path / "opened"
+    (tmp_path / "waiting.py").write_text(WAITING.format(opened=str(opened)))
+    text = "repetitions = 200\nvectorized = false\nmetrics = ['waiting.py:height_m']\n"
+    path = study_file(tmp_path, text)
     out = tmp_path / "cut"
-    command = [sys.executable, "-m", "volery.cli", "sweep", str(path), "--workers", "1"]
+    command = [sys.executable, "-m", "volery.cli", "sweep", str(path), "--workers", "1", "--trust"]
     with subprocess.Popen([*command, "--out", str(out)], stdout=subprocess.DEVNULL) as driver:
-        while len(list(out.glob("runs/*/*.json"))) < 5:
-            assert driver.poll() is None
-            time.sleep(0.01)
-        workers = running_children(driver.pid)
-        driver.send_signal(signal.SIGKILL)
-    found = len(list(out.glob("runs/*/*.json")))
-    assert found < 60
+        try:
+            until = time.monotonic() + 120.0
+            while not list(out.glob("runs/*/*.json")):
+                assert driver.poll() is None
+                assert time.monotonic() < until
+                time.sleep(0.01)
+            workers = running_children(driver.pid)
+        finally:
+            driver.kill()
     assert workers
     until = time.monotonic() + 60.0
     while any(is_alive(pid) for pid in workers):  # they end with their driver
         assert time.monotonic() < until
         time.sleep(0.05)
-    resumed = run_study(path, out, workers=0)
-    whole = run_study(path, tmp_path / "whole", workers=0)
+    assert 0 < len(list(out.glob("runs/*/*.json"))) < 200
+    opened.touch()
+    resumed = run_study(path, out, workers=0, trust=True)
+    whole = run_study(path, tmp_path / "whole", workers=0, trust=True)
     assert resumed.repeatable == whole.repeatable
-    assert len(whole) == 60
+    assert len(whole) == 200
