@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore import EmbreeDevice
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
@@ -26,6 +27,10 @@ from volery.world.scene import Scene
 from volery.world.scene_content import MATERIALS, BodyShape, SceneContent
 from volery.world.scene_memory import BodyTable, SceneHandle
 
+DEVICE = EmbreeDevice()
+"""Lives as long as the process, as embreex's devices allow TBB more threads than Volery's do: once
+the last of them is gone, a TBB worker that then exceeds the limit spins for ever on one core."""
+
 _SHORT_OF_TARGET_M = 1e-4
 _FAR_M = 1e6
 
@@ -38,7 +43,7 @@ class FlatScene:
         whole = concatenate(list(meshes))
         self._scene: Any = None
         if len(whole):
-            self._scene = EmbreeScene()
+            self._scene = EmbreeScene(DEVICE)
             self._mesh = TriangleMesh(
                 self._scene, whole.vertices.copy(), whole.triangles.astype(np.int32)
             )

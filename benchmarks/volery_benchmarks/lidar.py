@@ -20,6 +20,7 @@ import importlib.util
 import statistics
 import time
 from collections.abc import Callable, Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -118,11 +119,23 @@ def _peers(seconds_budget: float) -> dict[str, float]:
     return {name: value / ours for name, value in seconds.items()}
 
 
+@cache
+def _embreex_device() -> Any:
+    """Returns the device of embreex's call, which lives as long as the process.
+
+    It allows TBB more threads than Volery's devices do. Once it is gone, a TBB worker that exceeds
+    the limit spins on one core and disturbs all measurements that follow.
+    """
+    from embreex.rtcore import EmbreeDevice
+
+    return EmbreeDevice()
+
+
 def _embreex_call(whole: Mesh, origins: Array, directions: Array) -> Callable[[], object]:
     from embreex.mesh_construction import TriangleMesh
     from embreex.rtcore_scene import EmbreeScene
 
-    scene: Any = EmbreeScene()
+    scene: Any = EmbreeScene(_embreex_device())
     mesh = TriangleMesh(scene, whole.vertices.copy(), whole.triangles.astype(np.int32))
     o, d = origins.astype(np.float32), directions.astype(np.float32)
     reach = np.full(len(o), REACH_M, dtype=np.float32)

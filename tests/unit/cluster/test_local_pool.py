@@ -1,7 +1,6 @@
 """Worker processes: other versions, killed workers, timeouts, killed drivers."""
 
 import os
-import signal
 import subprocess
 import sys
 import time

@@ -3,6 +3,7 @@
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
+from plain_scene import DEVICE
 
 from volery.world.trees import DetailLevel, TreeModel
 
@@ -21,7 +22,7 @@ def gap_fractions(model: TreeModel, level: DetailLevel, rays: int = 60) -> np.nd
     radius = np.percentile(np.linalg.norm(leaves[:, :2] - centre, axis=1), 90)
     low, high = np.percentile(leaves[:, 2], [3, 97])
     middle = np.array([*centre, (low + high) / 2])
-    scene = EmbreeScene()
+    scene = EmbreeScene(DEVICE)
     for mesh in (model.levels[level].wood, model.levels[level].leaves):
         TriangleMesh(scene, np.array(mesh.vertices), np.array(mesh.triangles, np.int32))
     across, along = (a.ravel() for a in np.meshgrid(*2 * [(np.arange(rays) + 0.5) / rays * 2 - 1]))
