@@ -246,10 +246,11 @@ def test_services_are_offered(loop, client):
 # ------------------------------------------------------------------------------------- connections
 
 
-def test_it_comes_back_and_asks_for_everything_again(loop, connect):
-    first = RosTcpEndpoint(port=0)
+def test_it_comes_back_and_asks_for_everything_again(loop, connect, hold_port):
+    port = hold_port()
+    first = RosTcpEndpoint(port=port)
     loop.bridges.open(first)
-    client = connect(first.port)
+    client = connect(port)
     client.advertise("/in", STRING)
     messages = client.subscribe("/out", STRING, wake=lambda: None)
     client.create_service("/do", TRIGGER, lambda _q, reply: reply.answer(Response(True, "again")))
@@ -264,8 +265,8 @@ def test_it_comes_back_and_asks_for_everything_again(loop, connect):
     assert client.dropped == 1
     with pytest.raises(GraphError, match="no connection"):
         call(client, "/do", Request())
-    loop.bridges.open(RosTcpEndpoint(port=first.port))
-    client.wait_until_connected(10.0)
+    loop.bridges.open(RosTcpEndpoint(port=port))
+    client.wait_until_connected(60.0)
     assert client.connections == 2
     seen = collect(loop, "/in")
     client.publish("/in", String("again"))

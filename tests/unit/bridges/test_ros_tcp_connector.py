@@ -10,7 +10,6 @@ import threading
 
 import numpy as np
 import pytest
-from held_ports import held_port
 from ros_tcp_client import Loop, cdr_string, frame, ros1_string, until
 
 from volery.bridges.bridge_host import BridgeHost
@@ -48,14 +47,13 @@ def there():
 
 
 @pytest.fixture
-def port():
+def port(hold_port):
     """A port that is the test's own, with nobody there yet."""
-    with held_port() as number:
-        yield number
+    return hold_port()
 
 
-def join(here, there, generation="ros1", **options):
-    endpoint = RosTcpEndpoint(port=0, generation=generation)
+def join(here, there, generation="ros1", port=0, **options):
+    endpoint = RosTcpEndpoint(port=port, generation=generation)
     there.bridges.open(endpoint)
     connector = RosTcpConnector(port=endpoint.port, **(PATIENT | options))
     here.bridges.open(connector)
@@ -173,14 +171,14 @@ def test_latched_messages_stay_latched(here, there):
     assert seen[0].message.data == "kept"
 
 
-def test_it_connects_again_and_registers_again(here, there):
+def test_it_connects_again_and_registers_again(here, there, port):
     out = here.graph.advertise("/uav1/status", STRING)
-    endpoint, connector = join(here, there)
+    endpoint, connector = join(here, there, port=port)
     until(lambda: "/uav1/status" in topics(there))
     there.bridges.call(endpoint.stop())
     until(lambda: connector.state == "not connected")
     assert not here.gateway.sessions()
-    there.bridges.open(RosTcpEndpoint(port=endpoint.port))
+    there.bridges.open(RosTcpEndpoint(port=port))
     until(lambda: connector.state == "ros1")
     seen = collect(there, "/uav1/status")
     until(lambda: topics(there)["/uav1/status"].publishers == 1)

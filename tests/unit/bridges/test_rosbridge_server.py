@@ -376,8 +376,9 @@ def test_its_services(simulation, client):
     until(lambda: not simulation.graph.has_service("/mine"))
 
 
-def test_it_comes_back_and_announces_everything_again(simulation, bridges):
-    first = RosbridgeServer(port=0)
+def test_it_comes_back_and_announces_everything_again(simulation, bridges, hold_port):
+    port = hold_port()
+    first = RosbridgeServer(port=port)
     bridges.open(first)
     client = RosbridgeClient(url_of(first), name="node", connect_timeout_s=60.0)
     try:
@@ -392,8 +393,8 @@ def test_it_comes_back_and_announces_everything_again(simulation, bridges):
         client.publish("/in", m.String("lost"))
         assert client.dropped == 1
         assert "no connection" in str(ask(client, "/mine"))
-        bridges.open(RosbridgeServer(port=first.port))
-        client.wait_until_connected(20)
+        bridges.open(RosbridgeServer(port=port))
+        client.wait_until_connected(60.0)
         assert client.connections == 2
         until(lambda: simulation.graph.has_service("/mine"))
         counts = {t.name: (t.publishers, t.subscribers) for t in simulation.graph.topics()}

@@ -394,7 +394,10 @@ def test_a_flight_seen_from_the_ros_side(ros):
     assert all((published.topic, published.cdr) in sent for published in heard)
 
 
-def test_the_ros_side_joins_again(loop, link, bridges, ros):
+def test_the_ros_side_joins_again(loop, bridges, ros, hold_port):
+    port, image_port = hold_port(), hold_port()
+    link = SensorLink(port=port, image_port=image_port)
+    bridges.open(link)
     publisher = loop.graph.advertise("/uav1/range", m.Range)
     seen = collect(ros, "/uav1/range", m.Range)
     ros_bridges, _ = joined(ros, link)
@@ -402,7 +405,7 @@ def test_the_ros_side_joins_again(loop, link, bridges, ros):
         wanted(loop, publisher)
         bridges.call(link.stop())
         until(lambda: not publisher.has_subscribers)
-        again = SensorLink(port=link.port, image_port=link.image_port)
+        again = SensorLink(port=port, image_port=image_port)
         bridges.open(again)
         wanted(loop, publisher)
         loop.publish(publisher, sonar(1))
