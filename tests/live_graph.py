@@ -37,7 +37,7 @@ class LiveGraph:
 
     def do(self, action):
         """Have something done, and what it publishes delivered; its result."""
-        return self.post(action).result(10.0)
+        return self.post(action).result(180.0)
 
     def waiting(self):
         """How much has been posted and not been begun."""

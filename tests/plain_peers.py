@@ -16,10 +16,10 @@ from pathlib import Path
 from ros2_bench import DOMAIN
 
 _PROGRAM = Path(__file__).parent / "conformance" / "bridges" / "plain_ros2.py"
-_PATIENCE_S = 60.0
-_START_S = 60.0
+_PATIENCE_S = 180.0
+_START_S = 180.0
 """On a machine that is busy with other things."""
-_SHORT_S, _LONG_S = 1.0, 30.0
+_SHORT_S, _LONG_S = 4.0, 120.0
 _idle = {_SHORT_S: [], _LONG_S: []}
 
 
@@ -96,7 +96,7 @@ class PlainPeer:
 def take_peer(hear=None, *, patient=False):
     """A peer that takes part in nothing yet.
 
-    patient: others take it for gone after half a minute of silence, in place of a second.
+    patient: others take it for gone after two minutes of silence, in place of four seconds.
     """
     idle = _idle[_LONG_S if patient else _SHORT_S]
     peer = idle.pop() if idle else PlainPeer(_LONG_S if patient else _SHORT_S)

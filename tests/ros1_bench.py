@@ -19,6 +19,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from held_ports import held_port
 from live_graph import LiveGraph
 
 from volery.bridges.ros1.environment import rospy_is_installed
@@ -43,13 +44,7 @@ def require_ros1():
         pytest.skip(f"no {', '.join(missing)}: see .ci/install_ros1", allow_module_level=True)
 
 
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
-def wait_until(condition, seconds=60.0):
+def wait_until(condition, seconds=180.0):
     """Whether a condition comes true in time."""
     end = time.monotonic() + seconds
     while not condition():
@@ -63,7 +58,8 @@ class Master:
     """A rosmaster on loopback, and the environment of its nodes, which is set in this process."""
 
     def __init__(self):
-        self._port = free_port()
+        self._held = contextlib.ExitStack()
+        self._port = self._held.enter_context(held_port())  # also while none runs
         self._folder = tempfile.mkdtemp(prefix="volery-ros1-")
         self._process = None
         self.uri = f"http://127.0.0.1:{self._port}"
@@ -95,6 +91,7 @@ class Master:
 
     def close(self):
         self.stop()
+        self._held.close()
         shutil.rmtree(self._folder, ignore_errors=True)
 
 
@@ -112,13 +109,13 @@ def end(process):
     if process.poll() is None:
         process.terminate()
         try:
-            process.wait(3.0)
+            process.wait(10.0)
         except subprocess.TimeoutExpired:
             process.kill()
-            process.wait(3.0)
+            process.wait(60.0)
 
 
-def tool(*command, seconds=15.0, **environment):
+def tool(*command, seconds=180.0, **environment):
     """What a command of ROS prints."""
     process = subprocess.Popen(
         command,
@@ -133,7 +130,32 @@ def tool(*command, seconds=15.0, **environment):
     finally:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)  # those it started, too
-        process.wait(3.0)
+        process.wait(60.0)
+        process.stdout.close()
+
+
+@contextlib.contextmanager
+def running(*command):
+    """A command of ROS that runs until the block ends; lines of what it prints, as they come."""
+    process = subprocess.Popen(
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    )
+    said = []
+    reader = threading.Thread(target=lambda: said.extend(process.stdout), daemon=True)
+    reader.start()
+    try:
+        yield said
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)  # those it started, too
+        process.wait(60.0)
+        reader.join(60.0)
         process.stdout.close()
 
 
@@ -160,9 +182,9 @@ class Program:
                     self._lines.put(json.loads(line))
         self._lines.put(EOFError())
 
-    def next(self, seconds=60.0):
+    def next(self, seconds=180.0):
         """The next value."""
-        value = self._lines.get(timeout=seconds)
+        value = self._lines.get(timeout=seconds)  # of a program that may still have to start
         if isinstance(value, EOFError):
             raise value
         return value
@@ -176,8 +198,8 @@ class Program:
 
     def __exit__(self, *_):
         self.process.kill()  # rospy takes seconds to leave in good order
-        self.process.wait(3.0)
-        self._reader.join(3.0)
+        self.process.wait(60.0)
+        self._reader.join(60.0)
         self.process.stdin.close()
         self.process.stdout.close()
 

@@ -13,7 +13,7 @@ import time
 from live_graph import LiveGraph
 
 
-def until(what, timeout_s=60.0):
+def until(what, timeout_s=180.0):
     """Wait for `what()` to be true, and return that."""
     end = time.monotonic() + timeout_s
     while time.monotonic() < end:
@@ -53,7 +53,7 @@ class Client:
         self.sock = socket.socket()
         if receive_buffer:
             self.sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
-        self.sock.settimeout(20.0)
+        self.sock.settimeout(240.0)  # longer than any test waits: silence is no end
         self.sock.connect(("127.0.0.1", port))
         self.frames = queue.Queue()
         self.ended = threading.Event()
@@ -71,7 +71,7 @@ class Client:
     def command(self, name, ending=b"", **fields):
         self.send(f"__{name}", json.dumps(fields).encode() + ending)
 
-    def next(self, timeout_s=60.0):
+    def next(self, timeout_s=180.0):
         """The next frame; JSON is parsed."""
         destination, payload = self.frames.get(timeout=timeout_s)
         if destination.startswith("__"):

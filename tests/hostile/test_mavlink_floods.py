@@ -204,18 +204,18 @@ def udp_link():
     vehicles = Vehicles()
     with BridgeHost(live.gateway) as bridges, contextlib.ExitStack() as stack:
         agreed = stack.enter_context(bound())
-        own, peer = free_port(), agreed.getsockname()
+        peer = agreed.getsockname()
 
         async def opened():
             limits = RateLimits(frames_per_s=1e-3)
-            return _UdpLink(vehicles, 1, 1, own, peer, None, limits, for_peer=True)
+            return _UdpLink(vehicles, 1, 1, 0, peer, None, limits, for_peer=True)
 
         async def closed():
             link.close()
 
         link = bridges.call(opened())
         vehicles.taken.clear()
-        yield vehicles.taken, own, agreed, link
+        yield vehicles.taken, link._socket.getsockname()[1], agreed, link
         bridges.call(closed())
     live.close()
 
@@ -228,11 +228,6 @@ def bound():
     sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     sock.bind(("127.0.0.1", 0))
     return sock
-
-
-def free_port():
-    with bound() as sock:
-        return sock.getsockname()[1]
 
 
 def test_a_flood_of_a_udp_port_does_not_crowd_out_its_agreed_peer(udp_link):

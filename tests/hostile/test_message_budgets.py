@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from filling import filled
 from live_graph import HandGraph
+from patient_websockets import connect
 from ros_tcp_client import frame
 from rosbridge_bench import Bench, FakeSimulation
 from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import connect
 
 from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.ros_tcp.session import EndpointSession

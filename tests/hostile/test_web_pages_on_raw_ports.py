@@ -11,6 +11,7 @@ import threading
 from functools import partial
 
 import pytest
+from held_ports import held_port
 from hypothesis import given
 from hypothesis import strategies as st
 from live_graph import LiveGraph
@@ -92,6 +93,12 @@ class Graph:
             subscribe = partial(self.live.graph.subscribe, topic, self.heard.append, kind)
             self.live.do(subscribe)
         self.bridges = BridgeHost(self.live.gateway)
+        self._held = contextlib.ExitStack()
+
+    def open_px4(self):
+        """A bridge for PX4, and its port, which has to have a number."""
+        port = self._held.enter_context(held_port())
+        return self.open(Px4Bridge(port=port)), port
 
     def open(self, bridge):
         self.bridges.open(bridge)
@@ -99,6 +106,7 @@ class Graph:
 
     def close(self):
         self.bridges.close()
+        self._held.close()
         self.live.close()
 
 
@@ -162,20 +170,12 @@ def ports(graph, comms, name):
     if name == "ros_tcp":
         return graph.open(RosTcpEndpoint(port=0)).port, ros_tcp_frame("/in", b"\0" * 8)
     if name == "px4":
-        port = free_port()
-        graph.open(Px4Bridge(port=port))
-        return port, heartbeat()
+        return graph.open_px4()[1], heartbeat()
     link = graph.open(SensorLink(port=0, image_port=0))
     return (link.port if name == "sensor_link" else link.image_port), pose()
 
 
 NAMES = ("comms", "mavlink_tcp", "ros_tcp", "px4", "sensor_link", "sensor_link_images")
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def is_ended(sock):
@@ -217,8 +217,7 @@ def test_tls_is_sent_away(graph, comms, name):
 
 
 def test_a_page_does_not_keep_a_px4_from_its_port(graph):
-    port = free_port()
-    bridge = graph.open(Px4Bridge(port=port))
+    bridge, port = graph.open_px4()
     idle = socket.create_connection(("127.0.0.1", port))
     with idle, socket.create_connection(("127.0.0.1", port)) as px4:
         px4.sendall(heartbeat())

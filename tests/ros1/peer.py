@@ -2,11 +2,13 @@
 
 import argparse
 import json
+import logging
 import sys
 import threading
 import time
 
 import rospy
+from geometry_msgs.msg import Twist
 from std_msgs.msg import Header, String
 from std_srvs.srv import SetBool, Trigger, TriggerResponse
 
@@ -19,25 +21,39 @@ class AlteredTrigger(Trigger):
     _md5sum = "0123456789abcdef0123456789abcdef"
 
 
+class Refusals(logging.Handler):
+    """Prints what rospy reports of sums that do not fit."""
+
+    def emit(self, record):
+        if "md5sum" in record.getMessage():
+            say({"refused": record.getMessage()})
+
+
 def say(value):
     sys.stdout.write(json.dumps(value) + "\n")
     sys.stdout.flush()
 
 
 def listen(options):
-    """Prints what comes; `--slow` seconds of sleep a message; `--altered`: with a wrong md5."""
+    """Prints what comes; `--slow` seconds of sleep a message; `--twist`: x of its velocity.
+
+    `--altered`: with a wrong md5; then it prints why it is refused, too.
+    """
     done = threading.Event()
     seen = []
 
     def on_message(message):
         header = message._connection_header
         seen.append(message)
-        say([message.data[:100], header["latching"], header["callerid"]])
+        what = message.linear.x if options.twist else message.data[:100]
+        say([what, header["latching"], header["callerid"]])
         time.sleep(options.slow)
         if len(seen) >= options.count:
             done.set()
 
-    kind = AlteredString if options.altered else String
+    if options.altered:
+        logging.getLogger("rospy").addHandler(Refusals(logging.WARNING))
+    kind = AlteredString if options.altered else Twist if options.twist else String
     rospy.Subscriber(options.name, kind, on_message, buff_size=4096 if options.slow else 65536)
     say("ready")
     done.wait(options.seconds)
@@ -104,9 +120,10 @@ def main():
     parser.add_argument("job", choices=JOBS)
     parser.add_argument("name")
     parser.add_argument("--count", type=int, default=1)
-    parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--seconds", type=float, default=240.0)
     parser.add_argument("--slow", type=float, default=0.0)
     parser.add_argument("--altered", action="store_true")
+    parser.add_argument("--twist", action="store_true")
     parser.add_argument("--latch", action="store_true")
     options = parser.parse_args()
     rospy.init_node(f"peer_{options.job}", anonymous=True, argv=["peer"], disable_rostime=True)

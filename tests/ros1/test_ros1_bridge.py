@@ -6,6 +6,7 @@ import gc
 import re
 import sys
 import threading
+from xmlrpc.client import ServerProxy
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from ros1_bench import (
     ours,
     peer,
     require_ros1,
+    running,
     shared_master,
     tool,
     wait_until,
@@ -106,6 +108,21 @@ def wanted(live, topic):
     return any(t.name == topic and t.subscribers for t in live.graph.topics())
 
 
+def readers(topic):
+    """How many connections the bridge has to subscribers of a topic in ROS 1."""
+    with ServerProxy(join_ros1("volery").master.ask("lookupNode", "/volery")) as node:
+        rows = node.getBusInfo("/test")[2]
+    return sum(row[2] == "o" and row[4] == topic for row in rows)
+
+
+@pytest.fixture(scope="module")
+def trigger(live):
+    """A service of the graph."""
+    live.graph.create_service(
+        "/trigger", TRIGGER, lambda _request: Triggered(True, f"done, {UNICODE}")
+    )
+
+
 def test_topics_are_listed_with_their_types(live, registered):
     live.publisher("/uav1/listed", "sensor_msgs/msg/LaserScan")
     live.publisher("/map_tree", "octomap_msgs/msg/Octomap")  # no package of it is installed
@@ -149,12 +166,13 @@ def test_rates_are_measured(live, registered):
     talking = threading.Thread(target=talk)
     talking.start()
     try:
-        command = ("timeout", "-sINT", "3", "rostopic", "hz", "--wall-time", "-w20", "/rated")
-        measured = re.findall(r"average rate: ([\d.]+)", tool(*command))
+        with running("rostopic", "hz", "--wall-time", "-w20", "/rated") as said:
+            assert wait_until(lambda: "average rate" in "".join(said))
+            measured = re.findall(r"average rate: ([\d.]+)", "".join(said))
     finally:
         stop.set()
         talking.join()
-    assert float(measured[-1]) > 1.0  # how many a busy machine sends is its own business
+    assert float(measured[0]) > 0.0  # how many a busy machine sends is its own business
 
 
 def test_sequence_numbers_count_what_was_sent(live, registered):
@@ -176,11 +194,11 @@ def test_a_wrong_md5_sum_is_refused_and_others_are_served(live, registered):
     with peer("listen", "/summed", "--altered") as wrong, peer("listen", "/summed") as right:
         assert wrong.next() == "ready"
         assert right.next() == "ready"
-        assert wait_until(lambda: wanted(live, "/summed"))
+        assert wait_until(lambda: readers("/summed") and wanted(live, "/summed"))
+        assert "0123456789abcdef0123456789abcdef" in wrong.next()["refused"]
         publish(String("fits"))
         assert right.next()[0] == "fits"
-        with pytest.raises(Exception):  # noqa: B017, PT011
-            wrong.next(0.5)
+        assert readers("/summed") == 1
 
 
 def test_the_late_get_what_was_latched_each_publisher_s_own(live, registered):
@@ -212,8 +230,8 @@ def test_a_slow_reader_delays_nobody(live, bridge, registered):
     with peer("hang", "/flood") as slow, peer("listen", "/flood", "--count=1000000") as quick:
         assert slow.next() == "ready"
         assert quick.next() == "ready"
+        assert wait_until(lambda: readers("/flood") == 2)
         assert wait_until(lambda: wanted(live, "/flood"))
-        threading.Event().wait(0.5)
         big = "x" * 200_000
         for _ in range(200):
             publish(String(big))
@@ -230,41 +248,42 @@ def subscribed():
 
 
 def test_commands_come_in_and_do_not_come_back(live, registered):
-    live.publisher("/uav1/cmd_vel", TWIST)  # the graph may have publishers of its own
+    ours = live.publisher("/uav1/cmd_vel", TWIST)  # the graph may have publishers of its own
     seen = live.collect("/uav1/cmd_vel", TWIST)
     registered("/uav1/cmd_vel")
     assert wait_until(lambda: "/uav1/cmd_vel" in dict(subscribed()))
     twist = "{linear: {x: 1.5}, angular: {z: -0.5}}"
-    echo = threading.Thread(
-        target=lambda: heard.append(tool("timeout", "3", "rostopic", "echo", "/uav1/cmd_vel"))
-    )
-    heard = []
-    echo.start()
-    kind = "geometry_msgs/Twist"
-    tool("timeout", "-sINT", "2", "rostopic", "pub", "-r5", "/uav1/cmd_vel", kind, twist)
-    echo.join()
-    assert len(seen) >= 3
+    kind, heard = "geometry_msgs/Twist", []
+    with peer("listen", "/uav1/cmd_vel", "--twist", "--count=1000000") as listener:
+        assert listener.next() == "ready"
+        assert wait_until(lambda: readers("/uav1/cmd_vel"))
+        with running("rostopic", "pub", "-r5", "/uav1/cmd_vel", kind, twist):
+            assert wait_until(lambda: len(seen) >= 3)
+            while sum(sender.startswith("/rostopic") for _, _, sender in heard) < 3:
+                heard.append(listener.next())
+        ours(Twist(Vector3(9.0, 0.0, 0.0), Vector3(0.0, 0.0, 0.0)))
+        while heard[-1][0] != 9.0:
+            heard.append(listener.next())
     assert seen[0] == Twist(Vector3(1.5, 0.0, 0.0), Vector3(0.0, 0.0, -0.5))
-    assert heard[0].count("linear") <= len(seen)  # each once
+    assert [x for x, _, sender in heard if sender == "/volery"] == [9.0]  # and none twice
 
 
 def test_topics_without_publishers_come_in_as_they_appear(live, bridge):
     with peer("talk", "/from_outside") as talker:
         assert talker.next() == "ready"
         seen = live.collect("/from_outside", STRING)
-        talked = 0
-        while not seen and talked < 100:
-            talker.tell(f"{talked} {UNICODE}")
-            talked += 1
-            threading.Event().wait(0.05)
+
+        def arrives():
+            talker.tell(UNICODE)
+            return seen
+
+        assert wait_until(arrives)
         assert seen[0].data.endswith(UNICODE)
     assert "/from_outside" in {t for s in live.gateway.sessions() for t in s.publishes}
 
 
+@pytest.mark.usefixtures("trigger")
 def test_services_of_the_graph(live, registered):
-    live.graph.create_service(
-        "/trigger", TRIGGER, lambda _request: Triggered(True, f"done, {UNICODE}")
-    )
     bool_response = message_type("std_srvs/srv/SetBool_Response")
     live.graph.create_service(
         "/set", "std_srvs/srv/SetBool", lambda q: bool_response(q.data, f"{q.data}")
@@ -295,7 +314,7 @@ def own_types(tmp_path_factory):
         write_package(name, folder, ros1=True)
     paths = dict(
         line.removeprefix("export ").split("=", 1)
-        for line in tool(SYSTEM_PYTHON, str(write_generator(folder)), seconds=60.0).splitlines()
+        for line in tool(SYSTEM_PYTHON, str(write_generator(folder))).splitlines()
     )
     return {name: path.replace(":$PYTHONPATH", "") for name, path in paths.items()}
 
@@ -369,26 +388,23 @@ def test_a_bag_is_recorded(live, registered, tmp_path):
     registered("/map_recorded")
     bag = tmp_path / "flight.bag"
     done = []
-    command = (
-        "rosbag",
-        "record",
-        "-O",
-        str(bag),
-        "--duration=3",
-        "/uav1/recorded",
-        "/map_recorded",
-    )
+    topics = ("/uav1/recorded", "/map_recorded")
+    command = ("rosbag", "record", "-O", str(bag), "--limit=5", *topics)  # of each topic
     recording = threading.Thread(target=lambda: done.append(tool(*command)))
     recording.start()
-    assert wait_until(lambda: wanted(live, "/uav1/recorded"))
+    assert wait_until(lambda: all(map(readers, topics)) and wanted(live, "/uav1/recorded"))
     for k in range(5):
         scans(Header(Time(k, 0), "laser"))
+        if k:  # the first one was latched
+            kept(octomap(Header(Time(9, 9), "map"), True, "OcTree", 0.25, tree))
     recording.join()
     with AnyReader([bag]) as reader:
         read = [(c.topic, reader.deserialize(d, c.msgtype)) for c, _, d in reader.messages()]
     headers = [message for topic, message in read if topic == "/uav1/recorded"]
     assert [message.stamp.sec for message in headers] == [0, 1, 2, 3, 4]
-    (map_read,) = [message for topic, message in read if topic == "/map_recorded"]
+    map_read, *later = [message for topic, message in read if topic == "/map_recorded"]
+    assert map_read.header.stamp.sec == 3
+    assert len(later) == 4
     np.testing.assert_array_equal(map_read.data, tree)
 
 
@@ -397,21 +413,18 @@ def test_one_node_a_process(bridge):
         join_ros1("another")
 
 
+@pytest.mark.usefixtures("trigger")
 def test_a_program_of_ours(live, registered):
-    live.publisher("/latched", STRING, latched=True)
+    live.publisher("/latched", STRING, latched=True)(String("third"))
     live.graph.create_service("/trigger_ours", TRIGGER, lambda _: Triggered(True, "yes"))
     seen = live.collect("/from_program", STRING)
     headers = live.collect("/headers_in", HEADER)
     registered("/latched")
     del headers
-    if not live.graph.has_service("/trigger"):
-        live.graph.create_service(
-            "/trigger", TRIGGER, lambda _: Triggered(True, f"done, {UNICODE}")
-        )
     registered("/trigger", "lookupService")
     with ours("client_program.py") as program:
-        text, received = program.next(20.0)
-        assert text in {"new", "second"}
+        text, received = program.next()
+        assert text in {"new", "second", "third"}
         assert received >= 1
         assert program.next() == "topic '/headers_in' carries std_msgs/msg/Header"
         assert program.next() == f"done, {UNICODE}"
@@ -429,22 +442,24 @@ def test_a_node_with_the_hostname_localhost_hears(live, registered):
     publish(String("heard"))
     registered("/to_localhost")
     with ours("localhost_program.py", ROS_HOSTNAME="localhost") as program:
-        assert program.next(20.0) == "heard"
+        assert program.next() == "heard"
 
 
-def test_a_master_that_began_anew_is_told_everything(live, master, registered):
+@pytest.mark.usefixtures("trigger")
+def test_a_master_that_began_anew_is_told_everything(live, master, registered, caplog):
     publish = live.publisher("/lasting", STRING)
     registered("/lasting")
+    registered("/trigger", "lookupService")
     master.stop()
     live.publisher("/appeared_meanwhile", STRING)
-    threading.Event().wait(1.5)  # the bridge looks for topics and for the master
+    assert wait_until(lambda: "ROS master" in caplog.text)  # the bridge has missed it
     master.start()
     registered("/lasting")
     registered("/appeared_meanwhile")
     registered("/trigger", "lookupService")
     with peer("listen", "/lasting") as listener:
         assert listener.next() == "ready"
-        assert wait_until(lambda: wanted(live, "/lasting"))
+        assert wait_until(lambda: readers("/lasting") and wanted(live, "/lasting"))
         publish(String("still here"))
         assert listener.next()[0] == "still here"
     assert wait_until(lambda: "/use_sim_time" in tool("rosparam", "list"))

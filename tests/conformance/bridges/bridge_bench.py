@@ -28,7 +28,7 @@ IMAGE = "sensor_msgs/msg/Image"
 TRIGGER = "std_srvs/srv/Trigger"
 LIMIT_BYTES = 12 << 20
 """Of one message, where a bridge can be told."""
-PATIENCE_S = 60.0
+PATIENCE_S = 180.0
 _TCP_REPAIR = 19
 
 Triggered = message_type(f"{TRIGGER}_Response")
@@ -84,6 +84,10 @@ class Client:
     def call(self, service):
         """Answer of a Trigger; raises `Refused`."""
         raise NotImplementedError
+
+    def call_in_vain(self, service):
+        """Call a service that has ended; raises `Refused`."""
+        self.call(service)
 
     def create_service(self, service):
         """Offer a Trigger."""

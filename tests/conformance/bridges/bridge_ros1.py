@@ -71,6 +71,10 @@ class NodeClient(Client):
             raise Refused(str(error)) from None
         return self._form.answer(body)
 
+    def call_in_vain(self, service):
+        until(lambda: self.node.master.lookupService(self.node.name, service)[0] != 1)
+        raise Refused("the master knows no server")
+
     def create_service(self, service):
         answer = None if self.their_answer is None else self._form.triggered(self.their_answer)
         self.node.create_service(service, TRIGGER.replace("/srv", ""), answer)

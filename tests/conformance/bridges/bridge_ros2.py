@@ -51,7 +51,7 @@ class PeerClient(Client):
             self.messages.put(data[8 : 8 + length - 1].decode())
 
     def advertise(self, topic, msgtype=STRING, *, latched=False):
-        self._do("advertise", topic=topic, type=msgtype, latched=latched, wait=True)
+        assert self._do("advertise", topic=topic, type=msgtype, latched=latched, wait=True)
 
     def publish(self, topic, text):
         self.publish_bytes(topic, text.encode())
@@ -85,10 +85,14 @@ class PeerClient(Client):
             raise Refused(text)
         return text
 
+    def call_in_vain(self, service):
+        assert self._do("outlive", service=service)
+        raise Refused("no server")
+
     def create_service(self, service):
         answer = None if self.their_answer is None else self._form.triggered(self.their_answer)
         data = None if answer is None else base64.b64encode(answer).decode()
-        self._do("create_service", service=service, answer=data)
+        assert self._do("create_service", service=service, answer=data)
         until(lambda: self._bench.is_offered(service))
 
     def settle(self):

@@ -308,7 +308,10 @@ class ConnectorBench(Bench):
         listener.listen(1)
         self._listeners.append(listener)
         connector = RosTcpConnector(
-            port=listener.getsockname()[1], subscribe=["/in*", "/image_in"], publish=["/*out*"]
+            port=listener.getsockname()[1],
+            subscribe=["/in*", "/image_in"],
+            publish=["/*out*"],
+            handshake_s=PATIENCE_S,
         )
         self._connectors[listener] = connector
         self.ours.bridges.open(connector)

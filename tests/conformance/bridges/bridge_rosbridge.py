@@ -24,9 +24,9 @@ from bridge_bench import (
     Triggered,
     reset,
 )
+from patient_websockets import connect
 from ros_tcp_client import until
 from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import connect
 from websockets.sync.server import serve
 
 from volery.bridges.rosbridge.client import RosbridgeClient
@@ -289,7 +289,9 @@ class ClientBench(Bench):
         self._done = threading.Event()
         self._server = self._serve(0)
         self._port = self._server.socket.getsockname()[1]
-        self.ours = Program(RosbridgeClient(f"ws://127.0.0.1:{self._port}"))
+        self.ours = Program(
+            RosbridgeClient(f"ws://127.0.0.1:{self._port}", connect_timeout_s=PATIENCE_S)
+        )
 
     def _serve(self, port):
         def handle(websocket):

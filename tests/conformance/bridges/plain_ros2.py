@@ -43,7 +43,7 @@ CONFIG = """<CycloneDDS><Domain id="any">
     <ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>
     <Peers><Peer address="localhost"/></Peers></Discovery>
 </Domain></CycloneDDS>"""
-MATCH_S = 3.0
+MATCH_S = 150.0
 PICTURE_HEAD = 1000
 """Bytes of a picture that are reported. A pipe takes a line below 4096 bytes as one: a process that
 is stopped while it writes leaves no half line."""
@@ -136,7 +136,7 @@ class Peer:
 
     def join(self):
         self.participant = DomainParticipant(self.domain_id)
-        self.writers, self.hearers, self.leaving = {}, [], False
+        self.writers, self.askers, self.hearers, self.leaving = {}, {}, [], False
         self.waitset = WaitSet(self.participant)
         self.listener = threading.Thread(target=self.listen, daemon=True)
         self.listener.start()
@@ -234,6 +234,7 @@ class Peer:
         quality = qos(user_data=b"clientid=1.2.3;")
         writer = self.speak(f"rq{service}Request", Request_, quality)
         reader = self.hear(f"rr{service}Reply", Response_, take, quality)
+        self.askers[service] = writer
         both = self.matched(
             lambda: writer.get_matched_subscriptions() and reader.get_matched_publications()
         )
@@ -242,6 +243,10 @@ class Peer:
             come.wait(MATCH_S)
         self.hearers = [known for known in self.hearers if known[0] is not reader]
         return base64.b64encode(found[0]).decode() if found else None
+
+    def outlive(self, service):
+        """Wait until a service that was called has no server any more."""
+        return self.matched(lambda: not self.askers[service].get_matched_subscriptions())
 
     def create_service(self, service, answer):
         quality = qos(user_data=b"serviceid=1.2.3;")

@@ -1,9 +1,11 @@
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 
 import numpy as np
 import pytest
+from held_ports import held_port
 
 from volery.graph import messages as m
 
@@ -57,3 +59,10 @@ def make_flight(seconds: float = 2.0) -> list[m.Published]:
 @pytest.fixture
 def flight() -> Callable[[float], list[m.Published]]:
     return make_flight
+
+
+@pytest.fixture
+def hold_port() -> Iterator[Callable[[], int]]:
+    """Ports that stay the test's own, also while no server listens there."""
+    with ExitStack() as held:
+        yield lambda: held.enter_context(held_port())

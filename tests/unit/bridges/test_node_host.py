@@ -152,11 +152,11 @@ def test_who_calls_a_service_at_its_start_has_the_graph_joined(world):
 
 def test_timers_can_be_put_off(world):
     host = NodeHost(world.gateway.open("node"), clock="wall")
+    begin_ns = host.now_ns()
     node = Parrot(context=host.context())
     host.postpone(3 * 10**8)
-    begin = time.monotonic()
     spin_until(host, lambda: node.times)
-    assert time.monotonic() - begin > 0.75
+    assert node.times[0] - begin_ns >= 8 * 10**8
 
 
 def test_a_service_that_nobody_offers(world):
@@ -198,8 +198,9 @@ def test_a_simulation_that_starts_again_keeps_timers_going(world):
 def test_without_a_clock_the_computers_counts(world):
     host = NodeHost(world.gateway.open("node"), clock="wall")
     node = Parrot(context=host.context())
+    begin_ns = time.time_ns()
     spin_until(host, lambda: node.times)
-    assert abs(node.times[0] - time.time_ns()) < 5_000_000_000
+    assert begin_ns <= node.times[0] <= time.time_ns()
 
 
 def test_what_a_node_breaks_ends_the_host_with_its_name(world):

@@ -18,11 +18,16 @@ from volery.graph.service_reply import ServiceReply
 STRING = "std_msgs/msg/String"
 TRIGGER = "std_srvs/srv/Trigger"
 Request = message_type(f"{TRIGGER}_Request")
+PATIENT = {"connect_timeout_s": 60.0}
+"""With a busy machine."""
 WAYS = {
-    "ros-tcp": (RosTcpEndpoint, lambda port, **options: RosTcpClient(port=port, **options)),
+    "ros-tcp": (
+        RosTcpEndpoint,
+        lambda port, **options: RosTcpClient(port=port, **PATIENT, **options),
+    ),
     "rosbridge": (
         RosbridgeServer,
-        lambda port, **options: RosbridgeClient(f"ws://127.0.0.1:{port}", **options),
+        lambda port, **options: RosbridgeClient(f"ws://127.0.0.1:{port}", **PATIENT, **options),
     ),
 }
 

@@ -48,6 +48,7 @@ from volery.graph.typestore import typestore
 
 STRING = "std_msgs/msg/String"
 TRIGGER = "std_srvs/srv/Trigger"
+TWIST = "geometry_msgs/msg/Twist"
 STEPS = "simulation_interfaces/action/SimulateSteps"
 NODE = "/uav1/gap_following"
 
@@ -192,15 +193,26 @@ def test_names_that_ros2_does_not_allow_stay_inside(world, other):
 
 
 def test_other_domains_are_not_heard(world):
-    stranger = Other(Ros2Environment(domain_id=DOMAIN + 2))
-    _, publish = stranger.speak("/uav1/cmd_vel", "geometry_msgs/msg/Twist")
-    before = len(world.commands)
-    for _ in range(20):
-        publish(zero_message("geometry_msgs/msg/Twist"))
+    """Not by the time at which what came later in its own domain is heard."""
+    elsewhere = Ros2Environment(domain_id=DOMAIN + 2)
+    stranger, friend_there, friend = Other(elsewhere), Other(elsewhere), Other()
+    _, publish = stranger.speak("/uav1/cmd_vel", TWIST)
+    heard_there = friend_there.hear("/uav1/cmd_vel", TWIST)
+    _, publish_here = friend.speak("/uav1/cmd_vel", TWIST)
+    theirs, ours = zero_message(TWIST), zero_message(TWIST)
+    theirs.linear.x, ours.linear.x = 2.5, 3.5
+
+    def both_arrive():
+        publish(theirs)
+        publish_here(ours)
         time.sleep(0.01)
-    assert len(world.commands) == before
-    assert stranger.participant.publishers() == []
-    stranger.close()
+        return heard_there.qsize() and any(c.message.linear.x == 3.5 for c in world.commands)
+
+    until(both_arrive)
+    assert not any(c.message.linear.x == 2.5 for c in world.commands)
+    assert [p.topic for p in friend_there.participant.publishers()] == ["/uav1/cmd_vel"]
+    for one in (stranger, friend_there, friend):
+        one.close()
 
 
 def test_one_domain_has_one_configuration_in_a_process(world):
@@ -278,11 +290,15 @@ def test_parameters_are_listed_described_and_read(world, other):
 def test_parameters_are_set_and_that_is_told(world, other):
     events = other.hear("/parameter_events", "rcl_interfaces/msg/ParameterEvent")
     until(lambda: any(p.topic == "/parameter_events" for p in other.participant.publishers()))
-    time.sleep(0.1)
     wanted = [parameter_message("height_m", 4.5), parameter_message("name", "y")]
-    results = parameters(other, "SetParameters", parameters=wanted).results
-    assert [r.successful for r in results] == [True, False]
-    assert "read-only" in results[1].reason
+
+    def is_told():
+        results = parameters(other, "SetParameters", parameters=wanted).results
+        assert [r.successful for r in results] == [True, False]
+        assert "read-only" in results[1].reason
+        return events.qsize()
+
+    until(is_told)
     assert world.graph.parameters.get(NODE, "height_m").value == 4.5
     event = events.get(timeout=60.0)
     assert (event.node, event.changed_parameters[0].name) == (NODE, "height_m")
@@ -483,16 +499,20 @@ def test_clients_and_servers_of_another_kind_are_told_and_not_misread(world, oth
     )
     for _ in range(20):
         library.write(writer, b"\0\1\0\0" + bytes(20))
-        time.sleep(0.01)
+    caller = other.participant.caller(ServiceSpec(other.node, "/strange", TRIGGER))
+    until(lambda: caller.ready)
+    caller.call(encode_cdr(zero_message(f"{TRIGGER}_Request"), f"{TRIGGER}_Request"), print, print)
+    until(lambda: asked)
+    assert len(asked) == 1  # which was put behind the others
     assert caplog.text.count("/strange") == 1
-    assert asked == []
+    caller.close()
     library.delete(writer)
 
     server = DataReader(inner, Topic(inner, "rq/foreignRequest", request), qos=quality)
     answers = DataWriter(inner, Topic(inner, "rr/foreignReply", response), qos=quality)
     link = Ros2Client(Ros2Environment(domain_id=DOMAIN), "/asker")
     with pytest.raises(GraphError, match="its server is of Cyclone DDS and lacks 'serviceid="):
-        call_and_wait(link, "/foreign", None, 15.0)
+        call_and_wait(link, "/foreign", None, 60.0)
     link.close()
     library.delete(server)
     library.delete(answers)

@@ -171,13 +171,13 @@ def test_a_link_finds_topics_and_services(simulated, link):
     assert link.topic_types()["/clock"] == "rosgraph_msgs/msg/Clock"
     until(lambda: "/ours" in link.service_types())
     assert link.service_types()["/ours"] == TRIGGER
-    assert call_and_wait(link, "/ours", None, 10.0).message == "ours"
+    assert call_and_wait(link, "/ours", None, 60.0).message == "ours"
 
 
 def test_a_link_says_what_is_not_there(link, monkeypatch):
     monkeypatch.setattr("volery.bridges.ros2.client._LONGEST_LOOK_S", 0.1)
     with pytest.raises(GraphError, match="service '/nowhere' has no server"):
-        call_and_wait(link, "/nowhere", None, 10.0)
+        call_and_wait(link, "/nowhere", None, 60.0)
     with pytest.raises(GraphError, match="no topic '/nowhere'"):
         link.subscribe("/nowhere", wake=lambda: None)
     with pytest.raises(GraphError, match="not known"):
@@ -185,7 +185,7 @@ def test_a_link_says_what_is_not_there(link, monkeypatch):
     with pytest.raises(GraphError, match="does not allow"):
         link.advertise("/1x", STRING)
     with pytest.raises(GraphError, match="needs"):
-        call_and_wait(link, "/ours", String("x"), 10.0)
+        call_and_wait(link, "/ours", String("x"), 60.0)
     with pytest.raises(GraphError, match="not advertised"):
         link.publish("/never", String("x"))
 

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import json
 import queue
-import socket
 import struct
+import threading
 import time
 
 import pytest
 import zenoh
+from held_ports import held_port
 from live_graph import LiveGraph
 from ros2_bench import DOMAIN, Other
 from ros_tcp_client import until
@@ -118,26 +119,21 @@ def test_attachments_have_33_bytes():
 # ---------------------------------------------------------------------------------- two at a router
 
 
-def free_port():
-    with socket.socket() as sock:
-        sock.bind(("127.0.0.1", 0))
-        return sock.getsockname()[1]
-
-
 @pytest.fixture(scope="module")
 def router():
     """A router of the tests' own."""
-    address = f"127.0.0.1:{free_port()}"
-    config = zenoh.Config()
-    for key, value in {
-        "mode": "router",
-        "listen/endpoints": [f"tcp/{address}"],
-        "scouting/multicast/enabled": False,
-    }.items():
-        config.insert_json5(key, json.dumps(value))
-    session = zenoh.open(config)
-    yield address
-    session.close()
+    with held_port() as port:
+        address = f"127.0.0.1:{port}"
+        config = zenoh.Config()
+        for key, value in {
+            "mode": "router",
+            "listen/endpoints": [f"tcp/{address}"],
+            "scouting/multicast/enabled": False,
+        }.items():
+            config.insert_json5(key, json.dumps(value))
+        session = zenoh.open(config)
+        yield address
+        session.close()
 
 
 @pytest.fixture(scope="module")
@@ -194,9 +190,10 @@ def test_services_go_both_ways(world, other):
     server = other.participant.server(spec, lambda _data, reply: reply(answer))
     assert call(world, "/theirs").get(timeout=60.0).message == "theirs"
     server.close()
-    silent = other.participant.server(spec, lambda _data, _reply: None)
+    heard = threading.Event()
+    silent = other.participant.server(spec, lambda _data, _reply: heard.set())
     asked = call(world, "/theirs")
-    time.sleep(0.3)
+    assert heard.wait(60.0)
     silent.close()
     assert isinstance(asked.get(timeout=60.0), GraphError)
 
@@ -210,35 +207,45 @@ def call(world, service):
 def test_strangers_do_no_harm(world, other, router):
     """Queries without attachment, bytes that are no message, another hash."""
     stranger, _ = zenoh_session.open_session(router)
-    world.graph.create_service("/asked", TRIGGER, lambda _q: Triggered(True, "asked"))
+    asked = []
+    world.graph.create_service(
+        "/asked", TRIGGER, lambda q: asked.append(q) or Triggered(True, "asked")
+    )
     until(lambda: "/asked" in other.participant.service_types())
-    replies = list(stranger.get(service_key(DOMAIN, "/asked", TRIGGER), payload=b"x", timeout=2.0))
+    replies = list(stranger.get(service_key(DOMAIN, "/asked", TRIGGER), payload=b"x", timeout=0.5))
     assert [reply for reply in replies if reply.ok is not None] == []
     seen = []
     world.do(lambda: world.graph.subscribe("/odd", seen.append, STRING))
-    time.sleep(0.4)
-    stranger.put(topic_key(DOMAIN, "/odd", STRING), b"no CDR")
+    key = topic_key(DOMAIN, "/odd", STRING)
+
+    def arrives():
+        stranger.put(key, b"\0\1\0\0\2\0\0\0w\0")
+        time.sleep(0.01)
+        return seen
+
+    until(arrives)
+    stranger.put(key, b"no CDR")
     stranger.put(f"{DOMAIN}/odd/std_msgs::msg::dds_::String_/RIHS01_00", b"\0\1\0\0\2\0\0\0x\0")
-    stranger.put(topic_key(DOMAIN, "/odd", STRING), b"\0\1\0\0\2\0\0\0y\0")
-    until(lambda: seen)
-    time.sleep(0.1)
-    assert [p.message.data for p in seen] == ["y"]
+    stranger.put(key, b"\0\1\0\0\2\0\0\0y\0")
+    until(lambda: seen[-1].message.data == "y")
+    assert {p.message.data for p in seen} == {"w", "y"}
     stranger.close()
     assert other.call("/asked", TRIGGER).message == "asked"
+    assert len(asked) == 1
 
 
 def test_a_router_that_is_not_there_is_named():
-    address = f"127.0.0.1:{free_port()}"
-    with pytest.raises(BridgeError, match=address):
-        zenoh_session.open_session(address)
+    with held_port() as port, pytest.raises(BridgeError, match=f"127.0.0.1:{port}"):
+        zenoh_session.open_session(f"127.0.0.1:{port}")
 
 
 def test_without_a_router_the_session_becomes_one(monkeypatch):
-    monkeypatch.setattr(zenoh_session, "DEFAULT_ROUTER", f"127.0.0.1:{free_port()}")
-    first, where = zenoh_session.open_session("")
-    second, there = zenoh_session.open_session("")
-    assert "as the router" in where
-    assert "as the router" not in there
-    until(lambda: list(second.info.routers_zid()))
-    second.close()
-    first.close()
+    with held_port() as port:
+        monkeypatch.setattr(zenoh_session, "DEFAULT_ROUTER", f"127.0.0.1:{port}")
+        first, where = zenoh_session.open_session("")
+        second, there = zenoh_session.open_session("")
+        assert "as the router" in where
+        assert "as the router" not in there
+        until(lambda: list(second.info.routers_zid()))
+        second.close()
+        first.close()

@@ -30,6 +30,9 @@ Request = message_type(f"{TRIGGER}_Request")
 Response = message_type(f"{TRIGGER}_Response")
 EmptyRequest = message_type(f"{EMPTY}_Request")
 
+PATIENT = {"connect_timeout_s": 60.0, "handshake_s": 60.0}
+"""With a busy machine."""
+
 
 @pytest.fixture
 def loop():
@@ -51,7 +54,7 @@ def connect():
     clients = []
 
     def connect(port, **options):
-        clients.append(RosTcpClient(port=port, **options))
+        clients.append(RosTcpClient(port=port, **(PATIENT | options)))
         return clients[-1]
 
     yield connect
@@ -75,7 +78,7 @@ def collect(loop, topic, msgtype=STRING):
 
 
 def call(client, service, request=None):
-    return call_and_wait(client, service, request, 10.0)
+    return call_and_wait(client, service, request, 60.0)
 
 
 # ------------------------------------------------------------------------------------------ topics
@@ -243,10 +246,11 @@ def test_services_are_offered(loop, client):
 # ------------------------------------------------------------------------------------- connections
 
 
-def test_it_comes_back_and_asks_for_everything_again(loop, connect):
-    first = RosTcpEndpoint(port=0)
+def test_it_comes_back_and_asks_for_everything_again(loop, connect, hold_port):
+    port = hold_port()
+    first = RosTcpEndpoint(port=port)
     loop.bridges.open(first)
-    client = connect(first.port)
+    client = connect(port)
     client.advertise("/in", STRING)
     messages = client.subscribe("/out", STRING, wake=lambda: None)
     client.create_service("/do", TRIGGER, lambda _q, reply: reply.answer(Response(True, "again")))
@@ -261,8 +265,8 @@ def test_it_comes_back_and_asks_for_everything_again(loop, connect):
     assert client.dropped == 1
     with pytest.raises(GraphError, match="no connection"):
         call(client, "/do", Request())
-    loop.bridges.open(RosTcpEndpoint(port=first.port))
-    client.wait_until_connected(10.0)
+    loop.bridges.open(RosTcpEndpoint(port=port))
+    client.wait_until_connected(60.0)
     assert client.connections == 2
     seen = collect(loop, "/in")
     client.publish("/in", String("again"))
@@ -276,7 +280,7 @@ def test_it_comes_back_and_asks_for_everything_again(loop, connect):
 def test_what_waits_is_sent_before_it_leaves(loop, endpoint):
     """More than the network takes at once."""
     seen = collect(loop, "/in")
-    client = RosTcpClient(port=endpoint.port)
+    client = RosTcpClient(port=endpoint.port, **PATIENT)
     client.advertise("/in", STRING)
     client.publish("/in", String("x" * 20_000_000))
     client.close()
@@ -461,8 +465,10 @@ def test_an_old_endpoint_sends_no_handshake(connect, generation, ending):
         (frame("__handshake", b'{"version": "v9"}'), "neither ROS1 nor ROS2"),
     ],
 )
-def test_who_speaks_something_else_is_named(greeting, why):
+def test_who_speaks_something_else_is_named(connect, greeting, why):
     other = Other(greeting)
+    client = connect(other.port, connect_timeout_s=0)
+    until(lambda: why in client._why)
     with pytest.raises(BridgeError, match=why):
-        RosTcpClient(port=other.port, connect_timeout_s=2.0)
+        client.wait_until_connected(0.0)
     other.close()

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import gc
 import json
+import select
 import socket
 import struct
 import threading
-import time
 import tracemalloc
 from pathlib import Path
 
@@ -448,17 +448,25 @@ def test_answers_overtake_a_flood(loop, serve, connect):
 
 
 def test_errors_nobody_reads_do_not_pile_up(loop, serve, connect):
-    client = connect(serve().port, reading=False, receive_buffer=4096)
-    client.sock.settimeout(0.5)
+    port = serve().port
+    client, other = connect(port, reading=False, receive_buffer=4096), connect(port)
+    client.sock.setblocking(False)
     wrong = frame("/unknown", b"") * 1000
 
-    def flood():
-        for _ in range((64 << 20) // len(wrong)):
-            client.sock.sendall(wrong)
+    def takes_more():
+        """Whether the socket takes more by the time at which somebody else was served often."""
+        for _ in range(50):
+            if select.select([], [client.sock], [], 0.0)[1]:
+                return True
+            other.synchronize()
+        return False
 
-    with pytest.raises(TimeoutError):
-        flood()
-    client.read()
+    sent, rest = 0, b""
+    while sent < 64 << 20 and takes_more():
+        rest = rest or wrong
+        count = client.sock.send(rest)
+        sent, rest = sent + count, rest[count:]
+    assert sent < 64 << 20
 
 
 def test_commands_do_not_pile_up_while_the_simulation_is_busy(loop, client):
@@ -602,13 +610,9 @@ def test_a_flood_of_one_client_delays_no_other(loop, serve, connect):
 
     thread = threading.Thread(target=flood)
     thread.start()
-    waits = []
     try:
-        for _ in range(30):
-            start = time.perf_counter()
+        for _ in range(30):  # the flood itself never ends: who had to wait for that would fail
             other.synchronize()
-            waits.append(time.perf_counter() - start)
     finally:
         stop.set()
         thread.join()
-    assert sorted(waits)[15] < 5.0  # the flood itself never ends

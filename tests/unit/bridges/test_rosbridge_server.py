@@ -14,9 +14,9 @@ from pathlib import Path
 import cbor2
 import numpy as np
 import pytest
+from patient_websockets import connect
 from rosbridge_bench import SET_BOOL, STEPS, STRING, TRIGGER, FakeSimulation, trigger_response
 from websockets.exceptions import ConnectionClosed, InvalidStatus
-from websockets.sync.client import connect
 
 from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.origins import Origins
@@ -163,7 +163,7 @@ def test_eight_megabytes_both_ways(simulation, server, compression):
         client.send("advertise", topic="/back", type=IMAGE)
         operation = {"op": "publish", "topic": "/back", "msg": {"data": bytes(8_000_000)}}
         client.socket.send(cbor2.dumps(operation))
-        until(lambda: seen, 30)
+        until(lambda: seen)
         assert seen[0].message.data.shape == (8_000_000,)
 
 
@@ -196,10 +196,12 @@ def test_throttled_streams(simulation, server):
         simulation.do(lambda: publisher.publish(m.String("first")))
         assert client.read()["msg"]["data"] == "first"
         simulation.do(lambda: [publisher.publish(m.String(str(k))) for k in range(50)])
-        assert client.read()["msg"]["data"] == "49"
-        assert time.monotonic() - began > 0.19
-        with pytest.raises(TimeoutError):
-            client.read(0.3)
+        read = [client.read()["msg"]["data"]]
+        while read[-1] != "49":
+            read.append(client.read()["msg"]["data"])
+        assert len(read) <= (time.monotonic() - began) / 0.19
+        client.send("unadvertise_service", service="/nothing", id="sync")
+        assert client.read()["id"] == "sync"  # and nothing more came
 
 
 def test_unknown_types_are_told(server):
@@ -318,7 +320,7 @@ def test_half_open_sockets_and_nonsense(server):
 
 @pytest.fixture
 def client(server):
-    client = RosbridgeClient(url_of(server), name="node")
+    client = RosbridgeClient(url_of(server), name="node", connect_timeout_s=60.0)
     yield client
     client.close()
 
@@ -374,10 +376,11 @@ def test_its_services(simulation, client):
     until(lambda: not simulation.graph.has_service("/mine"))
 
 
-def test_it_comes_back_and_announces_everything_again(simulation, bridges):
-    first = RosbridgeServer(port=0)
+def test_it_comes_back_and_announces_everything_again(simulation, bridges, hold_port):
+    port = hold_port()
+    first = RosbridgeServer(port=port)
     bridges.open(first)
-    client = RosbridgeClient(url_of(first), name="node")
+    client = RosbridgeClient(url_of(first), name="node", connect_timeout_s=60.0)
     try:
         client.advertise("/in", STRING)
         queue = client.subscribe("/out", STRING, wake=lambda: None)
@@ -390,8 +393,8 @@ def test_it_comes_back_and_announces_everything_again(simulation, bridges):
         client.publish("/in", m.String("lost"))
         assert client.dropped == 1
         assert "no connection" in str(ask(client, "/mine"))
-        bridges.open(RosbridgeServer(port=first.port))
-        client.wait_until_connected(20)
+        bridges.open(RosbridgeServer(port=port))
+        client.wait_until_connected(60.0)
         assert client.connections == 2
         until(lambda: simulation.graph.has_service("/mine"))
         counts = {t.name: (t.publishers, t.subscribers) for t in simulation.graph.topics()}
@@ -409,8 +412,8 @@ def test_nobody_answers():
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]
-    with pytest.raises(BridgeError, match="no rosbridge server"):
-        RosbridgeClient(f"ws://127.0.0.1:{port}", connect_timeout_s=0.3)
+        with pytest.raises(BridgeError, match="no rosbridge server"):
+            RosbridgeClient(f"ws://127.0.0.1:{port}", connect_timeout_s=0.3)
     with pytest.raises(BridgeError, match="not a rosbridge address"):
         RosbridgeClient("http://127.0.0.1")
 

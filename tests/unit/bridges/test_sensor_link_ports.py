@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import socket
-import time
 
 import numpy as np
 import pytest
@@ -55,7 +54,7 @@ class Plain:
         self.socket = socket.socket()
         if receive_buffer:
             self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
-        self.socket.settimeout(10.0)
+        self.socket.settimeout(60.0)
         self.socket.connect(("127.0.0.1", port))
         self.parser = SensorLinkParser()
         self.frames = []
@@ -264,14 +263,10 @@ def test_pictures_that_nobody_reads_delay_no_scan(loop, link, connect):
     sensors, images = connect(link.port), connect(link.image_port, receive_buffer=1 << 16)
     wanted(loop, camera)
     wanted(loop, laser)
-    ages = []
     for k in range(60):
         loop.post(lambda k=k: camera.publish(image(k, 640)))
-        began = time.perf_counter()
         loop.publish(laser, scan(k))
-        assert sensors.next().sequence == k
-        ages.append(time.perf_counter() - began)
-    assert np.median(ages) < 1.0  # a scan behind pictures that are not read would never come
+        assert sensors.next().sequence == k  # behind pictures that are not read it would never come
     info = next(info for info in link.clients if "images" in info.name)
     assert info.waiting <= 1
     frames = [images.next()]
@@ -290,16 +285,16 @@ def test_images_at_a_rate_of_their_own(loop, bridges, connect):
     camera = loop.graph.advertise("/uav1/camera/image_raw", Image)
     images = connect(link.image_port)
     wanted(loop, camera)
-    stamps = []
+    first_of_each_tenth, stamps = (0, 4, 7, 10, 13, 16, 19), []
     for k in range(20):
         clock[0] = k * 33_000_000
         loop.publish(camera, image(k, 8))
-        time.sleep(0.005)
+        if k in first_of_each_tenth:  # a client that lags has only the newest
+            stamps.append(images.next().stamp_ns)
     clock[0] = 1_000_000  # the simulation went back
     loop.publish(camera, image(99, 8))
-    while 99_000_000 not in stamps:
-        stamps.append(images.next().stamp_ns)
-    assert len(stamps) == 8  # 0.63 s hold seven, and the last
+    stamps.append(images.next().stamp_ns)
+    assert stamps == [k * 1_000_000 for k in (*first_of_each_tenth, 99)]
 
 
 def test_a_port_in_use(link, bridges):
@@ -399,7 +394,10 @@ def test_a_flight_seen_from_the_ros_side(ros):
     assert all((published.topic, published.cdr) in sent for published in heard)
 
 
-def test_the_ros_side_joins_again(loop, link, bridges, ros):
+def test_the_ros_side_joins_again(loop, bridges, ros, hold_port):
+    port, image_port = hold_port(), hold_port()
+    link = SensorLink(port=port, image_port=image_port)
+    bridges.open(link)
     publisher = loop.graph.advertise("/uav1/range", m.Range)
     seen = collect(ros, "/uav1/range", m.Range)
     ros_bridges, _ = joined(ros, link)
@@ -407,7 +405,7 @@ def test_the_ros_side_joins_again(loop, link, bridges, ros):
         wanted(loop, publisher)
         bridges.call(link.stop())
         until(lambda: not publisher.has_subscribers)
-        again = SensorLink(port=link.port, image_port=link.image_port)
+        again = SensorLink(port=port, image_port=image_port)
         bridges.open(again)
         wanted(loop, publisher)
         loop.publish(publisher, sonar(1))
