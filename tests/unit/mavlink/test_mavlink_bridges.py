@@ -113,7 +113,9 @@ def test_a_port_that_is_taken_is_told(running):
     other = Simulation(scenario(), threads=1)
     with other, BridgeHost(other.gateway) as bridges, pytest.raises(BridgeError) as told:
         bridges.open(MavlinkUdp(port=running.base))
-    assert str(told.value) == f"uav1: cannot listen on UDP port {running.base + 40}: the port is taken"
+    assert (
+        str(told.value) == f"uav1: cannot listen on UDP port {running.base + 40}: the port is taken"
+    )
     with pytest.raises(BridgeError, match="other machines"):
         running.bridges.open(make_bridge("mavlink=0.0.0.0:14540", BridgeOptions()))
 
