@@ -128,7 +128,7 @@ def test_the_newest_of_two_stays_and_the_old_one_does_not_come_again() -> None:
         old = await joined(server, 0)
         new = await joined(server, 0)
         await until(lambda: old.core.fatal is not None)
-        await until(lambda: old._task.done())  # which connects again as long as it runs
+        await until(old._task.done)  # which connects again as long as it runs
         assert new.joined
         assert not old.joined
         assert server.statistics.replaced == 1

@@ -136,6 +136,8 @@ def test_several_vehicles_share_one_clock(opened):
     for autopilot in autopilots:
         assert autopilot.done.wait(60.0)
         assert autopilot.fault is None
+    assert len(set(bridge.ports)) == 2
+    assert bridge.address(1) == f"127.0.0.1:{bridge.ports[1]}"
     first, second = ([s.time_usec for s in autopilot.sensors[2:]] for autopilot in autopilots)
     assert set(first) & set(second)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-
 import pytest
 from fake_wall_clock import FakeWallClock
 
