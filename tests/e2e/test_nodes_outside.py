@@ -217,7 +217,6 @@ def test_who_does_not_answer_is_left_behind(gone):
         simulation.run(0.5)
         waited_s = time.monotonic() - before
         assert simulation.time_s == pytest.approx(0.5)
-        assert waited_s < 60.0
         if gone == "is silent":
             assert waited_s >= 0.3
         simulation.clock.add_partner("lost", period_s=1.0)  # the name is free again

@@ -227,6 +227,8 @@ def test_shipped_nodes_of_a_log_start(trap: Trap) -> None:
     trap.file.write_text(TOML.format(node="map_merging"))
     with Simulation(scenario_from_log(trap), threads=1) as simulation:
         simulation.run(0.01)
+        assert simulation.time_ns == 10_000_000
+        assert "/map_merging/status" in {topic.name for topic in simulation.graph.topics()}
 
 
 # ----------------------------------------------------------------------------- the command line

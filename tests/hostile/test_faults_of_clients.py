@@ -117,11 +117,13 @@ def test_what_a_client_causes_at_second_hand_does_not_end_the_run_either(client)
     simulation = client.simulation
     second = simulation.graph.advertise("/second", String)
     simulation.graph.subscribe("/first", lambda _: second.publish(String("on")), String)
-    reached = []
-    simulation.graph.subscribe("/second", lambda _: reached.append(None) or 1 / 0, String)
+    seen = []
+    simulation.graph.subscribe("/second", lambda _: 1 / 0, String)
+    simulation.graph.subscribe("/second", seen.append, String)
     client.publish("/first", String("go"))
     simulation.step(5)
-    assert reached
+    assert [published.message.data for published in seen] == ["on"]
+    assert simulation.time_ns >= 5_000_000
 
 
 def test_a_node_that_breaks_by_itself_still_ends_the_run(client):

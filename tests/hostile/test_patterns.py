@@ -42,8 +42,7 @@ def test_catastrophic_filters_are_answered_or_refused_at_once(pattern):
         passes = name_filter(pattern)
     except RefusedError:
         return
-    passes(LONG)
-    passes(LONG + "!")
+    assert {passes(LONG), passes(LONG + "!")} <= {True, False}
 
 
 @pytest.mark.timeout(240, func_only=True)
@@ -92,9 +91,10 @@ def test_what_needs_backtracking_is_refused(pattern):
 @given(st.text(alphabet="a(|)*+?{1,9}[]^$.\\:-bd\0é", max_size=200), st.text(max_size=50))
 def test_any_text_is_a_filter_or_is_refused(pattern, name):
     try:
-        name_filter(pattern)(name)
+        passes = name_filter(pattern)
     except RefusedError:
         return
+    assert passes(name) in (True, False)
 
 
 @pytest.mark.timeout(240, func_only=True)
@@ -104,5 +104,4 @@ def test_patterns_of_topics_take_no_longer(pattern):
         passes = topic_filter([pattern])
     except GraphError:
         return
-    passes("/" + "a" * 5_000)
-    passes("/a" * 2_000)
+    assert {passes("/" + "a" * 5_000), passes("/a" * 2_000)} <= {True, False}

@@ -84,12 +84,19 @@ def test_rewards_that_no_term_explains(monkeypatch):
         check_task(load_task("homing"), checks=("infos",))
 
 
-def test_returns_that_are_no_sums():
-    kept = np.zeros((3, 1))
+def test_rewards_that_a_term_explains():
+    asked, kept = [], np.zeros((3, 1))
+
+    def own(fleet):
+        asked.append(fleet)
+        return kept + 1.0
+
     task = load_task("homing")
-    check_task(
-        replace(task, rewards=(Reward("own", lambda f: kept + 1.0, 1.0),)), checks=("infos",)
-    )
+    try:
+        check_task(replace(task, rewards=(Reward("own", own, 1.0),)), checks=("infos",))
+    except ConformanceError as error:
+        pytest.fail(str(error))
+    assert asked
 
 
 def test_shared_buffers(monkeypatch):

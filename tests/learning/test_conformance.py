@@ -10,7 +10,7 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
 from volery.core.errors import CommandError, ScenarioError
-from volery.learning.conformance import check_task
+from volery.learning.conformance import ConformanceError, check_task
 from volery.learning.registration import register_tasks
 from volery.learning.single_env import TaskEnv
 from volery.learning.tasks import TASKS, load_task
@@ -57,7 +57,10 @@ def in_few_worlds(name):
 
 @every_task
 def test_every_task_keeps_the_rules(name):
-    check_task(in_few_worlds(name))
+    try:
+        check_task(in_few_worlds(name))
+    except ConformanceError as error:
+        pytest.fail(str(error))
 
 
 @tasks_of_one_uav

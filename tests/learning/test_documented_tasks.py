@@ -20,7 +20,9 @@ BLOCKS = [
 @pytest.mark.parametrize("number", range(len(BLOCKS)))
 def test_the_code_runs(number):
     name, block = BLOCKS[number]
-    exec(compile(block, f"docs/{name}.md, block {number}", "exec"), {})
+    made = {}
+    exec(compile(block, f"docs/{name}.md, block {number}", "exec"), made)
+    assert made.keys() - {"__builtins__"}
 
 
 def test_there_is_code():

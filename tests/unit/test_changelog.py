@@ -36,10 +36,13 @@ def test_the_newest_release_is_the_version_of_the_package():
 
 
 def test_only_the_newest_release_may_have_no_date():
-    for number, (heading, _) in enumerate(releases()):
-        day = heading.partition("] - ")[2]
-        if day != "unreleased" or number > 0:
-            date.fromisoformat(day)
+    days = [heading.partition("] - ")[2] for heading, _ in releases()]
+    if days[0] == "unreleased":
+        days = days[1:]
+    for day in days:
+        assert re.fullmatch(r"\d{4}-\d\d-\d\d", day), day
+    dates = [date.fromisoformat(day) for day in days]
+    assert dates == sorted(dates, reverse=True)
 
 
 @pytest.mark.parametrize(("heading", "content"), releases())

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import statistics
-
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
 from volery_benchmarks import search
 from volery_benchmarks.registry import BENCHES
@@ -29,4 +27,3 @@ def test_calls_over_a_bridge_are_timed_in_both_processes(monkeypatch):
         took = search.exchange("ros_tcp", bridge.port)
     assert len(took) == 30
     assert all(0 < one_way < round_trip for one_way, round_trip in took)
-    assert statistics.median(round_trip for _, round_trip in took) < 1e9

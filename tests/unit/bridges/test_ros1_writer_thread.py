@@ -118,6 +118,7 @@ def test_what_still_waits_goes_with_the_pump(pair):
     reader = pump.reader(Connection(ours))
     reader.send(b"x" * 1_000_000)
     pump.close()
+    assert not pump._thread.is_alive()  # it waits for no reader
     reader.close()
     ours.close()
     received = 0

@@ -30,9 +30,17 @@ from volery.graph.parameter_values import plain_of, type_of, value_message
 from volery.graph.typestore import typestore
 
 
+def is_allowed(name):
+    try:
+        check_name(name)
+    except GraphError:
+        return False
+    return True
+
+
 @pytest.mark.parametrize("name", ["/a", "/uav1/laser/horizontal/scan", "/_hidden/x9", "/a__b"])
 def test_names_that_ros2_allows(name):
-    check_name(name)
+    assert is_allowed(name)
 
 
 @pytest.mark.parametrize(

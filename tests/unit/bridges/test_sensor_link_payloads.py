@@ -133,9 +133,11 @@ def test_every_cut_and_every_surplus_is_refused(kind):
 @given(st.integers(0, 255), st.binary(max_size=300), st.integers(-(2**63), 2**63 - 1))
 def test_random_payloads_are_decoded_or_refused(kind, payload, stamp_ns):
     try:
-        decode_payload(kind, payload, stamp_ns)
+        name, message = decode_payload(kind, payload, stamp_ns)
     except BridgeError:
         return
+    assert isinstance(name, str)
+    assert type(message) is type(ALL[SensorLinkKind(kind)]())
 
 
 def test_arrays_are_read_only_and_aligned():

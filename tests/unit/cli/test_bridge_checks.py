@@ -45,7 +45,10 @@ def test_what_does_not_go_together(bridges, more, text):
     ],
 )
 def test_what_goes_together(bridges, more):
-    check_bridges(RunOptions("hover", bridges=bridges, **more))
+    try:
+        check_bridges(RunOptions("hover", bridges=bridges, **more))
+    except BridgeError as error:
+        pytest.fail(str(error))
 
 
 @pytest.mark.parametrize(

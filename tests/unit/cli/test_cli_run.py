@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from child_process import start_child
 from fake_simulation import FakeSimulation
 from typer.testing import CliRunner, Result
 
@@ -185,25 +186,30 @@ def test_one_missing_folder_is_made(invoke: Invoke, tmp_path: Path) -> None:
     assert (report / "index.html").exists()
 
 
+def wait_for(process: subprocess.Popen[str], condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + 120.0
+    while not condition():
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
 def test_ctrl_c_while_kernels_compile(tmp_path: Path) -> None:
     """One line, no traceback, nothing left behind: the real simulation with an empty cache."""
     log, report = tmp_path / "new" / "flight.mcap", tmp_path / "report"
     cache = tmp_path / "cache"
     command = [sys.executable, "-m", "volery.cli", "run", "hover"]
     command += ["--record", str(log), "--report", str(report)]
-    with subprocess.Popen(
+    with start_child(
         command,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         env={**os.environ, "VOLERY_CACHE_DIR": str(cache)},
     ) as process:
-        for _ in range(600):
-            if any(cache.glob("volery/kernels/*/*/*.nbi")):
-                break
-            time.sleep(0.05)
+        wait_for(process, lambda: any(cache.glob("volery/kernels/*/*/*.nbi")))
         process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=60)
+        out, err = process.communicate(timeout=300)
     # Python ends by the signal itself where it met it in an `exec`; shells call that 130 too.
     assert process.returncode in (130, -signal.SIGINT), err
     assert out == "hover: compiling; later runs start at once\n"
@@ -257,9 +263,11 @@ def test_ctrl_c_in_an_awkward_place(part: str, said: str) -> None:
     """One that Python cannot pass on, two that leave something half made, one that must wait."""
     program = INTERRUPTED_WHILE_BUILT.format(part=part)
     command = [sys.executable, "-c", program, str(Path(__file__).parent), "run", "hover"]
-    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
-    assert done.returncode == 130
-    assert (done.stdout, done.stderr) == (said, "Stopped with Ctrl-C before the flight began\n")
+    pipe = subprocess.PIPE
+    with start_child(command, stdout=pipe, stderr=pipe, text=True) as process:
+        output = process.communicate(timeout=300)
+    assert process.returncode == 130
+    assert output == (said, "Stopped with Ctrl-C before the flight began\n")
 
 
 @pytest.mark.parametrize("suffix", [".mcap", ".bag"])
@@ -268,15 +276,10 @@ def test_ctrl_c_in_mid_flight(tmp_path: Path, suffix: str) -> None:
     log, report = tmp_path / f"flight{suffix}", tmp_path / "report"
     command = [sys.executable, "-c", INTERRUPTED, str(Path(__file__).parent), "run", "hover"]
     command += ["--seconds", "3000", "--record", str(log), "--report", str(report)]
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        for _ in range(600):
-            if log.exists() and log.stat().st_size > 100_000:
-                break
-            time.sleep(0.05)
+    with start_child(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        wait_for(process, lambda: log.exists() and log.stat().st_size > 100_000)
         process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=60)
+        out, err = process.communicate(timeout=300)
     assert process.returncode == 130, err
     assert err == ""
     assert "Stopped with Ctrl-C: flew" in out

@@ -6,6 +6,7 @@ import os
 import pty
 import re
 import select
+import signal
 import sys
 import termios
 import time
@@ -24,6 +25,7 @@ class Terminal:
     def __init__(self, *command: str) -> None:
         self.process, self.terminal = pty.fork()
         if self.process == 0:
+            signal.signal(signal.SIGINT, signal.SIG_DFL)  # `nohup` and `&` hand on an ignored one
             os.environ.update(TERM="xterm", COLUMNS="120", LINES="40")
             os.execv(command[0], command)
         self.screen = ""

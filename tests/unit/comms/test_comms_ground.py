@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import math
 import signal
+import socket
 import subprocess
 import sys
-import time
+import threading
 
 import pytest
 from live_graph import LiveGraph
@@ -31,7 +33,6 @@ from volery.comms.payloads import (
     encode_named,
 )
 from volery.comms.protocol import StationFrame, StationFrameKind
-from volery.comms.server.tcp import CommsServer
 from volery.comms.station.address_parsing import address_of
 from volery.comms.station.ground_station import GroundStation
 from volery.comms.station.station_bridge import StationBridge
@@ -275,17 +276,26 @@ def test_gcs_says_that_the_server_is_gone_and_back_and_what_did_not_come() -> No
         assert gcs.process.wait(60.0) == 0
 
 
+PATIENT = """
+import volery.cli.gcs
+from volery.cli.app import main
+volery.cli.gcs._FIRST_S, volery.cli.gcs._OTHERS_S = 60.0, 1.0
+main()
+"""
+
+
 def test_a_script_waits_for_the_first_states(graph) -> None:
     vehicles = graph.do(lambda: graph.graph.advertise("/volery/vehicles", States))
     both = States(Header(Time(0, 0), "map"), [state("uav1"), state("uav2")])
-    with served() as (_, port), BridgeHost(graph.gateway) as bridges, Gcs(port) as gcs:
+    tell = lambda: graph.do(lambda: vehicles.publish(both))  # noqa: E731
+    with served() as (_, port), BridgeHost(graph.gateway) as bridges:
+        gcs = Gcs(port)
+        gcs.command[1:3] = ["-c", PATIENT]
         bridges.open(StationBridge(port=port))
-        gcs.tell("list\nquit")
-        gcs.says("joined as ground station")
-        for _ in range(5):
-            graph.do(lambda: vehicles.publish(both))
-            time.sleep(0.2)
-        rows = [line for line in gcs.process.stdout if " HOLD " in line]
+        with gcs, repeated(tell):
+            gcs.tell("list\nquit")
+            gcs.says("joined as ground station")
+            rows = [line for line in gcs.process.stdout if " HOLD " in line]
     assert [row.split()[0] for row in rows] == ["uav1", "uav2"]
 
 
@@ -305,6 +315,24 @@ def test_servers_as_people_write_them() -> None:
     for wrong in ("base:x", ":1", "base:70000"):
         with pytest.raises(CommsError, match="HOST:PORT"):
             parse_server(wrong)
+
+
+@contextlib.contextmanager
+def repeated(action):
+    """Do something again and again meanwhile."""
+    over = threading.Event()
+
+    def work():
+        while not over.wait(0.05):
+            action()
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
 
 
 @pytest.fixture
@@ -338,11 +366,9 @@ def test_uavs_of_a_graph_are_commanded_by_lines_of_another_process(graph) -> Non
         try:
             said = [gcs.stdout.readline()]
             assert "joined as ground station" in said[0]
-            for _ in range(4):
-                tell()
-                time.sleep(0.25)
-            while sum(": HOLD" in line for line in said) < 2:
-                said.append(gcs.stdout.readline())
+            with repeated(tell):
+                while sum(": HOLD" in line for line in said) < 2:
+                    said.append(gcs.stdout.readline())
             gcs.stdin.write("hold uav2\nland uav1\nnonsense\n")
             while not any("nonsense" in line for line in said):
                 said.append(gcs.stdout.readline())
@@ -398,7 +424,7 @@ def test_a_mission_takes_what_would_go_against_it(graph) -> None:
         await station.start()
 
         async def until(true) -> None:
-            for _ in range(200):
+            for _ in range(1200):
                 graph.do(lambda: vehicles.publish(both))
                 graph.do(lambda: missions.publish(status))
                 if true():
@@ -435,14 +461,10 @@ def test_the_server_ends_in_good_order() -> None:
 
 
 def test_gcs_without_a_server_says_what_to_do() -> None:
-    async def free_port() -> int:
-        server = CommsServer(port=0)
-        await server.start()
-        await server.stop()
-        return server.port
-
-    port = asyncio.run(free_port())
-    command = [sys.executable, "-m", "volery.cli.app", "gcs", "--server", f"127.0.0.1:{port}"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, input="")
+    with socket.socket() as silent:  # bound, but it does not listen: connections are refused
+        silent.bind(("127.0.0.1", 0))
+        server = f"127.0.0.1:{silent.getsockname()[1]}"
+        command = [sys.executable, "-m", "volery.cli.app", "gcs", "--server", server]
+        done = subprocess.run(command, capture_output=True, text=True, check=False, input="")
     assert done.returncode == 2
     assert "start one with volery comms" in done.stderr

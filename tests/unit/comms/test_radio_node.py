@@ -33,9 +33,9 @@ def _port() -> Iterator[int]:
         await server.start()
         return server
 
-    server = asyncio.run_coroutine_threadsafe(start(), loop).result(10.0)
+    server = asyncio.run_coroutine_threadsafe(start(), loop).result(60.0)
     yield server.port
-    asyncio.run_coroutine_threadsafe(server.stop(), loop).result(10.0)
+    asyncio.run_coroutine_threadsafe(server.stop(), loop).result(60.0)
     loop.call_soon_threadsafe(loop.stop)
     thread.join()
     loop.close()

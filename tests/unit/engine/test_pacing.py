@@ -103,8 +103,12 @@ def test_other_threads_end_a_wait_at_once(monkeypatch):
     pacer = Pacer()
     for change in (pacer.resume, pacer.wake, lambda: pacer.single_steps(1)):
         pacer.pause()
-        threading.Timer(0.01, change).start()
+        timer = threading.Timer(0.01, change)
+        timer.start()
         pacer.wait(0)  # else for five minutes
+        timer.join(60.0)
+        assert timer.finished.is_set()
+    assert pacer.paused_s < 300.0
 
 
 def test_pauses_are_measured(pacer):

@@ -248,4 +248,6 @@ def test_anything_is_read_or_refused(name: str, plain: Any) -> None:
         message = decode_plain(plain, name)
     except GraphError:
         return
-    typestore().serialize_cdr(message, name)
+    sent = bytes(typestore().serialize_cdr(message, name))
+    received = typestore().deserialize_cdr(sent, name)
+    assert bytes(typestore().serialize_cdr(received, name)) == sent

@@ -81,7 +81,7 @@ class ArdupilotStandIn(threading.Thread):
         self.link.send(struct.pack(f"<HHI{self.outputs}H", self.magic, 1200, number, *outputs))
 
     def _state(self, number):
-        for _ in range(30):
+        for _ in range(60):
             try:
                 return self.link.recv(65000)
             except (TimeoutError, ConnectionRefusedError):

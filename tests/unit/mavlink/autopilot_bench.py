@@ -1,14 +1,8 @@
 """What the tests of bridges for real autopilots begin with."""
 
-import socket
+import time
 
 from volery.scenario.load import parse_scenario
-
-
-def free_port(kind=socket.SOCK_STREAM):
-    with socket.socket(socket.AF_INET, kind) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def irises(count=1):
@@ -21,3 +15,24 @@ def irises(count=1):
         "uavs": [{**uavs, "position_m": [0.0, 0.0], "last_position_m": [5.0, 0.0]}],
     }
     return parse_scenario(data, where="flat")
+
+
+class SilenceClock:
+    """In the place of the lock step's `time`: passes only while `autopilot` is silent for good.
+
+    So a stand-in whose answer a busy machine delays does not count as silent.
+    """
+
+    def __init__(self, monkeypatch):
+        self.autopilot = None
+        self.now_s = 0.0
+        self._last_s = time.monotonic()
+        for user in ("engine.lock_step", "mavlink.hil.lock_step"):
+            monkeypatch.setattr(f"volery.{user}.time", self)
+
+    def monotonic(self):
+        real_s = time.monotonic()
+        if self.autopilot is not None and self.autopilot.done.is_set():
+            self.now_s += real_s - self._last_s
+        self._last_s = real_s
+        return self.now_s

@@ -7,10 +7,11 @@ import socket
 import struct
 import threading
 import time
+from types import SimpleNamespace
 
 import pytest
 from ardupilot_stand_in import ArdupilotStandIn, read
-from autopilot_bench import free_port, irises
+from autopilot_bench import SilenceClock, irises
 
 from volery.bridges.bridge_host import BridgeHost
 from volery.core.errors import BridgeError, PartnerError
@@ -24,7 +25,7 @@ from volery.mavlink.hil.ardupilot_json import (
     shares,
     state_line,
 )
-from volery.mavlink.hil.lock_step import DEFAULT_TIMEOUT, TimeoutPolicy
+from volery.mavlink.hil.lock_step import TimeoutPolicy
 from volery.mavlink.scenario_setup import with_ardupilot
 from volery.runtime import Simulation
 from volery.scenario.load import parse_scenario
@@ -35,6 +36,7 @@ X = (
     RotorPosition(0.1, 0.2, "cw"),
     RotorPosition(-0.1, -0.2, "cw"),
 )
+PATIENT = TimeoutPolicy(60.0)
 CLIMB = 1780
 """microseconds: 0.78 of full speed; 0.73 carries an iris."""
 STILL = State(
@@ -51,11 +53,11 @@ def opened():
     """A simulation of `count` UAVs and its bridge."""
     closing = []
 
-    def open_one(count=1, timeout_policy=DEFAULT_TIMEOUT):
+    def open_one(count=1, timeout_policy=PATIENT):
         simulation = Simulation(scenario(count), threads=1)
         bridges = BridgeHost(simulation.gateway)
         closing.extend([bridges, simulation])
-        bridge = ArdupilotBridge(port=free_port(socket.SOCK_DGRAM), timeout_policy=timeout_policy)
+        bridge = ArdupilotBridge(port=0, timeout_policy=timeout_policy)
         bridges.open(bridge)
         simulation.process_commands()
         return simulation, bridge
@@ -84,7 +86,7 @@ def finish(*autopilots):
 @pytest.mark.parametrize("magic", [18458, 29569])
 def test_a_vehicle_flies_in_lock_step(opened, magic):
     simulation, bridge = opened()
-    autopilot = ArdupilotStandIn(bridge._port, 960, pwm=CLIMB, arm_at=80, magic=magic)
+    autopilot = ArdupilotStandIn(bridge.ports[0], 960, pwm=CLIMB, arm_at=80, magic=magic)
     autopilot.start()
     meet(simulation, bridge, 1)
     simulation.run(1.2)
@@ -98,7 +100,7 @@ def test_a_vehicle_flies_in_lock_step(opened, magic):
 
 def test_several_have_ports_of_their_own(opened):
     simulation, bridge = opened(count=2)
-    autopilots = [ArdupilotStandIn(bridge._port + 10 * k, 160, pwm=1000 + k) for k in range(2)]
+    autopilots = [ArdupilotStandIn(bridge.ports[k], 160, pwm=1000 + k) for k in range(2)]
     for autopilot in autopilots:
         autopilot.start()
     meet(simulation, bridge, 2)
@@ -111,7 +113,7 @@ def test_several_have_ports_of_their_own(opened):
 def test_one_that_was_restarted_is_met_anew(opened):
     simulation, bridge = opened()
     for first in (5, 0):
-        autopilot = ArdupilotStandIn(bridge._port, 80, first=first)
+        autopilot = ArdupilotStandIn(bridge.ports[0], 80, first=first)
         autopilot.start()
         end = time.monotonic() + 60.0
         while bridge._sessions[0]._number != first and time.monotonic() < end:
@@ -123,7 +125,7 @@ def test_one_that_was_restarted_is_met_anew(opened):
 
 def test_it_flies_on_after_a_reset(opened):
     simulation, bridge = opened()
-    autopilot = ArdupilotStandIn(bridge._port, 160, pwm=CLIMB, may_jump=True)
+    autopilot = ArdupilotStandIn(bridge.ports[0], 160, pwm=CLIMB, may_jump=True)
     autopilot.start()
     meet(simulation, bridge, 1)
     simulation.run(0.1)
@@ -133,15 +135,16 @@ def test_it_flies_on_after_a_reset(opened):
     assert autopilot.jumps == 1
 
 
-def test_who_is_silent_ends_the_run_or_is_given_up(opened, caplog):
+def test_who_is_silent_ends_the_run_or_is_given_up(opened, monkeypatch, caplog):
+    silence = SilenceClock(monkeypatch)
     simulation, bridge = opened(timeout_policy=TimeoutPolicy(0.3))
-    autopilot = ArdupilotStandIn(bridge._port, 5)
+    silence.autopilot = autopilot = ArdupilotStandIn(bridge.ports[0], 5)
     autopilot.start()
     meet(simulation, bridge, 1)
     with pytest.raises(PartnerError, match=r"'ardupilot_of_uav1' did not answer within 0\.3 s"):
         simulation.run(1.0)
     simulation, bridge = opened(timeout_policy=TimeoutPolicy(0.3, drops=True))
-    autopilot = ArdupilotStandIn(bridge._port, 5, pwm=CLIMB)
+    silence.autopilot = autopilot = ArdupilotStandIn(bridge.ports[0], 5, pwm=CLIMB)
     autopilot.start()
     meet(simulation, bridge, 1)
     with caplog.at_level(logging.WARNING, logger="volery.mavlink"):
@@ -155,7 +158,8 @@ def test_who_is_silent_ends_the_run_or_is_given_up(opened, caplog):
 
 def test_what_was_lost_is_said_again(opened):
     simulation, bridge = opened()
-    autopilot = ArdupilotStandIn(bridge._port, 1)
+    autopilot = ArdupilotStandIn(bridge.ports[0], 1)
+    autopilot.link.settimeout(60.0)
     autopilot.send(0)
     meet(simulation, bridge, 1)
     run = threading.Thread(target=simulation.run, args=(0.0022,))
@@ -169,9 +173,11 @@ def test_what_was_lost_is_said_again(opened):
     autopilot.link.close()
 
 
-def test_noise_and_a_second_one_are_told_of_and_passed_over(opened, caplog):
+def test_noise_and_a_second_one_are_told_of_and_passed_over(opened, monkeypatch, caplog):
+    now = SimpleNamespace(monotonic=lambda: 100.0)  # else a slow stand-in counts as gone
+    monkeypatch.setattr("volery.mavlink.hil.ardupilot_bridge.time", now)
     simulation, bridge = opened()
-    autopilot = ArdupilotStandIn(bridge._port, 160, pwm=CLIMB)
+    autopilot = ArdupilotStandIn(bridge.ports[0], 160, pwm=CLIMB)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         for data in (
             b"",
@@ -179,12 +185,12 @@ def test_noise_and_a_second_one_are_told_of_and_passed_over(opened, caplog):
             b"\x1a\x48" * 21,
             struct.pack("<HHI16H", 18459, 1, 0, *[0] * 16),
         ):
-            other.sendto(data, ("127.0.0.1", bridge._port))
+            other.sendto(data, ("127.0.0.1", bridge.ports[0]))
         autopilot.start()
         meet(simulation, bridge, 1)
         for number in (10_000, 0):  # one that flies elsewhere, and one that was just started
             frame = struct.pack("<HHI16H", 18458, 400, number, *[1000] * 16)
-            other.sendto(frame, ("127.0.0.1", bridge._port))
+            other.sendto(frame, ("127.0.0.1", bridge.ports[0]))
         simulation.run(0.2)
     finish(autopilot)
     assert caplog.messages == [
@@ -195,7 +201,8 @@ def test_noise_and_a_second_one_are_told_of_and_passed_over(opened, caplog):
 
 def test_a_frame_that_comes_late_begins_nothing_anew(opened):
     simulation, bridge = opened()
-    autopilot = ArdupilotStandIn(bridge._port, 1)
+    autopilot = ArdupilotStandIn(bridge.ports[0], 1)
+    autopilot.link.settimeout(60.0)
     autopilot.send(1000)
     meet(simulation, bridge, 1)
     run = threading.Thread(target=simulation.run, args=(0.0047,))

@@ -1,6 +1,8 @@
 """Sockets and serial lines: pymavlink as a client of a running simulation."""
 
+import contextlib
 import os
+import random
 import socket
 import threading
 import time
@@ -20,8 +22,8 @@ from volery.runtime import Simulation
 
 mavutil = pytest.importorskip("pymavlink.mavutil")
 
-BASE = 24540
-"""Away from 14540, where a run of the user's may stand."""
+BASES = range(24540, 32000, 300)
+"""Away from 14540, where a run of the user's may stand; the first one that is free is taken."""
 
 
 class Running:
@@ -48,13 +50,16 @@ class Running:
 @pytest.fixture(scope="module")
 def running():
     with Running(Simulation(scenario(count=2), threads=1)) as running:
-        running.bridges.open(MavlinkUdp(port=BASE))
+        for running.base in BASES:
+            with contextlib.suppress(BridgeError):
+                running.bridges.open(MavlinkUdp(port=running.base))
+                break
         yield running
 
 
 @pytest.fixture
 def client(running):
-    link = mavutil.mavlink_connection(f"udpin:127.0.0.1:{BASE}", source_system=245)
+    link = mavutil.mavlink_connection(f"udpin:127.0.0.1:{running.base}", source_system=245)
     yield link
     link.close()
 
@@ -76,8 +81,8 @@ def test_a_client_is_found_and_answered(client):
 
 
 def test_every_vehicle_has_a_port_and_the_ground_station_hears_all(running):
-    second = mavutil.mavlink_connection(f"udpin:127.0.0.1:{BASE + 1}")
-    ground = mavutil.mavlink_connection(f"udpin:127.0.0.1:{BASE + 10}")
+    second = mavutil.mavlink_connection(f"udpin:127.0.0.1:{running.base + 1}")
+    ground = mavutil.mavlink_connection(f"udpin:127.0.0.1:{running.base + 10}")
     try:
         assert second.wait_heartbeat(timeout=60.0).get_srcSystem() == 2
         heard = set()
@@ -94,10 +99,12 @@ def test_every_vehicle_has_a_port_and_the_ground_station_hears_all(running):
 def test_heartbeats_go_on_while_the_simulation_stands_still(running, client):
     assert client.wait_heartbeat(timeout=60.0)
     running.simulation.clock.pause()
-    time.sleep(0.3)
+    running.simulation.post(lambda: None).result(60.0)  # it stands still
+    stands_at_ns = running.simulation.time_ns
     while client.recv_msg():
         pass
-    beats = [client.recv_match(type="HEARTBEAT", blocking=True, timeout=60.0) for _ in range(2)]
+    beats = [client.recv_match(type="HEARTBEAT", blocking=True, timeout=60.0) for _ in range(3)]
+    assert running.simulation.time_ns == stands_at_ns
     running.simulation.clock.resume()
     assert all(beats)
 
@@ -105,8 +112,10 @@ def test_heartbeats_go_on_while_the_simulation_stands_still(running, client):
 def test_a_port_that_is_taken_is_told(running):
     other = Simulation(scenario(), threads=1)
     with other, BridgeHost(other.gateway) as bridges, pytest.raises(BridgeError) as told:
-        bridges.open(MavlinkUdp(port=BASE))
-    assert str(told.value) == f"uav1: cannot listen on UDP port {BASE + 40}: the port is taken"
+        bridges.open(MavlinkUdp(port=running.base))
+    assert (
+        str(told.value) == f"uav1: cannot listen on UDP port {running.base + 40}: the port is taken"
+    )
     with pytest.raises(BridgeError, match="other machines"):
         running.bridges.open(make_bridge("mavlink=0.0.0.0:14540", BridgeOptions()))
 
@@ -156,15 +165,15 @@ def test_a_serial_line_carries_them_too(running):
 def test_noise_on_the_socket_disturbs_nobody(running, client):
     assert client.wait_heartbeat(timeout=60.0)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as noise:
-        for data in (b"", b"\xfd", bytes(300), b"\xfd" * 5000, os.urandom(1000)):
-            noise.sendto(data, ("127.0.0.1", BASE + 40))
+        for data in (b"", b"\xfd", bytes(300), b"\xfd" * 5000, random.Random(1).randbytes(1000)):
+            noise.sendto(data, ("127.0.0.1", running.base + 40))
     assert ack_of(client, 512, 242) == 0
 
 
-def test_names_of_the_command_line():
+def test_names_of_the_command_line(running):
     simulation = Simulation(scenario(), threads=1)
     with simulation:
-        options = RunOptions("flat", bridges=(f"mavlink={BASE + 200}", "mavlink-tcp=0"))
+        options = RunOptions("flat", bridges=(f"mavlink={running.base + 200}", "mavlink-tcp=0"))
         with open_bridges(simulation.gateway, options):
             simulation.run(0.1)
         with (

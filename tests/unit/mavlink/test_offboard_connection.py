@@ -1,5 +1,6 @@
 """Nodes that fly an autopilot over MAVLink: conversions, odometry, setpoints, commands."""
 
+import os
 import threading
 import time
 
@@ -18,7 +19,8 @@ from volery.mavlink.offboard.connection import OffboardConnection
 from volery.mavlink.offboard.conversions import attitude_setpoint, odometry, velocity_setpoint
 
 mavutil = pytest.importorskip("pymavlink.mavutil")
-PORT = 24640
+PORT = 24640 + 2 * (os.getpid() % 3000)
+"""Another one in each process that runs these tests."""
 TARGET = "mavros_msgs/msg/AttitudeTarget"
 
 
@@ -111,7 +113,7 @@ def peer():
 
 
 def until(condition):
-    for _ in range(1000):
+    for _ in range(3000):
         if condition():
             return
         time.sleep(0.02)
@@ -119,7 +121,7 @@ def until(condition):
 
 
 def test_a_node_flies_an_autopilot(peer):
-    connection = OffboardConnection(f"udpin:127.0.0.1:{PORT}", "pilot", engages=True, timeout_s=30)
+    connection = OffboardConnection(f"udpin:127.0.0.1:{PORT}", "pilot", engages=True, timeout_s=60)
     try:
         queue = connection.subscribe("/uav1/odom", "nav_msgs/msg/Odometry", wake=lambda: None)
         connection.advertise("/uav1/cmd_vel", "geometry_msgs/msg/Twist")
@@ -129,13 +131,13 @@ def test_a_node_flies_an_autopilot(peer):
         assert queue.take(1)[0].message.pose.pose.position.z == 3.0
         until(lambda: peer.count("SET_POSITION_TARGET_LOCAL_NED", vx=1.0, target_system=3))
         until(lambda: peer.count("COMMAND_LONG", command=176, param2=6.0))  # it engages
-        assert call_and_wait(connection, "/uav1/hold", None, 30.0).success
-        refused = call_and_wait(connection, "/uav1/take_off", None, 30.0)
+        assert call_and_wait(connection, "/uav1/hold", None, 60.0).success
+        refused = call_and_wait(connection, "/uav1/take_off", None, 60.0)
         assert not refused.success
         assert "MAV_RESULT_DENIED" in refused.message
         assert peer.count("COMMAND_LONG", command=400, param1=1.0) == 1
         with pytest.raises(GraphError, match="does not exist over MAVLink"):
-            call_and_wait(connection, "/uav1/dance", None, 30.0)
+            call_and_wait(connection, "/uav1/dance", None, 60.0)
         with pytest.raises(GraphError, match="no setpoint of rotor speeds"):
             connection.advertise("/uav1/rotor_speeds", "std_msgs/msg/Float32MultiArray")
     finally:

@@ -8,13 +8,13 @@ import threading
 import time
 
 import pytest
-from autopilot_bench import free_port, irises
+from autopilot_bench import SilenceClock, irises
 from px4_stand_in import StandIn, Terminal
 
 from volery.bridges.bridge_host import BridgeHost
 from volery.core.errors import BridgeError, PartnerError
 from volery.mavlink.codec import Codec, dialect
-from volery.mavlink.hil.lock_step import DEFAULT_TIMEOUT, TimeoutPolicy
+from volery.mavlink.hil.lock_step import TimeoutPolicy
 from volery.mavlink.hil.protocol import HilLink
 from volery.mavlink.hil.px4_bridge import Px4Bridge, _Connection
 from volery.mavlink.hil.px4_serial_bridge import Px4SerialBridge
@@ -23,6 +23,7 @@ from volery.mavlink.scenario_setup import with_px4
 from volery.runtime import Simulation
 from volery.scenario.load import parse_scenario
 
+PATIENT = TimeoutPolicy(60.0)
 CLIMB = 0.78
 """Share of full speed; 0.73 carries an iris: the root of its share of thrust."""
 
@@ -36,11 +37,11 @@ def opened():
     """A simulation of `count` UAVs, its bridge and the first port."""
     closing = []
 
-    def open_one(count=1, timeout_policy=DEFAULT_TIMEOUT):
+    def open_one(count=1, timeout_policy=PATIENT):
         simulation = Simulation(scenario(count), threads=1)
         bridges = BridgeHost(simulation.gateway)
         closing.extend([bridges, simulation])
-        bridge = Px4Bridge(port=free_port(), timeout_policy=timeout_policy)
+        bridge = Px4Bridge(port=0, timeout_policy=timeout_policy)
         bridges.open(bridge)
         simulation.process_commands()
         return simulation, bridge
@@ -48,6 +49,11 @@ def opened():
     yield open_one
     for one in closing:
         one.close()
+
+
+@pytest.fixture
+def silence(monkeypatch):
+    return SilenceClock(monkeypatch)
 
 
 def meet(simulation, bridge, count):
@@ -59,11 +65,25 @@ def meet(simulation, bridge, count):
     assert len(bridge.connected) == count
 
 
+def start(simulation, sessions, *autopilots):
+    """Run until all stand-ins have answered, before which the simulation waits for none."""
+    for autopilot in autopilots:
+        autopilot.start()
+    for _ in range(60):
+        simulation.run(0.004)
+        soon = time.monotonic() + 1.0
+        while time.monotonic() < soon:
+            if all(session._link.locked for session in sessions):
+                return
+            time.sleep(0.001)
+    raise AssertionError("no answer came")
+
+
 def test_a_vehicle_flies_in_lock_step(opened):
     simulation, bridge = opened()
-    autopilot = StandIn(bridge._port, 400, throttle=CLIMB, arm_at=100)
+    autopilot = StandIn(bridge.ports[0], 400, throttle=CLIMB, arm_at=100)
     meet(simulation, bridge, 1)
-    autopilot.start()
+    start(simulation, bridge._sessions, autopilot)
     simulation.run(2.0)
     assert autopilot.done.wait(60.0)
     if autopilot.fault:
@@ -78,7 +98,7 @@ def test_a_vehicle_flies_in_lock_step(opened):
 
 
 def is_ended(connection):
-    connection.settimeout(20.0)
+    connection.settimeout(60.0)
     with contextlib.suppress(ConnectionResetError):
         while connection.recv(4096):
             pass
@@ -87,7 +107,7 @@ def is_ended(connection):
 
 def test_who_speaks_no_mavlink_gives_way_and_who_comes_after_a_px4_is_ended(opened, caplog):
     simulation, bridge = opened()
-    address = ("127.0.0.1", bridge._port)
+    address = ("127.0.0.1", bridge.ports[0])
     with socket.create_connection(address) as stranger:
         meet(simulation, bridge, 1)
         stranger.sendall(b"hello, is this the way to the aviary?" * 5)
@@ -109,23 +129,24 @@ def test_who_speaks_no_mavlink_gives_way_and_who_comes_after_a_px4_is_ended(open
 
 def test_several_vehicles_share_one_clock(opened):
     simulation, bridge = opened(count=2)
-    autopilots = [StandIn(bridge._port + k, 150) for k in range(2)]
+    autopilots = [StandIn(bridge.ports[k], 150) for k in range(2)]
     meet(simulation, bridge, 2)
-    for autopilot in autopilots:
-        autopilot.start()
+    start(simulation, bridge._sessions, *autopilots)
     simulation.run(1.0)
     for autopilot in autopilots:
         assert autopilot.done.wait(60.0)
         assert autopilot.fault is None
+    assert len(set(bridge.ports)) == 2
+    assert bridge.address(1) == f"127.0.0.1:{bridge.ports[1]}"
     first, second = ([s.time_usec for s in autopilot.sensors[2:]] for autopilot in autopilots)
     assert set(first) & set(second)
 
 
-def test_a_silent_one_ends_the_run_with_an_error(opened):
+def test_a_silent_one_ends_the_run_with_an_error(opened, silence):
     simulation, bridge = opened(timeout_policy=TimeoutPolicy(0.5))
-    autopilot = StandIn(bridge._port, 50, falls_silent=True)
+    silence.autopilot = autopilot = StandIn(bridge.ports[0], 50, falls_silent=True)
     meet(simulation, bridge, 1)
-    autopilot.start()
+    start(simulation, bridge._sessions, autopilot)
     with pytest.raises(PartnerError) as told:
         simulation.run(1.0)
     told_s = round(autopilot.sensors[-1].time_usec / 1e6 + 0.004, 3)
@@ -135,19 +156,22 @@ def test_a_silent_one_ends_the_run_with_an_error(opened):
     autopilot.close()
 
 
-def test_a_silent_one_is_given_up_where_that_is_wanted_and_may_come_back(opened, caplog):
+def test_a_silent_one_is_given_up_where_that_is_wanted_and_may_come_back(opened, silence, caplog):
     simulation, bridge = opened(timeout_policy=TimeoutPolicy(0.5, drops=True))
-    autopilot = StandIn(bridge._port, 50, throttle=CLIMB, falls_silent=True)
+    autopilot = StandIn(bridge.ports[0], 50, throttle=CLIMB, falls_silent=True)
+    silence.autopilot = autopilot
     meet(simulation, bridge, 1)
-    autopilot.start()
+    start(simulation, bridge._sessions, autopilot)
+    begun_s = simulation.time_s
     with caplog.at_level(logging.WARNING, logger="volery.mavlink"):
         simulation.run(1.0)
-    assert simulation.time_s == pytest.approx(1.0)
+    assert simulation.time_s == pytest.approx(begun_s + 1.0)
+    assert len(autopilot.sensors) == 50
     told = "uav1: its autopilot has been silent for 0.5 s; the simulation goes on without it"
     assert told in caplog.messages
-    again = StandIn(bridge._port, 50)
+    silence.autopilot = again = StandIn(bridge.ports[0], 50)
     meet(simulation, bridge, 1)
-    again.start()
+    start(simulation, bridge._sessions, again)
     simulation.run(0.5)
     assert again.done.wait(60.0)
     assert again.fault is None
@@ -156,10 +180,10 @@ def test_a_silent_one_is_given_up_where_that_is_wanted_and_may_come_back(opened,
 
 def test_time_goes_on_without_one_that_is_disarmed_and_says_nothing(opened, caplog):
     """As PX4 in Offboard without setpoints: it answers again when time has gone on."""
-    simulation, bridge = opened(timeout_policy=TimeoutPolicy(1.0))
-    autopilot = StandIn(bridge._port, 50, arm_at=1000, dozes=100)
+    simulation, bridge = opened()
+    autopilot = StandIn(bridge.ports[0], 50, arm_at=1000, dozes=100)
     meet(simulation, bridge, 1)
-    autopilot.start()
+    start(simulation, bridge._sessions, autopilot)
     simulation.run(1.0)
     assert autopilot.done.wait(60.0)
     if autopilot.fault:
@@ -169,23 +193,25 @@ def test_time_goes_on_without_one_that_is_disarmed_and_says_nothing(opened, capl
     assert told == {"uav1: its autopilot is disarmed and silent; the simulation goes on without it"}
 
 
-def test_one_that_is_disarmed_and_never_answers_again_ends_the_run(opened):
+def test_one_that_is_disarmed_and_never_answers_again_ends_the_run(opened, silence):
     simulation, bridge = opened(timeout_policy=TimeoutPolicy(0.5))
-    autopilot = StandIn(bridge._port, 50, arm_at=1000, falls_silent=True)
+    silence.autopilot = autopilot = StandIn(bridge.ports[0], 50, arm_at=1000, falls_silent=True)
     meet(simulation, bridge, 1)
-    autopilot.start()
+    start(simulation, bridge._sessions, autopilot)
     with pytest.raises(PartnerError, match=r"did not answer within 0\.5 s"):
         simulation.run(60.0)
     assert len(autopilot.sensors) == 50
-    assert 1.0 < simulation.time_s < 5.0  # about six times the timeout, no faster than real time
+    silent_s = simulation.time_s - autopilot.sensors[-1].time_usec / 1e6
+    assert silence.now_s >= 6 * 0.5
+    assert 0.04 < silent_s <= silence.now_s  # it goes on, no faster than real time
     autopilot.close()
 
 
 def test_a_reset_sends_them_away_and_a_restarted_one_flies(opened, caplog):
     simulation, bridge = opened()
-    before = StandIn(bridge._port, 10_000, throttle=CLIMB)
+    before = StandIn(bridge.ports[0], 10_000, throttle=CLIMB)
     meet(simulation, bridge, 1)
-    before.start()
+    start(simulation, bridge._sessions, before)
     simulation.run(0.5)
     simulation.reset()
     with caplog.at_level(logging.WARNING, logger="volery.mavlink"):
@@ -194,9 +220,9 @@ def test_a_reset_sends_them_away_and_a_restarted_one_flies(opened, caplog):
     assert "the simulator closed the connection" in str(before.fault)
     assert any("the simulation was reset" in message for message in caplog.messages)
     assert bridge.connected == ()
-    again = StandIn(bridge._port, 100, throttle=CLIMB)
+    again = StandIn(bridge.ports[0], 100, throttle=CLIMB)
     meet(simulation, bridge, 1)
-    again.start()
+    start(simulation, bridge._sessions, again)
     simulation.run(0.6)
     assert again.done.wait(60.0)
     assert again.fault is None
@@ -205,7 +231,7 @@ def test_a_reset_sends_them_away_and_a_restarted_one_flies(opened, caplog):
 
 def test_one_with_a_clock_of_its_own_is_not_waited_for(opened):
     simulation, bridge = opened()
-    autopilot = StandIn(bridge._port, 20, falls_silent=True, in_lock_step=False)
+    autopilot = StandIn(bridge.ports[0], 20, falls_silent=True, in_lock_step=False)
     meet(simulation, bridge, 1)
     autopilot.start()
     simulation.run(1.0)
@@ -227,8 +253,7 @@ def test_one_on_a_serial_line_flies_the_uav_that_is_left():
         assert [line.uav for line in lines] == ["uav1", "uav2"]
         with pytest.raises(BridgeError, match="no UAV with an IMU is left"):
             bridges.open(Px4SerialBridge(terminals[0].path))
-        for autopilot in autopilots:
-            autopilot.start()
+        start(simulation, [line._session for line in lines], *autopilots)
         simulation.run(1.0)
         assert simulation.uavs["uav1"].position_map[2] > 0.2
         assert simulation.uavs["uav2"].position_map[2] > 0.2
@@ -294,9 +319,9 @@ def test_in_step_the_simulation_tells_and_nobody_is_woken_for_it(opened, monkeyp
         return tell(session, time_ns, news)
 
     monkeypatch.setattr(HilSession, "send_sensors", told)
-    autopilot = StandIn(bridge._port, 50)
+    autopilot = StandIn(bridge.ports[0], 50)
     meet(simulation, bridge, 1)
-    autopilot.start()
+    start(simulation, bridge._sessions, autopilot)
     simulation.run(1.0)
     assert autopilot.done.wait(60.0)
     assert autopilot.fault is None
@@ -312,7 +337,7 @@ def test_what_cannot_be_said_is_told_of_and_the_run_goes_on(opened, monkeypatch,
     def refuse(_link, _time_ns, _sensed):
         raise OverflowError("infinity is no integer")
 
-    autopilot = StandIn(bridge._port, 50)
+    autopilot = StandIn(bridge.ports[0], 50)
     meet(simulation, bridge, 1)
     monkeypatch.setattr(HilLink, "encode_exchange", refuse)
     simulation.run(0.1)
@@ -324,7 +349,7 @@ def test_what_cannot_be_said_is_told_of_and_the_run_goes_on(opened, monkeypatch,
 
 def test_who_was_let_go_is_not_obeyed(opened):
     simulation, bridge = opened()
-    autopilot = StandIn(bridge._port, 50)
+    autopilot = StandIn(bridge.ports[0], 50)
     meet(simulation, bridge, 1)
     (session,) = bridge._sessions
     asked = []

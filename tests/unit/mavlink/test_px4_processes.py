@@ -1,12 +1,12 @@
 """Starting, watching and ending PX4 instances, with a program in PX4's place."""
 
+import contextlib
 import socket
 import sys
 import time
 from types import SimpleNamespace
 
 import pytest
-from autopilot_bench import free_port
 
 from volery.cli.bridges import _px4_instances
 from volery.cli.flight import RunOptions
@@ -16,7 +16,7 @@ from volery.mavlink.hil.px4_processes import FIRST_PORT, Px4Instances, establish
 from volery.vehicle.airframe import load_airframe
 
 NUMBER = 187
-"""Of instances, so that their ports are nobody's."""
+"""Of instances that do not connect."""
 
 CONNECTS = """
 import os, signal, socket, sys, time
@@ -53,20 +53,25 @@ def make_px4(folder, program):
 
 @pytest.fixture
 def simulator():
-    """Listens where instance NUMBER connects."""
-    with socket.create_server(("127.0.0.1", FIRST_PORT + NUMBER)) as server:
-        server.settimeout(20.0)
-        yield server
+    """Listens where instance `number` connects, the first one whose port is free."""
+    for number in range(100, 254):
+        with contextlib.suppress(OSError):
+            server = socket.create_server(("127.0.0.1", FIRST_PORT + number))
+            break
+    with server:
+        server.settimeout(60.0)
+        yield SimpleNamespace(number=number, accept=server.accept)
 
 
 def test_an_instance_connects_and_ends(tmp_path, simulator):
     build = make_px4(tmp_path, CONNECTS)
-    with Px4Instances(find_px4(tmp_path), 1, first=NUMBER, folder=tmp_path / "kept"):
+    number = simulator.number
+    with Px4Instances(find_px4(tmp_path), 1, first=number, folder=tmp_path / "kept"):
         link, _ = simulator.accept()
     with link:
-        link.settimeout(20.0)
+        link.settimeout(60.0)
         assert link.recv(1) == b""
-    said = (tmp_path / f"kept/instance_{NUMBER}/output.txt").read_text()
+    said = (tmp_path / f"kept/instance_{number}/output.txt").read_text()
     assert said == f"none_iris 127.0.0.1 ['-d', '{build / 'etc'}']\n"
 
 
@@ -85,7 +90,7 @@ def test_each_instance_gets_its_parameters_and_the_environments_come_first(tmp_p
     own = [{"CA_ROTOR_COUNT": 4, "MPC_THR_HOVER": 0.7}, {"CA_ROTOR0_PX": -0.159}]
     kept = tmp_path / "kept"
     with Px4Instances(find_px4(tmp_path), 2, first=NUMBER, folder=kept, parameters=own) as all_of:
-        assert all_of.wait(20.0)
+        assert all_of.wait(60.0)
     said = [(kept / f"instance_{NUMBER + k}/output.txt").read_text() for k in range(2)]
     assert "PX4_PARAM_CA_ROTOR_COUNT 4\n" in said[0]
     assert "PX4_PARAM_MPC_THR_HOVER 0.6\n" in said[0]
@@ -97,9 +102,11 @@ def test_each_instance_gets_its_parameters_and_the_environments_come_first(tmp_p
 @pytest.mark.skipif(established_ports() is None, reason="this system does not tell connections")
 def test_one_that_lost_its_simulation_begins_anew(tmp_path, simulator):
     make_px4(tmp_path, CONNECTS)
-    with Px4Instances(find_px4(tmp_path), 1, first=NUMBER) as instances:
+    with Px4Instances(find_px4(tmp_path), 1, first=simulator.number) as instances:
         first, _ = simulator.accept()
-        time.sleep(0.6)  # so that the connection is seen
+        end = time.monotonic() + 60.0
+        while not instances._instances[0]._was_linked and time.monotonic() < end:
+            time.sleep(0.01)
         first.close()
         second, _ = simulator.accept()
         second.close()
@@ -141,22 +148,26 @@ def test_numbers_beyond_mavlinks_ids_are_refused(tmp_path, first, count):
 
 
 HANGS = """
-import time
+import pathlib, time
 print("INFO [init] waiting for something", flush=True)
+pathlib.Path(__file__).with_name("said").touch()
 time.sleep(1000)
 """
 
 
 def test_one_that_never_connects_is_told_with_its_last_words(tmp_path, monkeypatch):
-    make_px4(tmp_path, HANGS)
+    said, end = make_px4(tmp_path, HANGS) / "bin/said", time.monotonic() + 60.0
+    is_over = lambda: said.exists() or time.monotonic() > end  # noqa: E731
+    wall = SimpleNamespace(monotonic=lambda: 2.0 if is_over() else 0.0)
+    monkeypatch.setattr("volery.cli.bridges.time", wall)
     monkeypatch.setattr("volery.cli.bridges._LONGEST_START_S", 1.0)
     uavs = {"uav1": SimpleNamespace(airframe=load_airframe("f450"))}
     options = RunOptions("hover", px4_dir=tmp_path)
     with (
         pytest.raises(BridgeError) as error,
-        _px4_instances(uavs, [Px4Bridge(port=free_port())], options),
+        _px4_instances(uavs, [Px4Bridge()], options),
     ):
         pass
-    said = str(error.value)
-    assert said.startswith("uav1: PX4 0 has not connected to 127.0.0.1:")
-    assert "within 1 s; last output:\n  INFO [init] waiting for something" in said
+    told = str(error.value)
+    assert told.startswith("uav1: PX4 0 has not connected to 127.0.0.1:")
+    assert "within 1 s; last output:\n  INFO [init] waiting for something" in told

@@ -57,7 +57,7 @@ def test_playing_pausing_stopping(simulate, flat_data):
 def test_quitting_ends_a_run_and_later_ones(simulate, flat_data):
     simulation = simulate(flat_data)
     with InThread(simulation, None, speed=1.0):
-        simulation.post(lambda: enter(simulation, QUITTING)).result(10.0)
+        simulation.post(lambda: enter(simulation, QUITTING)).result(60.0)
     assert simulation.time_s < 30.0
     assert simulation.clock.finished
     assert state(simulation) == QUITTING

@@ -60,7 +60,9 @@ def test_a_sensor_sits_on_its_uav(flat_data, key, value):
 def test_worlds_of_ten_kilometres_are_real(flat_data):
     flat_data["world"] = {"terrain": {"kind": "flat", "extent_m": 10_000.0}}
     flat_data["uavs"][0]["position_m"] = [9000.0, -9000.0]
-    parse_scenario(flat_data)
+    scenario = parse_scenario(flat_data)
+    assert scenario.world.terrain.extent_m == 10_000.0
+    assert tuple(scenario.uavs[0].position_m) == (9000.0, -9000.0)
 
 
 def test_a_world_of_1e308_m_is_none(flat_data):

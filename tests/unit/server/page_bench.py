@@ -34,7 +34,7 @@ class Flight:
 
     def do(self, action):
         """Have something done in the simulation's thread."""
-        return self.simulation.post(action).result(20.0)
+        return self.simulation.post(action).result(60.0)
 
 
 def hover(**options):

@@ -50,6 +50,12 @@ def test_half_rights_are_refused(host, tokens, anywhere, why):
         check_rights(host, tokens, anywhere=anywhere)
 
 
-def test_whole_rights_pass():
-    check_rights("127.0.0.1", Tokens(), anywhere=False)
-    check_rights("0.0.0.0", Tokens("a", "b"), anywhere=True)
+@pytest.mark.parametrize(
+    ("host", "tokens", "anywhere"),
+    [("127.0.0.1", Tokens(), False), ("0.0.0.0", Tokens("a", "b"), True)],
+)
+def test_whole_rights_pass(host, tokens, anywhere):
+    try:
+        check_rights(host, tokens, anywhere=anywhere)
+    except BridgeError as error:
+        pytest.fail(str(error))

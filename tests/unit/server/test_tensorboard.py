@@ -147,7 +147,7 @@ def test_it_ends_with_the_server(monkeypatch, tmp_path):
         port = server._site.tensorboard.port
         assert ask(server, "/tensorboard/data/runs").status == 200
     with pytest.raises(ConnectionRefusedError):
-        http.client.HTTPConnection("127.0.0.1", port, timeout=20).request("GET", "/")
+        http.client.HTTPConnection("127.0.0.1", port, timeout=60).request("GET", "/")
 
 
 def test_it_ends_with_its_parent_and_does_not_see_the_tokens(monkeypatch):

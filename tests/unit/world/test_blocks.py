@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import math
+import threading
+import tracemalloc
 
 import numpy as np
 import pytest
 from plain_scene import PlainScene
 
 from volery.core.errors import CommandError
+from volery.world import embree
 from volery.world.grid_maps import GridMap, block_mesh
 from volery.world.materials import Material
 from volery.world.scene import Scene, Solid
@@ -161,16 +166,43 @@ def test_blocks_replace_each_other_and_leave_the_rest():
 
 
 def test_replacing_many_times_does_not_grow():
-    import resource
-
     grid = grid_of(random_cells(shape=(300, 300)), cell=1.0)
     blocks = solid(grid)
     scene = Scene(None, None, solids=[blocks])
-    for _ in range(5):
-        scene.replace_solids([Solid(blocks.mesh, Material.BLOCK, "block")])
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    for _ in range(20):
-        scene.replace_solids([Solid(blocks.mesh, Material.BLOCK, "block")])
-    grown_mb = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
-    assert grown_mb < 40
+
+    def replace(times):
+        """How much more Embree and NumPy hold afterwards, in the meshes' sizes."""
+        before = embree_bytes(), tracemalloc.get_traced_memory()[0]
+        for _ in range(times):
+            scene.replace_solids([Solid(blocks.mesh, Material.BLOCK, "block")])
+        after = embree_bytes(), tracemalloc.get_traced_memory()[0]
+        size = blocks.mesh.vertices.nbytes + blocks.mesh.triangles.nbytes
+        return [(b - a) / size for a, b in zip(before, after, strict=True)]
+
+    with counted() as embree_bytes:
+        first = replace(1)  # with the tree of the first, which Embree holds until the next commit
+        assert max(replace(20)) < 0.1, first
     scene.close()
+
+
+@contextlib.contextmanager
+def counted():
+    """Count bytes in Embree, by its own report of each allocation, and in Python's arrays."""
+    held, lock = [0], threading.Lock()
+
+    def count(_, size, _is_done):
+        with lock:  # it comes from Embree's threads
+            held[0] += size
+        return True
+
+    library = embree.load()
+    watch = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_void_p, ctypes.c_ssize_t, ctypes.c_bool)
+    set_monitor = library.rtcSetDeviceMemoryMonitorFunction
+    callback = watch(count)
+    tracemalloc.start()
+    set_monitor(ctypes.c_void_p(embree._device()), callback, None)
+    try:
+        yield lambda: held[0]
+    finally:
+        set_monitor(ctypes.c_void_p(embree._device()), None, None)
+        tracemalloc.stop()

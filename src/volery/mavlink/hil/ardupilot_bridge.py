@@ -68,7 +68,8 @@ Address = tuple[Any, ...]
 class ArdupilotBridge:
     """Listens for instance i, the autopilot of the i-th UAV, at `port` + 10 i.
 
-    The gateway provides the rotors of each UAV. notice_s: wall time after which the bridge logs
+    The gateway provides the rotors of each UAV. port: 0 takes a free port for each UAV, see
+    `ports`. notice_s: wall time after which the bridge logs
     that ArduPilots are missing; None: the caller reports them.
     """
 
@@ -87,6 +88,7 @@ class ArdupilotBridge:
         self._timeout_policy = timeout_policy
         self._anywhere = anywhere
         self._sessions: list[_Session] = []
+        self._ports: list[int] = []
 
     @property
     def name(self) -> str:
@@ -97,6 +99,11 @@ class ArdupilotBridge:
     def connected(self) -> tuple[str, ...]:
         """UAVs whose ArduPilot has connected."""
         return tuple(session.uav for session in self._sessions if session.peer is not None)
+
+    @property
+    def ports(self) -> tuple[int, ...]:
+        """Ports of the ArduPilots, in the order of the UAVs; empty while the bridge is closed."""
+        return tuple(self._ports)
 
     async def start(self, gateway: Gateway) -> None:
         """Starts listening.
@@ -115,7 +122,7 @@ class ArdupilotBridge:
                 raise BridgeError(f"{uav}: {error}") from None
             session = _Session(gateway, uav, motors, self._timeout_policy)
             self._sessions.append(session)
-            await self._listen(session, self._port + PORT_STEP * k)
+            await self._listen(session, self._port + PORT_STEP * k if self._port else 0)
         self._absence = ConnectionNotice(
             "ArduPilot", self._missing, self._how_to_start, self._notice_s
         )
@@ -127,30 +134,34 @@ class ArdupilotBridge:
         for session in self._sessions:
             session.close()
         self._sessions.clear()
+        self._ports.clear()
         await asyncio.sleep(0)
 
     def _missing(self) -> dict[str, str]:
         """Returns the addresses of the missing ArduPilots, by UAV."""
         return {
-            session.uav: f"UDP {self._host}:{self._port + PORT_STEP * number}"
+            session.uav: f"UDP {self._host}:{self._ports[number]}"
             for number, session in enumerate(self._sessions)
             if session.peer is None
         }
 
     def _how_to_start(self) -> str:
         absent = next((k for k, session in enumerate(self._sessions) if session.peer is None), 0)
-        instance, odd = divmod(self._port + PORT_STEP * absent - PORT, PORT_STEP)
+        instance, odd = divmod(self._ports[absent] - PORT, PORT_STEP)
         chosen = f" -I {instance}" if instance >= 0 and not odd else ""
         return f"start with: arducopter --model JSON{chosen} ... (docs/mavlink.md)"
 
     async def _listen(self, session: _Session, port: int) -> None:
         loop = asyncio.get_running_loop()
         try:
-            await loop.create_datagram_endpoint(lambda: session, local_addr=(self._host, port))
+            transport, _ = await loop.create_datagram_endpoint(
+                lambda: session, local_addr=(self._host, port)
+            )
         except (OSError, OverflowError) as error:
             raise BridgeError(
                 f"{session.uav}: cannot listen on UDP {self._host}:{port}: {why_not(error)}"
             ) from None
+        self._ports.append(transport.get_extra_info("sockname")[1])
 
 
 class _Session(asyncio.DatagramProtocol):

@@ -41,6 +41,7 @@ _log = logging.getLogger(__name__)
 class Px4Bridge:
     """Serves PX4 instance i, the autopilot of the i-th UAV, at `port` + i.
 
+    port: 0 takes a free port for each UAV, see `ports`.
     notice_s: wall time after which missing PX4s are logged; None: the caller reports them.
     """
 
@@ -59,6 +60,7 @@ class Px4Bridge:
         self._timeout_policy = timeout_policy
         self._anywhere = anywhere
         self._servers: list[asyncio.Server] = []
+        self._ports: list[int] = []
         self._sessions: list[HilSession] = []
 
     @property
@@ -71,9 +73,15 @@ class Px4Bridge:
         """UAVs whose PX4 is connected."""
         return tuple(session.uav for session in self._sessions if session.taken)
 
+    @property
+    def ports(self) -> tuple[int, ...]:
+        """Ports of the PX4s, in the order of the UAVs; empty while the bridge is closed."""
+        return tuple(self._ports)
+
     def address(self, number: int) -> str:
         """Returns the address to which instance `number` connects."""
-        return f"{self._host}:{self._port + number}"
+        port = self._ports[number] if number < len(self._ports) else self._port + number
+        return f"{self._host}:{port}"
 
     async def start(self, gateway: Gateway) -> None:
         """Starts listening. Raises `BridgeError` if a port is taken or a UAV lacks an IMU."""
@@ -85,7 +93,7 @@ class Px4Bridge:
         for k, uav in enumerate(uavs):
             session = HilSession(gateway, uav, k + 1, self._timeout_policy)
             self._sessions.append(session)
-            await self._listen(session, self._port + k)
+            await self._listen(session, self._port + k if self._port else 0)
         if self._notice_s is not None:
             self._absence = ConnectionNotice(
                 "PX4", self._missing, lambda: how_to_start(len(uavs), self._port), self._notice_s
@@ -100,6 +108,7 @@ class Px4Bridge:
         for session in self._sessions:
             session.close()
         self._servers.clear()
+        self._ports.clear()
         self._sessions.clear()
         for _ in range(2):  # for connections to be aborted, and their callbacks to run
             await asyncio.sleep(0)
@@ -124,6 +133,7 @@ class Px4Bridge:
                 f"{session.uav}: cannot listen on {self._host}:{port}: {why_not(error)}"
             ) from None
         self._servers.append(server)
+        self._ports.append(listener.getsockname()[1])
 
 
 class _Connection(asyncio.Protocol):
