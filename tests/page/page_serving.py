@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import threading
 import urllib.request
+from contextlib import contextmanager
 
 import roslibpy
 
@@ -69,6 +70,23 @@ class Served(PageProcess):
         finally:
             subscriber.unsubscribe()
         return fitting[0]
+
+    @contextmanager
+    def heard(self, topic, msgtype):
+        """List of the messages of a topic from before the block on: none is too late for it."""
+        messages, began = [], threading.Event()
+
+        def take(message):
+            messages.append(message)
+            began.set()
+
+        subscriber = roslibpy.Topic(self.ros, topic, msgtype)
+        subscriber.subscribe(take)
+        try:
+            assert began.wait(ANSWER_S), f"nothing came on {topic}"
+            yield messages
+        finally:
+            subscriber.unsubscribe()
 
     def stop(self):
         if self._ros is not None:

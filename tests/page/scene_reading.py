@@ -29,6 +29,18 @@ def wait_for_frames(page, count=3):
     )
 
 
+def wait_for_rest(page):
+    """Until the camera stands still, as after the first picture."""
+    seen = []
+
+    def rests(page):
+        wait_for_frames(page)
+        seen.append(eye(page))
+        return len(seen) > 2 and np.ptp(seen[-3:], axis=0).max() < 1e-3
+
+    wait_until(page, rests)
+
+
 def wait_until(page, condition, timeout_s=DRAWN_S):
     """Until a Python condition of the page is true; the last value that it gave."""
     ends = time.monotonic() + timeout_s

@@ -5,7 +5,7 @@ import re
 
 import pytest
 from page_browsing import keep_picture
-from truth import until
+from truth import heard_vehicles, of_uav, pass_seconds, place, until
 from working import WIDE, open_panel
 
 pytestmark = pytest.mark.slow
@@ -85,16 +85,20 @@ def test_a_plot_draws_a_field_and_keeps_it_as_csv(page):
     page.get_by_role("option", name="pose.pose.position.z", exact=True).click()
     line = panel.locator("[data-line='/uav1/odom.pose.pose.position.z']")
     until(lambda: re.search(r" \d", line.inner_text()))
-    page.wait_for_timeout(1500)
     keep_picture(page, "plots")
-    with page.expect_download() as kept:
-        panel.get_by_role("button", name="Download as CSV").click()
-    head, *rows = kept.value.path().read_text().splitlines()
+    head, *rows = until(lambda: csv_of(page, panel, 10))
     assert head == "time_s,/uav1/odom.pose.pose.position.z"
     times = [float(row.split(",")[0]) for row in rows]
-    assert len(rows) > 10
     assert times == sorted(times)
     assert all(-1.0 < float(row.split(",")[1]) < 5.0 for row in rows)
+
+
+def csv_of(page, panel, most):
+    """Lines of the plot's file once it has more than so many values, or None."""
+    with page.expect_download() as kept:
+        panel.get_by_role("button", name="Download as CSV").click()
+    lines = kept.value.path().read_text().splitlines()
+    return lines if len(lines) > most + 1 else None
 
 
 def test_a_service_is_called_by_a_form_of_its_own(page, served):
@@ -116,14 +120,10 @@ def test_a_fault_is_injected_and_told_in_the_log(page, served):
     page.get_by_role("option", name="Displacement").click()
     for axis, metres in (("east", "3"), ("north", "0"), ("up", "1")):
         panel.get_by_label(f"Offset, m, {axis}").fill(metres)
-    before = served.once("/volery/vehicles", "volery_interfaces/msg/VehicleStates")
-    panel.get_by_role("button", name="Inject").click()
-    x = before["vehicles"][0]["position"]["x"]
-    served.once(
-        "/volery/vehicles",
-        "volery_interfaces/msg/VehicleStates",
-        lambda message: message["vehicles"][0]["position"]["x"] > x + 2.0,
-    )
+    x = place(served, "uav1")[0]
+    with heard_vehicles(served) as heard:
+        panel.get_by_role("button", name="Inject").click()
+        until(lambda: any(uav["position"]["x"] > x + 2.0 for uav in of_uav(heard, "uav1")))
     log = open_panel(page, "Log")
     log.get_by_role("log").get_by_text("fault", exact=True).first.wait_for()
     keep_picture(page, "log")
@@ -139,12 +139,12 @@ def test_a_wrong_fault_tells_why(page):
 
 
 @pytest.mark.parametrize("name", ["from_the_page.mcap", "from_the_page.bag"])
-def test_a_flight_is_recorded_listed_fetched_and_brought_again(page, recordings, name):
+def test_a_flight_is_recorded_listed_fetched_and_brought_again(page, served, recordings, name):
     panel = open_panel(page, "Recordings")
     panel.get_by_label("Name of the recording").fill(name)
     panel.get_by_role("button", name="Record", exact=True).click()
     panel.get_by_role("button", name="Stop").wait_for()
-    page.wait_for_timeout(1000)
+    pass_seconds(served, 1.0)
     panel.get_by_role("button", name="Stop").click()
     row = panel.get_by_role("row", name=re.compile(f"^{name}"))
     row.wait_for()
@@ -183,7 +183,7 @@ def test_a_recording_is_played_with_a_slider_and_left_again(page, served, shared
     panel.get_by_label("Name of the recording").fill("to_be_played")
     panel.get_by_role("button", name="Record", exact=True).click()
     panel.get_by_role("button", name="Stop").wait_for()
-    page.wait_for_timeout(2000)
+    pass_seconds(served, 2.0)
     panel.get_by_role("button", name="Stop").click()
     panel.get_by_role("button", name="Play to_be_played.mcap").click()
     player = page.get_by_role("group", name="Playback")

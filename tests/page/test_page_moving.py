@@ -6,8 +6,15 @@ import numpy as np
 import pytest
 from map_reading import map_canvas, red_circle
 from page_browsing import keep_picture
-from scene_reading import on_screen, project, wait_for_frames, wait_for_picture, wait_until
-from truth import place, put, until, vehicle
+from scene_reading import (
+    on_screen,
+    project,
+    wait_for_frames,
+    wait_for_picture,
+    wait_for_rest,
+    wait_until,
+)
+from truth import hurried, place, put, until, vehicle
 from working import WIDE, inspect, pull
 
 pytestmark = pytest.mark.slow
@@ -20,6 +27,8 @@ window.pad = { axes: [0, 0, 0, 0], buttons: [], connected: true, id: "pad", inde
 navigator.getGamepads = () => [null, window.pad];
 document.hasFocus = () => true;
 """
+DRAWN_MAP = "() => new Promise((drawn) => setTimeout(drawn, 300))"
+"""The map draws fifteen times a second by a timer of the same thread, which comes before this."""
 
 
 @pytest.fixture(scope="module")
@@ -27,8 +36,9 @@ def served(chromium):
     from page_serving import Served
 
     with Served("hover", "--uavs", "3") as server:
-        for uav in HOMES:
-            vehicle(server, uav, lambda told: told["mode"] == "HOLD")  # after its own take-off
+        with hurried(server):
+            for uav in HOMES:
+                vehicle(server, uav, lambda told: told["mode"] == "HOLD")  # after its take-off
         yield server
 
 
@@ -91,8 +101,10 @@ def circle_of(page, uav):
     """Where the red circle is once this UAV is selected."""
     page.get_by_role("option", name=uav).click()
     page.get_by_role("option", name=uav, selected=True).wait_for()
-    page.wait_for_timeout(300)  # the map draws fifteen times a second
-    return wait_until(page, lambda page: red_circle(page) is not None) and red_circle(page)
+    page.evaluate(DRAWN_MAP)
+    found = []
+    wait_until(page, lambda page: found.append(red_circle(page)) or found[-1] is not None)
+    return found[-1]
 
 
 def test_the_map_zooms_follows_and_shows_all(browsing, served, homes):
@@ -121,7 +133,8 @@ def near(seen, wanted, metres):
 
 
 def arrives(served, uav, x, y):
-    return until(lambda: near(place(served, uav), (x, y), 0.4), what=f"{uav} did not come")
+    with hurried(served):
+        until(lambda: near(place(served, uav), (x, y), 0.4), what=f"{uav} did not come")
 
 
 # -------------------------------------------------------------------------------- handles
@@ -157,7 +170,8 @@ def test_a_uav_is_lifted_by_its_arrow(page, served):
     below = on_screen(page, "uav1")
     grip = np.add(at, [0.0, 0.0, 0.9 * handle_scale(page, at)])
     pull(page, project(page, grip), project(page, np.add(grip, [0.0, 0.0, 2.0])))
-    until(lambda: abs(place(served, "uav1")[2] - at[2] - 2.0) < 0.4, what="it was not lifted")
+    with hurried(served):
+        until(lambda: abs(place(served, "uav1")[2] - at[2] - 2.0) < 0.4, what="it was not lifted")
     assert near(place(served, "uav1"), at, 0.4)
     wait_until(page, lambda page: on_screen(page, "uav1")["y"] < below["y"] - 20)
 
@@ -245,7 +259,7 @@ def test_the_first_picture_frames_all_uavs(browsing, served, homes, viewport):
     page = browsing.open(served.url, viewport=viewport)
     page.keyboard.press("m")
     wait_for_picture(page)
-    page.wait_for_timeout(1500)  # until the view has settled
+    wait_for_rest(page)
     box = page.get_by_label("Scene", exact=True).bounding_box()
     seen = np.array([project(page, place(served, uav)) for uav in HOMES])
     inside = (seen - (box["x"], box["y"])) / (box["width"], box["height"])

@@ -5,7 +5,7 @@ import re
 
 import pytest
 from page_browsing import keep_picture
-from truth import until, vehicle
+from truth import hurried, until, vehicle
 from working import WIDE, choose_field, open_panel, panel_button
 
 pytestmark = pytest.mark.slow
@@ -76,6 +76,20 @@ def test_two_panels_lie_side_by_side(page):
     until(lambda: box(plots)[2] > 0.9 * WIDE["width"])
 
 
+def curve_to(page, plots, x):
+    """(x, y) of the first curve, as the plots' file has it, once it reaches x; None before."""
+    with page.expect_download() as kept:
+        plots.get_by_role("button", name="Download as CSV").click()
+    head, *rows = kept.value.path().read_text().splitlines()
+    assert head.split(",")[:3] == [
+        "time_s",
+        "/uav1/odom.pose.pose.position.x",
+        "/uav1/odom.pose.pose.position.y",
+    ]
+    flown = [tuple(map(float, cells[1:3])) for row in rows if (cells := row.split(","))[1]]
+    return flown if flown[-1][0] > x else None
+
+
 def test_a_field_is_plotted_over_another_one(page, served):
     plots = open_panel(page, "Plots")
     plots.get_by_role("button", name="x-y plot").click()  # begins with the selected UAV from above
@@ -91,19 +105,11 @@ def test_a_field_is_plotted_over_another_one(page, served):
     until(lambda: re.search(r"-?\d+\.\d+, -?\d+\.\d+$", other.inner_text()))
     same = plots.get_by_role("button", name="Same scale on both axes")
     assert same.get_attribute("aria-pressed") == "true"
-    send_away(served)
+    with hurried(served):
+        send_away(served)
     keep_picture(page, "plots_xy")
-    with page.expect_download() as kept:
-        plots.get_by_role("button", name="Download as CSV").click()
-    head, *rows = kept.value.path().read_text().splitlines()
-    assert head.split(",")[:3] == [
-        "time_s",
-        "/uav1/odom.pose.pose.position.x",
-        "/uav1/odom.pose.pose.position.y",
-    ]
-    flown = [tuple(map(float, cells[1:3])) for row in rows if (cells := row.split(","))[1]]
+    flown = until(lambda: curve_to(page, plots, SENT_TO["x"] - 1.0))
     assert flown[0] == pytest.approx((0.0, 0.0), abs=0.5)
-    assert flown[-1][0] > SENT_TO["x"] - 1.0
     saved = json.loads(page.evaluate("localStorage.getItem('volery.plots')"))["plots"]
     assert len(saved[-1]["curves"]) == 2
 

@@ -10,7 +10,7 @@ import roslibpy
 from page_browsing import keep_picture
 from page_serving import Served
 from scene_reading import on_screen, wait_for_picture, wait_until
-from truth import place, until, vehicle
+from truth import hurried, pass_seconds, place, until, vehicle
 from working import WIDE, inspect, open_panel
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
@@ -32,8 +32,9 @@ ASK = """
 @pytest.fixture(scope="module")
 def served(chromium):
     with Served("hover", "--uavs", "2", "--viewer-token", VIEWERS, token=OPERATORS) as server:
-        for uav in ("uav1", "uav2"):
-            vehicle(server, uav, lambda told: told["mode"] == "HOLD")
+        with hurried(server):
+            for uav in ("uav1", "uav2"):
+                vehicle(server, uav, lambda told: told["mode"] == "HOLD")
         yield server
 
 
@@ -131,7 +132,7 @@ def test_two_operators_and_a_hand_over(browsing, served):
     ben.keyboard.press("c")
     ben.get_by_role("group", name="Manual control").get_by_text("Anna controls uav1").wait_for()
     ben.keyboard.down("KeyW")
-    ben.wait_for_timeout(1000)
+    pass_seconds(served, 1.0)
     ben.keyboard.up("KeyW")
     assert vehicle(served, "uav1")["mode"] != "VELOCITY"
     ben.keyboard.press("Escape")

@@ -57,7 +57,6 @@ def fits_with(page, name, size, kept):
     assert box["y"] + box["height"] <= size["height"] + 1
     assert overflow(page) <= 0
     if name in ("Topics", "Plots"):
-        page.wait_for_timeout(500)
         keep_picture(page, f"{kept}_{name.lower()}")
     panel_button(page, name).click()
 

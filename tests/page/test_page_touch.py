@@ -3,7 +3,7 @@
 import pytest
 from page_browsing import keep_picture
 from scene_reading import on_screen, wait_until
-from truth import place, vehicle
+from truth import hurried, place, vehicle
 
 pytestmark = pytest.mark.slow
 
@@ -35,7 +35,8 @@ class Thumbs:
 
 @pytest.fixture
 def page(browsing, served):
-    vehicle(served, "uav1", lambda uav: uav["mode"] == "HOLD")  # after its own take-off
+    with hurried(served):
+        vehicle(served, "uav1", lambda uav: uav["mode"] == "HOLD")  # after its own take-off
     page = browsing.open(served.url + "#uav=uav1", viewport=PHONE, **TOUCH)
     page.get_by_role("button", name="Manual control").tap()
     return page

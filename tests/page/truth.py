@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from contextlib import contextmanager
+from itertools import pairwise
 
 VEHICLES = "volery_interfaces/msg/VehicleStates"
 STATUS = "volery_interfaces/msg/SimulationStatus"
@@ -38,6 +40,53 @@ def place(served, uav):
 def status(served, fits=lambda _: True, timeout_s=180.0):
     """What the simulation says of itself, once it is so."""
     return served.once("/volery/status", STATUS, fits, timeout_s)
+
+
+def heard_status(served):
+    """Context with the list of what the simulation says of itself, from before its block on."""
+    return served.heard("/volery/status", STATUS)
+
+
+def heard_vehicles(served):
+    """Context with the list of the states of all UAVs, from before its block on."""
+    return served.heard("/volery/vehicles", VEHICLES)
+
+
+def first_after_return(statuses):
+    """The first status after simulated time has gone back; None: it has not yet."""
+    return next(
+        (after for before, after in pairwise(list(statuses)) if stamp_ns(after) < stamp_ns(before)),
+        None,
+    )
+
+
+def of_uav(messages, uav):
+    """What messages tell of one UAV."""
+    return [one for message in list(messages) for one in message["vehicles"] if one["name"] == uav]
+
+
+def pass_seconds(served, seconds):
+    """Wait until so much simulated time has passed."""
+    ends_ns = stamp_ns(status(served)) + int(seconds * 1e9)
+    status(served, lambda told: stamp_ns(told) >= ends_ns)
+
+
+def set_speed(served, factor):
+    """Real-time factor; 0: as fast as possible."""
+    served.call("/volery/set_speed", "volery_interfaces/srv/SetSpeed", {"factor": factor})
+
+
+@contextmanager
+def hurried(served):
+    """Simulated time passes as fast as it can, then in real time again.
+
+    For ways and take-offs on which nobody steers by hand.
+    """
+    set_speed(served, 0.0)
+    try:
+        yield
+    finally:
+        set_speed(served, 1.0)
 
 
 def weather(served, fits=lambda _: True, timeout_s=180.0):

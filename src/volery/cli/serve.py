@@ -207,8 +207,8 @@ class _Host:
         try:
             while not simulation.clock.quitting:
                 simulation.run(speed=speed, on_progress=self._look)
-                speed = simulation.clock.speed
                 simulation.wait_at_end(self._look)
+                speed = simulation.clock.speed  # also where it was set at the end
         except _StoppedError:
             return
         time.sleep(_FAREWELL_S)
