@@ -102,7 +102,7 @@ class ArdupilotBridge:
 
     @property
     def ports(self) -> tuple[int, ...]:
-        """Ports of the ArduPilots, in the order of the UAVs; empty while the bridge is closed."""
+        """Ports of the ArduPilots, in the order of the UAVs; empty while closed."""
         return tuple(self._ports)
 
     async def start(self, gateway: Gateway) -> None:

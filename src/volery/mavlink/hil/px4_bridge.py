@@ -75,7 +75,7 @@ class Px4Bridge:
 
     @property
     def ports(self) -> tuple[int, ...]:
-        """Ports of the PX4s, in the order of the UAVs; empty while the bridge is closed."""
+        """Ports of the PX4s, in the order of the UAVs; empty while closed."""
         return tuple(self._ports)
 
     def address(self, number: int) -> str:
