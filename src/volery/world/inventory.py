@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import csv
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +40,10 @@ class Inventory:
     def __len__(self) -> int:
         """Number of trees."""
         return len(self.position)
+
+    def moved(self, by: tuple[float, float]) -> Inventory:
+        """Returns the trees displaced by x and y, m."""
+        return replace(self, position=self.position + np.array(by))
 
     def within(self, region: tuple[float, float, float, float]) -> Inventory:
         """Returns trees with x0 <= x < x1 and y0 <= y < y1 of `region` (x0, y0, x1, y1), m."""
