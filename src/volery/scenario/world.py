@@ -38,12 +38,15 @@ class FlatTerrain(Data):
 
 
 class GridTerrain(Data):
-    """A heightfield from a CSV grid: row k holds the elevations at y = k * spacing."""
+    """A heightfield from a CSV grid: row k holds the elevations at y = k * spacing.
+
+    An ESRI ASCII grid is read, too; its first row is at the highest y.
+    """
 
     kind: Literal["grid"] = "grid"
     """Ground from a grid of elevations."""
     file: str
-    """CSV file of elevations."""
+    """CSV file or ESRI ASCII grid of elevations in m."""
     spacing_m: Positive
     """Distance between neighbours of the grid."""
     origin_m: Vector2 = (0.0, 0.0)
