@@ -5,7 +5,7 @@ of the triangle there, so that rays (`Terrain.mesh`), ground contact (`terrain_h
 `terrain_normal`) and queries agree to rounding. Beyond the grid the height is that of the nearest
 edge point and the ground is horizontal across the edge.
 
-In `TerrainGrid.heights` row i holds y = origin_y + i * spacing, column j x = origin_x + j * spacing.
+Row i of the heights holds y = origin_y + i * spacing, column j x = origin_x + j * spacing.
 """
 
 from __future__ import annotations

@@ -89,7 +89,9 @@ def _decode(
                 return grey, np.ones_like(grey)
             colours = np.asarray(picture.convert("RGBA"))
     except Image.UnidentifiedImageError:
-        raise DataFileError(f"{where}: the image is damaged, or not {' or '.join(formats)}") from None
+        raise DataFileError(
+            f"{where}: the image is damaged, or not {' or '.join(formats)}"
+        ) from None
     except Image.DecompressionBombError:
         raise DataFileError(f"{where}: too many pixels; allowed are 1 to {MOST_CELLS}") from None
     except (OSError, SyntaxError, ValueError, EOFError, struct.error, zlib.error) as error:

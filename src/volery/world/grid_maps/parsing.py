@@ -22,8 +22,8 @@ _SUFFIXES = (".csv", ".txt", ".png", ".pgm", ".map")
 def read_cells(path: Path, threshold: float = 0.5) -> NDArray[np.bool_]:
     """Returns the blocked cells (rows, columns) of a grid map's file, row 0: lowest y.
 
-    A .csv or .txt file is a matrix of 0 and 1, a .map file one of movingai.com, a .png or
-    .pgm file an image in which a cell is blocked where it is darker than `threshold` (0 white, 1 black). The
+    A .csv or .txt file is a matrix of 0 and 1, a .map file one of movingai.com, a .png or .pgm file
+    an image in which a cell is blocked where it is darker than `threshold` (0 white, 1 black). The
     first row of a file is the top: it holds the highest y. Raises `DataFileError`, naming the file
     and, where there are lines, the line, for other input.
     """
