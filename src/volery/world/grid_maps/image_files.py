@@ -71,7 +71,7 @@ def _decode(
     data: bytes, where: str, *formats: str
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Returns grey and alpha (rows, columns), 0 to 1."""
-    from PIL import Image
+    from PIL import Image, UnidentifiedImageError
 
     try:
         with (
@@ -88,7 +88,7 @@ def _decode(
                 grey = np.asarray(picture, dtype=np.float32) / 65535.0
                 return grey, np.ones_like(grey)
             colours = np.asarray(picture.convert("RGBA"))
-    except Image.UnidentifiedImageError:
+    except UnidentifiedImageError:
         raise DataFileError(
             f"{where}: the image is damaged, or not {' or '.join(formats)}"
         ) from None
