@@ -110,8 +110,9 @@ def _read(data, name):
     path.write_bytes(data)
     with contextlib.suppress(DataFileError):
         file = read_mesh(path)
-        assert 0 < len(file.mesh) <= MOST_TRIANGLES
+        assert 0 < len(file.triangles) <= MOST_TRIANGLES
         assert np.isfinite(file.mesh.vertices).all()
-        assert file.mesh.area > 0.0
+        moved = np.column_stack([np.eye(3), -file.points.min(axis=0)])  # to the origin
+        assert file.placed(moved).area > 0.0
         assert all(0.0 <= part <= 1.0 for part in file.colour)
     return 1

@@ -101,11 +101,7 @@ def test_a_model_too_stiff_for_the_step_is_refused_before_the_flight(tmp_path, f
 def test_an_stl_that_is_no_text_does_not_ask_for_a_module(tmp_path):
     path = tmp_path / "x.stl"
     path.write_bytes(b"\xff" * 80 + struct.pack("<I", 7) + b"\xfe" * 33)
-    with pytest.raises(DataFileError, match="no text in UTF-8, and no binary STL of its size"):
-        read_mesh(path)
-    path = tmp_path / "x.obj"
-    path.write_bytes(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n# \xff\xfe\xe4")
-    with pytest.raises(DataFileError, match="no text in UTF-8"):
+    with pytest.raises(DataFileError, match="header announces 7 triangles, 434 bytes; it has 117"):
         read_mesh(path)
 
 

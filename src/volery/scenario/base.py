@@ -24,6 +24,8 @@ from volery.scenario.validation import describe_validation_error
 
 Vector2 = tuple[float, float]
 Vector3 = tuple[float, float, float]
+PROJECTED = Quantity("m", 3.5e7, 1e-9)
+"""Limits of projected coordinates; the largest have a zone's number before the easting."""
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=40)]
 Topic = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*(/[a-z][a-z0-9_]*)*$", max_length=120)]
 Positive = Annotated[float, Field(gt=0.0)]

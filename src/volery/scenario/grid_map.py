@@ -16,14 +16,17 @@ Side = Annotated[float, Field(ge=0.001, le=1000.0)]
 
 
 class GridMapFile(Data):
-    """A map in a file: .csv, .txt (0 and 1), .png (dark is blocked) or .map (movingai.com)."""
+    """A map in a file: .csv, .txt (0 and 1), .png, .pgm (dark is blocked), .map (movingai.com).
+
+    A .yaml file of ROS' map_server brings its image, cell size, origin, yaw and thresholds.
+    """
 
     file: str
-    """File of the matrix."""
+    """File of the map."""
     name: MapName | None = None
     """Name of the map; None: the file's name without its suffix."""
     threshold: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
-    """Darkness above which a pixel is blocked, from 0 (white) to 1 (black)."""
+    """Darkness above which a pixel is blocked, from 0 (white) to 1 (black); not of a .yaml file."""
 
     @model_validator(mode="after")
     def _has_a_name(self) -> Self:
@@ -45,13 +48,13 @@ class GridMapWorld(Data):
     map: str | None = None
     """Name of the map at the start; None: the first."""
     cell_size_m: Side = 1.0
-    """Side of a cell."""
+    """Side of a cell; a .yaml file has its own."""
     block_height_m: Side = 5.0
     """Height of the blocks above the ground."""
     origin_m: Vector2 = (0.0, 0.0)
-    """Lower left corner of a file's map."""
+    """Lower left corner of a file's map; a .yaml file has its own."""
     unknown_is_blocked: bool = False
-    """Whether cells of a `nav_msgs/OccupancyGrid` that are unknown (-1) become blocks."""
+    """Whether unknown cells become blocks: -1 in a `nav_msgs/OccupancyGrid`, and in .yaml maps."""
 
     @model_validator(mode="after")
     def _names_are_known(self) -> Self:

@@ -7,8 +7,10 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
+from volery.core.quantities import Quantity
 from volery.scenario.actors import Actors, check_actors
 from volery.scenario.base import (
+    PROJECTED,
     Data,
     NonNegative,
     Positive,
@@ -36,12 +38,15 @@ class FlatTerrain(Data):
 
 
 class GridTerrain(Data):
-    """A heightfield from a CSV grid: row k holds the elevations at y = k * spacing."""
+    """A heightfield from a CSV grid: row k holds the elevations at y = k * spacing.
+
+    An ESRI ASCII grid is read, too; its first row is at the highest y.
+    """
 
     kind: Literal["grid"] = "grid"
     """Ground from a grid of elevations."""
     file: str
-    """CSV file of elevations."""
+    """CSV file or ESRI ASCII grid of elevations in m."""
     spacing_m: Positive
     """Distance between neighbours of the grid."""
     origin_m: Vector2 = (0.0, 0.0)
@@ -60,13 +65,17 @@ class InventoryForest(Data):
     mapped."""
     species_map: Annotated[dict[str, str], Field(max_length=10_000)] = Field(default_factory=dict)
     """Shipped species by the inventory's names of species."""
+    position_m: Vector2 = (0.0, 0.0)
+    """Position x, y of the file's origin in the map; for projected coordinates their negative
+    values."""
     region_m: tuple[float, float, float, float] | None = None
-    """x_min, y_min, x_max, y_max; only trees with x_min <= x < x_max (y alike) are used; None:
-    all."""
+    """x_min, y_min, x_max, y_max in the map; only trees with x_min <= x < x_max (y alike) are
+    used; None: all."""
     fraction: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
     """Fraction of the trees, at random; a smaller fraction is a subset of a larger one."""
 
     former_keys: ClassVar[Mapping[str, str]] = {"share": "fraction"}
+    quantities: ClassVar[Mapping[str, Quantity]] = {"position_m": PROJECTED}
 
     @model_validator(mode="after")
     def _region_is_a_rectangle(self) -> Self:

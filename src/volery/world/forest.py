@@ -87,14 +87,16 @@ def forest_from_inventory(
     seed: int = 0,
     diameters: str | None = None,
     species_map: Mapping[str, str] | None = None,
+    position: tuple[float, float] = (0.0, 0.0),
 ) -> Forest:
     """Returns a forest of surveyed trees; missing sizes are drawn from the species' laws.
 
     inventory: a CSV file or the result of `read_inventory`.
     species: species of trees without one in the inventory, or with one that is not shipped; one
     warning counts the latter. species_map: shipped species by the inventory's names.
-    region: (x0, y0, x1, y1) in m; only trees with x0 <= x < x1 and y0 <= y < y1 are used. None uses
-    all.
+    position: of the inventory's origin in the map, x and y in m.
+    region: (x0, y0, x1, y1) in the map, m; only trees with x0 <= x < x1 and y0 <= y < y1 are used.
+    None uses all.
     fraction: of the trees, 0 to 1, chosen at random.
     diameters: name of the species' distribution of missing diameters (None: its "stand").
     Sizes are drawn for the whole inventory before the region is selected, so a tree is the same in
@@ -102,6 +104,7 @@ def forest_from_inventory(
     `ScenarioError` for an unknown `species` or one in `species_map`.
     """
     trees = inventory if isinstance(inventory, Inventory) else read_inventory(inventory)
+    trees = trees.moved(position)
     load_species(species)
     where = (
         f"inventory {Path(inventory).name}" if isinstance(inventory, str | Path) else "inventory"

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import csv
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from volery.core.errors import DataFileError
 from volery.core.plurals import counted
+from volery.world.inventory_doubts import question
 
 _REQUIRED = ("x_m", "y_m")
 _OPTIONAL = ("dbh_cm", "height_m", "species")
@@ -40,6 +41,10 @@ class Inventory:
     def __len__(self) -> int:
         """Number of trees."""
         return len(self.position)
+
+    def moved(self, by: tuple[float, float]) -> Inventory:
+        """Returns the trees displaced by x and y, m."""
+        return replace(self, position=self.position + np.array(by))
 
     def within(self, region: tuple[float, float, float, float]) -> Inventory:
         """Returns trees with x0 <= x < x1 and y0 <= y < y1 of `region` (x0, y0, x1, y1), m."""
@@ -70,6 +75,7 @@ def read_inventory(path: str | Path) -> Inventory:
     faults: list[str] = []
     numbers: list[list[float]] = []
     names: list[str] = []
+    sound: list[int] = []
     for number, row in enumerate(rows[1:], start=2):
         if not any(field.strip() for field in row):
             continue
@@ -79,6 +85,7 @@ def read_inventory(path: str | Path) -> Inventory:
         else:
             numbers.append(values)
             names.append(name)
+            sound.append(number)
     if faults:
         shown = "; ".join(faults[:_SHOWN_FAULTS])
         others = [fault.split(":")[0].removeprefix("row ") for fault in faults[_SHOWN_FAULTS:]]
@@ -86,6 +93,7 @@ def read_inventory(path: str | Path) -> Inventory:
         plural = "row" if len(faults) == 1 else "rows"
         raise DataFileError(f"inventory {path} has {len(faults)} bad {plural}: {shown}")
     table = np.array(numbers, dtype=np.float64).reshape(-1, 4)
+    question(f"inventory {path.name}", np.array(sound, dtype=np.int64), table)
     return Inventory(table[:, :2], table[:, 2], table[:, 3], tuple(names))
 
 

@@ -6,46 +6,63 @@ in the file's units, z up.
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from volery.core.errors import DataFileError
 from volery.core.frames import enu_from_gltf
 from volery.core.plurals import counted
 from volery.world.gltf_import import Part, read_gltf
 from volery.world.mesh import Mesh
+from volery.world.obj_import import read_obj
+from volery.world.stl_import import read_stl
 
 MOST_BYTES = 128_000_000
 MOST_TRIANGLES = 5_000_000
 """Maximum number of triangles: 5 million take about 1 GB in the ray caster."""
 FARTHEST_M = 100_000.0
-"""Maximum distance of vertices, which larger scale errors exceed; beyond, 32-bit numbers are
-coarser than 4 mm."""
+"""Maximum distance of placed vertices, which larger scale errors exceed; beyond, 32-bit numbers are
+coarser than 4 mm. A file's own coordinates may be larger."""
 _LARGEST = 1e15
 """Maximum coordinate in a file's units; products of three of them fit 64-bit numbers."""
 FORMATS = (".glb", ".gltf", ".obj", ".stl")
 _GLTF = (".glb", ".gltf")
 _MOST_MATERIAL_BYTES = 4_000_000
-_STL_HEAD, _STL_TRIANGLE = 84, 50
-"""Bytes of a binary STL: a header with the number of triangles, then each of them."""
 _GREY = (0.5, 0.5, 0.5)
 
 
 @dataclass(frozen=True, eq=False)
 class MeshFile:
-    """Content of a file: a mesh, z up, in its units; linear (r, g, b) of its largest part."""
+    """Content of a file: a surface, z up, in its units; linear (r, g, b) of its largest part.
 
-    mesh: Mesh
+    points: (V, 3) float64, so that projected coordinates keep their precision until the surface is
+    placed near the map's origin. triangles: (T, 3) rows of `points`.
+    """
+
+    points: NDArray[np.float64]
+    triangles: NDArray[np.uint32]
     colour: tuple[float, float, float]
     dropped: int
     """Number of omitted triangles without area."""
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        """The surface in the file's coordinates, rounded to single precision."""
+        return Mesh(self.points.astype(np.float32), self.triangles)
+
+    def placed(self, transform: ArrayLike) -> Mesh:
+        """Returns the surface in another frame; `transform` as in `Mesh.transformed`."""
+        matrix = np.asarray(transform, dtype=np.float64)[:3, :4]
+        points = self.points @ matrix[:, :3].T + matrix[:, 3]
+        mirrored = float(np.linalg.det(matrix[:, :3])) < 0.0
+        return Mesh(
+            points.astype(np.float32), self.triangles[:, ::-1] if mirrored else self.triangles
+        )
 
 
 def read_mesh(path: str | Path, *, up: Literal["y", "z"] | None = None) -> MeshFile:
@@ -72,12 +89,12 @@ def read_mesh(path: str | Path, *, up: Literal["y", "z"] | None = None) -> MeshF
         raise DataFileError(f"{path} has no triangle")
     is_y_up = (up or ("y" if kind in _GLTF else "z")) == "y"
     points, triangles = _joined(path, parts)
-    mesh = Mesh((enu_from_gltf(points) if is_y_up else points).astype(np.float32), triangles)
-    flat = ~(mesh.face_normals != 0.0).any(axis=1)
+    points = enu_from_gltf(points) if is_y_up else points
+    near = Mesh((points - points.min(axis=0)).astype(np.float32), triangles)
+    flat = ~(near.face_normals != 0.0).any(axis=1)
     if flat.all():
         raise DataFileError(f"{path}: {counted(count, 'triangle')}, none of which has an area")
-    colour = _colour_of_largest(mesh, parts)
-    return MeshFile(Mesh(mesh.vertices, mesh.triangles[~flat]), colour, int(flat.sum()))
+    return MeshFile(points, triangles[~flat], _colour_of_largest(near, parts), int(flat.sum()))
 
 
 def _load(path: Path, kind: str) -> list[Part]:
@@ -86,45 +103,13 @@ def _load(path: Path, kind: str) -> list[Part]:
         if kind in _GLTF:
             with np.errstate(all="ignore"):
                 return read_gltf(path, MOST_BYTES, MOST_TRIANGLES)
-        with _quiet():
-            return _read_other(path)
-    except Exception as error:  # the parsers raise any exception for a broken file
+        data = path.read_bytes()
+        if kind == ".stl":
+            return read_stl(data, MOST_TRIANGLES)
+        return read_obj(data, _Materials(path.parent).get, MOST_TRIANGLES)
+    except Exception as error:  # broken files raise any exception
         told = " ".join(str(error).split())[:200] or type(error).__name__
         raise DataFileError(f"{path} cannot be read as a mesh: {told}") from None
-
-
-def _read_other(path: Path) -> list[Part]:
-    """Reads OBJ and STL, by trimesh."""
-    import trimesh
-
-    _check_text(path)
-    materials: Any = _Materials(path.parent)
-    scene = trimesh.load_scene(path, process=False, resolver=materials)
-    meshes = [part for part in scene.geometry.values() if isinstance(part, trimesh.Trimesh)]
-    count = sum(len(part.faces) for part in meshes)
-    if count > MOST_TRIANGLES:
-        raise ValueError(f"it has {count:,} triangles; at most {MOST_TRIANGLES:,} are read")
-    return [
-        Part(
-            np.asarray(part.vertices, dtype=np.float64),
-            np.asarray(part.faces, dtype=np.int64),
-            _colour_of(part),
-        )
-        for part in meshes
-        if len(part.faces)
-    ]
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Disables trimesh's log: problems are raised as errors."""
-    log = logging.getLogger("trimesh.util")
-    was_off, log.disabled = log.disabled, True
-    try:
-        with np.errstate(all="ignore"):
-            yield
-    finally:
-        log.disabled = was_off
 
 
 class _Materials:
@@ -133,35 +118,15 @@ class _Materials:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
 
-    def __getitem__(self, name: str) -> bytes:
-        return self.get(name)
-
     def get(self, name: str) -> bytes:
         """Returns the content of a material file; raises `OSError` for any other."""
-        path = (self._folder / name).resolve()
+        path = (self._folder / name.replace("\\", "/")).resolve()
         is_material = path.suffix.lower() == ".mtl" and path.is_file()
         if not (is_material and path.is_relative_to(self._folder.resolve())):
             raise FileNotFoundError(name)
         if path.stat().st_size > _MOST_MATERIAL_BYTES:
             raise OSError(f"{name} is too large")
-        return path.read_bytes().decode("utf-8", "replace").encode()
-
-
-def _check_text(path: Path) -> None:
-    """Raises `ValueError` for an OBJ or STL file that is neither text nor a complete binary STL.
-
-    trimesh would guess the encoding of such a file.
-    """
-    data = path.read_bytes()
-    if path.suffix.lower() == ".stl" and len(data) >= _STL_HEAD:
-        triangles = int.from_bytes(data[_STL_HEAD - 4 : _STL_HEAD], "little")
-        if len(data) == _STL_HEAD + _STL_TRIANGLE * triangles:
-            return
-    try:
-        data.decode("utf-8")
-    except UnicodeDecodeError as error:
-        binary = ", and no binary STL of its size" if path.suffix.lower() == ".stl" else ""
-        raise ValueError(f"it is no text in UTF-8{binary} (byte {error.start})") from None
+        return path.read_bytes()
 
 
 def _joined(path: Path, parts: list[Part]) -> tuple[NDArray[np.float64], NDArray[np.uint32]]:
@@ -194,12 +159,3 @@ def _colour_of_largest(mesh: Mesh, parts: list[Part]) -> tuple[float, float, flo
         return _GREY
     r, g, b = largest.clip(0.0, 1.0).tolist()
     return r, g, b
-
-
-def _colour_of(part: Any) -> NDArray[np.float64] | None:
-    """Returns the linear diffuse colour of a trimesh material, which is coded as sRGB."""
-    main = getattr(getattr(part.visual, "material", None), "main_color", None)
-    if main is None:
-        return None
-    coded = np.asarray(main, dtype=np.float64)[:3] / 255.0
-    return np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4)

@@ -5,8 +5,7 @@ of the triangle there, so that rays (`Terrain.mesh`), ground contact (`terrain_h
 `terrain_normal`) and queries agree to rounding. Beyond the grid the height is that of the nearest
 edge point and the ground is horizontal across the edge.
 
-A file of heights is a CSV matrix without a header: row i holds y = origin_y + i * spacing, column j
-holds x = origin_x + j * spacing.
+Row i of the heights holds y = origin_y + i * spacing, column j x = origin_x + j * spacing.
 """
 
 from __future__ import annotations
@@ -20,11 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from volery.core.compiled import inline_kernel, kernel
-from volery.core.errors import DataFileError
-from volery.core.plurals import counted
+from volery.world.elevation_files import read_elevations
 from volery.world.mesh import Mesh
-
-_SHOWN_FAULTS = 20
 
 
 class TerrainGrid(NamedTuple):
@@ -157,10 +153,10 @@ class Terrain:
     ) -> Terrain:
         """Reads a terrain from a CSV matrix of heights in m (first row at the lowest y).
 
+        ESRI ASCII grids are read, too (first row at the highest y); `origin` is not theirs.
         Raises `DataFileError`, naming the file and every invalid row.
         """
-        path = Path(path)
-        return cls.from_heights(_read_heights(path), spacing_m, origin)
+        return cls.from_heights(read_elevations(Path(path), spacing_m), spacing_m, origin)
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
@@ -210,54 +206,3 @@ class Terrain:
 def _broadcast(x: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     bx, by = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64))
     return np.ascontiguousarray(bx).reshape(bx.shape), np.ascontiguousarray(by).reshape(by.shape)
-
-
-def _read_heights(path: Path) -> NDArray[np.float64]:
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except FileNotFoundError:
-        raise DataFileError(f"elevation grid {path} does not exist") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise DataFileError(f"elevation grid {path} cannot be read: {error}") from None
-    rows: list[list[float]] = []
-    faults: list[str] = []
-    columns = 0
-    for number, line in enumerate(lines, start=1):
-        if not line.strip():
-            continue
-        fields = line.split(",")
-        columns = columns or len(fields)
-        if len(fields) != columns:
-            faults.append(
-                f"row {number} has {counted(len(fields), 'value')}, the first row {columns}"
-            )
-            continue
-        try:
-            row = [float(field) for field in fields]
-        except ValueError:
-            at = next(k for k, f in enumerate(fields, start=1) if not _is_number(f))
-            faults.append(f"row {number}, column {at}: not a number")
-            continue
-        wrong = next((k for k, value in enumerate(row, start=1) if not math.isfinite(value)), 0)
-        if wrong:
-            faults.append(f"row {number}, column {wrong}: not finite")
-            continue
-        rows.append(row)
-    if faults:
-        more = len(faults) - _SHOWN_FAULTS
-        shown = "; ".join(faults[:_SHOWN_FAULTS]) + (f"; and {more} more" if more > 0 else "")
-        raise DataFileError(f"elevation grid {path}: {shown}")
-    if len(rows) < 2 or columns < 2:
-        raise DataFileError(
-            f"elevation grid {path} has {counted(len(rows), 'row')} of "
-            f"{counted(columns, 'value')}; at least 2 x 2 needed"
-        )
-    return np.array(rows)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

@@ -3,6 +3,7 @@ import pytest
 from volery.core.errors import DataFileError
 from volery.runtime.build.fleet import add_bodies
 from volery.runtime.build.placement import StartPose
+from volery.sensors.beam_file import read_beams
 from volery.sensors.imu import ImuModel
 from volery.sensors.lidar_model import load_lidar
 from volery.vehicle.airframe import load_airframe
@@ -38,6 +39,16 @@ def test_a_file_changes_only_what_it_says(write):
     assert near.scan.columns == shipped.scan.columns
     assert near.noise == shipped.noise
     assert near.name == "Velodyne VLP-16, changed in near.toml"
+
+
+def test_files_may_begin_with_a_byte_order_mark(write, tmp_path):
+    head = "azimuth_deg,elevation_deg,time_s\n"
+    (tmp_path / "beams.csv").write_text(head + "0,0,0\n1,0,0.01\n", encoding="utf-8-sig")
+    path = write("table.toml", "")
+    text = 'base = "vlp_16"\n[scan]\nkind = "table"\nrate_hz = 10.0\nfile = "beams.csv"\n'
+    path.write_text(text, encoding="utf-8-sig")
+    assert load_lidar(path).scan.kind == "table"
+    assert len(read_beams(tmp_path / "beams.csv", 0.1, 10).ring) == 2
 
 
 def test_a_table_of_another_kind_replaces_the_whole_table(write):

@@ -90,6 +90,17 @@ def test_an_inventory_becomes_a_forest(checked):
     np.testing.assert_allclose(forest.dbh_m, [0.2, 0.3, 0.25])
 
 
+def test_projected_coordinates_are_moved_to_the_origin(checked):
+    trees = b"x_m,y_m\n385000.25,6672000.5\n385010.25,6672010.5\n"
+    scenario = checked("forest", ".csv", trees)
+    forest = build_forest(scenario, build_terrain(scenario))
+    np.testing.assert_allclose(forest.position_map[:, :2], [[-4.75, -5.5], [5.25, 4.5]])
+    wall = b"v 385000.1 6672000.3 0\nv 385000.3 6672000.3 0\nv 385000.3 6672000.3 4\nf 1 2 3\n"
+    scenario = checked("mesh", ".obj", wall)
+    (solid,) = build_solids(scenario, build_terrain(scenario))
+    np.testing.assert_allclose(solid.mesh.bounds, [[-0.1, 0, 0], [0.1, 0, 4]], atol=1e-5)
+
+
 @pytest.mark.parametrize(
     ("kind", "suffix", "content", "why"),
     [
@@ -105,7 +116,7 @@ def test_an_inventory_becomes_a_forest(checked):
         ("mesh", ".glb", b"glTF" + b"\0" * 40, "mesh.glb"),
         ("forest", ".csv", b"x,y\n1,2\n", "row 1, column 1: unknown name"),
         ("forest", ".csv", b"x_m,y_m\n", "0 trees"),
-        ("forest", ".csv", b"x_m,y_m\n385000,6672000\n", "at most 5000 m"),
+        ("forest", ".csv", b"x_m,y_m\n385000,6672000\n0,0\n", "at most 5000 m"),
         ("forest", ".csv", b"x_m,y_m\n1,nan\n", "row 2"),
     ],
 )

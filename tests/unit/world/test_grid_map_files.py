@@ -94,6 +94,8 @@ def test_the_threshold_is_a_darkness():
 
 def test_moving_ai_maps_are_read_from_the_top():
     np.testing.assert_array_equal(parse_cells(as_map(PATTERN), ".map", "x.map"), PATTERN)
+    marked = b"\xef\xbb\xbf" + as_map(PATTERN)
+    np.testing.assert_array_equal(parse_cells(marked, ".map", "x.map"), PATTERN)
     every = b"type octile\nwidth 7\nheight 1\nmap\n.GS@OTW"
     read = parse_cells(every, ".map", "x.map")
     assert read.tolist() == [[False] * 3 + [True] * 4]

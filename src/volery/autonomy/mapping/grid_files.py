@@ -36,7 +36,7 @@ def write_grid(stem: Path, values: NDArray[np.int8], origin: Array, cell_m: floa
     text = (
         f"image: {picture.name}\nmode: trinary\nresolution: {cell_m:g}\n"
         f"origin: [{origin[0]:.6g}, {origin[1]:.6g}, 0.0]\nnegate: 0\n"
-        "occupied_thresh: 0.65\nfree_thresh: 0.25\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.196\n"  # with .25 unknown cells are free
     )
     try:
         head = f"P5\n# written by Volery\n{columns} {rows}\n255\n".encode()

@@ -7,7 +7,7 @@ import math
 from volery.core.errors import CommandError, DataFileError, ScenarioError
 from volery.scenario.grid_map import GridMapFile
 from volery.scenario.schema import Scenario
-from volery.world.grid_maps import GridMap, block_mesh, read_cells
+from volery.world.grid_maps import GridMap, block_mesh, read_cells, read_map_server
 from volery.world.materials import Material
 from volery.world.scene import Solid
 from volery.world.terrain import Terrain
@@ -23,6 +23,11 @@ def read_grid_map(scenario: Scenario, entry: GridMapFile) -> GridMap:
     key = f"{scenario.name}: world.grid_map.maps: '{entry.called}'"
     try:
         path = scenario.access.find_file(entry.file)
+        if path.suffix.lower() in (".yaml", ".yml"):
+            file = read_map_server(path)
+            cells = file.blocked | file.unknown if world.unknown_is_blocked else file.blocked
+            own = file.cell_m, world.block_height_m, file.origin_m, file.yaw_rad
+            return GridMap(entry.called, cells, *own)
         cells = read_cells(path, entry.threshold)
         return GridMap(entry.called, cells, world.cell_size_m, world.block_height_m, world.origin_m)
     except DataFileError as error:

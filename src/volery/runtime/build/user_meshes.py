@@ -12,6 +12,7 @@ from volery.core.errors import DataFileError
 from volery.scenario.schema import Scenario
 from volery.scenario.user_mesh import UserMesh
 from volery.world.materials import Material
+from volery.world.mesh import Mesh
 from volery.world.mesh_files import FARTHEST_M, MeshFile, read_mesh
 from volery.world.scene import Look, Solid
 
@@ -35,13 +36,8 @@ def mesh_solids(scenario: Scenario) -> tuple[Solid, ...]:
 
 
 def _solid(entry: UserMesh, path: Path, file: MeshFile) -> Solid:
-    mesh = file.mesh.transformed(_placing(entry))
-    far = float(np.abs(mesh.vertices).max())
-    if not far <= FARTHEST_M:
-        raise DataFileError(
-            f"{path} extends to {far:.3g} m from the map's origin, at most {FARTHEST_M:g} m is "
-            "allowed; is `scale` right?"
-        )
+    mesh = file.placed(_placing(entry))
+    _check_distance(entry, path, mesh)
     colour = entry.colour or file.colour
     material, name = Material[entry.material.upper()], entry.name or path.stem
     return Solid(mesh, material, name, look=Look(colour), is_shell=not mesh.is_closed)
@@ -52,3 +48,20 @@ def _placing(entry: UserMesh) -> NDArray[np.float64]:
     turn = rotations.from_rpy(*np.radians(entry.rpy_deg))
     axes = np.stack([rotations.rotate(turn, axis) for axis in np.eye(3)], axis=1)
     return np.column_stack([axes * np.broadcast_to(entry.scale, 3), entry.position_m])
+
+
+def _check_distance(entry: UserMesh, path: Path, mesh: Mesh) -> None:
+    """Raises `DataFileError` for a mesh far away, with the position of one only shifted."""
+    far = float(np.abs(mesh.vertices).max())
+    if far <= FARTHEST_M:
+        return
+    low, high = mesh.bounds
+    advice = "is `scale` right?"
+    if float((high - low).max()) <= FARTHEST_M:
+        middle = np.round(np.array(entry.position_m) - (low + high) / 2.0)
+        there = ", ".join(f"{value:.0f}" for value in middle.tolist())
+        advice += f" If its coordinates are projected ones: position_m = [{there}]"
+    raise DataFileError(
+        f"{path} extends to {far:.3g} m from the map's origin, at most {FARTHEST_M:g} m is "
+        f"allowed; {advice}"
+    )

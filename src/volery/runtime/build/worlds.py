@@ -98,9 +98,20 @@ def build_forest(scenario: Scenario, terrain: Terrain, city: City | None = None)
             raise ScenarioError(
                 f"{scenario.name}: world.forest: {counted(outside, 'tree')} beyond the "
                 f"terrain, which extends from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m; "
-                "region_m crops an inventory"
+                f"region_m crops an inventory{_shift_of(forest, scenario)}"
             )
     return joined(forest, _street_trees(scenario, terrain, city))
+
+
+def _shift_of(forest: Forest, scenario: Scenario) -> str:
+    """Returns advice for an inventory whose origin is far away; empty for others."""
+    settings = scenario.world.forest
+    low, high = forest.position_map[:, :2].min(axis=0), forest.position_map[:, :2].max(axis=0)
+    middle = (low + high) / 2.0
+    if not isinstance(settings, InventoryForest) or (abs(middle) <= high - low).all():
+        return ""
+    x, y = (middle - settings.position_m).tolist()
+    return f", position_m = [{-x:.0f}, {-y:.0f}] moves its middle to the map's origin"
 
 
 def _street_trees(scenario: Scenario, terrain: Terrain, city: City | None) -> Forest | None:
@@ -119,6 +130,7 @@ def _grow(scenario: Scenario, terrain: Terrain) -> Forest | None:
     if isinstance(forest, InventoryForest):
         return forest_from_inventory(
             scenario.access.find_file(forest.file),
+            position=forest.position_m,
             region=forest.region_m,
             fraction=forest.fraction,
             species=forest.species,

@@ -106,10 +106,11 @@ def _city(path: Path) -> _Part:
 
 
 def _mesh(path: Path) -> _Part:
-    mesh = read_mesh(path).mesh
-    if len(mesh) > MOST_TRIANGLES:
-        raise DataFileError(f"{path}: {len(mesh)} triangles; at most {MOST_TRIANGLES} are allowed")
-    low, high = mesh.bounds
+    file = read_mesh(path)
+    count = len(file.triangles)
+    if count > MOST_TRIANGLES:
+        raise DataFileError(f"{path}: {count} triangles; at most {MOST_TRIANGLES} are allowed")
+    low, high = file.points.min(axis=0), file.points.max(axis=0)
     middle = (low + high) / 2.0
     place = (-float(middle[0]), -float(middle[1]), -float(low[2]))
     half = float((high - low)[:2].max()) / 2.0
@@ -131,6 +132,10 @@ def _forest(path: Path) -> _Part:
         f'[world.forest]\nkind = "inventory"\nfile = {json.dumps(path.name)}\n'
         'species = "broadleaf"\n'
     )
+    if float(np.abs([low, high]).max()) > FARTHEST_M:  # projected coordinates
+        middle = np.round((low + high) / 2.0)
+        low, high = low - middle, high - middle
+        world += f"position_m = {_numbers((-float(middle[0]), -float(middle[1])))}\n"
     y = float(low[1] + high[1]) / 2.0
     extent = float(np.abs([low, high]).max()) + _BESIDE_M
     return _Part(world, extent, *_beside(float(low[0]), y))

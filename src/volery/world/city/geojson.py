@@ -21,7 +21,8 @@ from volery.core.errors import DataFileError
 MOST_BYTES = 256_000_000
 """Maximum file size: parsed larger files would need gigabytes."""
 _WGS_84 = ("CRS84", "EPSG::4326", "EPSG:4326")
-_ID_KEYS = ("id", "@id", "osm_id")
+_ID_KEYS = ("id", "@id", "osm_id", "osm_way_id", "full_id", "fid", "OBJECTID", "gml_id")
+"""Keys of ids, in the words of OpenStreetMap's and others' exporters."""
 _SHAPES = ("Point", "MultiPoint", "LineString", "MultiLineString", "GeometryCollection")
 """Valid geometries that are not outlines."""
 
@@ -104,6 +105,8 @@ def _id_of(feature: Mapping[str, Any], number: int) -> str:
     for holder in (feature, properties or {}):
         for key in _ID_KEYS:
             own = holder.get(key)
+            if isinstance(own, float) and own.is_integer():  # of a table with gaps
+                own = int(own)
             if isinstance(own, str | int) and not isinstance(own, bool) and str(own).strip():
                 shown = str(own).strip()[:80]  # also in messages and on terminals
                 return "".join(c if c.isprintable() else "?" for c in shown)

@@ -10,8 +10,24 @@ from typing import Any
 
 TALLEST_M = 1000.0
 """Maximum height; larger numbers are errors."""
-_FOOT_M = 0.3048
-_LENGTH = re.compile(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*(m|metres|meters|ft|feet|'|)\s*", re.IGNORECASE)
+_INCH_M = 0.0254
+_LONGEST = 60
+"""Maximum characters of a height that are read."""
+_NUMBER = r"(\d+(?:[.,]\d*)?|[.,]\d+)"
+_LENGTH = re.compile(rf"(?:~|ca\.?)?\s*{_NUMBER}\s*([a-z]*)\.?", re.IGNORECASE)
+_INCH = r"(?:\"|in|inch|inches)"
+_FEET_AND_INCHES = re.compile(
+    rf"{_NUMBER}\s*(?:'|ft|feet|foot)(?:\s*-?\s*{_NUMBER}\s*{_INCH}?)?|{_NUMBER}\s*{_INCH}",
+    re.IGNORECASE,
+)
+_QUOTES = str.maketrans("\u2032\u2019\u2018\u00b4`\u2033\u201d\u201c", "'" * 5 + '"' * 3)
+"""Primes and quotes that stand for feet and inches."""
+_UNITS_M = {
+    **dict.fromkeys(("", "m", "metre", "metres", "meter", "meters"), 1.0),
+    **dict.fromkeys(("cm", "centimetres", "centimeters"), 0.01),
+    **dict.fromkeys(("ft", "feet", "foot"), 0.3048),
+}
+_HEIGHTS = ("height", "building:height", "est_height")
 _MOST_LEVELS = 300.0
 
 
@@ -48,11 +64,12 @@ class Height:
 def height_of(properties: Mapping[str, Any], rule: HeightRule) -> Height:
     """Returns a building's `height` (m, or with a unit), else its levels times the storey height.
 
-    Levels are `building:levels` or `levels`. As in OpenStreetMap, `height` counts from the lowest
+    `building:height` and `est_height` stand in for `height`. Levels are `building:levels` or
+    `levels`. As in OpenStreetMap, `height` counts from the lowest
     point on the ground to the top.
     """
     faults = []
-    given = properties.get("height")
+    given = next((properties[key] for key in _HEIGHTS if properties.get(key) is not None), None)
     levels, fault = _levels(properties)
     if fault:
         faults.append(fault)
@@ -85,20 +102,39 @@ def _levels(properties: Mapping[str, Any]) -> tuple[float | None, str]:
 
 
 def _length_m(given: Any) -> float | None:
-    if isinstance(given, bool):
+    """Returns a length in m: a number, one with a unit, or feet and inches; else None.
+
+    Of several lengths, separated by semicolons, the largest counts.
+    """
+    if isinstance(given, bool) or not isinstance(given, str | int | float):
         return None
-    match = _LENGTH.fullmatch(str(given)) if isinstance(given, str | int | float) else None
+    text = str(given)
+    if len(text) > _LONGEST:
+        return None
+    lengths = [_one_length_m(part.strip()) for part in text.split(";")]
+    known = [length for length in lengths if length is not None and 0.0 < length <= TALLEST_M]
+    return max(known) if len(known) == len(lengths) else None
+
+
+def _one_length_m(text: str) -> float | None:
+    match = _LENGTH.fullmatch(text)
+    if match is not None and match[2].lower() in _UNITS_M:
+        return _decimal(match[1]) * _UNITS_M[match[2].lower()]
+    plain = text.translate(_QUOTES).replace("'" * 2, '"')
+    match = _FEET_AND_INCHES.fullmatch(plain)
     if match is None:
         return None
-    length = float(match[1]) * (
-        1.0 if match[2].lower().startswith("m") or not match[2] else _FOOT_M
-    )
-    return length if 0.0 < length <= TALLEST_M else None
+    feet, inches, alone = (_decimal(part) if part else 0.0 for part in match.groups())
+    return (12.0 * feet + inches + alone) * _INCH_M
+
+
+def _decimal(text: str) -> float:
+    return float(text.replace(",", "."))
 
 
 def _number(text: str) -> float | None:
     try:
-        number = float(text)
+        number = _decimal(text)
     except ValueError:
         return None
     return number if math.isfinite(number) else None

@@ -1,10 +1,12 @@
-"""Grid maps as PNG images: one pixel per cell, dark ones are blocked."""
+"""Grid maps as PNG, PGM and BMP images: one pixel per cell, dark ones are blocked."""
 
 from __future__ import annotations
 
 import io
 import struct
+import warnings
 import zlib
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +17,7 @@ from volery.world.grid_maps.grid_map import MOST_CELLS
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _HEAD = struct.Struct(">8sI4sII")
 """Signature, then length, name, width and height of the first chunk."""
+_MOST_BYTES = 8 * MOST_CELLS
 _LUMA = (0.299, 0.587, 0.114)
 """Weights of red, green and blue: ITU-R BT.601."""
 
@@ -27,8 +30,30 @@ def parse_image(data: bytes, where: str, threshold: float = 0.5) -> NDArray[np.b
     other input.
     """
     _check_size(data, where)
-    grey, alpha = _decode(data, where)
+    grey, alpha = _decode(data, where, "PNG")
     return np.asarray((1.0 - grey > threshold) & (alpha >= 0.5))
+
+
+def parse_pgm(data: bytes, where: str, threshold: float = 0.5) -> NDArray[np.bool_]:
+    """Returns the same of a grey image in the formats P2 or P5, 8 or 16 bits."""
+    grey, _ = _decode(data, where, "PPM")
+    return np.asarray(1.0 - grey > threshold)
+
+
+def read_image(path: Path) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Returns grey from 0 to 1 and whether a pixel is opaque (rows, columns), row 0: the top.
+
+    The image is PGM, PNG or BMP. Raises `DataFileError` for other files.
+    """
+    try:
+        size = path.stat().st_size
+        if size > _MOST_BYTES:
+            raise DataFileError(f"{path}: {size} bytes are too many; at most {_MOST_BYTES}")
+        data = path.read_bytes()
+    except OSError as error:
+        raise DataFileError(f"{path}: cannot be read: {error.strerror}") from None
+    grey, alpha = _decode(data, str(path), "PPM", "PNG", "BMP")
+    return grey, alpha >= 0.5
 
 
 def _check_size(data: bytes, where: str) -> None:
@@ -42,17 +67,33 @@ def _check_size(data: bytes, where: str) -> None:
         )
 
 
-def _decode(data: bytes, where: str) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def _decode(
+    data: bytes, where: str, *formats: str
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Returns grey and alpha (rows, columns), 0 to 1."""
-    from PIL import Image
+    from PIL import Image, UnidentifiedImageError
 
     try:
-        with Image.open(io.BytesIO(data), formats=["PNG"]) as picture:
+        with (
+            warnings.catch_warnings(action="ignore"),
+            Image.open(io.BytesIO(data), formats=formats) as picture,
+        ):
+            width, height = picture.size
+            if not 0 < width * height <= MOST_CELLS:
+                raise DataFileError(
+                    f"{where}: an image of {width} x {height} pixels; allowed are 1 to {MOST_CELLS}"
+                )
             picture.load()
             if picture.mode.startswith("I"):  # 16 bits of grey
                 grey = np.asarray(picture, dtype=np.float32) / 65535.0
                 return grey, np.ones_like(grey)
             colours = np.asarray(picture.convert("RGBA"))
+    except UnidentifiedImageError:
+        raise DataFileError(
+            f"{where}: the image is damaged, or not {' or '.join(formats)}"
+        ) from None
+    except Image.DecompressionBombError:
+        raise DataFileError(f"{where}: too many pixels; allowed are 1 to {MOST_CELLS}") from None
     except (OSError, SyntaxError, ValueError, EOFError, struct.error, zlib.error) as error:
         raise DataFileError(f"{where}: the image is damaged: {error}") from None
     grey = np.zeros(colours.shape[:2], dtype=np.float32)

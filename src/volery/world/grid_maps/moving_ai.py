@@ -25,7 +25,7 @@ def parse_moving_ai(data: bytes, where: str) -> NDArray[np.bool_]:
 
     Raises `DataFileError`, naming line and column, for other input.
     """
-    lines = data.splitlines()
+    lines = data.removeprefix(b"\xef\xbb\xbf").splitlines()
     height, width = _head(lines, where)
     rows = lines[_HEAD_LINES:]
     while len(rows) > height and not rows[-1].strip():

@@ -142,6 +142,22 @@ def test_a_region_crops(read):
         ({"height": 12.5}, 12.5, 4, "height"),
         ({"height": "12.13 m"}, 12.13, 4, "height"),
         ({"height": "40 ft"}, 12.192, 4, "height"),
+        ({"height": "18'0\""}, 5.4864, 2, "height"),
+        ({"height": "6'6\""}, 1.9812, 1, "height"),
+        ({"height": "6' 6.5''"}, 1.9939, 1, "height"),
+        ({"height": "20\u2032 3\u2033"}, 6.1722, 2, "height"),
+        ({"height": "20\u2019"}, 6.096, 2, "height"),
+        ({"height": "20'-3"}, 6.1722, 2, "height"),
+        ({"height": "20 ft 6 in"}, 6.2484, 2, "height"),
+        ({"height": '240"'}, 6.096, 2, "height"),
+        ({"height": "12,5 m"}, 12.5, 4, "height"),
+        ({"height": "1250 cm"}, 12.5, 4, "height"),
+        ({"height": "~12.5"}, 12.5, 4, "height"),
+        ({"height": "ca. 12 Meter"}, 12.0, 4, "height"),
+        ({"height": "9;12.5"}, 12.5, 4, "height"),
+        ({"height": None, "building:height": "12.5"}, 12.5, 4, "height"),
+        ({"est_height": 12.5}, 12.5, 4, "height"),
+        ({"building:levels": "3,5"}, 10.5, 4, "levels"),
         ({"height": "18", "building:levels": "5"}, 18.0, 5, "height"),
         ({"building:levels": "3.5"}, 10.5, 4, "levels"),
         ({"building:levels": 6}, 18.0, 6, "levels"),
@@ -156,11 +172,48 @@ def test_heights(properties, height_m, storeys, source):
     assert (height.storeys, height.source, height.fault) == (storeys, source, "")
 
 
-@pytest.mark.parametrize("height", ["tall", -3, 0, 1e9, True, [3], "nan", "12 parsecs"])
+@pytest.mark.parametrize(
+    "height",
+    [
+        "tall",
+        -3,
+        0,
+        1e9,
+        True,
+        [3],
+        "nan",
+        "12 parsecs",
+        "",
+        "'",
+        "12;tall",
+        "6'6'",
+        "-5'",
+        '-5"',
+        "12-14",
+    ],
+)
 def test_heights_not_understood_are_told(read, height):
     (outline,), report = read(feature(square(), height=height))
     assert outline.height.height_m == 10.0
     assert "is no length" in dict(report.guessed)["b"]
+
+
+@pytest.mark.parametrize(
+    ("properties", "own"),
+    [
+        ({"@id": "way/7"}, "way/7"),
+        ({"osm_id": None, "osm_way_id": "7"}, "7"),
+        ({"osm_id": 7.0}, "7"),
+        ({"full_id": "w7", "osm_type": "way"}, "w7"),
+        ({"OBJECTID": 12}, "12"),
+        ({"fid": 3}, "3"),
+        ({}, "#1"),
+    ],
+)
+def test_the_report_has_the_ids_of_the_file(read, properties, own):
+    data = feature(square(), own=None, height="tall", **properties)
+    _, report = read(data)
+    assert [name for name, _ in report.guessed] == [own]
 
 
 def spoilt(change):

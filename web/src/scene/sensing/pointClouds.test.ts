@@ -49,6 +49,30 @@ describe("returns", () => {
     expect([...pointsOfCloud({ ...made, data: text }, 9)]).toEqual([1, 2, 3]);
   });
 
+  it("of a cloud whose rows are padded are read row by row", () => {
+    const data = new Uint8Array(3 * 40).fill(0x7f);
+    const view = new DataView(data.buffer);
+    const rows = [0, 1, 2].map((r) => [0, 1].map((c) => [10 * r + c, 2, 3]));
+    rows.forEach((row, r) =>
+      row.forEach((point, c) =>
+        point.forEach((v, k) => view.setFloat32(40 * r + 16 * c + 4 * k, v, true)),
+      ),
+    );
+    const padded = { ...cloud([]), data, height: 3, width: 2, row_step: 40 };
+    expect([...pointsOfCloud(padded, 9)]).toEqual(rows.flat(2));
+    // the last row may end without its padding, and a cut message in any row
+    expect([...pointsOfCloud({ ...padded, data: data.slice(0, 112) }, 9)]).toEqual(rows.flat(2));
+    const cut = { ...padded, data: data.slice(0, 40 + 20) };
+    expect([...pointsOfCloud(cut, 9)]).toEqual(rows.flat(2).slice(0, 9));
+    // a row_step of 0, as some publishers leave it, is that of rows without padding
+    const made = cloud([
+      [1, 2, 3],
+      [4, 5, 6],
+    ]);
+    expect([...pointsOfCloud({ ...made, row_step: 0 }, 9)]).toEqual([1, 2, 3, 4, 5, 6]);
+    expect(pointsOfCloud({ ...made, width: 0 }, 9)).toHaveLength(0);
+  });
+
   it("of strange clouds are none", () => {
     const made = cloud([[1, 2, 3]]);
     expect(pointsOfCloud({ ...made, fields: [] }, 9)).toHaveLength(0);

@@ -28,15 +28,16 @@ export function pointsOfCloud(cloud: sensor_msgs_PointCloud2, most: number): Flo
   const reach = ["x", "y", "z"].map((name) => reader(cloud, name, bytes));
   const [x, y, z] = reach;
   if (x == null || y == null || z == null || !(cloud.point_step > 0)) return new Float32Array(0);
-  const total = Math.min(
-    cloud.width * cloud.height,
-    Math.floor(bytes.byteLength / cloud.point_step),
-  );
+  const begin = pointBegin(cloud);
+  let total = cloud.width * cloud.height;
+  if (begin(total - 1) + cloud.point_step > bytes.byteLength) {
+    total = wholePoints(cloud, bytes.byteLength); // a message that was cut
+  }
   const stride = Math.max(1, Math.ceil(total / Math.max(1, most)));
   const out = new Float32Array(3 * Math.ceil(total / stride));
   let count = 0;
   for (let i = 0; i < total; i += stride) {
-    const at = i * cloud.point_step;
+    const at = begin(i);
     const [px, py, pz] = [x(at), y(at), z(at)];
     if (!Number.isFinite(px + py + pz)) continue;
     out[count++] = px;
@@ -44,6 +45,29 @@ export function pointsOfCloud(cloud: sensor_msgs_PointCloud2, most: number): Flo
     out[count++] = pz;
   }
   return out.subarray(0, count);
+}
+
+/** Length of a row in bytes: rows may be padded; a length that is too short counts as none. */
+function rowStep({ width, point_step, row_step }: sensor_msgs_PointCloud2): number {
+  return Math.max(width * point_step, row_step);
+}
+
+/** The byte at which a point begins, by its number. */
+function pointBegin(cloud: sensor_msgs_PointCloud2): (i: number) => number {
+  const { width, point_step } = cloud;
+  const row = rowStep(cloud);
+  if (row === width * point_step) return (i) => i * point_step;
+  return (i) => Math.floor(i / width) * row + (i % width) * point_step;
+}
+
+/** Number of points that lie within so many bytes. */
+function wholePoints(cloud: sensor_msgs_PointCloud2, length: number): number {
+  const { width, height, point_step } = cloud;
+  const row = rowStep(cloud);
+  if (!(row > 0)) return 0;
+  const rows = Math.floor(length / row);
+  const inLast = Math.min(width, Math.floor((length - rows * row) / point_step));
+  return Math.min(width * height, rows * width + inLast);
 }
 
 /** How to read a field of the point that begins at a byte; null: it cannot be read. */
