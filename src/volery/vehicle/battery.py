@@ -94,7 +94,7 @@ class Battery(Table):
     critical: Share = 0.07
     """... `BAT_CRIT_THR` ..."""
     emergency: Share = 0.05
-    """... and `BAT_EMERGEN_THR`, with PX4's defaults."""
+    """... and `BAT_EMERGEN_THR`, with PX4's defaults; a default above `critical` is that level."""
 
     @model_validator(mode="after")
     def _is_a_battery(self) -> Self:
@@ -102,7 +102,7 @@ class Battery(Table):
             raise ValueError("open_circuit_v must not fall from empty to full")
         if not self.critical < self.low:
             raise ValueError(f"critical = {self.critical} must be below low = {self.low}")
-        if not self.emergency < self.critical:
+        if "emergency" in self.model_fields_set and not self.emergency < self.critical:
             raise ValueError(
                 f"emergency = {self.emergency} must be below critical = {self.critical}"
             )
@@ -132,7 +132,7 @@ def battery_row(
     row["speed_a_volt"] = max_speed_rad_s / battery.rated_v
     row["low"] = battery.low
     row["critical"] = battery.critical
-    row["emergency"] = battery.emergency
+    row["emergency"] = min(battery.emergency, battery.critical)
     row["period"] = period_s
     return row
 
