@@ -96,7 +96,7 @@ def _take_pose(body: Any, control_state: Any, step: int, dt: float) -> None:
         for k in range(3):
             control_state.velocity_target[k] = control_state.rates[k] = 0.0
         control_state.deadline_step = NO_DEADLINE
-        control_state.pose_steps = max(1, int(round(STOP_S / dt)))
+        control_state.pose_steps = max(1, round(STOP_S / dt))
     left = max(control_state.pose_steps, 1)
     vx, vy, vz = three(body.velocity_map)
     vx += (control_state.velocity_target[0] - vx) / left

@@ -26,7 +26,9 @@ def weak(flat_data, tmp_path):
 
 def heard_events(simulation):
     heard = []
-    simulation.graph.subscribe("/events", lambda p: heard.append(json.loads(p.message.data)), String)
+    simulation.graph.subscribe(
+        "/events", lambda p: heard.append(json.loads(p.message.data)), String
+    )
     return heard
 
 
@@ -68,7 +70,9 @@ def test_its_action_brings_it_down_in_time(simulate, weak, action, modes, caplog
     assert uav.battery_charge > 0.0
     events = [event.detail for event in simulation.diagnostics.events]
     assert f"changed to {modes[0]}: battery critical" in events
-    assert any("it lands" in r.getMessage() or "it returns" in r.getMessage() for r in caplog.records)
+    assert any(
+        "it lands" in r.getMessage() or "it returns" in r.getMessage() for r in caplog.records
+    )
 
 
 def test_a_later_command_replaces_the_action(simulate, weak):
