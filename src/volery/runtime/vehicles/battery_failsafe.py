@@ -38,14 +38,16 @@ class BatteryFailsafe:
         row = self._engine.names.index(uav.name)
         level = BatteryLevel(int(self._engine.fleet.state.battery_level[row]))
         mode = self._action(scenario.types[uav.type_name].flight.low_battery_action, level, uav)
-        charge = 100.0 * uav.battery_charge
+        consequence = _FALLS if level is BatteryLevel.EMPTY else ""
+        if mode is not None:
+            consequence = _CONSEQUENCES[mode]
         _log.warning(
             "%.1f s: %s: %s, %.0f %% left%s",
             event.time_ns * 1e-9,
             uav.name,
             event.detail,
-            charge,
-            _CONSEQUENCES.get(mode, "") if level is not BatteryLevel.EMPTY else _FALLS,
+            100.0 * uav.battery_charge,
+            consequence,
         )
         if mode is FlightMode.LAND:
             uav.land()
