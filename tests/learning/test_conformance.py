@@ -145,11 +145,11 @@ def test_reward_terms_and_ends_sum_to_the_return(make, name):
     ends = {0.0} | {end.reward for end in task.terminations}
     seen = 0
     for *_, info in play(make(name), 200)[1:]:
-        for k in np.flatnonzero(info.get("_episode", np.zeros(3))):
+        for k in np.flatnonzero(info.get("_end", np.zeros(3))):
             terms = sum(sums[k] for sums in info["reward_terms"].values())
-            extra = info["episode"]["r"][k] - terms
+            extra = info["episode_return"][k] - terms
             assert min(abs(extra - end) for end in ends) < 1e-6
-            assert 1 <= info["episode"]["l"][k] <= task.episode_decisions
+            assert 1 <= info["episode_length"][k] <= task.episode_decisions
             seen += 1
     assert seen
 

@@ -153,8 +153,8 @@ def test_all_rows_of_an_environment_end_together(make, name):
         over = terminated | truncated
         if over.any():
             ended.append(over.tolist())
-            assert info["_episode"].tolist() == info["_final_obs"].tolist() == over.tolist()
-            assert info["episode"]["l"][over].tolist() == [12] * agents
+            assert info["_end"].tolist() == info["_final_obs"].tolist() == over.tolist()
+            assert info["episode_length"][over].tolist() == [12] * agents
     assert ended == [[False] * agents + [True] * agents, [True] * agents + [False] * agents]
     with pytest.raises(CommandError, match=f"the {agents} rows of an environment reset together"):
         env.reset(options={"reset_mask": np.arange(env.num_envs) == 0})
@@ -231,8 +231,8 @@ def success_of(name, policy, count):
     succeeded = np.full(count, -1)
     while (succeeded < 0).any():
         info = env.step(policy(env.episodes.flight).reshape(env.num_envs, 3))[4]
-        if "_episode" in info:
-            new = info["_episode"][::agents] & (succeeded < 0)
+        if "_end" in info:
+            new = info["_end"][::agents] & (succeeded < 0)
             succeeded[new] = info["success"][::agents][new]
     env.close()
     return succeeded.mean()

@@ -244,14 +244,16 @@ class CommandLineFlight:
         if city is not None:
             typer.echo(f"  {city.report.summary()}")
         events = [
-            e for e in self._simulation.diagnostics.events if str(e.kind) in {"impact", "collision"}
+            e
+            for e in self._simulation.diagnostics.events
+            if str(e.kind) in {"impact", "collision"} or e.detail == "battery empty"
         ]
         for event in events[:_CONTACTS_SHOWN]:
             typer.echo(f"  {event.describe()}")
         if len(events) > _CONTACTS_SHOWN:
             counts = Counter(event.uav for event in events)
             typer.echo(
-                f"  and more: {len(events)} contacts of {counted(len(counts), 'UAV')} in all"
+                f"  and more: {len(events)} problems of {counted(len(counts), 'UAV')} in all"
             )
 
     def _reason(self, problem: str) -> str:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from volery.control import batch_commands
 from volery.control.estimated_state import EstimatedState
 from volery.control.flight_modes import FlightMode
+from volery.control.pose_stream import NO_DEADLINE, NO_STAMP, follow_pose
 from volery.control.segment_store import SegmentStore
 from volery.control.setpoints import (
     MAX_COORDINATE,
@@ -268,25 +269,48 @@ class FleetCommands:
         i: int,
         position: ArrayLike,
         attitude: ArrayLike,
-        velocity: ArrayLike = (0.0, 0.0, 0.0),
-        omega_body: ArrayLike = (0.0, 0.0, 0.0),
+        velocity: ArrayLike | None = None,
+        omega_body: ArrayLike | None = None,
+        *,
+        stamp_ns: int = NO_STAMP,
     ) -> None:
         """Sets the pose of the kinematic UAV `i` from the next step on.
 
-        position: (3,) m, map; attitude: (4,), map from body. velocity: (3,) m/s, map, and
-        omega_body: (3,) rad/s, FLU, are the motion that its sensors measure. The pose holds until
-        the next command.
+        position: (3,) m, map; attitude: (4,), map from body. The pose holds until the next command.
+        velocity: (3,) m/s, map, and omega_body: (3,) rad/s, FLU, are the motion that its sensors
+        measure; one alone leaves the other zero. Without both, they measure the motion between the
+        poses of a stream, see `control.pose_stream`; stamp_ns: simulated time of the pose, ns.
         """
         self._refuse_plants(i, "poses", RigidBody, IdentifiedModel)
         position = checked("position", position, (3,), MAX_COORDINATE)
         attitude = checked_attitude(attitude)
-        velocity = checked("velocity", velocity, (3,), 1e3)
-        omega_body = checked("rates", omega_body, (3,), 1e3)
+        implied = velocity is None and omega_body is None
+        none = (0.0, 0.0, 0.0)
+        velocity = checked("velocity", none if velocity is None else velocity, (3,), 1e3)
+        omega_body = checked("rates", none if omega_body is None else omega_body, (3,), 1e3)
+        in_stream = bool(self._control_states["level"][i] == ControlLevel.POSE)
         control_state = self._enter_low_level(i, ControlLevel.POSE)
+        if implied:
+            limits = self.airframes[i].limits
+            follow_pose(
+                control_state,
+                position,
+                attitude,
+                stamp_ns,
+                in_stream=in_stream,
+                step=self.step,
+                dt=self._dt,
+                limits=limits,
+            )
+        else:
+            control_state["start_step"] = self.step
+            control_state["pose_stamp"] = stamp_ns
+            control_state["velocity_target"] = velocity
+            control_state["rates"] = omega_body
+            control_state["pose_steps"] = 1
+            control_state["deadline_step"] = NO_DEADLINE
         control_state["position_target"] = position
         control_state["attitude"] = attitude
-        control_state["velocity_target"] = velocity
-        control_state["rates"] = omega_body
 
     def take_off(self, i: int, altitude_m: float = 2.5) -> None:
         """Starts the take-off of the landed UAV `i` to `altitude_m` above its position."""

@@ -347,6 +347,10 @@ class Fleet(FleetCommands):
         if in_air:
             self._bodies["on_ground"][i] = False
 
+    def rest(self, i: int) -> None:
+        """Lets the landed UAV `i` rest where it stands, without motion, until the next command."""
+        self._bodies["on_ground"][i] = self._bodies["asleep"][i] = True
+
     def push(self, i: int, velocity: ArrayLike, omega_body: ArrayLike) -> None:
         """Sets the velocity (3,) m/s, map, and rates (3,) rad/s, FLU, of UAV `i`.
 

@@ -16,6 +16,7 @@ from volery.control.flight_modes import (
     wanted_velocity,
 )
 from volery.control.heading import heading_of
+from volery.control.pose_stream import NO_DEADLINE, STOP_S
 from volery.control.setpoints import ControlLevel
 from volery.control.trajectory_kernels import END, path_time, polynomial, segment_at
 from volery.vehicle.compiled import inner_kernel
@@ -52,7 +53,7 @@ def fly_kinematic(
     for r in range(plant.rotors):
         body.rotor_speed[r] = model.hover_speed
     if control_state.level == _POSE:
-        _take_pose(body, control_state, dt)
+        _take_pose(body, control_state, step, dt)
         return stop_at_ground(body, plant, model, grid, steepest, step + 1, dt)
     if guiding:
         for k in range(3):
@@ -89,15 +90,30 @@ def _rest(body: Any, plant: Any) -> None:
 
 
 @inner_kernel
-def _take_pose(body: Any, control_state: Any, dt: float) -> None:
+def _take_pose(body: Any, control_state: Any, step: int, dt: float) -> None:
+    """Takes the commanded pose; velocity and rates reach theirs evenly in `pose_steps`."""
+    if step >= control_state.deadline_step:
+        for k in range(3):
+            control_state.velocity_target[k] = control_state.rates[k] = 0.0
+        control_state.deadline_step = NO_DEADLINE
+        control_state.pose_steps = max(1, round(STOP_S / dt))
+    left = max(control_state.pose_steps, 1)
+    vx, vy, vz = three(body.velocity_map)
+    vx += (control_state.velocity_target[0] - vx) / left
+    vy += (control_state.velocity_target[1] - vy) / left
+    vz += (control_state.velocity_target[2] - vz) / left
     px, py, pz = three(control_state.position_target)
-    vx, vy, vz = three(control_state.velocity_target)
     put(body, px, py, pz, vx, vy, vz, dt)
     for k in range(4):
         body.attitude[k] = control_state.attitude[k]
     for k in range(3):
-        body.angular_acceleration_body[k] = (control_state.rates[k] - body.omega_body[k]) / dt
-        body.omega_body[k] = control_state.rates[k]
+        change = (control_state.rates[k] - body.omega_body[k]) / left
+        body.angular_acceleration_body[k] = change / dt
+        body.omega_body[k] += change
+    if control_state.pose_steps == 0:  # a jump is no acceleration
+        for k in range(3):
+            body.acceleration_map[k] = body.angular_acceleration_body[k] = 0.0
+    control_state.pose_steps = max(left - 1, 1)
 
 
 @inner_kernel

@@ -81,6 +81,8 @@ CONTROL_STATE = np.dtype(
         ("velocity_integral", "f8", 3),  # m/s^2, map: against steady disturbances
         ("attitude", "f8", 4),  # map from body
         ("rotor_target", "f8", MAX_ROTORS),  # rad/s, where speeds are commanded
+        ("pose_stamp", "i8"),  # ns, of the last external pose; -1: it had none
+        ("pose_steps", "i8"),  # steps until an external motion has its velocity; 0: a jump
     ],
     align=True,
 )

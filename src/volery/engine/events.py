@@ -20,7 +20,7 @@ class EventKind(StrEnum):
     MODE = "mode"
     """Changed its flight mode."""
     BATTERY = "battery"
-    """Its battery ran low, critical or empty."""
+    """Its battery fell to low, critical, emergency or empty."""
     FAULT = "fault"
     """A planned fault began or ended."""
     WORLD = "world"

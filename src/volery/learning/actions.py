@@ -37,7 +37,11 @@ class Action(Protocol):
 
 @dataclass(frozen=True)
 class Velocity:
-    """Velocity in the level heading frame and yaw rate."""
+    """Velocity in the level heading frame and yaw rate.
+
+    The four numbers of -1 to 1 are forward, left and up, where 1 is `speed_m_s`, and the yaw rate,
+    counter-clockwise from above, where 1 is `yaw_rate_rad_s`.
+    """
 
     speed_m_s: float = 3.0
     yaw_rate_rad_s: float = 1.0

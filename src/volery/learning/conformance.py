@@ -237,16 +237,16 @@ def _infos(subject: _Subject) -> None:
         returns += step.reward
         for row in np.flatnonzero(step.over).tolist():
             info = step.info
-            apart = abs(info["episode"]["r"][row] - returns[row])
-            subject.require(apart < 1e-9, "info['episode']['r'] is not the sum of rewards")
-            length = info["episode"]["l"][row]
+            apart = abs(info["episode_return"][row] - returns[row])
+            subject.require(apart < 1e-9, "info['episode_return'] is not the sum of rewards")
+            length = info["episode_length"][row]
             subject.require(1 <= length <= task.episode_decisions, "wrong length of an episode")
             end = info["end_name"][row]
             is_known = end in names and (end == "time_limit") == bool(step.truncated[row])
             subject.require(is_known, f"wrong name of an end: '{end}'")
             terms = sum(float(sums[row]) for sums in info["reward_terms"].values())
             ends = [0.0, *(float(e.reward) for e in task.terminations)]
-            extra = min(abs(info["episode"]["r"][row] - terms - end) for end in ends)
+            extra = min(abs(info["episode_return"][row] - terms - end) for end in ends)
             subject.require(extra < 1e-6, "the terms of the reward do not sum to the return")
             returns[row] = 0.0
 

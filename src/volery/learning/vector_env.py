@@ -82,12 +82,14 @@ class TaskVectorEnv(VectorEnv[Observations, Array, Any]):
     ) -> tuple[Observations, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Acts (K * m, A) and returns observations, rewards, terminated, truncated and info.
 
-        Of the episodes that end with this step, `info["episode"]` has return `r` and decisions `l`,
-        `info["success"]` whether they succeed, `info["end"]` the number of the termination (or
-        their count: the time limit), `info["end_name"]` its name ("time_limit"), and
-        `info["reward_terms"]` the sums of each term; the mask
-        `_episode` (K * m,) says which they are. Raises `CommandError` for an action of a wrong
-        shape or one that is not finite, and for an environment that needs a reset.
+        Of the episodes that end with this step, `info["episode_return"]` has the sum of rewards,
+        `info["episode_length"]` the number of decisions, `info["success"]` whether they succeed,
+        `info["end"]` the number of the termination (or their count: the time limit),
+        `info["end_name"]` its name ("time_limit"), and `info["reward_terms"]` the sums of each
+        term; the mask `_end` (K * m,), like that of each other key, says which they are. The key
+        `episode` is left to Gymnasium's `RecordEpisodeStatistics`. Raises `CommandError` for an
+        action of a wrong shape or one that is not finite, and for an environment that needs a
+        reset.
         """
         self._check_open()
         if not self._has_begun:
@@ -167,16 +169,16 @@ class TaskVectorEnv(VectorEnv[Observations, Array, Any]):
         episodes, agents, ends = self.episodes, self.task.num_agents, self._rows(over)
         sums = {name: own[:, :agents].reshape(-1) for name, own in episodes.reward_sums.items()}
         return {
-            "episode": {
-                "r": np.where(ends, episodes.returns[:, :agents].reshape(-1), 0.0),
-                "l": self._rows(np.where(over, episodes.flight.decisions, 0)),
-            },
-            "_episode": ends,
+            "episode_return": np.where(ends, episodes.returns[:, :agents].reshape(-1), 0.0),
+            "_episode_return": ends,
+            "episode_length": self._rows(np.where(over, episodes.flight.decisions, 0)),
+            "_episode_length": ends,
             "success": self._rows(outcome.success & over),
             "_success": ends,
             "end": self._rows(np.where(over, outcome.end, -1)),
-            "end_name": self._rows(np.where(over, self._ends[outcome.end], "")),
             "_end": ends,
+            "end_name": self._rows(np.where(over, self._ends[outcome.end], "")),
+            "_end_name": ends,
             "reward_terms": {name: np.where(ends, own, 0.0) for name, own in sums.items()},
             "_reward_terms": ends,
         }

@@ -45,6 +45,9 @@ class Flight(Data):
     """Minimum height above the take-off position on the way home."""
     command_timeout_s: Annotated[float, Field(ge=0.05, le=60.0)] = 0.5
     """Time without a velocity command after which the UAV holds its position."""
+    low_battery_action: Literal["warn", "land", "return"] = "warn"
+    """As PX4's COM_LOW_BAT_ACT: warn; land at the critical level; return home at the critical level
+    and land at the emergency level."""
 
 
 class NodeEntry(Data):

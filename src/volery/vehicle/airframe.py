@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, TypeAlias
 
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
@@ -51,7 +51,7 @@ class Body(Table):
     drag_area_m2: tuple[NotNegative, NotNegative, NotNegative]
     """Drag coefficient times area along each axis."""
     size_m: PositiveVector
-    """Box that range sensors of other vehicles detect."""
+    """Box of the plates, electronics and battery between the rotors."""
     collision_radius_m: Positive
     """Radius of a sphere about the origin that contains the whole vehicle, rotor discs included."""
 
@@ -86,6 +86,21 @@ class Ground(Table):
     landing_speed_limit_m_s: Positive
     friction: Annotated[float, Field(ge=0.0, le=2.0)]
     restitution: Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+Colour: TypeAlias = Literal["black", "grey", "white", "red", "orange", "amber", "blue", "green"]
+"""Colours of a UAV's parts, for cameras and the page."""
+
+
+class Colours(Table):
+    """Colours of the parts, which cameras and the page show."""
+
+    front: Colour = "orange"
+    """Arms to the front, and the mark on the front of the body."""
+    back: Colour = "grey"
+    """The other arms."""
+    plates: Colour = "black"
+    legs: Colour = "black"
 
 
 class Limits(Table):
@@ -140,6 +155,7 @@ class Airframe(Table):
     rotors: Rotors
     ground: Ground
     limits: Limits
+    colours: Colours = Colours()
     control: Bandwidths = Bandwidths()
     battery: Battery | None = None
     """Omitted: an ideal supply with constant voltage."""

@@ -41,6 +41,7 @@ BATTERY = np.dtype(
         ("speed_a_volt", "f8"),  # rad/s V
         ("low", "f8"),
         ("critical", "f8"),
+        ("emergency", "f8"),
         ("period", "f8"),  # s
     ],
     align=True,
@@ -53,15 +54,18 @@ class BatteryLevel(IntEnum):
 
     NORMAL = 0
     LOW = 1
-    """Below the battery's `low`: return home."""
+    """Below the battery's `low`: time to return."""
     CRITICAL = 2
-    """Below its `critical`: land."""
-    EMPTY = 3
+    """Below its `critical`: return home now."""
+    EMERGENCY = 3
+    """Below its `emergency`: land at once."""
+    EMPTY = 4
     """No charge: the rotors stop."""
 
 
 _LOW = int(BatteryLevel.LOW)
 _CRITICAL = int(BatteryLevel.CRITICAL)
+_EMERGENCY = int(BatteryLevel.EMERGENCY)
 _EMPTY = int(BatteryLevel.EMPTY)
 
 
@@ -85,8 +89,12 @@ class Battery(Table):
     """Voltage of the loaded pack at which rotors reach `max_speed_rad_s`."""
     power_torque_m: Positive | None = None
     """k_P, torque over thrust for the rotors' power; default: `rotors.torque_m`."""
-    low: Share = 0.25
-    critical: Share = 0.10
+    low: Share = 0.15
+    """Charge below which the battery is low; this and the next two: PX4's `BAT_LOW_THR`, ..."""
+    critical: Share = 0.07
+    """... `BAT_CRIT_THR` ..."""
+    emergency: Share = 0.05
+    """... and `BAT_EMERGEN_THR`, with PX4's defaults; a default above `critical` is that level."""
 
     @model_validator(mode="after")
     def _is_a_battery(self) -> Self:
@@ -94,6 +102,10 @@ class Battery(Table):
             raise ValueError("open_circuit_v must not fall from empty to full")
         if not self.critical < self.low:
             raise ValueError(f"critical = {self.critical} must be below low = {self.low}")
+        if "emergency" in self.model_fields_set and not self.emergency < self.critical:
+            raise ValueError(
+                f"emergency = {self.emergency} must be below critical = {self.critical}"
+            )
         return self
 
 
@@ -120,6 +132,7 @@ def battery_row(
     row["speed_a_volt"] = max_speed_rad_s / battery.rated_v
     row["low"] = battery.low
     row["critical"] = battery.critical
+    row["emergency"] = min(battery.emergency, battery.critical)
     row["period"] = period_s
     return row
 
@@ -150,6 +163,8 @@ def drain(body: Any, plant: Any, command: Any) -> bool:
     level = 0
     if charge <= 0.0:
         level = _EMPTY
+    elif charge < battery.emergency:
+        level = _EMERGENCY
     elif charge < battery.critical:
         level = _CRITICAL
     elif charge < battery.low:

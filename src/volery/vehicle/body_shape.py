@@ -1,20 +1,40 @@
-"""Shape of a UAV for other UAVs' sensors: body, arms and rotors as meshes in the body frame."""
+"""Shape of a UAV for other UAVs' sensors: body, arms, motors, legs and rotors as meshes, FLU, m.
+
+It is the one that the page draws (`web/src/scene/uavs/airframeGeometry.ts`), made from the
+airframe's data file: positions of rotors and feet, the body's box, colours.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from volery.core.arrays import Array
-from volery.vehicle.airframe import Airframe, RotorGeometry
+from volery.vehicle.airframe import Airframe, Colour, RotorGeometry
 from volery.world.materials import Material
-from volery.world.mesh import Mesh
+from volery.world.mesh import Mesh, concatenate
 from volery.world.rotor_kernels import DISC_SIDES
 from volery.world.scene_content import BodyShape
 
-_ARM_WIDTH_M = 0.025
+Piece: TypeAlias = tuple[Mesh, Material]
+
+MATERIAL_OF: dict[Colour, Material] = {
+    "black": Material.UAV_BODY,
+    "grey": Material.UAV_GREY,
+    "white": Material.UAV_WHITE,
+    "red": Material.UAV_RED,
+    "orange": Material.UAV_ORANGE,
+    "amber": Material.UAV_AMBER,
+    "blue": Material.UAV_BLUE,
+    "green": Material.UAV_GREEN,
+}
+"""Materials of an airframe's colours."""
+_SIDES = 14
+"""Sides of motors and pads."""
 
 _BOX_CORNERS = np.array(
     [[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)], dtype=np.float64
@@ -29,34 +49,96 @@ _BOX_TRIANGLES = np.array(
 
 
 def body_shape(airframe: Airframe) -> BodyShape:
-    """Returns box, arms and rotor discs of an airframe, in FLU about its centre of mass, m.
+    """Returns the shape of an airframe, with a part for each of its materials.
 
     A turning rotor is a disc to a LIDAR: a pulse of some nanoseconds hits a blade or passes, but a
     sweep covers the whole circle. A camera sees the blades at their angles (`world.rotor_kernels`).
     """
-    solid = [_box(np.zeros(3), np.array(airframe.body.size_m), 0.0)]
-    solid += [_arm(place) for place in airframe.rotors.places]
+    pieces: dict[Material, list[Mesh]] = {}
+    for mesh, material in _pieces(airframe):
+        pieces.setdefault(material, []).append(mesh)
     radius = airframe.rotors.radius_m
     rotors = np.array([_turning(place, radius) for place in airframe.rotors.places])
-    discs = [_disc(rotor) for rotor in rotors]
-    return BodyShape(
-        ((_joined(solid), Material.UAV_BODY), (_joined(discs), Material.ROTOR)), rotors
-    )
+    discs = concatenate([_disc(rotor) for rotor in rotors])
+    solid = ((concatenate(meshes), material) for material, meshes in pieces.items())
+    return BodyShape((*solid, (discs, Material.ROTOR)), rotors)
 
 
-def _box(center: Array, size: Array, yaw: float) -> tuple[Array, NDArray[np.uint32]]:
-    corners = _BOX_CORNERS * size
-    c, s = math.cos(yaw), math.sin(yaw)
-    turned = corners @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    return turned + center, _BOX_TRIANGLES
+def _pieces(airframe: Airframe) -> Iterator[Piece]:
+    yield from _hub(airframe)
+    for place in airframe.rotors.places:
+        yield from _arm(airframe, place)
+    for foot in airframe.ground.feet_m:
+        yield from _leg(airframe, np.array(foot))
 
 
-def _arm(place: RotorGeometry) -> tuple[Array, NDArray[np.uint32]]:
-    """Returns a bar from the body's axis to below the rotor, at half the rotor's height."""
+def _hub(airframe: Airframe) -> Iterator[Piece]:
+    """Yields two plates, electronics between them, the battery on top, a mark in front."""
+    x, y, z = size = np.array(airframe.body.size_m)
+    thick = 0.06 * size.min()
+    plates, front = MATERIAL_OF[airframe.colours.plates], MATERIAL_OF[airframe.colours.front]
+    yield _box([x, 0.8 * y, 1.5 * thick], [0.0, 0.0, 0.22 * z]), plates
+    yield _box([0.9 * x, 0.72 * y, 1.5 * thick], [0.0, 0.0, -0.18 * z]), plates
+    yield _box([0.55 * x, 0.45 * y, 0.32 * z], [0.0, 0.0, 0.02 * z]), Material.UAV_GREY
+    yield _box([0.62 * x, 0.3 * y, 0.22 * z], [-0.04 * x, 0.0, 0.35 * z]), Material.UAV_BLUE
+    yield _box([0.08 * x, 0.3 * y, 0.12 * z], [0.5 * x, 0.0, 0.02 * z]), front
+
+
+def _arm(airframe: Airframe, place: RotorGeometry) -> Iterator[Piece]:
+    """Yields a bar from the body to below the rotor, the motor, and the cap above it."""
     x, y, z = place.position_m
+    radius, colours = airframe.rotors.radius_m, airframe.colours
     length = math.hypot(x, y)
-    size = np.array([length, _ARM_WIDTH_M, _ARM_WIDTH_M])
-    return _box(np.array([x / 2.0, y / 2.0, z / 2.0]), size, math.atan2(y, x))
+    seat = z - 0.16 * radius
+    start = [0.12 * x, 0.12 * y, min(seat, 0.18 * airframe.body.size_m[2])]
+    colour = colours.front if x > 0.01 * length else colours.back
+    yield _bar(start, [x, y, seat], 0.1 * length, 0.06 * length), MATERIAL_OF[colour]
+    yield _cylinder(0.13 * radius, 0.22 * radius, [x, y, z - 0.12 * radius]), Material.UAV_GREY
+    yield _cylinder(0.05 * radius, 0.1 * radius, [x, y, z + 0.02 * radius]), Material.UAV_WHITE
+
+
+def _leg(airframe: Airframe, foot: Array) -> Iterator[Piece]:
+    """Yields a bar from the body down to a foot, and its pad."""
+    reach = max(math.hypot(*place.position_m[:2]) for place in airframe.rotors.places)
+    thick = 0.045 * reach
+    legs = MATERIAL_OF[airframe.colours.legs]
+    top = [0.7 * foot[0], 0.7 * foot[1], -0.1 * airframe.body.size_m[2]]
+    yield _bar(top, foot + np.array([0.0, 0.0, 0.5 * thick]), thick, thick), legs
+    pad = foot + np.array([0.0, 0.0, 0.25 * thick])
+    yield _cylinder(1.1 * thick, 0.5 * thick, pad), legs
+
+
+def _box(sides: ArrayLike, centre: ArrayLike) -> Mesh:
+    return _mesh(np.asarray(centre) + _BOX_CORNERS * np.asarray(sides), _BOX_TRIANGLES)
+
+
+def _bar(start: ArrayLike, end: ArrayLike, width: float, height: float) -> Mesh:
+    """Returns a straight bar between two points (3,); its width is horizontal."""
+    a, b = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
+    length = float(np.linalg.norm(b - a))
+    along = (b - a) / length if length > 1e-9 else np.array([1.0, 0.0, 0.0])
+    level = math.hypot(along[0], along[1])
+    across = np.array([-along[1], along[0], 0.0]) / level if level > 0.0 else np.array([0, 1.0, 0])
+    axes = np.array([along, across, np.cross(along, across)])
+    corners = (_BOX_CORNERS * [length, width, height]) @ axes
+    return _mesh(0.5 * (a + b) + corners, _BOX_TRIANGLES)
+
+
+def _cylinder(radius: float, height: float, centre: ArrayLike) -> Mesh:
+    """Returns an upright closed cylinder."""
+    angle = np.arange(_SIDES) * (2.0 * math.pi / _SIDES)
+    rim = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(_SIDES)])
+    half = np.array([0.0, 0.0, 0.5 * height])
+    points = np.vstack([rim - half, rim + half, -half, half]) + np.asarray(centre)
+    i = np.arange(_SIDES)
+    j, low, high = (i + 1) % _SIDES, 2 * _SIDES, 2 * _SIDES + 1
+    triangles = [
+        np.column_stack([i, j, _SIDES + j]),
+        np.column_stack([i, _SIDES + j, _SIDES + i]),
+        np.column_stack([j, i, np.full(_SIDES, low)]),
+        np.column_stack([_SIDES + i, _SIDES + j, np.full(_SIDES, high)]),
+    ]
+    return _mesh(points, np.vstack(triangles).astype(np.uint32))
 
 
 def _turning(place: RotorGeometry, radius: float) -> Array:
@@ -68,21 +150,15 @@ def _turning(place: RotorGeometry, radius: float) -> Array:
     return np.concatenate([place.position_m, side, other, [radius]])
 
 
-def _disc(rotor: Array) -> tuple[Array, NDArray[np.uint32]]:
+def _disc(rotor: Array) -> Mesh:
     centre, side, other, radius = rotor[:3], rotor[3:6], rotor[6:9], rotor[9]
     angle = np.arange(DISC_SIDES) * (2.0 * math.pi / DISC_SIDES)
     rim = radius * (np.cos(angle)[:, None] * side + np.sin(angle)[:, None] * other)
     vertices = np.vstack([np.zeros(3), rim]) + centre
     k = np.arange(DISC_SIDES)
     triangles = np.stack([np.zeros_like(k), k + 1, (k + 1) % DISC_SIDES + 1], axis=1)
-    return vertices, triangles.astype(np.uint32)
+    return _mesh(vertices, triangles.astype(np.uint32))
 
 
-def _joined(parts: list[tuple[Array, NDArray[np.uint32]]]) -> Mesh:
-    offsets = np.cumsum([0, *(len(vertices) for vertices, _ in parts[:-1])])
-    return Mesh(
-        np.vstack([vertices for vertices, _ in parts]).astype(np.float32),
-        np.vstack(
-            [triangles + offset for (_, triangles), offset in zip(parts, offsets, strict=True)]
-        ).astype(np.uint32),
-    )
+def _mesh(vertices: Array, triangles: NDArray[np.uint32]) -> Mesh:
+    return Mesh(vertices.astype(np.float32), triangles)

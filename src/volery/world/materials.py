@@ -36,6 +36,14 @@ class Material(IntEnum):
     """Paint in the colour of its solid."""
     PRINT_WHITE = 19
     PRINT_BLACK = 20
+    UAV_GREY = 21
+    """This and the next ones: plastic and metal of a UAV in the colours of its airframe."""
+    UAV_WHITE = 22
+    UAV_RED = 23
+    UAV_ORANGE = 24
+    UAV_AMBER = 25
+    UAV_BLUE = 26
+    UAV_GREEN = 27
 
 
 _TABLE = read_table(__file__, "materials.toml")

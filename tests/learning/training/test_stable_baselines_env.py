@@ -50,7 +50,10 @@ def test_only_ends_have_infos_of_their_own(played):
             own = infos[k]
             np.testing.assert_array_equal(own["terminal_observation"], info["final_obs"][k])
             assert own["TimeLimit.truncated"] == truncated[k]
-            assert own["episode"] == {"r": info["episode"]["r"][k], "l": info["episode"]["l"][k]}
+            assert own["episode"] == {
+                "r": info["episode_return"][k],
+                "l": info["episode_length"][k],
+            }
             assert own["is_success"] == info["success"][k]
             assert sum(own["reward_terms"].values()) == pytest.approx(own["episode"]["r"])
     assert ended >= 3

@@ -1,5 +1,7 @@
 """Identified and kinematic plants: exactness, agreement with the rigid body, slices, snapshots."""
 
+import math
+
 import numpy as np
 import pytest
 from flights import F450, FLAT, LEVEL, track
@@ -11,6 +13,7 @@ from volery.control.fleet_events import FleetEventKind
 from volery.control.flight_modes import FlightMode
 from volery.control.trajectory import Trajectory
 from volery.core import rotations
+from volery.core.clock import NS_PER_S
 from volery.core.errors import CommandError
 from volery.vehicle.identified import FirstOrder, SecondOrder, load_identified, transition
 from volery.vehicle.kinematic import Kinematic
@@ -278,6 +281,70 @@ def test_a_pose_is_taken_and_left():
     assert np.linalg.norm(fleet.state.position_map[0] - (3, 4, 50)) < 1.0
     assert np.linalg.norm(fleet.state.velocity_map[0]) < 1e-3
     np.testing.assert_allclose(fleet.state.attitude[0, :2], 0.0)
+
+
+def test_a_stream_of_poses_has_the_velocity_between_them():
+    """A circle of 2 m radius at 2 m/s: 2 m/s^2 towards its centre, without spikes."""
+    fleet, period = flying(KINEMATIC), 20
+    rates, felt = [], []
+    for k in range(100):
+        t = k * period * 1e-3
+        place = 2.0 * np.array([math.sin(t), -math.cos(t), 0.0]) + (0, 0, 50)
+        fleet.command_pose(
+            0, place, rotations.from_rpy(0, 0, t), stamp_ns=round(t * NS_PER_S) + 5000
+        )
+        for _ in range(period):
+            fleet.advance(1, FLAT.grid)
+            rates.append(fleet.state.omega_body[0].copy())
+            felt.append(fleet.state.acceleration_map[0].copy())
+        np.testing.assert_array_equal(fleet.state.position_map[0], place)
+        if k > 1:
+            middle = t - 0.5 * period * 1e-3
+            moving = 2.0 * np.array([math.cos(middle), math.sin(middle), 0.0])
+            np.testing.assert_allclose(fleet.state.velocity_map[0], moving, atol=2e-3)
+    size = np.linalg.norm(felt, axis=1)
+    np.testing.assert_allclose(size[3 * period :], 2.0, atol=0.01)
+    np.testing.assert_allclose(rates[3 * period :], np.tile([0, 0, 1], (97 * period, 1)), atol=1e-6)
+    fleet.advance(1000, FLAT.grid)  # the stream ends
+    np.testing.assert_array_equal(fleet.state.velocity_map[0], 0.0)
+    np.testing.assert_array_equal(fleet.state.omega_body[0], 0.0)
+    np.testing.assert_array_equal(fleet.state.position_map[0], place)
+
+
+def test_poses_without_time_in_bursts_have_the_mean_velocity():
+    fleet, rng = flying(KINEMATIC), np.random.default_rng(5)
+    speeds, felt, sent = [], [], 0
+    for step in range(3000):  # 2 m/s, poses every 20 ms that arrive up to 15 ms late
+        if step >= 20 * sent + rng.integers(15):
+            fleet.command_pose(0, (0.04 * sent, 0, 50), LEVEL)
+            sent += 1
+        if step % 50 == 0:  # twice at one instant
+            fleet.command_pose(0, (0.04 * (sent - 1), 0, 50), LEVEL)
+        fleet.advance(1, FLAT.grid)
+        speeds.append(fleet.state.velocity_map[0, 0])
+        felt.append(abs(fleet.state.acceleration_map[0, 0]))
+    assert np.mean(speeds[500:]) == pytest.approx(2.0, abs=0.1)
+    assert np.std(speeds[500:]) < 0.3
+    assert max(felt) < 100.0
+
+
+@pytest.mark.parametrize("stamped", [True, False])
+def test_a_teleport_is_no_speed(stamped):
+    fleet = flying(KINEMATIC)
+    fastest = felt = 0.0
+    for k in range(100):
+        x = 0.04 * k + (100.0 if k >= 50 else 0.0)
+        stamp = {"stamp_ns": k * NS_PER_S // 50} if stamped else {}
+        turned = rotations.from_rpy(0.0, 0.0, 3.0 if k >= 75 else 0.0)
+        fleet.command_pose(0, (x, 0, 50), turned, **stamp)
+        for _ in range(20):
+            fleet.advance(1, FLAT.grid)
+            fastest = max(fastest, float(np.linalg.norm(fleet.state.velocity_map[0])))
+            felt = max(felt, float(np.linalg.norm(fleet.state.acceleration_map[0])))
+            assert np.linalg.norm(fleet.state.omega_body[0]) < 1e-9
+    assert fastest < 2.01
+    assert felt < 110.0  # from rest to 2 m/s within a period
+    assert fleet.state.velocity_map[0, 0] == pytest.approx(2.0, abs=0.01)
 
 
 @pytest.mark.parametrize(("speed", "kind"), [(0.5, "touch_down"), (5.0, "impact")])

@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
+from volery.core import rotations
 from volery.core.errors import DataFileError, PlacementError, ScenarioError
+from volery.graph.messages import Imu
+from volery.vehicle.airframe import load_airframe
 
 
 def test_under_the_ground(simulate, flat_data):
@@ -43,6 +46,46 @@ def test_a_line_of_uavs_is_evenly_spaced(simulate, flat_data):
     xs = [uav.position_map[0] for uav in simulation.uavs.values()]
     np.testing.assert_allclose(xs, [0, 5, 10, 15, 20])
     assert simulation.vehicles.names == ("uav1", "uav2", "uav3", "uav4", "uav5")
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.3])
+@pytest.mark.parametrize("airframe", ["f450", "crazyflie"])
+def test_a_standing_uav_rests_from_the_first_step(simulate, flat_data, tmp_path, slope, airframe):
+    """Its IMU measures gravity alone, its pose does not change, and it stands on its feet."""
+    rows = [",".join(f"{slope * (x + 0.5 * y):.6f}" for x in range(5)) for y in range(5)]
+    (tmp_path / "slope.csv").write_text("\n".join(rows) + "\n")
+    ground = {"kind": "grid", "file": str(tmp_path / "slope.csv"), "spacing_m": 1.0}
+    flat_data["world"] = {"terrain": ground}
+    flat_data["types"] = {
+        "still": {
+            "airframe": airframe,
+            "sensors": [{"kind": "imu", "noise": False, "rate_hz": 1000}],
+        }
+    }
+    flat_data["uavs"] = [{"type": "still", "position_m": [2.2, 1.7], "yaw_deg": 30.0}]
+    simulation = simulate(flat_data)
+    uav, felt = simulation.uavs["uav1"], []
+    start, attitude = uav.position_map.copy(), uav.attitude.copy()
+    simulation.graph.subscribe(
+        "/uav1/imu",
+        lambda p: felt.append([getattr(p.message.linear_acceleration, axis) for axis in "xyz"]),
+        Imu,
+    )
+    simulation.run(0.3)
+    assert len(felt) >= 300
+    np.testing.assert_allclose(np.linalg.norm(felt, axis=1), 9.80665, atol=1e-5)
+    np.testing.assert_array_equal(uav.position_map, start)
+    np.testing.assert_array_equal(uav.attitude, attitude)
+    feet = start + rotations.rotate(attitude, np.array(load_airframe(airframe).ground.feet_m))
+    gaps = feet[:, 2] - simulation.world.terrain.height(feet[:, 0], feet[:, 1])
+    np.testing.assert_allclose(gaps, 0.0, atol=1e-6)
+    assert float(rotations.yaw_of(attitude)) == pytest.approx(np.radians(30.0), abs=0.1)
+    uav.take_off(1.0)
+    simulation.run(0.02)  # it wakes without a jump
+    assert np.linalg.norm(uav.position_map - start) < 0.002
+    assert max(np.linalg.norm(felt, axis=1)) < 15.0
+    simulation.run(4.0)
+    assert uav.position_map[2] - start[2] > 0.8
 
 
 def test_missing_files_name_the_places_looked_at(simulate, flat_data):

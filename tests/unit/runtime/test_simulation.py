@@ -8,8 +8,13 @@ import volery
 from volery.core.errors import CommandError, ScenarioError, VoleryError
 from volery.engine import pacing
 from volery.graph.messages import (
+    Imu,
     MultiDOFJointTrajectory,
     MultiDOFJointTrajectoryPoint,
+    Odometry,
+    Point,
+    Pose,
+    PoseStamped,
     Quaternion,
     Transform,
     Twist,
@@ -319,6 +324,36 @@ def test_plants_of_a_scenario(simulate, flat_data):
     np.testing.assert_allclose(mover.position_map, (5.8, 5, 10), atol=1e-9)
     simulation.run(6.0)
     assert real.position_map[2] == pytest.approx(3.12, abs=0.05)
+
+
+def test_poses_on_the_topic_move_odometry_and_imu(simulate, flat_data):
+    """What a game engine sends: poses of 2 m/s at 50 Hz, no velocity."""
+    flat_data["types"]["mover"] = {
+        "plant": "kinematic",
+        "sensors": [{"kind": "ground_truth"}, {"kind": "odometry"}, {"kind": "imu"}],
+    }
+    flat_data["uavs"] = [{"type": "mover", "position_m": [0.0, 0.0, 4.0]}]
+    simulation = simulate(flat_data)
+    twists, forces = {"ground_truth/odom": [], "odom": []}, []
+    for name, heard in twists.items():
+        simulation.graph.subscribe(
+            f"/uav1/{name}",
+            lambda p, heard=heard: heard.append(p.message.twist.twist.linear.x),
+            Odometry,
+        )
+    simulation.graph.subscribe(
+        "/uav1/imu", lambda p: forces.append(p.message.linear_acceleration.x), Imu
+    )
+    poses = simulation.graph.advertise("/uav1/pose_command", PoseStamped)
+    for k in range(60):
+        stamp = header(20_000_000 * k, "map")
+        place = Point(0.04 * k, 0.0, 4.0)
+        poses.publish(PoseStamped(stamp, Pose(place, Quaternion(0.0, 0.0, 0.0, 1.0))))
+        simulation.run(0.02)
+    for heard in twists.values():
+        assert heard[-1] == pytest.approx(2.0, abs=0.1)
+    assert np.abs(forces).max() < 105.0
+    assert np.abs(forces[-20:]).max() < 1.0
 
 
 @pytest.mark.parametrize(

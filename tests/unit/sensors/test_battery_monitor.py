@@ -38,7 +38,7 @@ def test_publishes_battery_states(flat_data, simulate):
 
 
 def test_low_is_an_event(flat_data, simulate):
-    simulation = simulate(with_monitor(flat_data, battery_charge=0.24))
+    simulation = simulate(with_monitor(flat_data, battery_charge=0.14))
     simulation.run(0.5)
     (event,) = [e for e in simulation.diagnostics.events if e.kind is EventKind.BATTERY]
     assert event.detail == "battery low"

@@ -71,7 +71,12 @@ def test_own_file_beside_the_scenario(tmp_path):
             "efficiency = 1.5",
             ["battery.efficiency", "less than or equal to 1"],
         ),
-        ("rated_v = 14.8", "rated_v = 14.8\nlow = 0.1", ["critical = 0.1 must be below low"]),
+        ("rated_v = 14.8", "rated_v = 14.8\nlow = 0.05", ["critical = 0.07 must be below low"]),
+        (
+            "rated_v = 14.8",
+            "rated_v = 14.8\nemergency = 0.1",
+            ["emergency = 0.1 must be below critical"],
+        ),
         ("rated_v = 14.8", "rated_v = 14.8\nvolts = 3", ["battery.volts"]),
         ("[0.159, 0.159, 0.11]", "[0.159, nan, 0.11]", ["rotors.places", "finite"]),
         ("tilt_deg = 45.0", "tilt_deg = 95.0", ["limits.tilt_deg", "75"]),

@@ -110,6 +110,7 @@ def test_levels_are_told_once_and_an_empty_pack_lets_it_fall():
     assert [e.battery_level for e in noted] == [
         BatteryLevel.LOW,
         BatteryLevel.CRITICAL,
+        BatteryLevel.EMERGENCY,
         BatteryLevel.EMPTY,
     ]
     assert fleet.state.battery_level[0] == BatteryLevel.EMPTY

@@ -3,6 +3,7 @@
 import { create } from "zustand";
 import { secondsOf } from "../lib/time.ts";
 import { link } from "../link/link.ts";
+import { showFailure } from "./notices.ts";
 
 export type EntrySort = "event" | "problem" | "command";
 
@@ -55,7 +56,10 @@ export function followJournal(): void {
     "std_msgs/msg/String",
     ({ message }) => {
       const entry = entryOfEvent(message.data);
-      if (entry !== null) write(entry);
+      if (entry === null) return;
+      write(entry);
+      const warning = warningOf(entry);
+      if (warning !== null) showFailure(warning, entry.text);
     },
     { depth: COMMAND_DEPTH },
   );
@@ -65,6 +69,11 @@ export function followJournal(): void {
     ({ message }: { message: unknown }) => write(entryOfCommand(message as Command)),
     { depth: COMMAND_DEPTH },
   );
+}
+
+/** Title of the notice that an event deserves, as a falling battery does; null: none. */
+export function warningOf({ kind, who, timeS }: Omit<Entry, "number">): string | null {
+  return kind === "battery" ? `${who}, ${timeS.toFixed(1)} s` : null;
 }
 
 export function clearJournal(): void {

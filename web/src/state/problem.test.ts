@@ -2,7 +2,7 @@ import { describe, expect, it, vi } from "vitest";
 
 vi.mock("../link/link.ts", () => ({ link: {} }));
 const { problemOf } = await import("./problem.ts");
-const { entryOfEvent } = await import("./journal.ts");
+const { entryOfEvent, warningOf } = await import("./journal.ts");
 
 describe("problem", () => {
   it("is nothing while all is well", () => {
@@ -36,6 +36,16 @@ describe("an entry of the log", () => {
     const entry = entryOfEvent(JSON.stringify(EVENT));
     expect(entry).toMatchObject({ timeS: 2.5, sort: "problem", who: "uav1" });
     expect(entry?.text).toBe("hit tree 7 at 1.25 m/s at (1.0, 2.0, 3.0) m");
+  });
+
+  it("of a falling battery gets a notice, that of a collision none", () => {
+    const fallen = { ...EVENT, kind: "battery", partner: "", detail: "battery critical" };
+    const entry = entryOfEvent(JSON.stringify(fallen));
+    expect(entry).toMatchObject({ sort: "problem", who: "uav1" });
+    expect(entry?.text).toBe("battery critical at (1.0, 2.0, 3.0) m");
+    expect(entry && warningOf(entry)).toBe("uav1, 2.5 s");
+    const collision = entryOfEvent(JSON.stringify(EVENT));
+    expect(collision && warningOf(collision)).toBeNull();
   });
 
   it("is made of events alone", () => {

@@ -105,7 +105,7 @@ class StableBaselinesEnv(VecEnv):
     def _info_of(self, k: int, info: Info, is_truncated: bool) -> Info:
         own: Info = {
             "terminal_observation": info["final_obs"][k],
-            "episode": {"r": float(info["episode"]["r"][k]), "l": int(info["episode"]["l"][k])},
+            "episode": {"r": float(info["episode_return"][k]), "l": int(info["episode_length"][k])},
             "is_success": bool(info["success"][k]),
             "reward_terms": {name: float(v[k]) for name, v in info["reward_terms"].items()},
         }

@@ -143,8 +143,8 @@ class _Records:
 
     def add(self, over: NDArray[np.bool_], info: dict[str, Any]) -> None:
         """Adds the episodes that end in the environments `over` (K,)."""
-        self._returns.append(info["episode"]["r"][over])
-        self._lengths.append(info["episode"]["l"][over])
+        self._returns.append(info["episode_return"][over])
+        self._lengths.append(info["episode_length"][over])
         self._successes.append(info["success"][over])
         self._ends.append(info["end"][over])
         for name, sums in info["reward_terms"].items():

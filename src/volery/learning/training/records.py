@@ -37,10 +37,10 @@ class Latest:
 
     def add(self, info: dict[str, Any]) -> None:
         """Adds the episodes in an info of `TaskVectorEnv`."""
-        if "_episode" not in info:
+        if "_end" not in info:
             return
-        over = info["_episode"]
-        self.returns.extend(info["episode"]["r"][over].tolist())
+        over = info["_end"]
+        self.returns.extend(info["episode_return"][over].tolist())
         self.successes.extend(info["success"][over].tolist())
         for name, sums in info["reward_terms"].items():
             self.terms[name].extend(sums[over].tolist())

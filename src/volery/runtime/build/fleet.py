@@ -85,6 +85,8 @@ def build_fleet(
     for row, start in enumerate(starts):
         flight = scenario.types[start.type_name].flight
         fleet.set_command_timeout(flight.command_timeout_s, row)
+        if start.at_rest:
+            fleet.rest(row)
     return fleet
 
 

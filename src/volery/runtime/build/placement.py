@@ -19,8 +19,13 @@ from volery.world.terrain import Terrain
 _SEARCH_STEP_M = 1.0
 _SEARCH_RADIUS_M = 30.0
 _ROOM_TO_STAND_M = 1.5
-_SINK_M = 0.002
-"""Height above the ground at which a UAV is placed, m."""
+_TOLERANCE_M = 0.002
+"""Depth of the feet below the ground that counts as none, m."""
+_AT_REST_M = 0.005
+"""Maximum distance of a given height from that at rest at which a UAV stands there, m."""
+_TILT_SWEEPS = 4
+_GRIP_FRACTION = 0.9
+"""Fraction of the feet's friction up to which a UAV rests on a slope."""
 _DROP_M = 0.3
 """Max height above the ground at which a UAV still counts as landed, m."""
 _PRESSED_M = 0.02
@@ -41,6 +46,8 @@ class StartPose:
     attitude: Array
     on_ground: bool
     takes_off: bool
+    at_rest: bool = False
+    """Whether the pose is one in which it rests on the ground."""
 
 
 def place_uavs(
@@ -62,16 +69,28 @@ def place_uavs(
             place = _nominal_place(group, k, airframe, terrain)
             if group.placement == "nearest_free":
                 place = _nearest_free(place, airframe, altitude, scene, terrain, starts, where)
-            check_place(place, airframe, scene, terrain, starts, where, hint=_HINT)
+            rest = _rest_of(group, place, yaw, airframe, terrain)
+            place, attitude = (place, yaw) if rest is None else rest
+            check_place(
+                place,
+                airframe,
+                scene,
+                terrain,
+                starts,
+                where,
+                hint=_HINT,
+                at_rest=rest is not None,
+            )
             starts.append(
                 StartPose(
                     name,
                     group.type,
                     airframe,
                     place,
-                    yaw,
-                    on_ground=stands_on_ground(place, airframe, terrain),
+                    attitude,
+                    on_ground=rest is not None or stands_on_ground(place, airframe, terrain),
                     takes_off=group.on_start == "take_off",
+                    at_rest=rest is not None,
                 )
             )
     return tuple(starts)
@@ -92,7 +111,49 @@ def _standing(xy: Array, airframe: Airframe, terrain: Terrain) -> Array:
         float(terrain.height(xy[0] + foot[0], xy[1] + foot[1])) - foot[2]
         for foot in airframe.ground.feet_m
     )
-    return np.array([xy[0], xy[1], z + _SINK_M])
+    return np.array([xy[0], xy[1], z])
+
+
+def _rest_of(
+    group: UavGroup, place: Array, yaw: Array, airframe: Airframe, terrain: Terrain
+) -> tuple[Array, Array] | None:
+    """Returns the pose at rest of a UAV that starts on the ground; None: it starts elsewhere."""
+    given = len(group.position_m) == 3 and group.placement == "exact"
+    if given and abs(place[2] - _standing(place[:2], airframe, terrain)[2]) > _AT_REST_M:
+        return None
+    x0, y0, x1, y1 = terrain.bounds
+    if not (x0 <= place[0] <= x1 and y0 <= place[1] <= y1):
+        return None
+    return resting(place[:2], yaw, airframe, terrain)
+
+
+def resting(
+    xy: Array, yaw: Array, airframe: Airframe, terrain: Terrain
+) -> tuple[Array, Array] | None:
+    """Returns position (3,), m, and attitude (4,) in which a UAV rests on the ground.
+
+    yaw: (4,), a turn about the vertical. It tilts with the plane below its feet, none of which is
+    in the ground. None: the ground is too steep to rest on.
+    """
+    feet_body = np.array(airframe.ground.feet_m)
+    attitude = yaw
+    for _ in range(_TILT_SWEEPS):
+        feet = rotations.rotate(attitude, feet_body)
+        ground = terrain.height(xy[0] + feet[:, 0], xy[1] + feet[:, 1])
+        spread = np.column_stack([feet[:, :2], np.ones(len(feet))])
+        slope = np.linalg.lstsq(spread, ground, rcond=None)[0][:2]
+        steepness = float(np.hypot(*slope))
+        if steepness > _GRIP_FRACTION * airframe.ground.friction:
+            return None
+        if steepness == 0.0:
+            attitude = yaw
+            continue
+        normal = np.array([-slope[0], -slope[1], 1.0]) / math.hypot(1.0, steepness)
+        tilt = np.array([-normal[1], normal[0], 0.0, 1.0 + normal[2]])
+        attitude = rotations.multiply(rotations.normalize(tilt), yaw)
+    feet = rotations.rotate(attitude, feet_body)
+    ground = terrain.height(xy[0] + feet[:, 0], xy[1] + feet[:, 1])
+    return np.array([xy[0], xy[1], float((ground - feet[:, 2]).max())]), attitude
 
 
 def _nearest_free(
@@ -152,10 +213,12 @@ def check_place(
     where: str,
     *,
     hint: str = "",
+    at_rest: bool = False,
 ) -> None:
     """Raises `PlacementError` if a UAV cannot be at `place` (3,), m, map, among `others`.
 
-    `where` begins the message; `hint` ends it with a remedy.
+    `where` begins the message; `hint` ends it with a remedy. at_rest: the place is one of
+    `resting`, where a tilted UAV may be lower than a level one.
     """
     at = f"position_m ({place[0]:.2f}, {place[1]:.2f}, {place[2]:.2f})"
     x0, y0, x1, y1 = terrain.bounds
@@ -164,7 +227,7 @@ def check_place(
             f"{where}: {at} is beyond the terrain, which extends from ({x0:g}, {y0:g}) to "
             f"({x1:g}, {y1:g}) m"
         )
-    check_room(place, airframe, scene, terrain, f"{where}: {at}", hint=hint)
+    check_room(place, airframe, scene, terrain, f"{where}: {at}", hint=hint, at_rest=at_rest)
     radius = airframe.body.collision_radius_m
     for other in others:
         distance = float(np.linalg.norm(place - other.position_map))
@@ -177,14 +240,21 @@ def check_place(
 
 
 def check_room(
-    place: Array, airframe: Airframe, scene: Scene, terrain: Terrain, what: str, *, hint: str = ""
+    place: Array,
+    airframe: Airframe,
+    scene: Scene,
+    terrain: Terrain,
+    what: str,
+    *,
+    hint: str = "",
+    at_rest: bool = False,
 ) -> None:
     """Raises `PlacementError` if a position (3,), m, map, is below the ground or in an obstacle.
 
-    `what` begins the message; `hint` ends it with a remedy.
+    `what` begins the message; `hint` ends it with a remedy. at_rest: as in `check_place`.
     """
     standing = float(_standing(place[:2], airframe, terrain)[2])
-    if place[2] < standing - _SINK_M:
+    if place[2] < standing - _TOLERANCE_M and not at_rest:
         raise PlacementError(
             f"{what} lies {standing - place[2]:.2f} m under the ground or with its feet in "
             f"it; z must be at least {standing:.2f} there"

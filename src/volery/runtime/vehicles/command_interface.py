@@ -10,6 +10,7 @@ import numpy as np
 
 from volery.control.flight_modes import FlightMode
 from volery.core import rotations
+from volery.core.clock import NS_PER_S
 from volery.core.errors import CommandError
 from volery.core.vectors import norm
 from volery.graph.graph import Graph
@@ -105,7 +106,12 @@ def stand_at_message(uav: Uav, message: Any) -> None:
     if message.header.frame_id not in ("", "map"):
         raise CommandError(f"poses are in 'map', not in '{message.header.frame_id}'")
     place, turn = message.pose.position, message.pose.orientation
-    uav.command_pose([place.x, place.y, place.z], [turn.x, turn.y, turn.z, turn.w])
+    stamp = message.header.stamp
+    uav.command_pose(
+        [place.x, place.y, place.z],
+        [turn.x, turn.y, turn.z, turn.w],
+        stamp_ns=stamp.sec * NS_PER_S + stamp.nanosec,
+    )
 
 
 def _careful(uav: Uav, take: Callable[[Any], None], topic: str) -> Callable[[Published], None]:

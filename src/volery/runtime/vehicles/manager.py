@@ -14,6 +14,7 @@ from volery.control.fleet import Fleet
 from volery.core.arrays import Array
 from volery.core.errors import CommandError, PlacementError
 from volery.engine.engine import Engine
+from volery.engine.events import Event
 from volery.engine.faults import FaultPlan
 from volery.engine.sensor_restart import NamedStreams
 from volery.graph.graph import Graph
@@ -27,6 +28,7 @@ from volery.runtime.conditional_runs import ConditionalRuns
 from volery.runtime.monitoring.output_sink import OutputSink
 from volery.runtime.services.results import Close
 from volery.runtime.services.uav_services import offer_uav_services
+from volery.runtime.vehicles.battery_failsafe import BatteryFailsafe
 from volery.runtime.vehicles.command_interface import open_commands
 from volery.runtime.vehicles.external_odometry import ExternalOdometry
 from volery.runtime.vehicles.flight_futures import CHECK_PERIOD_S, FlightFutures
@@ -82,6 +84,7 @@ class VehicleManager:
     pose_aids: ExternalOdometry = field(init=False)
     futures: FlightFutures = field(init=False)
     """Futures of the UAVs' flight commands."""
+    _battery_failsafe: BatteryFailsafe = field(init=False)
     _closes: dict[str, list[Close]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -89,7 +92,8 @@ class VehicleManager:
         self.pose_aids = ExternalOdometry(self.graph, self.engine)
         self.flight_states = FlightStates(self.graph, self.engine, origin)
         self.futures = FlightFutures(self._fleet_row_of, self.runs)
-        self.outlet.on_event = self.futures.happened
+        self._battery_failsafe = BatteryFailsafe(self.engine, self.uavs.get)
+        self.outlet.on_event = self._on_event
 
     def open(self, parts: Assembly) -> None:
         """Connects the engine's first UAVs to the graph."""
@@ -206,6 +210,10 @@ class VehicleManager:
         if self.outlet.latest.requests(cameras):
             return EVERY_PART
         return self.publisher.cameras.subscribed_parts(cameras)
+
+    def _on_event(self, event: Event) -> None:
+        self.futures.happened(event)
+        self._battery_failsafe.happened(event, self.scenario)
 
     def _fleet_row_of(self, name: str) -> tuple[Fleet, int]:
         if name not in self.uavs:

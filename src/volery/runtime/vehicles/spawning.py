@@ -9,13 +9,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from volery.control.setpoints import checked_attitude
+from volery.core import rotations
 from volery.core.errors import (
     CommandError,
     PlacementError,
     SpawnError,
     SpawnFault,
 )
-from volery.runtime.build.placement import StartPose, check_place, on_ground, stands_on_ground
+from volery.runtime.build.placement import (
+    StartPose,
+    check_place,
+    on_ground,
+    resting,
+    stands_on_ground,
+)
 from volery.runtime.snapshot_manager import SnapshotManager
 from volery.runtime.vehicles.manager import VehicleManager
 from volery.runtime.vehicles.teleport import near
@@ -111,11 +118,26 @@ class Spawner:
             turn = checked_attitude(attitude)
         except CommandError as error:
             raise PlacementError(str(error)) from None
-        place = on_ground(place, airframe, self._terrain)
+        raised = on_ground(place, airframe, self._terrain)
+        rest = None
+        if not np.array_equal(raised, place):
+            yaw = rotations.from_rpy(0.0, 0.0, rotations.yaw_of(turn))
+            rest = resting(place[:2], yaw, airframe, self._terrain)
+        place, turn = (raised, turn) if rest is None else rest
+        at_rest = rest is not None
         others = near(self._manager.starts, self._manager.engine.fleet.state.position_map, place)
-        check_place(place, airframe, self._scene, self._terrain, others, name)
-        stands = stands_on_ground(place, airframe, self._terrain)
-        return StartPose(name, kind, airframe, place, turn, on_ground=stands, takes_off=False)
+        check_place(place, airframe, self._scene, self._terrain, others, name, at_rest=at_rest)
+        stands = at_rest or stands_on_ground(place, airframe, self._terrain)
+        return StartPose(
+            name,
+            kind,
+            airframe,
+            place,
+            turn,
+            on_ground=stands,
+            takes_off=False,
+            at_rest=at_rest,
+        )
 
 
 def usual_type(airframe: Airframe) -> UavType:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from volery.control.fleet import Fleet
 from volery.control.flight_modes import FlightMode
+from volery.control.pose_stream import NO_STAMP
 from volery.control.setpoints import MAX_COORDINATE, checked
 from volery.control.trajectory import Trajectory
 from volery.core.arrays import Array
@@ -296,15 +297,22 @@ class Uav:
         self,
         position_map: ArrayLike,
         attitude: ArrayLike,
-        velocity_map: ArrayLike = (0.0, 0.0, 0.0),
-        omega_body: ArrayLike = (0.0, 0.0, 0.0),
+        velocity_map: ArrayLike | None = None,
+        omega_body: ArrayLike | None = None,
+        *,
+        stamp_ns: int = NO_STAMP,
     ) -> None:
         """Sets the pose with the next step; kinematic UAVs only.
 
         Position (3,), m, velocity (3,), m/s, and attitude (4,), x y z w, are in the map; angular
-        velocity (3,), rad/s, is in the body frame (FLU).
+        velocity (3,), rad/s, is in the body frame (FLU). Without velocities the sensors measure
+        the motion between successive poses; stamp_ns: simulated time of the pose, else it is that
+        of the command. A jump faster than three times the airframe's limits, and 20 m/s, is a
+        teleport without velocity.
         """
-        self._fleet.command_pose(self._row, position_map, attitude, velocity_map, omega_body)
+        self._fleet.command_pose(
+            self._row, position_map, attitude, velocity_map, omega_body, stamp_ns=stamp_ns
+        )
         self._replaced("command_pose")
 
     def command_attitude(self, attitude: ArrayLike, thrust: float) -> None:

@@ -53,14 +53,14 @@ def depth_of(message):
 
 
 def test_a_flat_thing_is_shifted_by_its_disparity(look):
-    """The box of the UAV ahead shows its front, 2.78 m before the cameras."""
+    """The plates of the UAV ahead show their fronts, 2.78 m before the cameras."""
     got = look(facing())
     middle = {}
     for side in ("left", "right"):
         depth = depth_of(got[f"{side}/depth"])
         material = np.asarray(got[f"{side}/labels/material"].data).reshape(depth.shape)
         front = (material == Material.UAV_BODY) & (np.abs(depth - 2.78) < 1e-3)
-        assert front.sum() > 500
+        assert front.sum() > 60
         middle[side] = np.mean(np.nonzero(front), axis=1)
     f = got["left/camera_info"].k[0]
     assert f == pytest.approx(320.0 / np.tan(np.radians(30.0)))  # 60 degrees by default

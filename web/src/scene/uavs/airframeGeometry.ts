@@ -10,32 +10,25 @@ import {
   type BufferGeometry,
 } from "three";
 import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
-import { AIRFRAMES, type AirframeShape } from "./airframes.generated.ts";
-
-interface Colours {
-  front: string;
-  back: string;
-  plates: string;
-  legs: string;
-}
-
-const DARK: Colours = { front: "#e0662a", back: "#3a3d42", plates: "#2b2d31", legs: "#2b2d31" };
-const COLOURS: Record<string, Colours> = {
-  f450: { front: "#c8201c", back: "#e9e9e6", plates: "#24262a", legs: "#1b1c1f" },
-  iris: { front: "#1c5fa8", back: "#17181a", plates: "#17181a", legs: "#17181a" },
-  hummingbird: { front: "#e0a020", back: "#26282b", plates: "#26282b", legs: "#3a3d42" },
-  crazyflie: { front: "#1f3b2a", back: "#1f3b2a", plates: "#16271d", legs: "#d8d8d4" },
-};
+import {
+  AIRFRAMES,
+  USUAL_COLOURS,
+  type AirframeColours,
+  type AirframeShape,
+} from "./airframes.generated.ts";
 
 /** Shape of an airframe by name; of one that is not known an ordinary quadrotor's. */
 export function shapeOf(airframe: string): AirframeShape {
   return AIRFRAMES[airframe] ?? AIRFRAMES.f450!;
 }
 
-/** Body, arms, motors and feet in one geometry with colours in its vertices. */
+/**
+ * Body, arms, motors and feet in one geometry with colours in its vertices; cameras and LIDARs
+ * see the same one (src/volery/vehicle/body_shape.py).
+ */
 export function bodyOf(airframe: string): BufferGeometry {
   const shape = shapeOf(airframe);
-  const colours = COLOURS[airframe] ?? DARK;
+  const colours = AIRFRAMES[airframe]?.colours ?? USUAL_COLOURS;
   const pieces = [
     ...hub(shape, colours),
     ...shape.rotors.flatMap((rotor) => arm(shape, rotor, colours)),
@@ -47,7 +40,7 @@ export function bodyOf(airframe: string): BufferGeometry {
 }
 
 /** Two plates, electronics between them, the battery on top, a mark in front. */
-function hub({ size }: AirframeShape, { plates, front }: Colours): BufferGeometry[] {
+function hub({ size }: AirframeShape, { plates, front }: AirframeColours): BufferGeometry[] {
   const [x, y, z] = size;
   const thick = 0.06 * Math.min(x, y, z);
   return [
@@ -59,7 +52,11 @@ function hub({ size }: AirframeShape, { plates, front }: Colours): BufferGeometr
   ];
 }
 
-function arm({ size, rotorRadius }: AirframeShape, rotor: readonly number[], colours: Colours) {
+function arm(
+  { size, rotorRadius }: AirframeShape,
+  rotor: readonly number[],
+  colours: AirframeColours,
+) {
   const [x, y, z] = rotor as [number, number, number];
   const length = Math.hypot(x, y);
   const thick = Math.max(0.012 * length, 0.1 * length);
@@ -68,18 +65,18 @@ function arm({ size, rotorRadius }: AirframeShape, rotor: readonly number[], col
   const to = new Vector3(x, y, seat);
   return [
     bar(from, to, thick, 0.6 * thick, x > 0.01 * length ? colours.front : colours.back),
-    cylinder(0.13 * rotorRadius, 0.24 * rotorRadius, [x, y, z - 0.12 * rotorRadius], "#3d4045"),
+    cylinder(0.13 * rotorRadius, 0.22 * rotorRadius, [x, y, z - 0.12 * rotorRadius], "#3d4045"),
     cylinder(0.05 * rotorRadius, 0.1 * rotorRadius, [x, y, z + 0.02 * rotorRadius], "#b9bcc2"),
   ];
 }
 
-function leg({ size, rotors }: AirframeShape, foot: readonly number[], { legs }: Colours) {
+function leg({ size, rotors }: AirframeShape, foot: readonly number[], { legs }: AirframeColours) {
   const [x, y, z] = foot as [number, number, number];
   const reach = Math.max(...rotors.map(([rx, ry]) => Math.hypot(rx!, ry!)));
   const thick = 0.045 * reach;
   const top = new Vector3(0.7 * x, 0.7 * y, -0.1 * size[2]);
   return [
-    bar(top, new Vector3(x, y, z), thick, thick, legs),
+    bar(top, new Vector3(x, y, z + 0.5 * thick), thick, thick, legs),
     cylinder(1.1 * thick, 0.5 * thick, [x, y, z + 0.25 * thick], legs),
   ];
 }

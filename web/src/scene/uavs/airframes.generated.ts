@@ -10,6 +10,14 @@ export interface AirframeShape {
   /** x, y, z, axis x, y, z, and 1 for counter-clockwise seen from above, else -1. */
   rotors: readonly (readonly number[])[];
   feet: readonly (readonly number[])[];
+  colours: AirframeColours;
+}
+
+export interface AirframeColours {
+  front: string;
+  back: string;
+  plates: string;
+  legs: string;
 }
 
 export const AIRFRAMES: Readonly<Record<string, AirframeShape>> = {
@@ -29,6 +37,7 @@ export const AIRFRAMES: Readonly<Record<string, AirframeShape>> = {
       [-0.028, -0.028, -0.02],
       [0.028, -0.028, -0.02],
     ],
+    colours: { front: "#1f3b2a", back: "#1f3b2a", plates: "#1f3b2a", legs: "#e0e0dc" },
   },
   f450: {
     title: "DJI F450 (OpenUAV)",
@@ -46,6 +55,7 @@ export const AIRFRAMES: Readonly<Record<string, AirframeShape>> = {
       [-0.13, -0.13, -0.12],
       [0.13, -0.13, -0.12],
     ],
+    colours: { front: "#c8201c", back: "#e0e0dc", plates: "#26282b", legs: "#26282b" },
   },
   hummingbird: {
     title: "AscTec Hummingbird (RotorS)",
@@ -63,6 +73,7 @@ export const AIRFRAMES: Readonly<Record<string, AirframeShape>> = {
       [-0.1, -0.1, -0.07],
       [0.1, -0.1, -0.07],
     ],
+    colours: { front: "#e0a020", back: "#26282b", plates: "#26282b", legs: "#4a4f57" },
   },
   iris: {
     title: "3DR Iris (PX4)",
@@ -80,5 +91,14 @@ export const AIRFRAMES: Readonly<Record<string, AirframeShape>> = {
       [-0.12, -0.16, -0.1],
       [0.12, -0.18, -0.1],
     ],
+    colours: { front: "#1c5fa8", back: "#26282b", plates: "#26282b", legs: "#26282b" },
   },
+};
+
+/** Of an airframe without colours. */
+export const USUAL_COLOURS: AirframeColours = {
+  front: "#e0662a",
+  back: "#4a4f57",
+  plates: "#26282b",
+  legs: "#26282b",
 };

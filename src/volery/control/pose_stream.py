@@ -1,0 +1,98 @@
+"""The motion that a stream of poses implies: velocity and rates of an externally moved UAV.
+
+A game engine or a motion capture system sends poses without velocities. Sensors of the UAV measure
+the motion between two poses: their displacement over the time between them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from volery.core import rotations
+from volery.core.arrays import Array
+from volery.core.clock import NS_PER_S
+from volery.vehicle.airframe import Limits
+
+NO_STAMP = -1
+"""Stamp of a pose that has none, ns."""
+NO_DEADLINE = 2**62
+"""Step until which a motion that was commanded with its velocity lasts."""
+_MAX_GAP_S = 1.0
+"""Poses farther apart begin a new stream."""
+_CLOCK_TOLERANCE_NS = NS_PER_S
+"""Stamps within it of the simulated time are taken as simulated time."""
+_SMOOTHING_S = 0.05
+"""Time constant against the jitter of poses whose time is that of their arrival."""
+_MIN_PERIOD_S = 0.02
+"""Shortest period that is assumed of poses whose time is that of their arrival."""
+_TELEPORT_FACTOR = 3.0
+"""Multiple of the airframe's speed and rate limits beyond which a change of pose is a teleport."""
+_MIN_TELEPORT_M_S = 20.0
+_MIN_TELEPORT_RAD_S = math.radians(1000.0)
+_MISSED_POSES = 3.0
+_MIN_PATIENCE_S = 0.1
+"""The UAV stands still when no pose came for this time and for `_MISSED_POSES` periods."""
+STOP_S = 0.1
+"""Time in which the measured motion ends after the last pose of a stream."""
+
+
+def follow_pose(
+    control_state: Any,
+    position: Array,
+    attitude: Array,
+    stamp_ns: int,
+    *,
+    in_stream: bool,
+    step: int,
+    dt: float,
+    limits: Limits,
+) -> None:
+    """Sets velocity and rates of a `CONTROL_STATE` from its last pose and the next one.
+
+    position: (3,) m, map; attitude: (4,), map from body. stamp_ns: time of the pose; it counts if
+    it is simulated time, else the time of arrival does, and the jitter of arrival is smoothed.
+    in_stream: whether the last command was a pose, too. step: of arrival; dt: physics step, s.
+    """
+    now_ns = round(step * dt * NS_PER_S)
+    if stamp_ns < 0 or abs(stamp_ns - now_ns) > _CLOCK_TOLERANCE_NS:
+        stamp_ns = NO_STAMP
+    arrival_s = (step - int(control_state["start_step"])) * dt
+    last_ns = int(control_state["pose_stamp"])
+    stamped = min(stamp_ns, last_ns) >= 0 and stamp_ns > last_ns
+    gap_s = (stamp_ns - last_ns) / NS_PER_S if stamped else arrival_s
+    period_s = max(gap_s, dt if stamped else _MIN_PERIOD_S)
+
+    way = position - control_state["position_target"]
+    turn = rotations.logarithm(
+        rotations.multiply(rotations.conjugate(control_state["attitude"]), attitude)
+    )
+    control_state["start_step"] = step
+    control_state["pose_stamp"] = stamp_ns
+    if not in_stream or gap_s > _MAX_GAP_S or _is_teleport(way, turn, period_s, limits):
+        control_state["velocity_target"] = control_state["rates"] = 0.0
+        control_state["pose_steps"] = 0
+        control_state["deadline_step"] = NO_DEADLINE
+        return
+    if stamped:
+        control_state["velocity_target"] = way / gap_s
+        control_state["rates"] = turn / gap_s
+    else:
+        # A first-order filter, of several poses at one instant as well.
+        share = 1.0 - math.exp(-gap_s / _SMOOTHING_S)
+        a_second = share / gap_s if gap_s > 0.0 else 1.0 / _SMOOTHING_S
+        for name, change in (("velocity_target", way), ("rates", turn)):
+            control_state[name] = (1.0 - share) * control_state[name] + a_second * change
+    control_state["pose_steps"] = max(1, round(period_s / dt))
+    patience_s = max(_MISSED_POSES * period_s, _MIN_PATIENCE_S)
+    control_state["deadline_step"] = step + max(1, round(patience_s / dt))
+
+
+def _is_teleport(way: Array, turn: Array, period_s: float, limits: Limits) -> bool:
+    fastest = max(limits.speed_m_s, limits.climb_m_s, limits.descent_m_s)
+    speed = max(_TELEPORT_FACTOR * fastest, _MIN_TELEPORT_M_S)
+    rate = max(_TELEPORT_FACTOR * math.radians(limits.rate_deg_s), _MIN_TELEPORT_RAD_S)
+    moved, turned = float(np.linalg.norm(way)), float(np.linalg.norm(turn))
+    return moved > speed * period_s or turned > rate * period_s
