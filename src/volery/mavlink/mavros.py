@@ -35,7 +35,7 @@ from volery.graph.messages import (
 from volery.mavlink.autopilot import arming, commands, mode_transitions, offboard
 from volery.mavlink.autopilot.command_protocol import Command
 from volery.mavlink.autopilot.modes import mode_named
-from volery.mavlink.autopilot.setpoints import OffboardSetpoint
+from volery.mavlink.autopilot.setpoints import OffboardSetpoint, from_body, from_heading
 
 if TYPE_CHECKING:
     from volery.graph.nodes.node import Node
@@ -191,8 +191,9 @@ class Mavros:
         def take(message: Any) -> None:
             try:
                 setpoint = read(message)
-            except CommandError:
-                return  # an invalid setpoint has no response
+            except CommandError as error:  # a topic has no response
+                self._context.complain(f"setpoint refused: {error}")
+                return
             offboard.take(self._context, _SOURCE, setpoint)
 
         return take
@@ -209,18 +210,23 @@ class Mavros:
 
     def _raw(self, message: Any) -> OffboardSetpoint:
         mask = int(message.type_mask)
-        if message.coordinate_frame not in (1, 8) or mask & 512:
-            raise CommandError("unsupported setpoint")
+        if message.coordinate_frame not in (1, 8):
+            raise CommandError(f"frame {message.coordinate_frame} is not supported")
         place = self._in_map(message.position) if message.coordinate_frame == 1 else _NOTHING
-        push = message.acceleration_or_force
+        velocity = _masked(_parts(message.velocity), mask >> 3)
+        push = _masked(_parts(message.acceleration_or_force), mask >> 6)
+        if message.coordinate_frame == 8:
+            attitude = self._context.state.attitude
+            velocity, push = from_heading(velocity, attitude), from_body(push, attitude)
+        if mask & 512 and any(map(math.isfinite, push)):
+            raise CommandError("forces are not supported")
         return _checked(
             OffboardSetpoint(
                 _masked(place, mask),
-                _masked(_parts(message.velocity), mask >> 3),
-                _masked(_parts(push), mask >> 6),
+                velocity,
+                push,
                 math.nan if mask & 1024 else message.yaw,
                 math.nan if mask & 2048 else message.yaw_rate,
-                message.coordinate_frame == 8,
             )
         )
 
@@ -284,6 +290,8 @@ def _attitude(message: Any) -> OffboardSetpoint:
         if mask & 7 or not all(map(math.isfinite, rates)):
             raise CommandError("three finite body rates are needed")
         return OffboardSetpoint(rates=rates, thrust=thrust)
+    if not mask & 4 and math.isfinite(message.body_rate.z) and message.body_rate.z != 0.0:
+        raise CommandError("a yaw rate with an attitude is not supported")
     q = message.orientation
     length = math.hypot(q.x, q.y, q.z, q.w)
     if not 0.9 <= length <= 1.1:

@@ -300,7 +300,7 @@ def test_pausing_setting_the_item_and_going_on(flight):
     place = simulation.uavs["uav1"].position_map
     station.seconds(1.0)
     assert simulation.uavs["uav1"].position_map == pytest.approx(place, abs=0.2)
-    assert station.command(224, 7.0) == 2  # no such item
+    assert station.command(224, 7.0) == 4  # no such item: FAILED
     assert station.command(224, 2.0) == ACCEPTED
     assert station.mode(4, 4) == ACCEPTED
     station.seconds(6.0)

@@ -204,7 +204,7 @@ def test_a_second_station_is_not_heard_while_the_first_one_flies(flight):
         (1, 2552, math.nan, math.nan, math.nan),
         (1, 2552, math.inf, 0.0, -4.0),
         (1, 2552, 1e9, 0.0, -4.0),
-        (1, 2552 | 512, 0.0, 0.0, -4.0),
+        (1, 2104 | 512, 0.0, 0.0, -4.0),  # a force
         (1, 4095 & ~512, 0.0, 0.0, -4.0),
         (8, 2552, 1.0, 0.0, -4.0),
         (99, 2552, 0.0, 0.0, -4.0),

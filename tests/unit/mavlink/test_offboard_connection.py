@@ -26,8 +26,8 @@ TARGET = "mavros_msgs/msg/AttitudeTarget"
 
 def test_the_autopilot_reads_velocities_as_they_are_meant():
     twist = Twist(Vector3(1.0, 2.0, 0.5), Vector3(0.0, 0.0, 0.3))
-    setpoint = local_setpoint(velocity_setpoint(twist, (1, 1), 0), (0.0, 0.0, 0.0))
-    assert setpoint.in_heading
+    east = tuple(rotations.from_rpy(0.0, 0.0, 0.0).tolist())
+    setpoint = local_setpoint(velocity_setpoint(twist, (1, 1), 0), (0.0, 0.0, 0.0), east)
     assert setpoint.velocity == pytest.approx((1.0, 2.0, 0.5))
     assert setpoint.yaw_rate == pytest.approx(0.3)
     assert np.isnan(setpoint.position).all()
@@ -38,11 +38,11 @@ def test_the_autopilot_reads_attitudes_and_rates_as_they_are_meant():
     target = zero_message(TARGET)
     q = rotations.from_rpy(0.2, -0.1, 1.3)
     target.orientation, target.thrust, target.type_mask = Quaternion(*q.tolist()), 0.4, 7
-    setpoint = autopilot_attitude(attitude_setpoint(target, (1, 1), 0))
+    setpoint = autopilot_attitude(attitude_setpoint(target, (1, 1), 0), (0.0, 0.0, 0.0))
     assert abs(np.dot(setpoint.attitude, q)) == pytest.approx(1.0)
     assert setpoint.thrust == pytest.approx(0.4)
     target.type_mask, target.body_rate = 128, Vector3(0.1, 0.2, 0.3)
-    setpoint = autopilot_attitude(attitude_setpoint(target, (1, 1), 0))
+    setpoint = autopilot_attitude(attitude_setpoint(target, (1, 1), 0), (0.0, 0.0, 0.0))
     assert setpoint.attitude is None
     assert setpoint.rates == pytest.approx((0.1, 0.2, 0.3))
 

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from volery.autonomy.avoidance.stop import Stop
 from volery.autonomy.perception.list_parameters import declare_numbers
 from volery.autonomy.perception.scan_points import OdometrySample
 from volery.core.arrays import Array
@@ -31,7 +32,9 @@ class DepthCoursePhase(StrEnum):
 
 
 class DepthCourse(SavedAttributes, Node):
-    """Takes off, flies `distance_m` ahead at a height, lands, with a depth camera and odometry.
+    """Takes off, flies `distance_m` ahead at a height, stops and lands.
+
+    It uses a depth camera and odometry.
 
     Parameters
     ----------
@@ -43,7 +46,9 @@ class DepthCourse(SavedAttributes, Node):
 
     """
 
-    STATE: ClassVar[tuple[str, ...]] = ("phase", "pose", "_home", "_course", "_image_ns", "_info")
+    STATE: ClassVar[tuple[str, ...]] = (
+        *("phase", "pose", "_home", "_course", "_image_ns", "_info", "_stop"),
+    )
 
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
@@ -63,6 +68,7 @@ class DepthCourse(SavedAttributes, Node):
         self.pose: OdometrySample | None = None
         self._home = np.zeros(3)
         self._course = 0.0
+        self._stop = Stop()
         self._image_ns: int | None = None
         self._info: CameraInfo | None = None
 
@@ -153,11 +159,13 @@ class DepthCourse(SavedAttributes, Node):
 
     def _fly(self, pose: OdometrySample) -> None:
         if float(self.to_goal(pose) @ self._ahead) < 0.0:
-            if self._land.call().success:
-                self.phase = DepthCoursePhase.LAND
+            self._stop.begin(self.now_ns)
+        if self._stop.is_over(pose, self.now_ns) and self._land.call().success:
+            self.phase = DepthCoursePhase.LAND
             return
         sees = self._image_ns is not None and self.now_ns - self._image_ns < _BLIND_AFTER_S * 1e9
-        velocity, yaw_rate = self.steer(pose) if sees else (np.zeros(2), 0.0)
+        flies_on = sees and not self._stop.has_begun
+        velocity, yaw_rate = self.steer(pose) if flies_on else (np.zeros(2), 0.0)
         climb = 1.2 * (self._home[2] + self._height - float(pose.position[2]))
         c, s = math.cos(pose.yaw), math.sin(pose.yaw)
         forward, left = c * velocity[0] + s * velocity[1], c * velocity[1] - s * velocity[0]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from volery.autonomy.avoidance.gap_flight import GapFlight
+from volery.autonomy.avoidance.stop import Stop
 from volery.autonomy.perception.list_parameters import declare_points
 from volery.autonomy.perception.scan_points import OdometrySample
 from volery.core.arrays import Array
@@ -16,6 +17,12 @@ from volery.graph.messages import String
 
 _PERIOD_S = 0.05
 _LEAST_CLIMB_M = 1.0
+_AT_PLACE_M = 0.6
+"""Distance from its landing position within which the UAV stops."""
+_CLEAR_M, _WANTED_CLEAR_M = 1.0, 1.2
+"""Distance from growth at which the UAV lands, and with which a position is chosen."""
+_MOST_PLACES = 4
+"""Positions that the UAV tries before it lands where it is (modelling choice)."""
 
 
 class GapFollowingPhase(StrEnum):
@@ -39,7 +46,10 @@ class GapFollowing(GapFlight):
 
     """
 
-    STATE = ("_phase", "_home", "_next_waypoint", "_settle_at", *GapFlight.STATE)
+    STATE = (
+        *("_phase", "_home", "_next_waypoint", "_settle_at", "_stop", "_places"),
+        *GapFlight.STATE,
+    )
 
     def __init__(self, **options: Any) -> None:
         super().__init__("gap_following", **options)
@@ -49,6 +59,9 @@ class GapFollowing(GapFlight):
         self._home = np.zeros(3)
         self._next_waypoint = 0
         self._settle_at: Array | None = None
+        self._stop = Stop()
+        self._places = 0
+        """Landing positions chosen so far."""
         self._status = self.create_publisher(String, "~/phase", 1)
         self._take_off = self.create_client("std_srvs/srv/Trigger", "take_off")
         self._land = self.create_client("std_srvs/srv/Trigger", "land")
@@ -96,30 +109,44 @@ class GapFollowing(GapFlight):
         self._go_towards(pose, to_goal)
 
     def _settle(self, pose: OdometrySample) -> None:
-        """Flies to a position without low growth, then lands there."""
+        """Flies to a position without low growth, stops, and lands if there is none below it."""
         self._refit_ground(pose)
         assert self._settle_at is not None
+        now = self.get_clock().now_ns()
         to_place = self._settle_at - pose.position[:2]
         distance = float(np.hypot(*to_place))
-        if distance < 0.6 or self._steering.is_stuck(distance, self.get_clock().now_ns()):
-            if self._land.call().success:
-                self._phase = GapFollowingPhase.LAND
+        if distance < _AT_PLACE_M or self._steering.is_stuck(distance, now):
+            self._stop.begin(now)
+        if not self._stop.has_begun:
+            self._go_towards(pose, to_place)
             return
-        self._go_towards(pose, to_place)
+        self._publish(pose, np.zeros(2), 0.0)
+        if not self._stop.is_over(pose, now):
+            return
+        if self._clearance(pose, np.zeros(2)) < _CLEAR_M and self._places < _MOST_PLACES:
+            self._settle_at = self._landing_place(pose)
+            self._steering.begin_leg(now)
+            self._stop = Stop()
+        elif self._land.call().success:
+            self._phase = GapFollowingPhase.LAND
 
     def _wait(self, pose: OdometrySample) -> None:
         """Does nothing: the flight mode lands the UAV."""
 
     def _landing_place(self, pose: OdometrySample) -> Array:
-        """Returns the nearest position (2,) m within 8 m without growth within 1 m."""
-        now = self.get_clock().now_ns()
-        growth = self._low_obstacles.around(pose.position[:2], now, 10.0)
+        """Returns the nearest position (2,) m within 8 m without growth within 1.2 m."""
+        self._places += 1
         best, best_cost = np.zeros(2), math.inf
         for radius in np.arange(0.0, 8.1, 1.0):
             for angle in np.arange(0.0, 2.0 * math.pi, math.pi / 8.0):
                 place = radius * np.array([math.cos(angle), math.sin(angle)])
-                gap = float(np.hypot(*(growth - place).T).min()) if len(growth) else math.inf
-                cost = float(radius) + 20.0 * max(0.0, 1.2 - gap)
+                gap = self._clearance(pose, place)
+                cost = float(radius) + 20.0 * max(0.0, _WANTED_CLEAR_M - gap)
                 if cost < best_cost:
                     best, best_cost = place, cost
         return np.asarray(pose.position[:2] + best)
+
+    def _clearance(self, pose: OdometrySample, place: Array) -> float:
+        """Returns the distance from growth, m, of a position (2,) m from the UAV."""
+        growth = self._low_obstacles.around(pose.position[:2], self.get_clock().now_ns(), 10.0)
+        return float(np.hypot(*(growth - place).T).min()) if len(growth) else math.inf

@@ -14,6 +14,8 @@ _PROGRESS_M = 0.2
 """Decrease of the distance that counts as progress. Modelling choice."""
 _CLIMBED_M, _STILL_M_S = 0.5, 0.2
 """Min rise and max climb rate at the end of a take-off. Modelling choice."""
+_STOPPED_M_S, _STOP_NS = 0.3, 3_000_000_000
+"""Max speed over ground of a UAV that has stopped, and how long it is given. Modelling choice."""
 
 
 class CoveragePhase(StrEnum):
@@ -37,6 +39,7 @@ class CoverageFlight:
     phase: CoveragePhase = CoveragePhase.GROUND
     position_map: Array | None = None
     climb_m_s: float = 0.0
+    speed_m_s: float = 0.0
     received_ns: int = 0
     home_map: Array | None = None
     waypoints: WaypointProgress | None = None
@@ -48,9 +51,12 @@ class CoverageFlight:
     """Min distance to it so far, and since when it has not decreased."""
     since_ns: int = 0
 
-    def moved(self, position_map: Array, climb_m_s: float, now_ns: int) -> None:
-        """Stores the current position."""
+    def moved(
+        self, position_map: Array, climb_m_s: float, now_ns: int, speed_m_s: float = 0.0
+    ) -> None:
+        """Stores the current position, climb rate and speed over ground."""
         self.position_map, self.climb_m_s, self.received_ns = position_map, climb_m_s, now_ns
+        self.speed_m_s = speed_m_s
         if self.home_map is None:
             self.home_map = position_map.copy()
 
@@ -71,6 +77,10 @@ class CoverageFlight:
     def is_level(self) -> bool:
         """Whether it neither climbs nor descends noticeably."""
         return abs(self.climb_m_s) < _STILL_M_S
+
+    def has_stopped(self, now_ns: int) -> bool:
+        """Returns whether it has stopped at its last goal, or cannot in gusts."""
+        return self.speed_m_s < _STOPPED_M_S or now_ns - self.since_ns > _STOP_NS
 
     @property
     def covers(self) -> bool:

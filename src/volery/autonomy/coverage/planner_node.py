@@ -109,10 +109,11 @@ class CoveragePlanner(SavedAttributes, Node):
             pose, twist = message.pose.pose, message.twist.twist.linear
             turn = pose.orientation
             q = np.array([turn.x, turn.y, turn.z, turn.w])
-            climb = float(rotations.rotate(q, [twist.x, twist.y, twist.z])[2])
+            velocity = rotations.rotate(q, [twist.x, twist.y, twist.z])
+            climb, speed = float(velocity[2]), float(np.hypot(*velocity[:2]))
             place = np.array([pose.position.x, pose.position.y, pose.position.z])
             flight = self._flights[number]
-            flight.moved(place, climb, self.get_clock().now_ns())
+            flight.moved(place, climb, self.get_clock().now_ns(), speed)
             if flight.covers:
                 self._mark(place)
 
@@ -239,9 +240,10 @@ class CoveragePlanner(SavedAttributes, Node):
         elif flight.phase is CoveragePhase.COVER:
             goal = flight.goal(self._acceptance_radius_m, now)
             if goal is None:
-                flight.phase = CoveragePhase.DONE
-                self._land[number].call_async()
-                self._publish_status()
+                if flight.has_stopped(now):  # at its last goal, to which it still flies
+                    flight.phase = CoveragePhase.DONE
+                    self._land[number].call_async()
+                    self._publish_status()
             elif flight.following != flight.published or self._ticks % _REPEAT == 0:
                 flight.published = flight.following
                 self._goals[number].publish(messages.goal_message(goal, now))

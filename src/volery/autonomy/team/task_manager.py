@@ -54,6 +54,8 @@ _RETURN_TIMEOUT_S = 60.0
 _LOST_TIMEOUT_S = 30.0
 """Duration without a position after which the UAV lands."""
 _HOME_M, _NEARER_M = 1.5, 1.0
+_STOPPED_M_S = 0.3
+"""Speed over ground below which a UAV over home has stopped, and may land."""
 _LANDED_M, _SUNK_M = 0.3, 0.25
 _NEVER_NS = -1 << 62
 HELD, LANDED = "held by the operator", "landed by the operator"
@@ -412,7 +414,8 @@ class TaskManager(SavedAttributes, Node):
         if distance < self._nearest_m - _NEARER_M:
             self._nearest_m, self.member.progress_ns = distance, now
         timeout_ns = _RETURN_TIMEOUT_S * NS_PER_S
-        if distance < _HOME_M or now - self.member.progress_ns > timeout_ns:
+        hovers = distance < _HOME_M and norm(pose.velocity[:2]) < _STOPPED_M_S
+        if hovers or now - self.member.progress_ns > timeout_ns:
             self._enter(MissionPhase.LAND)
 
     def _sink(self, pose: OdometrySample, _now: int) -> None:

@@ -9,7 +9,8 @@ from volery.mavlink.codec import Codec
 
 MOST_LINKS = 64
 """Links of one vehicle; frames of further links are ignored (modelling choice)."""
-_ALL_LINKS = 65535
+ALL_LINKS = 65535
+"""Stands for all open links."""
 
 
 @dataclass
@@ -36,10 +37,10 @@ class ClientLinks:
         self._codec = Codec(system)
         self._sent: list[tuple[int, bytes]] = []
 
-    def send(self, message: Any, link: int = _ALL_LINKS) -> None:
+    def send(self, message: Any, link: int = ALL_LINKS) -> None:
         """Sends a message on one link, or on all links."""
         links = self.open
-        chosen = links.values() if link == _ALL_LINKS else filter(None, [links.get(link)])
+        chosen = links.values() if link == ALL_LINKS else filter(None, [links.get(link)])
         for one in chosen:
             self._sent.append((one.number, self._codec.pack(message, one.sequence)))
             one.sequence = (one.sequence + 1) % 256

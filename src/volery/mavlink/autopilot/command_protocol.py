@@ -9,6 +9,7 @@ from volery.mavlink.autopilot.state import Source
 from volery.mavlink.codec import dialect
 
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
+UNSUPPORTED_FRAME = 9
 """Values of MAV_RESULT."""
 
 

@@ -25,12 +25,13 @@ from volery.mavlink.autopilot.command_protocol import (
     FAILED,
     TEMPORARILY_REJECTED,
     UNSUPPORTED,
+    UNSUPPORTED_FRAME,
     Command,
     acknowledge,
 )
 from volery.mavlink.autopilot.context import AutopilotContext
 from volery.mavlink.autopilot.geofence import breach
-from volery.mavlink.autopilot.modes import Mode, mode_of
+from volery.mavlink.autopilot.modes import Mode, mode_of, mode_of_flags
 from volery.mavlink.autopilot.state import Source
 
 DO_SET_MODE = 176
@@ -38,7 +39,12 @@ _FENCE_TELLS = (0, 1)
 """GF_ACTION values of fences that do not restrict flight."""
 _CHANGE_MODE = 1
 """Flag of MAV_DO_REPOSITION_FLAGS."""
-_ABOVE_HOME = (3, 6, 10, 11)
+_ABOVE_HOME = (3, 6)
+_GLOBAL_FRAMES = (0, 5, *_ABOVE_HOME)
+_LEVEL_SPEEDS = (0, 1)
+"""SPEED_TYPE: air and ground speed, one as the other, as in PX4."""
+_FARTHEST_TAKE_OFF_M = 10_000.0
+"""Distance to which a take-off leads at most (modelling choice)."""
 
 
 def take(context: AutopilotContext, source: Source, command: Command) -> None:
@@ -53,6 +59,9 @@ def do(context: AutopilotContext, source: Source, command: Command) -> int:
         return UNSUPPORTED
     if context.memory.state is None:
         return TEMPORARILY_REJECTED
+    if command.number in _PLACED and not _frame_is_known(command):
+        context.say(4, f"Command {command.number}: frame {command.frame} is not supported")
+        return UNSUPPORTED_FRAME
     try:
         return handler(context, source, command)
     except CommandError as error:
@@ -60,10 +69,17 @@ def do(context: AutopilotContext, source: Source, command: Command) -> int:
         return TEMPORARILY_REJECTED
 
 
+def _frame_is_known(command: Command) -> bool:
+    """Returns whether a position of a COMMAND_INT is in a frame that is known, if there is one."""
+    somewhere = any(math.isfinite(part) for part in command.params[4:7])
+    return command.frame is None or command.frame in _GLOBAL_FRAMES or not somewhere
+
+
 def _arm(context: AutopilotContext, _source: Source, command: Command) -> int:
-    wanted, force = command.params[0], command.params[1]
-    forced = round(force) == 21196 if math.isfinite(force) else False  # PX4's magic number
-    if wanted not in (0.0, 1.0):
+    forced = _whole(command.params[1]) == 21196  # PX4's magic number
+    wanted = _whole(command.params[0])
+    if wanted not in (0, 1):
+        context.say(2, f"Unsupported ARM_DISARM param: {command.params[0]:.3f}")
         return DENIED
     why = arming.arm(context) if wanted else arming.disarm(context, forced=forced)
     if why:
@@ -72,32 +88,41 @@ def _arm(context: AutopilotContext, _source: Source, command: Command) -> int:
 
 
 def _take_off(context: AutopilotContext, _source: Source, command: Command) -> int:
-    altitude = command.params[6]
+    *_, latitude, longitude, altitude = command.params
     if math.isinf(altitude):
         return DENIED
-    height = math.nan
+    height, place = math.nan, None
     if math.isfinite(altitude):
         height = _height_in_map(context, altitude, command.frame) - context.state.position[2]
         if height <= 0.0:
             context.say(4, "Take-off altitude is below the vehicle")
             return DENIED
-    context.memory.take_off_height = height
+    if math.isfinite(latitude) and math.isfinite(longitude):
+        place = _place_in_map(context, latitude, longitude)
+        if place is None or math.dist(place, context.state.position[:2]) > _FARTHEST_TAKE_OFF_M:
+            context.say(4, "Take-off position is too far away; nan: above the vehicle")
+            return DENIED
+    context.memory.take_off_height, context.memory.take_off_place = height, place
     return _switch(context, Mode.TAKE_OFF)
 
 
 def _land(context: AutopilotContext, _source: Source, _command: Command) -> int:
-    return _switch(context, Mode.LAND)
+    result = _switch(context, Mode.LAND)
+    if result == ACCEPTED:
+        context.say(6, "Landing at current position")
+    return result
 
 
 def _return(context: AutopilotContext, _source: Source, _command: Command) -> int:
-    return _switch(context, Mode.RETURN)
+    result = _switch(context, Mode.RETURN)
+    if result == ACCEPTED:
+        context.say(6, "Returning to launch")
+    return result
 
 
 def _set_mode(context: AutopilotContext, _source: Source, command: Command) -> int:
-    base, main, sub = command.params[:3]
-    if not (math.isfinite(base) and int(base) & 1 and math.isfinite(main)):
-        return DENIED  # PX4's modes are custom modes
-    mode = mode_of(int(main), int(sub) if math.isfinite(sub) else 0)
+    base, main, sub = (_whole(part) for part in command.params[:3])
+    mode = mode_of(main, sub) if base & 1 else mode_of_flags(base)
     if mode is None:
         context.say(4, "This flight mode is not offered")
         return UNSUPPORTED
@@ -119,16 +144,20 @@ def _reposition(context: AutopilotContext, _source: Source, command: Command) ->
     speed, flags, _, yaw, latitude, longitude, altitude = command.params
     if any(math.isinf(param) for param in command.params):
         return DENIED
-    changes_mode = math.isfinite(flags) and bool(int(flags) & _CHANGE_MODE)
+    if _whole(flags) & ~_CHANGE_MODE:
+        context.say(4, "Reposition with a relative yaw is not supported")
+        return UNSUPPORTED
+    changes_mode = bool(_whole(flags) & _CHANGE_MODE)
     if not mode_transitions.flies(context) or not (
         changes_mode or context.memory.mode is Mode.HOLD
     ):
         return DENIED
     x, y, z = context.state.position
     if math.isfinite(latitude) and math.isfinite(longitude):
-        if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
+        place = _place_in_map(context, latitude, longitude)
+        if place is None:
             return DENIED
-        x, y, _ = context.earth.place(latitude, longitude, context.build.origin[2])
+        x, y = place
     if math.isfinite(altitude):
         z = _height_in_map(context, altitude, command.frame)
     if int(context.parameter("GF_ACTION")) not in _FENCE_TELLS and breach(context, (x, y, z)):
@@ -146,16 +175,26 @@ def _reposition(context: AutopilotContext, _source: Source, command: Command) ->
 def _orbit(context: AutopilotContext, source: Source, command: Command) -> int:
     # Above sea level in any frame, as in PX4: MAVSDK sends it as relative.
     height = _height_in_map(context, command.params[6], None)
+    if math.isfinite(command.params[3]) and command.params[3] != 0.0:
+        context.say(4, "An orbit lasts until the mode changes: a number of turns is not supported")
+        return DENIED
     result = orbit.prepare(context, source, command, height)
     return _switch(context, Mode.ORBIT) if result == ACCEPTED else result
 
 
 def _change_speed(context: AutopilotContext, _source: Source, command: Command) -> int:
-    speed = command.params[1]
-    if speed in (-1.0, -2.0):  # the default speed
-        speed = math.nan
-    elif not (math.isfinite(speed) and speed > 0.0):
+    """Handles DO_CHANGE_SPEED: without a positive speed the default one, as in PX4."""
+    kind, speed, throttle = command.params[:3]
+    if math.isinf(speed):
         return DENIED
+    if _whole(kind) not in _LEVEL_SPEEDS:
+        context.say(4, "Speeds of climb and descent are set by MPC_Z_V_AUTO_UP and _DN")
+        return DENIED
+    if not speed > 0.0:
+        if throttle > 0.0:
+            context.say(4, "A multicopter has no cruise throttle")
+            return DENIED
+        speed = math.nan
     if context.memory.mode is Mode.MISSION:
         context.memory.mission.speed = speed
     context.memory.cruise = speed
@@ -165,15 +204,15 @@ def _change_speed(context: AutopilotContext, _source: Source, command: Command) 
 
 
 def _set_home(context: AutopilotContext, _source: Source, command: Command) -> int:
-    latitude, longitude, altitude = command.params[4:7]
+    yaw, latitude, longitude, altitude = command.params[3:7]
     if command.params[0] > 0.5:
         home.set_here(context)
         return ACCEPTED
     if not all(map(math.isfinite, (latitude, longitude, altitude))):
         return DENIED
-    why = home.choose(
-        context, latitude, longitude, _height_in_map(context, altitude, command.frame)
-    )
+    height = _height_in_map(context, altitude, command.frame)
+    facing = 0.5 * math.pi - math.radians(yaw) if math.isfinite(yaw) else math.nan
+    why = home.choose(context, latitude, longitude, height, facing)
     if why:
         context.say(4, why)
     return DENIED if why else ACCEPTED
@@ -192,6 +231,9 @@ def _start_mission(context: AutopilotContext, _source: Source, command: Command)
         first = 0.0 if mission.complete else mission.current
     if mission.complete or int(first) != mission.current:
         mission_protocol.jump_to(context, int(first))
+    last = command.params[1]
+    if math.isfinite(last) and 0.0 < last < len(context.memory.plans[plans.MISSION]) - 1:
+        context.say(4, f"The mission flies to its end, not to item {last:.0f}")
     result = _switch(context, Mode.MISSION)
     if result == ACCEPTED and not context.memory.armed:
         why = arming.arm(context)
@@ -202,13 +244,19 @@ def _start_mission(context: AutopilotContext, _source: Source, command: Command)
 
 
 def _jump(context: AutopilotContext, _source: Source, command: Command) -> int:
-    number = command.params[0]
-    there = math.isfinite(number) and mission_protocol.jump_to(context, int(number))
-    return ACCEPTED if there else DENIED
+    """Handles DO_SET_MISSION_CURRENT; -1: the current item, with param2 to reset the mission."""
+    number, resets = command.params[:2]
+    if not (math.isfinite(number) and number >= -1.0 and (math.isnan(resets) or resets in (0, 1))):
+        return DENIED
+    sequence = int(number) if number >= 0.0 else context.memory.mission.current
+    there = mission_protocol.jump_to(context, sequence, resets=resets == 1.0)
+    return ACCEPTED if there else FAILED
 
 
 def _pause(context: AutopilotContext, _source: Source, command: Command) -> int:
-    return _switch(context, Mode.MISSION if command.params[0] == 1.0 else Mode.HOLD)
+    """Handles DO_PAUSE_CONTINUE: 0 holds, 1 continues the mission."""
+    mode = {0.0: Mode.HOLD, 1.0: Mode.MISSION}.get(command.params[0])
+    return DENIED if mode is None else _switch(context, mode)
 
 
 def _check(context: AutopilotContext, _source: Source, _command: Command) -> int:
@@ -220,15 +268,32 @@ def _check(context: AutopilotContext, _source: Source, _command: Command) -> int
 
 def _terminate(context: AutopilotContext, _source: Source, command: Command) -> int:
     """Handles DO_FLIGHTTERMINATION: stops the rotors permanently."""
-    if not command.params[0] > 0.5:
-        return ACCEPTED
+    if not (command.params[0] > 0.5 and context.memory.armed):
+        return DENIED
     why = arming.disarm(context, forced=True)
     return FAILED if why else ACCEPTED
 
 
-def _reboot(context: AutopilotContext, _source: Source, _command: Command) -> int:
-    """Handles a reboot, which is not supported; `/reset_uav` resets the UAV."""
+def _reboot(context: AutopilotContext, _source: Source, command: Command) -> int:
+    """Handles a reboot, which is not supported; `/reset_uav` resets the UAV. 0: do nothing."""
+    if _whole(command.params[0]) == 0:
+        return ACCEPTED
     return DENIED if context.memory.armed else UNSUPPORTED
+
+
+def _whole(param: float) -> int:
+    """Returns a parameter that holds a whole number; 0 if it is not given."""
+    return round(param) if math.isfinite(param) else 0
+
+
+def _place_in_map(
+    context: AutopilotContext, latitude: float, longitude: float
+) -> tuple[float, float] | None:
+    """Returns x and y in the map, m; None for degrees that are not on the earth."""
+    if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
+        return None
+    x, y, _ = context.earth.place(latitude, longitude, context.build.origin[2])
+    return x, y
 
 
 def _height_in_map(context: AutopilotContext, altitude: float, frame: int | None) -> float:
@@ -263,3 +328,5 @@ _HANDLERS: dict[int, Callable[[AutopilotContext, Source, Command], int]] = {
     **dict.fromkeys(requests.RETIRED, requests.send_as_of_old),
 }
 """Handlers by MAV_CMD."""
+_PLACED = (plans.TAKE_OFF, orbit.DO_ORBIT, plans.SET_HOME, 192)
+"""Commands with a position."""

@@ -13,6 +13,9 @@ from volery.mavlink.autopilot.state import AutopilotState
 from volery.mavlink.autopilot.status_messages import heartbeat, status_texts
 from volery.mavlink.autopilot.vehicle import FlightState, Vector, Vehicle, VehicleInfo
 
+_COMPLAINT_NS = 1_000_000_000
+"""Time between two equal complaints (modelling choice): setpoints arrive fifty times a second."""
+
 
 class AutopilotContext:
     """Holds the state of one autopilot, commands its UAV and sends to its clients."""
@@ -37,8 +40,19 @@ class AutopilotContext:
     def say(self, severity: int, text: str) -> None:
         """Sends a status text to all links and logs it. severity: a MAV_SEVERITY."""
         self.log.note(self.memory.now_ns, severity, text)
-        for message in status_texts(severity, text):
+        self.memory.text_number = self.memory.text_number % 65535 + 1
+        for message in status_texts(severity, text, self.memory.text_number):
             self.links.send(message)
+
+    def complain(self, text: str) -> None:
+        """Says why a message without an answer is refused, each text once a second at most."""
+        said, now_ns = self.memory.complaints, self.memory.now_ns
+        if now_ns - said.get(text, -_COMPLAINT_NS) < _COMPLAINT_NS:
+            return
+        for old in [one for one, time_ns in said.items() if now_ns - time_ns >= _COMPLAINT_NS]:
+            del said[old]
+        said[text] = now_ns
+        self.say(2, text)
 
     def announce(self) -> None:
         """Reports a change of mode at once."""

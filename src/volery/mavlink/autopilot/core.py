@@ -20,6 +20,7 @@ from volery.mavlink.autopilot import (
     flight_tasks,
     message_handlers,
     mode_transitions,
+    requests,
     streams,
 )
 from volery.mavlink.autopilot.client_links import MOST_LINKS, LinkState
@@ -31,6 +32,10 @@ from volery.mavlink.autopilot.state import Source
 from volery.mavlink.autopilot.vehicle import FlightState, Vehicle, VehicleInfo
 from volery.mavlink.codec import AUTOPILOT, Parser
 from volery.mavlink.framing import Framer
+
+_COMMANDS, _FOR_ONE = ("COMMAND_LONG", "COMMAND_INT"), ("COMMAND_", "MISSION_", "PARAM_")
+_PLANNER = 190
+"""Component MAV_COMP_ID_MISSIONPLANNER, to which plans may be sent."""
 
 
 class Autopilot:
@@ -104,6 +109,17 @@ class Autopilot:
             return  # the request was answered before; a refused setpoint is not flown
 
     def _is_meant(self, message: Any) -> bool:
+        """Returns whether a message is for this vehicle.
+
+        As in PX4, commands, plans and parameters name the vehicle; the others may be for all.
+        """
+        kind = message.get_type()
         system = getattr(message, "target_system", 0)
         component = getattr(message, "target_component", 0)
-        return system in (0, self.context.system) and component in (0, AUTOPILOT)
+        if kind in _COMMANDS and message.command in requests.FOR_ALL:
+            return system in (0, self.context.system)
+        if system == 0 and kind.startswith(_FOR_ONE):
+            self.context.complain(f"{kind} to system 0 ignored: this one is {self.context.system}")
+            return False
+        planner = _PLANNER if kind.startswith("MISSION_") else AUTOPILOT
+        return system in (0, self.context.system) and component in (0, AUTOPILOT, planner)

@@ -22,6 +22,9 @@ from volery.mavlink.autopilot.setpoints import OffboardSetpoint
 from volery.mavlink.autopilot.state import MissionLeg
 from volery.mavlink.autopilot.vehicle import FlightState
 
+_ASIDE_M = 1.0
+"""Distance from which a take-off ends at a position of its own (modelling choice)."""
+
 
 def fly(context: AutopilotContext, state: FlightState) -> None:
     """Runs the current mode, except while disarmed or while another client controls the UAV."""
@@ -40,6 +43,11 @@ def _take_off(context: AutopilotContext, state: FlightState) -> None:
             mode_transitions.rise(context)
         return
     there = state.mode == "HOLD" if memory.leg is None else fly_leg(context, memory.leg)
+    goal = memory.take_off_goal
+    aside = goal is not None and math.dist(goal[:2], state.position[:2]) > _ASIDE_M
+    if there and memory.leg is None and goal is not None and aside:
+        mode_transitions.go_to(context, goal, None)  # it climbs before it goes there
+        return
     if there:
         wants_mission = context.parameter("COM_TAKEOFF_ACT") == 1
         goes_on = wants_mission and not mode_transitions.obstacle_to(context, Mode.MISSION)

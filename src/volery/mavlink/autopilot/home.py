@@ -18,6 +18,7 @@ none)."""
 def set_here(context: AutopilotContext) -> None:
     """Sets home to the UAV's position."""
     context.memory.home, context.memory.chosen_home = context.state.position, None
+    context.memory.home_yaw = math.nan
     context.links.send(position_message(context))
 
 
@@ -27,8 +28,10 @@ def set_on_arming(context: AutopilotContext) -> None:
         set_here(context)
 
 
-def choose(context: AutopilotContext, latitude: float, longitude: float, z: float) -> str:
-    """Sets home to a position in degrees and a height in the map, m.
+def choose(
+    context: AutopilotContext, latitude: float, longitude: float, z: float, yaw: float = math.nan
+) -> str:
+    """Sets home to a position in degrees, a height in the map, m, and a yaw, rad, map; nan: free.
 
     Returns why not, empty if home is set.
     """
@@ -40,6 +43,7 @@ def choose(context: AutopilotContext, latitude: float, longitude: float, z: floa
         return "Home is too far away"
     context.memory.home = (place[0], place[1], z)
     context.memory.chosen_home = (latitude, longitude, z + origin[2])
+    context.memory.home_yaw = yaw
     context.links.send(position_message(context))
     return ""
 
@@ -54,7 +58,15 @@ def position_message(context: AutopilotContext) -> Any:
     return dialect().MAVLink_home_position_message(
         *motion.degrees_e7(context.memory.chosen_home or context.earth.geodetic(home)),
         *ned_of_enu(place),
-        (math.nan,) * 4,
+        _heading(context.memory.home_yaw),
         *(math.nan,) * 3,
         motion.us(context),
     )
+
+
+def _heading(yaw: float) -> tuple[float, float, float, float]:
+    """Returns the quaternion w x y z, NED, of a yaw in the map; nan for nan."""
+    if not math.isfinite(yaw):
+        return (math.nan,) * 4
+    half = 0.5 * (0.5 * math.pi - yaw)
+    return math.cos(half), 0.0, 0.0, math.sin(half)

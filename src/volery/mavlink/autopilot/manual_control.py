@@ -25,14 +25,18 @@ _LIFT_M = 1.0
 
 
 def take(context: AutopilotContext, _source: object, message: Any) -> None:
-    """Handles MANUAL_CONTROL; ignores messages with values out of range."""
+    """Handles MANUAL_CONTROL.
+
+    An axis out of range is unused, as INT16_MAX by MAVLink's definition, and centred, as in PX4.
+    """
     if message.target not in (0, context.system):
         return
-    parts = (message.x, message.y, message.z, message.r)
-    if any(abs(part) > 1000 for part in parts):
-        return
-    x, y, z, r = (part / 1000.0 for part in parts)
-    context.memory.sticks = ManualInput(x, y, 2.0 * z - 1.0, r, context.memory.now_ns)
+    forward, right, turn = (
+        part / 1000.0 if -1000 <= part <= 1000 else 0.0
+        for part in (message.x, message.y, message.r)
+    )
+    up = message.z / 500.0 - 1.0 if 0 <= message.z <= 1000 else 0.0
+    context.memory.sticks = ManualInput(forward, right, up, turn, context.memory.now_ns)
 
 
 def fly_position(context: AutopilotContext, state: FlightState) -> None:
@@ -52,7 +56,7 @@ def fly_position(context: AutopilotContext, state: FlightState) -> None:
     )
     c, s = math.cos(context.yaw), math.sin(context.yaw)
     x, y = speed * (c * forward + s * right), speed * (s * forward - c * right)
-    rate = -turn * math.radians(float(context.parameter("MPC_MAN_Y_MAX")))
+    rate = yaw_rate(context)
     context.vehicle.steer((x, y, _climb(context, up)), None, rate)
     mode_transitions.order(context, "steer")
 
@@ -62,7 +66,7 @@ def fly_altitude(context: AutopilotContext, state: FlightState) -> None:
     if not _is_up(context, state):
         return
     memory = context.memory
-    forward, right, up, turn = _alive(memory.sticks)
+    forward, right, up, _ = _alive(memory.sticks)
     if memory.order != "tilt":
         memory.climb_thrust, memory.altitude_target = 0.0, state.position[2]
     if up != 0.0:
@@ -80,10 +84,16 @@ def fly_altitude(context: AutopilotContext, state: FlightState) -> None:
     roll, pitch = right * most, forward * most
     lean = math.cos(roll) * math.cos(pitch)
     thrust = context.build.hover_thrust * (1.0 + push / _GRAVITY) / max(lean, 0.3)
-    rate = -turn * math.radians(float(context.parameter("MPC_MAN_Y_MAX")))
+    rate = yaw_rate(context)
     x, y, z, w = from_rpy(roll, pitch, context.yaw + 0.2 * rate).tolist()
     context.vehicle.tilt((x, y, z, w), min(max(thrust, 0.05), 1.0))
     mode_transitions.order(context, "tilt")
+
+
+def yaw_rate(context: AutopilotContext) -> float:
+    """Returns the yaw rate that the sticks command, rad/s, map."""
+    turn = _alive(context.memory.sticks)[3]
+    return -turn * math.radians(float(context.parameter("MPC_MAN_Y_MAX")))
 
 
 def _is_up(context: AutopilotContext, state: FlightState) -> bool:

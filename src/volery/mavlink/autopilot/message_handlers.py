@@ -17,13 +17,15 @@ from volery.mavlink.autopilot import (
     parameter_protocol,
     shell,
 )
-from volery.mavlink.autopilot.command_protocol import Command
+from volery.mavlink.autopilot.command_protocol import DENIED, Command, acknowledge
 from volery.mavlink.autopilot.context import AutopilotContext
 from volery.mavlink.autopilot.state import Source
 from volery.mavlink.codec import dialect
 
 _GROUND_STATION = 6
 """Value MAV_TYPE_GCS."""
+_UNSET, _UNSET_AS_FLOAT, _NAN_AS_INTEGER = 2**31 - 1, 2.0**31, 0x7FF80000
+"""INT32_MAX, also as a float, and the bits of a nan that PX4 recognizes in an integer."""
 
 
 def _heartbeat(context: AutopilotContext, _source: Source, message: Any) -> None:
@@ -45,16 +47,26 @@ def _time_sync(context: AutopilotContext, source: Source, message: Any) -> None:
         context.links.send(answer, source[0])
 
 
+def _deny(context: AutopilotContext, source: Source, message: Any, why: str) -> None:
+    """Denies a command whose position has the other message's value for "unset", as PX4 does."""
+    context.say(4, f"Command {message.command} denied: {why}")
+    acknowledge(context.links, source, message.command, DENIED)
+
+
 def _command_long(context: AutopilotContext, source: Source, message: Any) -> None:
     params = tuple(float(getattr(message, f"param{k}")) for k in range(1, 8))
+    if params[4] == params[5] == _UNSET_AS_FLOAT:
+        _deny(context, source, message, "param5 and param6 are INT32_MAX, not nan")
+        return
     commands.take(context, source, Command(message.command, params, None))
 
 
 def _command_int(context: AutopilotContext, source: Source, message: Any) -> None:
-    x, y = (
-        math.nan if part == 2**31 - 1 or part == -(2**31) else part * 1e-7
-        for part in (message.x, message.y)
-    )
+    if message.x == message.y == _NAN_AS_INTEGER:
+        _deny(context, source, message, "x and y are nan, not INT32_MAX")
+        return
+    unset = message.x == message.y == _UNSET
+    x, y = (math.nan if unset else part * 1e-7 for part in (message.x, message.y))
     params = (message.param1, message.param2, message.param3, message.param4, x, y, message.z)
     commands.take(context, source, Command(message.command, params, int(message.frame)))
 
@@ -69,6 +81,24 @@ def _set_mode(context: AutopilotContext, source: Source, message: Any) -> None:
 def _data_stream(context: AutopilotContext, source: Source, message: Any) -> None:
     """Ignores the old REQUEST_DATA_STREAM, which MAVProxy sends at its start, as PX4 does."""
 
+
+def _refuse(context: AutopilotContext, _source: Source, message: Any) -> None:
+    """Says once that a message which PX4 obeys is not."""
+    kind = message.get_type()
+    if kind not in context.memory.refused_messages:
+        context.memory.refused_messages.add(kind)
+        context.say(4, f"{kind} is not supported and ignored")
+
+
+_REFUSED = (
+    *("ATT_POS_MOCAP", "COMMAND_CANCEL", "DISTANCE_SENSOR"),
+    *("GIMBAL_MANAGER_SET_ATTITUDE", "GIMBAL_MANAGER_SET_MANUAL_CONTROL", "HIL_GPS"),
+    *("HIL_OPTICAL_FLOW", "HIL_SENSOR", "HIL_STATE_QUATERNION", "LANDING_TARGET"),
+    *("OBSTACLE_DISTANCE", "ODOMETRY", "OPTICAL_FLOW_RAD", "PLAY_TUNE", "PLAY_TUNE_V2"),
+    *("RC_CHANNELS_OVERRIDE", "SET_ACTUATOR_CONTROL_TARGET", "SET_GPS_GLOBAL_ORIGIN"),
+    *("VISION_POSITION_ESTIMATE",),
+)
+"""Messages that act on a PX4, and for which there is nothing here."""
 
 HANDLERS: dict[str, Callable[[AutopilotContext, Source, Any], None]] = {
     "HEARTBEAT": _heartbeat,
@@ -101,4 +131,5 @@ HANDLERS: dict[str, Callable[[AutopilotContext, Source, Any], None]] = {
     "LOG_REQUEST_END": log_protocol.end,
     "LOG_ERASE": log_protocol.erase,
     "SERIAL_CONTROL": shell.take,
+    **dict.fromkeys(_REFUSED, _refuse),
 }

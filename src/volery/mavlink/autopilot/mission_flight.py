@@ -15,6 +15,9 @@ from volery.mavlink.codec import dialect
 
 _FACES_RAD = math.radians(5.0)
 """Yaw error below which a heading is reached (modelling choice)."""
+_SHORTEST_RAD, _LED_RAD_S = math.radians(175.0), math.radians(45.0)
+"""Turn from which the heading is led, so that it goes the right way round, and the rate of leading
+(modelling choices)."""
 _LOITER_RADIUS_M = 80.0
 """Radius of items without one: the default of PX4's NAV_LOITER_RAD."""
 _FACING = plans.PLACED - {plans.LAND, plans.TAKE_OFF}
@@ -27,7 +30,7 @@ def fly(context: AutopilotContext, state: FlightState) -> None:
     """Continues the mission; at its end the UAV holds its position."""
     memory = context.memory
     mission, items = memory.mission, memory.plans[plans.MISSION]
-    if mission.complete or not items:
+    if mission.complete or mission.stays or not items:
         if memory.leg is not None and state.mode != "LANDED":
             fly_leg(context, memory.leg)
         return
@@ -38,6 +41,8 @@ def fly(context: AutopilotContext, state: FlightState) -> None:
         if not _do(context, mission, items[mission.current], state):
             return
         _reach(context, mission)
+        if memory.mission.stays:
+            return
 
 
 def _face_interest(context: AutopilotContext, mission: Mission, item: plans.MissionItem) -> None:
@@ -56,6 +61,10 @@ def _reach(context: AutopilotContext, mission: Mission) -> None:
     mission.reached = mission.current
     context.links.send(dialect().MAVLink_mission_item_reached_message(mission.current))
     items = context.memory.plans[plans.MISSION]
+    item = items[mission.current]
+    mission.stays = not item.goes_on and item.command != plans.JUMP
+    if mission.stays:  # until a client chooses another item
+        return
     _advance(mission, items)
     if mission.complete:
         mission.speed = math.nan
@@ -123,8 +132,9 @@ def _do_on_ground(
 
 def _set(context: AutopilotContext, mission: Mission, item: plans.MissionItem) -> bool:
     """Executes an item that takes no time."""
-    if item.command == plans.CHANGE_SPEED and item.params[1] > 0.0:
-        mission.speed = item.params[1]
+    if item.command == plans.CHANGE_SPEED:
+        speed = item.params[1]
+        mission.speed = speed if speed > 0.0 else math.nan
     elif item.command in payload_items.INTEREST:
         somewhere = payload_items.is_place_of_interest(item.command)
         mission.interest = item_position(context, item) if somewhere else None
@@ -142,21 +152,25 @@ def _set(context: AutopilotContext, mission: Mission, item: plans.MissionItem) -
 def _take_off(
     context: AutopilotContext, mission: Mission, item: plans.MissionItem, state: FlightState
 ) -> bool:
+    """Handles a take-off: climbs, then flies to the item's position, if it has one, as PX4 does."""
     memory = context.memory
-    _, _, z = item_position(context, item)
+    position = item_position(context, item)
+    z = position[2]
     if state.mode == "LANDED":
         if memory.order != "take_off":
             memory.take_off_height = max(z - state.position[2], 0.5)
             mode_transitions.rise(context)
         return False
+    x, y = position[:2] if item.placed else state.position[:2]
     if memory.order == "take_off":
-        return state.mode == "HOLD" or _near_height(context, z)
-    if not mission.entered:
+        aside = math.dist((x, y), state.position[:2]) > float(context.parameter("NAV_ACC_RAD"))
+        if not aside:
+            return state.mode == "HOLD" or _near_height(context, z)
+        if state.mode != "HOLD":
+            return False
+    if not mission.entered or memory.leg is None:
         mission.entered = True
-        x, y, _ = state.position
-        memory.leg = MissionLeg(
-            (x, y, max(z, state.position[2])), None, mode_transitions.cruise(context)
-        )
+        mode_transitions.go_to(context, (x, y, max(z, state.position[2])), None)
     return memory.leg is None or fly_leg(context, memory.leg)
 
 
@@ -169,12 +183,8 @@ def _waypoint(
     if not mission.entered or memory.leg is None:
         mission.entered = True
         target = item_position(context, item)
-        # params count clockwise from north
-        yaw = 0.5 * math.pi - math.radians(item.params[3])
-        turns = (
-            math.isfinite(yaw) and item.command != plans.LOITER_TIME
-        )  # LOITER_TIME has no heading
-        facing = yaw if turns else bearing(context, target)
+        yaw = None if item.command == plans.LOITER_TIME else _yaw_of(item)
+        facing = bearing(context, target) if yaw is None else yaw
         memory.leg = MissionLeg(target, facing, mode_transitions.cruise(context))
     leg = memory.leg
     rests = fly_leg(context, leg)
@@ -190,6 +200,12 @@ def _waypoint(
     if not mission.waiting:
         mission.waiting, mission.since_ns = True, memory.now_ns
     return _has_waited(context, mission, wait_s)
+
+
+def _yaw_of(item: plans.MissionItem) -> float | None:
+    """Returns the yaw of an item, rad, map; its parameter counts clockwise from north."""
+    clockwise = item.params[3]
+    return 0.5 * math.pi - math.radians(clockwise) if math.isfinite(clockwise) else None
 
 
 def _change_height(
@@ -238,7 +254,7 @@ def _land(
         x, y, z = state.position
         if item.placed:
             x, y, _ = item_position(context, item)
-        memory.leg = MissionLeg((x, y, z), None, mode_transitions.cruise(context))
+        memory.leg = MissionLeg((x, y, z), _yaw_of(item), mode_transitions.cruise(context))
     if memory.leg is not None and not fly_leg(context, memory.leg):
         return False
     memory.leg = None
@@ -259,25 +275,41 @@ def _delay(
 def _face(
     context: AutopilotContext, mission: Mission, item: plans.MissionItem, state: FlightState
 ) -> bool:
-    """Handles CONDITION_YAW: turns on the spot, relative or clockwise from north."""
+    """Handles CONDITION_YAW: turns on the spot, relative or clockwise from north.
+
+    A turn with a rate, or the longer way round, leads the heading along.
+    """
     memory = context.memory
+    rate_deg = item.params[1]
     if not mission.entered:
-        mission.entered = True
-        angle = math.radians(item.params[0])
-        if item.params[3] == 1.0:
-            way = -1.0 if item.params[2] == -1.0 else 1.0
-            yaw = context.yaw - way * angle
-        else:
-            yaw = 0.5 * math.pi - angle
+        mission.entered, mission.since_ns = True, memory.now_ns
+        mission.turn = (context.yaw, _turn_of(item, context.yaw))
+    start, turn = mission.turn
+    rate = math.radians(rate_deg) if rate_deg > 0.0 else math.inf
+    if abs(turn) > _SHORTEST_RAD:
+        rate = min(rate, _LED_RAD_S)
+    elapsed_s = (memory.now_ns - mission.since_ns) * 1e-9
+    led = abs(turn) if math.isinf(rate) else min(rate * elapsed_s, abs(turn))
+    yaw = math.remainder(start + math.copysign(led, turn), 2.0 * math.pi)
+    if memory.leg is None or memory.leg.yaw != yaw:
         target = state.position if memory.leg is None else memory.leg.target
-        memory.leg = MissionLeg(
-            target, math.remainder(yaw, 2.0 * math.pi), mode_transitions.cruise(context)
-        )
-    leg = memory.leg
-    if leg is None or leg.yaw is None:
-        return True
-    fly_leg(context, leg)
-    return abs(math.remainder(leg.yaw - context.yaw, 2.0 * math.pi)) < _FACES_RAD
+        memory.leg = MissionLeg(target, yaw, mode_transitions.cruise(context))
+    fly_leg(context, memory.leg)
+    return led == abs(turn) and abs(math.remainder(yaw - context.yaw, 2.0 * math.pi)) < _FACES_RAD
+
+
+def _turn_of(item: plans.MissionItem, yaw: float) -> float:
+    """Returns by how much a CONDITION_YAW turns from a yaw, rad, counter-clockwise.
+
+    An angle from north is turned to in the direction of the third parameter, else the shorter way.
+    """
+    angle, _, direction, relative = item.params
+    if relative == 1.0:
+        return math.radians(angle) * (1.0 if direction == -1.0 else -1.0)
+    turn = math.remainder(0.5 * math.pi - math.radians(angle) - yaw, 2.0 * math.pi)
+    if direction in (-1.0, 1.0) and abs(turn) > _FACES_RAD and direction * turn > 0.0:
+        turn -= math.copysign(2.0 * math.pi, turn)
+    return turn
 
 
 def _has_waited(context: AutopilotContext, mission: Mission, seconds: float) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from volery.mavlink.autopilot import feasibility, mode_transitions, plans
+from volery.mavlink.autopilot import feasibility, mode_transitions, plans, telemetry
 from volery.mavlink.autopilot.context import AutopilotContext
 from volery.mavlink.autopilot.item_positions import item_position
 from volery.mavlink.autopilot.modes import Mode
@@ -61,6 +61,8 @@ def take_item(context: AutopilotContext, source: Source, message: Any) -> None:
         _end(context, transfer, fault)
         return
     transfer.items.append(item)
+    if int(message.current) == 1:
+        transfer.first = sequence
     if len(transfer.items) < transfer.count:
         _ask(context, transfer)
     elif kind == plans.FENCE and not plans.polygons_are_whole(transfer.items):
@@ -130,17 +132,23 @@ def clear(context: AutopilotContext, source: Source, message: Any) -> None:
 
 
 def set_current(context: AutopilotContext, _source: Source, message: Any) -> None:
-    """Handles the old MISSION_SET_CURRENT, which has no answer."""
-    jump_to(context, int(message.seq))
+    """Handles the old MISSION_SET_CURRENT, which has no answer: PX4 says why it fails."""
+    if not jump_to(context, int(message.seq), resets=False):
+        context.say(2, "WPM: WP CURR CMD: Not in list")
 
 
-def jump_to(context: AutopilotContext, sequence: int) -> bool:
-    """Makes an item the current one; returns whether the item exists."""
+def jump_to(context: AutopilotContext, sequence: int, *, resets: bool = True) -> bool:
+    """Makes an item the current one and tells it; returns whether the item exists.
+
+    resets: whether jumps start to count anew.
+    """
     if not 0 <= sequence < len(context.memory.plans[plans.MISSION]):
         return False
-    speed = context.memory.mission.speed
-    context.memory.mission = Mission(current=sequence, speed=speed)
+    before = context.memory.mission
+    counts = {} if resets else before.jumps_left
+    context.memory.mission = Mission(current=sequence, speed=before.speed, jumps_left=counts)
     context.memory.leg = None
+    context.links.send(telemetry.mission_current(context))
     return True
 
 
@@ -168,6 +176,8 @@ def _end(context: AutopilotContext, transfer: MissionTransfer, result: int) -> N
 
 def _take_over(context: AutopilotContext, transfer: MissionTransfer) -> None:
     _replace(context, transfer.kind, transfer.items)
+    if transfer.kind == plans.MISSION:
+        context.memory.mission.current = transfer.first
     context.memory.last_items[transfer.kind] = (transfer.source, transfer.count - 1)
     _end(context, transfer, plans.ACCEPTED)
     if transfer.kind in (plans.MISSION, plans.FENCE):

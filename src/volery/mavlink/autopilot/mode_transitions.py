@@ -86,7 +86,7 @@ def enter(context: AutopilotContext, mode: Mode) -> None:
     if mode is not Mode.FOLLOW_TARGET:
         memory.followed = None
     if mode is not Mode.MISSION:
-        memory.mission.entered = False
+        memory.mission.entered = memory.mission.stays = False
     if memory.armed and flies(context):
         if mode is Mode.LAND:
             order(context, "land", context.vehicle.land())
@@ -107,17 +107,19 @@ def rise(context: AutopilotContext) -> None:
     height = context.memory.take_off_height
     if not math.isfinite(height):
         height = float(context.parameter("MIS_TAKEOFF_ALT"))
+    memory = context.memory
     x, y, z = context.state.position
+    if memory.take_off_place is not None:
+        x, y = memory.take_off_place
+    requested = math.isfinite(memory.take_off_height)
+    memory.take_off_height, memory.take_off_place = math.nan, None
     if not flies(context):
         height = max(height, 0.1)
-        context.memory.take_off_height = math.nan
-        context.memory.take_off_goal = x, y, z + height
+        memory.take_off_goal = x, y, z + height
         order(context, "take_off", context.vehicle.take_off(height))
         return
-    ground = context.memory.home_or_origin[2]
-    top = z + height if math.isfinite(context.memory.take_off_height) else max(z, ground + height)
-    context.memory.take_off_height = math.nan
-    go_to(context, (x, y, top), None)
+    ground = memory.home_or_origin[2]
+    go_to(context, (x, y, z + height if requested else max(z, ground + height)), None)
 
 
 def order(context: AutopilotContext, what: str, why_not: str = "") -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from enum import Enum
 
+_SLOW_POSITION = (3, 2)
 _MANUAL_INPUT, _STABILIZE, _GUIDED, _AUTO = 64, 16, 8, 4
 """Flags of MAV_MODE_FLAG."""
 
@@ -51,8 +52,19 @@ def mode_of(main: int, sub: int) -> Mode | None:
     """Returns the mode of PX4's numbers; None for an unsupported mode."""
     if main == 4 and sub == 9:  # a precision landing without a visible target is a landing
         sub = 6
+    if main == 4 and sub == 0:
+        return Mode.MISSION
+    if (main, sub) == _SLOW_POSITION:
+        return None
     found = (mode for mode in Mode if mode.value[0] == main and mode.value[1] in (sub, 0))
     return next(found, None)
+
+
+def mode_of_flags(base: int) -> Mode | None:
+    """Returns the mode that PX4 selects by the flags of MAV_MODE_FLAG alone; None: unsupported."""
+    if base & _AUTO:
+        return Mode.MISSION
+    return Mode.POSITION if base & _MANUAL_INPUT and base & _GUIDED else None
 
 
 def mode_named(name: str) -> Mode | None:

@@ -8,8 +8,10 @@ silent for COM_OF_LOSS_T.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
+from volery.core.errors import CommandError
 from volery.mavlink.autopilot import failsafes, mode_transitions
 from volery.mavlink.autopilot.context import AutopilotContext
 from volery.mavlink.autopilot.modes import Mode
@@ -30,12 +32,15 @@ _REFRESH_NS, _FEEDBACK_NS = 100_000_000, 20_000_000
 """Periods at which velocities are repeated, and at which they are computed from the position."""
 _LIFTED_M = 0.3
 """Height from which setpoints are flown after a take-off from the ground."""
-_ABOVE_HOME = (3, 6, 10, 11)
+_ABOVE_HOME = (3, 6)
 
 
 def take_local(context: AutopilotContext, source: Source, message: Any) -> None:
     """Handles SET_POSITION_TARGET_LOCAL_NED."""
-    take(context, source, local_setpoint(message, context.memory.origin))
+    attitude = context.state.attitude
+    _read(
+        context, source, message, lambda: local_setpoint(message, context.memory.origin, attitude)
+    )
 
 
 def take_global(context: AutopilotContext, source: Source, message: Any) -> None:
@@ -44,12 +49,28 @@ def take_global(context: AutopilotContext, source: Source, message: Any) -> None
     above = message.coordinate_frame in _ABOVE_HOME
     home = context.memory.home_or_origin
     z = message.alt + (home[2] if above else -context.build.origin[2])
-    take(context, source, global_setpoint(message, (x, y, z)))
+    _read(context, source, message, lambda: global_setpoint(message, (x, y, z)))
 
 
 def take_attitude(context: AutopilotContext, source: Source, message: Any) -> None:
     """Handles SET_ATTITUDE_TARGET."""
-    take(context, source, attitude_setpoint(message))
+    rates = context.state.rates
+    _read(context, source, message, lambda: attitude_setpoint(message, rates))
+
+
+def _read(
+    context: AutopilotContext,
+    source: Source,
+    message: Any,
+    convert: Callable[[], OffboardSetpoint],
+) -> None:
+    """Takes a message's setpoint, or says why it is refused."""
+    try:
+        setpoint = convert()
+    except CommandError as error:
+        context.complain(f"{message.get_type()} {error}")
+        return
+    take(context, source, setpoint)
 
 
 def take(context: AutopilotContext, source: Source, setpoint: OffboardSetpoint) -> None:
@@ -168,12 +189,7 @@ def _track(
 
 def _push(context: AutopilotContext, setpoint: OffboardSetpoint, *, fresh: bool) -> None:
     if fresh or context.memory.order != "push":
-        push = (
-            _turned(context, setpoint.acceleration)
-            if setpoint.in_heading
-            else setpoint.acceleration
-        )
-        context.vehicle.push(push, *_turn(setpoint))
+        context.vehicle.push(setpoint.acceleration, *_turn(setpoint))
         mode_transitions.order(context, "push")
 
 
@@ -182,12 +198,10 @@ def _steer(
 ) -> None:
     """Commands velocities; axes with a position are controlled towards it."""
     age_ns = context.memory.now_ns - context.memory.ordered_ns
-    placed = any(map(math.isfinite, setpoint.position)) or setpoint.in_heading
+    placed = any(map(math.isfinite, setpoint.position))
     if not fresh and age_ns < (_FEEDBACK_NS if placed else _REFRESH_NS):
         return
     x, y, z = (v if math.isfinite(v) else 0.0 for v in setpoint.velocity)
-    if setpoint.in_heading:
-        x, y, z = _turned(context, (x, y, z))
     x, y, z = (
         v + (_GAIN * (goal - here) if math.isfinite(goal) else 0.0)
         for v, goal, here in zip((x, y, z), setpoint.position, state.position, strict=True)
@@ -203,13 +217,6 @@ def _steer(
 def _turn(setpoint: OffboardSetpoint) -> tuple[float | None, float]:
     rate = setpoint.yaw_rate if math.isfinite(setpoint.yaw_rate) else 0.0
     return (setpoint.yaw if math.isfinite(setpoint.yaw) else None), rate
-
-
-def _turned(context: AutopilotContext, vector: Vector) -> Vector:
-    """Rotates a vector from the horizontal heading frame to the map; nan counts as zero."""
-    x, y, z = (part if math.isfinite(part) else 0.0 for part in vector)
-    c, s = math.cos(context.yaw), math.sin(context.yaw)
-    return c * x - s * y, s * x + c * y, z
 
 
 def _finite(vector: Vector) -> bool:

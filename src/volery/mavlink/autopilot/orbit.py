@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from volery.mavlink.autopilot import mode_transitions
+from volery.mavlink.autopilot import manual_control, mode_requirements, mode_transitions
 from volery.mavlink.autopilot.command_protocol import (
     ACCEPTED,
     DENIED,
@@ -36,6 +36,9 @@ _PERIOD_NS = 20_000_000
 def prepare(context: AutopilotContext, _source: Source, command: Command, height: float) -> int:
     """Returns the result of DO_ORBIT, whose altitude is `height` in the map (nan: unchanged)."""
     if any(math.isinf(param) for param in command.params):
+        return DENIED
+    behaviour = command.params[2]
+    if math.isfinite(behaviour) and round(behaviour) not in range(6):
         return DENIED
     latitude, longitude = command.params[4:6]
     placed = math.isfinite(latitude) and math.isfinite(longitude)
@@ -92,6 +95,8 @@ def fly(context: AutopilotContext, state: FlightState) -> None:
     back = _GAIN * outside
     climb = math.copysign(_climb(context, z), -z)
     yaw, rate = _facing(orbit, outward, turning)
+    if orbit.facing == _BY_STICKS and mode_requirements.sticks_are_there(memory):
+        rate = manual_control.yaw_rate(context)
     velocity = along[0] - back * outward[0], along[1] - back * outward[1], climb
     memory.target = OffboardSetpoint(velocity=velocity, yaw=math.nan if yaw is None else yaw)
     context.vehicle.steer(velocity, yaw, rate)

@@ -38,14 +38,19 @@ NEED_NO_PLACE = {
     SET_HOME,
 } | payload_items.MARKERS
 """Items that may precede a take-off."""
-AMSL, MISSION_FRAME, ABOVE_HOME = (0, 5), (2,), (3, 6, 10, 11)
-"""MAV_FRAME: GLOBAL(_INT); MISSION; GLOBAL_RELATIVE_ALT(_INT), and TERRAIN_ALT(_INT), which counts
-from home: the autopilot has no terrain data."""
+AMSL, MISSION_FRAME, ABOVE_HOME = (0, 5), (2,), (3, 6)
+"""MAV_FRAME: GLOBAL(_INT); MISSION; GLOBAL_RELATIVE_ALT(_INT). As in PX4 there are no others."""
 
 ACCEPTED, ERROR, BAD_FRAME, UNSUPPORTED, NO_SPACE, INVALID = 0, 1, 2, 3, 4, 5
 INVALID_PARAM1, INVALID_X, INVALID_Y, INVALID_Z, INVALID_SEQUENCE, DENIED = 6, 10, 11, 12, 13, 14
 CANCELLED = 15
 """Values of MAV_MISSION_RESULT."""
+
+
+_UNSET = {-(2**31), 2**31 - 1}
+"""Integers that stand for a missing latitude or longitude; MAVLink's is INT32_MAX."""
+_LEVEL_SPEEDS = (0.0, 1.0)
+"""SPEED_TYPE of speeds along the ground."""
 
 
 class MissionItem(NamedTuple):
@@ -73,7 +78,7 @@ def item_of(message: Any) -> MissionItem:
     params = (message.param1, message.param2, message.param3, message.param4)
     x, y = float(message.x), float(message.y)
     if message.get_type() == "MISSION_ITEM_INT":
-        unset = message.x == -(2**31) or message.y == -(2**31)
+        unset = {message.x, message.y} & _UNSET
         x, y = (math.nan, math.nan) if unset else (x * 1e-7, y * 1e-7)
     return MissionItem(
         int(message.command), frame, params, x, y, message.z, bool(message.autocontinue)
@@ -95,12 +100,26 @@ def fault_of(item: MissionItem, kind: int, count: int) -> int:  # noqa: PLR0911
     if item.command in (DELAY, CONDITION_DELAY, LOITER_TIME) and not item.params[0] >= 0.0:
         return INVALID_PARAM1
     if item.command == CHANGE_SPEED:
+        if not (math.isnan(item.params[0]) or item.params[0] in _LEVEL_SPEEDS):
+            return INVALID_PARAM1
         return ACCEPTED if math.isfinite(item.params[1]) else INVALID_PARAM1 + 1
     if item.command == CONDITION_YAW:
-        return ACCEPTED if math.isfinite(item.params[0]) else INVALID_PARAM1
+        return _fault_of_turn(item)
     if kind == MISSION and item.command not in (*PLACED, SET_HOME):
         return ACCEPTED
     return _fault_of_place(item, kind)
+
+
+def _fault_of_turn(item: MissionItem) -> int:
+    angle, rate, direction, relative = item.params
+    if not math.isfinite(angle):
+        return INVALID_PARAM1
+    if rate < 0.0:
+        return INVALID_PARAM1 + 1
+    if not (math.isnan(direction) or direction in (-1.0, 0.0, 1.0)):
+        return INVALID_PARAM1 + 2
+    known = math.isnan(relative) or relative in (0.0, 1.0)
+    return ACCEPTED if known else INVALID_PARAM1 + 3
 
 
 def _fault_of_place(item: MissionItem, kind: int) -> int:  # noqa: PLR0911

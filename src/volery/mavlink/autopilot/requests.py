@@ -9,10 +9,15 @@ import math
 from typing import Any
 
 from volery.mavlink.autopilot import dialect_extensions, streams, telemetry
+from volery.mavlink.autopilot.client_links import ALL_LINKS
 from volery.mavlink.autopilot.command_protocol import ACCEPTED, DENIED, FAILED, Command
 from volery.mavlink.autopilot.context import AutopilotContext
 from volery.mavlink.autopilot.state import Source
 
+_EVERYONE, _TARGETS = 2, (0, 1, 2)
+"""Receivers of a requested message: as usual or the requester, both over its link; everyone."""
+FOR_ALL = (519, 520)
+"""MAV_CMD that PX4 executes if they are for all systems and whatever their component."""
 RETIRED = {410: 242, 519: 300, 520: 148}
 """MAV_CMD that MAV_CMD_REQUEST_MESSAGE replaced, and the message that each requested."""
 
@@ -37,9 +42,12 @@ def get_interval(context: AutopilotContext, source: Source, command: Command) ->
 
 def send(context: AutopilotContext, source: Source, command: Command) -> int:
     """Handles REQUEST_MESSAGE."""
-    number, what = command.params[:2]
-    if not math.isfinite(number):
+    number, what, *_, target = command.params
+    whom = round(target) if math.isfinite(target) else 0
+    if not math.isfinite(number) or whom not in _TARGETS:
         return DENIED
+    if whom == _EVERYONE:
+        source = (ALL_LINKS, *source[1:])
     if round(number) == telemetry.MESSAGE_INTERVAL:
         return _tell_interval(context, source, what)
     if round(number) == dialect_extensions.AvailableModes.id:

@@ -56,4 +56,6 @@ def _begin_leg(context: AutopilotContext, way: ReturnState) -> None:
         memory.leg = MissionLeg(target, bearing(context, target), mode_transitions.cruise(context))
     else:
         low = min(z, max(goal[2], home[2]) + float(context.parameter("RTL_DESCEND_ALT")))
-        memory.leg = MissionLeg((goal[0], goal[1], low), None, mode_transitions.cruise(context))
+        chosen = memory.home_yaw if goal == home else math.nan
+        yaw = chosen if math.isfinite(chosen) else None
+        memory.leg = MissionLeg((goal[0], goal[1], low), yaw, mode_transitions.cruise(context))

@@ -52,6 +52,8 @@ class MissionTransfer:
     """Time of the last message of the other side."""
     asked_ns: int = 0
     retries: int = 0
+    first: int = 0
+    """Item marked as the current one, with which the mission starts."""
 
 
 @dataclass
@@ -80,6 +82,10 @@ class Mission:
     """Speed of a DO_CHANGE_SPEED, m/s."""
     interest: Vector | None = None
     """Position of the region of interest to face, m, map."""
+    turn: tuple[float, float] = (0.0, 0.0)
+    """Yaw at the start of a turn on the spot, and by how much it turns, rad, map."""
+    stays: bool = False
+    """Whether the current item is done, and no other one follows by itself."""
     reached: int = -1
     complete: bool = False
 
@@ -140,6 +146,8 @@ class AutopilotState:
     landed_ns: int = 0
     take_off_height: float = math.nan
     """Requested height above the ground of the next take-off, m."""
+    take_off_place: tuple[float, float] | None = None
+    """Requested position of the next take-off, m, map, to which the UAV flies after its climb."""
     take_off_goal: Vector | None = None
     """Goal of the current take-off from the ground, m, map."""
     order: str = ""
@@ -152,6 +160,8 @@ class AutopilotState:
     home: Vector | None = None
     chosen_home: Vector | None = None
     """Latitude, longitude, degrees, and altitude, m, of a home that a client chose."""
+    home_yaw: float = math.nan
+    """Yaw of a home that a client chose, rad, map; nan: free."""
     origin: Vector = (0.0, 0.0, 0.0)
     """Origin of the local frame, m, map: the position at the start."""
     cruise: float = math.nan
@@ -194,6 +204,12 @@ class AutopilotState:
     """Failsafes that have been reported and handled."""
     failsafe: bool = False
     next_check_ns: int = 0
+    text_number: int = 0
+    """Number of the last STATUSTEXT, 1 to 65535."""
+    refused_messages: set[str] = field(default_factory=set)
+    """Messages that are not supported, and of which a client has been told."""
+    complaints: dict[str, int] = field(default_factory=dict)
+    """Refusals of messages without an answer, and when they were reported."""
 
     @property
     def home_or_origin(self) -> Vector:

@@ -103,7 +103,8 @@ def _estimator_status(context: AutopilotContext) -> Any:
     )
 
 
-def _mission_current(context: AutopilotContext) -> Any:
+def mission_current(context: AutopilotContext) -> Any:
+    """Returns MISSION_CURRENT."""
     mission, items = context.memory.mission, context.memory.plans[plans.MISSION]
     if not items:
         state = 1
@@ -149,7 +150,7 @@ BUILDERS: dict[int, Callable[[AutopilotContext], Any]] = {
     32: motion.local_position,
     33: motion.global_position,
     36: motion.servo_output,
-    42: _mission_current,
+    42: mission_current,
     49: _global_origin,
     74: motion.vfr_hud,
     83: motion.attitude_target,

@@ -1,0 +1,164 @@
+"""Nodes that land stop first: a UAV told to land in flight comes down beyond its place."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from node_bench import NodeBench, odometry
+
+from volery.autonomy.avoidance.depth_course import DepthCourse, DepthCoursePhase
+from volery.autonomy.avoidance.gap_following import GapFollowing
+from volery.autonomy.avoidance.stop import Stop
+from volery.autonomy.coverage.flight import CoverageFlight
+from volery.autonomy.coverage.waypoints import WaypointProgress
+from volery.autonomy.perception.scan_points import OdometrySample
+from volery.graph.codecs.zero import zero_message
+from volery.graph.messages import CameraInfo, Image
+
+TICK_NS = 20_000_000
+BRAKES_M_S2 = 2.0
+STILL_M_S = 0.3
+
+
+class Flier:
+    """A point that follows `cmd_vel` with an acceleration, and notes where it is told to land."""
+
+    def __init__(self, bench):
+        self.bench = bench
+        self.position, self.velocity = np.zeros(3), np.zeros(3)
+        self.flies, self.landed_at, self.speed_at_landing = False, None, None
+        self._commands = bench.listen("/uav1/cmd_vel")
+        for name, act in (("take_off", self._take_off), ("land", self._land)):
+            bench.graph.create_service(f"/uav1/{name}", "std_srvs/srv/Trigger", act)
+
+    def _take_off(self, _request):
+        self.flies = True
+        return answer()
+
+    def _land(self, _request):
+        self.landed_at = self.position.copy()
+        self.speed_at_landing = float(np.hypot(*self.velocity[:2]))
+        return answer()
+
+    def tick(self):
+        step_s = TICK_NS * 1e-9
+        wanted = np.array([0.0, 0.0, 1.0 if self.flies else 0.0])
+        if self._commands:
+            last = self._commands[-1].linear
+            wanted = np.array([last.x, last.y, last.z])
+        change = wanted - self.velocity
+        most = BRAKES_M_S2 * step_s
+        self.velocity += change * min(1.0, most / max(float(np.linalg.norm(change)), 1e-9))
+        self.position += step_s * self.velocity
+        now = self.bench.now_ns + TICK_NS
+        self.bench.send("/uav1/odom", odometry(now, self.position, self.velocity))
+        self.bench.run_to(now)
+
+    def fly(self, seconds):
+        for _ in range(round(seconds * 1e9) // TICK_NS):
+            if self.landed_at is not None:
+                return
+            self.tick()
+
+
+def answer():
+    response = zero_message("std_srvs/srv/Trigger_Response")
+    response.success = True
+    return response
+
+
+def sample(speed):
+    return OdometrySample.from_odometry(odometry(0, (0.0, 0.0, 3.0), (speed, 0.0, 0.0)))
+
+
+@pytest.fixture
+def bench():
+    return NodeBench()
+
+
+def along_a_route(bench, **parameters):
+    node = bench.start(GapFollowing, route=[[15.0, 0.0]], **parameters)
+    return Flier(bench), node
+
+
+def test_gap_following_stops_before_it_lands(bench):
+    flier, _ = along_a_route(bench)
+    flier.fly(60.0)
+    assert flier.speed_at_landing < STILL_M_S
+
+
+def test_gap_following_lands_nowhere_that_has_turned_out_overgrown(bench):
+    """Growth that it sees only when it has stopped makes it choose another place."""
+    flier, node = along_a_route(bench)
+    while not node._stop.has_begun:
+        flier.tick()
+    x, y = flier.position[:2] + np.array([0.5, 0.0])
+    for k in range(6):
+        node._low_obstacles.add(np.array([[x, y, 1.5]]), bench.now_ns + k)
+    flier.fly(60.0)
+    assert flier.speed_at_landing < STILL_M_S
+    assert math.dist(flier.landed_at[:2], (x, y)) > 1.0
+
+
+def test_gap_following_lands_in_the_end_where_all_is_overgrown(bench):
+    flier, node = along_a_route(bench)
+    grid = np.array([[x, y, 1.5] for x, y in itertools.product(np.arange(-10, 10, 0.5), repeat=2)])
+    while flier.landed_at is None and bench.now_ns < 200e9:
+        if node._stop.has_begun:
+            middle = [*flier.position[:2], 0.0]
+            for k in range(3):
+                node._low_obstacles.add(grid + middle, bench.now_ns + k)
+        flier.tick()
+    assert flier.landed_at is not None
+    assert flier.speed_at_landing < STILL_M_S
+
+
+class Straight(DepthCourse):
+    """Flies along the course at its speed."""
+
+    def __init__(self, **options):
+        super().__init__("straight", **options)
+
+    def look(self, image, info, pose):
+        pass
+
+    def steer(self, pose):
+        return self.speed * np.array([math.cos(self.course), math.sin(self.course)]), 0.0
+
+
+def test_a_depth_course_stops_before_it_lands(bench):
+    node = bench.start(Straight, distance_m=12.0, speed_m_s=4.0)
+    flier = Flier(bench)
+    image, info = zero_message("sensor_msgs/msg/Image"), zero_message("sensor_msgs/msg/CameraInfo")
+    assert isinstance(image, Image)
+    assert isinstance(info, CameraInfo)
+    bench.send("/uav1/camera/camera_info", info)
+    while flier.landed_at is None and bench.now_ns < 60e9:
+        bench.send("/uav1/camera/depth", image)
+        flier.tick()
+    assert flier.speed_at_landing < STILL_M_S
+    assert node.phase is DepthCoursePhase.LAND
+    assert 12.0 < flier.landed_at[0] < 12.0 + 4.0**2 / BRAKES_M_S2
+
+
+def test_a_covered_area_is_left_standing():
+    flight = CoverageFlight("uav1")
+    flight.send(WaypointProgress(np.zeros((1, 3)), np.array([True])), 0)
+    flight.moved(np.zeros(3), 0.0, 0, speed_m_s=3.0)
+    assert flight.goal(0.3, 0) is None
+    assert not flight.has_stopped(1_000_000_000)
+    flight.moved(np.zeros(3), 0.0, 0, speed_m_s=0.1)
+    assert flight.has_stopped(1_000_000_000)
+    flight.moved(np.zeros(3), 0.0, 0, speed_m_s=0.9)
+    assert flight.has_stopped(9_000_000_000)  # in gusts
+
+
+def test_a_stop_in_gusts_ends_all_the_same():
+    stop = Stop()
+    assert not stop.is_over(sample(0.0), 0)
+    stop.begin(1_000_000_000)
+    stop.begin(9_000_000_000)
+    assert not stop.is_over(sample(1.0), 2_000_000_000)
+    assert stop.is_over(sample(0.1), 2_000_000_000)
+    assert stop.is_over(sample(1.0), 7_000_000_000)
