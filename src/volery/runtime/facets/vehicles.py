@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from volery.comms.radio.network import RadioNetwork
 from volery.control.fleet import Fleet
+from volery.control.flight_modes import FlightMode
 from volery.core.errors import CommandError
 from volery.graph.nodes.node import Node
 from volery.runtime.build.placement import StartPose
@@ -162,6 +164,16 @@ class SimulationVehicles(BatchCommands):
 
     def _future_lists(self) -> Sequence[FlightFutures]:
         return [self._manager.futures]
+
+    def _check_reach(self, command: str, deaf: Collection[FlightMode]) -> None:
+        fleet = self._manager.engine.fleet
+        if not np.isin(fleet.modes, list(deaf)).all():
+            return
+        modes = ", ".join(
+            f"{name} is {fleet.mode(i).name}" for i, name in enumerate(self.names[:3])
+        )
+        more = f" and {len(self.names) - 3} more" if len(self.names) > 3 else ""
+        raise CommandError(f"{command} reaches no UAV: {modes}{more}; take off and wait() first")
 
     def row_of(self, name: str) -> int:
         """Returns a UAV's row in fleet arrays. Raises `CommandError` for an unknown name."""
