@@ -150,7 +150,7 @@ def test_batches_that_reach_no_uav_say_why(simulate, three_data):
 def test_all_uavs_wait_within_one_timeout(simulate, three_data):
     simulation = simulate(three_data)
     simulation.vehicles.take_off(3.0)
-    with pytest.raises(WaitTimeoutError, match="take_off of uav2 is not done within 0.5 s"):
+    with pytest.raises(WaitTimeoutError, match=r"take_off of uav2 is not done within 0\.5 s"):
         simulation.vehicles.wait(0.5)
     assert simulation.time_s == pytest.approx(0.5)
     assert [one.mode for one in simulation.vehicles.wait()] == [FlightMode.HOLD]

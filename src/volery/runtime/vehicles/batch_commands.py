@@ -237,7 +237,9 @@ class BatchCommands(ABC):
                 ) from None
         return [begin(uav) for uav in uavs]
 
-    def _check_reach(self, command: str, deaf: Collection[FlightMode]) -> None:
+    def _check_reach(  # noqa: B027 - environments have nothing to check
+        self, command: str, deaf: Collection[FlightMode]
+    ) -> None:
         """Refuses a command that streams if all UAVs are in `deaf` modes; environments do not."""
 
     def _guided(self) -> list[tuple[int, Uav]]:
