@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from volery.core.clock import s_from_ns
 from volery.core.errors import CommandError, ScenarioError
+from volery.core.plurals import counted
 from volery.engine.events import Event
 from volery.engine.lock_step import Partner
 from volery.engine.pacing import Pacer
@@ -337,6 +338,14 @@ class Simulation:
         with self.record(rate_hz) as recorder:
             self.run(seconds, speed=speed, on_progress=on_progress, progress=progress)
         return recorder.result()
+
+    def __repr__(self) -> str:
+        closed = ", closed" if self._closed else ""
+        return (
+            f"<Simulation '{self.scenario.name}': {self.time_s:.3f} of "
+            f"{self.scenario.duration_s:g} s, {counted(len(self.uavs), 'UAV')}, "
+            f"seed {self._manager.scenario.seed}{closed}>"
+        )
 
     def _repr_html_(self) -> str:
         """Returns time, UAVs and a map with the recorded paths, for notebooks."""
