@@ -266,9 +266,9 @@ def test_a_sensor_is_found_by_its_kind_where_it_is_the_only_one(simulate, flat_d
     assert "gnss" in sensors
     assert isinstance(sensors["gnss"].next(), GnssSample)
     assert "gnss" not in list(sensors)
-    with pytest.raises(SensorError, match="no sensor 'lidar'; known: .*and left of this kind"):
+    with pytest.raises(SensorError, match=r"no sensor 'lidar'; known: .*and left of this kind"):
         sensors["lidar"]
-    with pytest.raises(SensorError, match="no sensor 'gps'; known: .*fix"):
+    with pytest.raises(SensorError, match=r"no sensor 'gps'; known: .*fix"):
         sensors["gps"]
     with VectorizedSimulation(parse_scenario(flat_data), 2) as envs:
         assert envs.sensors["uav1"]["gnss"].name == "fix"
