@@ -89,6 +89,7 @@ def test_wheel_holds_page_data_and_commit_but_no_tests(packages):
     assert PAGE.removeprefix("src/") in names
     assert any(name.startswith("volery/server/static/assets/index-") for name in names)
     assert "volery_benchmarks/registry.py" in names
+    assert {"volery/examples/01_fly_one_uav.py", "volery/examples/studies/gusts.toml"} <= {*names}
     for suffix in DATA:
         assert any(name.endswith(suffix) for name in names), suffix
     assert not any("tests" in Path(name).parts or name.endswith(".pyc") for name in names)

@@ -21,6 +21,7 @@ import { followSilence } from "./state/silence.ts";
 import { followSimulation } from "./state/simulation.ts";
 import { hideToken } from "./state/token.ts";
 import { followTopics } from "./state/topics.ts";
+import { followFaults } from "./state/faults.ts";
 import { followVehicles } from "./state/vehicles.ts";
 
 hideToken(location, history);
@@ -28,6 +29,7 @@ followAddress();
 connectAsAddressed(location, useOperator.getState().wished);
 followDisconnection();
 followSimulation(useConnection.getState().volery);
+followFaults();
 followVehicles(useConnection.getState().volery);
 followHealth();
 followJournal();

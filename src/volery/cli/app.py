@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from volery.cli.error_reporting import word_logs
+from volery.cli.examples import examples
 from volery.cli.flight_commands import launch, list_scenarios, play, px4, run, serve
 from volery.cli.graph_commands import node, service_app, topic_app
 from volery.cli.learning_commands import evaluate, export_policy, train
@@ -57,6 +58,7 @@ def volery(
 app.command(cls=PageCommand)(run)
 app.command("list")(list_scenarios)
 for _command in (
+    examples,
     serve,
     play,
     sweep,

@@ -132,6 +132,24 @@ def _scenarios() -> str:
     return ", ".join(names)
 
 
+def _extras() -> str:
+    from volery.core.errors import VoleryError
+    from volery.scenario import library
+    from volery.scenario.load import load_scenario
+    from volery.scenario.node_packages import missing_packages
+
+    lacking = []
+    for name in library.names():
+        try:
+            missing = missing_packages(load_scenario(name))
+        except VoleryError:
+            continue  # the check of scenarios reports it
+        lacking += [f"{name} does not start: {missing}"] if missing else []
+    if lacking:
+        raise UnfitError("; ".join(lacking))
+    return "all shipped scenarios have the packages that they need"
+
+
 def _forests() -> str:
     from volery import world
 
@@ -177,6 +195,7 @@ CHECKS = (
     Check("kernel cache", _kernels, essential=False),
     Check("Embree", _embree, essential=False),
     Check("scenarios", _scenarios),
+    Check("extras", _extras, essential=False),
     Check("forest data", _forests),
     Check("cores", _cores, essential=False),
     Check("memory", _memory, essential=False),

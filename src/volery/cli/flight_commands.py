@@ -127,8 +127,14 @@ def serve(
         ),
     ] = None,
     port: Annotated[
-        int, typer.Option(min=0, max=65535, help="Set the page's port; 0 picks a free one.")
-    ] = 8080,
+        int | None,
+        typer.Option(
+            min=0,
+            max=65535,
+            help="Set the page's port; 0 picks a free one. Default: 8080, or a free one if it is "
+            "taken.",
+        ),
+    ] = None,
     host: Annotated[str, typer.Option(help="Set the address to listen on.")] = "127.0.0.1",
     allow_remote: Annotated[
         bool, typer.Option("--allow-remote", help="Accept remote clients.")
@@ -174,6 +180,7 @@ def serve(
 
     A scenario that ends stays loaded, paused at its end.
     """
+    from volery.cli.pages import usual_port
     from volery.cli.run import RunOptions, parse_speed
     from volery.cli.serve import ServeOptions, serve
     from volery.server.auth import Tokens
@@ -196,7 +203,7 @@ def serve(
             ),
             PageSettings(
                 host=host,
-                port=port,
+                port=usual_port(host) if port is None else port,
                 tokens=Tokens(token, viewer_token),
                 anywhere=allow_remote,
                 origins=tuple(origin or ()),

@@ -79,14 +79,21 @@ def _settings_of(options: RunOptions) -> PageSettings:
         tokens=Tokens(options.token), anywhere=options.allow_remote, recordings=options.recordings
     )
     if options.page == AT_THE_USUAL_PLACE:
-        if _is_taken(settings.host, settings.port):
-            typer.echo(f"port {settings.port} is taken; the page takes a free one", err=True)
-            settings = replace(settings, port=0)
-        return settings
+        return replace(settings, port=usual_port(settings.host))
     host, colon, port = (options.page or "").rpartition(":")
     if not port.isdecimal() or not 0 <= int(port) <= 65535 or (colon and not host):
         raise CommandError(f"--page={options.page}: an address is PORT or HOST:PORT")
     return replace(settings, host=host.strip("[]") or settings.host, port=int(port))
+
+
+def usual_port(host: str) -> int:
+    """Returns the page's default port; 0, for a free one, where it is taken, and says so."""
+    from volery.server.settings import DEFAULT_PORT
+
+    if not _is_taken(host, DEFAULT_PORT):
+        return DEFAULT_PORT
+    typer.echo(f"port {DEFAULT_PORT} is taken; the page takes a free one", err=True)
+    return 0
 
 
 def _is_taken(host: str, port: int) -> bool:

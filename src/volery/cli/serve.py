@@ -146,7 +146,7 @@ class _Host:
             if self._present is None:
                 raise
             what = str(error) if isinstance(error, VoleryError) else _unexpected(error)
-            self._problem = f"{wanted.name}: {what}"
+            self._problem = named_problem(wanted.name, what)
             complain_of(error, self._problem)
             self._wish.want(None if self._present is wanted else self._present)
 
@@ -242,6 +242,11 @@ def _first_scenario(options: RunOptions) -> Scenario:
         seconds=options.seconds,
         seed=options.seed,
     )
+
+
+def named_problem(name: str, what: str) -> str:
+    """Returns a problem after the name of its scenario or log, which many begin with already."""
+    return what if what.startswith(f"{name}: ") else f"{name}: {what}"
 
 
 def _unexpected(error: Exception) -> str:

@@ -57,6 +57,15 @@ class FlightMode(IntEnum):
     TRAJECTORY = 9
     """Follows a trajectory or trajectory setpoints; holds at the end or after a timeout."""
 
+    def __str__(self) -> str:
+        return self.name
+
+    def __format__(self, spec: str) -> str:
+        """Formats the name; a spec for integers, such as `d`, formats the number."""
+        return (
+            format(int(self), spec) if spec.endswith(tuple("bcdoxXn")) else format(self.name, spec)
+        )
+
 
 LANDED = int(FlightMode.LANDED)
 TAKE_OFF = int(FlightMode.TAKE_OFF)

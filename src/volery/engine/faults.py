@@ -18,6 +18,7 @@ from volery.scenario.faults import (
     Fault,
     GnssFault,
     GustFault,
+    LastingFault,
     MotorFault,
     RadioFault,
     SensorFault,
@@ -57,6 +58,7 @@ class FaultPlan:
         """(rotors,) health without faults, by UAV, wear included."""
         self._weak: dict[tuple[str, int], list[float]] = {}
         """Thrust factors of the active faults, by UAV and rotor."""
+        self._active: tuple[LastingFault, ...] = ()
         self.enlist(engine.names)
 
     def enlist(self, uavs: Collection[str]) -> None:
@@ -75,11 +77,22 @@ class FaultPlan:
         begin, end = self._actions(fault)
         uav = getattr(fault, "uav", None)
         until_s = getattr(fault, "until_s", None)
-        self._at(fault.at_s, begin, uav, f"fault: {fault.kind}", client)
+
+        def begin_it() -> None:
+            begin()
+            if isinstance(fault, LastingFault):
+                self._list(fault)
+
+        self._at(fault.at_s, begin_it, uav, f"fault: {fault.kind}", client)
         if until_s is not None:
             ends_by_itself = isinstance(fault, GnssFault)
             action = end if end is not None and not ends_by_itself else _nothing
-            self._at(until_s, action, uav, f"fault over: {fault.kind}", client)
+
+            def end_it() -> None:
+                action()
+                self._strike(fault)
+
+            self._at(until_s, end_it, uav, f"fault over: {fault.kind}", client)
 
     def end(self, fault: Fault, *, client: str = "") -> None:
         """Ends an active fault at the next tick; has no effect without such a fault.
@@ -91,21 +104,51 @@ class FaultPlan:
         if end is None:
             raise CommandError(f"fault: a {fault.kind} cannot be ended: it ends by itself")
         uav = getattr(fault, "uav", None)
-        self._at(0.0, end, uav, f"fault over: {fault.kind}", client)
+
+        def end_it() -> None:
+            end()
+            self._strike(fault)
+
+        self._at(0.0, end_it, uav, f"fault over: {fault.kind}", client)
+
+    @property
+    def active(self) -> tuple[LastingFault, ...]:
+        """Faults of present UAVs that have begun and not ended, oldest first.
+
+        `at_s` is the time at which they began. Gusts and displacements are not among them.
+        """
+        present = set(self._engine.names)
+        return tuple(fault for fault in self._active if fault.uav in present)
+
+    def _list(self, fault: LastingFault) -> None:
+        if isinstance(fault, SensorFault):
+            self._strike(fault)  # a sensor has one fault at a time
+        began = fault.model_copy(update={"at_s": s_from_ns(self._engine.time_ns)})
+        self._active = (*self._active, began)
+
+    def _strike(self, fault: Fault) -> None:
+        """Removes what a fault's end ends: one fault, or all of a sensor or of the GNSS."""
+        like = [one for one in self._active if _ends(fault, one)]
+        if not isinstance(fault, SensorFault | GnssFault):
+            like = like[:1]
+        self._active = tuple(one for one in self._active if not any(one is x for x in like))
 
     def mend(self, uav: str) -> None:
         """Clears the rotor faults and radio faults of a UAV that restarts."""
         if self._radios is not None:
             self._radios.restore_all(uav)
         self._weak = {key: shares for key, shares in self._weak.items() if key[0] != uav}
+        self._active = tuple(fault for fault in self._active if fault.uav != uav)
 
-    def get_state(self) -> dict[tuple[str, int], list[float]]:
-        """Returns the thrust factors, for a snapshot; engine, fleet and sensors save the rest."""
-        return {key: list(shares) for key, shares in self._weak.items()}
+    def get_state(self) -> dict[str, Any]:
+        """Returns the active faults, for a snapshot; engine, fleet and sensors save the rest."""
+        weak = {key: list(shares) for key, shares in self._weak.items()}
+        return {"weak": weak, "active": self._active}
 
-    def set_state(self, state: dict[tuple[str, int], list[float]]) -> None:
+    def set_state(self, state: dict[str, Any]) -> None:
         """Restores a saved state."""
-        self._weak = {key: list(shares) for key, shares in state.items()}
+        self._weak = {key: list(shares) for key, shares in state["weak"].items()}
+        self._active = state["active"]
 
     @property
     def _fleet(self) -> Fleet:
@@ -282,6 +325,18 @@ class FaultPlan:
                     if own.name == sensor:
                         return bank, row
         raise CommandError(f"{uav} has no sensor '{sensor}'; known: {', '.join(known)}")
+
+
+def _ends(fault: Fault, active: LastingFault) -> bool:
+    """Returns whether the end of `fault` ends an active one."""
+    if type(fault) is not type(active) or getattr(fault, "uav", None) != active.uav:
+        return False
+    if isinstance(fault, SensorFault) and isinstance(active, SensorFault):
+        return fault.sensor == active.sensor
+    if isinstance(fault, MotorFault) and isinstance(active, MotorFault):
+        same_rotor = fault.rotor == active.rotor
+        return same_rotor and fault.thrust_factor == active.thrust_factor
+    return True
 
 
 def _nothing() -> None:

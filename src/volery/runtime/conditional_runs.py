@@ -271,6 +271,11 @@ def _futures_of(awaited: Any) -> tuple[FlightFuture, ...]:
             "run_until takes a function without arguments, an EventKind or its name, or what "
             f"take_off(), go_to(), ... return, not {awaited!r}"
         )
+    if not futures:
+        raise CommandError(
+            "there is nothing to wait for: no flight command is among what run_until was given; "
+            "uav.wait() and simulation.vehicles.wait() wait for the present commands"
+        )
     return futures
 
 

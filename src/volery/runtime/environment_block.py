@@ -290,6 +290,11 @@ class EnvironmentBlock:
     def request(self, uav: str, sensor: str) -> None:
         """Does nothing: all sensors of environments measure."""
 
+    def kind(self, uav: str, sensor: str) -> str:
+        """Returns the kind of a sensor of a UAV, `NAME` or `ENV/NAME`, such as `gnss`."""
+        name = uav.rsplit("/", maxsplit=1)[-1]
+        return self._engine.banks[self._places[name, sensor][0]].name
+
     def is_camera(self, uav: str, sensor: str) -> bool:  # noqa: ARG002 - as for all
         """Returns False: cameras of environments render without a reader."""
         return False

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from volery.core.arrays import read_only
 from volery.core.errors import SensorError
 from volery.runtime.environment_block import EnvironmentBlock
-from volery.runtime.vehicles.uav_sensors import UnknownSensorError
+from volery.runtime.vehicles.uav_sensors import find_sensor
 from volery.sensors.cameras.camera import Part
 from volery.sensors.sample_rows import joined, sample_of
 from volery.sensors.samples import Samples
@@ -97,11 +97,13 @@ class EnvironmentSensors(Mapping[str, EnvironmentSensor]):
         self._uav = uav
 
     def __getitem__(self, name: str) -> EnvironmentSensor:
-        """Returns a sensor. Raises `UnknownSensorError`, a `KeyError`."""
-        if name not in tuple(self):
-            known = ", ".join(self) or "none"
-            raise UnknownSensorError(f"{self._uav} has no sensor '{name}'; known: {known}")
-        return EnvironmentSensor(self._blocks, self._uav, name)
+        """Returns a sensor by its name, or by its kind if it is the only one of that kind.
+
+        LIDARs and cameras are found by name alone.
+        Raises `UnknownSensorError`, a `KeyError`.
+        """
+        kinds = {own: self._blocks[0].kind(self._uav, own) for own in self}
+        return EnvironmentSensor(self._blocks, self._uav, find_sensor(self._uav, name, kinds))
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._blocks[0].names(self._uav))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from volery.core.clock import s_from_ns
 from volery.core.errors import CommandError, ScenarioError
+from volery.core.plurals import counted
 from volery.engine.events import Event
 from volery.engine.lock_step import Partner
 from volery.engine.pacing import Pacer
@@ -22,6 +23,7 @@ from volery.runtime.build.gateway import build_gateway
 from volery.runtime.build.geometry import Geometry, WorldTopic
 from volery.runtime.build.graph import all_down, plan_faults
 from volery.runtime.build.message_loading import learn_messages
+from volery.runtime.build.node_loading import check_nodes
 from volery.runtime.build.vehicles import build_vehicles
 from volery.runtime.build.worlds import build_world
 from volery.runtime.checks import check_reset_seed, check_seconds, check_steps
@@ -59,6 +61,7 @@ from volery.runtime.vehicles.uav import Uav
 from volery.runtime.warmup.parallel_compilation import compiled
 from volery.runtime.warmup.requirements import needs_of
 from volery.scenario.catalog import ScenarioCatalog
+from volery.scenario.node_packages import check_packages
 from volery.scenario.schema import Scenario
 from volery.world.ground_cover import BARE_GROUND
 
@@ -119,7 +122,9 @@ class Simulation:
         self._replays: list[Replay] = []
         self._command_replay: CommandReplay | None = None
         self._geometry: Geometry | None = None
+        check_packages(scenario)
         learn_messages(scenario)  # modules of nodes may import them
+        check_nodes(scenario)
         with compiled(needs_of(scenario)):
             world = build_world(scenario, threads)
         self._pacer = pacer = Pacer()
@@ -333,6 +338,14 @@ class Simulation:
         with self.record(rate_hz) as recorder:
             self.run(seconds, speed=speed, on_progress=on_progress, progress=progress)
         return recorder.result()
+
+    def __repr__(self) -> str:
+        closed = ", closed" if self._closed else ""
+        return (
+            f"<Simulation '{self.scenario.name}': {self.time_s:.3f} of "
+            f"{self.scenario.duration_s:g} s, {counted(len(self.uavs), 'UAV')}, "
+            f"seed {self._manager.scenario.seed}{closed}>"
+        )
 
     def _repr_html_(self) -> str:
         """Returns time, UAVs and a map with the recorded paths, for notebooks."""

@@ -10,6 +10,7 @@ from typing import Any
 
 from volery.core.clock import s_from_ns
 from volery.core.errors import SnapshotError
+from volery.core.plurals import counted
 from volery.core.saved_state import Stateful
 from volery.engine.lock_step import Partner
 from volery.graph.nodes.node import Node
@@ -34,6 +35,9 @@ class Snapshot:
     starts: tuple[StartPose, ...]
     """UAVs of the simulation at that time."""
     state: dict[str, Any]
+
+    def __repr__(self) -> str:
+        return f"<Snapshot at {self.time_s:.3f} s of {counted(len(self.starts), 'UAV')}>"
 
     @property
     def time_s(self) -> float:

@@ -271,6 +271,14 @@ class VectorizedSimulation(BatchCommands):
             self._pool.shutdown()
             self.scene.close()
 
+    def __repr__(self) -> str:
+        closed = ", closed" if self._closed else ""
+        return (
+            f"<VectorizedSimulation '{self.scenario.name}': "
+            f"{counted(self.num_envs, 'environment')} of {counted(len(self._starts), 'UAV')}, "
+            f"{self.time_s:.3f} s{closed}>"
+        )
+
     def __enter__(self) -> VectorizedSimulation:
         return self
 

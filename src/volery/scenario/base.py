@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, get_args
 
@@ -129,6 +129,11 @@ class Data(Bounded):
         """Counts `kind` as given: it says which table this is, in a file too."""
         if "kind" in type(self).model_fields:
             self.model_fields_set.add("kind")
+
+    def __repr_args__(self) -> Iterable[tuple[str | None, Any]]:
+        """Yields the keys that were given, without those that have their defaults."""
+        given = self.model_fields_set
+        return [(key, value) for key, value in super().__repr_args__() if key in given]
 
     @model_validator(mode="before")
     @classmethod

@@ -27,8 +27,8 @@ class _UavFault(_Fault):
     """Name of the UAV, such as `uav1`."""
 
 
-class _Passing(_UavFault):
-    """A fault that may end."""
+class LastingFault(_UavFault):
+    """A fault of one UAV that lasts until it ends, or for good."""
 
     until_s: SimulatedTime | None = None
     """Simulated time at which the fault ends; None: it is permanent."""
@@ -40,7 +40,7 @@ class _Passing(_UavFault):
         return self
 
 
-class MotorFault(_Passing):
+class MotorFault(LastingFault):
     """A rotor produces part of its thrust, or none."""
 
     kind: Literal["motor"] = "motor"
@@ -51,7 +51,7 @@ class MotorFault(_Passing):
     """Remaining fraction of its thrust; 0 stops the rotor."""
 
 
-class SensorFault(_Passing):
+class SensorFault(LastingFault):
     """A sensor sends nothing, repeats its last measurement, or has a bias."""
 
     kind: Literal["sensor"] = "sensor"
@@ -70,14 +70,14 @@ class SensorFault(_Passing):
         return self
 
 
-class GnssFault(_Passing):
+class GnssFault(LastingFault):
     """No satellites are received."""
 
     kind: Literal["gnss_loss"] = "gnss_loss"
     """Loss of satellite signals."""
 
 
-class RadioFault(_Passing):
+class RadioFault(LastingFault):
     """A UAV's radio neither sends nor receives."""
 
     kind: Literal["radio"] = "radio"

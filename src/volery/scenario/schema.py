@@ -13,6 +13,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import Field, PrivateAttr, model_validator
 
 from volery.core.errors import ScenarioError, reason_of
+from volery.core.plurals import counted
 from volery.scenario.access import ScenarioAccess
 from volery.scenario.base import Data, Name, renamed
 from volery.scenario.faults import Fault
@@ -224,3 +225,14 @@ class Scenario(Data):
     def uav_count(self) -> int:
         """Number of UAVs in all groups."""
         return sum(group.count for group in self.uavs)
+
+    def __repr__(self) -> str:
+        types = ", ".join(dict.fromkeys(group.type for group in self.uavs))
+        parts = ("forest", "city", "grid_map")
+        there = [part.replace("_", " ") for part in parts if getattr(self.world, part) is not None]
+        return (
+            f"<Scenario '{self.name}': {counted(self.uav_count, 'UAV')} ({types}), "
+            f"{' and '.join(there) or 'open ground'}, {self.duration_s:g} s, seed {self.seed}>"
+        )
+
+    __str__ = __repr__

@@ -14,6 +14,7 @@ from volery.runtime.build.world_asset import kind_of
 from volery.scenario import library
 from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.load import load_scenario
+from volery.scenario.node_packages import missing_packages
 from volery.scenario.schema import Scenario
 from volery.server.cards import CARDS
 from volery.server.replies import RefusedError
@@ -69,4 +70,5 @@ def _card(scenario: Scenario, *, uploaded: bool) -> Card:
         "duration_s": scenario.duration_s,
         "picture": f"./api/scenarios/{scenario.name}.jpg" if has_picture else None,
         "uploaded": uploaded,
+        "missing": missing_packages(scenario),
     }

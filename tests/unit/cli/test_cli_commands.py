@@ -17,6 +17,7 @@ from volery.bridges.logs.log_writer import create_log
 from volery.cli import bench, doctor, start
 from volery.cli.app import app
 from volery.cli.error_reporting import guarded, word_logs
+from volery.cli.serve import named_problem
 from volery.core.errors import VoleryError
 from volery.core.machine import describe_machine, describe_versions
 from volery.scenario import library
@@ -229,6 +230,21 @@ def test_doctor_finds_a_cache_that_is_not_kept(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(compiled, "cache_dir", lambda: Path("/tmp/volery-kernels-0/abc"))
     with pytest.raises(doctor.UnfitError, match="VOLERY_CACHE_DIR"):
         doctor._kernels()
+
+
+def test_doctor_names_scenarios_that_lack_an_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "ompl", None)
+    result = runner.invoke(app, ["doctor"])
+    assert result.exit_code == 0, result.stdout
+    (line,) = [line for line in result.stdout.splitlines() if "extras" in line]
+    assert line.startswith("note  extras: forest_search does not start: global_planner needs ompl")
+    assert line.endswith('pip install "volery[autonomy]"')
+
+
+def test_a_problem_names_its_scenario_once() -> None:
+    what = "forest_search: slam needs gtsam"
+    assert named_problem("forest_search", what) == what
+    assert named_problem("flight.mcap", "it is damaged") == "flight.mcap: it is damaged"
 
 
 @pytest.fixture

@@ -90,3 +90,16 @@ def test_a_taken_port_gives_way(monkeypatch, capsys):
     assert "is taken; the page takes a free one" in capsys.readouterr().err
     monkeypatch.setattr("volery.cli.pages._is_taken", lambda _host, _port: False)
     assert _settings_of(RunOptions("hover", page="")).port == 8080
+
+
+@pytest.mark.parametrize(("taken", "port"), [(False, 8080), (True, 0)])
+def test_serve_and_run_take_the_same_port(monkeypatch, taken, port):
+    """The default port gives way, a port that was asked for does not."""
+    found = []
+    monkeypatch.setattr("volery.cli.pages._is_taken", lambda _host, _port: taken)
+    monkeypatch.setattr("volery.cli.serve.serve", found.append)
+    for words in ((), ("--port", "8099")):
+        result = CliRunner().invoke(app, ["serve", *words])
+        assert result.exit_code == 0, result.output
+    assert _settings_of(RunOptions(scenario="hover", page="")).port == port
+    assert [options.page.port for options in found] == [port, 8099]

@@ -8,10 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from volery.core.errors import VoleryError
+from volery.core.errors import ScenarioError, VoleryError
+from volery.scenario.load import load_scenario, parse_scenario
+from volery.scenario.node_names import registered_nodes
+from volery.scenario.node_packages import NODE_PACKAGES, missing_packages
 
 ROOT = Path(__file__).parents[3]
 EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+SMALL = {"types": {"f450": {}}, "uavs": [{"type": "f450", "position_m": [0.0, 0.0]}]}
 FOR_DEVELOPERS = {"test", "lint", "bench", "docs"}
 """Extras that are not part of `all`: tools to change, measure and document Volery."""
 
@@ -203,6 +207,38 @@ def test_what_lacks_a_package_says_which_command_installs_it(
         use()
     assert re.search(rf'needs? {package}: pip install "volery\[{extra}\]"', str(caught.value))
     assert "\n" not in str(caught.value)
+
+
+def test_scenarios_know_the_packages_of_their_nodes():
+    """Each module that a shipped node imports late is listed, for cards and for a check at once."""
+    of_nodes = {"autonomy", "vision", "mavlink"}
+    used = {(name.partition(".")[0], package, extra) for name, package, extra, _ in USES}
+    listed = {(need.module, need.package, need.extra) for need in NODE_PACKAGES}
+    assert listed == {use for use in used if use[2] in of_nodes}
+    assert {need.node for need in NODE_PACKAGES} <= registered_nodes().keys()
+
+
+def test_a_scenario_without_its_packages_fails_before_anything_is_built(monkeypatch):
+    from volery.runtime import simulation
+
+    monkeypatch.setattr(simulation, "build_world", lambda *_: pytest.fail("a world was built"))
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    scenario = load_scenario("servoing")
+    command = r'tag_detection needs opencv-python-headless: pip install "volery\[vision\]"'
+    with pytest.raises(ScenarioError, match=f"^servoing: {command}$"):
+        simulation.Simulation(scenario)
+    monkeypatch.setitem(sys.modules, "no_such_module", None)
+    data = {"name": "own", "nodes": [{"node": "no_such_module:Node"}], **SMALL}
+    with pytest.raises(ScenarioError, match=r"own: nodes\[0\]: .*cannot be imported"):
+        simulation.Simulation(parse_scenario(data))
+
+
+def test_loop_closures_alone_need_gtsam(monkeypatch):
+    monkeypatch.setitem(sys.modules, "gtsam", None)
+    data = {"name": "own", "nodes": [{"node": "slam"}], **SMALL}
+    assert "slam needs gtsam" in missing_packages(parse_scenario(data))
+    data["nodes"] = [{"node": "slam", "parameters": {"loop_closures": False}}]
+    assert missing_packages(parse_scenario(data)) == ""
 
 
 def test_all_is_the_union_of_the_extras_for_users():

@@ -5,7 +5,7 @@ import pytest
 
 from volery.control.flight_modes import FlightMode
 from volery.control.trajectory import Trajectory
-from volery.core.errors import CommandError
+from volery.core.errors import CommandError, WaitTimeoutError
 from volery.runtime import VectorizedSimulation
 from volery.scenario.load import parse_scenario
 
@@ -115,7 +115,58 @@ def test_flight_modes_of_all_return_their_futures(simulate, three_data):
     assert all(future.done() for future in futures)
     simulation.run_until(vehicles.land())
     assert {uav.mode for uav in simulation.uavs.values()} == {FlightMode.LANDED}
-    assert vehicles.land() == vehicles.hold() == []
+    with pytest.raises(CommandError, match="land reaches no UAV: uav1 is on the ground already"):
+        vehicles.land()
+
+
+def test_batches_that_reach_no_uav_say_why(simulate, three_data):
+    """A script that commands before it waits must not end without a flight."""
+    for uav in three_data["uavs"]:
+        uav["position_m"] = uav["position_m"][:2]
+        uav["on_start"] = "take_off"
+    simulation = simulate(three_data)
+    vehicles = simulation.vehicles
+    with pytest.raises(CommandError, match=r"take_off reaches no UAV: uav1 .*TAKE_OFF.*wait\(\)"):
+        vehicles.take_off(2.0)
+    for stream in ("command_velocity", "command_velocity_map", "command_acceleration"):
+        with pytest.raises(CommandError, match=f"{stream} reaches no UAV: uav1 is TAKE_OFF, uav2"):
+            getattr(vehicles, stream)([1.0, 0.0, 0.0])
+    with pytest.raises(CommandError, match="command_setpoint reaches no UAV: uav1 is TAKE_OFF"):
+        vehicles.command_setpoint([0.0, 0.0, 3.0])
+    goals = [[0.0, 1.0, 3.0], [4.0, 1.0, 3.0], [8.0, 1.0, 3.0]]
+    assert len(vehicles.go_to(goals)) == 3  # as the command to a single UAV, it ends a take-off
+    results = vehicles.wait()
+    np.testing.assert_allclose([one.position_map for one in results], goals, atol=0.3)
+    assert vehicles.wait() == []
+    simulation.run_until(vehicles.land())
+    for command in (vehicles.land, vehicles.hold, lambda: vehicles.go_to([0.0, 0.0, 3.0])):
+        with pytest.raises(CommandError, match=r"reaches no UAV: uav1 is on the ground"):
+            command()
+    for nothing in ([], (), {}, (future for future in ())):
+        with pytest.raises(CommandError, match="nothing to wait for"):
+            simulation.run_until(nothing)
+
+
+def test_all_uavs_wait_within_one_timeout(simulate, three_data):
+    simulation = simulate(three_data)
+    simulation.vehicles.take_off(3.0)
+    with pytest.raises(WaitTimeoutError, match=r"take_off of uav2 is not done within 0\.5 s"):
+        simulation.vehicles.wait(0.5)
+    assert simulation.time_s == pytest.approx(0.5)
+    assert [one.mode for one in simulation.vehicles.wait()] == [FlightMode.HOLD]
+    with pytest.raises(CommandError, match="timeout_s must be a number"):
+        simulation.vehicles.wait(-1.0)
+
+
+def test_environments_wait_together_and_ignore_streams_that_reach_none(three_data):
+    with VectorizedSimulation(parse_scenario(three_data), 2, seeds=[1, 2], threads=1) as envs:
+        assert len(envs.take_off(2.0)) == 2
+        assert [one.mode for one in envs.wait()] == [FlightMode.HOLD] * 2
+        envs.land()
+        envs.wait()
+        envs.command_velocity([1.0, 0.0, 0.0])  # policies act at each step, also after a landing
+        with pytest.raises(CommandError, match="hold reaches no UAV"):
+            envs.hold()
 
 
 def test_a_batch_replaces_flight_modes_of_the_uavs_that_it_reaches(simulate, three_data):

@@ -1,6 +1,7 @@
 """Scenarios that clients of the graph load with changes."""
 
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -63,6 +64,28 @@ def test_what_cannot_be_is_refused_before_the_world_goes(
     )
     assert not answer.success
     assert all(word in answer.message for word in words), answer.message
+    assert asked == []
+
+
+@pytest.mark.parametrize("service", ["/volery/load_scenario", "/load_world"])
+def test_a_scenario_whose_packages_are_missing_does_not_end_the_flight(
+    simulate, flat_data, service, monkeypatch
+):
+    monkeypatch.setitem(sys.modules, "ompl", None)
+    monkeypatch.setitem(sys.modules, "gtsam", None)
+    asked = []
+    simulation = simulate(flat_data, on_load=asked.append)
+    if service == "/load_world":
+        fields = {"world_resource": {"uri": "forest_search"}}
+        answer = ask(simulation, service, **fields).result
+        message, done = answer.error_message, answer.result == 1
+    else:
+        answer = ask(simulation, service, scenario="forest_search")
+        message, done = answer.message, answer.success
+    assert not done
+    assert message == (
+        'forest_search: slam needs gtsam, global_planner needs ompl: pip install "volery[autonomy]"'
+    )
     assert asked == []
 
 

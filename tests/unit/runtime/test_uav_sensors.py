@@ -251,3 +251,25 @@ def test_environments_have_the_same_names(simulate, flat_data):
         assert not after.ranges.flags.writeable
         with pytest.raises(SensorError, match="of 1/uav1 has no sample yet"):
             _ = envs.uav(1, "uav1").sensors["horizontal"].latest
+
+
+def test_a_sensor_is_found_by_its_kind_where_it_is_the_only_one(simulate, flat_data):
+    """Scenarios name the GNSS `fix` after its topic; people look for the kind."""
+    flat_data["types"]["f450"]["sensors"] += [
+        {"kind": "gnss"},
+        {"kind": "barometer"},
+        {"kind": "lidar", "name": "left"},
+    ]
+    simulation = simulate(flat_data)
+    sensors = simulation.uavs["uav1"].sensors
+    assert [sensors[kind].name for kind in ("gnss", "barometer")] == ["fix", "pressure"]
+    assert "gnss" in sensors
+    assert isinstance(sensors["gnss"].next(), GnssSample)
+    assert "gnss" not in list(sensors)
+    with pytest.raises(SensorError, match=r"no sensor 'lidar'; known: .*and left of this kind"):
+        sensors["lidar"]
+    with pytest.raises(SensorError, match=r"no sensor 'gps'; known: .*fix"):
+        sensors["gps"]
+    with VectorizedSimulation(parse_scenario(flat_data), 2) as envs:
+        assert envs.sensors["uav1"]["gnss"].name == "fix"
+        assert envs.uav(1, "uav1").sensors["gnss"].name == "fix"

@@ -1,5 +1,6 @@
 """Cards of scenarios, and their pictures."""
 
+import sys
 from io import BytesIO
 from pathlib import Path
 from runpy import run_path
@@ -11,6 +12,7 @@ from PIL import Image
 from volery.scenario import library
 from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.load import load_scenario, parse_scenario
+from volery.server import scenarios
 from volery.server.cards import CARDS
 from volery.server.scenarios import cards_of
 
@@ -42,6 +44,15 @@ def test_cards_tell_what_the_scenarios_say():
     assert "lidar" in survey["sensors"]
     assert (hover["world"], cards["grid_map"]["world"]) == ("open", "grid_map")
     assert not any(card["uploaded"] for card in cards.values())
+
+
+def test_cards_say_which_packages_are_missing(monkeypatch):
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    monkeypatch.setattr(scenarios, "_shipped", scenarios._shipped.__wrapped__)
+    lacking = {card["name"]: card["missing"] for card in cards_of(ScenarioCatalog())}
+    command = 'tag_detection needs opencv-python-headless: pip install "volery[vision]"'
+    assert lacking.pop("servoing") == command
+    assert set(lacking.values()) == {""}
 
 
 def test_cards_and_pictures_over_http():

@@ -1,6 +1,6 @@
 import { describe, expect, it, vi } from "vitest";
 import { Latest } from "./latest.ts";
-import { RateMeter, rateText } from "./rates.ts";
+import { ArrivalMeter, RateMeter, ratesText, rateText } from "./rates.ts";
 
 describe("a rate", () => {
   it("is that of the stamps, not of their arrival", () => {
@@ -14,6 +14,21 @@ describe("a rate", () => {
     const meter = new RateMeter();
     for (const stamp of [100, 101, 0, 0.5, 1]) meter.add(stamp);
     expect(meter.hz).toBeCloseTo(2);
+  });
+
+  it("in wall time is that of the arrivals, and falls while nothing comes", () => {
+    const meter = new ArrivalMeter();
+    expect(meter.hzAt(0)).toBeNaN();
+    for (let i = 0; i < 5; i++) meter.add(10 + i);
+    expect(meter.hzAt(14)).toBeCloseTo(1);
+    expect(meter.hzAt(15)).toBeCloseTo(1);
+    expect(meter.hzAt(20)).toBeCloseTo(0.4);
+  });
+
+  it("is told for both clocks where they differ", () => {
+    expect(ratesText(0.7, 10)).toBe("10 Hz simulated, 0.7 Hz real");
+    expect(ratesText(9.7, 10)).toBe("10 Hz");
+    expect(ratesText(NaN, NaN)).toBe("–");
   });
 
   it("is told shortly", () => {

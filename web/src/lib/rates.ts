@@ -21,6 +21,39 @@ export class RateMeter {
   }
 }
 
+/** How often something comes in wall time; it falls while nothing comes. */
+export class ArrivalMeter {
+  private arrivals: number[] = [];
+
+  constructor(private readonly most = 20) {}
+
+  /** Something has come at this wall time, s. */
+  add(wallS: number): void {
+    this.arrivals.push(wallS);
+    if (this.arrivals.length > this.most) this.arrivals.shift();
+  }
+
+  /** Hz at this wall time, s; NaN before there are two. */
+  hzAt(nowS: number): number {
+    const { arrivals } = this;
+    if (arrivals.length < 2) return NaN;
+    const intervals = arrivals.length - 1;
+    const span = arrivals.at(-1)! - arrivals[0]!;
+    const waited = nowS - arrivals.at(-1)!;
+    return intervals / (span + (waited > (2 * span) / intervals ? waited : 0));
+  }
+}
+
+/** Rates that differ by less are told as one. */
+const SAME = 0.2;
+
+/** The rate in simulated time, and the one in wall time where it differs. */
+export function ratesText(wallHz: number, simulatedHz: number): string {
+  const differ = Math.abs(wallHz - simulatedHz) > SAME * simulatedHz;
+  const simulated = rateText(simulatedHz);
+  return differ ? `${simulated} simulated, ${rateText(wallHz)} real` : simulated;
+}
+
 export function rateText(hz: number): string {
   if (Number.isNaN(hz)) return "–";
   return `${hz >= 9.95 ? hz.toFixed(0) : hz.toFixed(1)} Hz`;

@@ -79,6 +79,11 @@ function keep(values: number[], value: number): void {
   if (values.length > FRAMES) values.shift();
 }
 
+/** Wall time since the simulation was at this simulated time, s; NaN: not known. */
+export function wallAgeS(stampS: number): number {
+  return (nowMs() - serverMs(stampS) - offset.ms) / 1000;
+}
+
 /** When, on this page's clock, what is shown was so; NaN: not known. */
 function shownMs(): number {
   return serverMs(link.frames.stampS) + offset.ms;

@@ -29,7 +29,7 @@ from volery.graph.nodes.launch import Launch, make_node
 from volery.graph.nodes.node import Context, Node
 from volery.scenario.access import ScenarioAccess
 from volery.scenario.node_names import node_path
-from volery.scenario.schema import NodeEntry
+from volery.scenario.schema import NodeEntry, Scenario
 
 _SHIPPED = ("volery.autonomy.", "volery.comms.", "volery.mavlink.")
 """Packages with nodes; some other modules of Volery are programs that an import would start."""
@@ -64,6 +64,18 @@ def _check_base(node: object, entry: NodeEntry, where: str) -> None:
             f'of Node before it does anything else; begin it with: super().__init__("{name.lower()}'
             '", **options)'
         )
+
+
+def check_nodes(scenario: Scenario) -> None:
+    """Imports the classes of all nodes, so that one that fails does so before a world is built.
+
+    Raises `ScenarioError` as `find_node` does.
+    """
+    for name, kind in scenario.types.items():
+        for k, entry in enumerate(kind.nodes):
+            find_node(entry, f"{scenario.name}: types.{name}.nodes[{k}]", scenario.access)
+    for k, entry in enumerate(scenario.nodes):
+        find_node(entry, f"{scenario.name}: nodes[{k}]", scenario.access)
 
 
 def find_node(entry: NodeEntry, where: str, access: ScenarioAccess) -> type[Any]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from volery.engine.faults import FaultPlan
 from volery.graph.graph import Graph
-from volery.scenario.faults import Fault, parse_fault
+from volery.scenario.faults import Fault, LastingFault, parse_fault
 
 
 class SimulationFaults:
@@ -18,6 +18,14 @@ class SimulationFaults:
 
     def __init__(self, plan: FaultPlan, graph: Graph, check_open: Callable[[], None]) -> None:
         self._plan, self._graph, self._check_open = plan, graph, check_open
+
+    @property
+    def active(self) -> tuple[LastingFault, ...]:
+        """Faults that have begun and not ended, oldest first; `at_s` is when they began.
+
+        Gusts and displacements end by themselves and are not among them.
+        """
+        return self._plan.active
 
     def inject(self, fault: Fault | Mapping[str, Any]) -> None:
         """Injects a fault as in a scenario's `faults`, at once if its time is past.

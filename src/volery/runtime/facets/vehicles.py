@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from volery.comms.radio.network import RadioNetwork
 from volery.control.fleet import Fleet
+from volery.control.flight_modes import FlightMode
 from volery.core.errors import CommandError
+from volery.core.plurals import counted
 from volery.graph.nodes.node import Node
 from volery.runtime.build.placement import StartPose
 from volery.runtime.build.sensor_suites import lidar_mounts
@@ -162,6 +165,23 @@ class SimulationVehicles(BatchCommands):
 
     def _future_lists(self) -> Sequence[FlightFutures]:
         return [self._manager.futures]
+
+    def _check_reach(self, command: str, deaf: Collection[FlightMode]) -> None:
+        fleet = self._manager.engine.fleet
+        if not np.isin(fleet.modes, list(deaf)).all():
+            return
+        modes = ", ".join(
+            f"{name} is {fleet.mode(i).name}" for i, name in enumerate(self.names[:3])
+        )
+        more = f" and {len(self.names) - 3} more" if len(self.names) > 3 else ""
+        raise CommandError(f"{command} reaches no UAV: {modes}{more}; take off and wait() first")
+
+    def __repr__(self) -> str:
+        uavs = self._manager.uavs.values()
+        modes = [f"{uav.name} {uav.mode.name}" for uav in list(uavs)[:6]]
+        if len(uavs) > 6:
+            modes.append(f"{len(uavs) - 6} more")
+        return f"<{counted(len(uavs), 'UAV')}: {', '.join(modes)}>"
 
     def row_of(self, name: str) -> int:
         """Returns a UAV's row in fleet arrays. Raises `CommandError` for an unknown name."""

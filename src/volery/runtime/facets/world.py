@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from volery.control.setpoints import checked, checked_attitude
 from volery.core.errors import CommandError
+from volery.core.plurals import counted
 from volery.engine.engine import Engine
 from volery.graph.graph import Graph
 from volery.runtime.build.worlds import BuiltWorld
@@ -59,6 +60,16 @@ class SimulationWorld:
         self._check_open = check_open
         self._topics = WeatherTopics(graph, settings, lambda: self.weather, self.set_weather)
         self._topics.tell(self.weather)
+
+    def __repr__(self) -> str:
+        parts = []
+        if self.forest is not None:
+            parts.append(counted(len(self.forest), "tree"))
+        if self.city is not None:
+            parts.append(counted(len(self.city.buildings), "building"))
+        if self.actors is not None:
+            parts.append(counted(len(self.actors.names), "actor"))
+        return f"<world: {', '.join(parts) or 'open ground'}>"
 
     @property
     def weather(self) -> Weather:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 
 from volery.graph.session import Gateway
+from volery.runtime.monitoring.active_faults import faults_topic
 from volery.runtime.monitoring.ground_truth_tf import ground_truth_topic
 from volery.runtime.monitoring.status import Status, StatusSources
 from volery.runtime.monitoring.vehicles import VehicleTopic
@@ -28,7 +29,11 @@ class Monitor:
         self._graph = gateway.graph
         engine, publisher, outlet = manager.engine, manager.publisher, manager.outlet
         vehicles = VehicleTopic(engine, manager.uavs, gateway, operators.holder_of)
-        self._present = (ground_truth_topic(gateway.graph, engine), vehicles.present)
+        self._present = (
+            ground_truth_topic(gateway.graph, engine),
+            vehicles.present,
+            faults_topic(gateway.graph, manager.faults),
+        )
         self._status = Status(manager.scenario, engine, gateway, sources)
         engine.every(
             _CLOCK_PERIOD_S,

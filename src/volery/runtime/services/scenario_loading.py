@@ -13,6 +13,7 @@ from volery.runtime.build.fleet import check_types
 from volery.runtime.services.results import Fields, offer_command
 from volery.scenario import changes as scenario_changes
 from volery.scenario.changes import Changes, WorldRequest
+from volery.scenario.node_packages import check_packages
 from volery.scenario.schema import Scenario
 from volery.scenario.sensor_sets import SENSOR_SETS, describe
 from volery.vehicle.airframe import airframe_names
@@ -37,7 +38,9 @@ def offer_choices(
             raise CommandError(f"no scenario '{request.scenario}'; known: {known}")
         changes = scenario_changes.parse_changes(request.changes)
         _check_airframe(changes)
-        check_types(scenario_changes.apply(find(request.scenario), changes))
+        scenario = scenario_changes.apply(find(request.scenario), changes)
+        check_types(scenario)
+        check_packages(scenario)
         change(WorldRequest(request.scenario, changes))
         return {"message": f"{request.scenario} is being loaded"}
 

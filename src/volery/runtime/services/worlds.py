@@ -8,6 +8,7 @@ from typing import Any
 
 from volery.core.errors import ScenarioError, VoleryError
 from volery.graph.graph import Graph
+from volery.runtime.build.fleet import check_types
 from volery.runtime.services.filters import tag_filter
 from volery.runtime.services.results import (
     Fields,
@@ -23,6 +24,7 @@ from volery.scenario import library
 from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.changes import LogRequest, WorldRequest
 from volery.scenario.load import load_scenario
+from volery.scenario.node_packages import check_packages
 from volery.scenario.schema import Scenario
 
 _SRV = "simulation_interfaces/srv"
@@ -64,6 +66,8 @@ def offer_worlds(
 
     def load(request: Any) -> Fields:
         scenario = _wanted(request.world_resource, shelf) if on_load is not None else None
+        if scenario is not None:
+            _check_start(scenario)
         change(None if scenario is None else WorldRequest(scenario.name))
         return {"world": _world(scenario, shelf.names())} if scenario is not None else {}
 
@@ -91,6 +95,15 @@ def offer_worlds(
     offer_result(graph, "/unload_world", f"{_SRV}/UnloadWorld", unload)
     offer_command(graph, "/volery/play_recording", "volery_interfaces/srv/PlayRecording", play)
     offer_choices(graph, shelf.names, lambda name: _read(shelf, name), change)
+
+
+def _check_start(scenario: Scenario) -> None:
+    """Refuses a scenario that cannot be built here, while the present one flies on."""
+    try:
+        check_types(scenario)
+        check_packages(scenario)
+    except VoleryError as error:
+        raise RefusedError(ResultCode.OPERATION_FAILED, str(error)) from None
 
 
 def tags_of(scenario: Scenario) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from itertools import zip_longest
 
 import numpy as np
@@ -15,13 +15,17 @@ from volery.control.flight_modes import FlightMode
 from volery.control.setpoints import ControlLevel
 from volery.control.trajectory import Trajectory
 from volery.core.arrays import Array
+from volery.core.clock import s_from_ns
 from volery.core.errors import CommandError
-from volery.runtime.vehicles.flight_future import FlightFuture
+from volery.runtime.checks import check_timeout
+from volery.runtime.vehicles.flight_future import CommandResult, FlightFuture
 from volery.runtime.vehicles.flight_futures import FlightFutures
 from volery.runtime.vehicles.uav import Uav
 from volery.vehicle.fleet import FleetState
 
+_DOWN = (FlightMode.LANDED, FlightMode.CRASHED)
 _NOT_GUIDED = (FlightMode.LANDED, FlightMode.TAKE_OFF, FlightMode.CRASHED)
+_NOT_LOW_LEVEL = (FlightMode.CRASHED,)
 
 
 class BatchCommands(ABC):
@@ -29,9 +33,10 @@ class BatchCommands(ABC):
 
     Arrays have the shape (n, ...) of the UAVs in fleet order, or (K, n, ...) in K environments, and
     broadcast to it. Commands act from the next physics step. Crashed UAVs ignore all of them; UAVs
-    on the ground and taking off ignore those that guide a flight (velocity, acceleration, setpoint,
-    position, trajectory). Raises `CommandError`, and changes nothing, for numbers that do not
-    broadcast, are not finite or are out of range, and for plants that lack a command.
+    on the ground ignore those that guide a flight, and during a take-off those that stream
+    (velocity, acceleration, setpoint). Raises `CommandError`, and changes nothing, for numbers that
+    do not broadcast, are not finite or are out of range, for plants that lack a command, and for a
+    flight mode that no UAV accepts, with the reason of the first one.
     """
 
     _checked_fleets: tuple[Fleet, ...] = ()
@@ -41,16 +46,30 @@ class BatchCommands(ABC):
 
     def take_off(self, altitude_m: float | None = None) -> list[FlightFuture]:
         """Takes off with all UAVs on the ground, by `altitude_m`, m; returns their futures."""
-        modes = (FlightMode.LANDED,)
-        return [uav.take_off(altitude_m) for uav in self._handles() if uav.mode in modes]
+        landed = [uav for uav in self._handles() if uav.mode is FlightMode.LANDED]
+        return self._begin_all("take_off", landed, lambda uav: uav.take_off(altitude_m))
 
     def hold(self) -> list[FlightFuture]:
         """Stops all flying UAVs, which then hold; returns their futures."""
-        return [uav.hold() for uav in self._flying()]
+        return self._begin_all("hold", self._flying(), lambda uav: uav.hold())
 
     def land(self) -> list[FlightFuture]:
         """Lands all flying UAVs; returns their futures."""
-        return [uav.land() for uav in self._flying()]
+        return self._begin_all("land", self._flying(), lambda uav: uav.land())
+
+    def wait(self, timeout_s: float = 60.0) -> list[CommandResult]:
+        """Waits for the present flight commands of all UAVs, such as the take-off at the start.
+
+        Returns the results of the UAVs that had a command to complete. `timeout_s` is simulated
+        time, s, for all together. See `Uav.wait`.
+        """
+        check_timeout(timeout_s)
+        pending = [future for uav in self._handles() if (future := uav.pending_command)]
+        if not pending:
+            return []
+        fleet = self._fleets()[0][0]
+        end_s = s_from_ns(fleet.time_ns) + timeout_s
+        return [future.wait(max(0.0, end_s - s_from_ns(fleet.time_ns))) for future in pending]
 
     def go_to(self, position_map: ArrayLike, yaw: ArrayLike | None = None) -> list[FlightFuture]:
         """Flies to positions (n, 3), m, in the map frame, with headings `yaw` (n,), rad.
@@ -61,10 +80,12 @@ class BatchCommands(ABC):
         limits = self._find_limits()
         goals = limits.positions(self._flat("position", position_map, (3,)))
         yaws = self._flat_yaw(yaw)
-        return [
-            uav.go_to(goals[i], None if yaws is None else float(yaws[i]))
-            for i, uav in self._guided()
-        ]
+        rows = {uav: i for i, uav in enumerate(self._handles())}
+
+        def go(uav: Uav) -> FlightFuture:
+            return uav.go_to(goals[rows[uav]], None if yaws is None else float(yaws[rows[uav]]))
+
+        return self._begin_all("go_to", self._flying(), go)
 
     def follow_trajectory(
         self, trajectories: Trajectory | Sequence[Trajectory]
@@ -78,7 +99,10 @@ class BatchCommands(ABC):
             raise CommandError(
                 f"{len(several)} trajectories for {len(handles)} UAVs; give one each"
             )
-        return [uav.follow_trajectory(several[i]) for i, uav in self._guided()]
+        own = dict(zip(handles, several, strict=True))
+        return self._begin_all(
+            "follow_trajectory", self._flying(), lambda uav: uav.follow_trajectory(own[uav])
+        )
 
     # ------------------------------------------------------------------------ lower-level commands
 
@@ -87,6 +111,7 @@ class BatchCommands(ABC):
         limits = self._find_limits()
         velocities = limits.velocities(self._flat("velocity", velocity, (3,)))
         rates = limits.yaw_rates(self._flat("yaw rate", yaw_rate))
+        self._check_reach("command_velocity", _NOT_GUIDED)
         for fleet, rows in self._fleets():
             fleet.command_velocities(velocities[rows], rates[rows])
         self._replace_futures("command_velocity", FlightMode.VELOCITY)
@@ -98,6 +123,7 @@ class BatchCommands(ABC):
         limits = self._find_limits()
         velocities = limits.velocities(self._flat("velocity", velocity, (3,)))
         rates, yaws = limits.yaw_rates(self._flat("yaw rate", yaw_rate)), self._flat_yaw(yaw)
+        self._check_reach("command_velocity_map", _NOT_GUIDED)
         for fleet, rows in self._fleets():
             fleet.command_map_velocities(velocities[rows], _of(yaws, rows), rates[rows])
         self._replace_futures("command_velocity_map", FlightMode.VELOCITY)
@@ -109,6 +135,7 @@ class BatchCommands(ABC):
         limits = self._find_limits()
         accelerations = limits.accelerations(self._flat("acceleration", acceleration_map, (3,)))
         rates, yaws = limits.yaw_rates(self._flat("yaw rate", yaw_rate)), self._flat_yaw(yaw)
+        self._check_reach("command_acceleration", _NOT_GUIDED)
         for i, uav in self._guided():
             angle = None if yaws is None else float(yaws[i])
             uav.command_acceleration(accelerations[i], angle, float(rates[i]))
@@ -135,6 +162,7 @@ class BatchCommands(ABC):
             ),
         }
         rates, yaws = limits.yaw_rates(self._flat("yaw rate", yaw_rate)), self._flat_yaw(yaw)
+        self._check_reach("command_setpoint", _NOT_GUIDED)
         for fleet, rows in self._fleets():
             own = {name: values[rows] for name, values in setpoints.items()}
             fleet.command_setpoints(own, _of(yaws, rows), rates[rows])
@@ -194,8 +222,25 @@ class BatchCommands(ABC):
     # ------------------------------------------------------------------------------------ inside
 
     def _flying(self) -> list[Uav]:
-        down = (FlightMode.LANDED, FlightMode.CRASHED)
-        return [uav for uav in self._handles() if uav.mode not in down]
+        return [uav for uav in self._handles() if uav.mode not in _DOWN]
+
+    def _begin_all(
+        self, command: str, uavs: Sequence[Uav], begin: Callable[[Uav], FlightFuture]
+    ) -> list[FlightFuture]:
+        """Begins a flight mode of `uavs`, which accept it; raises `CommandError` without any."""
+        if not uavs and self._handles():
+            try:
+                begin(self._handles()[0])  # it refuses, and says why
+            except CommandError as error:
+                raise CommandError(
+                    f"{command} reaches no UAV: {error}; wait() waits for their present commands"
+                ) from None
+        return [begin(uav) for uav in uavs]
+
+    def _check_reach(  # noqa: B027 - environments have nothing to check
+        self, command: str, deaf: Collection[FlightMode]
+    ) -> None:
+        """Refuses a command that streams if all UAVs are in `deaf` modes; environments do not."""
 
     def _guided(self) -> list[tuple[int, Uav]]:
         """Returns the UAVs that guided commands reach, with their rows."""
@@ -208,6 +253,7 @@ class BatchCommands(ABC):
     def _command_all(
         self, command: str, level: ControlLevel, setpoints: Mapping[str, Array | float]
     ) -> None:
+        self._check_reach(command, _NOT_LOW_LEVEL)
         for fleet, rows in self._fleets():
             own = {
                 name: values[rows] if isinstance(values, np.ndarray) else values

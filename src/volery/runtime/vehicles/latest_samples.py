@@ -32,6 +32,8 @@ class LatestSamples:
         self._places: dict[str, tuple[int, int]] = {}
         """Bank and row of each sensor by path."""
         self._mounts: dict[str, Mount] = {}
+        self._kinds: dict[str, str] = {}
+        """Kinds of the sensors by path."""
         self._names: dict[str, tuple[str, ...]] = {}
         """Names of the sensors by UAV."""
         self._requested: set[str] = set()
@@ -52,10 +54,11 @@ class LatestSamples:
         }
         self._batches = {}
         self._single = {path: before[path] for path in self._places if before.get(path) is not None}
-        self._mounts = {}
+        self._mounts, self._kinds = {}, {}
         names: dict[str, list[str]] = {}
         for sensor in fitted:
             self._mounts[sensor.id.path] = sensor.mount
+            self._kinds[sensor.id.path] = sensor.spec.kind
             names.setdefault(sensor.id.uav_name, []).append(sensor.id.name)
         self._names = {uav: tuple(own) for uav, own in names.items()}
         self._requested &= self._places.keys()
@@ -103,6 +106,10 @@ class LatestSamples:
         path = f"{uav}/{sensor}"
         if self.is_camera(uav, sensor):
             self._requested.add(path)
+
+    def kind(self, uav: str, sensor: str) -> str:
+        """Returns the kind of a sensor, such as `gnss`."""
+        return self._kinds[f"{uav}/{sensor}"]
 
     def is_camera(self, uav: str, sensor: str) -> bool:
         """Returns whether a sensor is a camera."""

@@ -62,9 +62,27 @@ class Uav:
         """Its type in the scenario."""
         self._check_goal = check_goal
 
+    def __repr__(self) -> str:
+        kind = f" ({self.type_name})" if self.type_name else ""
+        if self._place is None:
+            return f"<Uav '{self._path}'{kind}: deleted>"
+        x, y, z = self.position_map.tolist()
+        return f"<Uav '{self._path}'{kind}: {self.mode.name} at ({x:.2f}, {y:.2f}, {z:.2f}) m>"
+
+    def _repr_html_(self) -> str:
+        """Returns flight mode, motion, battery and sensors, for notebooks."""
+        from volery.runtime.notebook_view import uav_html
+
+        return uav_html(self)
+
     def move_to(self, place: tuple[Fleet, int] | None) -> None:
         """Follows the UAV to another fleet and row, or marks the UAV as deleted (None)."""
         self._place = place
+
+    @property
+    def is_deleted(self) -> bool:
+        """Whether it was deleted; its state and commands then raise `CommandError`."""
+        return self._place is None
 
     @property
     def _fleet(self) -> Fleet:

@@ -10,6 +10,9 @@ from volery.runtime.checks import check_seconds
 from volery.runtime.vehicles.sample_stream import SampleStream
 from volery.sensors.sensor_samples import SensorSample
 
+_NAMED_ONLY = ("lidar", "camera")
+"""Kinds without a usual name: which one is meant may change with the next that is added."""
+
 
 class UnknownSensorError(SensorError, KeyError):
     """A UAV has no sensor of this name."""
@@ -28,6 +31,9 @@ class SampleSource(Protocol):
 
     def request(self, uav: str, sensor: str) -> None:
         """Makes a camera render from now on."""
+
+    def kind(self, uav: str, sensor: str) -> str:
+        """Returns the kind of a sensor, such as `gnss`."""
 
     def is_camera(self, uav: str, sensor: str) -> bool:
         """Returns whether a sensor is a camera."""
@@ -142,9 +148,13 @@ class UavSensors(Mapping[str, UavSensor]):
         self._uav = uav
 
     def __getitem__(self, name: str) -> UavSensor:
-        """Returns a sensor. Raises `UnknownSensorError`, a `KeyError`."""
-        _check_exists(self._source, self._uav, name)
-        return UavSensor(self._source, self._runs, self._uav, name)
+        """Returns a sensor by its name, or by its kind if it is the only one of that kind.
+
+        LIDARs and cameras are found by name alone.
+        Raises `UnknownSensorError`, a `KeyError`.
+        """
+        kinds = {own: self._source.kind(self._uav, own) for own in self}
+        return UavSensor(self._source, self._runs, self._uav, find_sensor(self._uav, name, kinds))
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._source.names(self._uav))
@@ -154,6 +164,21 @@ class UavSensors(Mapping[str, UavSensor]):
 
     def __repr__(self) -> str:
         return f"<sensors of {self._uav}: {', '.join(self)}>"
+
+
+def find_sensor(uav: str, wanted: str, kinds: Mapping[str, str]) -> str:
+    """Returns the name of the sensor that `wanted` names; `kinds` are the kinds by name.
+
+    Raises `UnknownSensorError`, a `KeyError`.
+    """
+    if wanted in kinds:
+        return wanted
+    found = [name for name, kind in kinds.items() if kind == wanted]
+    if len(found) == 1 and wanted not in _NAMED_ONLY:
+        return found[0]
+    known = ", ".join(kinds) or "none"
+    of_kind = f", and {' and '.join(found)} of this kind" if found else ""
+    raise UnknownSensorError(f"{uav} has no sensor '{wanted}'; known: {known}{of_kind}")
 
 
 def _check_exists(source: SampleSource, uav: str, name: str) -> None:

@@ -11,6 +11,8 @@ export interface ScenarioCard {
   sensors: string[];
   world: "forest" | "city" | "grid_map" | "open";
   duration_s: number;
+  /** Which packages it lacks, with the command that installs them; empty: none. */
+  missing: string;
   /** Relative URL; null: none is there. */
   picture: string | null;
   uploaded: boolean;

@@ -1,6 +1,6 @@
 import { Text } from "@mantine/core";
 import { useState } from "react";
-import { rateText } from "../../lib/rates.ts";
+import { ratesText } from "../../lib/rates.ts";
 import { spanText } from "../../lib/time.ts";
 import { showPicture, useLayout, type Tile } from "../../state/layout.ts";
 import { FloatingTile } from "../FloatingTile.tsx";
@@ -15,7 +15,11 @@ const MOST_SHARE = 0.25;
 export function CameraTile({ camera, usual }: { camera: CameraTopic; usual: Tile }) {
   const [canvas, setCanvas] = useState<HTMLCanvasElement | null>(null);
   const width = useLayout((layout) => layout.tiles[camera.name]?.width ?? usual.width);
-  const { aspect, hz, ageS, range, problem } = useCameraImage(camera, canvas, width >= LARGE_PX);
+  const { aspect, hz, simulatedHz, ageS, range, problem } = useCameraImage(
+    camera,
+    canvas,
+    width >= LARGE_PX,
+  );
   return (
     <FloatingTile
       name={camera.name}
@@ -32,7 +36,7 @@ export function CameraTile({ camera, usual }: { camera: CameraTopic; usual: Tile
         </Text>
       )}
       <Text size="xs" className="picture-label" aria-label={`${camera.title}: rate and age`}>
-        {rateText(hz)} · {spanText(ageS)} old
+        {ratesText(hz, simulatedHz)} · {spanText(ageS)} old
       </Text>
       {range !== null && <Legend range={range} />}
     </FloatingTile>

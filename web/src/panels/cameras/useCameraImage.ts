@@ -1,24 +1,33 @@
 import { useEffect, useState } from "react";
-import { RateMeter } from "../../lib/rates.ts";
+import { ArrivalMeter, RateMeter } from "../../lib/rates.ts";
 import { nowMs, secondsOf } from "../../lib/time.ts";
 import { link } from "../../link/link.ts";
 import type { sensor_msgs_CompressedImage, sensor_msgs_Image } from "../../messages/generated.ts";
-import { useSimulation } from "../../state/simulation.ts";
+import { wallAgeS } from "../../state/health.ts";
 import type { CameraTopic } from "./cameraTopics.ts";
 import { decode } from "./decoding.ts";
 
 export interface CameraImageState {
   /** Width over height. */
   aspect: number;
-  /** True rate, by the pictures' stamps. */
+  /** Pictures per second of wall time ... */
   hz: number;
-  /** Simulated time since the picture was taken, s. */
+  /** ... and of simulated time, by their stamps. */
+  simulatedHz: number;
+  /** Wall time since the picture was taken, s. */
   ageS: number;
   range: [number, number] | null;
   problem: string;
 }
 
-const NOTHING: CameraImageState = { aspect: 4 / 3, hz: NaN, ageS: NaN, range: null, problem: "" };
+const NOTHING: CameraImageState = {
+  aspect: 4 / 3,
+  hz: NaN,
+  simulatedHz: NaN,
+  ageS: NaN,
+  range: null,
+  problem: "",
+};
 
 /** Small tiles are content with fewer pictures. */
 const LARGE_MS = 50;
@@ -51,7 +60,7 @@ function receive(
   throttleMs: number,
   setState: (update: (state: CameraImageState) => CameraImageState) => void,
 ): () => void {
-  const meter = new RateMeter();
+  const [meter, arrivals] = [new RateMeter(), new ArrivalMeter()];
   let [busy, stampS, arrivedMs] = [false, NaN, NaN];
   const show = async (picture: Picture) => {
     if (busy) return; // the newest of those that come meanwhile is soon there
@@ -80,12 +89,19 @@ function receive(
       stampS = secondsOf(picture.header.stamp);
       arrivedMs = at;
       meter.add(stampS);
+      arrivals.add(at / 1000);
       void show(picture);
     },
     { throttleMs, depth: 1 },
   );
   const timer = setInterval(
-    () => setState((now) => ({ ...now, hz: meter.hz, ageS: ageOf(stampS, arrivedMs) })),
+    () =>
+      setState((now) => ({
+        ...now,
+        hz: arrivals.hzAt(nowMs() / 1000),
+        simulatedHz: meter.hz,
+        ageS: ageOf(stampS, arrivedMs),
+      })),
     TELL_MS,
   );
   return () => {
@@ -94,11 +110,10 @@ function receive(
   };
 }
 
-/** By the simulated clock where there is one; else since it came. */
+/** By the server's clock where it is known; else, and at least, since it came. */
 function ageOf(stampS: number, arrivedMs: number): number {
-  const { status } = useSimulation.getState();
-  if (status !== null) return Math.max(0, secondsOf(status.stamp) - stampS);
-  return (nowMs() - arrivedMs) / 1000;
+  const [known, since] = [wallAgeS(stampS), (nowMs() - arrivedMs) / 1000];
+  return Number.isNaN(known) ? since : Math.max(known, 0);
 }
 
 /** Copies of the bytes alone travel to the decoder. */

@@ -7,6 +7,7 @@ import { attempt, showSuccess } from "../../state/notices.ts";
 import { useWhyNot } from "../../state/rights.ts";
 import { simulatedS } from "../../state/simulation.ts";
 import { useVehicles } from "../../state/vehicles.ts";
+import { ActiveFaults } from "./ActiveFaults.tsx";
 import { EFFECTS, faultOf, KINDS, USUAL, type FaultForm, type FaultKind } from "./fault.ts";
 import { VectorInput } from "./VectorInput.tsx";
 
@@ -30,6 +31,7 @@ export default function Faults() {
   return (
     <ScrollArea h="100%" type="auto">
       <Stack gap="xs" px="sm" pb="sm" maw={560}>
+        <ActiveFaults />
         <Group gap="xs" grow>
           <Select
             size="xs"
@@ -75,7 +77,8 @@ export default function Faults() {
             Inject
           </Button>
           <Text size="xs" c="dimmed">
-            {whyNot ?? "The fault starts at once, appears in the log, and ends at a reset."}
+            {whyNot ??
+              "The fault starts at once, is listed above while it lasts, and ends at a reset."}
           </Text>
         </Group>
       </Stack>

@@ -13,7 +13,7 @@ interface CardProps {
 
 /** A scenario as a picture, its name and what flies there. */
 export function Card({ card, present, choose }: CardProps) {
-  const { name, description, picture, world, uploaded } = card;
+  const { name, description, picture, world, uploaded, missing } = card;
   const contents = contentsOf(card);
   const Icon = ICONS[world] ?? Mountain;
   return (
@@ -42,6 +42,11 @@ export function Card({ card, present, choose }: CardProps) {
             </Badge>
           )}
         </Group>
+        {missing !== "" && (
+          <Text size="xs" c="orange" className="reason">
+            {missing}
+          </Text>
+        )}
         <Text size="xs" c="dimmed" lineClamp={2}>
           {description}
         </Text>

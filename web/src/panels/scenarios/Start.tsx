@@ -38,6 +38,11 @@ export function Start({ card, back }: { card: ScenarioCard; back: () => void }) 
     >
       <Stack gap="sm">
         <Text size="sm">{card.description}</Text>
+        {card.missing !== "" && (
+          <Text size="sm" c="orange" role="alert" className="reason">
+            {card.missing}
+          </Text>
+        )}
         <SimpleGrid cols={{ base: 1, xs: 2 }} spacing="sm">
           <NumberInput
             label="UAVs"
@@ -89,7 +94,7 @@ export function Start({ card, back }: { card: ScenarioCard; back: () => void }) 
           <Button
             type="submit"
             loading={busy}
-            disabled={whyNot !== null}
+            disabled={whyNot !== null || card.missing !== ""}
             leftSection={<Play size={16} />}
             data-autofocus
           >

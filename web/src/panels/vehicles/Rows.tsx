@@ -1,6 +1,8 @@
 import { Badge, Text } from "@mantine/core";
 import { memo, useEffect, useRef, useState, type KeyboardEvent } from "react";
 import type { volery_interfaces_VehicleState as VehicleState } from "../../messages/generated.ts";
+import { faultText } from "../../lib/activeFaults.ts";
+import { useFaults } from "../../state/faults.ts";
 import { batteryColour, colourOf, modeText } from "./modes.ts";
 
 const ROW_PX = 44;
@@ -94,6 +96,7 @@ const Row = memo(function Row({ vehicle, top, selected, choose }: RowProps) {
           {operator === "" ? airframe : `${airframe} · ${operator}`}
         </Text>
       </div>
+      <FaultBadge uav={name} />
       {Number.isFinite(battery) && (
         <Text size="xs" ff="monospace" c={batteryColour(battery)}>
           {Math.round(100 * battery)} %
@@ -105,6 +108,26 @@ const Row = memo(function Row({ vehicle, top, selected, choose }: RowProps) {
     </div>
   );
 }, isSame);
+
+/** How many faults a UAV has, and which. */
+function FaultBadge({ uav }: { uav: string }) {
+  const active = useFaults((faults) => faults.active);
+  const own = active.filter((fault) => fault.uav === uav);
+  if (own.length === 0) return null;
+  const text = own.map(faultText).join(", ");
+  return (
+    <Badge
+      size="sm"
+      variant="light"
+      tt="none"
+      color="red"
+      title={text}
+      aria-label={`Fault: ${text}`}
+    >
+      {own.length === 1 ? "fault" : `${own.length} faults`}
+    </Badge>
+  );
+}
 
 /** Only what a row shows counts: positions change with every message. */
 function isSame(a: RowProps, b: RowProps): boolean {

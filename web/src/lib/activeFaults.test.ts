@@ -1,0 +1,17 @@
+import { expect, test } from "vitest";
+import { activeFaultsOf, faultText } from "./activeFaults.ts";
+
+test("active faults come as JSON, and anything else is none", () => {
+  const told = [{ kind: "motor", uav: "uav1", at_s: 2, rotor: 3, thrust_factor: 0.25 }];
+  expect(activeFaultsOf(JSON.stringify(told))).toEqual(told);
+  for (const text of ["", "{", "{}", "null"]) expect(activeFaultsOf(text)).toEqual([]);
+});
+
+test("a fault says in words what is wrong", () => {
+  const of = { uav: "uav1", at_s: 0 };
+  expect(faultText({ ...of, kind: "motor", rotor: 3, thrust_factor: 0.25 })).toBe(
+    "rotor 3 at 25 %",
+  );
+  expect(faultText({ ...of, kind: "sensor", sensor: "imu", effect: "stuck" })).toBe("imu stuck");
+  expect(faultText({ ...of, kind: "gnss_loss" })).toBe("no GNSS");
+});

@@ -1,0 +1,38 @@
+/** A fault that has begun and not ended, as in a scenario. */
+export interface ActiveFault {
+  kind: string;
+  uav: string;
+  /** Simulated times, s; without the second it stays. */
+  at_s: number;
+  until_s?: number;
+  rotor?: number;
+  thrust_factor?: number;
+  sensor?: string;
+  effect?: string;
+  bias?: number[];
+}
+
+export function activeFaultsOf(text: string): ActiveFault[] {
+  try {
+    const told: unknown = JSON.parse(text);
+    return Array.isArray(told) ? (told as ActiveFault[]) : [];
+  } catch {
+    return [];
+  }
+}
+
+/** What is wrong, in a few words: `rotor 2 at 50 %`. */
+export function faultText(fault: ActiveFault): string {
+  switch (fault.kind) {
+    case "motor":
+      return `rotor ${fault.rotor} at ${(100 * (fault.thrust_factor ?? 0)).toFixed(0)} %`;
+    case "sensor":
+      return `${fault.sensor} ${fault.effect}`;
+    case "gnss_loss":
+      return "no GNSS";
+    case "radio":
+      return "no radio";
+    default:
+      return fault.kind;
+  }
+}
