@@ -278,6 +278,26 @@ def test_the_token(bridges):
         pass
 
 
+def test_json_and_cbor_in_binary_frames_of_one_server(simulation, bridges):
+    server = RosbridgeServer(port=0, token="secret")
+    bridges.open(server)
+    with connect(url_of(server)) as json_client, connect(url_of(server)) as cbor_client:
+        for client, encode in ((json_client, as_binary_json), (cbor_client, cbor2.dumps)):
+            client.send(encode({"op": "auth", "token": "secret"}))
+            client.send(encode({"op": "subscribe", "topic": "/out", "type": STRING}))
+        until(lambda: simulation.graph.subscribers("/out") == 2)
+        simulation.publish("/out", m.String("seven"))
+        for client in (json_client, cbor_client):
+            assert json.loads(client.recv(timeout=60))["msg"] == {"data": "seven"}
+    with connect(url_of(server)) as client:
+        client.send(as_binary_json({"op": "subscribe", "topic": "/out"}))
+        assert "not authorized" in client.recv(timeout=60)
+
+
+def as_binary_json(operation) -> bytes:
+    return json.dumps(operation).encode()
+
+
 def test_one_path_only(bridges):
     server = RosbridgeServer(port=0, path="/rosbridge")
     bridges.open(server)

@@ -37,7 +37,8 @@ class AutopilotContext:
     def say(self, severity: int, text: str) -> None:
         """Sends a status text to all links and logs it. severity: a MAV_SEVERITY."""
         self.log.note(self.memory.now_ns, severity, text)
-        for message in status_texts(severity, text):
+        self.memory.text_number = self.memory.text_number % 65535 + 1
+        for message in status_texts(severity, text, self.memory.text_number):
             self.links.send(message)
 
     def announce(self) -> None:

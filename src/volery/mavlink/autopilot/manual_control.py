@@ -25,14 +25,18 @@ _LIFT_M = 1.0
 
 
 def take(context: AutopilotContext, _source: object, message: Any) -> None:
-    """Handles MANUAL_CONTROL; ignores messages with values out of range."""
+    """Handles MANUAL_CONTROL.
+
+    An axis out of range is unused, as INT16_MAX by MAVLink's definition, and centred, as in PX4.
+    """
     if message.target not in (0, context.system):
         return
-    parts = (message.x, message.y, message.z, message.r)
-    if any(abs(part) > 1000 for part in parts):
-        return
-    x, y, z, r = (part / 1000.0 for part in parts)
-    context.memory.sticks = ManualInput(x, y, 2.0 * z - 1.0, r, context.memory.now_ns)
+    forward, right, turn = (
+        part / 1000.0 if -1000 <= part <= 1000 else 0.0
+        for part in (message.x, message.y, message.r)
+    )
+    up = message.z / 500.0 - 1.0 if 0 <= message.z <= 1000 else 0.0
+    context.memory.sticks = ManualInput(forward, right, up, turn, context.memory.now_ns)
 
 
 def fly_position(context: AutopilotContext, state: FlightState) -> None:

@@ -194,6 +194,8 @@ class AutopilotState:
     """Failsafes that have been reported and handled."""
     failsafe: bool = False
     next_check_ns: int = 0
+    text_number: int = 0
+    """Number of the last STATUSTEXT, 1 to 65535."""
 
     @property
     def home_or_origin(self) -> Vector:

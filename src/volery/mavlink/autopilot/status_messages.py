@@ -11,7 +11,8 @@ _PX4 = 12
 """Value MAV_AUTOPILOT_PX4."""
 _CHUNK = 50
 """Characters of a STATUSTEXT."""
-_LONGEST_TEXT = 250
+_MOST_CHUNKS = 256
+"""Chunks that `chunk_seq` can number."""
 
 
 def heartbeat(memory: AutopilotState) -> Any:
@@ -26,10 +27,14 @@ def heartbeat(memory: AutopilotState) -> Any:
     return dialect().MAVLink_heartbeat_message(kind, _PX4, base, memory.mode.custom_mode, status, 3)
 
 
-def status_texts(severity: int, text: str) -> list[Any]:
-    """Returns the STATUSTEXT messages of a text, in pieces if it is long."""
-    raw = text[:_LONGEST_TEXT].encode("ascii", "replace")
-    pieces = [raw[k : k + _CHUNK] for k in range(0, len(raw), _CHUNK)] or [b""]
-    number = 0 if len(pieces) == 1 else 1 + sum(raw) % 65535
+def status_texts(severity: int, text: str, number: int) -> list[Any]:
+    """Returns the STATUSTEXT messages of a text: chunks with the id `number` if it is long.
+
+    A receiver that joins chunks knows the last one by its NUL, so that one is never full.
+    """
+    raw = text.replace("\0", "?").encode("ascii", "replace")[: _MOST_CHUNKS * _CHUNK - 1]
     status = dialect().MAVLink_statustext_message
+    if len(raw) <= _CHUNK:
+        return [status(severity, raw, 0, 0)]
+    pieces = [raw[k : k + _CHUNK] for k in range(0, len(raw) + 1, _CHUNK)]
     return [status(severity, piece, number, k) for k, piece in enumerate(pieces)]
