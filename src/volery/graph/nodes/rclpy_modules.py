@@ -16,9 +16,13 @@ from volery.graph.nodes.timer import Timer
 
 
 class Node(VoleryNode):
-    """`rclpy.node.Node`: parameters may be set at run time unless declared read-only."""
+    """`rclpy.node.Node`: parameters may be set at run time unless declared read-only.
+
+    Received messages are copies that the node may modify, with sequences that behave as in rclpy.
+    """
 
     settable_parameters = True
+    receives_copies = True
 
 
 class CallbackGroup:
