@@ -44,7 +44,7 @@ class FileData:
 def read_toml(path: Path) -> dict[str, Any]:
     """Returns the tables of a TOML file; raises `DataFileError` naming the file."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, UnicodeDecodeError) as error:
         raise DataFileError(f"{path}: cannot be read: {reason_of(error)}") from None
     except tomllib.TOMLDecodeError as error:

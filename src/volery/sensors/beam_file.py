@@ -36,7 +36,7 @@ def read_beams(path: Path, longest_s: float, most: int) -> BeamList:
     file violates this.
     """
     try:
-        with path.open(encoding="utf-8", newline="") as file:
+        with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.DictReader(file)
             columns = tuple(reader.fieldnames or ())
             if not set(_NEEDED) <= set(columns) <= {*_NEEDED, "ring"}:

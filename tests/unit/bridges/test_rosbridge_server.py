@@ -259,6 +259,13 @@ def test_pages_from_where_they_connect_to(origin, host, token, welcome):
     assert Origins(token_needed=token is not None).let_in(origin, host) is welcome
 
 
+@pytest.mark.parametrize("listed", ["null", "file://"])
+def test_pages_opened_from_files(listed):
+    for origin in ("null", "file://"):
+        assert Origins([listed]).let_in(origin, "127.0.0.1:9090")
+        assert not Origins().let_in(origin, "127.0.0.1:9090")
+
+
 def test_the_token(bridges):
     server = RosbridgeServer(port=0, token="secret")
     bridges.open(server)

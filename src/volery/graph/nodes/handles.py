@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from volery.graph.message_copies import message_checker, message_copier
+from volery.graph.messages import message_type
 from volery.graph.nodes.deferred_execution import DeferredExecutor
 from volery.graph.topics import Publisher, Subscription
 
@@ -37,6 +38,11 @@ class NodePublisher(Publisher):
     def msgtype(self) -> str:
         """Type of the messages."""
         return self._publisher.msgtype
+
+    @property
+    def msg_type(self) -> type[Any]:
+        """Class of the messages."""
+        return message_type(self._publisher.msgtype)
 
     @property
     def has_subscribers(self) -> bool:
