@@ -21,7 +21,9 @@ if TYPE_CHECKING:
 def _rosbridge(address: Address, options: BridgeOptions) -> Bridge:
     from volery.bridges.rosbridge.server import RosbridgeServer
 
-    return RosbridgeServer(*address, token=options.token, anywhere=options.allow_remote)
+    return RosbridgeServer(
+        *address, token=options.token, anywhere=options.allow_remote, origins=options.origins
+    )
 
 
 def _ros_tcp(address: Address, options: BridgeOptions) -> Bridge:

@@ -19,14 +19,15 @@ class Origins:
     Parameters
     ----------
     listed
-        Further origins, such as `https://studio.example.org`.
+        Further origins, such as `https://studio.example.org`; `null` and `file://` mean pages
+        opened from files.
     token_needed
         Whether clients also need a token.
 
     """
 
     def __init__(self, listed: Sequence[str] = (), *, token_needed: bool = False) -> None:
-        self._listed = frozenset(origin.rstrip("/") for origin in listed)
+        self._listed = frozenset(_plain(origin) for origin in listed)
         self._token_needed = token_needed
 
     def let_in(self, origin: str | None, host: str) -> bool:
@@ -34,7 +35,7 @@ class Origins:
 
         Host: the client's name for this server.
         """
-        if origin is None or origin in self._listed:
+        if origin is None or _plain(origin) in self._listed:
             return True
         page = name_of(origin.partition("//")[2])
         if page is None:  # "null": a file, or a page that hides its origin
@@ -48,6 +49,11 @@ class Origins:
     def lists(self, host: str) -> bool:
         """Returns whether a listed origin has this host, such as `studio.example.org:8443`."""
         return any(origin.partition("//")[2] == host for origin in self._listed)
+
+
+def _plain(origin: str) -> str:
+    """Returns an origin as browsers send it; programs in a web view send files as `file://`."""
+    return "null" if origin.startswith("file:") else origin.rstrip("/")
 
 
 def name_of(host: str) -> str | None:

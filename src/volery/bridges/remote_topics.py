@@ -57,9 +57,13 @@ class RemoteTopics(ABC):
     # ------------------------------------------------------------------------------ publications
 
     def advertise(self, topic: str, msgtype: str, latched: bool) -> None:
-        """Advertises a topic. Raises `GraphError` for an unknown type."""
+        """Advertises a topic. Raises `GraphError` for an unknown type.
+
+        A latched topic stays so until `unadvertise`.
+        """
         self._check_type(msgtype)
         with self._lock:
+            latched = latched or self._announced.get(topic, ("", False))[1]
             if self._announced.get(topic) != (msgtype, latched):
                 self._announced[topic] = (msgtype, latched)
                 self._send_advertised(topic, msgtype, latched)

@@ -80,6 +80,7 @@ def _bridge_options(options: RunOptions) -> BridgeOptions:
     return BridgeOptions(
         allow_remote=options.allow_remote,
         token=options.token,
+        origins=options.origins,
         report=lambda text: typer.echo(text, err=True),
         domain_id=options.domain_id,
         interfaces=options.interfaces,

@@ -56,6 +56,8 @@ class RunOptions:
     recordings: Path | None = None
     allow_remote: bool = False
     token: str | None = None
+    origins: tuple[str, ...] = ()
+    """Web origins whose pages may connect."""
     domain_id: int | None = None
     """ROS 2 domain; None: ROS_DOMAIN_ID."""
     interfaces: tuple[str, ...] = ()

@@ -17,6 +17,7 @@ from volery.cli.options import (
     InterfaceOption,
     MavlinkKeyOption,
     MiddlewareOption,
+    OriginOption,
     Px4DirOption,
     RemoteOption,
     Ros2Option,
@@ -56,6 +57,7 @@ def run(
     bridge: BridgesOption = None,
     allow_remote: RemoteOption = False,
     token: BridgeTokenOption = None,
+    origin: OriginOption = None,
     ros2: Ros2Option = False,
     domain_id: DomainOption = None,
     middleware: MiddlewareOption = "dds",
@@ -95,6 +97,7 @@ def run(
         recordings=recordings_dir,
         allow_remote=allow_remote,
         token=token,
+        origins=tuple(origin or ()),
         threads=threads,
         record=record,
         topics=tuple(topics or ()),
@@ -150,10 +153,7 @@ def serve(
         str | None,
         typer.Option(envvar="VOLERY_VIEWER_TOKEN", help="Require this token from viewers."),
     ] = None,
-    origin: Annotated[
-        list[str] | None,
-        typer.Option(help="Accept pages of this origin, such as a reverse proxy's, repeatable."),
-    ] = None,
+    origin: OriginOption = None,
     recordings_dir: Annotated[
         Path, typer.Option(help="Set the folder of recordings; uploads go to its folder uploads.")
     ] = Path("runs/recordings"),
@@ -199,6 +199,7 @@ def serve(
                 recordings=recordings_dir,
                 allow_remote=allow_remote,
                 token=token,
+                origins=tuple(origin or ()),
                 threads=threads,
             ),
             PageSettings(
@@ -228,6 +229,7 @@ def play(
     bridge: BridgesOption = None,
     allow_remote: RemoteOption = False,
     token: BridgeTokenOption = None,
+    origin: OriginOption = None,
 ) -> None:
     """Play a log over bridges (rosbridge by default) until Ctrl-C.
 
@@ -243,6 +245,7 @@ def play(
         bridges=tuple(bridge or ()),
         allow_remote=allow_remote,
         token=token,
+        origins=tuple(origin or ()),
     )
     play_log(log, options, scenario=scenario, loop=loop, paused=paused)
 

@@ -29,6 +29,13 @@ TokenOption = Annotated[
 BridgeTokenOption = Annotated[
     str | None, bridge_option(envvar="VOLERY_TOKEN", help="Require this token from remote clients.")
 ]
+OriginOption = Annotated[
+    list[str] | None,
+    bridge_option(
+        help="Accept pages of this web origin, such as https://lab.example.org, or null for pages "
+        "opened from files; repeatable."
+    ),
+]
 Ros2Option = Annotated[
     bool, ros2_option("--ros2", help="Join the ROS 2 graph by the bridge ros2 or ros2-zenoh.")
 ]

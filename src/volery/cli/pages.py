@@ -76,7 +76,10 @@ def _settings_of(options: RunOptions) -> PageSettings:
     from volery.server.settings import PageSettings
 
     settings = PageSettings(
-        tokens=Tokens(options.token), anywhere=options.allow_remote, recordings=options.recordings
+        tokens=Tokens(options.token),
+        anywhere=options.allow_remote,
+        origins=options.origins,
+        recordings=options.recordings,
     )
     if options.page == AT_THE_USUAL_PLACE:
         return replace(settings, port=usual_port(settings.host))

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
+from functools import partial
 
 import typer
 
@@ -19,6 +20,8 @@ from volery.graph.connection import GraphConnection
 from volery.graph.messages import Published
 
 _DEPTH = 1000
+_CLOCK_WAIT_S = 2.0
+"""Time within which a graph with a clock publishes it."""
 
 
 def list_topics(via: str, *, types: bool) -> None:
@@ -120,18 +123,38 @@ def publish(
     if not (math.isfinite(rate_hz) and rate_hz > 0.0):
         raise BridgeError(f"--rate: expects a positive number, not {rate_hz}")
     name = msgtype if "/msg/" in msgtype else msgtype.replace("/", "/msg/", 1)
-    message = read_message(values, name)
+    read_message(values, name)  # an error before the connection
     with closing(open_link(via, "volery_topic_pub")) as link:
         link.advertise(topic, name)
-        _repeat(link, topic, message, 1.0 / rate_hz, times)
+        now_ns = partial(_graph_time, link)
+        _repeat(link, topic, lambda: read_message(values, name, now_ns), 1.0 / rate_hz, times)
+
+
+def _graph_time(link: GraphConnection) -> int:
+    """Returns the time of the graph's clock, ns; without a clock the wall time."""
+    come = threading.Event()
+    queue = link.subscribe("/clock", "rosgraph_msgs/msg/Clock", depth=1, wake=come.set)
+    try:
+        come.wait(_CLOCK_WAIT_S)
+        found = queue.take()
+    finally:
+        link.unsubscribe(queue)
+    if not found:
+        return time.time_ns()
+    clock = found[-1].message.clock
+    return int(clock.sec) * 1_000_000_000 + int(clock.nanosec)
 
 
 def _repeat(
-    link: GraphConnection, topic: str, message: object, period_s: float, times: int | None
+    link: GraphConnection,
+    topic: str,
+    make: Callable[[], object],
+    period_s: float,
+    times: int | None,
 ) -> None:
     sent, due = 0, time.monotonic()
     while times is None or sent < times:
-        link.publish(topic, message)
+        link.publish(topic, make())
         sent += 1
         due += period_s
         if times is None or sent < times:

@@ -80,9 +80,15 @@ def at_terminal() -> bool:
 
 
 def trust_file() -> Path:
-    """Returns the file of saved answers: below XDG_STATE_HOME, or ~/.local/state."""
+    """Returns the file of saved answers: below XDG_STATE_HOME, or ~/.local/state.
+
+    Raises `OSError` for a user without a home folder, whose answers are not saved.
+    """
     base = os.environ.get("XDG_STATE_HOME")
-    root = Path(base) if base else Path.home() / ".local" / "state"
+    try:
+        root = Path(base) if base else Path.home() / ".local" / "state"
+    except RuntimeError as error:
+        raise FileNotFoundError(str(error)) from None
     return root / "volery" / "trusted.json"
 
 
@@ -103,8 +109,8 @@ def _remember(file: Path, modules: Iterable[str]) -> None:
     """Saves an answer; if that fails, the user is asked again next time."""
     known = _read()
     known[str(file.resolve())] = sorted(_trusted(file) | set(modules))
-    target = trust_file()
     try:
+        target = trust_file()
         target.parent.mkdir(parents=True, exist_ok=True)
         waiting = target.with_suffix(f".{os.getpid()}")
         waiting.write_text(json.dumps(known, indent=1), encoding="utf-8")

@@ -97,7 +97,7 @@ def _read(path: Path) -> dict[str, Any]:
     if path.is_dir():
         raise StudyError(f"{path} is a folder; a study is a .toml file")
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, UnicodeDecodeError) as error:
         raise StudyError(f"{path}: cannot be read: {reason_of(error)}") from None
     except tomllib.TOMLDecodeError as error:

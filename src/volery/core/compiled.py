@@ -10,10 +10,12 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
+import stat
 import sys
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -56,10 +58,30 @@ def _cache_key() -> str:
 
 
 def cache_root() -> Path:
-    """Returns the cache folder: below VOLERY_CACHE_DIR, XDG_CACHE_HOME or ~/.cache."""
+    """Returns the cache folder: below VOLERY_CACHE_DIR, XDG_CACHE_HOME or ~/.cache.
+
+    A user without a home folder, as in some containers of clusters, gets a temporary one.
+    """
     base = os.environ.get("VOLERY_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
-    root = Path(base) if base else Path.home() / ".cache"
-    return root / "volery"
+    if base:
+        return Path(base) / "volery"
+    try:
+        return Path.home() / ".cache" / "volery"
+    except RuntimeError:
+        return _private_folder() / "volery"
+
+
+@cache
+def _private_folder() -> Path:
+    """Returns a folder for temporary files that no other user can write: caches hold code."""
+    folder = Path(tempfile.gettempdir()) / f"volery-{os.getuid()}"
+    with suppress(OSError):
+        folder.mkdir(mode=0o700, exist_ok=True)
+        found = folder.lstat()
+        is_ours = found.st_uid == os.getuid() and stat.S_ISDIR(found.st_mode)
+        if is_ours and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+            return folder
+    return Path(tempfile.mkdtemp(prefix="volery-"))
 
 
 def _sweep(root: Path, keep: Path) -> None:
@@ -85,7 +107,7 @@ def cache_dir() -> Path:
             pass
         _sweep(root, folder)
     except OSError:
-        folder = Path(tempfile.gettempdir()) / f"volery-kernels-{os.getuid()}" / folder.name
+        folder = _private_folder() / "volery-kernels" / folder.name
         folder.mkdir(parents=True, exist_ok=True)
     return folder
 

@@ -55,6 +55,8 @@ class BridgeOptions:
     """Whether bridges may listen beyond loopback."""
     token: str | None = None
     """Token that clients must send, if the protocol supports one."""
+    origins: tuple[str, ...] = ()
+    """Web origins whose pages are accepted besides this machine's; `null`: pages from files."""
     report: Callable[[str], None] | None = None
     """Receives lines for users, from any thread: connections begin or end. None: logged."""
     domain_id: int | None = None

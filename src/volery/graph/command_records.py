@@ -65,7 +65,7 @@ def content_of(kind: str, type_name: str, cdr: bytes) -> Any:
     """Decodes what `content_bytes` encoded. Raises `GraphError` for other bytes."""
     if not cdr:
         return None
-    if kind == "failure":
+    if kind in ("failure", "refused"):
         return cdr.decode(errors="replace")
     return decode_cdr(cdr, content_type(kind, type_name))
 

@@ -69,6 +69,15 @@ class _QueuedMessage(NamedTuple):
     """Length of the chain of messages in response to each other, this message included."""
 
 
+class Refusal(NamedTuple):
+    """States that a client's message is not obeyed."""
+
+    client: str
+    topic: str
+    msgtype: str
+    reason: str
+
+
 @dataclass(frozen=True)
 class _Service:
     """A service: `handler` responds at once, `async_handler` at once or later."""
@@ -106,6 +115,8 @@ class Graph:
         self.acting_client = ""
         """External client whose command is being executed; empty: none. A subscriber that fails on
         a message caused by a client is logged, and does not end the run."""
+        self.on_refused: Callable[[Refusal], None] = lambda _refusal: None
+        """Receives what `refuse` says, in the simulation's thread."""
         self._members = threading.RLock()
         """Guards changes of topics, publishers, subscribers and services."""
 
@@ -308,6 +319,7 @@ class Graph:
                 try:
                     callback(published)
                 except Exception as error:
+                    self.refuse(published.topic, _first_line(error))
                     _log.warning(
                         "topic '%s': a message caused by %s was rejected: %s",
                         published.topic,
@@ -315,6 +327,15 @@ class Graph:
                         error,
                         exc_info=not isinstance(error, VoleryError),
                     )
+
+    def refuse(self, topic: str, reason: str) -> None:
+        """Tells the client that caused the message being delivered why it is not obeyed.
+
+        Has no effect for messages of the simulation's own nodes. In the simulation's thread.
+        """
+        if self.acting_client:
+            msgtype = self.topic_type(topic) or ""
+            self.on_refused(Refusal(self.acting_client, topic, msgtype, reason))
 
     @contextmanager
     def on_behalf_of(self, client: str) -> Iterator[None]:
@@ -464,6 +485,11 @@ def _request(service: _Service, request: Any | None) -> Any:
     if request is None:
         return zero_message(f"{service.srvtype}_Request")
     return request
+
+
+def _first_line(error: Exception) -> str:
+    lines = str(error).splitlines()
+    return lines[0] if lines else type(error).__name__
 
 
 def _has_gone(sender: Publisher) -> bool:

@@ -31,6 +31,12 @@ class LazyList(Sequence[Any]):
     def __getitem__(self, which: int | slice) -> Any:
         return list(self)[which]
 
+    def __add__(self, other: Any) -> Any:
+        return list(self) + list(other) if isinstance(other, list | LazyList) else NotImplemented
+
+    def __radd__(self, other: Any) -> Any:
+        return other + list(self) if isinstance(other, list) else NotImplemented
+
     def __eq__(self, other: object) -> bool:
         return isinstance(other, list | LazyList) and list(self) == list(other)
 

@@ -3,13 +3,18 @@
 A node may modify a message after publishing it, as with rclpy, which serializes at once. So a
 published message is a copy: nested messages and lists are new, writeable arrays are copied and
 read-only, read-only arrays are shared. Number sequences given as lists, tuples, bytes or
-`array.array` become numpy arrays of the field's type.
+`array.array` become numpy arrays of the field's type. A value of another type than its field's
+raises an error that names the field, as rclpy's assertions do.
+
+A node written for rclpy receives copies too (`receive_message`): with sequences as in rclpy, and it
+may modify them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import fields
+from enum import Enum
 from functools import cache, partial
 from typing import Any
 
@@ -19,7 +24,9 @@ from rosbags.interfaces import Nodetype
 
 from volery.core.errors import GraphError
 from volery.graph.codecs.zero import DTYPES
+from volery.graph.lazy_list import LazyList
 from volery.graph.message_defaults import is_plain_name
+from volery.graph.number_sequence import received
 from volery.graph.typestore import typestore
 
 Copy = Callable[[Any], Any]
@@ -32,40 +39,132 @@ def copy_message(message: Any) -> Any:
 
 @cache
 def message_copier(msgtype: str) -> Copy:
-    """Returns the function that copies messages of a type."""
+    """Returns the function that copies messages of a type for subscribers."""
+    return _copier(msgtype, _CHECKED)
+
+
+def receive_message(message: Any) -> Any:
+    """Returns a copy of a received message with the sequences of rclpy, for one subscriber."""
+    return _copier(message.__msgtype__, _RECEIVED)(message)
+
+
+@cache
+def message_checker(msgtype: str) -> Callable[[Any], None]:
+    """Returns the function that checks messages of a type, without a copy; raises `GraphError`."""
+    return _copier(msgtype, _LOOKED_AT)
+
+
+class _Purpose(Enum):
+    """Why a message is copied."""
+
+    CHECKED = "to be published"
+    RECEIVED = "for one node"
+    LOOKED_AT = "not at all: its values are checked"
+
+
+_CHECKED, _RECEIVED, _LOOKED_AT = _Purpose
+_USUAL = {"float32": "float", "float64": "float", "string": "str", "bool": "bool"}
+"""Python's class of a base type whose every value fits."""
+
+
+@cache
+def _copier(msgtype: str, purpose: _Purpose) -> Copy:
     store = typestore()
     cls: Any = store.types[msgtype]
     described = dict(store.fielddefs[msgtype][1])
     if not all(is_plain_name(name) for name in described):
         raise GraphError(f"{msgtype}: a field's name is not a Python identifier")
-    scope: dict[str, Any] = {"_cls": cls}
+    scope: dict[str, Any] = {"_cls": cls, "_check": partial(_check_class, msgtype, cls)}
     values = []
     for name in (field.name for field in fields(cls) if field.name in described):
-        copier = _field_copier(f"{msgtype}: {name}", described[name])
+        copier = _field_copier(f"{msgtype}: {name}", described[name], purpose)
         if copier is None:
             values.append(f"message.{name}")
-        else:
-            scope[f"_copy_{name}"] = copier
-            values.append(f"_copy_{name}(message.{name})")
-    text = f"def copy(message):\n    return _cls({', '.join(values)})"
-    exec(text, scope)  # field names only
+            continue
+        scope[f"_copy_{name}"] = copier
+        usual = _USUAL.get(described[name][1][0]) if described[name][0] == Nodetype.BASE else None
+        values.append(
+            f"_copy_{name}(message.{name})"
+            if usual is None
+            else f"(v if (v := message.{name}).__class__ is {usual} else _copy_{name}(v))"
+        )
+    most = len(described)
+    is_odd = f"message.__class__ is not _cls or len(message.__dict__) > {most}"
+    check = "" if purpose is _RECEIVED else f"    if {is_odd}: _check(message)\n"
+    listed = ", ".join(values)
+    made = f"[{listed}]" if purpose is _LOOKED_AT else f"_cls({listed})"
+    exec(f"def copy(message):\n{check}    return {made}", scope)  # field names only
     copy: Copy = scope["copy"]
     return copy
 
 
-def _field_copier(where: str, described: Any) -> Copy | None:
+def _check_class(msgtype: str, cls: Any, message: Any) -> None:
+    """Raises `GraphError` for an object of another class, or with a field that does not exist."""
+    if isinstance(message, type) or getattr(message, "__msgtype__", None) != msgtype:
+        found = message.__name__ if isinstance(message, type) else type(message).__name__
+        what = f"the class {found}" if isinstance(message, type) else f"{message!r:.80} ({found})"
+        raise GraphError(f"{msgtype}: must be a message of this type, not {what}")
+    known = cls.__dataclass_fields__
+    unknown = next((name for name in vars(message) if name not in known), None)
+    if unknown is not None:
+        names = ", ".join(name for name in known if not name.startswith("_"))
+        raise GraphError(f"{msgtype}: has no field '{unknown}'; fields: {names}")
+
+
+def _field_copier(where: str, described: Any, purpose: _Purpose) -> Copy | None:
     """Returns the function that copies a field; None where its value is immutable."""
     kind, detail = described
     if kind == Nodetype.BASE:
-        return None
+        return None if purpose is _RECEIVED else _base_checker(where, detail[0])
     if kind == Nodetype.NAME:
-        return message_copier(detail)
+        return partial(_nested, where, _copier(detail, purpose))
     (inner, inner_detail), size = detail
+    length = size if kind == Nodetype.ARRAY else 0
     if inner == Nodetype.NAME:
-        return partial(_copy_list, message_copier(inner_detail) if _holds(inner_detail) else None)
+        is_shared = purpose is _CHECKED and not _holds(inner_detail)
+        looked_at = _copier(inner_detail, _LOOKED_AT if is_shared else purpose)
+        return partial(_copy_list, where, looked_at, is_shared)
     if inner_detail[0] == "string":
-        return partial(_copy_list, None)
-    return partial(_numbers, where, DTYPES[inner_detail[0]], size if kind == Nodetype.ARRAY else 0)
+        check = None if purpose is _RECEIVED else _base_checker(where, "string")
+        return partial(_copy_list, where, check, False)
+    if purpose is _RECEIVED:
+        return received if kind == Nodetype.SEQUENCE else _writeable
+    copy = _look_at_numbers if purpose is _LOOKED_AT else _numbers
+    return partial(copy, where, DTYPES[inner_detail[0]], length)
+
+
+def _base_checker(where: str, base: str) -> Copy:
+    """Returns the function that returns a value of a base type, or raises `GraphError`."""
+    if base in ("string", "wstring"):
+        return partial(_check_value, where, base, str, None)
+    if base == "bool":
+        return partial(_check_value, where, base, (bool, np.bool_), None)
+    if base in ("float32", "float64"):
+        return partial(_check_value, where, base, (float, int, np.floating, np.integer), None)
+    limits = np.iinfo(DTYPES[base])
+    return partial(_check_value, where, base, (int, np.integer), (int(limits.min), int(limits.max)))
+
+
+def _check_value(
+    where: str, base: str, classes: Any, limits: tuple[int, int] | None, value: Any
+) -> Any:
+    if not isinstance(value, classes):
+        raise GraphError(f"{where} must be a {base}, not {value!r:.80} ({type(value).__name__})")
+    if limits is not None and not limits[0] <= value <= limits[1]:
+        raise GraphError(f"{where} must be a {base}, {limits[0]} to {limits[1]}, not {value}")
+    return value
+
+
+def _nested(where: str, copy: Copy, value: Any) -> Any:
+    try:
+        return copy(value)
+    except GraphError as error:
+        raise GraphError(f"{where}: {error}") from None
+
+
+def _writeable(values: Any) -> Any:
+    """Returns a fixed array, which is one of numpy in rclpy as well."""
+    return np.array(values)
 
 
 @cache
@@ -78,14 +177,24 @@ def _holds(msgtype: str) -> bool:
     )
 
 
-def _copy_list(copy: Copy | None, values: Any) -> Any:
-    if not isinstance(values, list | tuple):  # built when read, and so immutable
-        return values
-    return list(values) if copy is None else [copy(value) for value in values]
+def _copy_list(where: str, copy: Copy | None, is_shared: bool, values: Any) -> Any:
+    """Returns a list of copied parts; `is_shared`: of the parts themselves, after `copy`."""
+    if not isinstance(values, list | tuple):
+        if isinstance(values, LazyList):  # built when read, and so immutable
+            return values
+        raise GraphError(f"{where} must be a list, not {values!r:.80} ({type(values).__name__})")
+    if copy is None:
+        return list(values)
+    try:
+        copied = [copy(value) for value in values]
+    except GraphError as error:
+        raise GraphError(f"{where}[...]: {error}") from None
+    return list(values) if is_shared else copied
 
 
 def _numbers(where: str, dtype: np.dtype[Any], length: int, values: Any) -> NDArray[Any]:
     if isinstance(values, np.ndarray) and values.dtype == dtype:
+        values = values if type(values) is np.ndarray else values.view(np.ndarray)
         if values.flags.writeable:
             values = values.copy()
     elif isinstance(values, bytes | bytearray | memoryview):
@@ -100,3 +209,10 @@ def _numbers(where: str, dtype: np.dtype[Any], length: int, values: Any) -> NDAr
     values.setflags(write=False)
     array: NDArray[Any] = values
     return array
+
+
+def _look_at_numbers(where: str, dtype: np.dtype[Any], length: int, values: Any) -> None:
+    """Raises `GraphError` if `_numbers` would; copies no array."""
+    fits = isinstance(values, np.ndarray) and values.dtype == dtype
+    if not fits or length not in (0, values.size):
+        _numbers(where, dtype, length, values)

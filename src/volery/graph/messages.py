@@ -112,6 +112,16 @@ def header(time_ns: int, frame_id: str) -> Header:
     return Header(time_from_ns(time_ns), frame_id)
 
 
+def frame_name(name: str) -> str:
+    """Returns the name of a frame without a leading slash, which ROS 1 wrote and tf2 ignores."""
+    return name.removeprefix("/")
+
+
+def frame_of(message: Any) -> str:
+    """Returns the frame of a message's header, as `frame_name`."""
+    return frame_name(message.header.frame_id)
+
+
 def single(value: float) -> float:
     """Returns the value rounded to float32, so that nodes receive what is sent on the wire."""
     return float(np.float32(value))

@@ -17,13 +17,15 @@ from __future__ import annotations
 import itertools
 import logging
 import threading
+import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from volery.core.errors import GraphError, NodeError, VoleryError
-from volery.graph.graph import Graph
+from volery.graph.graph import Graph, Refusal
 from volery.graph.messages import message_type
 from volery.graph.nodes.failures import report_failure
 from volery.graph.qos import DEFAULT_DEPTH, check_depth
@@ -48,6 +50,10 @@ _log = logging.getLogger(__name__)
 _MAX_FAILURES_LOGGED = 20
 """Topics and services of one client; each is logged once."""
 
+_TELL_PERIOD_S = 1.0
+_MAX_TOLD = 20
+"""Different refusals told within that time."""
+
 MAX_LATCHED_BYTES = 128 * 1024 * 1024
 """Limit of the latched messages of one client, which the graph stores for late subscribers."""
 _MOST_NAMES = 20_000
@@ -57,7 +63,7 @@ _MOST_NAMES = 20_000
 class ClientCommand(NamedTuple):
     """Describes a client's command, in the simulation's thread just before it takes effect.
 
-    kind: `call`, `publish`, `advertise`, ... as in `volery_interfaces/msg/CommandRecord`.
+    kind: `call`, `publish`, `refused`, ... as in `volery_interfaces/msg/CommandRecord`.
     """
 
     client: str
@@ -119,6 +125,7 @@ class Gateway:
         self._sessions: list[Session] = []
         self._lock = threading.Lock()
         self._lost = 0
+        graph.on_refused = self._note_refused
         self.commands = 0
         """Number of external publications and calls on names within a namespace."""
         self.commanded_ns: dict[str, int] = {}
@@ -171,6 +178,16 @@ class Gateway:
             if len(self.commanded_ns) > _MOST_NAMES:
                 del self.commanded_ns[next(iter(self.commanded_ns))]
 
+    def _note_refused(self, refusal: Refusal) -> None:
+        """Records that a client's message is not obeyed, and tells the client."""
+        client, topic, msgtype, reason = refusal
+        with suppress(GraphError):  # the run has ended
+            self.watch(ClientCommand(client, "refused", topic, msgtype, reason))
+        with self._lock:
+            told = [session for session in self._sessions if session.name == client]
+        for session in told:
+            session.tell_refused(topic, reason)
+
     def note_lost(self, messages: int) -> None:
         """Adds the dropped messages of a subscription that ends; used by `Session`."""
         with self._lock:
@@ -208,6 +225,11 @@ class Session:
         self._offers: dict[str, set[ServiceReply]] = {}
         self._closed = False
         self._failed: set[str] = set()
+        self.on_refused: Callable[[str], None] | None = None
+        """Receives why a message of the client is not obeyed, in the simulation's thread; must not
+        block. A bridge sets it where its protocol can tell the client."""
+        self._told: dict[tuple[str, str], float] = {}
+        """Wall time of the last refusals that the client was told, s."""
 
     @property
     def graph(self) -> Graph:
@@ -245,11 +267,13 @@ class Session:
     def advertise(self, topic: str, msgtype: str, *, latched: bool = False) -> None:
         """Announces that the client publishes on `topic`. Raises `GraphError` for a wrong type.
 
-        A second call with the same type has no effect.
+        A second call with the same type has no effect, except that it may make the topic latched: a
+        latched topic stays so until `unadvertise`.
         """
         with self._lock:
             self._check_open()
             old = self._publishers.get(topic)
+            latched = latched or (old is not None and old.latched)
             if old is not None and old.msgtype == msgtype and old.latched == latched:
                 return
             self._publishers[topic] = self._graph.advertise(topic, msgtype, latched=latched)
@@ -458,9 +482,25 @@ class Session:
             publishes, offers = tuple(self._publishers), tuple(self._offers)
             return SessionInfo(self.name, publishes, self.queues, offers)
 
+    def tell_refused(self, topic: str, reason: str) -> None:
+        """Tells the client that its message on `topic` is not obeyed.
+
+        A repeated refusal is told once per second, and at most 20 different ones: a stream of
+        messages would else be answered by a stream of errors.
+        """
+        if self.on_refused is None:
+            return
+        now_s = time.monotonic()
+        self._told = {k: at_s for k, at_s in self._told.items() if now_s - at_s < _TELL_PERIOD_S}
+        if (topic, reason) not in self._told and len(self._told) < _MAX_TOLD:
+            self._told[topic, reason] = now_s
+            self.on_refused(f"{topic}: {reason}")
+
     def _log_failure(self, done: Future[Any], name: str) -> None:
         """Logs the failure of a publication or response that nothing waits for."""
         error = None if done.cancelled() else done.exception()
+        if isinstance(error, VoleryError) and not self._closed:
+            self.tell_refused(name, str(error))
         known = name in self._failed or len(self._failed) >= _MAX_FAILURES_LOGGED
         if error is None or self._closed or known:
             return

@@ -165,7 +165,7 @@ class Log:
     @property
     def tf(self) -> LoggedTransforms:
         """Transforms of `/tf` and `/tf_static`; read anew at each use."""
-        here = [name for name in ("/tf_static", "/tf") if name in self]
+        here = [name for name in ("/tf_static", "tf_static", "/tf", "tf") if name in self]
         found = self.messages(*here) if here else iter(())
         return LoggedTransforms(found)
 

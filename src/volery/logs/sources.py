@@ -81,10 +81,10 @@ class ChunkSource:
 
 def open_source(path: Path) -> LogSource:
     """Opens a log of any format. Raises `RecordingError` if the file is missing or no log."""
-    if path.suffix == ".ulg":
+    if path.suffix.lower() == ".ulg":
         return UlogSource(path)
     files = mcap_parts(path)
-    if not files and (path.is_dir() or path.suffix == ".db3"):
+    if not files and (path.is_dir() or path.suffix.lower() == ".db3"):
         return SqliteSource(path)
     parts: list[ChunkedLog] = []
     try:

@@ -12,7 +12,7 @@ from volery.core import rotations
 from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.errors import VoleryError
-from volery.graph.messages import stamp_of
+from volery.graph.messages import frame_name, frame_of, stamp_of
 from volery.logs.topic_data import LoggedMessage
 
 _DEEPEST = 64
@@ -70,9 +70,9 @@ class LoggedTransforms:
                 numbers = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
                 if not np.isfinite(numbers).all() or not any(numbers[3:]):
                     continue
-                child = found.child_frame_id
+                child = frame_name(found.child_frame_id)
                 time_s = (stamp_of(found) or time_ns) / NS_PER_S
-                parents[child] = found.header.frame_id, topic.endswith("tf_static")
+                parents[child] = frame_of(found), topic.endswith("tf_static")
                 rows.setdefault(child, []).append((time_s, *numbers))
         self._edges = {child: _edge(*parents[child], rows[child]) for child in parents}
 
@@ -88,7 +88,7 @@ class LoggedTransforms:
         or time 0 if none moves. Raises `VoleryError` for an unknown frame, or if no transforms
         connect both.
         """
-        up, down = self._chain(child), self._chain(parent)
+        up, down = self._chain(frame_name(child)), self._chain(frame_name(parent))
         common = next((frame for frame in up if frame in down), None)
         if common is None:
             raise VoleryError(

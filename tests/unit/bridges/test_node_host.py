@@ -71,6 +71,23 @@ def spin_until(host, condition, timeout_s=60.0):
     assert condition()
 
 
+def test_two_publishers_of_one_topic_on_one_connection(world):
+    session = world.gateway.open("node")
+    graph = NodeHost(session).context().graph
+    first = graph.advertise("/probe", String, latched=True)
+    second = graph.advertise("/probe", String)
+    first.publish(String("seven"))
+    first.cancel()
+    second.publish(String("eight"))
+    late = []
+    world.do(lambda: world.graph.subscribe("/probe", late.append, String))
+    world.do(lambda: None)
+    assert [published.message.data for published in late] == ["eight"]
+    second.cancel()
+    second.cancel()
+    assert session.info.publishes == ()
+
+
 def test_topics_and_services_both_ways(world):
     session = world.gateway.open("node")
     host = NodeHost(session)

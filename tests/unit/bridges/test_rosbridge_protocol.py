@@ -47,6 +47,42 @@ def test_publish_and_subscribe(bench, client, spelling):
     assert client.read() == []
 
 
+def test_advertisements_of_one_topic_count_by_id(bench, client):
+    client.send("advertise", id="p1", topic="/probe", type=STRING, latch=True)
+    client.send("advertise", id="p2", topic="/probe", type=STRING)
+    client.send("publish", topic="/probe", msg={"data": "seven"})
+    late = bench.peer("late")
+    late.send("subscribe", topic="/probe", type=STRING)
+    assert [answer["msg"]["data"] for answer in late.read()] == ["seven"]
+    client.send("unadvertise", id="p1", topic="/probe")
+    assert bench.graph.publishers("/probe") == 1
+    client.send("publish", topic="/probe", msg={"data": "eight"})
+    client.send("unadvertise", id="p2", topic="/probe")
+    assert client.read() == []
+    assert [answer["msg"]["data"] for answer in late.read()] == ["eight"]
+    assert bench.graph.publishers("/probe") == 0
+
+
+def test_advertisements_end_by_name_and_together(bench, client):
+    for key in ("p1", "p2"):
+        client.send("advertise", id=key, topic="/probe", type=STRING)
+    client.send("unadvertise", id="p3", topic="/probe")
+    assert "no such advertisement" in client.read()[0]["msg"]
+    client.send("unadvertise", topic="/probe")
+    assert client.read() == []
+    assert bench.graph.publishers("/probe") == 0
+    client.send("unadvertise", topic="/probe")
+    assert "does not publish" in client.read()[0]["msg"]
+
+
+def test_a_topic_published_without_advertisement_ends_by_any_id(bench, client):
+    bench.graph.subscribe("/probe", lambda _: None, STRING)
+    client.send("publish", topic="/probe", msg={"data": "seven"})
+    client.send("unadvertise", id="p1", topic="/probe")
+    assert client.read() == []
+    assert bench.graph.publishers("/probe") == 0
+
+
 def test_reliable_subscriptions_lose_nothing(bench, client):
     client.send("subscribe", topic="/out", type=STRING, qos={"reliability": "reliable"})
     publish(bench, *map(str, range(500)))

@@ -261,6 +261,13 @@ def test_pages_from_where_they_connect_to(origin, host, token, welcome):
     assert Origins(token_needed=token is not None).let_in(origin, host) is welcome
 
 
+@pytest.mark.parametrize("listed", ["null", "file://"])
+def test_pages_opened_from_files(listed):
+    for origin in ("null", "file://"):
+        assert Origins([listed]).let_in(origin, "127.0.0.1:9090")
+        assert not Origins().let_in(origin, "127.0.0.1:9090")
+
+
 def test_the_token(bridges):
     server = RosbridgeServer(port=0, token="secret")
     bridges.open(server)
@@ -278,6 +285,26 @@ def test_the_token(bridges):
             socket.recv(60.0)
     with pytest.raises(InvalidStatus, match="401"), connect(f"{url_of(server)}/?token=no"):
         pass
+
+
+def test_json_and_cbor_in_binary_frames_of_one_server(simulation, bridges):
+    server = RosbridgeServer(port=0, token="secret")
+    bridges.open(server)
+    with connect(url_of(server)) as json_client, connect(url_of(server)) as cbor_client:
+        for client, encode in ((json_client, as_binary_json), (cbor_client, cbor2.dumps)):
+            client.send(encode({"op": "auth", "token": "secret"}))
+            client.send(encode({"op": "subscribe", "topic": "/out", "type": STRING}))
+        until(lambda: simulation.graph.subscribers("/out") == 2)
+        simulation.publish("/out", m.String("seven"))
+        for client in (json_client, cbor_client):
+            assert json.loads(client.recv(timeout=60))["msg"] == {"data": "seven"}
+    with connect(url_of(server)) as client:
+        client.send(as_binary_json({"op": "subscribe", "topic": "/out"}))
+        assert "not authorized" in client.recv(timeout=60)
+
+
+def as_binary_json(operation) -> bytes:
+    return json.dumps(operation).encode()
 
 
 def test_one_path_only(bridges):

@@ -264,3 +264,37 @@ def test_bytes_in_json_are_base64():
     assert base64.b64decode(found["data"]) == data.tobytes()
     assert (found["fields"][0]["name"], found["is_dense"]) == ("x", True)
     assert found == MessageEncoder().plain(cloud, published.msgtype)
+
+
+OPERATION = {"op": "publish", "topic": "/höhe", "msg": {"data": 1}}
+
+
+@pytest.mark.parametrize("before", ["", "\n", " \t", "\r\n", "\ufeff"])
+@pytest.mark.parametrize("after", ["", "\n", "\0"])
+def test_json_in_frames_of_either_kind(before, after):
+    text = f"{before}{json.dumps(OPERATION, ensure_ascii=False)}{after}"
+    assert decode_frame(text, limited=True) == OPERATION
+    assert decode_frame(text.encode(), limited=True) == OPERATION
+
+
+@pytest.mark.parametrize("tagged", [False, True])
+def test_cbor_of_any_length_stays_cbor(tagged):
+    for members in (0, 1, 22, 23, 200, 300):
+        operation = {"op": "status", **{f"k{k}": k for k in range(members)}}
+        data = cbor2.dumps(cbor2.CBORTag(55799, operation) if tagged else operation)
+        assert decode_frame(data, limited=True) == operation
+
+
+@pytest.mark.parametrize(
+    ("frame", "words"),
+    [
+        (b'{"op": "\xff"}', "not readable as JSON"),
+        (b'["op"]', "an object with the key"),
+        (b"", "CBOR"),
+        (bytes.fromhex("10000000026f7000020000007800") + b"\0\0", "BSON is not accepted"),
+        (b'{"op": "x", "n": [' + b"1," * 300_000 + b"1]}", "values"),
+    ],
+)
+def test_binary_frames_that_are_no_operation(frame, words):
+    with pytest.raises(BridgeError, match=words):
+        decode_frame(frame, limited=True)

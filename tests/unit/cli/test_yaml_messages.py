@@ -7,6 +7,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from volery.cli.yaml_codec import read_message, to_yaml
+from volery.core.errors import GraphError
 from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import Header, LaserScan, String, Time, message_type
 
@@ -97,3 +98,25 @@ def test_messages_in_a_list_are_items_of_a_block():
 
 def test_a_message_without_fields_is_empty_text():
     assert to_yaml(zero_message("std_msgs/msg/Empty")) == ""
+
+
+@pytest.mark.parametrize(
+    ("msgtype", "text", "stamp_of"),
+    [
+        ("geometry_msgs/msg/PoseStamped", "{header: auto}", lambda m: m.header.stamp),
+        ("geometry_msgs/msg/PoseStamped", "{header: {stamp: now}}", lambda m: m.header.stamp),
+        ("nav_msgs/msg/Path", "{poses: [{header: auto}]}", lambda m: m.poses[0].header.stamp),
+        ("builtin_interfaces/msg/Time", "now", lambda m: m),
+    ],
+)
+def test_present_times(msgtype, text, stamp_of):
+    stamp = stamp_of(read_message(text, msgtype, lambda: 3_000_000_005))
+    assert (stamp.sec, stamp.nanosec) == (3, 5)
+
+
+def test_words_that_are_no_times():
+    assert read_message("{data: now}", "std_msgs/msg/String").data == "now"
+    message = read_message("{header: {frame_id: auto}}", "geometry_msgs/msg/PoseStamped")
+    assert message.header.frame_id == "auto"
+    with pytest.raises(GraphError, match="an object"):
+        read_message("{header: later}", "geometry_msgs/msg/PoseStamped")

@@ -3,6 +3,8 @@
 import os
 import subprocess
 import sys
+import tempfile
+from pathlib import Path
 
 from volery.core import compiled
 
@@ -47,7 +49,24 @@ def test_unwritable_cache_falls_back_to_a_temporary_folder(tmp_path):
     out = subprocess.run(
         [sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True
     )
-    assert out.stdout.strip().startswith(str(tmp_path / "volery-kernels"))
+    assert out.stdout.strip().startswith(str(tmp_path / "volery-"))
+
+
+def test_a_user_without_a_home_folder(tmp_path, monkeypatch):
+    def home():
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(Path, "home", home)
+    monkeypatch.delenv("VOLERY_CACHE_DIR", raising=False)
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(compiled, "_private_folder", compiled._private_folder.__wrapped__)
+    root = compiled.cache_root()
+    assert root.is_relative_to(tmp_path)
+    assert compiled.cache_root() == root
+    assert root.parent.stat().st_mode & 0o077 == 0
+    root.parent.chmod(0o777)  # others can write it, and a cache holds code
+    assert compiled.cache_root() != root
 
 
 def test_old_caches_are_swept(tmp_path):

@@ -160,3 +160,9 @@ def test_no_ulog_and_unknown_features(path):
         open_log(path)
     with pytest.raises(RecordingError, match="cannot read the log: No such file"):
         open_log(path.with_name("none.ulg"))
+
+
+def test_a_suffix_in_capitals(path):
+    renamed = path.rename(path.with_name("FLIGHT.ULG"))
+    with open_log(renamed) as log:
+        assert len(log["/odd"]["x"]) == 50

@@ -22,7 +22,9 @@ def no_stand_ins_left(monkeypatch, without_ros1):
     monkeypatch.chdir(FOLDER)
     yield
     withdraw_ros_imports()
-    for name in [name for name in sys.modules if name in ("minimal_nodes", "broken_nodes")]:
+    for name in [
+        name for name in sys.modules if name in ("minimal_nodes", "broken_nodes", "idiom_nodes")
+    ]:
         del sys.modules[name]
 
 
@@ -188,3 +190,47 @@ def test_node_files_find_volerys_messages_before_other_packages(tmp_path):
         if has_ros2:
             (tmp_path / "rclpy" / "__init__.py").unlink()
             (tmp_path / "rclpy").rmdir()
+
+
+def fly_idioms(simulate, flat_data, name):
+    flat_data["types"]["f450"]["nodes"] = [{"node": f"idiom_nodes:{name}"}]
+    simulation = simulate(flat_data)
+    simulation.run(0.35)
+    return simulation.vehicles.nodes[0]
+
+
+def test_idioms_of_published_nodes(simulate, flat_data):
+    seen = fly_idioms(simulate, flat_data, "Idioms").seen
+    assert seen.pop("yaw") == pytest.approx(1.0)
+    assert seen.pop("inside") == pytest.approx(1.683, abs=1e-3)  # 2 sin(1)
+    assert seen == {
+        "time": 7_000_000_000,
+        "qos": 1,
+        "sim": True,
+        "nodes": ["idioms"],
+        "count": (1, 0),
+        "msg_type": True,
+        "slices": (6, False, 0),
+        "x": 2.0,
+        "moon": "there is no frame 'moon'",
+    }
+
+
+def test_a_value_of_a_wrong_type_is_reported_with_node_line_and_field(simulate, flat_data):
+    with pytest.raises(NodeError) as caught:
+        fly_idioms(simulate, flat_data, "Typed")
+    text = str(caught.value)
+    line = next(
+        k
+        for k, line in enumerate((FOLDER / "idiom_nodes.py").read_text().splitlines(), 1)
+        if "self.out.publish(message)" in line
+    )
+    assert "/uav1/typed" in text
+    assert "data must be a string, not 7 (int)" in text
+    assert "idiom_nodes.py" in text
+    assert f"line {line}" in text or f":{line}" in text
+
+
+def test_what_cannot_wait_is_refused_in_one_line(simulate, flat_data):
+    with pytest.raises(Exception, match="use a timer"):
+        fly_idioms(simulate, flat_data, "Waiting")

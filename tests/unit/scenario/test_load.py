@@ -6,6 +6,7 @@ import pytest
 
 from volery.core.errors import ScenarioError
 from volery.scenario import library
+from volery.scenario.data_file_bases import read_toml
 from volery.scenario.load import load_scenario, parse_scenario
 from volery.scenario.overrides import apply
 
@@ -113,6 +114,16 @@ def test_good_data_is_taken():
     scenario = parse_scenario(GOOD)
     assert scenario.uav_count == 1
     assert scenario.types["t"].sensors[0].name == "front"
+
+
+def test_files_with_a_byte_order_mark(tmp_path):
+    (tmp_path / "base.toml").write_text('base = "f450"\nname = "mine"\n', encoding="utf-8-sig")
+    assert read_toml(tmp_path / "base.toml")["name"] == "mine"
+    file = tmp_path / "bom.toml"
+    file.write_text(
+        'name = "bom"\n[types.t]\n[[uavs]]\ntype = "t"\nposition_m = [0, 0]\n', encoding="utf-8-sig"
+    )
+    assert load_scenario(file).name == "bom"
 
 
 def test_unknown_name_lists_the_library_and_guesses():

@@ -118,7 +118,7 @@ function textOf({
 function entryOfCommand({ stamp, client, kind, name, content }: Command): Omit<Entry, "number"> {
   return {
     timeS: secondsOf(stamp),
-    sort: "command",
+    sort: kind === "refused" ? "problem" : "command",
     kind,
     who: client,
     text: `${name} ${content}`,

@@ -15,7 +15,7 @@ from volery.autonomy.status import publish_status
 from volery.core.errors import DataFileError, PlanError
 from volery.core.saved_state import SavedAttributes
 from volery.core.vectors import norm
-from volery.graph.messages import String, TFMessage
+from volery.graph.messages import String, TFMessage, frame_name, frame_of
 from volery.graph.nodes.node import Node
 
 
@@ -76,12 +76,12 @@ class MapMerging(SavedAttributes, Node):
 
     def _on_tf(self, message: TFMessage) -> None:
         for stamped in message.transforms:
-            if stamped.header.frame_id != MAP:
+            if frame_of(stamped) != MAP:
                 continue
             p, q = stamped.transform.translation, stamped.transform.rotation
             position, attitude = np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
             if np.isfinite(position).all() and abs(norm(attitude) - 1.0) < 0.01:
-                self._placements[stamped.child_frame_id] = Pose(position, attitude)
+                self._placements[frame_name(stamped.child_frame_id)] = Pose(position, attitude)
 
     def _on_timer(self) -> None:
         if self._changed:
@@ -109,7 +109,7 @@ class MapMerging(SavedAttributes, Node):
 
     def _placed(self, topic: str) -> PlacedMap | None:
         message = self._maps[topic]
-        frame = message.header.frame_id
+        frame = frame_of(message)
         placement = self._placements.get(frame)
         if frame not in ("", MAP) and placement is None:
             self._reasons[topic] = f"/tf holds no transform of '{frame}' in '{MAP}'"

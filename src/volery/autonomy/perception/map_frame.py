@@ -16,7 +16,7 @@ from volery.core.clock import NS_PER_S
 from volery.core.rotation_kernels import moved_points
 from volery.core.saved_state import SavedAttributes
 from volery.core.vectors import norm
-from volery.graph.messages import Odometry, TFMessage, stamp_of
+from volery.graph.messages import Odometry, TFMessage, frame_name, frame_of, stamp_of
 
 MAP = "map"
 UNKNOWN_PLACE = "pose in the map unknown"
@@ -38,19 +38,19 @@ class MapFrame(SavedAttributes):
 
     def on_odometry(self, message: Odometry) -> None:
         """Selects the frame of this odometry."""
-        self.odom_frame, self._odom_ns = message.header.frame_id, stamp_of(message)
+        self.odom_frame, self._odom_ns = frame_of(message), stamp_of(message)
 
     def on_tf(self, message: TFMessage) -> None:
         """Stores the transforms of a message; ignores those that are not finite."""
         for stamped in message.transforms:
-            if stamped.header.frame_id != MAP or not stamped.child_frame_id.endswith("/odom"):
+            if frame_of(stamped) != MAP or not frame_name(stamped.child_frame_id).endswith("/odom"):
                 continue
             p, q = stamped.transform.translation, stamped.transform.rotation
             position, attitude = np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
             length = norm(attitude)
             if np.isfinite(position).all() and 0.9 < length < 1.1:
-                self._known[stamped.child_frame_id] = Pose(position, attitude / length)
-                self._tf_ns[stamped.child_frame_id] = stamp_of(stamped)
+                self._known[frame_name(stamped.child_frame_id)] = Pose(position, attitude / length)
+                self._tf_ns[frame_name(stamped.child_frame_id)] = stamp_of(stamped)
 
     @property
     def map_from_odom(self) -> Pose | None:

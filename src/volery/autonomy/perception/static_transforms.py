@@ -9,7 +9,7 @@ import numpy as np
 from volery.core import rotations
 from volery.core.arrays import Array
 from volery.core.vectors import norm
-from volery.graph.messages import TFMessage
+from volery.graph.messages import TFMessage, frame_name, frame_of
 
 _JOINTS = 16
 """Max number of frames between body and sensor."""
@@ -38,7 +38,7 @@ class StaticTransforms:
             turn = np.array([q.x, q.y, q.z, q.w])
             if np.isfinite([p.x, p.y, p.z, *turn]).all() and norm(turn) > 0.5:
                 mount = Mount(np.array([p.x, p.y, p.z]), rotations.normalize(turn))
-                self.joints[found.child_frame_id] = found.header.frame_id, mount
+                self.joints[frame_name(found.child_frame_id)] = frame_of(found), mount
 
     def mount_of(self, frame: str, own: Mount = LEVEL) -> Mount:
         """Returns a frame's pose in the body, the root of its chain.

@@ -31,6 +31,7 @@ from volery.graph.messages import (
     PoseStamped,
     Quaternion,
     String,
+    frame_of,
     header,
     message_type,
     single,
@@ -141,11 +142,9 @@ class Exploration(SavedAttributes, Node):
     def _on_area(self, message: Any) -> None:
         corners = np.array([[p.x, p.y] for p in message.polygon.points], dtype=np.float64)
         self._goal, self._refused, self._visited = None, [], []
-        if message.header.frame_id not in ("", MAP):
+        if frame_of(message) not in ("", MAP):
             self._area = None
-            self._become(
-                ExplorationState.WAITING, f"areas are in 'map', not '{message.header.frame_id}'"
-            )
+            self._become(ExplorationState.WAITING, f"areas are in 'map', not '{frame_of(message)}'")
             return
         if len(corners) == 0:
             self._area = None

@@ -28,6 +28,7 @@ from volery.graph.messages import (
     PoseStamped,
     Quaternion,
     String,
+    frame_of,
     header,
 )
 from volery.graph.nodes.node import Node
@@ -125,8 +126,8 @@ class GlobalPlanner(SavedAttributes, Node):
     def _on_goal(self, message: PoseStamped) -> None:
         p = message.pose.position
         goal = np.array([p.x, p.y, p.z], dtype=np.float64)
-        if message.header.frame_id not in ("", MAP):
-            self._give_up("refused", f"goals are in 'map', not in '{message.header.frame_id}'")
+        if frame_of(message) not in ("", MAP):
+            self._give_up("refused", f"goals are in 'map', not in '{frame_of(message)}'")
         elif not np.isfinite(goal).all():
             self._give_up("refused", "the goal's position is not finite")
         elif self._goal is None or not np.array_equal(goal, self._goal) or self._waypoints is None:

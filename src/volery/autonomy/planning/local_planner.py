@@ -36,6 +36,7 @@ from volery.graph.messages import (
     PathMessage,
     Range,
     String,
+    frame_of,
     message_type,
 )
 from volery.graph.nodes.node import Node
@@ -163,7 +164,7 @@ class LocalPlanner(SavedAttributes, Node):
     def _on_path(self, message: PathMessage) -> None:
         places = [[p.pose.position.x, p.pose.position.y, p.pose.position.z] for p in message.poses]
         found = np.array(places, dtype=np.float64).reshape(-1, 3)
-        if message.header.frame_id not in ("", MAP) or not np.isfinite(found).all():
+        if frame_of(message) not in ("", MAP) or not np.isfinite(found).all():
             self._publish_status(
                 "refused",
                 ["a path whose frame is not 'map', or with positions that are not finite"],

@@ -21,6 +21,7 @@ from volery.graph.messages import (
     String,
     Twist,
     Vector3,
+    frame_of,
 )
 from volery.graph.nodes.node import Node
 
@@ -79,13 +80,13 @@ class TrajectoryFollower(SavedAttributes, Node):
         pose = OdometrySample.from_odometry(message)
         values = (pose.position, pose.attitude, pose.velocity)
         if all(np.isfinite(v).all() for v in values) and not is_stuck(pose, self._pose):
-            self._pose, self._frame = pose, message.header.frame_id
+            self._pose, self._frame = pose, frame_of(message)
             self._received_ns = self.get_clock().now_ns()
 
     def _on_trajectory(self, message: MultiDOFJointTrajectory) -> None:
-        if message.header.frame_id != self._frame:
+        if frame_of(message) != self._frame:
             self._publish_status(
-                "refused", f"plans are in '{self._frame}', not '{message.header.frame_id}'"
+                "refused", f"plans are in '{self._frame}', not '{frame_of(message)}'"
             )
             return
         samples = samples_of(message)

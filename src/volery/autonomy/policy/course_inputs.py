@@ -17,7 +17,14 @@ from volery.core import rotations
 from volery.core.arrays import Array
 from volery.core.clock import ns_from_s
 from volery.core.errors import NodeError
-from volery.graph.messages import MultiDOFJointTrajectory, Odometry, PathMessage, Pose, TFMessage
+from volery.graph.messages import (
+    MultiDOFJointTrajectory,
+    Odometry,
+    PathMessage,
+    Pose,
+    TFMessage,
+    frame_of,
+)
 from volery.graph.nodes.node import Node
 
 _FARTHEST_M = 1e6
@@ -53,7 +60,7 @@ class TrajectoryInput(NodeInput):
         return np.stack([_point(self._samples, now_ns + ns_from_s(time)) for time in ahead_s])
 
     def _on_message(self, message: MultiDOFJointTrajectory) -> None:
-        samples, frame = samples_of(message), message.header.frame_id
+        samples, frame = samples_of(message), frame_of(message)
         if frame not in ("", MAP):
             self._refuse(f"must be in '{MAP}', not in '{frame[:80]}'")
         elif samples is None or float(np.abs(samples.position).max()) > _FARTHEST_M:
@@ -102,7 +109,7 @@ class GatesInput(NodeInput):
         self._accept()
 
     def _on_path(self, path: PathMessage) -> None:
-        frame, gates = path.header.frame_id, np.array([_gate_of(p.pose) for p in path.poses])
+        frame, gates = frame_of(path), np.array([_gate_of(p.pose) for p in path.poses])
         if frame not in ("", MAP):
             self._refuse(f"must be in '{MAP}', not in '{frame[:80]}'")
         elif not 0 < len(gates) <= _MOST_GATES or not _are_possible(gates):

@@ -18,7 +18,7 @@ from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.saved_state import SavedAttributes
 from volery.core.vectors import norm
-from volery.graph.messages import Odometry, PoseStamped
+from volery.graph.messages import Odometry, PoseStamped, frame_of
 from volery.graph.nodes.node import Node
 
 _FARTHEST_M = 1e6
@@ -120,7 +120,7 @@ class GoalInput(NodeInput):
     def _on_goal(self, message: PoseStamped) -> None:
         p = message.pose.position
         position = np.array([p.x, p.y, p.z], np.float64)
-        frame = message.header.frame_id
+        frame = frame_of(message)
         if frame not in ("", MAP):
             self._refuse(f"must be in '{MAP}', not in '{frame[:80]}'")
         elif not np.isfinite(position).all() or float(np.abs(position).max()) > _FARTHEST_M:

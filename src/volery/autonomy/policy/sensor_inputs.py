@@ -16,7 +16,7 @@ from volery.core import rotations
 from volery.core.arrays import Array
 from volery.core.errors import GraphError
 from volery.core.vectors import norm
-from volery.graph.messages import Image, LaserScan, PoseStamped
+from volery.graph.messages import Image, LaserScan, PoseStamped, frame_of
 from volery.graph.nodes.node import Node
 
 _MOST_BEAMS, _MOST_PIXELS = 100_000, 4_000_000
@@ -119,7 +119,7 @@ class LineInput(NodeInput):
 
     def _on_pose(self, message: PoseStamped) -> None:
         p, q = message.pose.position, message.pose.orientation
-        attitude, frame = np.array([q.x, q.y, q.z, q.w]), message.header.frame_id
+        attitude, frame = np.array([q.x, q.y, q.z, q.w]), frame_of(message)
         start = np.array([p.x, p.y], np.float64)
         if frame not in ("", MAP):
             self._refuse(f"must be in '{MAP}', not in '{frame[:80]}'")

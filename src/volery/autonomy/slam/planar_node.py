@@ -28,6 +28,7 @@ from volery.graph.messages import (
     PathMessage,
     String,
     TFMessage,
+    frame_of,
     stamp_of,
 )
 from volery.graph.nodes.node import Node
@@ -171,7 +172,7 @@ class PlanarSlam(SavedAttributes, Node):
         dt = passed / NS_PER_S
         step = step_between(self._before, here, dt)
         self._before, self._taken_ns = here, time_ns
-        mount = self._joints.mount_of(scan.header.frame_id, self._mount)
+        mount = self._joints.mount_of(frame_of(scan), self._mount)
         seen = returns(scan, mount, follower.motion.velocity, self._settings.returns)
         frame = follower.follow(time_ns, seen, step)
         if frame is not None:

@@ -50,7 +50,8 @@ class MirroredGraph(Graph):
         """Advertises a topic here and remotely."""
         name = msgtype if isinstance(msgtype, str) else type_name(msgtype)
         self._link.advertise(topic, name, latched=latched)
-        return _RemotePublisher(super().advertise(topic, name, latched=latched), self._link)
+        local = super().advertise(topic, name, latched=latched)
+        return _RemotePublisher(local, self._link, lambda: not self.publishers(topic))
 
     def subscribe(
         self,
@@ -176,9 +177,12 @@ class _RemoteSubscription(Subscription):
 class _RemotePublisher(Publisher):
     """Publishes through the connection; remote subscribers are unknown."""
 
-    def __init__(self, local: Publisher, link: GraphConnection) -> None:
+    def __init__(
+        self, local: Publisher, link: GraphConnection, is_last: Callable[[], bool]
+    ) -> None:
         self._local = local
         self._link = link
+        self._is_last = is_last
         self.latched = local.latched
 
     @property
@@ -209,9 +213,12 @@ class _RemotePublisher(Publisher):
         self._link.publish(self.topic, message)
 
     def cancel(self) -> None:
-        """Ends the publication, here and remotely."""
+        """Ends the publication here, and remotely if no other node here publishes the topic."""
+        if self._local.cancelled:
+            return
         self._local.cancel()
-        self._link.unadvertise(self.topic)
+        if self._is_last():
+            self._link.unadvertise(self.topic)
 
 
 def _number(entry: tuple[int, str, Published]) -> int:

@@ -59,6 +59,7 @@ class EndpointSession:
         self._called: dict[str, str] = {}
         self._offered: set[str] = set()
         self._requests = _Requests()
+        self._session.on_refused = self.complain
         self._calls = Calls(self._session, self.outbox, self.complain)
         self._body: tuple[str, int, Body] | None = None
         self._commands: dict[str, Callable[[Fields], None]] = {

@@ -55,6 +55,8 @@ _DTYPES = {
     86: "<f8",
 }
 _BYTE_STRING, _TEXT, _ARRAY, _MAP, _TAG = 2, 3, 4, 5, 6
+_SELF_DESCRIBED = bytes.fromhex("d9d9f7")
+"""Head of tag 55799 (RFC 8949, 3.4.6), which says that the bytes are CBOR, and nothing else."""
 
 
 def encode_cbor(value: Any) -> bytes:
@@ -84,7 +86,7 @@ def decode_cbor(data: bytes) -> Any:
     """
     try:
         return cbor2.loads(
-            data,
+            data.removeprefix(_SELF_DESCRIBED),
             tag_hook=_typed_array,
             semantic_decoders=_REFUSED,
             max_depth=MOST_DEPTH,

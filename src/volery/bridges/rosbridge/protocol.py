@@ -116,6 +116,7 @@ class RosbridgePeer:
         self._closed = False
         self._now_s = 0.0
         self._topics = RosbridgeTopics(session, wake, shared.now_ns, self._complain)
+        session.on_refused = lambda text: post(lambda: self._complain(text))
         guarded = self._poster(post)
         self._services = RosbridgeServices(session, shared.forms, self.send, guarded)
         self._actions = RosbridgeActions(session, shared.forms, self.send, guarded)
@@ -320,6 +321,7 @@ class RosbridgePeer:
             return
         self._closed = True
         self._actions.close()
+        self._session.on_refused = None
         self._session.close()
         self._outbox.clear()
 

@@ -208,7 +208,8 @@ class RosbridgeServer:
         origin = request.headers.get("Origin")
         if not self._origins.let_in(origin, request.headers.get("Host", "")):
             return connection.respond(
-                HTTPStatus.FORBIDDEN, f"pages of {origin} are not accepted; add it to `origins`\n"
+                HTTPStatus.FORBIDDEN,
+                f"pages of {origin} are not accepted; start with --origin {origin}\n",
             )
         given = parse_qs(url.query).get("token", [None])[0]
         scheme, _, bearer = request.headers.get("Authorization", "").partition(" ")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from volery.bridges.rosbridge.fields import (
@@ -86,6 +86,15 @@ def combine(wishes: list[SubscriptionOptions]) -> SubscriptionOptions:
         max((w.compression for w in wishes), key=COMPRESSIONS.index),
         any(w.reliable for w in wishes),
     )
+
+
+@dataclass
+class Advertisements:
+    """A client's advertisements of one topic."""
+
+    msgtype: str
+    ids: set[Id] = field(default_factory=set)
+    """Their ids; empty for a topic that the client publishes without having advertised it."""
 
 
 class TopicStream:
@@ -172,39 +181,59 @@ class RosbridgeTopics:
         self._wake = wake
         self._now_ns = now_ns
         self._streams: dict[str, TopicStream] = {}
-        self._published: dict[str, str] = {}
+        self._published: dict[str, Advertisements] = {}
         self._ready: deque[TopicStream] = deque()
         """Streams whose queues have woken; the simulation's thread appends."""
         self._held: list[TopicStream] = []
         """Streams whose messages are not due yet."""
 
     def advertise(self, operation: Operation) -> None:
-        """Advertises a topic of the client."""
-        topic = absolute(read_text(operation, "topic"))
+        """Advertises a topic of the client; advertisements with other ids stay.
+
+        The topic is latched once one of them is.
+        """
+        topic, key = absolute(read_text(operation, "topic")), read_id(operation)
         msgtype = ros2_name(read_text(operation, "type"))
-        if topic not in self._published and len(self._published) >= MOST_STREAMS:
-            raise BridgeError(f"advertise: more than {MOST_STREAMS} topics")
         qos = read_qos(operation)
         latched = operation.get("latch") is True or (qos is not None and qos.latched)
+        self._check_room(topic, key)
+        self._advertise(topic, msgtype, latched=latched).ids.add(key)
+
+    def _check_room(self, topic: str, key: Id) -> None:
+        known = self._published.get(topic)
+        if known is not None and key not in known.ids and len(known.ids) >= MOST_REQUESTS:
+            raise BridgeError(f"advertise: more than {MOST_REQUESTS} advertisements of '{topic}'")
+
+    def _advertise(self, topic: str, msgtype: str, *, latched: bool = False) -> Advertisements:
+        if topic not in self._published and len(self._published) >= MOST_STREAMS:
+            raise BridgeError(f"advertise: more than {MOST_STREAMS} topics")
         self._session.advertise(topic, msgtype, latched=latched)
-        self._published[topic] = msgtype
+        return self._published.setdefault(topic, Advertisements(msgtype))
 
     def unadvertise(self, operation: Operation) -> None:
-        """Ends an advertisement."""
-        topic = absolute(read_text(operation, "topic"))
+        """Ends one advertisement of a topic, or all of them if none is named."""
+        topic, key = absolute(read_text(operation, "topic")), read_id(operation)
+        found = self._published.get(topic)
+        if found is None:
+            raise BridgeError(f"unadvertise: {self._session.name} does not publish '{topic}'")
+        if key is not None and found.ids and key not in found.ids:
+            raise BridgeError(f"unadvertise: no such advertisement of '{topic}'")
+        found.ids.discard(key)
+        if found.ids and key is not None:
+            return
+        del self._published[topic]
         self._session.unadvertise(topic)
-        self._published.pop(topic, None)
 
     def publish(self, operation: Operation) -> None:
         """Publishes a message; an existing topic need not be advertised."""
         topic = absolute(read_text(operation, "topic"))
-        msgtype = self._published.get(topic)
-        if msgtype is None:
+        advertised = self._published.get(topic)
+        if advertised is None:
             known = self._session.graph.topic_type(topic)
             if known is None:
                 raise BridgeError(f"publish: no topic '{topic}'; advertise it first")
-            self.advertise({"op": "publish", "topic": topic, "type": known})
-            msgtype = known
+            advertised = self._advertise(topic, known)
+        msgtype = advertised.msgtype
         plain = operation.get("msg", {})
         message = decode_plain(plain, msgtype)
         if isinstance(plain, dict):

@@ -1,6 +1,7 @@
 """Encodes rosbridge v2 frames: operations as JSON text, as CBOR, inside PNG images.
 
-An operation is a dict with the key `op`. A text frame contains JSON, a binary frame CBOR. Large
+An operation is a dict with the key `op`. A text frame contains JSON, a binary frame CBOR or, from
+clients such as ROS#, JSON in UTF-8; the first byte tells them apart. Large
 operations may be sent as a PNG image or in fragments (`bridges.rosbridge.fragments`).
 """
 
@@ -29,6 +30,9 @@ MOST_MESSAGE_BYTES = 64 * 1024 * 1024
 """Largest message that a client accepts from a server; `message_budget` has the limits of servers.
 """
 
+_JSON_BEGINS = frozenset(b"{[ \t\r\n\xef")
+"""First bytes of JSON text: a value, white space or a byte order mark. CBOR that begins with one of
+them is a text, an array, a number or invalid, and none of these is an operation, which is a map."""
 _PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 
 
@@ -43,6 +47,10 @@ def decode_frame(frame: Frame, *, limited: bool = False) -> Operation:
         The frame has no operation, or exceeds the budget.
 
     """
+    if isinstance(frame, bytes) and frame[:1] and frame[0] in _JSON_BEGINS:
+        frame = _text_of(frame)
+    elif isinstance(frame, bytes) and _is_bson(frame):
+        raise BridgeError("BSON is not accepted; send JSON or CBOR")
     if limited:
         check_cbor(frame) if isinstance(frame, bytes) else check_json(frame)
     found = decode_cbor(frame) if isinstance(frame, bytes) else _decode_json(frame)
@@ -119,9 +127,22 @@ def decode_png(operation: Operation, most_bytes: int, *, limited: bool = False) 
     return found
 
 
+def _text_of(frame: bytes) -> str:
+    """Returns the JSON text of a binary frame."""
+    try:
+        return frame.decode()
+    except UnicodeDecodeError as error:
+        raise BridgeError(f"not readable as JSON: {error}") from None
+
+
+def _is_bson(frame: bytes) -> bool:
+    """Returns whether bytes begin with their own number and end with zero, as a BSON document."""
+    return int.from_bytes(frame[:4], "little") == len(frame) and frame[-1:] == b"\0"
+
+
 def _decode_json(text: str) -> Any:
     try:
-        return json.loads(text)
+        return json.loads(text.removeprefix("\ufeff").rstrip("\0"))  # C strings carry their end
     except (ValueError, RecursionError) as error:
         raise BridgeError(f"not readable as JSON: {error}") from None
 

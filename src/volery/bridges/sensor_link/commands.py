@@ -9,6 +9,7 @@ from volery.bridges.ros_tcp.incoming_queue import IncomingQueue
 from volery.bridges.sensor_link.payloads import PAYLOADS, decode_payload
 from volery.bridges.sensor_link.wire import SensorLinkFrame, SensorLinkKind
 from volery.core.errors import BridgeError, GraphError
+from volery.graph.messages import frame_of
 from volery.graph.session import Session
 
 COMMAND_TOPICS = {
@@ -63,8 +64,8 @@ class SensorLinkCommands:
 
 
 def _check_pose(stamped: Any, *, may_keep_heading: bool) -> None:
-    if stamped.header.frame_id not in ("", "map"):
-        raise BridgeError(f"poses must be in 'map', not in '{stamped.header.frame_id}'")
+    if frame_of(stamped) not in ("", "map"):
+        raise BridgeError(f"poses must be in 'map', not in '{frame_of(stamped)}'")
     turn = stamped.pose.orientation
     length = math.hypot(turn.x, turn.y, turn.z, turn.w)
     if abs(length - 1.0) > _UNIT_TOLERANCE and not (may_keep_heading and length == 0.0):

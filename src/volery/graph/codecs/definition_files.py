@@ -113,8 +113,10 @@ class DefinitionFile:
         return [f"{self.base}{part}" for part in _PARTS[self.kind]]
 
 
-def find_definition_files(folder: Path) -> list[DefinitionFile]:
+def find_definition_files(folder: Path, *, foreign: bool = False) -> list[DefinitionFile]:
     """Returns all definition files below a folder, sorted by path.
+
+    foreign: the files come from a log, whose types may have any name that ROS 1 allows.
 
     Raises `GraphError` if the folder does not exist, contains no definition, or a file or package
     has an invalid ROS name.
@@ -135,7 +137,7 @@ def find_definition_files(folder: Path) -> list[DefinitionFile]:
             path = parent / name
             if in_kind and parent.name != kind:
                 raise GraphError(f"{path}: a {suffix} file belongs in a folder {kind}/")
-            if not _FILE_NAME.fullmatch(stem):
+            if not (_TYPE_NAME if foreign else _FILE_NAME).fullmatch(stem):
                 raise GraphError(
                     f"{path}: '{stem}' is not a valid name of a ROS type: use CamelCase, "
                     "a capital followed by letters and digits"
@@ -155,7 +157,7 @@ def read_definition_file(file: DefinitionFile) -> list[Definition]:
     file and line.
     """
     try:
-        text = file.path.read_text(encoding="utf-8")
+        text = file.path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise GraphError(f"{file.path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:

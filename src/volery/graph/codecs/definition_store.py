@@ -100,7 +100,7 @@ class DefinitionStore(Typestore):
         large.
         """
         found: dict[str, Definition] = {}
-        for file in find_definition_files(folder):
+        for file in find_definition_files(folder, foreign=foreign):
             for definition in read_definition_file(file):
                 other = found.get(definition.name)
                 if other is not None:

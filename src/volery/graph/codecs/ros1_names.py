@@ -18,6 +18,8 @@ _TYPES = {
 _OLD_TYPES = {
     **{old: new for new, old in _TYPES.items()},
     **{old.replace("/", "/msg/"): new for new, old in _TYPES.items()},
+    "tf/tfMessage": "tf2_msgs/msg/TFMessage",
+    "tf/msg/tfMessage": "tf2_msgs/msg/TFMessage",
 }
 _NAME = re.compile(r"([A-Za-z]\w*)/(?:(msg|srv|action)/)?([A-Za-z]\w*)", re.ASCII)
 _PART = re.compile(r"(.+)_(Request|Response|Goal|Result|Feedback)")

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from volery.graph.message_copies import message_copier
+from volery.graph.message_copies import message_checker, message_copier
+from volery.graph.messages import message_type
 from volery.graph.nodes.deferred_execution import DeferredExecutor
 from volery.graph.topics import Publisher, Subscription
 
@@ -20,6 +21,7 @@ class NodePublisher(Publisher):
         self._publisher = publisher
         self._executor = executor
         self._copy = message_copier(publisher.msgtype)
+        self._check = message_checker(publisher.msgtype)
         self.latched = publisher.latched
 
     @property
@@ -38,6 +40,11 @@ class NodePublisher(Publisher):
         return self._publisher.msgtype
 
     @property
+    def msg_type(self) -> type[Any]:
+        """Class of the messages."""
+        return message_type(self._publisher.msgtype)
+
+    @property
     def has_subscribers(self) -> bool:
         """Whether a message would be delivered or latched; otherwise it need not be built."""
         return self._publisher.has_subscribers
@@ -47,11 +54,17 @@ class NodePublisher(Publisher):
         return self._publisher.subscriptions
 
     def publish(self, message: Any) -> None:
-        """Publishes a message. Raises `GraphError` if its type is not the topic's."""
+        """Publishes a message.
+
+        Raises `GraphError` if its type is not the topic's, or the type of a value not its field's,
+        also without subscribers: otherwise the error would come with the first recording.
+        """
         publisher = self._publisher
+        publisher.check(message)
         if publisher.has_subscribers:
-            publisher.check(message)
             message = self._copy(message)
+        else:
+            self._check(message)
         if self._executor is None or not self._executor.defer(lambda: publisher.publish(message)):
             publisher.publish(message)
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache
+from importlib import import_module
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder
 from types import ModuleType
@@ -22,10 +23,12 @@ from volery.graph.messages import message_type
 from volery.graph.typestore import typestore
 
 _KINDS = ("msg", "srv", "action")
+_PYTHON_PACKAGES = ("rclpy", "tf2_ros", "tf2_py", "tf2_geometry_msgs", "tf_transformations")
+"""Packages without message types; the stand-ins have the most usual parts of them."""
 
 
 class _Finder(MetaPathFinder):
-    """Finds `rclpy`, its modules, and the packages of all known message types."""
+    """Finds `rclpy`, `tf2_ros`, their modules, and the packages of all known message types."""
 
     def find_spec(
         self,
@@ -98,9 +101,9 @@ def forget_message_packages(names: Iterable[str]) -> None:
 
 def _filler(package: str, rest: str) -> Callable[[ModuleType], None] | None:
     """Returns the function that fills a module; None for other modules."""
-    if package == "rclpy":
-        name = f"rclpy.{rest}" if rest else "rclpy"
-        return (lambda module: vars(module).update(_rclpy()[name])) if name in _rclpy() else None
+    if package in _PYTHON_PACKAGES:
+        name = f"{package}.{rest}" if rest else package
+        return (lambda module: _fill(module, name)) if name in _modules() else None
     names = [name for name in typestore().names() if name.startswith(f"{package}/")]
     if not names or rest not in ("", *_KINDS):
         return None
@@ -111,10 +114,22 @@ def _filler(package: str, rest: str) -> Callable[[ModuleType], None] | None:
 
 
 @cache
-def _rclpy() -> dict[str, dict[str, Any]]:
-    from volery.graph.nodes.rclpy_modules import contents  # imports the node
+def _modules() -> dict[str, dict[str, Any]]:
+    from volery.graph.nodes import rclpy_modules, tf2  # import the node
 
-    return contents()
+    return rclpy_modules.contents() | tf2.contents()
+
+
+def _fill(module: ModuleType, name: str) -> None:
+    """Fills a module; `rclpy.time` and the like are there after `import rclpy`, as in ROS 2."""
+
+    def find(part: str) -> Any:
+        if f"{name}.{part}" not in _modules():
+            raise AttributeError(f"Volery's module '{name}' has no '{part}' (docs/nodes.md)")
+        return import_module(f"{name}.{part}")
+
+    vars(module).update(_modules()[name])
+    module.__getattr__ = find  # type: ignore[method-assign]
 
 
 def _root(name: str, kind: str) -> str:

@@ -26,7 +26,7 @@ from typing import Any, ClassVar
 
 from volery.core.errors import GraphError, NodeError, VoleryError
 from volery.graph.graph import check_period
-from volery.graph.message_copies import copy_message
+from volery.graph.message_copies import copy_message, receive_message
 from volery.graph.messages import Published, message_type
 from volery.graph.nodes.deferred_execution import DeferredExecutor
 from volery.graph.nodes.failures import add_frames, place_of
@@ -54,6 +54,9 @@ class Node(ParameterMethods):
     and `automatically_declare_parameters_from_overrides` have an effect.
     """
 
+    receives_copies: ClassVar[bool] = False
+    """Whether received messages are copies with the sequences of rclpy (`number_sequence`); else
+    they hold shared, read-only numpy arrays."""
     WARMUP_TASKS: ClassVar[tuple[str, ...]] = ()
     """Functions that compile the node's numba code, as `module:function`; see `warmup_tasks`."""
 
@@ -192,7 +195,7 @@ class Node(ParameterMethods):
             client = self._context.graph.acting_client
             if client:
                 self.__last_client = f"{client} on {name}"
-            self.__run(partial(callback, published.message), occasion)
+            self.__run(partial(callback, self.__received(published.message)), occasion)
 
         subscription: Subscription = self._context.graph.subscribe(
             name, receive, msg_type, qos=profile_of(qos_profile)
@@ -242,9 +245,12 @@ class Node(ParameterMethods):
 
         def respond(request: Any) -> Any:
             response = self.__guarded_service(
-                lambda: callback(request, response_type()), occasion, response_type
+                lambda: callback(self.__received(request), response_type()), occasion, response_type
             )
-            return copy_message(response)
+            try:
+                return copy_message(response)
+            except GraphError as error:
+                raise self.__failure(error, occasion) from None
 
         def handle(request: Any) -> Any:
             if self.__executor is None:
@@ -267,6 +273,7 @@ class Node(ParameterMethods):
             self.__executor,
             later=self.__later,
             run=self.__run,
+            receive=self.__received,
         )
 
     def destroy_publisher(self, publisher: NodePublisher) -> bool:
@@ -350,6 +357,9 @@ class Node(ParameterMethods):
         if release is not None:
             self.__defer(release)
         return release is not None
+
+    def __received(self, message: Any) -> Any:
+        return receive_message(message) if self.receives_copies else message
 
     def __run(self, callback: Callable[[], Any], occasion: str, *, heavy: bool = False) -> None:
         if self.__destroyed:

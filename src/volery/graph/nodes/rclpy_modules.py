@@ -16,9 +16,70 @@ from volery.graph.nodes.timer import Timer
 
 
 class Node(VoleryNode):
-    """`rclpy.node.Node`: parameters may be set at run time unless declared read-only."""
+    """`rclpy.node.Node`: parameters may be set at run time unless declared read-only.
+
+    Received messages are copies that the node may modify, with sequences that behave as in rclpy.
+    """
 
     settable_parameters = True
+    receives_copies = True
+
+    def __init__(self, node_name: str, **options: Any) -> None:
+        super().__init__(node_name, **options)
+        if not self.has_parameter("use_sim_time"):  # declared from an override
+            self.declare_parameter("use_sim_time", True)
+
+    def get_node_names(self) -> list[str]:
+        """Returns the names of all nodes, without namespaces."""
+        return [name for name, _ in self.get_node_names_and_namespaces()]
+
+    def get_node_names_and_namespaces(self) -> list[tuple[str, str]]:
+        """Returns names and namespaces of all nodes."""
+        parts = [name.rpartition("/") for name in sorted(self._context.graph.parameters.nodes())]
+        return [(name, namespace or "/") for namespace, _, name in parts]
+
+    def get_topic_names_and_types(self, no_demangle: bool = False) -> list[tuple[str, list[str]]]:  # noqa: ARG002
+        """Returns all topics with their types."""
+        return [(topic.name, [topic.msgtype]) for topic in self._context.graph.topics()]
+
+    def get_service_names_and_types(self) -> list[tuple[str, list[str]]]:
+        """Returns all services with their types."""
+        return [(name, [kind]) for name, kind in self._context.graph.services().items()]
+
+    def count_publishers(self, topic_name: str) -> int:
+        """Returns the number of publishers of a topic."""
+        return self._context.graph.publishers(self.resolve(topic_name))
+
+    def count_subscribers(self, topic_name: str) -> int:
+        """Returns the number of subscribers to a topic."""
+        return self._context.graph.subscribers(self.resolve(topic_name))
+
+    def create_rate(self, *_arguments: Any, **_options: Any) -> Any:
+        """Raises `GraphError`: no callback can wait."""
+        raise GraphError("a rate waits, and simulated time stands still in a callback: use a timer")
+
+    def create_guard_condition(self, *_arguments: Any, **_options: Any) -> Any:
+        """Raises `GraphError`."""
+        raise GraphError("Volery has no guard conditions: publish on a topic, or use a timer")
+
+
+class _Refused:
+    """A class of rclpy that Volery lacks."""
+
+    def __init__(self, *_arguments: Any, **_options: Any) -> None:
+        raise GraphError(f"Volery has no rclpy {type(self).__name__}; see docs/nodes.md")
+
+
+class ActionClient(_Refused):
+    """Refuses construction."""
+
+
+class ActionServer(_Refused):
+    """Refuses construction."""
+
+
+class LifecycleNode(_Refused):
+    """Refuses construction."""
 
 
 class CallbackGroup:
@@ -129,6 +190,9 @@ def contents() -> dict[str, dict[str, Any]]:
             "ParameterDescriptor": descriptor,
             "SetParametersResult": result,
         },
+        "rclpy.action": {"ActionClient": ActionClient, "ActionServer": ActionServer},
+        "rclpy.lifecycle": {"LifecycleNode": LifecycleNode, "Node": LifecycleNode},
+        "rclpy.utilities": {"ok": _ok, "shutdown": _shutdown, "try_shutdown": _shutdown},
         "rclpy.parameter": {"Parameter": parameters.ParameterSetting},
         "rclpy.qos": {
             "QoSProfile": qos.QoSProfile,

@@ -95,11 +95,13 @@ class Client:
         *,
         later: Callable[[], Later | None],
         run: Callable[[Callable[[], None], str], None],
+        receive: Callable[[Any], Any],
     ) -> None:
         self._graph = graph
         self._executor = executor
         self._later = later
         self._run = run
+        self._receive = receive
         self._request_type = f"{srvtype}_Request"
         self._looks = (0, 0)  # number of waits, and their time
         self.service = service
@@ -139,7 +141,7 @@ class Client:
             raise GraphError(
                 f"a node with a latency cannot wait for service '{self.service}': use call_async"
             )
-        return self._graph.call(self.service, self._filled(request))
+        return self._receive(self._graph.call(self.service, self._filled(request)))
 
     def call_async(self, request: Any | None = None) -> Future:
         """Calls; the response comes at once, or later from an external server.
@@ -176,7 +178,7 @@ class Client:
         def call() -> None:
             here = threading.get_ident()
             reply = ServiceReply(
-                lambda response: settle(lambda: future.set_result(response), here),
+                lambda response: settle(lambda: future.set_result(self._receive(response)), here),
                 lambda error: settle(lambda: future.set_exception(error), here),
             )
             self._graph.call_async(self.service, request, reply)

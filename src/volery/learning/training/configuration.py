@@ -122,13 +122,13 @@ def load_configuration(task: str, file: str | Path | None = None) -> TrainingCon
     """
     if file is not None:
         try:
-            text = Path(file).read_text(encoding="utf-8")
+            text = Path(file).read_text(encoding="utf-8-sig")
         except (OSError, UnicodeDecodeError) as error:
             raise VoleryError(f"{file}: {reason_of(error)}") from None
         return _parsed(text, str(file))
     shipped = _BASELINES / f"{task}.toml"
     return (
-        _parsed(shipped.read_text(encoding="utf-8"), shipped.name)
+        _parsed(shipped.read_text(encoding="utf-8-sig"), shipped.name)
         if shipped.is_file()
         else (TrainingConfiguration())
     )

@@ -20,6 +20,7 @@ from contextlib import contextmanager
 from importlib.machinery import PathFinder
 from importlib.util import find_spec
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from volery.core.errors import ScenarioError, VoleryError
@@ -174,13 +175,21 @@ def _find_class(path: str, where: str) -> type[Any]:
         found = getattr(module, class_name)
     except AttributeError:
         raise ScenarioError(
-            f"{where}: module '{module_name}' has no class '{class_name}'"
+            f"{where}: module '{module_name}' has no class '{class_name}'{_source_of(module)}"
         ) from None
     if not (isinstance(found, type) and issubclass(found, Node)):
         raise ScenarioError(
             f"{where}: '{path}' is no subclass of volery.graph.nodes.node.Node{_hint(found)}"
         )
     return found
+
+
+def _source_of(module: ModuleType) -> str:
+    """Returns which file a module came from: an installed package may have the name of a file."""
+    file = getattr(module, "__file__", None)
+    if file is None:
+        return "; the name is that of a module of Python or of ROS: rename your file"
+    return f"; it is {file}. If you mean another file of this name, rename that"
 
 
 def _hint(found: Any) -> str:

@@ -42,7 +42,9 @@ class CommandReplay:
         pacer: Pacer,
         log: CommandLog,
     ) -> None:
-        self._commands: Sequence[RecordedCommand] = flight.commands
+        self._commands: Sequence[RecordedCommand] = [
+            command for command in flight.commands if command.taken.kind != "refused"
+        ]  # refusals follow from the commands again
         self._engine = engine
         self._pacer = pacer
         self._log = log

@@ -15,6 +15,7 @@ from volery.graph.messages import (
     Transform,
     TransformStamped,
     Vector3,
+    frame_of,
     header,
 )
 from volery.runtime.facets.world import SimulationWorld
@@ -54,13 +55,14 @@ def offer_actors(
     for actor in actors.actors:
         if isinstance(actor.motion, GivenMotion):
             topic = f"/actors/{actor.name}/pose"
-            graph.subscribe(topic, _placing(world, actor.name), PoseStamped)
+            graph.subscribe(topic, _placing(graph, world, actor.name), PoseStamped)
 
 
-def _placing(world: SimulationWorld, name: str) -> Callable[[Published], None]:
+def _placing(graph: Graph, world: SimulationWorld, name: str) -> Callable[[Published], None]:
     def receive(published: Published) -> None:
         message: Any = published.message
-        if message.header.frame_id not in ("", "map"):
+        if (frame := frame_of(message)) not in ("", "map"):
+            graph.refuse(published.topic, f"poses are in 'map', not in '{frame}'")
             return
         place, turn = message.pose.position, message.pose.orientation
         attitude = [turn.x, turn.y, turn.z, turn.w]
@@ -70,7 +72,7 @@ def _placing(world: SimulationWorld, name: str) -> Callable[[Published], None]:
                 [place.x, place.y, place.z],
                 attitude if any(attitude) else None,
             )
-        except CommandError:
-            return
+        except CommandError as error:
+            graph.refuse(published.topic, str(error))
 
     return receive

@@ -10,7 +10,16 @@ import numpy as np
 from volery.core.arrays import Array
 from volery.core.errors import PlacementError
 from volery.graph.graph import Graph
-from volery.graph.messages import Point, Pose, Quaternion, Twist, Vector3, header, message_type
+from volery.graph.messages import (
+    Point,
+    Pose,
+    Quaternion,
+    Twist,
+    Vector3,
+    frame_of,
+    header,
+    message_type,
+)
 from volery.runtime.facets.vehicles import SimulationVehicles
 from volery.runtime.facets.world import SimulationWorld
 from volery.runtime.services.entity_views import Entity, entities_of_actors, entity_of_uav
@@ -129,8 +138,8 @@ class Entities:
 
     def _set_state(self, request: Any) -> None:
         entity, state = self._find(request.entity), request.state
-        if state.header.frame_id not in ("", "map"):
-            reason = f"states are set in 'map', not in '{state.header.frame_id}'"
+        if frame_of(state) not in ("", "map"):
+            reason = f"states are set in 'map', not in '{frame_of(state)}'"
             raise RefusedError(ResultCode.OPERATION_FAILED, reason)
         if request.set_acceleration:
             reason = "accelerations follow from forces and cannot be set"

@@ -19,6 +19,7 @@ from volery.graph.messages import (
     Pose,
     Published,
     Quaternion,
+    frame_of,
     header,
     single,
     time_from_ns,
@@ -55,6 +56,7 @@ def offer_grid_maps(
             world.show(grid_of(message, height_m, unknown_is_blocked=settings.unknown_is_blocked))
         except CommandError as error:
             world.refuse(str(error))
+            graph.refuse(published.topic, str(error))
 
     def change(request: Any) -> Fields:
         shown = world.change(
@@ -107,8 +109,8 @@ def grid_of(message: Any, block_height_m: float, *, unknown_is_blocked: bool = F
     height of the origin is ignored: blocks stand on the ground.
     """
     info, place = message.info, message.info.origin.position
-    if message.header.frame_id not in ("", "map"):
-        raise CommandError(f"maps are in 'map', not in '{message.header.frame_id}'")
+    if frame_of(message) not in ("", "map"):
+        raise CommandError(f"maps are in 'map', not in '{frame_of(message)}'")
     data: NDArray[np.int8] = np.asarray(message.data, dtype=np.int8)
     rows, columns = int(info.height), int(info.width)
     if data.size != rows * columns:

@@ -7,6 +7,7 @@ from typing import Any
 
 from volery.core.errors import PlacementError, SpawnError, SpawnFault, VoleryError
 from volery.graph.graph import Graph
+from volery.graph.messages import frame_of
 from volery.runtime.facets.vehicles import SimulationVehicles
 from volery.runtime.services.results import (
     Fields,
@@ -66,8 +67,8 @@ class SpawnServices:
             raise RefusedError(_UNSUPPORTED_FORMAT, "UAVs are spawned by type, not from a string")
         if not request.entity_resource.uri:
             raise RefusedError(_NO_RESOURCE, "uri must be an entity_resource of /get_spawnables")
-        if pose.header.frame_id not in ("", "map"):
-            reason = f"poses are in 'map', not in '{pose.header.frame_id}'"
+        if frame_of(pose) not in ("", "map"):
+            reason = f"poses are in 'map', not in '{frame_of(pose)}'"
             raise RefusedError(_INVALID_POSE, reason)
         name = self._name(request)
         if request.entity_namespace.strip("/") not in ("", name):

@@ -28,8 +28,8 @@ class WeatherTopics:
     """Publishes the weather on `/weather`, latched; subscribes to `/weather_command`.
 
     The message holds everything that can be set while running: a log's `/weather`, played back
-    into `/weather_command`, sets the same weather at the same times. Invalid commands are ignored,
-    as a topic has no response.
+    into `/weather_command`, sets the same weather at the same times. Invalid commands are refused
+    (`Graph.refuse`).
     """
 
     def __init__(
@@ -48,7 +48,8 @@ class WeatherTopics:
             try:
                 gusts = tuple(_gust_of(gust) for gust in message.gusts)
                 weather = replace(changed(present(), message), gusts=gusts)
-            except CommandError:
+            except CommandError as error:
+                graph.refuse(published.topic, str(error))
                 return
             if message.hour_of_day == 0.0:
                 weather = replace(weather, hour_of_day=None)

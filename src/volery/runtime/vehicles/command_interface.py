@@ -20,6 +20,7 @@ from volery.graph.messages import (
     Published,
     Twist,
     TwistStamped,
+    frame_of,
     header,
 )
 from volery.runtime.services.results import Close, offer_command
@@ -35,6 +36,9 @@ _DOWN = (FlightMode.LANDED, FlightMode.CRASHED)
 _BUSY = (FlightMode.TAKE_OFF, FlightMode.LAND, FlightMode.RETURN)
 """Modes that no topic ends: a landing continues while a stream of Twists arrives."""
 
+_GOALS = ("goal_pose", "trajectory")
+"""Topics of single commands; the others are streams."""
+
 _log = logging.getLogger(__name__)
 
 
@@ -47,7 +51,8 @@ def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> list[Clo
 
     A Twist is in the level heading frame, a pose and a trajectory in the map frame. The UAV
     ignores all of them on the ground and during take-off, landing and return. An invalid message
-    (nan, another frame) is discarded with a logged warning, once per topic. An accepted Twist is
+    (nan, another frame) is discarded with a logged warning, once per topic. An external client
+    learns of it, and of a goal or trajectory that is ignored (`Graph.refuse`). An accepted Twist is
     published on `cmd_vel/applied` with the simulated time from which it acts; clients measure
     round trips with it. The services take_off, hold, land and return_home respond with `success`
     and a reason. The returned functions undo all that.
@@ -73,7 +78,8 @@ def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> list[Clo
     closes: list[Close] = [applied.cancel]
     for name, (message_class, take) in topics.items():
         topic = f"/{uav.name}/{name}"
-        closes.append(graph.subscribe(topic, _careful(uav, take, topic), message_class).cancel)
+        receive = _careful(graph, uav, take, topic, streamed=name not in _GOALS)
+        closes.append(graph.subscribe(topic, receive, message_class).cancel)
     actions: dict[str, Callable[[], object]] = {
         "take_off": uav.take_off,
         "hold": uav.hold,
@@ -91,8 +97,8 @@ def go_to_message(uav: Uav, message: Any) -> None:
 
     Raises `CommandError` if the goal is invalid or in another frame.
     """
-    if message.header.frame_id not in ("", "map"):
-        raise CommandError(f"goals are in 'map', not in '{message.header.frame_id}'")
+    if frame_of(message) not in ("", "map"):
+        raise CommandError(f"goals are in 'map', not in '{frame_of(message)}'")
     place, turn = message.pose.position, message.pose.orientation
     q = np.array([turn.x, turn.y, turn.z, turn.w], dtype=np.float64)
     if not np.isfinite(q).all():
@@ -103,8 +109,8 @@ def go_to_message(uav: Uav, message: Any) -> None:
 
 def stand_at_message(uav: Uav, message: Any) -> None:
     """Sets the pose of a kinematic `uav` from a PoseStamped in the map. Raises `CommandError`."""
-    if message.header.frame_id not in ("", "map"):
-        raise CommandError(f"poses are in 'map', not in '{message.header.frame_id}'")
+    if frame_of(message) not in ("", "map"):
+        raise CommandError(f"poses are in 'map', not in '{frame_of(message)}'")
     place, turn = message.pose.position, message.pose.orientation
     stamp = message.header.stamp
     uav.command_pose(
@@ -114,16 +120,26 @@ def stand_at_message(uav: Uav, message: Any) -> None:
     )
 
 
-def _careful(uav: Uav, take: Callable[[Any], None], topic: str) -> Callable[[Published], None]:
+def _careful(
+    graph: Graph, uav: Uav, take: Callable[[Any], None], topic: str, *, streamed: bool
+) -> Callable[[Published], None]:
+    """Returns a subscriber that refuses invalid messages.
+
+    streamed: messages that a mode ignores are no news for a client, which repeats them.
+    """
     told = False
 
     def receive(published: Published) -> None:
         nonlocal told
         if uav.mode in _BUSY:
+            if not streamed:
+                graph.refuse(topic, f"{uav.name} is in mode {uav.mode.name}, which no goal ends")
             return
         try:
             take(published.message)
         except (CommandError, AttributeError) as error:
+            if not (streamed and uav.mode in _DOWN):
+                graph.refuse(topic, str(error))
             if not told and uav.mode not in _DOWN:
                 told = True
                 _log.warning("%s: a command is not obeyed: %s", topic, error)

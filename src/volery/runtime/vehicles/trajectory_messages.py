@@ -10,6 +10,7 @@ from volery.control.trajectory import Trajectory
 from volery.core import rotations
 from volery.core.arrays import Array
 from volery.core.errors import CommandError
+from volery.graph.messages import frame_of
 from volery.runtime.vehicles.uav import Uav
 
 
@@ -20,8 +21,8 @@ def follow_message(uav: Uav, message: Any) -> None:
     ignores the stamp. Transforms, velocities and accelerations are those of `base_link` in `map`;
     yaw comes from the rotations. Raises `CommandError`, also for another frame.
     """
-    if message.header.frame_id not in ("", "map"):
-        raise CommandError(f"trajectories are in 'map', not in '{message.header.frame_id}'")
+    if frame_of(message) not in ("", "map"):
+        raise CommandError(f"trajectories are in 'map', not in '{frame_of(message)}'")
     points = message.points
     if not len(points) or not all(len(point.transforms) for point in points):
         raise CommandError("a trajectory needs points, each with a transform")

@@ -24,7 +24,7 @@ def text_of(path: Path, name: str) -> str:
     Raises ScenarioError for a file that is not TOML, or has no line `name = "..."` at its top.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
         before = tomllib.loads(text)
     except (OSError, ValueError) as error:
         raise ScenarioError(f"{path}: not valid TOML: {reason_of(error)}") from None

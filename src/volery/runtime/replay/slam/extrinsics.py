@@ -13,6 +13,7 @@ from volery.autonomy.perception.static_transforms import Mount, StaticTransforms
 from volery.bridges.logs.recorded_flight import ORIGIN_TOPIC, RecordedScenario
 from volery.core import rotations
 from volery.core.errors import RecordingError, ScenarioError
+from volery.graph.messages import frame_name, frame_of
 from volery.runtime.replay.scenario_record import scenario_of
 from volery.runtime.replay.slam.sources import SlamInput
 
@@ -42,7 +43,7 @@ def frames_of(source: ExtrinsicsLog, topics: dict[str, str]) -> dict[str, str]:
     names = {topic: name for name, topic in topics.items()}
     frames: dict[str, str] = {}
     for topic, _, message in source.messages(set(names)):
-        frames.setdefault(names[topic], message.header.frame_id)
+        frames.setdefault(names[topic], frame_of(message))
         if len(frames) == len(names):
             break
     return frames
@@ -92,14 +93,14 @@ def _join_moving(source: ExtrinsicsLog, joints: StaticTransforms, frames: set[st
     both.joints = dict(joints.joints)
     for _, _, message in source.messages({"/tf"}):
         for found in message.transforms:
-            p, child = found.transform.translation, found.child_frame_id
+            p, child = found.transform.translation, frame_name(found.child_frame_id)
             if (
                 child not in both.joints
                 and not _is_body(child)
                 and np.isfinite([p.x, p.y, p.z]).all()
             ):
                 place = Mount(np.array([p.x, p.y, p.z]), rotations.IDENTITY)
-                both.joints[child] = found.header.frame_id, place
+                both.joints[child] = frame_of(found), place
         if all(_is_in_body(both, frame) for frame in frames):
             break
     for frame in frames:

@@ -8,6 +8,7 @@ from volery.bridges.logs.recorded_flight import ORIGIN_TOPIC, RecordedScenario
 from volery.core import rotations
 from volery.core.clock import NS_PER_S
 from volery.core.errors import VoleryError
+from volery.graph.messages import frame_of
 from volery.runtime.build.fleet import place
 from volery.runtime.build.worlds import build_world
 from volery.runtime.replay.scenario_record import scenario_of
@@ -41,7 +42,7 @@ def beginning_of(source: ExtrinsicsLog, uav: str, scan: str) -> Pose | None:
 
 def _true_pose(source: ExtrinsicsLog, topic: str) -> Pose | None:
     for _, _, message in source.messages({topic}):
-        if message.header.frame_id != _MAP:
+        if frame_of(message) != _MAP:
             return None
         p, q = message.pose.pose.position, message.pose.pose.orientation
         return p.x, p.y, p.z, float(rotations.yaw_of([q.x, q.y, q.z, q.w]))

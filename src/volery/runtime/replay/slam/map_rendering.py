@@ -13,7 +13,7 @@ from volery.autonomy.perception.static_transforms import Mount
 from volery.core import rotations
 from volery.core.arrays import Array
 from volery.core.errors import RecordingError
-from volery.graph.messages import LaserScan, stamp_of
+from volery.graph.messages import LaserScan, frame_of, stamp_of
 from volery.runtime.replay.slam.offline_slam import SlamResult
 from volery.runtime.replay.slam.trajectory import EstimatedTrajectory
 
@@ -41,7 +41,7 @@ def draw_map(outcome: SlamResult, cell_m: float, reach_m: float) -> LogOddsGrid:
     """
     ground = _ground(outcome)
     rays = [
-        _rays(outcome.trajectory, row, scan, outcome.mount(scan.header.frame_id), reach_m, ground)
+        _rays(outcome.trajectory, row, scan, outcome.mount(frame_of(scan)), reach_m, ground)
         for row, scan in outcome.scans
     ]
     ends = [np.concatenate([starts[:1], ends]) for starts, ends, _ in rays if len(starts)]
@@ -111,7 +111,7 @@ def _ground(outcome: SlamResult) -> VerticalStructures | None:
         angle = float(scan.angle_min) + beams * float(scan.angle_increment)
         x, y = length * np.cos(angle), length * np.sin(angle)
         along = np.stack([np.cos(nod) * x, y, -np.sin(nod) * x], axis=1)
-        mount = outcome.mount(scan.header.frame_id)
+        mount = outcome.mount(frame_of(scan))
         body = rotations.rotate(mount.attitude, along) + mount.position
         place, turn = _poses(outcome.trajectory, row, scan, beams)
         found.append(rotations.rotate(turn, body) + place)

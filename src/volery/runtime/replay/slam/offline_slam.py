@@ -16,7 +16,7 @@ from volery.autonomy.perception.static_transforms import Mount, StaticTransforms
 from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S
 from volery.core.errors import RecordingError
-from volery.graph.messages import LaserScan, stamp_of
+from volery.graph.messages import LaserScan, frame_of, stamp_of
 from volery.runtime.replay.slam.extrinsics import frames_of, read_joints
 from volery.runtime.replay.slam.initial_pose import beginning_of
 from volery.runtime.replay.slam.log_host import LogHost
@@ -228,7 +228,7 @@ class OfflineSlam:
 
     def _on_tf(self, message: Any) -> None:
         for found in message.transforms:
-            if found.header.frame_id == "map":
+            if frame_of(found) == "map":
                 q = found.transform.rotation
                 self._tilt = np.array([q.x, q.y, q.z, q.w])
 

@@ -1,0 +1,138 @@
+"""Messages of clients that are not obeyed: the client and `/volery/log` learn why."""
+
+import json
+import math
+
+import pytest
+from rosbridge_bench import TIME_NS
+
+from volery.bridges.rosbridge.protocol import RosbridgePeer, ServerContext
+from volery.graph.codecs.zero import zero_message
+from volery.graph.command_records import TOPIC, TYPE
+from volery.runtime import Simulation
+from volery.scenario.load import parse_scenario
+
+FLAT = {
+    "name": "flat",
+    "types": {"f450": {"sensors": [{"kind": "odometry", "noise": False}]}},
+    "uavs": [{"type": "f450", "position_m": [0.0, 0.0]}],
+}
+POSE = "geometry_msgs/msg/PoseStamped"
+
+
+@pytest.fixture
+def simulation():
+    with Simulation(parse_scenario(FLAT, where="flat"), threads=1) as simulation:
+        yield simulation
+
+
+@pytest.fixture(scope="module")
+def flying():
+    with Simulation(parse_scenario(FLAT, where="flat"), threads=1) as simulation:
+        simulation.uavs["uav1"].take_off(3.0)
+        simulation.run(6.0)
+        yield simulation
+
+
+def goal(frame="map", x=2.0):
+    message = zero_message(POSE)
+    message.header.frame_id, message.pose.orientation.w = frame, 1.0
+    message.pose.position.x, message.pose.position.z = x, 3.0
+    return message
+
+
+def told_about(simulation, topic, *messages):
+    """Returns what a client is told, and what the log records, about its messages."""
+    told, logged = [], []
+    log = simulation.graph.subscribe(TOPIC, lambda p: logged.append(p.message), TYPE)
+    session = simulation.gateway.open("client")
+    session.on_refused = told.append
+    session.advertise(topic, messages[0].__msgtype__)
+    for message in messages:
+        session.publish(topic, message)
+    simulation.run(0.1)
+    session.close()
+    log.cancel()
+    return told, [(r.client, r.name, r.content) for r in logged if r.kind == "refused"]
+
+
+@pytest.mark.parametrize(
+    ("message", "words"),
+    [(goal("moon"), "goals are in 'map', not in 'moon'"), (goal(x=math.nan), "finite")],
+)
+def test_a_goal_that_cannot_be(flying, message, words):
+    told, logged = told_about(flying, "/uav1/goal_pose", message)
+    assert len(told) == 1
+    assert told[0].startswith("/uav1/goal_pose: ")
+    assert words in told[0]
+    assert logged == [("client", "/uav1/goal_pose", told[0].partition(": ")[2])]
+
+
+def test_a_goal_in_the_map_with_a_slash(flying):
+    assert told_about(flying, "/uav1/goal_pose", goal("/map")) == ([], [])
+    flying.run(10.0)
+    assert flying.uavs["uav1"].position_map[0] == pytest.approx(2.0, abs=0.1)
+
+
+def test_a_trajectory_without_rotation(flying):
+    message = zero_message("trajectory_msgs/msg/MultiDOFJointTrajectory")
+    point = zero_message("trajectory_msgs/msg/MultiDOFJointTrajectoryPoint")
+    transform = zero_message("geometry_msgs/msg/Transform")
+    transform.rotation.w = 0.0
+    point.transforms = [transform]
+    message.points = [point]
+    told, _ = told_about(flying, "/uav1/trajectory", message)
+    assert "unit quaternions" in told[0]
+
+
+def test_a_pose_of_a_uav_that_flies_by_itself(flying):
+    told, logged = told_about(flying, "/uav1/pose_command", goal())
+    assert len(told) == len(logged) == 1
+
+
+def test_a_goal_on_the_ground_and_during_take_off(simulation):
+    told, _ = told_about(simulation, "/uav1/goal_pose", goal())
+    assert "must take off first" in told[0]
+    simulation.uavs["uav1"].take_off(3.0)
+    simulation.run(0.5)
+    told, _ = told_about(simulation, "/uav1/goal_pose", goal())
+    assert "TAKE_OFF" in told[0]
+
+
+def test_a_stream_on_the_ground_is_no_news(simulation):
+    twist = zero_message("geometry_msgs/msg/Twist")
+    assert told_about(simulation, "/uav1/cmd_vel", twist, twist) == ([], [])
+
+
+def test_a_stream_of_refusals_is_told_once(flying, monkeypatch):
+    monkeypatch.setattr("volery.graph.session._TELL_PERIOD_S", 1e9)
+    told, logged = told_about(flying, "/uav1/goal_pose", *[goal("moon")] * 30)
+    assert len(told) == 1
+    assert len(logged) == 30
+    frames = [goal(f"moon{k}") for k in range(30)]
+    assert len(told_about(flying, "/uav1/goal_pose", *frames)[0]) == 20
+
+
+def test_weather_that_cannot_be(flying):
+    message = zero_message("volery_interfaces/msg/Weather")
+    message.rain = math.nan
+    told, _ = told_about(flying, "/weather_command", message)
+    assert len(told) == 1
+
+
+def test_a_client_of_rosbridge_receives_a_status(flying):
+    session = flying.gateway.open("rosbridge 127.0.0.1:1")
+    peer = RosbridgePeer(
+        session,
+        ServerContext(now_ns=lambda: TIME_NS),
+        wake=lambda: None,
+        post=lambda action: action(),
+    )
+    message = {"header": {"frame_id": "moon"}, "pose": {"position": {"z": 3}}}
+    peer.receive(json.dumps({"op": "publish", "topic": "/uav1/goal_pose", "msg": message}), 0.0)
+    flying.run(0.1)
+    (status,) = map(json.loads, peer.frames(0.0))
+    assert status["op"] == "status"
+    assert status["level"] == "error"
+    assert "'moon'" in status["msg"]
+    peer.close()
