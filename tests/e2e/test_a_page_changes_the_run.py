@@ -70,7 +70,7 @@ class Page:
 
     def ask(self, name, srvtype, /, **fields):
         service = roslibpy.Service(self.ros, name, srvtype)
-        return service.call(roslibpy.ServiceRequest(fields), timeout=10)
+        return service.call(roslibpy.ServiceRequest(fields), timeout=60)
 
     def volery(self, name, srvtype, /, **fields):
         return self.ask(f"/volery/{name}", f"volery_interfaces/{srvtype}", **fields)

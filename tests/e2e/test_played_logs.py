@@ -9,6 +9,7 @@ import sys
 import time
 
 import pytest
+from child_process import start_child
 
 from volery.bridges.logs.log_writer import create_log
 from volery.bridges.rosbridge.client import RosbridgeClient
@@ -33,11 +34,11 @@ def flight(tmp_path):
 def seek(client, second):
     request = zero_message("volery_interfaces/srv/Seek_Request")
     request.time = second
-    return call_and_wait(client, "/volery/player/seek", request, 20.0)
+    return call_and_wait(client, "/volery/player/seek", request, 60.0)
 
 
 def test_a_log_is_played_to_a_client(flight):
-    process = subprocess.Popen(
+    process = start_child(
         [*PLAY, flight, "--paused", "--bridge", "rosbridge=0"], stderr=subprocess.PIPE, text=True
     )
     try:
@@ -54,7 +55,7 @@ def test_a_log_is_played_to_a_client(flight):
                 assert time.monotonic() < until
                 messages = [p.message for p in odom.take()]
                 stamps += [m.header.stamp.sec + m.header.stamp.nanosec / 1e9 for m in messages]
-        info = call_and_wait(client, "/volery/player/info", None, 20.0)
+        info = call_and_wait(client, "/volery/player/info", None, 60.0)
         assert (info.file, info.state, info.position) == ("flight.mcap", 2, 1.0)
         client.close()
         process.send_signal(signal.SIGINT)

@@ -69,7 +69,7 @@ class Operator:
         request = zero_message(f"{srvtype}_Request")
         for name, value in fields.items():
             setattr(request, name, value)
-        return call_and_wait(self.client, service, request, 20.0)
+        return call_and_wait(self.client, service, request, 60.0)
 
     def ours(self, service, kind, **fields):
         return self.call(f"/volery/{service}", f"volery_interfaces/srv/{kind}", **fields)
@@ -431,10 +431,11 @@ def test_a_lock_step_partner_is_met_again(tmp_path):
         come = threading.Event()
         go = session.subscribe("/volery/lock_step/operator/go", clock, depth=5, wake=come.set)
         request = zero_message("volery_interfaces/srv/JoinLockStep_Request")
-        request.name, request.period_s, request.timeout_s = "operator", 0.05, 20.0
+        request.name, request.period_s, request.timeout_s = "operator", 0.05, 60.0
         joined = []
         session.call("/volery/join_lock_step", request, ServiceReply(joined.append, joined.append))
         meetings = []
+        chance = random.Random(4)
 
         def steer():
             while len(meetings) < 12:
@@ -443,7 +444,7 @@ def test_a_lock_step_partner_is_met_again(tmp_path):
                 for published in go.take():
                     meetings.append(published.message)
                     stamp = published.message.clock
-                    turn = Vector3(0.0, 0.0, 0.7 * random.random())
+                    turn = Vector3(0.0, 0.0, 0.7 * chance.random())
                     session.publish("/uav1/cmd_vel", Twist(Vector3(0.5, 0.0, 0.0), turn))
                     assert stamp.nanosec % 50_000_000 == 0
                     session.publish("/volery/lock_step/operator/done", published.message)
@@ -493,14 +494,15 @@ def test_what_a_service_outside_answered_is_answered_again(tmp_path):
         simulation.graph.subscribe_all(log.write)
         session = simulation.gateway.open("oracle")
         timers = []
+        chance = random.Random(5)
 
         def answer(_request, reply):
             def tell():
-                if random.random() < 0.2:
+                if chance.random() < 0.2:
                     reply.fail(GraphError("no idea"))
-                reply.answer(response(success=True, message=str(random.random())))
+                reply.answer(response(success=True, message=str(chance.random())))
 
-            timers.append(threading.Timer(0.1 * random.random(), tell))
+            timers.append(threading.Timer(0.1 * chance.random(), tell))
             timers[-1].start()
 
         session.create_service("/oracle", "std_srvs/srv/Trigger", answer)

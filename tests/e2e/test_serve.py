@@ -14,6 +14,7 @@ import urllib.request
 from pathlib import Path
 
 import pytest
+from child_process import start_child
 
 roslibpy = pytest.importorskip("roslibpy")
 VOLERY = [sys.executable, "-m", "volery.cli"]
@@ -34,7 +35,7 @@ class Server:
     """A process with a page; `lines` are what it says."""
 
     def __init__(self, *words, cwd=None):
-        self.process = subprocess.Popen(
+        self.process = start_child(
             [*VOLERY, *map(str, words)], stderr=subprocess.PIPE, text=True, cwd=cwd
         )
         self.lines = []
@@ -108,7 +109,7 @@ class Ros:
 
     def call(self, service, srvtype, **fields):
         asked = roslibpy.Service(self.ros, service, srvtype)
-        return asked.call(roslibpy.ServiceRequest(fields), timeout=30)
+        return asked.call(roslibpy.ServiceRequest(fields), timeout=60)
 
     def load(self, name):
         source = {"world_resource": {"uri": name}}

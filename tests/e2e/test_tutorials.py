@@ -1,19 +1,13 @@
 """The tutorials run as they stand."""
 
-import socket
 import sys
 from pathlib import Path
 
 import pytest
+from own_port import own_port
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted(page for page in (ROOT / "docs" / "tutorials").glob("*.md") if page.stem != "index")
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +22,7 @@ def tutorial():
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_tutorial(tutorial, page, tmp_path):
-    port = free_port()
+    port = own_port()
     ports = {
         "--bridge rosbridge": f"--bridge rosbridge={port}",
         "volery node": f"volery node --via rosbridge://127.0.0.1:{port}",

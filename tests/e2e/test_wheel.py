@@ -16,6 +16,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from child_process import start_child
 
 ROOT = Path(__file__).parents[2]
 PAGE = "src/volery/server/static/index.html"
@@ -109,7 +110,7 @@ def test_wheel_names_its_commit(environment, tmp_path):
 
 def test_wheel_flies_with_its_page(environment, tmp_path):
     command = [str(environment / "volery"), "run", "hover", "--page=127.0.0.1:0"]
-    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+    with start_child(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
         killer = threading.Timer(2 * FIRST_STEP_TIMEOUT_S, process.kill)
         killer.start()
         try:

@@ -3,7 +3,22 @@
 import pytest
 import roslibpy
 from page_browsing import keep_picture
-from truth import VEHICLES, place, put, stamp_ns, status, vehicle, weather
+from truth import (
+    VEHICLES,
+    first_after_return,
+    heard_status,
+    heard_vehicles,
+    hurried,
+    of_uav,
+    place,
+    put,
+    set_speed,
+    stamp_ns,
+    status,
+    until,
+    vehicle,
+    weather,
+)
 from working import WIDE, inspect, open_panel, set_slider, tab_to
 
 pytestmark = pytest.mark.slow
@@ -56,7 +71,7 @@ def test_the_speed_slider_goes_from_slow_to_unbounded(page, served):
     set_slider(page, "Speed", "End", 1)
     status(served, lambda told: told["speed"] == 0.0)
     page.keyboard.press("Escape")
-    served.call("/volery/set_speed", "volery_interfaces/srv/SetSpeed", {"factor": 1.0})
+    set_speed(served, 1.0)
 
 
 def test_a_snapshot_is_taken_returned_to_and_forgotten(page, served):
@@ -67,18 +82,24 @@ def test_a_snapshot_is_taken_returned_to_and_forgotten(page, served):
     listed = served.call("/volery/list_snapshots", "volery_interfaces/srv/ListSnapshots")
     assert listed["names"] == ["before"]
     kept_s = listed["stamps"][0]["sec"]
-    status(served, lambda told: told["stamp"]["sec"] >= kept_s + 3)
-    page.get_by_role("button", name="Restore before").click()
-    status(served, lambda told: told["stamp"]["sec"] <= kept_s + 2)
+    with hurried(served):
+        status(served, lambda told: told["stamp"]["sec"] >= kept_s + 3)
+    with heard_status(served) as heard:
+        page.get_by_role("button", name="Restore before").click()
+        restored = until(lambda: first_after_return(heard))
+    assert kept_s <= restored["stamp"]["sec"] <= kept_s + 2
     page.get_by_role("button", name="Delete before").click()
     page.get_by_text("No snapshots.").wait_for()
 
 
 def test_a_reset_goes_back_to_the_start(page, served):
-    status(served, lambda told: told["stamp"]["sec"] >= 3)
+    with hurried(served):
+        status(served, lambda told: told["stamp"]["sec"] >= 3)
     page.get_by_role("button", name="Reset", exact=True).click()
-    page.get_by_role("button", name="Reset, same seed").click()
-    status(served, lambda told: told["stamp"]["sec"] <= 2)
+    with heard_status(served) as heard:
+        page.get_by_role("button", name="Reset, same seed").click()
+        started = until(lambda: first_after_return(heard))
+    assert started["stamp"]["sec"] <= 2
 
 
 # ------------------------------------------------------------------------------------------- UAVs
@@ -86,12 +107,14 @@ def test_a_reset_goes_back_to_the_start(page, served):
 
 def test_orders_and_a_place_to_go_to(page, served):
     panel = inspect(page, "uav1")
-    vehicle(served, "uav1", lambda uav: uav["mode"] == "HOLD")  # after its own take-off
+    with hurried(served):
+        vehicle(served, "uav1", lambda uav: uav["mode"] == "HOLD")  # after its own take-off
     panel.get_by_label("x, m").fill("6")
     panel.get_by_label("y, m").fill("-3")
     panel.get_by_label("z, m").fill("4")
     panel.get_by_role("button", name="Go", exact=True).click()
-    there = vehicle(served, "uav1", lambda uav: abs(uav["position"]["x"] - 6.0) < 0.3)
+    with hurried(served):
+        there = vehicle(served, "uav1", lambda uav: abs(uav["position"]["x"] - 6.0) < 0.3)
     assert there["position"]["y"] == pytest.approx(-3.0, abs=1.0)
     panel.get_by_role("button", name="Land", exact=True).click()
     vehicle(served, "uav1", lambda uav: uav["mode"] in ("LAND", "LANDED"))
@@ -99,12 +122,16 @@ def test_orders_and_a_place_to_go_to(page, served):
 
 
 def test_return_brings_a_uav_home(page, served):
-    vehicle(served, "uav2", lambda uav: uav["mode"] == "HOLD")
+    with hurried(served):
+        vehicle(served, "uav2", lambda uav: uav["mode"] == "HOLD")
     home = place(served, "uav2")
     put(served, "uav2", home[0] + 4.0, home[1], home[2])
-    inspect(page, "uav2").get_by_role("button", name="Return", exact=True).click()
-    vehicle(served, "uav2", lambda uav: uav["mode"] == "RETURN")
-    vehicle(served, "uav2", lambda uav: abs(uav["position"]["x"] - home[0]) < 0.5)
+    panel = inspect(page, "uav2")
+    with heard_vehicles(served) as heard:
+        panel.get_by_role("button", name="Return", exact=True).click()
+        until(lambda: any(uav["mode"] == "RETURN" for uav in of_uav(heard, "uav2")))
+    with hurried(served):
+        vehicle(served, "uav2", lambda uav: abs(uav["position"]["x"] - home[0]) < 0.5)
     served.call("/uav2/hold", "std_srvs/srv/Trigger")
 
 
