@@ -56,6 +56,7 @@ def _with_times(plain: Any, msgtype: str, now_ns: Callable[[], int]) -> Any:
     if not isinstance(plain, dict):
         return plain
     filled = dict(plain)
+    detail: Any
     for name, (kind, detail) in typestore().fielddefs[msgtype][1]:
         if name not in filled:
             continue

@@ -82,7 +82,8 @@ def _copier(msgtype: str, purpose: _Purpose) -> Copy:
             values.append(f"message.{name}")
             continue
         scope[f"_copy_{name}"] = copier
-        usual = _USUAL.get(described[name][1][0]) if described[name][0] == Nodetype.BASE else None
+        kind, details = described[name]
+        usual = _USUAL.get(str(details[0])) if kind == Nodetype.BASE else None
         values.append(
             f"_copy_{name}(message.{name})"
             if usual is None

@@ -22,7 +22,7 @@ MAX_COPIED_BYTES = 64 * 1024
 Plain = NDArray[Any]
 
 
-class NumberSequence(np.ndarray):  # type: ignore[type-arg]
+class NumberSequence(np.ndarray):
     """A field of numbers of a received message: 1-dimensional; see the module."""
 
     _is_field = True
@@ -87,7 +87,7 @@ class NumberSequence(np.ndarray):  # type: ignore[type-arg]
             return field_of(np.concatenate([_plain(self), np.asarray(other)]))
         return _plain(self) + _plain(other)
 
-    def __iadd__(self, other: Any) -> Any:  # type: ignore[misc]  # an `array.array` grows in place
+    def __iadd__(self, other: Any) -> Any:  # an `array.array` grows in place
         """Joins two sequences; adds anything else in a new array."""
         return self + other
 
@@ -113,7 +113,7 @@ class NumberSequence(np.ndarray):  # type: ignore[type-arg]
         """Compares two sequences as a whole; anything else element by element."""
         return self._compared(other, operator.ne)
 
-    __hash__ = None  # type: ignore[assignment]
+    __hash__ = None
 
     def __copy__(self) -> NumberSequence:
         """Returns a writeable copy."""
