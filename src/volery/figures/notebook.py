@@ -1,11 +1,14 @@
-"""Figures for scripts and notebooks: axes of pyplot, and PNG within HTML."""
+"""Figures for scripts and notebooks: axes of pyplot, PNG within HTML, tables of a state."""
 
 from __future__ import annotations
 
 import base64
+from html import escape
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from matplotlib.axes import Axes
 
 _MAP_WIDTH_PX = 640
@@ -15,6 +18,12 @@ def png_html(png: bytes) -> str:
     """Returns an `<img>` that holds a PNG."""
     data = base64.b64encode(png).decode("ascii")
     return f'<img width="{_MAP_WIDTH_PX}" alt="map" src="data:image/png;base64,{data}">'
+
+
+def state_html(name: str, kind: str, rows: Mapping[str, str]) -> str:
+    """Returns a heading, which names an object and its kind, and a table of its state as HTML."""
+    cells = "".join(f"<tr><th>{escape(k)}</th><td>{escape(v)}</td></tr>" for k, v in rows.items())
+    return f"<div><b>{escape(name)}</b> {escape(kind)}</div><table>{cells}</table>"
 
 
 def new_axes() -> Axes:

@@ -50,8 +50,8 @@ _log = logging.getLogger(__name__)
 _MAX_FAILURES_LOGGED = 20
 """Topics and services of one client; each is logged once."""
 
-_TELL_PERIOD_S = 1.0
-_MAX_TOLD = 20
+_REFUSAL_PERIOD_S = 1.0
+_MAX_REFUSALS = 20
 """Different refusals told within that time."""
 
 MAX_LATCHED_BYTES = 128 * 1024 * 1024
@@ -186,7 +186,7 @@ class Gateway:
         with self._lock:
             told = [session for session in self._sessions if session.name == client]
         for session in told:
-            session.tell_refused(topic, reason)
+            session.report_refusal(topic, reason)
 
     def note_lost(self, messages: int) -> None:
         """Adds the dropped messages of a subscription that ends; used by `Session`."""
@@ -228,7 +228,7 @@ class Session:
         self.on_refused: Callable[[str], None] | None = None
         """Receives why a message of the client is not obeyed, in the simulation's thread; must not
         block. A bridge sets it where its protocol can tell the client."""
-        self._told: dict[tuple[str, str], float] = {}
+        self._reported_s: dict[tuple[str, str], float] = {}
         """Wall time of the last refusals that the client was told, s."""
 
     @property
@@ -482,25 +482,26 @@ class Session:
             publishes, offers = tuple(self._publishers), tuple(self._offers)
             return SessionInfo(self.name, publishes, self.queues, offers)
 
-    def tell_refused(self, topic: str, reason: str) -> None:
-        """Tells the client that its message on `topic` is not obeyed.
+    def report_refusal(self, topic: str, reason: str) -> None:
+        """Reports to the client that its message on `topic` is not obeyed.
 
-        A repeated refusal is told once per second, and at most 20 different ones: a stream of
-        messages would else be answered by a stream of errors.
+        Each refusal is reported once per second, and at most 20 different ones: otherwise a stream
+        of messages causes a stream of errors.
         """
         if self.on_refused is None:
             return
         now_s = time.monotonic()
-        self._told = {k: at_s for k, at_s in self._told.items() if now_s - at_s < _TELL_PERIOD_S}
-        if (topic, reason) not in self._told and len(self._told) < _MAX_TOLD:
-            self._told[topic, reason] = now_s
+        recent = {k: s for k, s in self._reported_s.items() if now_s - s < _REFUSAL_PERIOD_S}
+        self._reported_s = recent
+        if (topic, reason) not in recent and len(recent) < _MAX_REFUSALS:
+            recent[topic, reason] = now_s
             self.on_refused(f"{topic}: {reason}")
 
     def _log_failure(self, done: Future[Any], name: str) -> None:
         """Logs the failure of a publication or response that nothing waits for."""
         error = None if done.cancelled() else done.exception()
         if isinstance(error, VoleryError) and not self._closed:
-            self.tell_refused(name, str(error))
+            self.report_refusal(name, str(error))
         known = name in self._failed or len(self._failed) >= _MAX_FAILURES_LOGGED
         if error is None or self._closed or known:
             return

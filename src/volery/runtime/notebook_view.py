@@ -13,34 +13,12 @@ from volery.results.drawing import flight_png
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from volery.core.arrays import Array
     from volery.results import FlightResult
     from volery.runtime.vehicles.uav import Uav
     from volery.scenario.schema import Scenario
 
 _ROWS = 12
 """UAVs in the table; more are counted."""
-
-
-def uav_html(uav: Uav) -> str:
-    """Returns the present state of a UAV and the names of its sensors as HTML."""
-    if uav.is_deleted:
-        return f"<div>{escape(repr(uav))}</div>"
-    rows = {
-        "flight mode": uav.mode.name,
-        "command": uav.pending_command.command if uav.pending_command else "none",
-        "position (map), m": _vector(uav.position_map),
-        "velocity (map), m/s": _vector(uav.velocity_map),
-        "battery": f"{100.0 * uav.battery_charge:.0f} %",
-        "sensors": ", ".join(uav.sensors) or "none",
-    }
-    cells = "".join(f"<tr><th>{k}</th><td>{escape(v)}</td></tr>" for k, v in rows.items())
-    kind = escape(f"{uav.type_name}, {uav.airframe.title}" if uav.type_name else "")
-    return f"<div><b>{escape(uav.name)}</b> {kind}</div><table>{cells}</table>"
-
-
-def _vector(values: Array) -> str:
-    return ", ".join(f"{value:.2f}" for value in values)
 
 
 def simulation_html(

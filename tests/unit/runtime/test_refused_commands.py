@@ -105,7 +105,7 @@ def test_a_stream_on_the_ground_is_no_news(simulation):
 
 
 def test_a_stream_of_refusals_is_told_once(flying, monkeypatch):
-    monkeypatch.setattr("volery.graph.session._TELL_PERIOD_S", 1e9)
+    monkeypatch.setattr("volery.graph.session._REFUSAL_PERIOD_S", 1e9)
     told, logged = told_about(flying, "/uav1/goal_pose", *[goal("moon")] * 30)
     assert len(told) == 1
     assert len(logged) == 30

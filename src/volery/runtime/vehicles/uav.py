@@ -71,9 +71,20 @@ class Uav:
 
     def _repr_html_(self) -> str:
         """Returns flight mode, motion, battery and sensors, for notebooks."""
-        from volery.runtime.notebook_view import uav_html
+        from volery.figures.notebook import state_html
 
-        return uav_html(self)
+        if self.is_deleted:
+            return state_html(repr(self), "", {})
+        rows = {
+            "flight mode": self.mode.name,
+            "command": self.pending_command.command if self.pending_command else "none",
+            "position (map), m": ", ".join(f"{value:.2f}" for value in self.position_map),
+            "velocity (map), m/s": ", ".join(f"{value:.2f}" for value in self.velocity_map),
+            "battery": f"{100.0 * self.battery_charge:.0f} %",
+            "sensors": ", ".join(self.sensors) or "none",
+        }
+        kind = f"{self.type_name}, {self.airframe.title}" if self.type_name else ""
+        return state_html(self.name, kind, rows)
 
     def move_to(self, place: tuple[Fleet, int] | None) -> None:
         """Follows the UAV to another fleet and row, or marks the UAV as deleted (None)."""
