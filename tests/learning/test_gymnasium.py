@@ -48,6 +48,7 @@ def test_statistics_of_episodes_are_recorded(mode):
         lambda envs: wrappers.DtypeObservation(envs, np.float64),
     ],
 )
+@pytest.mark.filterwarnings("ignore:overflow encountered in cast")  # of Box with a larger dtype
 def test_wrappers_for_vectors_step_over_ends_of_episodes(wrapper):
     options = {"max_episode_steps": 3, "autoreset_mode": "NextStep"}
     envs = wrapper(gymnasium.make_vec("volery/Homing-v0", num_envs=2, **options))

@@ -102,7 +102,7 @@ def test_missing_files_name_the_places_looked_at(simulate, flat_data):
     ("node", "parameters", "words"),
     [
         ("volery.autonomy.avoidance.gap_following:Gap", {}, "has no class"),
-        ("yaml:Gap", {}, "rename"),
+        ("numpy:Gap", {}, "rename"),
         ("volery.no_such:Gap", {}, "cannot be imported"),
         ("volery.core.clock:Schedule", {}, "no subclass"),
         ("gap_following", {"rout": []}, "no parameter rout"),
