@@ -6,7 +6,7 @@ import re
 import pytest
 from page_browsing import keep_picture
 from truth import heard_vehicles, of_uav, pass_seconds, place, until
-from working import WIDE, open_panel
+from working import WIDE, choose, open_panel
 
 pytestmark = pytest.mark.slow
 
@@ -136,6 +136,21 @@ def test_a_wrong_fault_tells_why(page):
     panel.get_by_label("Rotor", exact=True).fill("99")
     panel.get_by_role("button", name="Inject").click()
     page.get_by_text("Fault injection failed").wait_for()
+
+
+def test_an_active_fault_is_listed_and_can_be_ended(page):
+    panel = open_panel(page, "Faults")
+    choose(page, panel.get_by_role("combobox", name="Fault type"), "Sensor")
+    choose(page, panel.get_by_role("combobox", name="UAV"), "uav2")
+    panel.get_by_role("button", name="Inject").click()
+    badge = page.get_by_role("option", name="uav2").get_by_label("Fault: imu dropped")
+    badge.wait_for()
+    keep_picture(page, "active_fault")
+    listed = panel.get_by_role("list", name="Active faults").get_by_role("listitem")
+    assert re.match(r"uav2 imu dropped . since \d", listed.inner_text())
+    listed.get_by_role("button", name="End imu dropped of uav2").click()
+    badge.wait_for(state="detached")
+    listed.wait_for(state="detached")
 
 
 @pytest.mark.parametrize("name", ["from_the_page.mcap", "from_the_page.bag"])
