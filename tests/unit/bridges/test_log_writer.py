@@ -289,7 +289,7 @@ def test_messages_are_those_that_can_be_read(
 
 KILLED = """
 import sys, time
-sys.path.insert(0, sys.argv[2])
+sys.path[:0] = sys.argv[2:]
 from conftest import make_flight
 from volery.bridges.logs.log_writer import create_log
 log = create_log(sys.argv[1])
@@ -304,7 +304,8 @@ time.sleep(60)
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_killed_run_leaves_whole_chunks(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"flight{suffix}"
-    command = [sys.executable, "-c", KILLED, str(path), str(Path(__file__).parent)]
+    here = Path(__file__)
+    command = [sys.executable, "-c", KILLED, path, here.parent, here.parents[2]]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "written\n"
