@@ -11,7 +11,11 @@ from volery.cli.error_reporting import guarded, warn
 
 
 @guarded
-def info(file: Annotated[Path, typer.Argument(help="A .mcap or .bag log.")]) -> None:
+def info(
+    file: Annotated[
+        Path, typer.Argument(help="A .mcap or .bag log, a ROS 2 bag (folder, .db3) or a ULog.")
+    ],
+) -> None:
     """Show the contents of a log."""
     from volery.cli.logs import show_log
 

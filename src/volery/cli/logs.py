@@ -11,7 +11,9 @@ from volery.cli.tables import print_table
 from volery.core.clock import NS_PER_S
 from volery.core.plurals import counted
 
-_FORMATS = {"mcap": "MCAP", "bag": "ROS 1 bag"}
+_FORMATS = {"mcap": "MCAP", "bag": "ROS 1 bag", "ros2bag": "ROS 2 bag", "ulog": "ULog"}
+_RECOVERED = ("mcap", "bag")
+"""Formats that `volery recover` reads."""
 
 
 def show_log(path: Path) -> bool:
@@ -19,9 +21,9 @@ def show_log(path: Path) -> bool:
 
     Raises `RecordingError` if the file is no log.
     """
-    from volery.bridges.logs.reader import summarize
+    from volery.logs.summary import summarize_log
 
-    summary = summarize(path)
+    summary = summarize_log(path)
     start, end = summary.start_ns / NS_PER_S, summary.end_ns / NS_PER_S
     typer.echo(f"file      {path}")
     typer.echo(f"format    {_FORMATS[summary.format]}, {summary.size_bytes / 1e6:.2f} MB")
@@ -32,7 +34,8 @@ def show_log(path: Path) -> bool:
         typer.echo("")
         print_table(("topic", "type", "messages", "rate"), rows, right=(2, 3))
     if summary.problem:
-        complain(f"{path}: {summary.problem}; `volery recover {path}` writes what is readable")
+        recovery = f"; `volery recover {path}` writes what is readable"
+        complain(f"{path}: {summary.problem}{recovery if summary.format in _RECOVERED else ''}")
         return False
     return True
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.errors import VoleryError
+from volery.logs.rvl import decode_rvl
 
 _ENCODINGS: dict[str, tuple[str, int]] = {
     "mono8": ("u1", 1),
@@ -44,9 +45,9 @@ _DEPTH_HEADER = struct.Struct("<i2f")
 def image_array(message: Any) -> NDArray[Any]:
     """Returns the pixels (height, width) or (height, width, channels) of an Image.
 
-    Also of a CompressedImage (JPEG, PNG, `compressedDepth`). Colours are in the order red, green,
-    blue. Depth is in m (floats, nan where unknown) or in mm (uint16), as recorded. Raises
-    `VoleryError` for an unknown encoding or damaged data.
+    Also of a CompressedImage (JPEG, PNG, `compressedDepth` of PNG or RVL). Colours are in the order
+    red, green, blue. Depth is in m (floats, nan where unknown) or in mm (uint16), as recorded.
+    Raises `VoleryError` for an unknown encoding or damaged data.
     """
     try:
         return _compressed(message) if hasattr(message, "format") else _raw(message)
@@ -83,8 +84,11 @@ def _compressed(message: Any) -> NDArray[Any]:
         with Image.open(BytesIO(data)) as image:
             return np.array(image)
     inverse, a, b = _DEPTH_HEADER.unpack_from(data)
-    with Image.open(BytesIO(data[_DEPTH_HEADER.size :])) as image:
-        coded = np.array(image).astype(np.uint16)
+    if message.format.rstrip().endswith("rvl"):
+        coded = decode_rvl(data[_DEPTH_HEADER.size :])
+    else:
+        with Image.open(BytesIO(data[_DEPTH_HEADER.size :])) as image:
+            coded = np.array(image).astype(np.uint16)
     if message.format.startswith("16UC1") or inverse != 0 or a == 0.0:
         return coded
     with np.errstate(divide="ignore", invalid="ignore"):

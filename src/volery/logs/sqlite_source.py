@@ -18,8 +18,8 @@ class SqliteSource:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self.problem = ""
         index = sqlite_index(path)
+        self.problem = index.problem
         self.start_ns, self.end_ns = index.start_ns, index.end_ns
         self.topics = {
             name: TopicCount(msgtype, index.counts[name])
@@ -30,7 +30,8 @@ class SqliteSource:
         """Yields the records of `topics` from `start_ns` to before `end_ns`."""
         walk = BagWalk(self._path, topics, start_ns, end_ns)
         yield from walk
-        self.problem = self.problem or walk.problem
+        if walk.problem not in self.problem:
+            self.problem = "; ".join(filter(None, (self.problem, walk.problem)))
 
     def close(self) -> None:
         """Does nothing: the file is opened for each reading."""

@@ -1,4 +1,4 @@
-"""Reads the samples of selected topics from a log of PX4 (ULog), whole or truncated."""
+"""Reads the samples of selected topics from a log of PX4 (ULog), whole, truncated or damaged."""
 
 from __future__ import annotations
 
@@ -6,23 +6,22 @@ import struct
 from collections import Counter
 from collections.abc import Iterator, Set
 from pathlib import Path
-from typing import NamedTuple
+from typing import BinaryIO, NamedTuple
 
 from volery.bridges.logs.budgets import MAX_TIME_NS, TopicBudget
 from volery.bridges.logs.records import LogRecord, LogTopic
 from volery.core.errors import RecordingError
 from volery.logs.topic_count import TopicCount
 from volery.logs.ulog_format import TEXTS, US_NS, UlogTopic, text_cdr
+from volery.logs.ulog_recovery import HEAD, KINDS, UlogRecovery, is_unknown_kind
 
 MAGIC = b"ULog\x01\x12\x35"
 _HEADER_BYTES = 16
-_HEAD = struct.Struct("<HB")
 _NUMBER = struct.Struct("<H")
 _SUBSCRIPTION = struct.Struct("<BH")
 _TEXT = struct.Struct("<BQ")
 _TAGGED_TEXT = struct.Struct("<BHQ")
 _FLAGS = struct.Struct("<8s8s3Q")
-_KINDS = frozenset(b"ABCDFILMOPQRS")
 
 
 class _Message(NamedTuple):
@@ -109,32 +108,43 @@ class UlogSource:
         with file:
             if not file.read(_HEADER_BYTES).startswith(MAGIC):
                 raise RecordingError(f"{self._path}: is no ULog of PX4")
-            position, ends = _HEADER_BYTES, [size]
-            while position < size:
-                if len(ends) > 1 and position == ends[0]:
-                    del ends[0]
-                head = file.read(_HEAD.size)
-                length, kind = _HEAD.unpack(head) if len(head) == _HEAD.size else (0, ord("S"))
-                begin, position = position, position + _HEAD.size + length
-                if position > ends[0]:
-                    if len(ends) == 1:
-                        self._problems[f"cut off in the middle of a message at byte {begin}"] = None
-                        return
-                    position = ends.pop(0)  # a message is cut off where data were appended
-                    file.seek(position)
-                    continue
-                if kind not in _KINDS:
-                    self._problems[f"damaged at byte {begin}: the rest is not read"] = None
+            recovery = UlogRecovery()
+            yield from self._walk(file, size, recovery)
+            if recovery.problem:
+                self._problems[recovery.problem] = None
+
+    def _walk(self, file: BinaryIO, size: int, recovery: UlogRecovery) -> Iterator[_Message]:
+        """Yields all messages after the header of a file; skips damaged bytes."""
+        position, ends = _HEADER_BYTES, [size]
+        while position < size:
+            if len(ends) > 1 and position == ends[0]:
+                del ends[0]
+            file.seek(position)
+            head = file.read(HEAD.size)
+            length, kind = HEAD.unpack(head) if len(head) == HEAD.size else (0, ord("S"))
+            begin, position = position, position + HEAD.size + length
+            if position > ends[0]:
+                if recovery.has_sync(file, begin + 1, ends[0]):
+                    position = recovery.resume(file, begin, ends[0])
+                elif len(ends) == 1:
+                    self._problems[f"cut off in the middle of a message at byte {begin}"] = None
                     return
-                payload = file.read(length)
-                if kind == ord("B") and length >= _FLAGS.size:
-                    _, needed, *appended = _FLAGS.unpack_from(payload)
-                    if needed[0] & ~1 or any(needed[1:]):
-                        raise RecordingError(
-                            f"{self._path}: needs features of ULog that are not known here"
-                        )
-                    ends = [*sorted(a for a in appended if position < a < size), size]
-                yield _Message(kind, payload)
+                else:
+                    position = ends.pop(0)  # a message is cut off where data were appended
+                continue
+            if kind not in KINDS:
+                if not is_unknown_kind(file, kind, position, ends[0]):
+                    position = recovery.resume(file, begin, ends[0])
+                continue
+            payload = file.read(length)
+            if kind == ord("B") and length >= _FLAGS.size:
+                _, needed, *appended = _FLAGS.unpack_from(payload)
+                if needed[0] & ~1 or any(needed[1:]):
+                    raise RecordingError(
+                        f"{self._path}: needs features of ULog that are not known here"
+                    )
+                ends = [*sorted(a for a in appended if position < a < size), size]
+            yield _Message(kind, payload)
 
 
 def _sample(layout: UlogTopic, data: bytes) -> _Sample | None:

@@ -103,13 +103,58 @@ def test_a_truncated_log(path, whole):
     assert log["/odd"]["step"].tolist() == [-k for k in range(len(log["/odd"]))]
 
 
+SYNC = message("S", bytes.fromhex("2f731320250cbb12"))
+UNKNOWN = struct.pack("<HB", 16, 7)
+
+
+def counts(log, name="/odd"):
+    return log.topics[name].messages
+
+
 def test_a_damaged_log(path, whole):
+    """Without synchronization messages, a row of whole messages shows where the log goes on."""
     middle = whole.index(samples()[60])
     path.write_bytes(whole[:middle] + b"\x01\x00\x00" + whole[middle:])
     with pytest.warns(LogWarning, match=r"px4\.ulg: "):
         log = open_log(path)
-    assert log.problem == f"damaged at byte {middle}: the rest is not read"
-    assert len(log["/odd"]) == 20
+    assert log.problem == f"damaged at byte {middle}: 3 bytes skipped"
+    assert counts(log) == 50
+    assert log["/odd"]["step"].tolist() == [-k for k in range(50)]
+
+
+@pytest.mark.parametrize("garbage", [UNKNOWN * 33, b"\xff\xff", bytes(5000), b"\xff" * 70_001])
+def test_a_log_that_is_damaged_in_the_middle(path, whole, garbage):
+    """The whole messages between the damage and the next synchronization message are read, too."""
+    parts = [part for sample in samples() for part in (sample, SYNC)]
+    parts[63:63] = [samples()[k] for k in (0, 3, 6)]  # without synchronization messages
+    start = whole[: whole.index(samples()[0])]
+    before = start + b"".join(parts[:60])
+    path.write_bytes(before + garbage + b"".join(parts[60:]))
+    with pytest.warns(LogWarning, match=r"px4\.ulg: "):
+        log = open_log(path)
+    assert log.problem == f"damaged at byte {len(before)}: {len(garbage):,} bytes skipped"
+    theirs = {(data.name, data.multi_id): data.data for data in ULog(str(path)).data_list}
+    assert counts(log) == 50 >= len(theirs["odd", 0]["timestamp"])
+    assert counts(log, "/esc_status") == 53
+    assert log["/odd"]["step"].tolist() == [-k for k in range(50)]
+
+
+def test_two_damaged_places_and_lost_bytes(path, whole):
+    parts = [part for sample in samples() for part in (sample, SYNC)]
+    parts[20] = parts[20][:-7]  # the length of the message leads into the next one
+    parts[80] = b"\xf0\xff" + parts[80][2:]  # its length leads far beyond the end
+    start = whole[: whole.index(samples()[0])]
+    path.write_bytes(start + b"".join(parts))
+    with pytest.warns(LogWarning, match="damaged at 2 places, the first at byte "):
+        log = open_log(path)
+    assert [counts(log, name) for name in ("/esc_status", "/odd", "/odd_1")] == [50, 49, 50]
+
+
+def test_messages_of_later_versions_are_skipped(path, whole):
+    middle = whole.index(samples()[60])
+    path.write_bytes(whole[:middle] + message("Z", b"news") + whole[middle:])
+    log = open_log(path)
+    assert (log.problem, counts(log)) == ("", 50)
 
 
 @pytest.mark.parametrize("cut", [0, 5])

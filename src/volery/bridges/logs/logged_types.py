@@ -1,0 +1,171 @@
+"""Types as a log defines them, where the local definition of the same name is another.
+
+Definitions change between versions of packages. Such a type is registered under a package name of
+its own, `mavros_msgs_1a2b3c4d/msg/State`, and decodes the log's bytes. If all of its fields are
+also fields of the local type, messages become local ones, whose other fields have their defaults.
+"""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Mapping
+from dataclasses import fields
+from functools import lru_cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from rosbags.interfaces import Nodetype
+
+from volery.bridges.logs.budgets import MAX_DEFINITION_BYTES, MAX_NESTED_TYPES
+from volery.bridges.logs.records import LogTopic
+from volery.core.errors import GraphError
+from volery.graph.codecs.definition_files import Definition, parse_definition
+from volery.graph.codecs.definition_store import EMPTY_MEMBER
+from volery.graph.codecs.ros1 import ros1_codec
+from volery.graph.messages import add_definitions
+from volery.graph.typestore import typestore
+
+_SEPARATOR = re.compile(r"^=+\s*$", re.MULTILINE)
+_NESTED = re.compile(r"\s*MSG:\s*(\S+)[^\n]*\n?")
+_TYPE = re.compile(r"([A-Za-z]\w{0,99})/(?:msg/)?([A-Za-z]\w{0,99})", re.ASCII)
+_DEFINITION_FORMATS = {"ros1msg", "ros2msg"}
+_FIELD_TYPE = re.compile(r"^(\s*)([A-Za-z][\w/]*)", re.ASCII)
+
+
+def learn_type(name: str, topic: LogTopic) -> str:
+    """Returns the name of the type that decodes a topic; registers what the log defines.
+
+    name: the topic's type in ROS 2 style. Raises `GraphError` if the log does not define an
+    unknown type, or its definition is invalid.
+    """
+    return _learned(name, topic.definition, topic.schema_encoding, topic.encoding == "ros1")
+
+
+@lru_cache(256)
+def _learned(name: str, definition: str, form: str, is_ros1: bool) -> str:
+    is_known = name in typestore().types
+    try:
+        texts = _texts(name, definition, form)
+        renamed = _renamed(texts, is_ros1=is_ros1)
+        _register(texts, renamed)
+    except GraphError:
+        if is_known:
+            return name  # the local definition is the best that there is
+        raise
+    return renamed.get(name, name)
+
+
+def is_part_of(name: str, other: str) -> bool:
+    """Returns whether all fields of a type are fields of another."""
+    theirs = _shape(typestore().fielddefs[other][1])
+    return _shape(typestore().fielddefs[name][1]).items() <= theirs.items()
+
+
+def as_type(message: Any, msgtype: str) -> Any:
+    """Returns a message of another type with the same fields, and defaults in all others."""
+    values = {field.name: getattr(message, field.name) for field in fields(message)}
+    values.pop(EMPTY_MEMBER, None)
+    return typestore().types[msgtype](**values)
+
+
+def _texts(name: str, definition: str, form: str) -> dict[str, str]:
+    """Returns the definitions in a log by the names of their types, which are valid."""
+    if form == "ros2idl" and definition.strip():
+        raise GraphError(
+            f"type {name} is not known, and the log defines it in IDL, which is not read; add its "
+            ".msg file to the message packages"
+        )
+    if form not in _DEFINITION_FORMATS or not definition.strip():
+        raise GraphError(f"type {name} is not known, and the log does not define it")
+    if len(definition) > MAX_DEFINITION_BYTES:
+        raise GraphError(
+            f"the definition of {name} has more than {MAX_DEFINITION_BYTES} characters"
+        )
+    first, *others = _SEPARATOR.split(definition)
+    if len(others) > MAX_NESTED_TYPES:
+        raise GraphError(f"the definition of {name} nests more than {MAX_NESTED_TYPES} types")
+    written = {name: first}
+    for other in others:
+        head = _NESTED.match(other)
+        if head is not None:
+            written[head[1]] = other[head.end() :]
+    texts = {}
+    for long_name, text in written.items():
+        parts = _TYPE.fullmatch(long_name)
+        if parts is None:
+            raise GraphError(f"the log has a type with the name '{long_name[:100]}'")
+        texts[f"{parts[1]}/msg/{parts[2]}"] = text
+    return texts
+
+
+def _renamed(texts: Mapping[str, str], *, is_ros1: bool) -> dict[str, str]:
+    """Returns new names of the types that differ from the local ones, or contain such types."""
+    found = {name: parse_definition(text, name, name)[0] for name, text in texts.items()}
+    others = {name for name, definition in found.items() if _differs(definition, is_ros1=is_ros1)}
+    before = -1
+    while len(others) > before:
+        before = len(others)
+        others |= {n for n, d in found.items() if any(nested in others for nested, _ in d.nested)}
+    digest = sha256("\0".join(f"{n}\0{texts[n]}" for n in sorted(texts)).encode()).hexdigest()[:8]
+    parts = {name: name.split("/") for name in others}
+    return {name: f"{package}_{digest}/msg/{base}" for name, (package, _, base) in parts.items()}
+
+
+def _differs(definition: Definition, *, is_ros1: bool) -> bool:
+    name = definition.name
+    if name not in typestore().fielddefs:
+        return False
+    if is_ros1:
+        names = [field for field, _ in ros1_codec().fields(name)]
+        local = list(zip(names, ros1_codec().described(name), strict=True))
+    else:
+        local = typestore().fielddefs[name][1]
+    return list(_shape(local).items()) != list(_shape(definition.fields).items())
+
+
+def _register(texts: Mapping[str, str], renamed: Mapping[str, str]) -> None:
+    """Registers the renamed types and the unknown ones."""
+    known = typestore().types
+    wanted = {name: renamed.get(name, name) for name in texts}
+    new = {name: target for name, target in wanted.items() if target not in known}
+    if not new:
+        return
+    with tempfile.TemporaryDirectory(prefix="volery-types-") as folder:
+        for name, target in new.items():
+            package, _, base = target.split("/")
+            path = Path(folder, package, "msg", f"{base}.msg")
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(_with_names(texts, name, renamed), encoding="utf-8")
+        add_definitions(folder, foreign=True)
+
+
+def _with_names(texts: Mapping[str, str], name: str, renamed: Mapping[str, str]) -> str:
+    """Returns a type's definition with full names of nested types, some by their new names."""
+    package, _, _ = name.partition("/")
+
+    def full_name(match: re.Match[str]) -> str:
+        parts = match[2].split("/")
+        if len(parts) == 1:
+            parts = ["std_msgs" if parts == ["Header"] else package, *parts]
+        full = f"{parts[0]}/msg/{parts[-1]}"
+        is_type = full in texts or full in typestore().types
+        return match[1] + (renamed.get(full, full) if is_type else match[2])
+
+    return "".join(f"{_FIELD_TYPE.sub(full_name, line)}\n" for line in texts[name].splitlines())
+
+
+def _shape(described: Any) -> dict[str, Any]:
+    """Returns fields and their types as far as they determine the bytes: without bounds."""
+    return {name: _plain(kind) for name, kind in described if name != EMPTY_MEMBER}
+
+
+def _plain(described: Any) -> Any:
+    kind, detail = described
+    if kind == Nodetype.BASE:
+        return kind, detail[0]
+    if kind == Nodetype.NAME:
+        return kind, detail
+    inner, size = detail
+    return kind, _plain(inner), size if kind == Nodetype.ARRAY else 0

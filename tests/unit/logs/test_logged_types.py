@@ -1,0 +1,122 @@
+"""A log's own definitions decode it, also where a known type of the same name differs."""
+
+from __future__ import annotations
+
+import pytest
+from mcap.writer import Writer as McapWriter
+from rosbags.rosbag1 import Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from volery.core.errors import RecordingError
+from volery.graph.typestore import typestore
+from volery.logs import open_log
+
+LINE = "=" * 80 + "\n"
+HEADERS = {
+    "ros1": f"{LINE}MSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n",
+    "cdr": f"{LINE}MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n"
+    f"{LINE}MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n",
+}
+OLD_STATE = "std_msgs/Header header\nbool connected\nbool armed\nbool guided\nstring mode\n"
+STATE, RANGE = "mavros_msgs/msg/State", "sensor_msgs/msg/Range"
+
+
+@pytest.fixture(params=["ros1", "cdr"])
+def logged(request, tmp_path):
+    """Returns a function that writes one message to a bag or an MCAP file and opens it."""
+
+    def write(msgtype, definition, nested, values):
+        store = get_typestore(Stores.ROS1_NOETIC if request.param == "ros1" else Stores.ROS2_JAZZY)
+        for name in {msgtype, *nested}:
+            store.fielddefs.pop(name, None)
+            store.types.pop(name, None)
+        added = {}
+        for name, text in {**nested, msgtype: definition}.items():
+            added.update(get_types_from_msg(text, name))
+        store.register(added)
+        message = values(store)
+        full = definition + "".join(
+            f"{LINE}MSG: {name.replace('/msg/', '/')}\n{text}" for name, text in nested.items()
+        )
+        full += HEADERS[request.param]
+        if request.param == "ros1":
+            path = tmp_path / "old.bag"
+            with Writer(path) as writer:
+                _, md5 = store.generate_msgdef(msgtype, ros_version=1)
+                channel = writer.add_connection("/probe", msgtype, msgdef=full, md5sum=md5)
+                writer.write(channel, 1, bytes(store.serialize_ros1(message, msgtype)))
+        else:
+            path = tmp_path / "old.mcap"
+            with path.open("wb") as file:
+                mcap = McapWriter(file)
+                mcap.start()
+                schema = mcap.register_schema(msgtype, "ros2msg", full.encode())
+                data = bytes(store.serialize_cdr(message, msgtype))
+                mcap.add_message(mcap.register_channel("/probe", "cdr", schema), 1, data, 1)
+                mcap.finish()
+        return open_log(path)
+
+    return write
+
+
+def header(store):
+    stamp = store.types["builtin_interfaces/msg/Time"](3, 4)
+    numbers = () if "seq" not in store.types["std_msgs/msg/Header"].__annotations__ else (9,)
+    return store.types["std_msgs/msg/Header"](*numbers, stamp, "base_link")
+
+
+def test_fields_that_later_versions_added(logged):
+    log = logged(
+        STATE,
+        OLD_STATE,
+        {},
+        lambda store: store.types[STATE](header(store), True, False, True, "MANUAL"),
+    )
+    data = log["/probe"]
+    assert data["mode"].tolist() == ["MANUAL"]
+    assert data["header.frame_id"].tolist() == ["base_link"]
+    assert [data[name].tolist() for name in ("connected", "armed", "manual_input")] == [
+        [True], [False], [False],
+    ]  # fmt: skip
+    (found,) = log.messages("/probe")
+    assert type(found.message) is typestore().types[STATE]
+
+
+def test_fields_that_later_versions_changed(logged):
+    text = "std_msgs/Header header\nuint8 mode\nfloat64 old_field\n"
+    log = logged(STATE, text, {}, lambda store: store.types[STATE](header(store), 5, 2.5))
+    data = log["/probe"]
+    assert data.fields[-2:] == ("mode", "old_field")
+    assert (data["mode"].tolist(), data["old_field"].tolist()) == ([5], [2.5])
+    assert log.topics["/probe"].msgtype == STATE
+
+
+def test_a_nested_type_that_differs(logged):
+    nested = {
+        "nested_probe_msgs/msg/Plain": "int16 count\n",
+        "geometry_msgs/msg/Point32": "float64 x\nnested_probe_msgs/Plain plain\n",
+    }
+    name = "nested_probe_msgs/msg/Whole"
+
+    def values(store):
+        plain = store.types["nested_probe_msgs/msg/Plain"](7)
+        point = store.types["geometry_msgs/msg/Point32"](1.5, plain)
+        return store.types[name]([point], plain)
+
+    text = "geometry_msgs/Point32[] points # as sent\nPlain plain\n"
+    (found,) = logged(name, text, nested, values).messages("/probe")
+    assert found.message.plain.count == 7
+    assert (found.message.points[0].x, found.message.points[0].plain.count) == (1.5, 7)
+
+
+def test_a_definition_in_idl_is_refused_by_its_name(tmp_path):
+    path = tmp_path / "idl.mcap"
+    with path.open("wb") as file:
+        writer = McapWriter(file)
+        writer.start()
+        text = b"module probe_msgs { module msg { struct Level { double value; }; }; };"
+        schema = writer.register_schema("idl_probe_msgs/msg/Level", "ros2idl", text)
+        writer.add_message(writer.register_channel("/probe", "cdr", schema), 1, bytes(12), 1)
+        writer.finish()
+    with pytest.raises(RecordingError, match="the log defines it in IDL, which is not read"):
+        open_log(path)["/probe"]["value"]
