@@ -12,7 +12,9 @@ from volery.bridges.rosbridge.fields import absolute
 from volery.bridges.rosbridge.rosapi_parameters import NamedParameters, Parameters
 from volery.core.errors import BridgeError, CommandError, GraphError
 from volery.graph.graph import Graph
+from volery.graph.nodes.node import Context, Node
 from volery.graph.parameters import Parameter
+from volery.mavlink.mavros import Mavros
 from volery.runtime.vehicles.control_authority import ControlAuthority, operator_name, same_operator
 from volery.runtime.vehicles.control_targets import names_in, parts_of
 from volery.scenario.faults import parse_fault
@@ -75,6 +77,48 @@ def call(service, args=None):
 def test_another_operator_cannot_command_it(bob, operation):
     with pytest.raises(BridgeError, match="uav1 is held by Anna"):
         bob.check(operation)
+
+
+@pytest.mark.parametrize(
+    "operation",
+    [
+        {"op": "advertise_service", "topic": "/free", "service": "/uav1/x", "type": "x"},
+        {"op": "advertise_action", "topic": "/free", "action": "/uav1/x", "type": "x"},
+        {"op": "advertise_action", "service": "/free", "action": "/uav1/x", "type": "x"},
+        {"op": "publish", "topic": "/uav1/cmd_vel", "service": "/free", "msg": {}},
+    ],
+)
+def test_a_field_that_does_not_count_hides_nothing(bob, operation):
+    with pytest.raises(BridgeError, match="uav1 is held by Anna"):
+        bob.check(operation)
+
+
+@pytest.mark.parametrize(
+    "operation",
+    [
+        call("/mavros/cmd/command", {"command": 400, "param1": 0.0, "param2": 21196.0}),
+        call("mavros/cmd/land"),
+        call("/mavros/set_mode"),
+        {"op": "publish", "topic": "/mavros/setpoint_velocity/cmd_vel", "msg": {}},
+        {"op": "publish", "topic": "mavros/setpoint_raw/attitude", "msg": {}},
+    ],
+)
+def test_a_name_that_does_not_tell_its_uav_is_out_of_reach_too(operation):
+    graph = Graph(lambda: 0)
+    node = Node("autopilot", context=Context(graph, None, graph.now_ns), namespace="/uav1")
+    Mavros(node, None, "/mavros")
+    operators = ControlAuthority(lambda: ["uav1", "uav2"], graph.moved_uavs.of)
+    crew = OperatorNames()
+    anna = OperatorPolicy(crew.sign_in("Anna"), crew, operators)
+    ben = OperatorPolicy(crew.sign_in("Ben"), crew, operators)
+    operators.take("uav2", "Anna")
+    assert ben.check(operation)
+    operators.take("uav1", "Anna")
+    with pytest.raises(BridgeError, match="uav1 is held by Anna"):
+        ben.check(operation)
+    assert anna.check(operation)
+    node.destroy_node()
+    assert ben.check(operation)
 
 
 @pytest.mark.parametrize(

@@ -26,6 +26,7 @@ from volery.core.errors import GraphError, VoleryError
 from volery.graph.actions import Actions
 from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import Published, message_type, type_name
+from volery.graph.moved_uavs import MovedUavs
 from volery.graph.parameters import Parameters
 from volery.graph.qos import DEFAULT_QOS, QoSProfile
 from volery.graph.response_chains import ResponseChains
@@ -103,11 +104,15 @@ class Graph:
         self._post = post
         self._topics: dict[str, Topic] = {}
         self._unused: dict[str, Topic] = {}
+        self._expected: dict[str, list[Topic]] = {}
+        """Topics that external clients expect with other types than `_topics`, by their names."""
         self._services: dict[str, _Service] = {}
         self.actions = Actions()
         """Action servers."""
         self.parameters = Parameters()
         """Parameters that the nodes have declared."""
+        self.moved_uavs = MovedUavs()
+        """UAVs that topics and services move, as their receivers declare."""
         self._to_all: list[_Listener] = []
         self._queue: deque[_QueuedMessage] = deque()
         self._answers = 0  # length of the chain that a message published now extends
@@ -143,12 +148,14 @@ class Graph:
     def advertise(
         self, topic: str, msgtype: str | type[Any], *, latched: bool = False
     ) -> Publisher:
-        """Adds a publisher. Raises `GraphError` if the topic exists with another type.
+        """Adds a publisher. Raises `GraphError` if the topic has another type.
+
+        The type prevails over that of subscriptions of other threads, which end; see `attach`.
 
         latched: later subscribers receive the publisher's last message.
         """
         with self._members:
-            found = self._topic(topic, msgtype)
+            found = self._decided_topic(topic, msgtype)
             found.publishers += 1
             found.latched = found.latched or latched
         return Publisher(self, found, latched=latched)
@@ -170,35 +177,44 @@ class Graph:
     ) -> Subscription:
         """Calls `callback` with each message of `topic`.
 
-        Without `msgtype`, the topic must exist.
+        Without `msgtype`, the topic must exist. As for `advertise`, the type prevails.
 
         qos: affects only messages that have to wait, which never happens in lock step. The next
         delivery starts with the messages that latched publishers sent before; their `time_ns` is
         the time of this subscription.
         """
         with self._members:
-            found = self._known_topic(topic, msgtype)
+            found = self._decided_topic(topic, self._type_of(topic, msgtype))
             found.callbacks.append(callback)
         self._send_latched([found], callback)
         return Subscription(found.callbacks, callback, lambda: self._drop_unused(found))
 
     def attach(
-        self, topic: str, callback: Callback, msgtype: str | type[Any] | None = None
+        self,
+        topic: str,
+        callback: Callback,
+        msgtype: str | type[Any] | None = None,
+        *,
+        on_ended: Callable[[str], None] = lambda _reason: None,
     ) -> Subscription:
         """Like `subscribe`, for a callback of any thread; passes latched messages at once.
 
-        The order of the callback among the subscribers does not affect the simulation.
+        The order of the callback among the subscribers does not affect the simulation, and neither
+        does its type: the subscription waits for a publisher, or a subscriber of the simulation,
+        and ends with `on_ended(reason)`, which must not block, if that one has another type.
         """
         with self._members:
-            found = self._known_topic(topic, msgtype)
+            found = self._expected_topic(topic, self._type_of(topic, msgtype))
             for published in tuple(found.last_messages.values()):
                 callback(published)
             found.callbacks.append(callback)
             found.external.append(callback)
+            found.on_ended.append(on_ended)
             found.num_attached += 1
 
         def leave() -> None:
             found.external.remove(callback)
+            found.on_ended.remove(on_ended)
             self._drop_unused(found)
 
         return Subscription(found.callbacks, callback, leave)
@@ -384,12 +400,28 @@ class Graph:
     def _drop_unused(self, topic: Topic) -> None:
         """Removes the oldest unused topic when there are more than MOST_UNUSED."""
         with self._members:
-            if not topic.used:
-                self._unused[topic.name] = topic
+            if topic.used:
+                return
+            if self._topics.get(topic.name) is not topic:
+                self._drop_expected(topic)
+                return
+            others = self._expected.get(topic.name)
+            if others:
+                self._topics[topic.name] = others[0]
+                self._drop_expected(others[0])
+                return
+            self._unused[topic.name] = topic
             if len(self._unused) > MOST_UNUSED:
                 oldest = self._unused.pop(next(iter(self._unused)))
                 if not oldest.used:
                     del self._topics[oldest.name]
+
+    def _drop_expected(self, topic: Topic) -> None:
+        others = self._expected.get(topic.name, [])
+        if topic in others:
+            others.remove(topic)
+        if not others:
+            self._expected.pop(topic.name, None)
 
     def _send_latched(self, topics: list[Topic], callback: Callback) -> None:
         """Queues latched messages before all others, which are newer."""
@@ -401,26 +433,51 @@ class Graph:
         ]
         self._queue.extendleft(reversed(queued))
 
-    def _known_topic(self, name: str, msgtype: str | type[Any] | None) -> Topic:
+    def _type_of(self, name: str, msgtype: str | type[Any] | None) -> str | type[Any]:
         if msgtype is not None:
-            return self._topic(name, msgtype)
+            return msgtype
         if name not in self._topics:
             raise GraphError(f"no topic '{name}'; give a type to subscribe before it exists")
-        return self._topics[name]
+        return self._topics[name].msgtype
 
-    def _topic(self, name: str, msgtype: str | type[Any]) -> Topic:
+    def _decided_topic(self, name: str, msgtype: str | type[Any]) -> Topic:
+        """Returns the topic for a publisher or subscriber whose type prevails."""
+        found = self._expected_topic(name, msgtype)
+        rest = self._expected.pop(name, [])
+        if self._topics[name] is not found:
+            rest.append(self._topics[name])
+            self._topics[name] = found
+        for topic in rest:
+            if topic is not found:
+                topic.end(f"topic '{name}' carries {found.msgtype}, not {topic.msgtype}")
+        return found
+
+    def _expected_topic(self, name: str, msgtype: str | type[Any]) -> Topic:
+        """Returns the topic for a subscriber that waits for one of this type.
+
+        Raises `GraphError` if the topic has another type that is decided.
+        """
         kind = msgtype if isinstance(msgtype, str) else type_name(msgtype)
         _check_name(name)
         topic = self._topics.get(name)
-        if topic is None:
-            try:
-                message_type(kind)
-            except KeyError:
-                raise GraphError(f"topic '{name}': unknown message type '{kind}'") from None
-            topic = self._topics[name] = Topic(name, kind)
-        if topic.msgtype != kind:
+        if topic is not None and topic.msgtype == kind:
+            return topic
+        try:
+            message_type(kind)
+        except KeyError:
+            raise GraphError(f"topic '{name}': unknown message type '{kind}'") from None
+        if topic is not None and topic.is_decided:
             raise GraphError(f"topic '{name}' carries {topic.msgtype}, not {kind}")
-        return topic
+        if topic is None or not topic.used:
+            self._unused.pop(name, None)
+            topic = self._topics[name] = Topic(name, kind)
+            return topic
+        others = self._expected.setdefault(name, [])
+        for other in others:
+            if other.msgtype == kind:
+                return other
+        others.append(Topic(name, kind))
+        return others[-1]
 
     # -------------------------------------------------------------------------------- services
 

@@ -351,7 +351,7 @@ class Session:
         queue = SubscriptionQueue(topic, depth, wake, reliable=reliable)
         with self._lock:
             self._check_open()
-            self._queues[queue] = self._graph.attach(topic, queue.put, msgtype)
+            self._queues[queue] = self._graph.attach(topic, queue.put, msgtype, on_ended=queue.end)
         return queue
 
     def unsubscribe(self, queue: SubscriptionQueue) -> None:

@@ -82,6 +82,16 @@ class SubscriptionQueue:
         if was_empty or self._failure is not None:
             self._wake()
 
+    def end(self, reason: str) -> None:
+        """Ends the subscription; messages in the queue are dropped."""
+        with self._lock:
+            if self._failure is None:
+                self._failure = f"subscription of '{self.topic}' ended: {reason}"
+                self._dropped += len(self._waiting)
+                self._waiting.clear()
+                self._bytes = 0
+        self._wake()
+
     def _give_up(self) -> None:
         size = self._bytes / 2**20
         self._failure = (

@@ -33,6 +33,7 @@ class Topic:
         self.msgtype = msgtype
         self.callbacks: list[Callback] = []
         self.external: list[Callback] = []  # the callbacks that other threads have attached
+        self.on_ended: list[Callable[[str], None]] = []  # learn why external subscriptions end
         self.num_attached = 0  # number of external subscriptions so far
         self.publishers = 0
         self.messages = 0
@@ -45,6 +46,16 @@ class Topic:
     def used(self) -> bool:
         """Whether the topic has publishers or subscribers."""
         return bool(self.publishers or self.callbacks)
+
+    @property
+    def is_decided(self) -> bool:
+        """Whether its type cannot change: it has a publisher, or a subscriber of the simulation."""
+        return bool(self.publishers or len(self.callbacks) > len(self.external))
+
+    def end(self, reason: str) -> None:
+        """Tells the external subscribers that they will receive no message."""
+        for tell in tuple(self.on_ended):
+            tell(reason)
 
 
 class _Delivery(Protocol):

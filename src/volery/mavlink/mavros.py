@@ -82,13 +82,19 @@ class Mavros:
             "setpoint_raw/local": (message_type(_TARGET), self._raw),
             "setpoint_raw/attitude": (message_type(_ATTITUDE), _attitude),
         }
+        moves = (node.get_namespace().split("/")[1],)
         for name, (kind, read) in subscriptions.items():
-            node.create_subscription(kind, f"{prefix}/{name}", self._receiver(read))
-        node.create_service(_BOOL, f"{prefix}/cmd/arming", self._arm)
-        node.create_service(_MODE, f"{prefix}/set_mode", self._set_mode)
-        node.create_service(_TOL, f"{prefix}/cmd/takeoff", self._take_off)
-        node.create_service(_TOL, f"{prefix}/cmd/land", self._land)
-        node.create_service(_LONG, f"{prefix}/cmd/command", self._command)
+            topic = f"{prefix}/{name}"
+            node.create_subscription(kind, topic, self._receiver(read), moves=moves)
+        services: dict[str, tuple[str, Callable[[Any, Any], Any]]] = {
+            "cmd/arming": (_BOOL, self._arm),
+            "set_mode": (_MODE, self._set_mode),
+            "cmd/takeoff": (_TOL, self._take_off),
+            "cmd/land": (_TOL, self._land),
+            "cmd/command": (_LONG, self._command),
+        }
+        for name, (srvtype, answer) in services.items():
+            node.create_service(srvtype, f"{prefix}/{name}", answer, moves=moves)
 
     # --------------------------------------------------------------------------------------- out
 

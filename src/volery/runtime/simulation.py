@@ -143,7 +143,7 @@ class Simulation:
         self._manager = manager = build_vehicles(scenario, connected, world, self._runs)
         self._snapshots = SnapshotManager(manager, self._loop, self._partners, grid_map)
         self.uavs = MappingProxyType(manager.uavs)
-        self.operators = ControlAuthority(lambda: tuple(self.uavs))
+        self.operators = ControlAuthority(lambda: tuple(self.uavs), self.graph.moved_uavs.of)
         self.gateway = build_gateway(graph, engine, pacer, self.commands, self.uavs, self._partners)
         self.clock = SimulationClock(engine, pacer, self._loop, self._partners, self._check_open)
         self.vehicles = SimulationVehicles(manager, self._snapshots, self._check_open)

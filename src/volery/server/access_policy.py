@@ -22,6 +22,13 @@ from volery.server.read_only import READ_ONLY_SERVICES
 
 _LOOKING = {"subscribe", "unsubscribe", "set_level", "status", "auth"}
 """Operations without effect on other clients."""
+_NAMED_BY = {
+    "publish": "topic",
+    "advertise": "topic",
+    "advertise_service": "service",
+    "advertise_action": "action",
+}
+"""The field that names what each of these operations acts on; others do not count."""
 _WARN_AGAIN_S = 1.0
 """Min period of refusals for a stream of commands."""
 _MAX_WARNED = 1000
@@ -71,13 +78,12 @@ class OperatorPolicy:
                 self._check_free(service, operation)
         elif op == "send_action_goal":
             self._check_free(_absolute(operation.get("action")), operation)
-        elif op in ("publish", "advertise", "advertise_service", "advertise_action"):
-            return self._may_publish(operation)
+        elif op in _NAMED_BY:
+            return self._may_publish(_absolute(operation.get(_NAMED_BY[op])))
         return True
 
-    def _may_publish(self, operation: Operation) -> bool:
+    def _may_publish(self, topic: str) -> bool:
         """Returns whether a publication passes; refusals of a stream are reported periodically."""
-        topic = _absolute(operation.get("topic", operation.get("service", operation.get("action"))))
         try:
             self._check_free(topic, {})
         except BridgeError:
@@ -91,9 +97,10 @@ class OperatorPolicy:
         return True
 
     def _check_free(self, name: str, operation: Operation) -> None:
-        """Raises BridgeError for a name below, or about, a UAV that another operator controls."""
+        """Raises BridgeError for a name below, about or moving a UAV of another operator."""
         try:
-            about = {*parts_of(name), *names_in(operation.get("args"))}
+            told = self._operators.moved_by(name)
+            about = {*parts_of(name), *told, *names_in(operation.get("args"))}
         except CommandError as error:
             raise BridgeError(str(error)) from None
         for uav in sorted(about):

@@ -180,6 +180,8 @@ class Node(ParameterMethods):
         topic: str,
         callback: Callable[[Any], Any],
         qos_profile: int | QoSProfile = DEFAULT_DEPTH,
+        *,
+        moves: Sequence[str] = (),
         **_options: Any,
     ) -> NodeSubscription:
         """Calls `callback(message)` for each message of `topic`.
@@ -187,6 +189,9 @@ class Node(ParameterMethods):
         qos_profile: has an effect where messages arrive faster than the node processes them, which
         is possible only in a process of its own. A depth keeps that many of the newest; see
         `graph.qos.QoSProfile`.
+
+        moves: UAVs that the messages move, if their names are not in that of the topic; operators
+        who do not control them cannot publish on it.
         """
         name = self.resolve(topic)
         occasion = f"message on {name}{_name_of(callback)}"
@@ -202,6 +207,8 @@ class Node(ParameterMethods):
         )
         handle = NodeSubscription(subscription, name, callback)
         self.__handles[handle] = handle.cancel
+        if moves:
+            self.__declare_moves(name, moves)
         return handle
 
     def create_timer(
@@ -233,11 +240,16 @@ class Node(ParameterMethods):
         srv_type: str | type[Any],
         srv_name: str,
         callback: Callable[[Any, Any], Any],
+        *,
+        moves: Sequence[str] | None = None,
         **_options: Any,
     ) -> NodeService:
         """Creates a service: `callback(request, response)` returns the response, at once.
 
         srv_type: a class such as `std_srvs.srv.Trigger`, or its name, `std_srvs/srv/Trigger`.
+
+        moves: UAVs that the service moves, by default the one in whose namespace the node is;
+        operators who do not control them cannot call it.
         """
         kind, name, graph = service_type(srv_type), self.resolve(srv_name), self._context.graph
         response_type = message_type(f"{kind}_Response")
@@ -260,6 +272,8 @@ class Node(ParameterMethods):
         graph.create_service(name, kind, handle)
         service = NodeService(name, kind, lambda: graph.destroy_service(name))
         self.__handles[service] = service.destroy
+        own = [self.__namespace.split("/")[1]] if self.__namespace else []
+        self.__declare_moves(name, own if moves is None else moves)
         return service
 
     def create_client(self, srv_type: str | type[Any], srv_name: str, **_options: Any) -> Client:
@@ -336,6 +350,10 @@ class Node(ParameterMethods):
         """Waits until no callback of the node is running."""
         if self.__executor is not None:
             self.__executor.join()
+
+    def __declare_moves(self, name: str, uavs: Sequence[str]) -> None:
+        withdraw = self._context.graph.moved_uavs.declare(name, uavs)
+        self.__handles[withdraw] = withdraw
 
     def __now_ns(self) -> int:
         return self._context.now_ns() if self.__executor is None else self.__executor.now_ns()

@@ -42,11 +42,18 @@ def operator_key(name: str) -> str:
 class ControlAuthority:
     """Holds the control authority of one simulation; `names` returns its UAVs.
 
+    `moved_by` returns the UAVs that a topic, service or action moves, by its absolute name, beside
+    those that the name tells: whoever receives the requests declares them (`graph.moved_uavs`).
     Any thread may query it; only the simulation's thread changes it.
     """
 
-    def __init__(self, names: Callable[[], Collection[str]]) -> None:
+    def __init__(
+        self,
+        names: Callable[[], Collection[str]],
+        moved_by: Callable[[str], Collection[str]] = lambda _name: (),
+    ) -> None:
         self._names = names
+        self.moved_by = moved_by
         self._holders: dict[str, str] = {}
 
     def holder_of(self, uav: str) -> str:

@@ -1,7 +1,8 @@
 """Determines which UAVs a graph name, or the arguments of a request, concern.
 
-This is the only module that decides it, for topics, services, actions and parameters. It finds at
-least every UAV that the graph would resolve a spelling to; doubtful cases count as matches.
+It finds at least every UAV that the graph would resolve a spelling to, for topics, services,
+actions and parameters; doubtful cases count as matches. What a name moves without telling it, its
+receiver declares: `graph.moved_uavs`.
 """
 
 from __future__ import annotations
