@@ -67,7 +67,7 @@ for row, column in plan[:waypoints]:
     pose = {"position": {"x": x, "y": y, "z": height_m}}
     while max(abs(x - place["x"]), abs(y - place["y"]), abs(height_m - place["z"])) > 0.4:
         goal.publish(roslibpy.Message({"header": {"frame_id": "map"}, "pose": pose}))
-        moved.clear()  # goals are ignored during take-off: repeat until the UAV arrives
+        moved.clear()  # goals are refused during take-off: repeat until the UAV arrives
         moved.wait(1.0)
         threading.Event().wait(0.2)
     print(f"reached row {row}, column {column}")

@@ -44,7 +44,9 @@ def wait_for(wanted):
     while True:
         destination, payload = receive()
         if destination == "__error":
-            sys.exit(json.loads(payload)["text"])
+            text = json.loads(payload)["text"]
+            if not text.startswith(f"/{uav}/goal_pose"):  # refused during take-off: see below
+                sys.exit(text)
         if destination == wanted:
             return payload
 
@@ -102,7 +104,7 @@ for column in plan[:waypoints]:
     goal = (x0 + (column + 0.5) * side_m, y0 + (row + 0.5) * side_m, height_m)
     ticks = 0
     while max(abs(a - b) for a, b in zip(position(), goal, strict=True)) > 0.4:
-        if ticks % 25 == 0:  # goals are ignored during take-off: repeat
+        if ticks % 25 == 0:  # goals are refused during take-off: repeat
             send(f"/{uav}/goal_pose", header + struct.pack("<7d", *goal, 0.0, 0.0, 0.0, 0.0))
         ticks += 1
     print(f"reached row {row}, column {column}")

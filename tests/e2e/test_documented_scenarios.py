@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from volery import load_scenario
 
 PAGE = Path(__file__).parents[2] / "docs" / "scenarios_in_python.md"
@@ -25,7 +27,8 @@ def test_the_examples_run(tmp_path):
     )
     assert done.returncode == 0, done.stderr
     first, changed, refused, count, *scans, last = done.stdout.splitlines()
-    assert first.startswith("[ 2")  # the last of four UAVs in a line
+    x_m = float(first.strip("[ ]").split()[0])
+    assert x_m == pytest.approx(20.0, abs=0.5)  # the last of four UAVs in a line
     assert changed == "moderate 90.0"
     assert "key 'world.wind.turbulence': Input should be 'none', 'light'" in refused
     assert count == "18"

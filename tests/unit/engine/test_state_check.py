@@ -82,6 +82,7 @@ def test_a_spawned_uav_is_looked_at(flying):
 
 
 def test_vectorized_simulations_name_the_copy(flat_data):
+    flat_data["uavs"][0]["position_m"] = [0.0, 0.0, 3.0]  # none that rests
     with VectorizedSimulation(parse_scenario(flat_data), 5, threads=2) as envs:
         envs.run(0.1)
         envs._blocks[1].fleet.state.velocity_map[1] = math.nan
