@@ -10,6 +10,9 @@ PAGE := src/volery/server/static/index.html
 PAGE_SOURCES := web/index.html web/package.json web/tsconfig.json web/vite.config.ts \
 	$(shell find web/src web/public -type f)
 
+# Tests start hundreds of processes, each of which would compile the sources again where this is set.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .PHONY: help dev run serve web page test test-installation test-page-units lint docs bench docs-benchmarks package clean
 
@@ -82,7 +85,7 @@ test-page-units:
 
 test: lint test-installation test-page-units ## install what tests need, check everything, run the tests; failed ones once more
 	$(BIN)/python -m volery.runtime.warmup
-	$(BIN)/pytest --cache-clear -n 2 --dist loadfile -m 'not slow' tests || { [ $$? -eq 1 ] && .ci/second_run; }
+	$(BIN)/pytest --cache-clear -n 2 --dist loadfile --no-loadscope-reorder -m 'not slow' tests || { [ $$? -eq 1 ] && .ci/second_run; }
 
 docs: $(VENV)/.installed-docs ## build the documentation site: build/site/index.html
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet

@@ -1,6 +1,7 @@
 """The documentation site: generated pages are complete, links lead somewhere, quotes exist."""
 
 import ast
+import json
 import os
 import re
 import shlex
@@ -35,16 +36,21 @@ GENERATED_PAGES = {f"reference/{name}.md" for name in GENERATED}
 
 
 @cache
-def generated(name):
-    """The text of a generated page."""
+def generated_pages():
+    """The texts of all generated pages: a process makes them, whose survey of graphs they share."""
     lines = (
-        f"import sys; sys.path.insert(0, {str(TOOLS)!r})",
-        f"import {name}_reference as script",
-        "print(script.page(), end='')",
+        f"import json, sys; sys.path.insert(0, {str(TOOLS)!r})",
+        "from importlib import import_module",
+        f"pages = {{name: import_module(name + '_reference').page() for name in {GENERATED!r}}}",
+        "print(json.dumps(pages))",
     )
     command = [sys.executable, "-c", "\n".join(lines)]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
-    return done.stdout
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def generated(name):
+    return generated_pages()[name]
 
 
 def links(text):
@@ -207,9 +213,14 @@ def commands_of(text):
         yield shlex.split(line, comments=True)[1:]
 
 
+@cache
+def command_line():
+    return get_command(app)
+
+
 def unknown_parts(words):
     """The words of a command that the command line does not know."""
-    command = get_command(app)
+    command = command_line()
     while words and words[0] in getattr(command, "commands", {}):
         command, words = command.commands[words[0]], words[1:]
     if hasattr(command, "commands") and words and not words[0].startswith("-"):
