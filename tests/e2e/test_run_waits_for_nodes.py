@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import socket
 import subprocess
 import sys
 
@@ -66,43 +65,39 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def free_port():
-    with socket.socket() as found:
-        found.bind(("127.0.0.1", 0))
-        return found.getsockname()[1]
-
-
 def digests(text):
     """In order, and by topic."""
     return re.search(r"digest +(\w+)", text)[1], re.search(r"topics +(\w+)", text)[1]
 
 
 def fly_with_node_outside():
-    port = free_port()
     volery = [sys.executable, "-m", "volery.cli"]
     bridge = [
         "--bridge",
-        f"rosbridge={port}",
+        "rosbridge=0",
         "--wait-for",
         "climbing",
         "--wait-timeout",
         f"{HANG_S}",
     ]
     words = ["run", "climb.toml", "--trust", "--no-nodes", "--speed", "max", "--digest", *bridge]
-    way = ["--via", f"rosbridge://127.0.0.1:{port}", "--namespace", "/uav1"]
-    with (
-        subprocess.Popen([*volery, *words], stdout=subprocess.PIPE, text=True) as run,
-        subprocess.Popen(
-            [*volery, "node", "climbing_node:Climbing", *way, "--lock-step", "0.001"],
-            stderr=subprocess.DEVNULL,
-        ) as node,
-    ):
+    pipe = subprocess.PIPE
+    with subprocess.Popen([*volery, *words], stdout=pipe, stderr=pipe, text=True) as run:
         try:
-            return digests(run.communicate(timeout=HANG_S)[0])
+            found = (re.match(r"open .*(127\.0\.0\.1:\d+)", line) for line in run.stderr)
+            address = next(filter(None, found))[1]
+            way = ["--via", f"rosbridge://{address}", "--namespace", "/uav1"]
+            with subprocess.Popen(
+                [*volery, "node", "climbing_node:Climbing", *way, "--lock-step", "0.001"],
+                stderr=subprocess.DEVNULL,
+            ) as node:
+                try:
+                    return digests(run.communicate(timeout=HANG_S)[0])
+                finally:
+                    node.terminate()
+                    node.wait(HANG_S)
         finally:
             run.kill()
-            node.terminate()
-            node.wait(HANG_S)
 
 
 @pytest.mark.slow
@@ -117,7 +112,7 @@ def test_a_lock_step_node_in_its_own_process_is_byte_for_byte_the_one_inside():
 
 def test_what_does_not_come_is_named():
     words = ["run", "hover", "--wait-for", "a,/uav1/b", "--wait-timeout", "0.1"]
-    result = CliRunner().invoke(app, [*words, "--bridge", f"rosbridge={free_port()}"])
+    result = CliRunner().invoke(app, [*words, "--bridge", "rosbridge=0"])
     assert result.exit_code == 2
     assert "waiting for a, /uav1/b, at most 0.1 s" in result.output
     assert "a, /uav1/b not connected within 0.1 s; connected: none" in result.output
