@@ -13,6 +13,7 @@ import log_targets
 import mavlink_targets
 import mesh_targets
 import message_targets
+import policy_targets
 import ros2_targets
 import rosbridge_targets
 import scenario_targets
@@ -52,6 +53,8 @@ TARGETS = {
     "damaged_mcap": damaged_log_targets.damaged_mcap,
     "damaged_bag": damaged_log_targets.damaged_bag,
     "damaged_db3": damaged_log_targets.damaged_db3,
+    "policy_archives": policy_targets.archives,
+    "policy_contents": policy_targets.contents,
     "grid_map_matrix": grid_map_targets.matrix,
     "grid_map_moving_ai": grid_map_targets.moving_ai,
     "grid_map_picture": grid_map_targets.picture,

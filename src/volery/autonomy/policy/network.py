@@ -93,6 +93,7 @@ class Network:
         """Returns action, value and outputs of observations (..., D).
 
         D is `input_size`. Raises `CommandError` for another size or numbers that are not finite.
+        Outputs of large weights may overflow: then they are not finite.
         """
         x = np.ascontiguousarray(observation, np.float32)
         if x.shape[-1:] != (self.input_size,):
@@ -101,14 +102,21 @@ class Network:
             )
         if not np.isfinite(x).all():
             raise CommandError("the observation is not finite")
-        features = self._features(x)
-        outputs = self._forward(self._policy, features)
-        value = self._value_of(features, outputs)
+        with np.errstate(over="ignore", invalid="ignore"):
+            features = self._features(x)
+            outputs = self._forward(self._policy, features)
+            value = self._value_of(features, outputs)
         return PolicyOutput(self._action(outputs), value, outputs)
 
     def act(self, observation: ArrayLike) -> NDArray[np.float64]:
-        """Returns the actions (..., A) of observations (..., D); see `evaluate`."""
-        return self.evaluate(observation).action
+        """Returns the actions (..., A) of observations (..., D), as `evaluate` does.
+
+        Raises `CommandError` also for outputs that are not finite.
+        """
+        output = self.evaluate(observation)
+        if not np.isfinite(output.outputs).all():
+            raise CommandError("the policy's outputs are not finite")
+        return output.action
 
     # ------------------------------------------------------------------------------------- inside
 

@@ -11,11 +11,13 @@ import json
 import lzma
 import math
 import os
+import tokenize
+import warnings
 import zipfile
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -45,6 +47,7 @@ _DAMAGE: tuple[type[Exception], ...] = (
     zipfile.LargeZipFile,
     zlib.error,
     lzma.LZMAError,
+    tokenize.TokenError,
 )
 """What zipfile and numpy raise for damaged files."""
 
@@ -60,7 +63,7 @@ class Policy:
         """Returns actions as environments take them, for observations (..., D).
 
         Numbers from -1 to 1, (..., A), or choices (...). Raises `CommandError` for observations of
-        another size or that are not finite.
+        another size or that are not finite, and for outputs that are not finite.
         """
         action = self.network.act(observation)
         if self.description.action.choices is None:
@@ -163,18 +166,21 @@ def _arrays(content: bytes) -> dict[str, NDArray[Any]]:
         for member in members:
             with archive.open(member) as file:
                 data = file.read(_MAX_ARRAY_BYTES)
-            found[member.filename.removesuffix(".npy")] = _array(io.BytesIO(data), len(data))
+            found[member.filename.removesuffix(".npy")] = _array(data)
     return found
 
 
-def _array(file: IO[bytes], size: int) -> NDArray[Any]:
-    """Returns an array whose header claims no more than the `size` bytes of the file."""
+def _array(data: bytes) -> NDArray[Any]:
+    """Returns the array of a member whose header claims what the bytes hold."""
+    file = io.BytesIO(data)
     version = np.lib.format.read_magic(file)
     if version != (1, 0):
         raise ValueError(f"array of version {version}")
-    shape, _, dtype = np.lib.format.read_array_header_1_0(file)
-    if dtype.hasobject or math.prod(shape) * dtype.itemsize != size - file.tell():
+    with warnings.catch_warnings():  # about headers of Python 2, which damage resembles
+        warnings.simplefilter("ignore", UserWarning)
+        shape, is_fortran, dtype = np.lib.format.read_array_header_1_0(file)
+    start = file.tell()
+    if dtype.hasobject or math.prod(shape) * dtype.itemsize != len(data) - start:
         raise ValueError("an array is incomplete")
-    file.seek(0)
-    array: NDArray[Any] = np.lib.format.read_array(file, allow_pickle=False)
-    return array
+    order: Literal["F", "C"] = "F" if is_fortran else "C"
+    return np.frombuffer(data, dtype, offset=start).reshape(shape, order=order)

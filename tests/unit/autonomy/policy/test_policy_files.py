@@ -18,7 +18,7 @@ from volery.autonomy.policy.policy_file import (
     write_policy,
 )
 from volery.autonomy.policy.shipped_policies import find_policy
-from volery.core.errors import DataFileError
+from volery.core.errors import CommandError, DataFileError
 
 
 @pytest.mark.parametrize("policy", [small_policy(), image_policy()], ids=["mlp", "image"])
@@ -91,6 +91,26 @@ def test_objects_and_lying_headers_are_refused() -> None:
         archive.writestr("policy.0.weight.npy", header.getvalue())
     with pytest.raises(DataFileError, match="incomplete"):
         policy_from_bytes(buffer.getvalue())
+
+
+@pytest.mark.parametrize("end", ["(", "}", "'"])
+def test_headers_that_cannot_be_parsed_are_refused(end: str) -> None:
+    """numpy raises errors of other modules for some, and warns of a header of Python 2."""
+    text = "{'descr': '<f4', 'fortran_order': False, 'shape': (1,), } " + end
+    header = b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text.encode()
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        archive.writestr("policy.0.weight.npy", header + bytes(4))
+    with pytest.raises(DataFileError, match="damaged"):
+        policy_from_bytes(buffer.getvalue())
+
+
+def test_outputs_that_overflow_are_refused() -> None:
+    arrays = mlp("policy", [6, 8, 4], np.random.default_rng(0))
+    large = {name: np.full_like(array, 3e38) for name, array in arrays.items()}
+    policy = make_policy(description(), large)
+    with pytest.raises(CommandError, match="not finite"):
+        policy.act(np.ones(6))
 
 
 def test_a_bomb_and_a_large_file_are_refused(tmp_path: Path) -> None:
