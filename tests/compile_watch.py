@@ -1,4 +1,4 @@
-"""Notes which of Volery's kernels numba compiles; as a pytest plugin it leaves them in a file."""
+"""Notes which of Volery's kernels a process needs; as a pytest plugin, which it compiles."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from numba.core import event
+from numba.core.caching import FunctionCache
 
 
 class CompileWatch(event.Listener):
@@ -18,13 +19,33 @@ class CompileWatch(event.Listener):
         event.register("numba:compile", self)
 
     def on_start(self, event: Any) -> None:
-        function = event.data["dispatcher"].py_func
-        if function.__module__.startswith("volery."):
-            name = f"{function.__module__}.{function.__name__}"
-            self.compiled.append(f"{name} {event.data['args']}")
+        _note(self.compiled, event.data["dispatcher"].py_func, event.data["args"])
 
     def on_end(self, event: Any) -> None:
         """Nothing is noted twice."""
+
+
+class NeedsWatch:
+    """`needed`: each kernel that is compiled or loaded from the cache, from now on.
+
+    What a first start compiles in flight, a later one loads in flight: so a full cache serves to
+    tell what an empty one lacks.
+    """
+
+    def __init__(self) -> None:
+        self.needed: list[str] = []
+        load: Any = FunctionCache.load_overload
+
+        def note_and_load(cache: Any, signature: Any, context: Any) -> Any:
+            _note(self.needed, cache._py_func, signature)
+            return load(cache, signature, context)
+
+        FunctionCache.load_overload = note_and_load
+
+
+def _note(found: list[str], function: Any, types: Any) -> None:
+    if function.__module__.startswith("volery."):
+        found.append(f"{function.__module__}.{function.__name__} {types}")
 
 
 def pytest_configure(config: Any) -> None:

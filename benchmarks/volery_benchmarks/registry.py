@@ -140,6 +140,7 @@ BENCHES: dict[str, Bench] = {
                 "ratio_to_embreex_run": Bound(1.3),
                 "ratio_to_open3d": Bound(1.8),
             },
+            has_quick=True,
         ),
         Bench(
             "fleet",

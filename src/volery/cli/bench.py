@@ -37,7 +37,8 @@ def measure_and_show(
             raise VoleryError(f"{path}: folder {path.parent} does not exist")
     with _with_progress():
         if name == "all" and quick:
-            raise VoleryError("--quick is for one bench: forest_search, load, hostile or cluster")
+            short = ", ".join(each for each, bench in BENCHES.items() if bench.has_quick)
+            raise VoleryError(f"--quick is for one of these benches: {short}")
         if name == "all" and only:
             raise VoleryError("--only is for one bench: learning")
         if name == "all":

@@ -13,7 +13,7 @@ _BENCHES = (
     "lidar, fleet, camera, dynamics, reset, start, bridge, ros2, coverage, avoidance, search, "
     "mavlink, comms, page, forest_search, load, hostile, cluster, learning, peers"
 )
-_QUICK = "forest_search, load, hostile, cluster"
+_QUICK = "lidar, forest_search, load, hostile, cluster"
 
 
 @guarded

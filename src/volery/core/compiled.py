@@ -1,8 +1,9 @@
 """Compiles kernels with numba: nogil, cached under a key that cannot go stale.
 
 numba detects an edit of the file with a kernel, but not of a callee in another file. The cache
-folder is therefore named by a hash of all of Volery's sources with kernels, the versions of numba
-and numpy, and the CPU. An edited kernel gets a new folder; old folders are deleted.
+folder is therefore named by a hash of all of Volery's sources with kernels, the versions of Python,
+numba, llvmlite and numpy, and the CPU. An edited kernel gets a new folder; old folders are deleted.
+Where Volery is installed does not matter: installations of equal sources share what is compiled.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ import stat
 import sys
 import tempfile
 import time
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -25,6 +26,8 @@ from typing import Any, TypeVar
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 import numba
+
+from volery.core.kernel_places import LOCATORS
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -52,7 +55,8 @@ def _cache_key() -> str:
     for source in _kernel_sources():
         digest.update(source.relative_to(_PACKAGE).as_posix().encode())
         digest.update(source.read_bytes())
-    for word in (version("numba"), version("numpy"), sys.version, _cpu_name()):
+    versions = [version(name) for name in ("numba", "llvmlite", "numpy")]
+    for word in (*versions, sys.version, _cpu_name()):
         digest.update(word.encode())
     return digest.hexdigest()[:20]
 
@@ -181,10 +185,17 @@ def _decorate(function: F, **options: Any) -> F:
     said: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "forceinline": False}
     # Kernels are never passed to C code: entries for C would take a tenth of the time to compile.
     choices = {**said, "nogil": True, "no_cfunc_wrapper": True, **options}
-    saved = _CONFIG.CACHE_DIR
-    _CONFIG.CACHE_DIR = str(cache_dir())
-    try:
+    with cached_here():
         compiled: F = numba.njit(cache=True, **choices)(function)
-    finally:
-        _CONFIG.CACHE_DIR = saved
     return compiled
+
+
+@contextmanager
+def cached_here() -> Iterator[None]:
+    """Makes numba use `cache_dir` for functions that it decorates in this context."""
+    saved = _CONFIG.CACHE_DIR, _CONFIG.CACHE_LOCATOR_CLASSES
+    _CONFIG.CACHE_DIR, _CONFIG.CACHE_LOCATOR_CLASSES = str(cache_dir()), LOCATORS
+    try:
+        yield
+    finally:
+        _CONFIG.CACHE_DIR, _CONFIG.CACHE_LOCATOR_CLASSES = saved

@@ -11,7 +11,7 @@ from volery.core.data_tables import read_table
 
 
 class Material(IntEnum):
-    """Material number of a surface; it fits a uint8."""
+    """Material number of a surface; it fits a uint8. It is compiled into kernels."""
 
     NONE = 0
     GROUND = 1

@@ -17,7 +17,7 @@ from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from volery.core.compiled import cache_dir, inner_kernel, kernel, owning_kernel
+from volery.core.compiled import cached_here, inner_kernel, kernel, owning_kernel
 from volery.world.embree import (
     CONTEXT_INSTANCE,
     CONTEXT_INSTANCE_PRIMITIVE,
@@ -34,7 +34,6 @@ from volery.world.embree import (
 )
 
 _carray: Any = vars(numba)["carray"]
-_config: Any = vars(numba)["config"]
 _INVALID = np.uint32(INVALID)
 _FAR_AWAY_M = 1e7
 # State of a query, 64-bit floats: point, squared distance, nearest point, instance.
@@ -226,12 +225,8 @@ def _consider(arguments: Any) -> bool:
 
 
 def _compile_callback(function: Callable[..., Any]) -> Any:
-    saved = _config.CACHE_DIR
-    _config.CACHE_DIR = str(cache_dir())
-    try:
+    with cached_here():
         return numba.cfunc(types.boolean(types.voidptr), cache=True)(function)
-    finally:
-        _config.CACHE_DIR = saved
 
 
 _compiled: list[Any] = []

@@ -1,12 +1,17 @@
 """Tests that compiled kernels are cached, and that an edited kernel gets a new cache."""
 
+import ast
+import importlib
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
+from enum import EnumType
 from pathlib import Path
 
 from volery.core import compiled
+from volery.core.kernel_places import KernelLocator
 
 _TWO_KERNELS = """
 import sys
@@ -31,6 +36,17 @@ def second(x):
 print({"first": first, "second": second}[sys.argv[1]](2.0), len(lift_twice.stats.cache_hits))
 """
 
+_MOVE = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import numpy as np
+from volery.core.rotation_kernels import moved_points
+
+half_turn = np.array([0.0, 0.0, 1.0, 0.0])
+moved = moved_points(np.array([[1.0, 2.0, 3.0]]), half_turn, np.zeros(3))
+print(*moved[0], sum(moved_points.stats.cache_hits.values()), sys.modules["volery"].__file__)
+"""
+
 
 def test_cache_key_depends_on_every_kernel_source(monkeypatch, tmp_path):
     source = tmp_path / "callee.py"
@@ -39,6 +55,66 @@ def test_cache_key_depends_on_every_kernel_source(monkeypatch, tmp_path):
     before = compiled._cache_key()
     source.write_text("x = 2  # kernel")
     assert compiled._cache_key() != before
+
+
+def test_installations_of_equal_sources_share_compiled_kernels(tmp_path):
+    """Two checkouts or virtual environments: what one has compiled, the other loads."""
+    env = {**os.environ, "VOLERY_CACHE_DIR": str(tmp_path / "cache")}
+    env.pop("PYTHONPATH", None)
+    told = []
+    for place in (tmp_path / "first", tmp_path / "second"):
+        shutil.copytree(Path(compiled.__file__).parent, place / "volery" / "core")
+        (place / "volery" / "__init__.py").touch()
+        done = subprocess.run(
+            [sys.executable, "-P", "-c", _MOVE, str(place)],
+            env=env,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        told.append(done.stdout.split())
+        assert told[-1][-1] == str(place / "volery" / "__init__.py")
+    assert told[0][:4] == ["-1.0", "-2.0", "3.0", "0"]
+    assert told[1][:4] == ["-1.0", "-2.0", "3.0", "1"]
+
+
+def test_kernels_of_other_files_are_kept_apart_by_path(tmp_path):
+    places = [tmp_path / name / "mine.py" for name in ("a", "b")]
+    subpaths = {KernelLocator.get_suitable_cache_subpath(str(place)) for place in places}
+    assert len(subpaths) == 2
+
+
+def test_constants_that_kernels_import_belong_to_the_cache_key():
+    """numba freezes them: an edit of a file that is not in the key would go unnoticed."""
+    hashed, package = set(compiled._kernel_sources()), compiled._PACKAGE
+    for source in hashed:
+        tree = ast.parse(source.read_text(encoding="utf-8"))
+        imports = [node for node in tree.body if isinstance(node, ast.ImportFrom) and node.module]
+        if not any(node.module == "volery.core.compiled" for node in imports):
+            continue
+        used = _names_in_kernels(tree)
+        for node in imports:
+            origin = package.parent / f"{node.module.replace('.', '/')}.py"
+            names = used.intersection(alias.name for alias in node.names)
+            if origin.is_file() and any(_is_constant(node.module, name) for name in names):
+                assert origin in hashed, f"{source.name}: mention the kernels in {origin}"
+
+
+def _names_in_kernels(tree: ast.Module) -> set[str]:
+    """Names that kernels and constants of a module use; others are read by Python at each call."""
+    nodes = [inner for node in tree.body if _is_read(node) for inner in ast.walk(node)]
+    return {node.id for node in nodes if isinstance(node, ast.Name)}
+
+
+def _is_read(node: ast.stmt) -> bool:
+    """Whether a statement is a kernel, or neither function nor class."""
+    decorators = getattr(node, "decorator_list", None)
+    return decorators is None or any("kernel" in ast.unparse(each) for each in decorators)
+
+
+def _is_constant(module: str, name: str) -> bool:
+    value = getattr(importlib.import_module(module), name)
+    return isinstance(value, (int, float, tuple, EnumType))
 
 
 def test_unwritable_cache_falls_back_to_a_temporary_folder(tmp_path):

@@ -12,7 +12,7 @@ from volery.sensors.cameras.lens import undistort
 from volery.world.embree import LANES
 
 PIECE = 2048 // LANES
-"""Packets of a piece of work: a compact part of the image, 16 x 8 tiles."""
+"""Packets of a piece of work for a kernel: a compact part of the image, 16 x 8 tiles."""
 _PIECE_ACROSS, _PIECE_DOWN = 16, 8
 _OFFSETS = {
     1: np.array([[0.0, 0.0]]),
