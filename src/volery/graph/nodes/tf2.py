@@ -28,6 +28,7 @@ from volery.graph.messages import (
     header,
     stamp_of,
 )
+from volery.graph.nodes.service_client import Future
 from volery.graph.qos import DurabilityPolicy, QoSProfile
 
 CACHE_NS = 10_000_000_000
@@ -130,6 +131,8 @@ class Buffer:
 
     def __init__(self, *_arguments: Any, **_options: Any) -> None:
         self._frames: dict[str, _Frame] = {}
+        self._waiting: list[tuple[Future, str, str, Any]] = []
+        """Futures, with the target and source frame and the time of which each is."""
 
     def set_transform(self, transform: Any, authority: str = "") -> None:  # noqa: ARG002
         """Stores a TransformStamped."""
@@ -181,6 +184,22 @@ class Buffer:
             return False
         return True
 
+    def wait_for_transform_async(self, target_frame: str, source_frame: str, time: Any) -> Future:
+        """Returns a future that is done, with true, when `lookup_transform` would succeed."""
+        future = Future()
+        if self.can_transform(target_frame, source_frame, time):
+            future.set_result(True)
+        else:
+            self._waiting.append((future, target_frame, source_frame, time))
+        return future
+
+    async def lookup_transform_async(
+        self, target_frame: str, source_frame: str, time: Any = None
+    ) -> Any:
+        """Returns what `lookup_transform` does, when the transform is there."""
+        await self.wait_for_transform_async(target_frame, source_frame, time)
+        return self.lookup_transform(target_frame, source_frame, time)
+
     def transform(self, stamped: Any, target_frame: str, timeout: Any = None) -> Any:
         """Returns a PointStamped or PoseStamped in another frame; raises `TransformException`."""
         found = self.lookup_transform(
@@ -197,6 +216,23 @@ class Buffer:
     def clear(self) -> None:
         """Forgets all transforms."""
         self._frames.clear()
+
+    def all_frames_as_yaml(self, time: float = 0.0) -> str:  # noqa: ARG002  # as in tf2
+        """Returns each frame with its parent and the times of its transforms, s, as YAML."""
+        lines = []
+        for name, frame in self._frames.items():
+            first, last = (frame.placements[k].time_ns / 1e9 for k in (0, -1))
+            rate = (len(frame.placements) - 1) / (last - first) if last > first else 10_000.0
+            lines.append(
+                f"{name}:\n"
+                f"  parent: '{frame.parent}'\n"
+                "  broadcaster: 'default_authority'\n"
+                f"  rate: {rate:.3f}\n"
+                f"  most_recent_transform: {last:.6f}\n"
+                f"  oldest_transform: {first:.6f}\n"
+                f"  buffer_length: {last - first:.3f}\n"
+            )
+        return "".join(lines) or "{}"
 
     def all_frames_as_string(self) -> str:
         """Returns each frame with its parent."""
@@ -215,6 +251,15 @@ class Buffer:
         if frame is None or (frame.parent, frame.is_static) != (parent, is_static):
             frame = self._frames[child] = _Frame(parent, is_static)
         frame.add(_Placement(stamp_of(transform), position, attitude / length))
+        if self._waiting:
+            self._tell_waiting()
+
+    def _tell_waiting(self) -> None:
+        """Completes the futures whose transform is there now."""
+        ready = [wait for wait in self._waiting if self.can_transform(*wait[1:])]
+        self._waiting = [wait for wait in self._waiting if wait not in ready]
+        for future, *_ in ready:
+            future.set_result(True)
 
     def _chain(self, name: str) -> list[str]:
         """Returns a frame and its ancestors."""
@@ -264,6 +309,7 @@ class TransformBroadcaster:
     """`tf2_ros.TransformBroadcaster`: publishes on `/tf`."""
 
     def __init__(self, node: Any, qos: Any = _DEPTH, **_options: Any) -> None:
+        self.node = node
         self._publisher = node.create_publisher(TFMessage, "/tf", qos)
 
     def sendTransform(self, transform: Any) -> None:  # noqa: N802  # tf2's name
