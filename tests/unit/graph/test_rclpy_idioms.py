@@ -3,6 +3,8 @@
 import subprocess
 import sys
 import textwrap
+import threading
+from types import SimpleNamespace
 
 import pytest
 
@@ -14,7 +16,7 @@ from volery.graph.nodes.qos_events import PublisherEventCallbacks, SubscriptionE
 from volery.graph.nodes.rclpy_modules import Node, contents
 from volery.graph.nodes.ros_time import Clock, ClockType, ROSClock
 from volery.graph.nodes.service_client import Future
-from volery.graph.nodes.tf2 import Buffer
+from volery.graph.nodes.tf2 import Buffer, TransformListener
 from volery.graph.parameters import ParameterSetting
 
 TRIGGER = "std_srvs/srv/Trigger"
@@ -22,7 +24,7 @@ TRIGGER = "std_srvs/srv/Trigger"
 
 @pytest.fixture
 def node():
-    return Node("idioms", context=Context(Graph(lambda: 7), None, lambda: 7))
+    return Node("idioms", context=Context(Graph(lambda: 7), SimpleNamespace(), lambda: 7))
 
 
 def receive(node, callback):
@@ -134,6 +136,28 @@ def test_waiting_for_a_transform(node):
     buffer.set_transform(moved("probe"))
     assert (heard, future.result()) == ([2.0], True)
     assert buffer.wait_for_transform_async("map", "probe", None).done()
+
+
+def test_a_transform_that_is_there_is_reported_after_the_callback(node):
+    """Callbacks take locks, which the report takes too."""
+    soon, lock, heard = [], threading.Lock(), []
+    node._context.timers.at = lambda time_ns, action: soon.append((time_ns, action))
+    buffer = Buffer()
+    TransformListener(buffer, node)
+    buffer.set_transform(moved("probe"))
+
+    def on_ready(future):
+        with lock:
+            heard.append(future.result())
+
+    def on_text(message):
+        with lock:
+            buffer.wait_for_transform_async("map", "probe", None).add_done_callback(on_ready)
+
+    receive(node, on_text)
+    ((time_ns, report),) = soon
+    report()
+    assert (time_ns, heard) == (7, [True])
 
 
 def test_frames_as_yaml():

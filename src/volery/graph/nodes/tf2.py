@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections import deque
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -131,6 +132,8 @@ class Buffer:
 
     def __init__(self, *_arguments: Any, **_options: Any) -> None:
         self._frames: dict[str, _Frame] = {}
+        self.call_soon: Callable[[Callable[[], Any]], None] = _call
+        """Calls a function after the present callback; a listener sets it."""
         self._waiting: list[tuple[Future, str, str, Any]] = []
         """Futures, with the target and source frame and the time of which each is."""
 
@@ -185,10 +188,13 @@ class Buffer:
         return True
 
     def wait_for_transform_async(self, target_frame: str, source_frame: str, time: Any) -> Future:
-        """Returns a future that is done, with true, when `lookup_transform` would succeed."""
+        """Returns a future that is done, with true, when `lookup_transform` would succeed.
+
+        With a listener never before the callback that asks ends, which may hold a lock.
+        """
         future = Future()
         if self.can_transform(target_frame, source_frame, time):
-            future.set_result(True)
+            self.call_soon(lambda: future.set_result(True))
         else:
             self._waiting.append((future, target_frame, source_frame, time))
         return future
@@ -285,6 +291,7 @@ class TransformListener:
 
     def __init__(self, buffer: Buffer, node: Any, **_options: Any) -> None:
         self.buffer = buffer
+        buffer.call_soon = node.call_soon
         static = QoSProfile(depth=_DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._subscriptions = (
             node.create_subscription(TFMessage, "/tf", self._on_tf, _DEPTH),
@@ -367,6 +374,10 @@ def quaternion_from_euler(roll: float, pitch: float, yaw: float, axes: str = "sx
 def _check_axes(axes: str) -> None:
     if axes != "sxyz":
         raise ValueError(f"Volery's tf_transformations has the axes 'sxyz', not '{axes}'")
+
+
+def _call(action: Callable[[], Any]) -> None:
+    action()
 
 
 def _placement(transform: Any) -> _Placement:
