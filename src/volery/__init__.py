@@ -13,6 +13,8 @@ from __future__ import annotations
 
 from importlib import import_module
 
+from volery.graph.nodes import late_imports as _late_imports
+
 TYPE_CHECKING = False
 """As in `typing`, whose import takes longer than the rest of this module."""
 
@@ -122,3 +124,6 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *__all__, "__version__"})
+
+
+_late_imports.offer()

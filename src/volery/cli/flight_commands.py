@@ -218,7 +218,9 @@ def serve(
 
 @guarded
 def play(
-    log: Annotated[Path, typer.Argument(help="A .mcap or .bag log.")],
+    log: Annotated[
+        Path, typer.Argument(help="A .mcap, .bag or .db3 log, or the folder of a ROS 2 bag.")
+    ],
     scenario: Annotated[
         Path | None,
         typer.Option(help="Read the world's data files from the folder of this scenario file."),

@@ -36,15 +36,19 @@ def play(
     scenario: the user's scenario file of the flight; without it, data files are read from the log's
     folder. Raises `RecordingError` if there is no log or the log is empty.
     """
+    from volery.bridges.logs.one_file import one_file
     from volery.runtime.replay.log_player import LogPlayer
     from volery.scenario.load import load_scenario
 
     own = None if scenario is None else load_scenario(scenario)
     with (
         Interrupts() as interrupts,
-        LogPlayer(log, speed=options.speed, loop=loop, paused=paused, own=own) as player,
+        one_file(log) as (path, problem),
+        LogPlayer(path, speed=options.speed, loop=loop, paused=paused, own=own) as player,
     ):
         interrupts.be_gentle()
+        if problem:
+            typer.echo(f"{log}: {problem}", err=True)
         _introduce(player)
         with (
             open_bridges(player.gateway, replace(options, bridges=options.bridges or _BRIDGES)),

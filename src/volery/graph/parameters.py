@@ -135,7 +135,8 @@ class Parameter(ParameterSetting):
     like: an example value that determines the accepted kind, None: any. within: limits of a number.
     read_only: whether the value is fixed after the node's start. before_set: called before another
     value is set. agrees: called with a value that fits; raises `GraphError` with the reason if the
-    node rejects the value.
+    node rejects the value. after_set: called with the value that has been set. set_with: called
+    with a value that fits; returns whether it has set it, with others, or raises `GraphError`.
     """
 
     def __init__(
@@ -148,6 +149,8 @@ class Parameter(ParameterSetting):
         read_only: bool = True,
         before_set: Callable[[], None] | None = None,
         agrees: Callable[[Parameter, Any], None] | None = None,
+        after_set: Callable[[Parameter, Any], None] | None = None,
+        set_with: Callable[[Parameter, Any], bool] | None = None,
         description: str = "",
     ) -> None:
         super().__init__(name, value=value)
@@ -155,6 +158,8 @@ class Parameter(ParameterSetting):
         self.description = description
         self._agrees = agrees
         self._before_set = before_set
+        self._after_set = after_set
+        self._set_with = set_with
         self._like = like
         self._within = within
         self._check(value)
@@ -163,11 +168,15 @@ class Parameter(ParameterSetting):
     def set(self, value: Any) -> None:
         """Sets the value. Raises `GraphError` if read-only, or if the value does not fit."""
         self.check(value)
+        if self._set_with is not None and self._set_with(self, value):
+            return
         if self._before_set is not None:
             self._before_set()
         if self._agrees is not None:
             self._agrees(self, value)
         self.value = self._of_kind(value)
+        if self._after_set is not None:
+            self._after_set(self, self.value)
 
     def check(self, value: Any) -> None:
         """Raises `GraphError` if the parameter is read-only, or if the value does not fit."""

@@ -384,7 +384,7 @@ def test_a_type_of_the_same_name_that_is_another(tmp_path):
     [
         ("json", "jsonschema", "x", b"{}", "json"),
         ("cdr", "ros2msg", "other_msgs/msg/New", b"", "not define"),
-        ("cdr", "ros2idl", "other_msgs/msg/New", b"module", "defines it in IDL, which is not"),
+        ("cdr", "ros2idl", "other_msgs/msg/New", b"module", "in IDL is not readable"),
         ("cdr", "ros2msg", "../../msg/New", b"int8 x\n", "name"),
         ("cdr", "ros2msg", "other_msgs/msg/New", b"no/Such x\n", "no/"),
     ],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from mcap.writer import Writer as McapWriter
 from rosbags.rosbag1 import Writer
@@ -109,14 +110,71 @@ def test_a_nested_type_that_differs(logged):
     assert (found.message.points[0].x, found.message.points[0].plain.count) == (1.5, 7)
 
 
-def test_a_definition_in_idl_is_refused_by_its_name(tmp_path):
-    path = tmp_path / "idl.mcap"
+IDL = f"""{LINE}IDL: idl_probe_msgs/msg/Level
+// generated from rosidl_adapter/resource/msg.idl.em
+#include "std_msgs/msg/Header.idl"
+
+module idl_probe_msgs {{
+  module msg {{
+    module Level_Constants {{
+      const uint8 LOW = 1;
+    }};
+    typedef float float__2[2];
+    @verbatim (language="comment", text=
+      "A level." "\\n"
+      "With {{ brackets and = in its comment.")
+    struct Level {{
+      std_msgs::msg::Header header;
+      @unit (value="m")
+      double value;
+      float__2 pair;
+      sequence<idl_probe_msgs::msg::Part, 3> parts;
+      string<9> Name;
+      octet flags;
+    }};
+  }};
+}};
+{LINE}IDL: idl_probe_msgs/msg/Part
+module idl_probe_msgs {{ module msg {{ struct Part {{ boolean on; }}; }}; }};
+"""
+
+
+def mcap_in_idl(path, name, text, data):
     with path.open("wb") as file:
         writer = McapWriter(file)
         writer.start()
-        text = b"module probe_msgs { module msg { struct Level { double value; }; }; };"
-        schema = writer.register_schema("idl_probe_msgs/msg/Level", "ros2idl", text)
-        writer.add_message(writer.register_channel("/probe", "cdr", schema), 1, bytes(12), 1)
+        schema = writer.register_schema(name, "ros2idl", text.encode())
+        writer.add_message(writer.register_channel("/probe", "cdr", schema), 1, data, 1)
         writer.finish()
-    with pytest.raises(RecordingError, match="the log defines it in IDL, which is not read"):
-        open_log(path)["/probe"]["value"]
+    return open_log(path)
+
+
+def test_a_definition_in_idl_is_read(tmp_path):
+    name = "idl_probe_msgs/msg/Level"
+    store = get_typestore(Stores.ROS2_JAZZY)
+    store.register(get_types_from_msg("bool on\n", "idl_probe_msgs/msg/Part"))
+    fields = "std_msgs/Header header\nfloat64 value\nfloat32[2] pair\n"
+    fields += "idl_probe_msgs/Part[<=3] parts\nstring Name\nbyte flags\n"
+    store.register(get_types_from_msg(fields, name))
+    part = store.types["idl_probe_msgs/msg/Part"]
+    pair = np.array([1.0, 2.0], np.float32)
+    message = store.types[name](header(store), 2.5, pair, [part(True), part(False)], "probe", 7)
+    data = bytes(store.serialize_cdr(message, name))
+    (found,) = mcap_in_idl(tmp_path / "idl.mcap", name, IDL, data).messages("/probe")
+    read = found.message
+    assert (read.header.frame_id, read.value, read.pair.tolist()) == ("base_link", 2.5, [1.0, 2.0])
+    assert ([p.on for p in read.parts], read.Name, read.flags) == ([True, False], "probe", 7)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("module a { module msg { union B { }; }; };", "in IDL is not readable"),
+        ("module a {" * 60, "more than 50 brackets"),
+        ("@unit " * 3000, "2000 annotations"),
+        ("module a { module msg { struct B { double x; }; }; };", "defines others"),
+    ],
+)
+def test_a_definition_in_idl_that_is_not_readable_is_refused(tmp_path, text, words):
+    with pytest.raises(RecordingError, match=words):
+        mcap_in_idl(tmp_path / "bad.mcap", "idl_bad_msgs/msg/Level", text, bytes(12))["/probe"]["x"]

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import shutil
+import sqlite3
+from contextlib import closing
 
 import pytest
 from logged_messages import COUNT, write_log, write_sqlite_bag
 from typer.testing import CliRunner
 
+from volery.bridges.logs.one_file import one_file
+from volery.bridges.logs.playback import Playback
 from volery.bridges.logs.ros2_bags import BagWalk
 from volery.cli.app import app
 from volery.core.errors import LogWarning, RecordingError
+from volery.graph import messages as m
+from volery.graph.graph import Graph
 from volery.logs import open_log
 
 runner = CliRunner()
@@ -73,6 +79,50 @@ def test_info_of_a_bag(tmp_path, kind):
     assert "duration  1.900 s" in result.stdout
     (row,) = (line for line in result.stdout.splitlines() if line.startswith("/uav1/odom "))
     assert row.split() == ["/uav1/odom", "nav_msgs/msg/Odometry", str(COUNT), "10.0", "Hz"]
+
+
+@pytest.mark.parametrize("kind", ["folder", "file", "killed", "mcap", "two mcap", "log"])
+def test_a_bag_is_played_from_any_time(tmp_path, kind):
+    path, problem = tmp_path / "bag", ""
+    if kind == "log":
+        path = write_log(tmp_path / "flight.bag")
+    elif "mcap" in kind:
+        path.mkdir()
+        write_log(path / "bag_0.mcap")
+        if kind == "two mcap":
+            shutil.copy(path / "bag_0.mcap", path / "bag_1.mcap")
+    else:
+        write_sqlite_bag(path)
+        if kind == "killed":
+            (path / "metadata.yaml").unlink()
+            problem = "metadata.yaml is missing"
+        path = _file(path) if kind == "file" else path
+    heard = []
+    with one_file(path) as whole, closing(Playback(whole.path)) as playback:
+        assert problem in whole.problem
+        assert bool(whole.problem) == bool(problem)
+        counts = {topic.name: topic.messages for topic in playback.topics}
+        assert counts["/note"] == COUNT * (2 if kind == "two mcap" else 1)
+        graph = Graph(lambda: playback.now_ns)
+        playback.open(graph)
+        graph.subscribe("/note", lambda p: heard.append(p.message.data), m.String)
+        for time_ns in (1_500_000_000, 300_000_000):
+            playback.seek(time_ns)
+            graph.deliver()
+        copy = whole.path
+    assert heard == ["note 15", "note 3"]
+    assert copy.exists() == (kind in ("mcap", "log"))
+
+
+def test_a_bag_without_messages_is_not_played(tmp_path):
+    folder = write_sqlite_bag(tmp_path / "bag")
+    with closing(sqlite3.connect(_file(folder))) as base:
+        base.execute("DELETE FROM messages")
+        base.commit()
+    with pytest.raises(RecordingError, match="holds no readable message"), one_file(folder):
+        pass
+    with pytest.raises(RecordingError, match="holds no metadata"), one_file(tmp_path):
+        pass
 
 
 def test_info_of_a_bag_without_metadata(bag):

@@ -19,6 +19,7 @@ from typing import Any
 from rosbags.interfaces import Nodetype
 
 from volery.bridges.logs.budgets import MAX_DEFINITION_BYTES, MAX_NESTED_TYPES
+from volery.bridges.logs.idl_definitions import msg_texts
 from volery.bridges.logs.records import LogTopic
 from volery.core.errors import GraphError
 from volery.graph.codecs.definition_files import Definition, parse_definition
@@ -30,7 +31,7 @@ from volery.graph.typestore import typestore
 _SEPARATOR = re.compile(r"^=+\s*$", re.MULTILINE)
 _NESTED = re.compile(r"\s*MSG:\s*(\S+)[^\n]*\n?")
 _TYPE = re.compile(r"([A-Za-z]\w{0,99})/(?:msg/)?([A-Za-z]\w{0,99})", re.ASCII)
-_DEFINITION_FORMATS = {"ros1msg", "ros2msg"}
+_DEFINITION_FORMATS = {"ros1msg", "ros2msg", "ros2idl"}
 _FIELD_TYPE = re.compile(r"^(\s*)([A-Za-z][\w/]*)", re.ASCII)
 
 
@@ -72,32 +73,35 @@ def as_type(message: Any, msgtype: str) -> Any:
 
 def _texts(name: str, definition: str, form: str) -> dict[str, str]:
     """Returns the definitions in a log by the names of their types, which are valid."""
-    if form == "ros2idl" and definition.strip():
-        raise GraphError(
-            f"type {name} is not known, and the log defines it in IDL, which is not read; add its "
-            ".msg file to the message packages"
-        )
     if form not in _DEFINITION_FORMATS or not definition.strip():
         raise GraphError(f"type {name} is not known, and the log does not define it")
     if len(definition) > MAX_DEFINITION_BYTES:
         raise GraphError(
             f"the definition of {name} has more than {MAX_DEFINITION_BYTES} characters"
         )
-    first, *others = _SEPARATOR.split(definition)
-    if len(others) > MAX_NESTED_TYPES:
+    written = msg_texts(definition) if form == "ros2idl" else _parts(name, definition)
+    if len(written) > MAX_NESTED_TYPES + 1:
         raise GraphError(f"the definition of {name} nests more than {MAX_NESTED_TYPES} types")
-    written = {name: first}
-    for other in others:
-        head = _NESTED.match(other)
-        if head is not None:
-            written[head[1]] = other[head.end() :]
     texts = {}
     for long_name, text in written.items():
         parts = _TYPE.fullmatch(long_name)
         if parts is None:
             raise GraphError(f"the log has a type with the name '{long_name[:100]}'")
         texts[f"{parts[1]}/msg/{parts[2]}"] = text
+    if name not in texts:
+        raise GraphError(f"type {name} is not known, and the log defines others in its place")
     return texts
+
+
+def _parts(name: str, definition: str) -> dict[str, str]:
+    """Returns the texts of a definition in `.msg` form, with those after lines of `=`."""
+    first, *others = _SEPARATOR.split(definition)
+    written = {name: first}
+    for other in others:
+        head = _NESTED.match(other)
+        if head is not None:
+            written[head[1]] = other[head.end() :]
+    return written
 
 
 def _renamed(texts: Mapping[str, str], *, is_ros1: bool) -> dict[str, str]:

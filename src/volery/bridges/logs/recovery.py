@@ -66,7 +66,7 @@ def _write(kind: str, records: Iterable[LogRecord], out: Path) -> tuple[int, int
         with locked_for_replacing(made):
             made.unlink(missing_ok=True)
         try:
-            found = (_to_mcap if kind == "mcap" else _to_bag)(records, made)
+            found = (write_mcap if kind == "mcap" else _to_bag)(records, made)
             made.rename(out)
         finally:
             made.unlink(missing_ok=True)
@@ -77,7 +77,8 @@ def _write(kind: str, records: Iterable[LogRecord], out: Path) -> tuple[int, int
     return found
 
 
-def _to_mcap(records: Iterable[LogRecord], out: Path) -> tuple[int, int]:
+def write_mcap(records: Iterable[LogRecord], out: Path) -> tuple[int, int]:
+    """Writes records as they are; returns their number and the last time, ns."""
     from mcap.writer import CompressionType, Writer
 
     file = DiskFile(out)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from volery.graph.codecs.cdr import decode_cdr
 from volery.graph.message_copies import message_checker, message_copier
 from volery.graph.messages import message_type
 from volery.graph.nodes.deferred_execution import DeferredExecutor
@@ -57,9 +58,12 @@ class NodePublisher(Publisher):
         """Publishes a message.
 
         Raises `GraphError` if its type is not the topic's, or the type of a value not its field's,
-        also without subscribers: otherwise the error would come with the first recording.
+        also without subscribers: otherwise the error would come with the first recording. Bytes are
+        a message in CDR.
         """
         publisher = self._publisher
+        if isinstance(message, bytes):
+            message = decode_cdr(message, publisher.msgtype)
         publisher.check(message)
         if publisher.has_subscribers:
             message = self._copy(message)
@@ -67,6 +71,9 @@ class NodePublisher(Publisher):
             self._check(message)
         if self._executor is None or not self._executor.defer(lambda: publisher.publish(message)):
             publisher.publish(message)
+
+    def assert_liveliness(self) -> None:
+        """Does nothing: no publisher loses its liveliness."""
 
     def cancel(self) -> None:
         """Stops publishing."""

@@ -20,11 +20,11 @@ from typing import Any
 
 from volery.core.errors import GraphError
 from volery.graph.messages import message_type
+from volery.graph.nodes import late_imports
+from volery.graph.nodes.late_imports import PYTHON_PACKAGES
 from volery.graph.typestore import typestore
 
 _KINDS = ("msg", "srv", "action")
-_PYTHON_PACKAGES = ("rclpy", "tf2_ros", "tf2_py", "tf2_geometry_msgs", "tf_transformations")
-"""Packages without message types; the stand-ins have the most usual parts of them."""
 
 
 class _Finder(MetaPathFinder):
@@ -43,7 +43,8 @@ class _Finder(MetaPathFinder):
         filler = _filler(package, rest)
         if filler is None:
             return None
-        return ModuleSpec(fullname, _Loader(filler), is_package=not rest)
+        is_package = not rest or any(name.startswith(f"{fullname}.") for name in _parts(package))
+        return ModuleSpec(fullname, _Loader(filler), is_package=is_package)
 
 
 class _Path(list[str]):
@@ -79,8 +80,19 @@ def provide_ros_imports() -> None:
         sys.meta_path.insert(len(sys.meta_path) if has_ros2 else 0, _FINDER)
 
 
+def find_stand_in(
+    name: str, path: Sequence[str] | None, target: ModuleType | None
+) -> ModuleSpec | None:
+    """Returns the stand-in for a package that is not installed; provides all if there is one."""
+    found = _FINDER.find_spec(name, path, target)
+    if found is not None:
+        provide_ros_imports()
+    return found
+
+
 def withdraw_ros_imports() -> None:
     """Removes the stand-ins from the import path; imported stand-ins remain usable."""
+    late_imports.withdraw()
     if _FINDER in sys.meta_path:
         sys.meta_path.remove(_FINDER)
     for name, module in list(sys.modules.items()):
@@ -101,7 +113,7 @@ def forget_message_packages(names: Iterable[str]) -> None:
 
 def _filler(package: str, rest: str) -> Callable[[ModuleType], None] | None:
     """Returns the function that fills a module; None for other modules."""
-    if package in _PYTHON_PACKAGES:
+    if package in PYTHON_PACKAGES:
         name = f"{package}.{rest}" if rest else package
         return (lambda module: _fill(module, name)) if name in _modules() else None
     names = [name for name in typestore().names() if name.startswith(f"{package}/")]
@@ -115,9 +127,23 @@ def _filler(package: str, rest: str) -> Callable[[ModuleType], None] | None:
 
 @cache
 def _modules() -> dict[str, dict[str, Any]]:
-    from volery.graph.nodes import rclpy_modules, tf2  # import the node
+    from volery.graph.nodes import (  # import the node
+        message_filters,
+        point_cloud2,
+        qos_events,
+        rclpy_modules,
+        tf2,
+    )
 
-    return rclpy_modules.contents() | tf2.contents()
+    joined: dict[str, dict[str, Any]] = {}
+    for part in (rclpy_modules, qos_events, tf2, message_filters, point_cloud2):
+        joined |= part.contents()
+    return joined
+
+
+def _parts(package: str) -> Iterable[str]:
+    """Returns the modules of a package without message types."""
+    return _modules() if package in PYTHON_PACKAGES else ()
 
 
 def _fill(module: ModuleType, name: str) -> None:

@@ -28,6 +28,7 @@ from volery.core.errors import GraphError, NodeError, VoleryError
 from volery.graph.graph import check_period
 from volery.graph.message_copies import copy_message, receive_message
 from volery.graph.messages import Published, message_type
+from volery.graph.nodes.coroutines import advance, is_coroutine, result_of
 from volery.graph.nodes.deferred_execution import DeferredExecutor
 from volery.graph.nodes.failures import add_frames, place_of
 from volery.graph.nodes.handles import NodePublisher, NodeService, NodeSubscription
@@ -182,9 +183,12 @@ class Node(ParameterMethods):
         qos_profile: int | QoSProfile = DEFAULT_DEPTH,
         *,
         moves: Sequence[str] = (),
+        raw: bool = False,
         **_options: Any,
     ) -> NodeSubscription:
         """Calls `callback(message)` for each message of `topic`.
+
+        raw: passes the message's bytes in CDR.
 
         qos_profile: has an effect where messages arrive faster than the node processes them, which
         is possible only in a process of its own. A depth keeps that many of the newest; see
@@ -200,7 +204,8 @@ class Node(ParameterMethods):
             client = self._context.graph.acting_client
             if client:
                 self.__last_client = f"{client} on {name}"
-            self.__run(partial(callback, self.__received(published.message)), occasion)
+            received = published.cdr if raw else self.__received(published.message)
+            self.__run(partial(callback, received), occasion)
 
         subscription: Subscription = self._context.graph.subscribe(
             name, receive, msg_type, qos=profile_of(qos_profile)
@@ -370,6 +375,11 @@ class Node(ParameterMethods):
         timers, now_ns = self._context.timers, self._context.now_ns
         return lambda action: timers.at(now_ns(), lambda: self.__run(action, "first call"))
 
+    def call_soon(self, action: Callable[[], Any]) -> None:
+        """Calls `action` as a callback of its own, at the same simulated time."""
+        timers, now_ns = self._context.timers, self._context.now_ns
+        timers.at(now_ns(), lambda: self.__run(action, f"later call{_name_of(action)}"))
+
     def __release(self, handle: Any) -> bool:
         release = self.__handles.pop(handle, None)
         if release is not None:
@@ -400,7 +410,9 @@ class Node(ParameterMethods):
         command; a failure is then logged, and does not end the run.
         """
         try:
-            callback()
+            result = callback()
+            if is_coroutine(result):
+                advance(result, lambda rest: self.__run(rest, occasion))
         except Exception as error:
             if client:
                 cause = f"node {self.full_name}: {occasion}, caused by {client}"
@@ -416,6 +428,8 @@ class Node(ParameterMethods):
         """Returns the response; passes a `VoleryError` of the service on to the caller."""
         try:
             response = callback()
+            if is_coroutine(response):
+                response = result_of(response)
             if not isinstance(response, response_type):
                 raise TypeError(f"returned {response!r}, not the response")
         except VoleryError:

@@ -20,6 +20,10 @@ from volery.graph.parameters import (
 
 OnSet = Callable[[list[ParameterSetting]], Any]
 """Receives the values to set, returns a `SetParametersResult`."""
+PreSet = Callable[[list[ParameterSetting]], list[ParameterSetting]]
+"""Receives the values to set, returns those to set in their place."""
+PostSet = Callable[[list[ParameterSetting]], None]
+"""Receives the values that have been set."""
 
 
 class ParameterMethods:
@@ -47,6 +51,8 @@ class ParameterMethods:
         self.__overrides = dict(overrides)
         self.__parameters: dict[str, Parameter] = {}
         self.__on_set: list[OnSet] = []
+        self.__pre_set: list[PreSet] = []
+        self.__post_set: list[PostSet] = []
         self.__before_set = before_set
         self.__allow_undeclared = allow_undeclared
         self.__calls_callbacks = True
@@ -91,6 +97,8 @@ class ParameterMethods:
                 read_only=read_only,
                 before_set=self.__before_set,
                 agrees=self.__call_callbacks,
+                after_set=self.__call_after,
+                set_with=self.__set_with,
                 description="" if descriptor is None else descriptor.description,
             )
             self.__call_callbacks(parameter, start)
@@ -98,6 +106,7 @@ class ParameterMethods:
             raise type(error)(f"node {self.__name}: {error}") from None
         self.__declared.declare(self.__full_name, parameter)
         self.__parameters[name] = parameter
+        self.__call_after(parameter, parameter.value)
         return parameter
 
     def declare_parameters(
@@ -189,12 +198,32 @@ class ParameterMethods:
         self.__on_set.insert(0, callback)
         return callback
 
+    def add_pre_set_parameters_callback(self, callback: PreSet) -> PreSet:
+        """Adds a callback that may change the values to set, and add others."""
+        self.__pre_set.insert(0, callback)
+        return callback
+
+    def remove_pre_set_parameters_callback(self, callback: PreSet) -> None:
+        """Removes a callback."""
+        self.__pre_set.remove(callback)
+
+    def add_post_set_parameters_callback(self, callback: PostSet) -> PostSet:
+        """Adds a callback that receives values after they are set or declared."""
+        self.__post_set.insert(0, callback)
+        return callback
+
+    def remove_post_set_parameters_callback(self, callback: PostSet) -> None:
+        """Removes a callback."""
+        self.__post_set.remove(callback)
+
     def remove_on_set_parameters_callback(self, callback: OnSet) -> None:
         """Removes a callback."""
         self.__on_set.remove(callback)
 
     def __set(self, settings: Sequence[ParameterSetting]) -> Any:
         result = message_type("rcl_interfaces/msg/SetParametersResult")
+        for callback in tuple(self.__pre_set):
+            settings = callback(list(settings))
         try:
             for setting in settings:
                 known = setting.name in self.__parameters
@@ -215,11 +244,29 @@ class ParameterMethods:
             return result(successful=False, reason=str(error))
         finally:
             self.__calls_callbacks = True
+        self.__report(settings)
         return result(successful=True)
 
     def __call_callbacks(self, parameter: Parameter, value: Any) -> None:
         if self.__calls_callbacks:
             self.__consult([ParameterSetting(parameter.name, value=value)])
+
+    def __set_with(self, parameter: Parameter, value: Any) -> bool:
+        """Sets a value that comes from outside, with those that callbacks add."""
+        if not self.__pre_set or not self.__calls_callbacks:
+            return False
+        answer = self.__set([ParameterSetting(parameter.name, value=value)])
+        if not answer.successful:
+            raise GraphError(answer.reason)
+        return True
+
+    def __call_after(self, parameter: Parameter, value: Any) -> None:
+        if self.__calls_callbacks:
+            self.__report([ParameterSetting(parameter.name, value=value)])
+
+    def __report(self, settings: Sequence[ParameterSetting]) -> None:
+        for callback in tuple(self.__post_set):
+            callback(list(settings))
 
     def __consult(self, settings: Sequence[ParameterSetting]) -> None:
         for callback in tuple(self.__on_set):

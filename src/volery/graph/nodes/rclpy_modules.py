@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
+from enum import IntEnum, StrEnum
 from types import SimpleNamespace
 from typing import Any
 
 from volery.core.errors import GraphError
 from volery.graph import parameters, qos
+from volery.graph.codecs.cdr import decode_cdr, encode_cdr
 from volery.graph.messages import message_type
 from volery.graph.nodes import handles, logger, ros_time
 from volery.graph.nodes.node import Node as VoleryNode
 from volery.graph.nodes.service_client import Client, Future
 from volery.graph.nodes.timer import Timer
+from volery.graph.parameter_values import plain_of
 
 
 class Node(VoleryNode):
@@ -82,6 +84,28 @@ class LifecycleNode(_Refused):
     """Refuses construction."""
 
 
+class AsyncParameterClient(_Refused):
+    """Refuses construction."""
+
+
+class Context(_Refused):
+    """Refuses construction."""
+
+
+class GoalResponse(IntEnum):
+    """See `rclpy.action`; an action server is refused."""
+
+    REJECT = 1
+    ACCEPT = 2
+
+
+class CancelResponse(IntEnum):
+    """See `rclpy.action`."""
+
+    REJECT = 1
+    ACCEPT = 2
+
+
 class CallbackGroup:
     """A group has no effect: callbacks of a node run one after the other."""
 
@@ -132,6 +156,20 @@ def _shutdown(*_arguments: Any, **_options: Any) -> None:
 def _ok(*_arguments: Any, **_options: Any) -> bool:
     """Returns True: nodes are running."""
     return True
+
+
+def _remove_ros_args(args: list[str] | None = None) -> list[str]:
+    """Returns arguments without those from `--ros-args` to `--`."""
+    import sys
+
+    kept: list[str] = []
+    is_ros = False
+    for argument in sys.argv if args is None else args:
+        if argument in ("--ros-args", "--"):
+            is_ros = argument == "--ros-args"
+        elif not is_ros:
+            kept.append(argument)
+    return kept
 
 
 def _spin(*_arguments: Any, **_options: Any) -> None:
@@ -190,10 +228,39 @@ def contents() -> dict[str, dict[str, Any]]:
             "ParameterDescriptor": descriptor,
             "SetParametersResult": result,
         },
-        "rclpy.action": {"ActionClient": ActionClient, "ActionServer": ActionServer},
-        "rclpy.lifecycle": {"LifecycleNode": LifecycleNode, "Node": LifecycleNode},
-        "rclpy.utilities": {"ok": _ok, "shutdown": _shutdown, "try_shutdown": _shutdown},
-        "rclpy.parameter": {"Parameter": parameters.ParameterSetting},
+        "rclpy.action": {
+            "ActionClient": ActionClient,
+            "ActionServer": ActionServer,
+            "CancelResponse": CancelResponse,
+            "GoalResponse": GoalResponse,
+        },
+        "rclpy.action.client": {"ActionClient": ActionClient},
+        "rclpy.action.server": {"ActionServer": ActionServer, "ServerGoalHandle": object},
+        "rclpy.context": {"Context": Context},
+        "rclpy.impl": {},
+        "rclpy.impl.logging_severity": {"LoggingSeverity": logger.LoggingSeverity},
+        "rclpy.lifecycle": {
+            "LifecycleNode": LifecycleNode,
+            "Node": LifecycleNode,
+            "Publisher": handles.NodePublisher,
+            "State": object,
+            "TransitionCallbackReturn": object,
+        },
+        "rclpy.parameter_client": {"AsyncParameterClient": AsyncParameterClient},
+        "rclpy.serialization": {
+            "serialize_message": _serialize,
+            "deserialize_message": _deserialize,
+        },
+        "rclpy.utilities": {
+            "ok": _ok,
+            "remove_ros_args": _remove_ros_args,
+            "shutdown": _shutdown,
+            "try_shutdown": _shutdown,
+        },
+        "rclpy.parameter": {
+            "Parameter": parameters.ParameterSetting,
+            "parameter_value_to_python": plain_of,
+        },
         "rclpy.qos": {
             "QoSProfile": qos.QoSProfile,
             "QoSPresetProfiles": presets,
@@ -204,7 +271,7 @@ def contents() -> dict[str, dict[str, Any]]:
         "rclpy.duration": {"Duration": ros_time.Duration},
         "rclpy.clock": {
             "Clock": ros_time.Clock,
-            "ROSClock": ros_time.Clock,
+            "ROSClock": ros_time.ROSClock,
             "ClockType": ros_time.ClockType,
         },
         "rclpy.clock_type": {"ClockType": ros_time.ClockType},
@@ -239,6 +306,16 @@ def contents() -> dict[str, dict[str, Any]]:
             "ROSInterruptException": ROSInterruptException,
         },
     }
+
+
+def _serialize(message: Any) -> bytes:
+    """Returns a message in CDR."""
+    return encode_cdr(message, message.__msgtype__)
+
+
+def _deserialize(serialized_message: bytes, message_type: Any) -> Any:
+    """Returns the message in bytes in CDR."""
+    return decode_cdr(serialized_message, message_type.__msgtype__)
 
 
 def _free_logger(name: str) -> logger.NodeLogger:

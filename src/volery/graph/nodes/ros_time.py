@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from enum import IntEnum
 from functools import total_ordering
@@ -153,17 +154,25 @@ class Time:
 
 
 class Clock:
-    """A node's clock: simulated time in a simulation or where the graph has a `/clock`."""
+    """A node's clock: simulated time in a simulation or where the graph has a `/clock`.
+
+    Made without a node, as `Clock()`, it has the time of the computer, as in rclpy.
+    """
 
     def __init__(
-        self, now_ns: Callable[[], int], *, clock_type: ClockType = ClockType.ROS_TIME
+        self, now_ns: Callable[[], int] | None = None, *, clock_type: ClockType | None = None
     ) -> None:
+        if clock_type is None:
+            clock_type = ClockType.SYSTEM_TIME if now_ns is None else ClockType.ROS_TIME
+        if now_ns is None:
+            is_steady = clock_type == ClockType.STEADY_TIME
+            now_ns = time.monotonic_ns if is_steady else time.time_ns
         self._now_ns = now_ns
         self._clock_type = clock_type
 
     @property
     def clock_type(self) -> ClockType:
-        """ROS_TIME."""
+        """ROS_TIME for a node's clock."""
         return self._clock_type
 
     def now(self) -> Time:
@@ -173,3 +182,10 @@ class Clock:
     def now_ns(self) -> int:
         """Returns the current time, ns since the start of the run."""
         return self._now_ns()
+
+
+class ROSClock(Clock):
+    """`rclpy.clock.ROSClock`, which belongs to no node."""
+
+    def __init__(self) -> None:
+        super().__init__(clock_type=ClockType.ROS_TIME)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from typing import Any
 
 from volery.core.errors import GraphError
@@ -20,9 +20,9 @@ _MOST_LOOKS = 1000
 
 
 class Future:
-    """A pending response, with the interface of `rclpy.task.Future`."""
+    """A pending response, with the interface of `rclpy.task.Future`; callbacks can await it."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, executor: Any = None) -> None:  # noqa: ARG002  # as in rclpy
         self._response: Any = None
         self._error: BaseException | None = None
         self._done = False
@@ -52,6 +52,12 @@ class Future:
         if self._error is not None:
             raise self._error
         return self._response
+
+    def __await__(self) -> Generator[Future, None, Any]:
+        """Returns the response when it is there; see `coroutines`."""
+        if not self.done():
+            yield self
+        return self.result()
 
     def add_done_callback(self, callback: Callable[[Future], None]) -> None:
         """Calls `callback(future)` when the future is done, at once if it is."""

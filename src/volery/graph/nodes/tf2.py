@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections import deque
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,6 +29,7 @@ from volery.graph.messages import (
     header,
     stamp_of,
 )
+from volery.graph.nodes.service_client import Future
 from volery.graph.qos import DurabilityPolicy, QoSProfile
 
 CACHE_NS = 10_000_000_000
@@ -130,6 +132,10 @@ class Buffer:
 
     def __init__(self, *_arguments: Any, **_options: Any) -> None:
         self._frames: dict[str, _Frame] = {}
+        self.call_soon: Callable[[Callable[[], Any]], None] = _call
+        """Calls a function after the present callback; a listener sets it."""
+        self._waiting: list[tuple[Future, str, str, Any]] = []
+        """Futures, with the target and source frame and the time of which each is."""
 
     def set_transform(self, transform: Any, authority: str = "") -> None:  # noqa: ARG002
         """Stores a TransformStamped."""
@@ -181,6 +187,25 @@ class Buffer:
             return False
         return True
 
+    def wait_for_transform_async(self, target_frame: str, source_frame: str, time: Any) -> Future:
+        """Returns a future that is done, with true, when `lookup_transform` would succeed.
+
+        With a listener never before the callback that asks ends, which may hold a lock.
+        """
+        future = Future()
+        if self.can_transform(target_frame, source_frame, time):
+            self.call_soon(lambda: future.set_result(True))
+        else:
+            self._waiting.append((future, target_frame, source_frame, time))
+        return future
+
+    async def lookup_transform_async(
+        self, target_frame: str, source_frame: str, time: Any = None
+    ) -> Any:
+        """Returns what `lookup_transform` does, when the transform is there."""
+        await self.wait_for_transform_async(target_frame, source_frame, time)
+        return self.lookup_transform(target_frame, source_frame, time)
+
     def transform(self, stamped: Any, target_frame: str, timeout: Any = None) -> Any:
         """Returns a PointStamped or PoseStamped in another frame; raises `TransformException`."""
         found = self.lookup_transform(
@@ -197,6 +222,23 @@ class Buffer:
     def clear(self) -> None:
         """Forgets all transforms."""
         self._frames.clear()
+
+    def all_frames_as_yaml(self, time: float = 0.0) -> str:  # noqa: ARG002  # as in tf2
+        """Returns each frame with its parent and the times of its transforms, s, as YAML."""
+        lines = []
+        for name, frame in self._frames.items():
+            first, last = (frame.placements[k].time_ns / 1e9 for k in (0, -1))
+            rate = (len(frame.placements) - 1) / (last - first) if last > first else 10_000.0
+            lines.append(
+                f"{name}:\n"
+                f"  parent: '{frame.parent}'\n"
+                "  broadcaster: 'default_authority'\n"
+                f"  rate: {rate:.3f}\n"
+                f"  most_recent_transform: {last:.6f}\n"
+                f"  oldest_transform: {first:.6f}\n"
+                f"  buffer_length: {last - first:.3f}\n"
+            )
+        return "".join(lines) or "{}"
 
     def all_frames_as_string(self) -> str:
         """Returns each frame with its parent."""
@@ -215,6 +257,15 @@ class Buffer:
         if frame is None or (frame.parent, frame.is_static) != (parent, is_static):
             frame = self._frames[child] = _Frame(parent, is_static)
         frame.add(_Placement(stamp_of(transform), position, attitude / length))
+        if self._waiting:
+            self._tell_waiting()
+
+    def _tell_waiting(self) -> None:
+        """Completes the futures whose transform is there now."""
+        ready = [wait for wait in self._waiting if self.can_transform(*wait[1:])]
+        self._waiting = [wait for wait in self._waiting if wait not in ready]
+        for future, *_ in ready:
+            future.set_result(True)
 
     def _chain(self, name: str) -> list[str]:
         """Returns a frame and its ancestors."""
@@ -240,6 +291,7 @@ class TransformListener:
 
     def __init__(self, buffer: Buffer, node: Any, **_options: Any) -> None:
         self.buffer = buffer
+        buffer.call_soon = node.call_soon
         static = QoSProfile(depth=_DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._subscriptions = (
             node.create_subscription(TFMessage, "/tf", self._on_tf, _DEPTH),
@@ -264,6 +316,7 @@ class TransformBroadcaster:
     """`tf2_ros.TransformBroadcaster`: publishes on `/tf`."""
 
     def __init__(self, node: Any, qos: Any = _DEPTH, **_options: Any) -> None:
+        self.node = node
         self._publisher = node.create_publisher(TFMessage, "/tf", qos)
 
     def sendTransform(self, transform: Any) -> None:  # noqa: N802  # tf2's name
@@ -321,6 +374,10 @@ def quaternion_from_euler(roll: float, pitch: float, yaw: float, axes: str = "sx
 def _check_axes(axes: str) -> None:
     if axes != "sxyz":
         raise ValueError(f"Volery's tf_transformations has the axes 'sxyz', not '{axes}'")
+
+
+def _call(action: Callable[[], Any]) -> None:
+    action()
 
 
 def _placement(transform: Any) -> _Placement:

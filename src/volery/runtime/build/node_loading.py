@@ -194,6 +194,8 @@ def _source_of(module: ModuleType) -> str:
 
 def _hint(found: Any) -> str:
     bases = [base.__module__ for base in getattr(found, "__mro__", ())]
+    if "LifecycleNode" in [base.__name__ for base in getattr(found, "__mro__", ())]:
+        return ", but a lifecycle node, which Volery lacks: derive from rclpy.node.Node"
     if "rclpy.node" not in bases:
         return ""
     return (
