@@ -11,11 +11,14 @@ from __future__ import annotations
 
 import asyncio
 import threading
+import time
 from collections.abc import Callable
 from contextlib import suppress
 
-MAX_UNFINISHED_BYTES = 128 << 20
-"""Bytes of all clients together (modelling choice): twice the largest ROS-TCP frame."""
+from volery.core.allocator import return_free_memory
+
+MAX_UNFINISHED_BYTES = 96 << 20
+"""Bytes of all clients together (modelling choice): more than the largest ROS-TCP frame, 64 MiB."""
 MAX_UNFINISHED_S = 30.0
 """Time from the first to the last byte of a message, or to its last fragment."""
 NO_ROOM = "the server has no room for unfinished messages; send it again later"
@@ -24,7 +27,11 @@ TOO_SLOW = f"a message was not complete after {MAX_UNFINISHED_S:g} s"
 _IGNORED_BYTES = 4096
 """Fewer bytes of a client count as none, so that short commands cost nothing."""
 _READ_BYTES = 64 << 10
-"""Room for which one waiting client is read again."""
+"""Room for which one waiting client is read again, and what a client may have beyond its part."""
+_RETURNED_BYTES = 16 << 20
+_RETURN_PERIOD_S = 0.5
+"""Freed bytes and time after which free memory is returned to the system: blocks of many clients
+leave holes between each other."""
 
 
 class UnfinishedMessages:
@@ -37,6 +44,9 @@ class UnfinishedMessages:
         """Bytes of each client that has some, in the order in which they began."""
         self._total = 0
         self._waiting: dict[UnfinishedShare, None] = {}
+        self._freed = 0
+        """Bytes freed since memory was returned to the system."""
+        self._returned_s = 0.0
 
     @property
     def num_bytes(self) -> int:
@@ -69,10 +79,13 @@ class UnfinishedMessages:
                 else:
                     self._set(share, before)
             resumed = self._next_waiting()
+            returns = self._returns_memory()
         for other in evicted:
             other.evict()
         for other in resumed:
             other.resume()
+        if returns:
+            return_free_memory()
         return has_room
 
     def _set(self, share: UnfinishedShare, size: int) -> int:
@@ -84,7 +97,16 @@ class UnfinishedMessages:
             self._shares.pop(share, None)
             self._waiting.pop(share, None)
         self._total += size - before
+        self._freed += max(0, before - size)
         return before
+
+    def _returns_memory(self) -> bool:
+        """Returns whether enough was freed to return memory to the system now."""
+        now_s = time.monotonic()
+        if self._freed < _RETURNED_BYTES or now_s < self._returned_s + _RETURN_PERIOD_S:
+            return False
+        self._freed, self._returned_s = 0, now_s
+        return True
 
     def _evict_beyond(self, part: int) -> list[UnfinishedShare]:
         """Makes room: removes clients with more than an equal part, oldest messages first."""
@@ -92,7 +114,7 @@ class UnfinishedMessages:
         for share, size in tuple(self._shares.items()):
             if self._total <= self._max_bytes:
                 break
-            if size > part:
+            if size > part + _READ_BYTES:
                 self._set(share, 0)
                 found.append(share)
         return found

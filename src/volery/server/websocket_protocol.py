@@ -71,16 +71,19 @@ class PageWebSocket(WebSocketsSansIOProtocol):
         """Overrides uvicorn's method."""
         self._limits.message()
         super().handle_text(event)
+        event.data = b""  # the parser refers to the frame until the next one
 
     def handle_bytes(self, event: Frame) -> None:
         """Overrides uvicorn's method."""
         self._limits.message()
         super().handle_bytes(event)
+        event.data = b""
 
     def handle_cont(self, event: Frame) -> None:
         """Overrides uvicorn's method, for a bounded number of fragments."""
         if self._limits.fragment():
             super().handle_cont(event)
+            event.data = b""
         elif not self.close_sent:
             self._fail(CloseCode.MESSAGE_TOO_BIG, f"more than {MAX_FRAGMENTS} fragments")
 

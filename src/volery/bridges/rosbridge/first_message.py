@@ -8,6 +8,7 @@ and a client without a token fills no memory.
 from __future__ import annotations
 
 import asyncio
+from collections import deque
 from typing import Any, cast
 
 from websockets.asyncio.server import ServerConnection
@@ -35,6 +36,8 @@ class GuardedConnection(ServerConnection):
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
+        self._last_frames: deque[Frame] = deque()
+        """The last frame of each message that the application has not taken."""
         self._recv_unbounded = self.protocol.recv_frame
         self.protocol.recv_frame = self._recv_frame  # type: ignore[method-assign]
         if self.has_token:
@@ -68,6 +71,8 @@ class GuardedConnection(ServerConnection):
         """Receives the next message."""
         message = await super().recv(decode)
         self._limits.taken()
+        if self._last_frames:
+            self._last_frames.popleft().data = b""  # the parser refers to it until the next one
         return message
 
     def _end(self, reason: str) -> None:
@@ -94,6 +99,7 @@ class GuardedConnection(ServerConnection):
             self._limits.message()
         if frame.fin and frame.opcode in _MESSAGES:
             self._limits.whole(len(frame.data) + (self.protocol.current_size or 0))
+            self._last_frames.append(frame)
         self._recv_unbounded(frame)
 
     def _recv_first(self, frame: Frame) -> None:

@@ -124,6 +124,7 @@ async def _read(
             await checkpoint.receive(peer, frame)
             peer.reading.begin()  # the checkpoint gives others their turn
         spent_s += peer.reading.end(1, len(frame))
+        frame = ""  # frees it while the client sends nothing
         if spent_s >= TURN_S:  # `recv` does not wait if a frame is available
             spent_s = 0.0
             await asyncio.sleep(0)
