@@ -206,6 +206,22 @@ def test_many_clients_share_one_account(server, small_account):
     until(lambda: small_account.num_bytes == 0)
 
 
+def test_many_clients_are_read_in_turns(server, small_account):
+    """Each of them gets what it sends to the server, and others are answered meanwhile."""
+    with ExitStack() as strangers:
+        crowd = [strangers.enter_context(begin(server, MB // 4)) for _ in range(24)]
+        for stranger in crowd:
+            push(stranger, MB // 4 - 10)
+        until(lambda: small_account.num_bytes > 5 * MB)
+        assert small_account.is_crowded
+        assert serves(server)
+        for stranger in crowd:
+            stranger.settimeout(60.0)
+            stranger.sendall(bytes(10))
+        until(lambda: small_account.num_bytes == 0)
+        assert serves(server)
+
+
 def test_a_lone_client_sends_its_large_message(server, small_account):
     with begin(server, 7 * MB) as alone:
         push(alone, 7 * MB - 10)

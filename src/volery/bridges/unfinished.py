@@ -4,7 +4,8 @@ One account counts the bytes of all clients of all servers of this process: part
 messages and ROS-TCP frames, and fragments of rosbridge. A lone client may use as much as its
 protocol allows. When the account is full, each client with such bytes has an equal part of it: one
 that has more is not read from until there is room, and one that has less gets room by the end of
-the oldest message of a client that has more.
+the oldest message of a client that has more. Where many clients send large messages, they are read
+in turns, so that others hardly wait.
 """
 
 from __future__ import annotations
@@ -12,8 +13,10 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from weakref import WeakKeyDictionary
 
 from volery.core.allocator import return_free_memory
 
@@ -28,6 +31,10 @@ _IGNORED_BYTES = 4096
 """Fewer bytes of a client count as none, so that short commands cost nothing."""
 _READ_BYTES = 64 << 10
 """Room for which one waiting client is read again, and what a client may have beyond its part."""
+_FEW = 16
+"""Clients that are read without turns."""
+_READS_A_ROUND = 4
+"""Clients that are read in one round of a loop where there are more."""
 _RETURNED_BYTES = 16 << 20
 _RETURN_PERIOD_S = 0.5
 """Freed bytes and time after which free memory is returned to the system: blocks of many clients
@@ -52,6 +59,11 @@ class UnfinishedMessages:
     def num_bytes(self) -> int:
         """Bytes of all clients."""
         return self._total
+
+    @property
+    def is_crowded(self) -> bool:
+        """Whether so many clients have bytes here that they are read in turns."""
+        return len(self._shares) > _FEW
 
     def open(
         self, evict: Callable[[], None], resume: Callable[[], None] = lambda: None
@@ -162,6 +174,31 @@ class UnfinishedShare:
         self._size = 0
 
 
+class _ReadTurns:
+    """Queue of one loop's connections for a further read, a few in each round of the loop."""
+
+    def __init__(self) -> None:
+        self._waiting: deque[Callable[[], None]] = deque()
+        self._is_granting = False
+
+    def wait(self, loop: asyncio.AbstractEventLoop, resume: Callable[[], None]) -> None:
+        """Calls `resume` when it is the connection's turn."""
+        self._waiting.append(resume)
+        if not self._is_granting:
+            self._is_granting = True
+            loop.call_soon(self._grant, loop)
+
+    def _grant(self, loop: asyncio.AbstractEventLoop) -> None:
+        for _ in range(min(_READS_A_ROUND, len(self._waiting))):
+            self._waiting.popleft()()
+        self._is_granting = bool(self._waiting)
+        if self._is_granting:
+            loop.call_soon(self._grant, loop)
+
+
+_turns: WeakKeyDictionary[asyncio.AbstractEventLoop, _ReadTurns] = WeakKeyDictionary()
+
+
 class ArrivingMessages:
     """Counts what a connection has received of its messages. Belongs to its loop's thread.
 
@@ -179,8 +216,12 @@ class ArrivingMessages:
         self._loop = loop
         self._end = end
         self._pause = pause
+        self._resume = resume
+        self._account = account
+        self._turns = _turns.setdefault(loop, _ReadTurns())
+        self._has_room = self._has_turn = True
         self._share = account.open(
-            lambda: self._post(lambda: self._end_once(NO_ROOM)), lambda: self._post(resume)
+            lambda: self._post(lambda: self._end_once(NO_ROOM)), lambda: self._post(self._room)
         )
         self._began_s: float | None = None
         """Time at which the incomplete message began; None: there is none."""
@@ -196,7 +237,24 @@ class ArrivingMessages:
         elif self._began_s is None:
             self.restart()
         if not self._share.hold(incomplete + waiting, may_wait=True):
+            self._has_room = False
+        if incomplete > _READ_BYTES and self._has_turn and self._account.is_crowded:
+            self._has_turn = False
+            self._turns.wait(self._loop, self._turn)
+        if not (self._has_room and self._has_turn):
             self._pause()
+
+    def _room(self) -> None:
+        self._has_room = True
+        self._read_on()
+
+    def _turn(self) -> None:
+        self._has_turn = True
+        self._read_on()
+
+    def _read_on(self) -> None:
+        if self._has_room and self._has_turn and not self._has_ended:
+            self._resume()
 
     def restart(self) -> None:
         """Counts the time of an incomplete message from now on."""
