@@ -22,7 +22,7 @@ export const ENDINGS = [...Object.keys(BY_ENDING), "csv"].map((ending) => `.${en
 
 /** What to choose, for a first visit. */
 export const UPLOAD_HINT =
-  "A map (grid, GeoJSON, glTF, OBJ, STL, tree inventory), a scenario (TOML) or a log (MCAP, bag)";
+  "a map (grid, GeoJSON, glTF, OBJ, STL, tree inventory), a scenario (TOML) or a log (MCAP, bag)";
 
 /** What a file most likely is; a table with words in its first line lists trees. Null: unknown. */
 export function kindOf(name: string, beginning: string): FileKind | null {

@@ -5,6 +5,10 @@ import { read } from "./http.ts";
 
 export interface ScenarioCard {
   name: string;
+  /** Its name in words. */
+  title: string;
+  /** Under which heading it stands. */
+  section: string;
   description: string;
   uavs: number;
   airframes: string[];

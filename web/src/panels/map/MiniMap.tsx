@@ -11,6 +11,7 @@ import { drawPlan, type PlanColours } from "./drawPlan.ts";
 import { Pen } from "./drawTraffic.ts";
 import { extentOf } from "./extent.ts";
 import { MapButtons } from "./MapButtons.tsx";
+import { MapLegend } from "./MapLegend.tsx";
 import { MapCanvas } from "./MapCanvas.tsx";
 import { useTrails } from "./trails.ts";
 import { usePlannedPath } from "./usePlannedPath.ts";
@@ -79,6 +80,7 @@ export default function MiniMap() {
         stopFollowing={() => setFollows(false)}
         clickSends={clickSends}
       />
+      <MapLegend />
     </FloatingTile>
   );
 }
