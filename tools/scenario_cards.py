@@ -30,8 +30,8 @@ _TYPE = "photographer"
 _STUDIO_M = 150.0
 """Initial height of the photographer, above the highest ground."""
 _EXPOSURE_S = 0.3
-_BRIGHT, _MOST_GAIN = 215.0, 4.0
-"""Value of an image's bright parts, and the most by which dark ones are brightened."""
+_DARK, _BRIGHT, _MOST_GAIN = 110.0, 215.0, 4.0
+"""An image whose bright parts are below the first value is brightened to the second one."""
 
 
 @dataclass(frozen=True)
@@ -56,14 +56,14 @@ VIEWS = {
     "forest_rain": CardView(10.0, (-1.5, -0.6, 0.4), 70.0, hour_of_day=12.0),
     "forest_search": CardView(11.0, (-1.5, 1.2, 0.5), 70.0),
     "forest_survey": CardView(10.0, (-1.7, 0.7, 0.45), 70.0),
-    "grid_map": CardView(14.0, (-2.6, -1.6, 1.5), 75.0),
+    "grid_map": CardView(10.0, (-1.5, -0.9, 0.9), 75.0),
     "hover": CardView(5.0, (-1.1, -0.7, 0.35)),
     "longleaf": CardView(10.0, (-1.7, 0.7, 0.45), 70.0),
     "obstacle_field": CardView(10.0, (-1.8, -0.9, 0.6), 70.0),
     "plug_in": CardView(10.0, (-1.9, -1.5, 1.0), 70.0),
     "policy_homing": CardView(6.0, (-1.5, -1.0, 0.6)),
-    "servoing": CardView(2.3, (-1.3, -0.9, 1.1), 65.0),
-    "swarm_100": CardView(8.0, (-1.2, -1.2, 0.45), 70.0),
+    "servoing": CardView(2.3, (-1.5, -1.0, 1.4), 65.0),
+    "swarm_100": CardView(8.0, (-0.5, -0.35, 0.12), 75.0),
 }
 
 
@@ -115,10 +115,12 @@ def _jpeg(message: Any) -> bytes:
 
 
 def _exposed(pixels: np.ndarray) -> np.ndarray:
-    """Returns the image as bright as a photographer exposes it; a bright one stays as it is."""
+    """Returns the image as bright as a photographer exposes it; only dark ones change."""
     brightest = max(1.0, float(np.percentile(pixels, 97.0)))
+    if brightest > _DARK:
+        return pixels
     gain = min(_MOST_GAIN, _BRIGHT / brightest)
-    return pixels if gain <= 1.0 else np.minimum(pixels * gain, 255.0).astype(np.uint8)
+    return np.minimum(pixels * gain, 255.0).astype(np.uint8)
 
 
 def main(names: list[str]) -> None:
