@@ -118,10 +118,11 @@ export class Pen {
     context.strokeStyle = this.dark ? "#10131a" : "#ffffff";
     context.fillStyle = this.dark ? "#f8f9fa" : "#212529";
     const y = py < NAME_ROOM_PX ? py + NAME_ROOM_PX : py - 17; // inside the window also at its edge
-    const halfPx = context.measureText(name).width / 2 + 4;
+    const mostPx = this.size.width - 8;
+    const halfPx = Math.min(mostPx, context.measureText(name).width) / 2 + 4;
     const x = Math.max(halfPx, Math.min(px, this.size.width - halfPx));
-    context.strokeText(name, x, y);
-    context.fillText(name, x, y);
+    context.strokeText(name, x, y, mostPx);
+    context.fillText(name, x, y, mostPx);
   }
 
   /** How long a metre is. */
