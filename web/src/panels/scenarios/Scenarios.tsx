@@ -18,7 +18,7 @@ import { sectionsOf } from "../../lib/sections.ts";
 import { scenarios, type ScenarioCard } from "../../link/commands.ts";
 import { reasonOf } from "../../state/notices.ts";
 import { useSimulation } from "../../state/simulation.ts";
-import { closeWindow, offerFile, useWindows } from "../../state/windows.ts";
+import { closeWindow, offerFiles, useWindows } from "../../state/windows.ts";
 import { FilterInput } from "../shared/FilterInput.tsx";
 import { Card } from "./Card.tsx";
 import { Start } from "./Start.tsx";
@@ -93,7 +93,7 @@ function Gallery({ cards, choose }: { cards: ScenarioCard[]; choose: (name: stri
           value={filter}
           onChange={setFilter}
         />
-        <FileButton accept={ENDINGS} onChange={(file) => file !== null && offerFile(file)}>
+        <FileButton multiple accept={ENDINGS} onChange={offerFiles}>
           {(props) => (
             <Button variant="default" leftSection={<Upload size={16} />} {...props}>
               Upload a file
