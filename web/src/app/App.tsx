@@ -49,11 +49,11 @@ function Overlays() {
   const shown = useLayout((layout) => layout.shown);
   return (
     <div className="overlays">
+      <ReturnsLegend />
       <Suspense>
         {shown.map && <MiniMap />}
         {shown.pictures && <Cameras />}
       </Suspense>
-      <ReturnsLegend />
       <Picking />
       <ManualControl />
     </div>

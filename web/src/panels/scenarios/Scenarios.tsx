@@ -79,8 +79,8 @@ function Gallery({ cards, choose }: { cards: ScenarioCard[]; choose: (name: stri
     <Stack gap="sm">
       {unasked && (
         <Text size="sm">
-          Each card is a flight that you can set up, start and steer. Behind this window one UAV
-          hovers already: close the window to look around there.
+          Each card is a flight that you can set up, start and steer. One runs behind this window
+          already: close the window to look around there.
         </Text>
       )}
       <Group gap="sm" wrap="nowrap">
