@@ -30,6 +30,8 @@ _TYPE = "photographer"
 _STUDIO_M = 150.0
 """Initial height of the photographer, above the highest ground."""
 _EXPOSURE_S = 0.3
+_DARK, _BRIGHT, _MOST_GAIN = 110.0, 215.0, 4.0
+"""An image whose bright parts are below the first value is brightened to the second one."""
 
 
 @dataclass(frozen=True)
@@ -41,24 +43,27 @@ class CardView:
     eye_m: tuple[float, float, float] = (-5.0, -2.5, 1.8)
     """Offset from the first UAV, map axes, m."""
     fov_deg: float = 60.0
+    hour_of_day: float | None = None
+    """Hour of the picture; None: the scenario's."""
 
 
 VIEWS = {
-    "city_flight": CardView(12.0, (-6.0, -1.5, 2.0), 70.0),
-    "cooperative_search": CardView(12.0, (-4.0, -2.5, 2.0), 65.0),
-    "coverage": CardView(20.0, (-7.0, -7.0, 5.0), 70.0),
-    "forest_cameras": CardView(10.0, (-4.0, -1.0, 1.0), 70.0),
-    "forest_procedural": CardView(10.0, (-3.5, -1.0, 1.2), 70.0),
-    "forest_rain": CardView(10.0, (-3.0, -1.0, 0.6), 70.0),
-    "forest_search": CardView(11.0, (-2.5, 2.2, 0.9), 70.0),
-    "forest_survey": CardView(10.0, (-3.0, 1.2, 0.8), 70.0),
-    "grid_map": CardView(14.0, (-15.0, -11.0, 12.0), 65.0),
-    "hover": CardView(5.0, (-1.6, -1.0, 0.45)),
-    "longleaf": CardView(10.0, (-3.5, 1.2, 1.0), 70.0),
-    "obstacle_field": CardView(10.0, (-4.0, -2.0, 1.6), 70.0),
-    "plug_in": CardView(10.0, (-6.0, -5.0, 4.0), 70.0),
-    "servoing": CardView(2.3, (-1.7, -1.1, 1.5), 65.0),
-    "swarm_100": CardView(8.0, (-2.2, -2.2, 0.9), 70.0),
+    "city_flight": CardView(12.0, (-2.4, -0.9, 0.9), 70.0),
+    "cooperative_search": CardView(12.0, (-1.9, -1.1, 0.8), 65.0),
+    "coverage": CardView(20.0, (-2.2, -1.8, 1.3), 75.0),
+    "forest_cameras": CardView(10.0, (-1.7, -0.6, 0.45), 70.0),
+    "forest_procedural": CardView(10.0, (-1.7, -0.7, 0.5), 70.0),
+    "forest_rain": CardView(10.0, (-1.5, -0.6, 0.4), 70.0, hour_of_day=12.0),
+    "forest_search": CardView(11.0, (-1.5, 1.2, 0.5), 70.0),
+    "forest_survey": CardView(10.0, (-1.7, 0.7, 0.45), 70.0),
+    "grid_map": CardView(10.0, (-1.5, -0.9, 0.9), 75.0),
+    "hover": CardView(5.0, (-1.1, -0.7, 0.35)),
+    "longleaf": CardView(10.0, (-1.7, 0.7, 0.45), 70.0),
+    "obstacle_field": CardView(10.0, (-1.8, -0.9, 0.6), 70.0),
+    "plug_in": CardView(10.0, (-1.9, -1.5, 1.0), 70.0),
+    "policy_homing": CardView(6.0, (-1.5, -1.0, 0.6)),
+    "servoing": CardView(2.3, (-1.5, -1.0, 1.4), 65.0),
+    "swarm_100": CardView(8.0, (-0.5, -0.35, 0.12), 75.0),
 }
 
 
@@ -92,6 +97,8 @@ def _with_photographer(scenario: Scenario, view: CardView) -> Scenario:
     }
     data = scenario.model_dump(exclude_unset=True)
     data["types"][_TYPE] = {"airframe": "crazyflie", "plant": "kinematic", "sensors": [camera]}
+    if view.hour_of_day is not None:
+        data["world"]["light"]["hour_of_day"] = view.hour_of_day
     first = scenario.uavs[0].position_m
     waiting = {"type": _TYPE, "position_m": (first[0], first[1], _STUDIO_M)}
     data["uavs"] = [*data["uavs"], waiting]
@@ -103,8 +110,17 @@ def _jpeg(message: Any) -> bytes:
 
     pixels = np.asarray(message.data, dtype=np.uint8).reshape(message.height, message.width, 3)
     file = BytesIO()
-    Image.fromarray(pixels).save(file, "jpeg", quality=_QUALITY, optimize=True)
+    Image.fromarray(_exposed(pixels)).save(file, "jpeg", quality=_QUALITY, optimize=True)
     return file.getvalue()
+
+
+def _exposed(pixels: np.ndarray) -> np.ndarray:
+    """Returns the image as bright as a photographer exposes it; only dark ones change."""
+    brightest = max(1.0, float(np.percentile(pixels, 97.0)))
+    if brightest > _DARK:
+        return pixels
+    gain = min(_MOST_GAIN, _BRIGHT / brightest)
+    return np.minimum(pixels * gain, 255.0).astype(np.uint8)
 
 
 def main(names: list[str]) -> None:

@@ -22,9 +22,11 @@ import { followSimulation } from "./state/simulation.ts";
 import { hideToken } from "./state/token.ts";
 import { followTopics } from "./state/topics.ts";
 import { followFaults } from "./state/faults.ts";
+import { welcome } from "./state/welcome.ts";
 import { followVehicles } from "./state/vehicles.ts";
 
 hideToken(location, history);
+welcome(location.hash);
 followAddress();
 connectAsAddressed(location, useOperator.getState().wished);
 followDisconnection();

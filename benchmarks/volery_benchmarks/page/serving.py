@@ -28,7 +28,7 @@ class PageProcess:
     Parameters
     ----------
     scenario
-        A name, or the path of a TOML file.
+        A name, or the path of a TOML file; None: the server's own choice.
     options
         Command-line options.
     port
@@ -36,9 +36,10 @@ class PageProcess:
 
     """
 
-    def __init__(self, scenario: str, *options: str, port: int = 0) -> None:
+    def __init__(self, scenario: str | None, *options: str, port: int = 0) -> None:
         self.port = port
-        self._command = [sys.executable, "-P", "-m", "volery.cli", "serve", scenario, *options]
+        named = () if scenario is None else (scenario,)
+        self._command = [sys.executable, "-P", "-m", "volery.cli", "serve", *named, *options]
         self._process: subprocess.Popen[str] | None = None
         self._reader = threading.Thread()
         self._said: deque[str] = deque(maxlen=50)

@@ -211,6 +211,7 @@ def serve(
                 recordings=recordings_dir,
                 uploads=recordings_dir / "uploads",
                 tensorboard=tensorboard,
+                unasked=scenario is None,
             ),
         )
     )

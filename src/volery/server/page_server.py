@@ -52,6 +52,7 @@ class PageServer:
     def __init__(self, settings: PageSettings, shelf: ScenarioCatalog | None = None) -> None:
         self._settings = settings
         self._site = ServerState(settings.recordings, shelf or ScenarioCatalog(settings.uploads))
+        self._site.unasked = settings.unasked
         self._thread = LoopThread("volery-page")
         self._server: uvicorn.Server | None = None
         self._socket: Listener | None = None

@@ -17,6 +17,7 @@ from volery.scenario.load import load_scenario
 from volery.scenario.node_packages import missing_packages
 from volery.scenario.schema import Scenario
 from volery.server.cards import CARDS
+from volery.server.gallery import OWN, gallery
 from volery.server.replies import RefusedError
 from volery.server.server_state import ServerState
 
@@ -42,7 +43,7 @@ async def card_image(request: Request) -> Response:
 
 def cards_of(shelf: ScenarioCatalog) -> list[Card]:
     """Returns the cards of all scenarios that can be read."""
-    cards = [_shipped(name) for name in library.names()]
+    cards = [_shipped(name) for name in gallery()]
     cards += [_card(given, uploaded=False) for given in shelf.given()]
     for name in shelf.added():
         try:
@@ -54,7 +55,7 @@ def cards_of(shelf: ScenarioCatalog) -> list[Card]:
 
 @cache
 def _shipped(name: str) -> Card:
-    return _card(load_scenario(name), uploaded=False)
+    return _card(load_scenario(name), uploaded=False) | gallery()[name]._asdict()
 
 
 def _card(scenario: Scenario, *, uploaded: bool) -> Card:
@@ -62,6 +63,8 @@ def _card(scenario: Scenario, *, uploaded: bool) -> Card:
     has_picture = not uploaded and (CARDS / f"{scenario.name}.jpg").is_file()
     return {
         "name": scenario.name,
+        "title": scenario.name,
+        "section": OWN,
         "description": scenario.description.strip(),
         "uavs": scenario.uav_count,
         "airframes": sorted({kind.airframe for kind in flown}),

@@ -133,6 +133,8 @@ class ServerState:
     """Folder of logs; None: no recordings."""
     shelf: ScenarioCatalog = field(default_factory=ScenarioCatalog)
     """Scenarios that can be loaded; its folder is that of uploads."""
+    unasked: bool = False
+    """Whether nobody has named the present scenario."""
     tensorboard: TensorBoardProcess | None = None
     """TensorBoard inside the page; None: there is none."""
     situation: ServerSituation = field(default_factory=ServerSituation)
@@ -147,6 +149,7 @@ class ServerState:
     async def leave(self, situation: ServerSituation) -> None:
         """Disconnects all clients from the present world."""
         world, self.world, self.situation = self.world, None, situation
+        self.unasked = self.unasked and world is None  # a world ends when another one is asked for
         farewell = situation.message or "the world changes"
         await asyncio.gather(*(client.dismiss(farewell) for client in tuple(self.clients)))
         if world is not None:

@@ -26,5 +26,7 @@ class PageSettings:
     """Folder of recorded and uploaded logs; None: no recordings."""
     uploads: Path | None = None
     """Folder of uploaded scenarios; None: no uploads."""
+    unasked: bool = False
+    """Whether nobody named the first scenario: the page then opens with the choice."""
     tensorboard: Path | None = None
     """Folder of event files that TensorBoard shows; None: no TensorBoard."""

@@ -9,6 +9,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
 from volery.server.auth import Role
+from volery.server.gallery import title_of
 from volery.server.server_state import ServerActivity, ServerState
 
 
@@ -27,15 +28,17 @@ def _status(site: ServerState, role: Role | None) -> dict[str, Any]:
     }
     if role is None:
         nothing = {"state": None, "scenario": None, "description": "", "message": "", "world": None}
-        return nothing | {"tensorboard": False} | told
+        return nothing | {"title": "", "tensorboard": False, "unasked": False} | told
     now, world = site.situation, site.world
     geometry = None if world is None else world.geometry
     return {
         "state": ServerActivity.ENDED if world is not None and world.has_ended else now.state,
         "scenario": now.scenario,
+        "title": title_of(now.scenario or ""),
         "description": now.description,
         "message": now.message,
         "world": None if geometry is None else geometry.id,
         "tensorboard": site.tensorboard is not None,
+        "unasked": site.unasked,
         **told,
     }

@@ -32,11 +32,25 @@ def test_status_tells_what_flies(server, flight):
     told = ask(server, "/api/status").json
     assert told["state"] == "flying"
     assert told["scenario"] == "hover"
+    assert (told["title"], told["unasked"]) == ("First hover", False)
     assert told["description"].startswith("One F450")
     assert told["world"] == flight.simulation.geometry.id
     assert told["role"] == "operator"
     assert told["token_needed"] is False
     assert told["message"] == ""
+
+
+def test_a_first_scenario_that_nobody_named_is_unasked_until_another_one_flies(flight):
+    def unasked(server):
+        return ask(server, "/api/status").json["unasked"]
+
+    with serving(unasked=True) as server:
+        assert unasked(server)
+        server.building("hover")
+        with server.showing(flight.simulation):
+            assert unasked(server)
+        server.building("longleaf")
+        assert not unasked(server)
 
 
 def test_states_between_worlds():

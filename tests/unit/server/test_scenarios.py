@@ -7,13 +7,14 @@ from runpy import run_path
 
 import pytest
 from page_bench import ask, serving
-from PIL import Image
+from PIL import Image, ImageStat
 
 from volery.scenario import library
 from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.load import load_scenario, parse_scenario
 from volery.server import scenarios
 from volery.server.cards import CARDS
+from volery.server.gallery import gallery, title_of
 from volery.server.scenarios import cards_of
 
 RENDERER = run_path(str(Path(__file__).parents[3] / "tools" / "scenario_cards.py"))
@@ -27,7 +28,16 @@ def test_every_scenario_that_ships_has_a_picture(name):
         assert picture.size == (RENDERER["WIDTH"], RENDERER["HEIGHT"])
         low, high = picture.convert("L").getextrema()
         assert high - low > 40, "the picture shows nothing"
+        assert ImageStat.Stat(picture.convert("L")).mean[0] > 60, "the picture is black"
     assert path.stat().st_size < 80_000
+
+
+def test_the_gallery_has_each_scenario_that_ships_in_words():
+    assert sorted(gallery()) == library.names()
+    titles = [entry.title for entry in gallery().values()]
+    assert len(set(titles)) == len(titles)
+    assert not any("_" in title for title in titles)
+    assert (title_of("hover"), title_of("my_hall")) == ("First hover", "my_hall")
 
 
 def test_views_are_of_scenarios_that_ship():
@@ -36,7 +46,8 @@ def test_views_are_of_scenarios_that_ship():
 
 def test_cards_tell_what_the_scenarios_say():
     cards = {card["name"]: card for card in cards_of(ScenarioCatalog())}
-    assert list(cards) == library.names()
+    assert list(cards) == list(gallery())
+    assert (cards["hover"]["title"], cards["hover"]["section"]) == ("First hover", "Start here")
     city, survey, hover = cards["city_flight"], cards["forest_survey"], cards["hover"]
     assert (city["world"], city["uavs"], city["duration_s"]) == ("city", 3, 120.0)
     assert city["airframes"] == ["f450"]
@@ -85,7 +96,8 @@ def test_a_scenario_of_the_command_line_can_be_chosen_again(tmp_path, flat_data)
     shelf = ScenarioCatalog(tmp_path, given=mine)
     assert shelf.load("mine") is mine
     assert "mine" in shelf.names()
-    assert [card["name"] for card in cards_of(shelf)] == [*library.names(), "mine"]
+    assert [card["name"] for card in cards_of(shelf)] == [*gallery(), "mine"]
+    assert (cards_of(shelf)[-1]["title"], cards_of(shelf)[-1]["section"]) == ("mine", "Yours")
     # It hides none of the others.
     hidden = ScenarioCatalog(tmp_path, given=parse_scenario({**flat_data, "name": "hover"}))
     assert hidden.load("hover") == load_scenario("hover")

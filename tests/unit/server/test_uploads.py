@@ -70,6 +70,28 @@ def test_maps_of_movingai_and_pictures(checked, tmp_path):
     np.testing.assert_allclose(solid.mesh.bounds[:, :2], [[0.0, 0.0], [2.0, 2.0]])
 
 
+ROOM = b"""image: ../saved/elsewhere/room.pgm
+resolution: 0.5
+origin: [-1.0, -1.0, 0.0]
+negate: 0
+occupied_thresh: 0.65
+free_thresh: 0.25
+"""
+
+
+def room_pgm():
+    """3 x 2 cells, of which the first of the lower row is blocked."""
+    return b"P5\n3 2\n255\n" + bytes([254, 254, 254, 0, 254, 254])
+
+
+def test_a_map_of_map_server_keeps_its_place_and_cells(checked, tmp_path):
+    (tmp_path / "grid_map.pgm").write_bytes(room_pgm())
+    scenario = checked("grid_map", ".yaml", ROOM)
+    (solid,) = build_solids(scenario, build_terrain(scenario))
+    np.testing.assert_allclose(solid.mesh.bounds[:, :2], [[-1.0, -1.0], [-0.5, -0.5]])
+    assert scenario.uavs[0].position_m[0] < -1.0
+
+
 def test_outlines_become_a_city_around_its_middle(checked):
     scenario = checked("city", ".geojson", outlines())
     assert scenario.world.origin.latitude_deg == pytest.approx(60.17015)
@@ -225,6 +247,20 @@ def test_a_good_file_over_http_can_be_loaded(server):
     assert (card["name"], card["world"], card["uploaded"]) == ("my_hall", "grid_map", True)
 
 
+def test_a_map_of_map_server_over_http_comes_with_its_image(server):
+    query = f"kind=grid_map&name=room.yaml&image=room.pgm&head={len(ROOM)}"
+    answer = ask(server, f"/api/uploads?{query}", "POST", ROOM + room_pgm())
+    assert (answer.status, answer.json) == (201, {"scenario": "room"}), answer.body
+    before = ask(server, "/api/scenarios").json
+    broken = b"image: room.pgm\nresolution: 0.5\n"
+    query = f"kind=grid_map&name=b.yaml&image=b.pgm&head={len(broken)}"
+    answer = ask(server, f"/api/uploads?{query}", "POST", broken + room_pgm())
+    assert answer.status == 422
+    assert "b.yaml: origin must be [x, y, yaw]" in answer.error
+    assert "/" not in answer.error
+    assert ask(server, "/api/scenarios").json == before
+
+
 def test_a_scenario_over_http_can_be_loaded(server):
     answer = ask(server, "/api/uploads?kind=scenario&name=My%20Flight.toml", "POST", OWN.encode())
     assert (answer.status, answer.json) == (201, {"scenario": "my_flight"}), answer.body
@@ -252,6 +288,11 @@ def test_a_bad_file_over_http_leaves_nothing_behind(server):
         ("kind=mesh&name=a.exe", b"x", 415, "'.exe'"),
         ("kind=mesh", b"x", 415, "is read from"),
         ("kind=forest&name=a.csv", b"", 400, "empty"),
+        ("kind=grid_map&name=a.yaml", ROOM, 415, "together with its image"),
+        ("kind=grid_map&name=a.yml&image=a.toml&head=3", ROOM, 415, "together with its image"),
+        ("kind=grid_map&name=a.pgm", room_pgm(), 415, "together with its .yaml"),
+        ("kind=grid_map&name=a.yaml&image=a.pgm", ROOM, 400, "head is the size"),
+        ("kind=grid_map&name=a.yaml&image=a.pgm&head=9999", ROOM, 400, "head is the size"),
     ],
 )
 def test_refusals_over_http(server, query, body, status, why):

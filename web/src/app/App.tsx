@@ -10,6 +10,7 @@ import { Picking } from "./Picking.tsx";
 import { Rail } from "./Rail.tsx";
 import { SceneBoundary } from "./SceneBoundary.tsx";
 import { Situation } from "./Situation.tsx";
+import { ReturnsLegend } from "./ReturnsLegend.tsx";
 import { TopBar } from "./top/TopBar.tsx";
 import { useHotkeys } from "./useHotkeys.ts";
 
@@ -48,6 +49,7 @@ function Overlays() {
   const shown = useLayout((layout) => layout.shown);
   return (
     <div className="overlays">
+      <ReturnsLegend />
       <Suspense>
         {shown.map && <MiniMap />}
         {shown.pictures && <Cameras />}

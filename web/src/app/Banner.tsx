@@ -1,7 +1,7 @@
 import { Alert } from "@mantine/core";
 import { CloudOff, Hourglass } from "lucide-react";
 import { useEffect, useState } from "react";
-import { nowMs } from "../lib/time.ts";
+import { nowMs, timeOfDay } from "../lib/time.ts";
 import { useProblem } from "../state/problem.ts";
 
 const COUNT_MS = 500;
@@ -32,5 +32,5 @@ function Since({ sinceMs }: { sinceMs: number }) {
     return () => clearInterval(timer);
   }, []);
   const seconds = Math.max(0, Math.floor((now - sinceMs) / 1000));
-  return `Since ${new Date(sinceMs).toLocaleTimeString()}, ${seconds} s ago.`;
+  return `Since ${timeOfDay(sinceMs)}, ${seconds} s ago.`;
 }

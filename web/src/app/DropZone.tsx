@@ -3,7 +3,7 @@ import { Upload } from "lucide-react";
 import { useEffect, useState } from "react";
 import { UPLOAD_HINT } from "../lib/fileKinds.ts";
 import { useConnection } from "../state/connection.ts";
-import { offerFile } from "../state/windows.ts";
+import { offerFiles } from "../state/windows.ts";
 
 /** A file that is dropped anywhere on the page is offered for an upload. */
 export function DropZone() {
@@ -24,8 +24,7 @@ export function DropZone() {
       if (!hasFile(event)) return;
       event.preventDefault();
       setOver(false);
-      const file = event.dataTransfer?.files[0];
-      if (file !== undefined) offerFile(file);
+      offerFiles([...(event.dataTransfer?.files ?? [])]);
     };
     window.addEventListener("dragover", drag);
     window.addEventListener("dragleave", leave);

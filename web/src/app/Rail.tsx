@@ -14,7 +14,13 @@ export function Rail() {
   return (
     <Stack component="nav" className="rail" gap={4} p={6} aria-label="Panels">
       {panels.map(({ id, title, icon: Icon, dock }) => (
-        <Tooltip key={id} label={title} position="right">
+        // An open panel names itself; over its first row the tooltip would only be in the way.
+        <Tooltip
+          key={id}
+          label={title}
+          position="right"
+          disabled={slotOf(dock, id, layout) !== null}
+        >
           <ActionIcon
             size="lg"
             variant={slotOf(dock, id, layout) !== null ? "filled" : "subtle"}

@@ -47,7 +47,7 @@ function Building() {
     <Paper className="situation" shadow="lg" withBorder p="lg" role="status">
       <Group>
         <Loader size="sm" />
-        <Title order={4}>Building {server?.scenario}</Title>
+        <Title order={4}>Building {server?.title || server?.scenario}</Title>
       </Group>
       <Text size="sm" c="dimmed" mt={6}>
         {server?.message || server?.description}
@@ -63,7 +63,7 @@ function Failed() {
     <Paper className="situation" shadow="lg" withBorder p="lg" role="alert">
       <Group>
         <TriangleAlert size={20} color="var(--mantine-color-red-6)" />
-        <Title order={4}>Cannot start {server?.scenario || "the scenario"}</Title>
+        <Title order={4}>Cannot start {server?.title || server?.scenario || "the scenario"}</Title>
       </Group>
       <Text size="sm" my="sm" className="reason">
         {server?.message}

@@ -1,4 +1,4 @@
-import { createTheme } from "@mantine/core";
+import { createTheme, Tooltip } from "@mantine/core";
 
 export const theme = createTheme({
   primaryColor: "cyan",
@@ -6,4 +6,8 @@ export const theme = createTheme({
   fontFamilyMonospace: "ui-monospace, 'JetBrains Mono', Menlo, Consolas, monospace",
   defaultRadius: "md",
   cursorType: "pointer",
+  components: {
+    // A pointer that passes over a button shows nothing over what lies behind it.
+    Tooltip: Tooltip.extend({ defaultProps: { openDelay: 500 } }),
+  },
 });

@@ -7,6 +7,9 @@ it("files are told apart by their endings, tables by their first line", () => {
   expect(kindOf("maze.map", "type octile")).toBe("grid_map");
   expect(kindOf("plot.csv", "\n0,1,0\n1,0,0")).toBe("grid_map");
   expect(kindOf("plot.csv", "x_m,y_m,dbh_cm,species\n1,2,30,oak")).toBe("forest");
+  expect(kindOf("room.yaml", "image: room.pgm")).toBe("grid_map");
+  expect(kindOf("room.pgm", "P5")).toBe("grid_map");
+  expect(kindOf("notes.constructor", "")).toBeNull();
   expect(kindOf("flight.toml", "name = 'flight'")).toBe("scenario");
   expect(kindOf("flight.MCAP", "")).toBe("log");
   expect(kindOf("flight.bag", "")).toBe("log");

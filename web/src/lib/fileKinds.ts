@@ -1,10 +1,14 @@
 import type { UploadKind } from "../link/commands/scenarios.ts";
+import { ownEntry } from "./ownEntry.ts";
 
 /** What can be uploaded: what scenarios are made of, and logs. */
 export type FileKind = UploadKind | "log";
 
 const BY_ENDING: Readonly<Record<string, FileKind>> = {
   png: "grid_map",
+  yaml: "grid_map",
+  yml: "grid_map",
+  pgm: "grid_map",
   map: "grid_map",
   txt: "grid_map",
   geojson: "city",
@@ -22,12 +26,12 @@ export const ENDINGS = [...Object.keys(BY_ENDING), "csv"].map((ending) => `.${en
 
 /** What to choose, for a first visit. */
 export const UPLOAD_HINT =
-  "A map (grid, GeoJSON, glTF, OBJ, STL, tree inventory), a scenario (TOML) or a log (MCAP, bag)";
+  "a map (grid, .yaml with its image, GeoJSON, glTF, OBJ, STL, tree inventory), a scenario (TOML) or a log (MCAP, bag)";
 
 /** What a file most likely is; a table with words in its first line lists trees. Null: unknown. */
 export function kindOf(name: string, beginning: string): FileKind | null {
   const ending = name.split(".").at(-1)?.toLowerCase() ?? "";
-  if (ending !== "csv") return BY_ENDING[ending] ?? null;
+  if (ending !== "csv") return ownEntry(BY_ENDING, ending) ?? null;
   const first = beginning.split(/\r?\n/).find((line) => line.trim() !== "") ?? "";
   return /[a-z]/i.test(first) ? "forest" : "grid_map";
 }

@@ -1,6 +1,7 @@
 // Raw pictures (sensor_msgs/Image) as pixels of a canvas.
 
 import { labelColour, TURBO_TABLE } from "./colourMaps.ts";
+import { ownEntry } from "./ownEntry.ts";
 
 export interface RawImage {
   width: number;
@@ -41,7 +42,7 @@ export function pixelsOf(image: RawImage, topic = ""): Pixels {
     throw new Error(`the data of the ${width} x ${height} ${encoding} image is too short`);
   }
   if (/label/.test(topic)) return labelled(image);
-  const channels = BYTES[encoding];
+  const channels = ownEntry(BYTES, encoding);
   if (channels !== undefined) return coloured(image, channels);
   if (encoding === "32FC1" || encoding === "16UC1") return ofDepth(image);
   if (encoding === "mono16") return grey(image);
@@ -127,7 +128,7 @@ function numbersOf(image: RawImage): Float32Array {
     mono8: [1, (at) => view.getUint8(at)],
     "8UC1": [1, (at) => view.getUint8(at)],
   };
-  const reader = read[encoding];
+  const reader = ownEntry(read, encoding);
   if (reader === undefined) throw new Error(`unsupported encoding: ${encoding}`);
   const [bytes, at] = reader;
   const numbers = new Float32Array(width * height);

@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { clockText, hourText, secondsOf, spanText } from "./time.ts";
+import { clockText, hourText, secondsOf, spanText, timeOfDay } from "./time.ts";
 
 it("clocks have minutes, seconds and tenths", () => {
   expect(clockText(83.46)).toBe("1:23.4");
@@ -24,4 +24,9 @@ it("hours of the day are as on a clock", () => {
 it("times of both generations are read", () => {
   expect(secondsOf({ sec: 3, nanosec: 500_000_000 })).toBe(3.5);
   expect(secondsOf({ secs: 3, nsecs: 250_000_000 })).toBe(3.25);
+});
+
+it("wall time is told on a clock of 24 hours", () => {
+  expect(timeOfDay(new Date(2024, 4, 1, 16, 5, 9).getTime())).toBe("16:05:09");
+  expect(timeOfDay(new Date(2024, 4, 1, 0, 30, 0).getTime())).toBe("00:30:00");
 });

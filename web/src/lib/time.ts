@@ -36,3 +36,11 @@ export function hourText(hour: number): string {
   const minutes = Math.round(hour * 60) % 1440;
   return `${Math.floor(minutes / 60)}:${String(minutes % 60).padStart(2, "0")}`;
 }
+
+/** Wall time as a clock of 24 hours shows it, whatever the browser's language: `16:05:09`. */
+export function timeOfDay(ms: number): string {
+  const time = new Date(ms);
+  return [time.getHours(), time.getMinutes(), time.getSeconds()]
+    .map((part) => String(part).padStart(2, "0"))
+    .join(":");
+}

@@ -16,6 +16,8 @@ interface Subscription {
   key: string;
   listeners: Set<Listener>;
   last: Received<never> | null;
+  /** Whether a listener could not read a message; told once. */
+  unreadable: boolean;
 }
 
 export interface SubscribeOptions {
@@ -89,7 +91,13 @@ export class Link {
     const key = `${topic} ${type} ${throttleMs} ${depth}`;
     let subscription = this.byKey.get(key);
     if (subscription === undefined) {
-      subscription = { id: this.nextId++, key, listeners: new Set(), last: null };
+      subscription = {
+        id: this.nextId++,
+        key,
+        listeners: new Set(),
+        last: null,
+        unreadable: false,
+      };
       this.byKey.set(key, subscription);
       this.byId.set(subscription.id, subscription);
       this.tell({ kind: "subscribe", id: subscription.id, topic, type, throttleMs, depth });
@@ -166,7 +174,7 @@ export class Link {
         if (subscription === undefined) return;
         const received = told as unknown as Received<never>;
         subscription.last = received;
-        for (const listener of subscription.listeners) listener(received);
+        for (const listener of subscription.listeners) hand(received, listener, subscription);
         break;
       }
       case "poses":
@@ -214,6 +222,16 @@ export type DeepPartial<T> = T extends (infer U)[]
     : T extends object
       ? { [K in keyof T]?: DeepPartial<T[K]> }
       : T;
+
+/** A message that one listener cannot read, as when its sender left the type, still reaches the others. */
+function hand(received: Received<never>, listener: Listener, subscription: Subscription): void {
+  try {
+    listener(received);
+  } catch (error) {
+    if (!subscription.unreadable) console.warn(`unreadable: ${subscription.key}`, error);
+    subscription.unreadable = true;
+  }
+}
 
 /** The page's one link. */
 export const link = new Link();

@@ -7,6 +7,8 @@ import type { volery_interfaces_SimulationStatus } from "../messages/generated.t
 export interface ServerStatus {
   state: "flying" | "ended" | "building" | "no_world" | "failed";
   scenario: string;
+  /** Its name in words. */
+  title?: string;
   description: string;
   message: string;
   /** Changes with the geometry; null: there is none. */
@@ -16,6 +18,8 @@ export interface ServerStatus {
   token_needed: boolean;
   /** Whether `./tensorboard/` shows trainings; other servers do not say. */
   tensorboard?: boolean;
+  /** Whether nobody has named the scenario that flies. */
+  unasked?: boolean;
 }
 
 interface SimulationState {

@@ -1,4 +1,5 @@
 import { create } from "zustand";
+import { offeredOf } from "../lib/mapPair.ts";
 
 /** Large windows over the page; one at a time. */
 export type WindowName = "help" | "scenarios" | "upload";
@@ -9,22 +10,31 @@ interface Windows {
   scenario: string;
   /** File that was dropped on the page. */
   file: File | null;
+  /** Image of a .yaml map that was dropped with it. */
+  image: File | null;
 }
 
-export const useWindows = create<Windows>(() => ({ open: null, scenario: "", file: null }));
+export const useWindows = create<Windows>(() => ({
+  open: null,
+  scenario: "",
+  file: null,
+  image: null,
+}));
 
 export function openWindow(open: WindowName): void {
   useWindows.setState({ open });
 }
 
 export function closeWindow(): void {
-  useWindows.setState({ open: null, file: null, scenario: "" });
+  useWindows.setState({ open: null, file: null, image: null, scenario: "" });
 }
 
-export function offerFile(file: File): void {
-  useWindows.setState({ open: "upload", file });
+/** Offer what was chosen or dropped for an upload: one file, or the two of a map. */
+export function offerFiles(files: readonly File[]): void {
+  const offered = offeredOf(files);
+  if (offered !== null) useWindows.setState({ open: "upload", ...offered });
 }
 
 export function offerScenario(scenario: string): void {
-  useWindows.setState({ open: "scenarios", file: null, scenario });
+  useWindows.setState({ open: "scenarios", file: null, image: null, scenario });
 }

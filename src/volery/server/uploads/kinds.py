@@ -22,8 +22,14 @@ class Kind(NamedTuple):
 
 SCENARIO = "scenario"
 """Kind of a whole scenario; the others are worlds to which the server adds UAVs."""
+MAP_SERVER = ".yaml"
+"""Suffix of a map of map_server, which comes together with its image."""
+IMAGES = (".pgm", ".png")
+"""Suffixes of such an image."""
 KINDS = {
-    "grid_map": Kind((".csv", ".txt", ".png", ".map"), 8_000_000, "a matrix of 0 and 1"),
+    "grid_map": Kind(
+        (".csv", ".txt", ".png", ".map", MAP_SERVER), 8_000_000, "a matrix of 0 and 1"
+    ),
     "city": Kind((".geojson", ".json"), 32_000_000, "outlines of buildings as GeoJSON"),
     "mesh": Kind((".glb", ".obj", ".stl"), 64_000_000, "a mesh in metres"),
     "forest": Kind((".csv",), 8_000_000, "trees: x_m, y_m[, dbh_cm, height_m, species]"),
@@ -51,8 +57,26 @@ def kind_of_upload(name: str) -> Kind:
 
 def suffix_of(file_name: str, kind: Kind) -> str:
     """Returns the suffix of a client's file name. Raises RefusedError if it is not supported."""
-    suffix = PurePosixPath(file_name.replace("\\", "/")).suffix.lower()
+    suffix = _suffix(file_name)
+    if suffix == ".pgm" and MAP_SERVER in kind.suffixes:
+        raise RefusedError(415, "a .pgm comes together with its .yaml: choose both files")
     if suffix not in kind.suffixes:
         allowed = ", ".join(kind.suffixes)
         raise RefusedError(415, f"{kind.what} is read from {allowed}, not from '{suffix[:20]}'")
     return suffix
+
+
+def image_suffix_of(file_name: str) -> str:
+    """Returns the suffix of the image of a .yaml map. Raises RefusedError without an image."""
+    suffix = _suffix(file_name)
+    if suffix not in IMAGES:
+        allowed = " or ".join(IMAGES)
+        raise RefusedError(
+            415, f"a .yaml comes together with its image, {allowed}: choose both files"
+        )
+    return suffix
+
+
+def _suffix(file_name: str) -> str:
+    suffix = PurePosixPath(file_name.replace("\\", "/")).suffix.lower()
+    return MAP_SERVER if suffix == ".yml" else suffix

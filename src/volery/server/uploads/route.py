@@ -1,4 +1,8 @@
-"""Route `POST ./api/uploads?kind=...&name=...`: turns a file into a scenario."""
+"""Route `POST ./api/uploads?kind=...&name=...`: turns a file into a scenario.
+
+A map of map_server is a .yaml and its image: the body is the one after the other, `image` the name
+of the second one and `head` the size of the first one, bytes.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +21,14 @@ from volery.server.bounded_process import BoundedError, run_bounded
 from volery.server.replies import RefusedError
 from volery.server.request_bodies import check_operator, save_body
 from volery.server.server_state import ServerState
-from volery.server.uploads.kinds import BOUNDS, MOST_UPLOADS, kind_of_upload, suffix_of
+from volery.server.uploads.kinds import (
+    BOUNDS,
+    MAP_SERVER,
+    MOST_UPLOADS,
+    image_suffix_of,
+    kind_of_upload,
+    suffix_of,
+)
 
 _MOST_CHARACTERS = 30
 """Max length of a scenario's name, before its number."""
@@ -33,6 +44,7 @@ async def upload(request: Request) -> Response:
     kind = kind_of_upload(kind_name)
     called = request.query_params.get("name", "")[:200]
     suffix = suffix_of(called, kind)
+    image = image_suffix_of(request.query_params.get("image", "")) if suffix == MAP_SERVER else ""
     folder = site.shelf.folder
     if folder is None:
         raise RefusedError(409, "this server accepts no uploads; start it with `volery serve`")
@@ -40,6 +52,8 @@ async def upload(request: Request) -> Response:
     with tempfile.TemporaryDirectory(prefix=".upload_", dir=folder) as made:
         path = Path(made) / f"{kind_name}{suffix}"
         await save_body(request, path, kind.most_bytes)
+        if image:
+            _split(path, request.query_params.get("head", ""), path.with_suffix(image))
         lock: asyncio.Lock = request.app.state.upload_lock
         async with lock:  # one at a time
             if len(site.shelf.added()) >= MOST_UPLOADS:
@@ -48,6 +62,19 @@ async def upload(request: Request) -> Response:
             await asyncio.to_thread(_check, kind_name, path, name, called)
             await asyncio.to_thread(shutil.copytree, made, folder / name)
     return JSONResponse({"scenario": name}, 201)
+
+
+def _split(path: Path, head: str, image: Path) -> None:
+    """Moves what follows the first `head` bytes of a file to the file of an image.
+
+    Raises RefusedError if one of both is empty.
+    """
+    data = path.read_bytes()
+    size = int(head) if head.isdecimal() and len(head) < 9 else 0
+    if not 0 < size < len(data):
+        raise RefusedError(400, "head is the size of the .yaml, before the bytes of its image")
+    path.write_bytes(data[:size])
+    image.write_bytes(data[size:])
 
 
 def name_for(called: str, shelf: ScenarioCatalog) -> str:

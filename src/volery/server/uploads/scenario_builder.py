@@ -16,8 +16,16 @@ import numpy as np
 from volery.core.errors import DataFileError
 from volery.core.geodesy import LocalFrame
 from volery.core.plurals import counted
-from volery.server.uploads.kinds import FARTHEST_M, MOST_CELLS, MOST_TREES, MOST_TRIANGLES
+from volery.server.uploads.kinds import (
+    FARTHEST_M,
+    IMAGES,
+    MAP_SERVER,
+    MOST_CELLS,
+    MOST_TREES,
+    MOST_TRIANGLES,
+)
 from volery.world.city.geojson import read_features
+from volery.world.grid_maps.map_server import read_map_server, write_with_image
 from volery.world.grid_maps.parsing import read_cells
 from volery.world.inventory import read_inventory
 from volery.world.mesh_files import read_mesh
@@ -72,9 +80,10 @@ def toml_of(kind: str, path: Path, name: str, called: str) -> str:
 
 
 def _grid_map(path: Path) -> _Part:
+    if path.suffix == MAP_SERVER:
+        return _map_server(path)
     rows, columns = read_cells(path).shape
-    if rows * columns > MOST_CELLS:
-        raise DataFileError(f"{path}: {columns} x {rows} cells; at most {MOST_CELLS} are allowed")
+    _check_cells(path, rows, columns)
     width, height = columns * _CELL_M, rows * _CELL_M
     corner = (-width / 2.0, -height / 2.0)
     world = (
@@ -84,6 +93,26 @@ def _grid_map(path: Path) -> _Part:
         f"origin_m = {_numbers(corner)}\n"
     )
     return _Part(world, max(width, height) / 2.0, *_beside(corner[0]))
+
+
+def _map_server(path: Path) -> _Part:
+    """The image lies beside the file, under the same name with its own suffix."""
+    image = next(path.with_suffix(s) for s in IMAGES if path.with_suffix(s).is_file())
+    write_with_image(path, image.name)
+    file = read_map_server(path)
+    rows, columns = file.blocked.shape
+    _check_cells(path, rows, columns)
+    across, up = columns * file.cell_m, rows * file.cell_m
+    cos, sin = math.cos(file.yaw_rad), math.sin(file.yaw_rad)
+    corners = np.array([(0.0, 0.0), (across, 0.0), (0.0, up), (across, up)])
+    corners = corners @ np.array([[cos, sin], [-sin, cos]]) + file.origin_m
+    world = (
+        "[world.grid_map]\n"
+        f'maps = [{{ file = {json.dumps(path.name)}, name = "uploaded" }}]\n'
+        f"block_height_m = {_BLOCK_M}\n"
+    )
+    (west, south), (_, north) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+    return _Part(world, float(np.abs(corners).max()), *_beside(west, (south + north) / 2.0))
 
 
 def _city(path: Path) -> _Part:
@@ -139,6 +168,11 @@ def _forest(path: Path) -> _Part:
     y = float(low[1] + high[1]) / 2.0
     extent = float(np.abs([low, high]).max()) + _BESIDE_M
     return _Part(world, extent, *_beside(float(low[0]), y))
+
+
+def _check_cells(path: Path, rows: int, columns: int) -> None:
+    if rows * columns > MOST_CELLS:
+        raise DataFileError(f"{path}: {columns} x {rows} cells; at most {MOST_CELLS} are allowed")
 
 
 def _beside(x: float, y: float = 0.0) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -6,6 +6,7 @@ Keys and modes are those of nav2_map_server (and ROS 1): a pixel's darkness is c
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple
@@ -71,6 +72,12 @@ def read_map_server(path: Path) -> MapServerFile:
         (x, y),
         yaw,
     )
+
+
+def write_with_image(path: Path, image: str) -> None:
+    """Rewrites a `.yaml` file so that it names another image; raises `DataFileError` with file."""
+    settings = _settings(path) | {"image": image}
+    path.write_text(json.dumps(settings, indent=1, default=str), encoding="utf-8")  # is YAML
 
 
 def _settings(path: Path) -> dict[str, Any]:

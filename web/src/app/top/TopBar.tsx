@@ -48,22 +48,21 @@ export function TopBar() {
 function ScenarioButton() {
   const named = useSimulation(({ server, status }) => server?.scenario || status?.scenario || "");
   const volery = useConnection((connection) => connection.volery);
+  const title = useSimulation(({ server }) => server?.title) || named;
   if (!volery) return <Text truncate>{named || "Robot"}</Text>;
   return (
-    <Tooltip label="Choose another scenario">
-      <Button
-        variant="subtle"
-        size="compact-md"
-        className="top-scenario"
-        rightSection={<ChevronDown size={16} />}
-        onClick={() => openWindow("scenarios")}
-        aria-label={`Scenario ${named}: choose another scenario`}
-      >
-        <Text truncate inherit>
-          {named || "Choose a scenario"}
-        </Text>
-      </Button>
-    </Tooltip>
+    <Button
+      variant="subtle"
+      size="compact-md"
+      className="top-scenario"
+      rightSection={<ChevronDown size={16} />}
+      onClick={() => openWindow("scenarios")}
+      aria-label={`${title}. Scenario ${named}: choose another scenario`}
+    >
+      <Text truncate inherit>
+        {title || "Choose a scenario"}
+      </Text>
+    </Button>
   );
 }
 

@@ -5,6 +5,10 @@ import { read } from "./http.ts";
 
 export interface ScenarioCard {
   name: string;
+  /** Its name in words. */
+  title: string;
+  /** Under which heading it stands. */
+  section: string;
   description: string;
   uavs: number;
   airframes: string[];
@@ -71,10 +75,15 @@ export async function rebuildScenario(scenario: string, more: ScenarioChanges): 
 export const UPLOAD_KINDS = ["grid_map", "city", "mesh", "forest", "scenario"] as const;
 export type UploadKind = (typeof UPLOAD_KINDS)[number];
 
-/** Make a scenario of a file; its name. */
-export async function upload(file: File, kind: UploadKind): Promise<string> {
+/** Make a scenario of a file, a .yaml map with its image; its name. */
+export async function upload(file: File, kind: UploadKind, image: File | null): Promise<string> {
   const query = new URLSearchParams({ kind, name: file.name });
-  const answer = await fetch(`./api/uploads?${query}`, { method: "POST", body: file });
+  if (image !== null) {
+    query.set("image", image.name);
+    query.set("head", String(file.size));
+  }
+  const body = image === null ? file : new Blob([file, image]);
+  const answer = await fetch(`./api/uploads?${query}`, { method: "POST", body });
   const told = await read(answer);
   return (told as { scenario: string }).scenario;
 }

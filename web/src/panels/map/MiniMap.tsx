@@ -11,9 +11,11 @@ import { drawPlan, type PlanColours } from "./drawPlan.ts";
 import { Pen } from "./drawTraffic.ts";
 import { extentOf } from "./extent.ts";
 import { MapButtons } from "./MapButtons.tsx";
+import { MapLegend } from "./MapLegend.tsx";
 import { MapCanvas } from "./MapCanvas.tsx";
 import { useTrails } from "./trails.ts";
 import { usePlannedPath } from "./usePlannedPath.ts";
+import { ownEntry } from "../../lib/ownEntry.ts";
 
 const FRAME_MS = 66;
 const BESIDE_TOOLBAR = { x: 1, y: 0, width: 300 };
@@ -79,6 +81,7 @@ export default function MiniMap() {
         stopFollowing={() => setFollows(false)}
         clickSends={clickSends}
       />
+      <MapLegend />
     </FloatingTile>
   );
 }
@@ -118,7 +121,7 @@ function useDrawing(
       pen.cone();
       pen.line(trails.get(selected)?.points ?? [], "rgba(240, 62, 62, 0.75)");
       pen.line(path.current, "#f59f00", [5, 4]);
-      const goal = useGoals.getState()[selected];
+      const goal = ownEntry(useGoals.getState(), selected);
       if (goal !== undefined) pen.cross(goal.x, goal.y);
       pen.uavs(link.frames, useVehicles.getState().list, selected);
       pen.bar();

@@ -14,6 +14,8 @@ export interface Traveller {
 
 const CONE_PX = 70;
 const BAR_PX = 90;
+/** Room of a name above its UAV. */
+const NAME_ROOM_PX = 28;
 const RED = "#f03e3e";
 const EYE = "rgba(34, 139, 230, 0.28)";
 
@@ -115,8 +117,12 @@ export class Pen {
     context.lineWidth = 3;
     context.strokeStyle = this.dark ? "#10131a" : "#ffffff";
     context.fillStyle = this.dark ? "#f8f9fa" : "#212529";
-    context.strokeText(name, px, py - 17);
-    context.fillText(name, px, py - 17);
+    const y = py < NAME_ROOM_PX ? py + NAME_ROOM_PX : py - 17; // inside the window also at its edge
+    const mostPx = this.size.width - 8;
+    const halfPx = Math.min(mostPx, context.measureText(name).width) / 2 + 4;
+    const x = Math.max(halfPx, Math.min(px, this.size.width - halfPx));
+    context.strokeText(name, x, y, mostPx);
+    context.fillText(name, x, y, mostPx);
   }
 
   /** How long a metre is. */

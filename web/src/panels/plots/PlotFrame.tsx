@@ -73,7 +73,11 @@ export function PlotFrame({ plot, drawn, legend, hint, actions, children }: Plot
         </Group>
       </Group>
       <div className={classes.field}>
-        <div ref={drawn.place} className={classes.canvas} />
+        <div
+          ref={drawn.place}
+          className={classes.canvas}
+          data-empty={legend.length === 0 || undefined}
+        />
         {legend.length === 0 && (
           <Text className={classes.hint} size="sm" c="dimmed">
             {hint}

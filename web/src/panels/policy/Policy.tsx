@@ -14,6 +14,7 @@ import {
   type Sample,
 } from "./policy.ts";
 import classes from "./Policy.module.css";
+import { ownEntry } from "../../lib/ownEntry.ts";
 
 const STRING = "std_msgs/msg/String";
 const NUMBERS = "std_msgs/msg/Float32MultiArray";
@@ -54,7 +55,7 @@ function PolicyOf({ uav }: { uav: string }) {
     <ScrollArea h="100%" type="auto">
       <Stack gap="xs" px="sm" pb="sm">
         <Group gap="xs">
-          <Badge variant="light" tt="none" color={COLOURS[status?.state ?? ""] ?? "gray"}>
+          <Badge variant="light" tt="none" color={ownEntry(COLOURS, status?.state ?? "") ?? "gray"}>
             {status?.state ?? "unknown"}
           </Badge>
           <Text size="sm" fw={500}>

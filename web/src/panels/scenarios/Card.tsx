@@ -11,16 +11,16 @@ interface CardProps {
   choose: () => void;
 }
 
-/** A scenario as a picture, its name and what flies there. */
+/** A scenario as a picture, its name in words and what flies there. */
 export function Card({ card, present, choose }: CardProps) {
-  const { name, description, picture, world, uploaded, missing } = card;
+  const { name, title, description, picture, world, uploaded, missing } = card;
   const contents = contentsOf(card);
   const Icon = ICONS[world] ?? Mountain;
   return (
     <UnstyledButton
       className="card"
       onClick={choose}
-      aria-label={`${name}: ${description}`}
+      aria-label={`${name}: ${title}. ${description}`}
       data-present={present || undefined}
     >
       <div className="card-picture">
@@ -32,8 +32,8 @@ export function Card({ card, present, choose }: CardProps) {
       </div>
       <div className="card-text">
         <Group gap={6} wrap="nowrap" justify="space-between">
-          <Text fw={600} size="sm" truncate>
-            {name}
+          <Text fw={600} size="sm" className="card-title">
+            {title}
           </Text>
           {present && <Badge size="xs">running</Badge>}
           {uploaded && (
@@ -47,7 +47,7 @@ export function Card({ card, present, choose }: CardProps) {
             {missing}
           </Text>
         )}
-        <Text size="xs" c="dimmed" lineClamp={2}>
+        <Text size="xs" c="dimmed" className="reason">
           {description}
         </Text>
         <Text size="xs" mt={4}>

@@ -1,5 +1,6 @@
 import {
   Button,
+  Code,
   FileButton,
   Group,
   Loader,
@@ -7,16 +8,17 @@ import {
   SimpleGrid,
   Stack,
   Text,
-  Tooltip,
+  Title,
 } from "@mantine/core";
 import { Upload } from "lucide-react";
 import { useEffect, useState } from "react";
 import { ENDINGS, UPLOAD_HINT } from "../../lib/fileKinds.ts";
 import { matcher } from "../../lib/filter.ts";
+import { sectionsOf } from "../../lib/sections.ts";
 import { scenarios, type ScenarioCard } from "../../link/commands.ts";
 import { reasonOf } from "../../state/notices.ts";
 import { useSimulation } from "../../state/simulation.ts";
-import { closeWindow, offerFile, useWindows } from "../../state/windows.ts";
+import { closeWindow, offerFiles, useWindows } from "../../state/windows.ts";
 import { FilterInput } from "../shared/FilterInput.tsx";
 import { Card } from "./Card.tsx";
 import { Start } from "./Start.tsx";
@@ -38,7 +40,7 @@ export default function Scenarios() {
       opened
       onClose={closeWindow}
       size={card === undefined ? 1100 : "lg"}
-      title={card === undefined ? "Choose a scenario" : card.name}
+      title={card === undefined ? "Choose a scenario" : <Named card={card} />}
     >
       {problem !== "" && (
         <Text c="red" role="alert">
@@ -55,15 +57,32 @@ export default function Scenarios() {
   );
 }
 
+/** Its name in words, and the one that the command line knows. */
+function Named({ card: { name, title } }: { card: ScenarioCard }) {
+  if (title === name) return name;
+  return (
+    <>
+      {title} <Code>{name}</Code>
+    </>
+  );
+}
+
 function Gallery({ cards, choose }: { cards: ScenarioCard[]; choose: (name: string) => void }) {
   const [filter, setFilter] = useState("");
   const present = useSimulation(({ server }) => server?.scenario);
+  const unasked = useSimulation(({ server }) => server?.unasked ?? false);
   const matches = matcher(filter);
-  const shown = cards.filter(({ name, description, airframes, world }) =>
-    matches(`${name} ${description} ${airframes.join(" ")} ${world}`),
+  const shown = cards.filter(({ name, title, section, description, airframes, world }) =>
+    matches(`${name} ${title} ${section} ${description} ${airframes.join(" ")} ${world}`),
   );
   return (
     <Stack gap="sm">
+      {unasked && (
+        <Text size="sm">
+          Each card is a flight that you can set up, start and steer. One runs behind this window
+          already: close the window to look around there.
+        </Text>
+      )}
       <Group gap="sm" wrap="nowrap">
         <FilterInput
           label="Search"
@@ -74,26 +93,34 @@ function Gallery({ cards, choose }: { cards: ScenarioCard[]; choose: (name: stri
           value={filter}
           onChange={setFilter}
         />
-        <FileButton accept={ENDINGS} onChange={(file) => file !== null && offerFile(file)}>
+        <FileButton multiple accept={ENDINGS} onChange={offerFiles}>
           {(props) => (
-            <Tooltip label={UPLOAD_HINT} multiline w={280}>
-              <Button variant="default" leftSection={<Upload size={16} />} {...props}>
-                Upload a file
-              </Button>
-            </Tooltip>
+            <Button variant="default" leftSection={<Upload size={16} />} {...props}>
+              Upload a file
+            </Button>
           )}
         </FileButton>
       </Group>
-      <SimpleGrid cols={{ base: 1, xs: 2, md: 3, lg: 4 }} spacing="sm">
-        {shown.map((card) => (
-          <Card
-            key={card.name}
-            card={card}
-            present={card.name === present}
-            choose={() => choose(card.name)}
-          />
-        ))}
-      </SimpleGrid>
+      <Text size="xs" c="dimmed">
+        Or bring your own: {UPLOAD_HINT}
+      </Text>
+      {sectionsOf(shown).map(([section, cards]) => (
+        <section key={section} aria-label={section}>
+          <Title order={3} size="h5" mb={6}>
+            {section}
+          </Title>
+          <SimpleGrid cols={{ base: 1, xs: 2, md: 3, lg: 4 }} spacing="sm">
+            {cards.map((card) => (
+              <Card
+                key={card.name}
+                card={card}
+                present={card.name === present}
+                choose={() => choose(card.name)}
+              />
+            ))}
+          </SimpleGrid>
+        </section>
+      ))}
       {shown.length === 0 && <Text c="dimmed">No scenario matches all of these words.</Text>}
     </Stack>
   );

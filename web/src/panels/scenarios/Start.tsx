@@ -1,4 +1,13 @@
-import { Button, Checkbox, NumberInput, Select, SimpleGrid, Stack, Text } from "@mantine/core";
+import {
+  Button,
+  Checkbox,
+  Code,
+  NumberInput,
+  Select,
+  SimpleGrid,
+  Stack,
+  Text,
+} from "@mantine/core";
 import { ArrowLeft, Play } from "lucide-react";
 import { useEffect, useState } from "react";
 import {
@@ -86,6 +95,11 @@ export function Start({ card, back }: { card: ScenarioCard; back: () => void }) 
             value={changes.sensors ?? sensorSetsOf(card.sensors)}
             onChange={(sensors) => change({ sensors })}
           />
+        )}
+        {!card.uploaded && (
+          <Text size="xs" c="dimmed">
+            In a terminal: <Code>volery run {card.name} --page</Code>
+          </Text>
         )}
         <SubmitRow whyNot={whyNot} justify="space-between">
           <Button variant="subtle" leftSection={<ArrowLeft size={16} />} onClick={back}>

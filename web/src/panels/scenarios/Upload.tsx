@@ -1,18 +1,20 @@
 import { Alert, Button, FileButton, Group, Modal, Radio, Stack, Text } from "@mantine/core";
 import { useEffect, useState } from "react";
 import { ENDINGS, kindOf, type FileKind } from "../../lib/fileKinds.ts";
+import { missingHalfOf } from "../../lib/mapPair.ts";
 import { upload, uploadRecording } from "../../link/commands.ts";
 import { openPanel } from "../../state/layout.ts";
 import { reasonOf, showSuccess } from "../../state/notices.ts";
 import { useWhyNotOpen } from "../../state/rights.ts";
-import { closeWindow, offerFile, offerScenario, useWindows } from "../../state/windows.ts";
+import { closeWindow, offerFiles, offerScenario, useWindows } from "../../state/windows.ts";
 import { SubmitRow } from "./SubmitRow.tsx";
 
 const KINDS: { kind: FileKind; label: string; description: string }[] = [
   {
     kind: "grid_map",
     label: "Grid map",
-    description: "A matrix of 0 and 1: CSV, PNG (dark is blocked) or MovingAI .map",
+    description:
+      "A matrix of 0 and 1: CSV, PNG (dark is blocked) or MovingAI .map; or .yaml and image of ROS",
   },
   { kind: "city", label: "City", description: "Building outlines: GeoJSON" },
   { kind: "mesh", label: "Mesh", description: "Any geometry: glTF (.glb), OBJ, STL" },
@@ -28,11 +30,13 @@ const PEEK_BYTES = 4096;
 
 /** A map or a scenario of the user's own joins the scenarios, a log the recordings. */
 export default function Upload() {
-  const file = useWindows((windows) => windows.file);
+  const { file, image } = useWindows();
   const [kind, setKind] = useState<FileKind | null>(null);
   const [problem, setProblem] = useState("");
   const [busy, setBusy] = useState(false);
-  const whyNot = useWhyNotOpen();
+  const whyNotOpen = useWhyNotOpen();
+  const half = file !== null && kind === "grid_map" ? missingHalfOf(file.name, image) : null;
+  const whyNot = whyNotOpen ?? half;
   useEffect(() => {
     setProblem("");
     if (file === null) return;
@@ -46,7 +50,7 @@ export default function Upload() {
     setBusy(true);
     try {
       if (kind === "log") await sendLog(file);
-      else offerScenario(await upload(file, kind));
+      else offerScenario(await upload(file, kind, image));
     } catch (error) {
       setProblem(reasonOf(error));
     }
@@ -57,9 +61,9 @@ export default function Upload() {
       <Stack gap="sm">
         <Group justify="space-between" wrap="nowrap">
           <Text truncate fw={600}>
-            {file === null ? "No file" : `${file.name} (${sizeText(file.size)})`}
+            {file === null ? "No file" : nameOf(file, image)}
           </Text>
-          <FileButton accept={ENDINGS} onChange={(next) => next !== null && offerFile(next)}>
+          <FileButton multiple accept={ENDINGS} onChange={offerFiles}>
             {(props) => (
               <Button variant="default" size="compact-md" {...props}>
                 {file === null ? "Choose a file" : "Choose another file"}
@@ -107,6 +111,11 @@ async function sendLog(file: File): Promise<void> {
   showSuccess(`Uploaded ${await uploadRecording(file)}`);
   closeWindow();
   openPanel("bottom", "recordings");
+}
+
+function nameOf(file: File, image: File | null): string {
+  const names = image === null ? file.name : `${file.name} + ${image.name}`;
+  return `${names} (${sizeText(file.size + (image?.size ?? 0))})`;
 }
 
 function sizeText(bytes: number): string {

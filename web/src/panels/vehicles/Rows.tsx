@@ -102,7 +102,7 @@ const Row = memo(function Row({ vehicle, top, selected, choose }: RowProps) {
           {Math.round(100 * battery)} %
         </Text>
       )}
-      <Badge size="sm" variant="light" tt="none" color={colourOf(mode)}>
+      <Badge size="sm" variant="light" tt="none" maw="45%" color={colourOf(mode)}>
         {modeText(mode)}
       </Badge>
     </div>

@@ -1,3 +1,5 @@
+import { ownEntry } from "../../lib/ownEntry.ts";
+
 const COLOURS: Readonly<Record<string, string>> = {
   LANDED: "gray",
   TAKE_OFF: "blue",
@@ -13,7 +15,7 @@ const COLOURS: Readonly<Record<string, string>> = {
 
 /** Colour of a flight mode. */
 export function colourOf(mode: string): string {
-  return COLOURS[mode] ?? "gray";
+  return ownEntry(COLOURS, mode) ?? "gray";
 }
 
 /** `TAKE_OFF` as `take off`. */

@@ -23,7 +23,14 @@ import { shown } from "../stage/shown.ts";
 import { followTopics, isKnown, type Follower } from "../stage/topics.ts";
 import { fleet } from "../uavs/fleet.ts";
 import { currentWorld } from "../world/currentWorld.ts";
-import { heightColour, LEVEL, NODDING } from "./returnColours.ts";
+import {
+  colouringOf,
+  heightColour,
+  LEVEL,
+  NODDING,
+  type Bytes,
+  type ReturnColouring,
+} from "./returnColours.ts";
 import { pointsOfCloud, pointsOfScan } from "./pointClouds.ts";
 
 const SCAN = "sensor_msgs/msg/LaserScan";
@@ -34,6 +41,11 @@ const MOST_PER_SWEEP = 4000;
 /** Sensors of the selected UAV and of so many UAVs nearest to it. */
 const NEAREST = 3;
 const LOOK_MS = 500;
+const FIXED: Record<ReturnColouring, Bytes | null> = {
+  level: LEVEL,
+  nodding: NODDING,
+  height: null,
+};
 
 /** Returns of LIDARs: one buffer that runs round, one draw call; each return fades within a second. */
 export class Returns implements Part {
@@ -151,11 +163,7 @@ export class Returns implements Part {
       string,
       BufferAttribute
     >;
-    const fixed = /nod|tilt/i.test(topic)
-      ? NODDING
-      : /horizontal|level|scan/i.test(topic)
-        ? LEVEL
-        : null;
+    const fixed = FIXED[colouringOf(topic)];
     const ground = currentWorld.ground.heightAt(pose[0], pose[1]);
     const from = this.next;
     for (let i = 0; i + 2 < points.length; i += 3) {

@@ -16,10 +16,11 @@ import {
   type AirframeColours,
   type AirframeShape,
 } from "./airframes.generated.ts";
+import { ownEntry } from "../../lib/ownEntry.ts";
 
 /** Shape of an airframe by name; of one that is not known an ordinary quadrotor's. */
 export function shapeOf(airframe: string): AirframeShape {
-  return AIRFRAMES[airframe] ?? AIRFRAMES.f450!;
+  return ownEntry(AIRFRAMES, airframe) ?? AIRFRAMES.f450!;
 }
 
 /**
@@ -28,7 +29,7 @@ export function shapeOf(airframe: string): AirframeShape {
  */
 export function bodyOf(airframe: string): BufferGeometry {
   const shape = shapeOf(airframe);
-  const colours = AIRFRAMES[airframe]?.colours ?? USUAL_COLOURS;
+  const colours = ownEntry(AIRFRAMES, airframe)?.colours ?? USUAL_COLOURS;
   const pieces = [
     ...hub(shape, colours),
     ...shape.rotors.flatMap((rotor) => arm(shape, rotor, colours)),

@@ -1,3 +1,5 @@
+import { ownEntry } from "../../lib/ownEntry.ts";
+
 // What surfaces look like close up, by the names of `volery.world.materials`. Each is a few lines of
 // shader that change what the glTF says: `colour` and `rough` may be set, `height` (m) makes relief,
 // `glow` is light of its own, `vanish` (0 to 1) how much of it is lost in the haze. At hand are `place` (map, m), `own` (m, in the thing's own axes),
@@ -130,5 +132,5 @@ const FINISHES: Record<string, Finish> = {
 };
 
 export function finishOf(material: string): Finish {
-  return FINISHES[material.toLowerCase().replace(/[._]?\d+$/, "")] ?? PLAIN_FINISH;
+  return ownEntry(FINISHES, material.toLowerCase().replace(/[._]?\d+$/, "")) ?? PLAIN_FINISH;
 }
