@@ -49,11 +49,12 @@ function Entry({ kind }: { kind: ReturnColouring }) {
 }
 
 function Dot({ colour, text }: { colour: Bytes; text: string }) {
+  const linear = colour.map((channel) => channel / 255).join(" "); // as the scene takes them
   return (
     <span>
       <span
         className="returns-dot"
-        style={{ background: `rgb(${colour.join(" ")})` }}
+        style={{ background: `color(srgb-linear ${linear})` }}
         aria-hidden
       />
       {text}
