@@ -19,7 +19,7 @@ class DataFileError(VoleryError):
 
 
 class SpawnFault(Enum):
-    """Which argument of a new UAV is invalid."""
+    """Why a UAV cannot be spawned: which argument is invalid, or that building it failed."""
 
     NAME = "name"
     """The name has characters that topics cannot have."""
@@ -27,6 +27,8 @@ class SpawnFault(Enum):
     """Another UAV or actor has the name."""
     TYPE = "type"
     """There is no such type of UAV."""
+    FAILED = "failed"
+    """A step of building the UAV failed; none of it is left."""
 
 
 class SpawnError(VoleryError):
@@ -35,7 +37,7 @@ class SpawnError(VoleryError):
     def __init__(self, fault: SpawnFault, message: str) -> None:
         super().__init__(message)
         self.fault = fault
-        """Argument that is invalid."""
+        """Kind of the reason."""
 
 
 class PlacementError(ScenarioError):

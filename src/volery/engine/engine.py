@@ -118,12 +118,12 @@ class Engine:
         self.actors = scene.actors
         """Actors of the world; None without any."""
         self._looks = None if self.actors is None else ActorShapes(self.actors)
-        self.collisions = self._new_collisions(num_envs)
+        self.collisions = self._new_collisions(fleet, names, num_envs)
         self.state_check = StateCheck(fleet)
         self.banks = tuple(banks)
         self.estimation = estimation
         """Estimators that use the sensors' measurements; None without any."""
-        self.sensor_agenda = self._new_agenda(after_step=-1)
+        self.sensor_agenda = self._new_agenda(self.banks, after_step=-1)
         self.timer_agenda: Scheduler[Callable[[], Any]] = Scheduler(self.dt_ns)
         self.partner_agenda: Scheduler[Partner] = Scheduler(self.dt_ns)
         self.deadlines = OneShotTimers(self.dt_ns)
@@ -302,29 +302,36 @@ class Engine:
         names: tuple[str, ...],
         estimation: Estimation | None,
         going_on: Collection[str],
-    ) -> None:
+    ) -> Callable[[], None]:
         """Continues with a fleet that has more or fewer UAVs; called between ticks.
 
         All parts are new, as at a start. The UAVs `going_on` keep their state, and so do their
-        sensors and estimates; the others start now.
+        sensors and estimates; the others start now. An error leaves the engine as it was. Returns a
+        function that continues with the fleet of before, to be called before the next tick.
         """
         self._new_events += event_collection.drain(self.fleet, self.names)
         pairs = common_rows(names, self.names, going_on)
         fleet.continue_from(self.fleet, pairs)
-        collisions, old_banks = self.collisions, self.banks
         step = self.fleet.step
         measured = (self.sensor_agenda.next_step() or step) > step if step else False
-        self.fleet, self.names = fleet, names
-        self.state_check = StateCheck(fleet)
-        self.collisions = self._new_collisions(num_envs=1)
-        self.collisions.continue_from(collisions, pairs)
-        self.banks = tuple(banks)
-        self.sensor_agenda = self._new_agenda(after_step=step if measured else step - 1)
+        collisions = self._new_collisions(fleet, names, num_envs=1)
+        collisions.continue_from(self.collisions, pairs)
+        agenda = self._new_agenda(banks, after_step=step if measured else step - 1)
         for bank in banks:
-            continue_bank(bank, old_banks, going_on)
+            continue_bank(bank, self.banks, going_on)
         if estimation is not None and self.estimation is not None:
             estimation.continue_from(self.estimation, pairs)
-        self.estimation = estimation
+        check = StateCheck(fleet)
+        before = (self.fleet, self.names, self.banks, self.estimation)
+        helpers = (self.state_check, self.collisions, self.sensor_agenda)
+
+        def undo() -> None:
+            self.fleet, self.names, self.banks, self.estimation = before
+            self.state_check, self.collisions, self.sensor_agenda = helpers
+
+        self.fleet, self.names, self.banks, self.estimation = fleet, names, tuple(banks), estimation
+        self.state_check, self.collisions, self.sensor_agenda = check, collisions, agenda
+        return undo
 
     # ------------------------------------------------------------------------------ snapshot
 
@@ -364,21 +371,21 @@ class Engine:
     def _from_now(self, period_s: float) -> Schedule:
         return Schedule(Fraction(NS_PER_S, ns_from_s(period_s)), self.time_ns)
 
-    def _new_collisions(self, num_envs: int) -> Collisions:
+    def _new_collisions(self, fleet: Fleet, names: tuple[str, ...], num_envs: int) -> Collisions:
         emit = self._new_events.append
         return Collisions(
-            self.fleet,
+            fleet,
             self.scene,
-            self.names,
+            names,
             self._response,
             emit,
             num_envs=num_envs,
             looks=self._looks,
         )
 
-    def _new_agenda(self, *, after_step: int) -> Scheduler[SensorBank]:
+    def _new_agenda(self, banks: Sequence[SensorBank], *, after_step: int) -> Scheduler[SensorBank]:
         agenda: Scheduler[SensorBank] = Scheduler(self.dt_ns)
-        for bank in self.banks:
+        for bank in banks:
             agenda.add(
                 bank,
                 bank.schedule,

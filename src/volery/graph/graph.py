@@ -86,6 +86,7 @@ class _Service:
     srvtype: str
     handler: Callable[[Any], Any] | None
     async_handler: AsyncHandler
+    owner: str = ""
 
 
 class Graph:
@@ -489,9 +490,14 @@ class Graph:
 
         self._add_service(service, _Service(srvtype, handler, handle))
 
-    def create_async_service(self, service: str, srvtype: str, handler: AsyncHandler) -> None:
-        """Creates a service that may respond later; only `call_async` can call it."""
-        self._add_service(service, _Service(srvtype, None, handler))
+    def create_async_service(
+        self, service: str, srvtype: str, handler: AsyncHandler, *, owner: str = ""
+    ) -> None:
+        """Creates a service that may respond later; only `call_async` can call it.
+
+        owner: external client that serves it.
+        """
+        self._add_service(service, _Service(srvtype, None, handler, owner))
 
     def destroy_service(self, service: str) -> None:
         """Destroys a service."""
@@ -526,8 +532,9 @@ class Graph:
     def _add_service(self, name: str, service: _Service) -> None:
         _check_name(name)
         with self._members:
-            if name in self._services:
-                raise GraphError(f"service '{name}' already has a server")
+            if (other := self._services.get(name)) is not None:
+                by = f": the client {other.owner}" if other.owner else ""
+                raise GraphError(f"service '{name}' already has a server{by}")
             self._services[name] = service
 
     def _service(self, name: str) -> _Service:

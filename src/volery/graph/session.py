@@ -403,7 +403,7 @@ class Session:
                 relayed.when_done(lambda: pending.discard(relayed))
                 handler(request, relayed)
 
-            self._graph.create_async_service(service, srvtype, handle)
+            self._graph.create_async_service(service, srvtype, handle, owner=self.name)
             self._offers[service] = pending
         self.record_command("offer", service, srvtype)
 

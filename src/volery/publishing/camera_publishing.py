@@ -90,15 +90,12 @@ class CameraPublisher:
         """Advertises a camera's topics."""
         sensor = camera.sensor
         self._cameras[sensor.path] = camera
-        self._outlets[sensor.path] = [
-            _Outlet(
-                self._graph.advertise(f"/{sensor.path}{topic.suffix}", topic.message_class),
-                topic.message,
-                parts,
-            )
-            for topic in _TOPICS
-            if (parts := topic.parts(camera.settings))
-        ]
+        outlets = self._outlets[sensor.path] = []
+        for topic in _TOPICS:
+            if parts := topic.parts(camera.settings):
+                name = f"/{sensor.path}{topic.suffix}"
+                publisher = self._graph.advertise(name, topic.message_class)
+                outlets.append(_Outlet(publisher, topic.message, parts))
 
     def set_size(self, cameras: Sequence[SensorId], pixels: int) -> None:
         """Sets the number of pixels of these cameras' images."""
@@ -116,7 +113,7 @@ class CameraPublisher:
         """Ends the publishers of a UAV's cameras."""
         for path in [path for path in self._cameras if path.startswith(f"{uav_name}/")]:
             del self._cameras[path]
-            for outlet in self._outlets.pop(path):
+            for outlet in self._outlets.pop(path, ()):
                 outlet.publisher.cancel()
 
     def subscribed_parts(self, cameras: Sequence[SensorId]) -> set[Part]:

@@ -136,9 +136,10 @@ class GraphPublisher:
             self._static.append(_mount_transform(base, laser_frame(sensor), mount))
 
     def arrange(self, uav_names: Sequence[str]) -> None:
-        """Sorts the static transforms by this order of UAVs."""
+        """Sorts the static transforms by this order of UAVs; those of other UAVs come last."""
         rows = {name: row for row, name in enumerate(uav_names)}
-        self._static.sort(key=lambda t: rows[t.child_frame_id.split("/")[0]])
+        last = len(rows)
+        self._static.sort(key=lambda t: rows.get(t.child_frame_id.split("/")[0], last))
 
     def retire(self, uav_name: str) -> None:
         """Ends the publishers of a UAV's sensors, and removes its static transforms."""

@@ -96,7 +96,11 @@ class SnapshotManager:
         if changed or without_state(self._manager.nodes):
             self._manager.end_nodes()  # all, so that they start in the same order again
         if changed:
-            self._manager.regroup(self._starts)
+            try:
+                self._manager.regroup(self._starts)
+            except Exception:
+                self._manager.start_nodes()
+                raise
         self._put_back(self._start, "the simulation was reset")
         with self._graph.in_place_of(self._start["graph"]):
             self._manager.start_nodes()

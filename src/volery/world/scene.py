@@ -166,9 +166,10 @@ class Scene:
         index = np.asarray(shape_index, dtype=np.int64).reshape(-1)
         if index.size and (index.min() < 0 or index.max() >= len(shapes)):
             raise ValueError(f"shape_index must be in 0..{len(shapes) - 1}")
-        self._uav_rows = body_rows(shapes, index, self.backend.shape_scenes(shapes))
-        self._uavs_per_env = max(len(index) // num_envs, 1)
-        self._bodies = body_table(self._uav_rows, self._actor_rows, self._uavs_per_env)
+        rows = body_rows(shapes, index, self.backend.shape_scenes(shapes))
+        uavs_per_env = max(len(index) // num_envs, 1)
+        self._bodies = body_table(rows, self._actor_rows, uavs_per_env)
+        self._uav_rows, self._uavs_per_env = rows, uavs_per_env
 
     def set_actors(self, actors: MovingActors) -> None:
         """Adds `actors`, which all rays see; `move_actors` places them."""

@@ -136,10 +136,17 @@ class MirroredGraph(Graph):
 
         self._link.create_service(service, srvtype, ask)
 
-    def create_async_service(self, service: str, srvtype: str, ask: AsyncHandler) -> None:
+    def create_async_service(
+        self,
+        service: str,
+        srvtype: str,
+        handler: AsyncHandler,
+        *,
+        owner: str = "",  # noqa: ARG002
+    ) -> None:
         """Creates a service like `create_service`, for answers that come later."""
         self._link.create_service(
-            service, srvtype, lambda q, reply: self.post(lambda: ask(q, reply))
+            service, srvtype, lambda q, reply: self.post(lambda: handler(q, reply))
         )
 
     def has_service(self, service: str) -> bool:  # noqa: ARG002

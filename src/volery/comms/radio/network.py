@@ -21,9 +21,10 @@ from volery.comms.protocol import StationFrame, StationFrameKind
 from volery.comms.radio.channel import RadioChannel
 from volery.comms.server.settings import RouterSettings
 from volery.core.errors import CommandError, CommsError
+from volery.core.undo_steps import UndoSteps
 from volery.graph.graph import Graph
 from volery.graph.messages import Published
-from volery.graph.topics import Publisher, Subscription
+from volery.graph.topics import Publisher
 from volery.scenario.radio import RelayedTopic
 
 _TICK_S = 0.5
@@ -54,8 +55,9 @@ class _Member:
     """A UAV on the network: its relayed subscriptions, and publishers for the others' messages."""
 
     address: int
-    sent: list[Subscription] = field(default_factory=list)
     incoming: dict[str, Publisher] = field(default_factory=dict)
+    leave: UndoSteps = field(default_factory=UndoSteps)
+    """Undoes what was made for it."""
 
 
 class RadioNetwork:
@@ -100,18 +102,18 @@ class RadioNetwork:
         return {name: member.address for name, member in self._members.items()}
 
     def join(self, name: str) -> Callable[[], None]:
-        """Adds a radio to a UAV; returns the function that removes it."""
+        """Adds a radio to a UAV; returns the function that removes it.
+
+        If a step fails, there is no radio, and the error is raised.
+        """
         address = free_address(name, {m.address for m in self._members.values()})
-        self._exchange.join(Identity.of(address), self._graph.now_ns())
-        member = self._members[name] = _Member(address)
-        for topic in self._topics:
-            member.incoming[topic.name] = self._graph.advertise(
-                f"/{name}/radio/{topic.name}", topic.type
-            )
-            sent = f"/{name}/{topic.name}"
-            send = self._sender(name, topic)
-            member.sent.append(self._graph.subscribe(sent, send, topic.type))
-        return lambda: self._leave(name)
+        member = _Member(address)
+        try:
+            self._enter(name, member)
+        except Exception:
+            member.leave.run()
+            raise
+        return lambda: self._leave(member)
 
     def silence(self, name: str, by: int) -> None:
         """Adds (by = 1) or removes (by = -1) a fault that silences a UAV's radio."""
@@ -154,6 +156,19 @@ class RadioNetwork:
 
     # ---------------------------------------------------------------------------------- internals
 
+    def _enter(self, name: str, member: _Member) -> None:
+        leave, exchange, graph = member.leave, self._exchange, self._graph
+        exchange.join(Identity.of(member.address), graph.now_ns())
+        leave.add(lambda: exchange.leave(member.address, graph.now_ns()))
+        self._members[name] = member
+        leave.add(lambda: self._forget(name, member))
+        for topic in self._topics:
+            publisher = graph.advertise(f"/{name}/radio/{topic.name}", topic.type)
+            leave.add(publisher.cancel)
+            member.incoming[topic.name] = publisher
+            send = self._sender(name, topic)
+            leave.add(graph.subscribe(f"/{name}/{topic.name}", send, topic.type).cancel)
+
     def _sender(self, name: str, topic: RelayedTopic) -> Callable[[Published], None]:
         def send(published: Published) -> None:
             now_ns = self._graph.now_ns()
@@ -191,14 +206,14 @@ class RadioNetwork:
             return _LOST
         return self._inner(time_ns, source, destination, frame)
 
-    def _leave(self, name: str) -> None:
-        member = self._members.pop(name)
+    def _leave(self, member: _Member) -> None:
+        errors = member.leave.run()
+        if errors:
+            raise errors[0]
+
+    def _forget(self, name: str, member: _Member) -> None:
+        self._members.pop(name, None)
         self._silent.pop(member.address, None)
-        self._exchange.leave(member.address, self._graph.now_ns())
-        for subscription in member.sent:
-            subscription.cancel()
-        for publisher in member.incoming.values():
-            publisher.cancel()
 
     def _address_of(self, name: str) -> int:
         if name not in self._members:

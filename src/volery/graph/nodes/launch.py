@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -48,6 +49,8 @@ class Launch:
     context: Context
     namespace: str
     parameters: Mapping[str, Any]
+    begun: list[Callable[[], object]] = field(default_factory=list)
+    """Functions that destroy the nodes whose constructors have begun."""
 
 
 _present: ContextVar[Launch | None] = ContextVar("volery_node_launch", default=None)
@@ -59,7 +62,7 @@ def present_launch() -> Launch | None:
 
 
 def make_node(node_class: type[Any], launch: Launch) -> Any:
-    """Constructs a node; passes on exceptions of its constructor."""
+    """Constructs a node; passes on exceptions of its constructor, of which then nothing stays."""
     options = {
         "context": launch.context,
         "namespace": launch.namespace,
@@ -68,6 +71,11 @@ def make_node(node_class: type[Any], launch: Launch) -> Any:
     token = _present.set(launch)
     try:
         return node_class(**options) if _takes_context(node_class) else node_class()
+    except BaseException:
+        for destroy in launch.begun:
+            with suppress(Exception):  # the constructor's own error counts
+                destroy()
+        raise
     finally:
         _present.reset(token)
 

@@ -75,8 +75,8 @@ class Node(ParameterMethods):
         automatically_declare_parameters_from_overrides: bool = False,
         **_options: Any,
     ) -> None:
+        launch = present_launch()
         if context is None:
-            launch = present_launch()
             if launch is None:
                 raise GraphError(
                     f"node {node_name}: it has no context; name its class in a scenario, run it "
@@ -99,6 +99,8 @@ class Node(ParameterMethods):
             if context.latency_ns
             else None
         )
+        if launch is not None:
+            launch.begun.append(partial(Node.destroy_node, self))
         super().__init__(
             node_name,
             self.full_name,
@@ -336,13 +338,24 @@ class Node(ParameterMethods):
         return True
 
     def destroy_node(self) -> None:
-        """Destroys the node's publishers, subscriptions, timers, services and parameters."""
+        """Destroys the node's publishers, subscriptions, timers, services and parameters.
+
+        Passes on the first error after all others; what failed is tried again by the next call.
+        """
         self._context.graph.parameters.forget(self.full_name)
         if self.__executor is not None:
             self.__executor.close()
         self.__destroyed = True
-        while self.__handles:
-            self.__handles.popitem()[1]()
+        handles, errors = self.__handles, []
+        for handle, release in reversed(tuple(handles.items())):
+            handles.pop(handle, None)
+            try:
+                release()
+            except Exception as error:
+                errors.append(error)
+                handles[handle] = release
+        if errors:
+            raise errors[0]
 
     # ----------------------------------------------------------------------------------- helpers
 

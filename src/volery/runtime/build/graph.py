@@ -9,6 +9,7 @@ from volery.control.flight_modes import FlightMode
 from volery.core import rotations
 from volery.core.clock import ns_from_s
 from volery.core.errors import CommandError, ScenarioError
+from volery.core.undo_steps import UndoSteps
 from volery.engine.engine import Engine
 from volery.engine.events import Event
 from volery.engine.faults import FaultPlan
@@ -52,14 +53,21 @@ def start_nodes(
     engine: Engine,
     now_ns: Callable[[], int],
 ) -> list[Node]:
-    """Starts the nodes of the UAVs `starts`, in fleet order."""
-    nodes = []
-    for start in starts:
-        for k, entry in enumerate(scenario.types[start.type_name].nodes):
-            where = f"{scenario.name}: types.{start.type_name}.nodes[{k}]"
-            context = _context(scenario, entry, graph, engine, now_ns)
-            own = _with_start(entry, start)
-            nodes.append(start_node(own, context, f"/{start.name}", where, scenario.access))
+    """Starts the nodes of the UAVs `starts`, in fleet order; if one does not start, none runs."""
+    nodes: list[Node] = []
+    started = UndoSteps()
+    try:
+        for start in starts:
+            for k, entry in enumerate(scenario.types[start.type_name].nodes):
+                where = f"{scenario.name}: types.{start.type_name}.nodes[{k}]"
+                context = _context(scenario, entry, graph, engine, now_ns)
+                own = _with_start(entry, start)
+                node = start_node(own, context, f"/{start.name}", where, scenario.access)
+                started.add(node.destroy_node)
+                nodes.append(node)
+    except Exception:
+        started.run()
+        raise
     return nodes
 
 

@@ -49,6 +49,7 @@ def start_node(
     _check_base(node, entry, where)
     unused = node.unused_overrides()
     if unused:
+        node.destroy_node()
         raise ScenarioError(
             f"{where}: node '{entry.node}' has no parameter {', '.join(unused)}; "
             f"known: {', '.join(node.declared_parameters())}"

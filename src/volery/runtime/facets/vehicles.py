@@ -105,7 +105,8 @@ class SimulationVehicles(BatchCommands):
 
         kind: one of `spawnable`. The UAV stands or, in the air, holds; its topics, services,
         sensors and nodes begin now. A position between its feet and the ground counts as on the
-        ground. Raises `SpawnError` for a bad name or type, `PlacementError` for an impossible pose.
+        ground. Raises `SpawnError` for a bad name or type, or if a step fails, `PlacementError` for
+        an impossible pose; the flight then goes on as before.
         """
         self._check_open()
         return self._spawner.spawn(name, kind, position_map, attitude)

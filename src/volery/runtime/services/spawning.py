@@ -33,6 +33,7 @@ _CODES = {
     SpawnFault.NAME: _NAME_INVALID,
     SpawnFault.NAME_TAKEN: _NAME_NOT_UNIQUE,
     SpawnFault.TYPE: ResultCode.NOT_FOUND,
+    SpawnFault.FAILED: _SPAWN_FAILED,
 }
 
 

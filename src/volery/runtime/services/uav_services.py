@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 from volery.control.flight_modes import FlightMode
@@ -15,10 +16,10 @@ _TRIGGER = "std_srvs/srv/Trigger"
 _OURS = "volery_interfaces/srv"
 
 
-def offer_uav_services(graph: Graph, uav: Uav) -> list[Close]:
+def offer_uav_services(graph: Graph, uav: Uav) -> Iterator[Close]:
     """Creates the services of a UAV beside those of `runtime.vehicles.command_interface`.
 
-    The returned functions destroy them.
+    Yields the function that destroys each.
     """
     services: tuple[tuple[str, str, Handler], ...] = (
         ("arm", _TRIGGER, lambda _request: _arm(uav)),
@@ -47,10 +48,8 @@ def offer_uav_services(graph: Graph, uav: Uav) -> list[Close]:
             lambda request: uav.set_command_timeout(request.seconds),
         ),
     )
-    return [
-        offer_command(graph, f"/{uav.name}/{name}", srvtype, handler)
-        for name, srvtype, handler in services
-    ]
+    for name, srvtype, handler in services:
+        yield offer_command(graph, f"/{uav.name}/{name}", srvtype, handler)
 
 
 def _arm(uav: Uav) -> Fields:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -42,7 +42,7 @@ _GOALS = ("goal_pose", "trajectory")
 _log = logging.getLogger(__name__)
 
 
-def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> list[Close]:
+def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> Iterator[Close]:
     """Subscribes to the command topics of one UAV and creates its Trigger services.
 
     Topics are `cmd_vel`, `goal_pose`, `trajectory`, `setpoint_raw/local` and
@@ -55,9 +55,10 @@ def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> list[Clo
     learns of it, and of a goal or trajectory that is ignored (`Graph.refuse`). An accepted Twist is
     published on `cmd_vel/applied` with the simulated time from which it acts; clients measure
     round trips with it. The services take_off, hold, land and return_home respond with `success`
-    and a reason. The returned functions undo all that.
+    and a reason. Yields the function that undoes each step once the step is made.
     """
     applied = graph.advertise(f"/{uav.name}/cmd_vel/applied", TwistStamped)
+    yield applied.cancel
 
     def on_twist(twist: Any) -> None:
         linear, angular = twist.linear, twist.angular
@@ -75,11 +76,10 @@ def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> list[Clo
         "setpoint_raw/local": (_POSITION_TARGET, lambda target: steer_to_message(uav, target)),
         "setpoint_raw/attitude": (_ATTITUDE_TARGET, lambda target: turn_to_message(uav, target)),
     }
-    closes: list[Close] = [applied.cancel]
     for name, (message_class, take) in topics.items():
         topic = f"/{uav.name}/{name}"
         receive = _careful(graph, uav, take, topic, streamed=name not in _GOALS)
-        closes.append(graph.subscribe(topic, receive, message_class).cancel)
+        yield graph.subscribe(topic, receive, message_class).cancel
     actions: dict[str, Callable[[], object]] = {
         "take_off": uav.take_off,
         "hold": uav.hold,
@@ -88,8 +88,7 @@ def open_commands(graph: Graph, uav: Uav, now_ns: Callable[[], int]) -> list[Clo
     }
     for name, action in actions.items():
         path = f"/{uav.name}/{name}"
-        closes.append(offer_command(graph, path, _TRIGGER, _without_request(action)))
-    return closes
+        yield offer_command(graph, path, _TRIGGER, _without_request(action))
 
 
 def go_to_message(uav: Uav, message: Any) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import Any
 
@@ -43,21 +43,22 @@ class ExternalOdometry:
         """Starts to check the topics each `_LOOK_S` of simulated time."""
         every(_LOOK_S, self._look, wanted=lambda: bool(self._watched))
 
-    def open(self, uav_name: str, sensors: Iterable[Sensor]) -> list[Close]:
-        """Feeds the estimator of a UAV with the odometry that its "estimate" sensor names."""
+    def open(self, uav_name: str, sensors: Iterable[Sensor]) -> Iterator[Close]:
+        """Feeds the estimator of a UAV with the odometry that its "estimate" sensor names.
+
+        Yields the functions that end this.
+        """
         aids = [
             s.external_odometry
             for s in sensors
             if isinstance(s, EstimateSensor) and s.external_odometry is not None
         ]
-        closes: list[Close] = []
         for aid in aids:
             topic = f"/{uav_name}/{aid.topic}"
             self._watched[uav_name] = aid.topic, self._engine.time_ns
+            yield partial(self._forget, uav_name)
             take = _taker(self._engine, uav_name, aid)
-            closes.append(self._graph.subscribe(topic, take, Odometry).cancel)
-            closes.append(partial(self._forget, uav_name))
-        return closes
+            yield self._graph.subscribe(topic, take, Odometry).cancel
 
     def _forget(self, uav_name: str) -> None:
         self._watched.pop(uav_name, None)

@@ -44,24 +44,24 @@ class FlightStates:
         """Publishes each `PERIOD_S` of simulated time from now on."""
         every(PERIOD_S, self._publish, wanted=lambda: bool(self._wanted()))
 
-    def open(self, uav: Uav) -> list[Close]:
-        """Adds a UAV; the returned functions remove it."""
+    def open(self, uav: Uav) -> Iterator[Close]:
+        """Adds a UAV; yields the functions that remove it."""
         publisher = self._graph.advertise(f"/{uav.name}/flight_state", _TYPE)
         self._publishers[uav.name] = publisher
 
         def close() -> None:
-            del self._publishers[uav.name]
+            self._publishers.pop(uav.name, None)
             publisher.cancel()
 
-        offered = offer_command(
+        yield close
+        yield offer_command(
             self._graph, f"/{uav.name}/get_vehicle_info", _BUILD, lambda _request: self._build(uav)
         )
-        return [close, offered]
 
     def _wanted(self) -> list[tuple[int, Publisher]]:
         """Returns the rows and publishers of UAVs whose topic has subscribers."""
-        told = [(k, self._publishers[name]) for k, name in enumerate(self._engine.names)]
-        return [(k, publisher) for k, publisher in told if publisher.subscriptions]
+        told = [(k, self._publishers.get(name)) for k, name in enumerate(self._engine.names)]
+        return [(k, publisher) for k, publisher in told if publisher and publisher.subscriptions]
 
     def _publish(self) -> None:
         wanted = self._wanted()

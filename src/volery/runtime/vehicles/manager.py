@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+import logging
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -13,6 +14,7 @@ from volery.comms.radio.network import RadioNetwork
 from volery.control.fleet import Fleet
 from volery.core.arrays import Array
 from volery.core.errors import CommandError, PlacementError
+from volery.core.undo_steps import UndoSteps
 from volery.engine.engine import Engine
 from volery.engine.events import Event
 from volery.engine.faults import FaultPlan
@@ -21,12 +23,12 @@ from volery.graph.graph import Graph
 from volery.graph.nodes.node import Node
 from volery.publishing.graph_publisher import GraphPublisher
 from volery.runtime.build.assembly import Assembly, assemble
+from volery.runtime.build.fleet import add_bodies
 from volery.runtime.build.graph import announce_sensors, start_nodes, start_system_nodes
 from volery.runtime.build.placement import StartPose, check_room
 from volery.runtime.build.sensor_suites import SensorInstance, refit
 from volery.runtime.conditional_runs import ConditionalRuns
 from volery.runtime.monitoring.output_sink import OutputSink
-from volery.runtime.services.results import Close
 from volery.runtime.services.uav_services import offer_uav_services
 from volery.runtime.vehicles.battery_failsafe import BatteryFailsafe
 from volery.runtime.vehicles.command_interface import open_commands
@@ -44,6 +46,8 @@ from volery.world.terrain import Terrain
 
 _ROOT = "/"
 """Namespace of the nodes of the whole system."""
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass
@@ -85,7 +89,8 @@ class VehicleManager:
     futures: FlightFutures = field(init=False)
     """Futures of the UAVs' flight commands."""
     _battery_failsafe: BatteryFailsafe = field(init=False)
-    _closes: dict[str, list[Close]] = field(default_factory=dict)
+    _opened: dict[str, UndoSteps] = field(default_factory=dict)
+    """What was made for each UAV."""
 
     def __post_init__(self) -> None:
         origin = self.scenario.world.origin
@@ -101,23 +106,31 @@ class VehicleManager:
         self.pose_aids.start(self.engine.every)
         futures = self.futures
         self.engine.every(CHECK_PERIOD_S, futures.check, wanted=lambda: futures.needs_checks)
-        self._take_over(parts, self.starts)
+        self._join(parts, self.starts, parts.fleet.get_state())
         self.start_nodes()
 
-    def regroup(self, starts: Sequence[StartPose]) -> None:
-        """Replaces the UAVs by `starts`; call `start_nodes` for the nodes of new UAVs."""
+    def regroup(self, starts: Sequence[StartPose]) -> Callable[[], None]:
+        """Replaces the UAVs by `starts`; call `start_nodes` for the nodes of new UAVs.
+
+        If a step fails, the UAVs are those of before, and the error is raised. Returns a function
+        that undoes the addition of UAVs, to be called before the next tick.
+        """
         if not self.engine.stands:
             raise CommandError("UAVs are spawned and deleted between ticks; use post()")
         if not starts:
             raise CommandError("a simulation needs at least one UAV")
         parts = assemble(self.scenario, starts, self.engine.scene)
-        new = [start for start in starts if start not in self.starts]
-        going_on = {start.name for start in starts if start in self.starts}
-        for start in self.starts:
-            if start.name not in going_on:
-                self._dismiss(start.name)
-        self.starts = tuple(starts)
-        self._take_over(parts, new, going_on)
+        undo = UndoSteps()
+
+        def undo_all() -> None:
+            _report(undo.run(), "a part of a change of the UAVs was not undone")
+
+        try:
+            self._replace(parts, tuple(starts), undo)
+        except Exception:
+            undo_all()
+            raise
+        return undo_all
 
     def start_nodes(self) -> None:
         """Starts the nodes of UAVs without nodes, and those of the system if none runs."""
@@ -145,7 +158,9 @@ class VehicleManager:
 
     def restart_nodes(self, name: str) -> None:
         """Constructs the nodes of one UAV again."""
-        self._end_nodes_of(name)
+        for node in self._nodes_of(name):
+            node.destroy_node()
+            self.nodes.remove(node)
         self.start_nodes()
 
     def end_nodes(self) -> None:
@@ -155,18 +170,61 @@ class VehicleManager:
 
     # -------------------------------------------------------------------------------- inside
 
-    def _take_over(
-        self, parts: Assembly, new: Sequence[StartPose], going_on: set[str] | None = None
-    ) -> None:
-        names = tuple(start.name for start in self.starts)
-        begun = parts.fleet.get_state()
-        if going_on is not None:
-            self.engine.regroup(parts.fleet, parts.banks, names, parts.estimation, going_on)
-            self.outlet.fleet = parts.fleet
-        self.fitted = parts.fitted
+    def _replace(self, parts: Assembly, starts: tuple[StartPose, ...], undo: UndoSteps) -> None:
+        """Passes from the present UAVs to those of `starts`."""
+        undo.add(partial(add_bodies, self.engine.scene, self.starts))
+        going_on = {start.name for start in starts if start in self.starts}
+        new = [start for start in starts if start not in self.starts]
         fresh = {start.name for start in new}
-        announce_sensors(self.publisher, [f for f in self.fitted if f.id.uav_name in fresh])
-        self.publisher.arrange(names)
+        ended = [start for start in self.starts if start.name not in going_on]
+        names = tuple(start.name for start in starts)
+        begun = parts.fleet.get_state()
+        undo.add(self._restoring())
+        undo.add(self.engine.regroup(parts.fleet, parts.banks, names, parts.estimation, going_on))
+        self.outlet.fleet = parts.fleet
+        self.starts = starts
+        for start in ended:
+            if start.name in fresh:  # its names must be free for the new one
+                again = start, self.uavs[start.name], self.beginnings[start.name], self.fitted
+                undo.add(partial(self._reopen, *again))
+                self._dismiss(start.name)
+        for start in new:
+            undo.add(partial(self._dismiss, start.name))
+        self._join(parts, new, begun)
+        self.faults.enlist(fresh)
+        self._restart_sensors(fresh)
+        for start in ended:
+            if start.name not in fresh:
+                self._dismiss(start.name)
+
+    def _restoring(self) -> Callable[[], None]:
+        """Returns a function that restores what refers to the present fleet."""
+        starts, fitted, fleet = self.starts, self.fitted, self.outlet.fleet
+        places = {name: uav.fleet_row for name, uav in self.uavs.items()}
+        banks = self.engine.banks
+
+        def restore() -> None:
+            self.starts, self.fitted, self.outlet.fleet = starts, fitted, fleet
+            for name, uav in self.uavs.items():
+                uav.move_to(places[name])
+            self._sort_uavs()
+            self.outlet.latest.arrange(banks, fitted)
+
+        return restore
+
+    def _reopen(
+        self, start: StartPose, uav: Uav, beginning: InitialState, fitted: list[SensorInstance]
+    ) -> None:
+        """Restores a UAV that was dismissed, without its nodes."""
+        self._announce(start.name, fitted)
+        self._enlist(start, uav, beginning)
+
+    def _join(self, parts: Assembly, new: Sequence[StartPose], begun: dict[str, Any]) -> None:
+        """Connects new UAVs to the graph, and all UAVs to the parts of a fleet."""
+        self.fitted = parts.fitted
+        for start in new:
+            self._announce(start.name, self.fitted)
+        self.publisher.arrange([start.name for start in self.starts])
         self.outlet.latest.arrange(parts.banks, self.fitted)
         for bank in parts.banks:
             if bank.name == "camera":
@@ -174,36 +232,52 @@ class VehicleManager:
                 cameras.bank.requested_parts = partial(self._requested_parts, bank.sensors)
                 self.publisher.cameras.set_size(bank.sensors, cameras.bank.pixels)
         for row, start in enumerate(self.starts):
-            if start.name in fresh:
-                self.beginnings[start.name] = InitialState(begun, row)
-                self._enlist(start, row)
+            if start in new:
+                uav = self._new_uav(start, parts.fleet, row)
+                self._enlist(start, uav, InitialState(begun, row))
             else:
                 self.uavs[start.name].move_to((parts.fleet, row))
-        self.uavs.update({name: self.uavs.pop(name) for name in names})  # in fleet order
-        if going_on is not None:
-            self.faults.enlist(fresh)
-            self._restart_sensors(fresh)
+        self._sort_uavs()
 
-    def _enlist(self, start: StartPose, row: int) -> None:
-        flight = self.scenario.types[start.type_name].flight
-        uav = self.uavs[start.name] = Uav(
-            self.engine.fleet,
+    def _sort_uavs(self) -> None:
+        """Sorts the UAVs in fleet order."""
+        names = [start.name for start in self.starts if start.name in self.uavs]
+        self.uavs.update({name: self.uavs.pop(name) for name in names})
+
+    def _announce(self, name: str, fitted: Iterable[SensorInstance]) -> None:
+        """Advertises the topics of a UAV's sensors."""
+        opened = self._opened.setdefault(name, UndoSteps())
+        if errors := opened.run():  # what did not end when an earlier UAV of the name was removed
+            raise errors[0]
+        opened.add(partial(self.outlet.latest.forget, name))
+        opened.add(partial(self.publisher.retire, name))
+        announce_sensors(self.publisher, [f for f in fitted if f.id.uav_name == name])
+
+    def _new_uav(self, start: StartPose, fleet: Fleet, row: int) -> Uav:
+        return Uav(
+            fleet,
             row,
             start.name,
-            flight,
+            self.scenario.types[start.type_name].flight,
             start.type_name,
             self._check_goal,
             sensors=UavSensors(self.outlet.latest, self.runs, start.name),
             futures=self.futures,
         )
-        closes = self._closes[start.name] = [
-            *open_commands(self.graph, uav, self._now_ns),
-            *offer_uav_services(self.graph, uav),
-            *self.flight_states.open(uav),
-            *self.pose_aids.open(start.name, self._sensors_of(start)),
-        ]
+
+    def _enlist(self, start: StartPose, uav: Uav, beginning: InitialState) -> None:
+        """Adds a UAV and opens its commands."""
+        opened = self._opened[start.name]
+        self.uavs[start.name] = uav
+        self.beginnings[start.name] = beginning
+        opened.add(partial(self._forget, start.name))
+        opened.add(partial(self.futures.fail, start.name, "the UAV was deleted"))
+        opened.add_each(open_commands(self.graph, uav, self._now_ns))
+        opened.add_each(offer_uav_services(self.graph, uav))
+        opened.add_each(self.flight_states.open(uav))
+        opened.add_each(self.pose_aids.open(start.name, self._sensors_of(start)))
         if self.radio is not None and self.scenario.types[start.type_name].radio:
-            closes.append(self.radio.join(start.name))
+            opened.add(self.radio.join(start.name))
 
     def _requested_parts(self, cameras: Sequence[SensorId]) -> Collection[Part]:
         """Returns the parts of these cameras' images that have receivers."""
@@ -233,19 +307,19 @@ class VehicleManager:
         return self.scenario.types[start.type_name].sensors
 
     def _dismiss(self, name: str) -> None:
-        self._end_nodes_of(name)
-        for close in self._closes.pop(name):
-            close()
-        self.publisher.retire(name)
-        self.outlet.latest.forget(name)
-        self.futures.fail(name, "the UAV was deleted")
+        """Removes a UAV, as far as it was made; what fails is tried again before a new one."""
+        opened = self._opened.setdefault(name, UndoSteps())
+        for node in reversed(self._nodes_of(name)):
+            self.nodes.remove(node)
+            opened.add(partial(_destroy, node))
+        _report(opened.run(), f"a part of {name} was not removed")
+
+    def _forget(self, name: str) -> None:
         self.uavs.pop(name).move_to(None)
         del self.beginnings[name]
 
-    def _end_nodes_of(self, name: str) -> None:
-        for node in [node for node in self.nodes if node.get_namespace() == f"/{name}"]:
-            node.destroy_node()
-            self.nodes.remove(node)
+    def _nodes_of(self, name: str) -> list[Node]:
+        return [node for node in self.nodes if node.get_namespace() == f"/{name}"]
 
     def _restart_sensors(self, fresh: set[str]) -> None:
         keys = {(f.id.uav, f.id.name): f.key for f in self.fitted if f.id.uav_name in fresh}
@@ -254,3 +328,12 @@ class VehicleManager:
 
     def _now_ns(self) -> int:
         return self.engine.time_ns
+
+
+def _destroy(node: Node) -> None:
+    node.destroy_node()
+
+
+def _report(errors: Iterable[Exception], what: str) -> None:
+    for error in errors:
+        _log.warning("%s: %s", what, error, exc_info=error)

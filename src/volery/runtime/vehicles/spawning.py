@@ -12,9 +12,12 @@ from volery.control.setpoints import checked_attitude
 from volery.core import rotations
 from volery.core.errors import (
     CommandError,
+    DataFileError,
     PlacementError,
+    ScenarioError,
     SpawnError,
     SpawnFault,
+    VoleryError,
 )
 from volery.runtime.build.placement import (
     StartPose,
@@ -62,23 +65,33 @@ class Spawner:
         self._check_name(name)
         airframe = self._airframe_of(kind)
         start = self._start(name, kind, airframe, position_map, attitude)
-        before = self._manager.starts
         try:
-            self._manager.regroup((*before, start))
-            self._manager.start_nodes()
-        except Exception:
-            if self._manager.starts != before:
-                self._manager.regroup(before)
+            undo = self._manager.regroup((*self._manager.starts, start))
+            try:
+                self._manager.start_nodes()
+                self._snapshots.enlist(name)
+            except Exception:
+                undo()
+                raise
+        except (CommandError, ScenarioError, DataFileError):
             raise
-        self._snapshots.enlist(name)
+        except Exception as error:
+            reason = f"{name} was not spawned: {_text_of(error)}"
+            raise SpawnError(SpawnFault.FAILED, reason) from error
         return self._manager.uavs[name]
 
     def delete(self, names: Collection[str]) -> None:
-        """Removes UAVs. Raises `CommandError` if none would be left."""
-        if names:
-            self._manager.regroup(
-                [start for start in self._manager.starts if start.name not in names]
-            )
+        """Removes UAVs; raises `CommandError` if none would be left, or if that fails."""
+        if not names:
+            return
+        left = [start for start in self._manager.starts if start.name not in names]
+        try:
+            self._manager.regroup(left)
+        except VoleryError:
+            raise
+        except Exception as error:
+            reason = f"{', '.join(names)} not deleted: {_text_of(error)}"
+            raise CommandError(reason) from error
 
     def _check_name(self, name: str) -> None:
         if not _NAME.fullmatch(name) or name in _TAKEN:
@@ -150,3 +163,7 @@ def usual_type(airframe: Airframe) -> UavType:
     if airframe.battery is not None:
         sensors.append(BatterySensor(kind="battery"))
     return UavType(airframe=airframe.name, sensors=tuple(sensors))
+
+
+def _text_of(error: Exception) -> str:
+    return str(error) if isinstance(error, VoleryError) else f"{type(error).__name__}: {error}"
