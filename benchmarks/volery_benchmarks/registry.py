@@ -328,6 +328,8 @@ BENCHES: dict[str, Bench] = {
                 "rtf_under_attack": Bound(0.95),
                 "other_client_delay_p99_ms": Bound(50.0, at_most=True),
                 "memory_growth_mb": Bound(50.0, at_most=True),
+                "memory_growth_1000_viewers_mb": Bound(300.0, at_most=True),
+                "rtf_120_stopped_subscribers": Bound(0.95),
             },
             in_all=False,  # nothing else can be measured beside it
             has_quick=True,

@@ -182,7 +182,7 @@ def test_frames_are_counted_over_time():
 
     closing_handle, loop, transport = Handle(), Loop(), Transport()
     held = PausedTransport(transport)
-    limits = FrameLimits(held, loop)
+    limits = FrameLimits(held, loop, lambda _reason: None)
     for _ in range(5 * MAX_FRAMES_AHEAD):
         loop.now_s += 1.0 / FRAMES_PER_S
         limits.control_frame()

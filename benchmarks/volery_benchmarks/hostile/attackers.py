@@ -19,7 +19,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from typing import Any
 
-from volery_benchmarks.hostile import mavlink_flood
+from volery.bridges.unfinished import MAX_UNFINISHED_S
+from volery_benchmarks.hostile import crowds, mavlink_flood
 from volery_benchmarks.hostile.websocket import (
     BINARY,
     TEXT,
@@ -176,10 +177,16 @@ ATTACKS: dict[str, Callable[[int, int, float], int]] = {
     "service_loop": services,
     "service_pattern": pattern,
     "mavlink_flood": mavlink_flood.flood,
+    "viewers_1000": crowds.unfinished,
+    "subscribers_120_stopped": crowds.stopped,
 }
 """Attacks by name; each takes two ports and its end time."""
 MAVLINK_ATTACKS = frozenset({"mavlink_flood"})
 """Attacks whose ports are MAVLink's by TCP and UDP."""
+WITNESSED_FROM_START = frozenset({"subscribers_120_stopped"})
+"""Attacks whose first second counts."""
+SETTLE_S = {"viewers_1000": MAX_UNFINISHED_S + 2.0}
+"""Time after which what an attack leaves in memory is measured, where it is more than a second."""
 
 
 def _large(port: int, payload: bytes, kind: int, ends: float, first: bytes = b"") -> int:

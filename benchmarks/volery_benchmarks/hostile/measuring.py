@@ -24,7 +24,12 @@ from volery.core.errors import VoleryError
 from volery.mavlink.codec import dialect
 from volery.mavlink.links import ports
 from volery_benchmarks.ending import end
-from volery_benchmarks.hostile.attackers import ATTACKS, MAVLINK_ATTACKS
+from volery_benchmarks.hostile.attackers import (
+    ATTACKS,
+    MAVLINK_ATTACKS,
+    SETTLE_S,
+    WITNESSED_FROM_START,
+)
 from volery_benchmarks.hostile.witness import PERIOD_S
 from volery_benchmarks.registry import Measured
 
@@ -54,12 +59,17 @@ def measure(*, quick: bool = False) -> Measured:
 
 
 def worst_figures(figures: dict[str, float]) -> dict[str, float]:
-    """Returns the worst figures of all attacks."""
+    """Returns the worst figures of all attacks, and the bounds of the two crowds of clients."""
 
     def of_attacks(figure: str) -> list[float]:
         return [figures[f"{attack}_{figure}"] for attack in ATTACKS]
 
-    return {
+    of_crowds = {
+        "memory_growth_1000_viewers_mb": "viewers_1000_peak_mb",
+        "rtf_120_stopped_subscribers": "subscribers_120_stopped_rtf",
+    }
+    worst = {name: figures[figure] for name, figure in of_crowds.items() if figure in figures}
+    return worst | {
         "rtf_under_attack": min(of_attacks("rtf")),
         "other_client_delay_p99_ms": max(of_attacks("delay_p99_ms")),
         "memory_growth_mb": max(of_attacks("memory_mb")),
@@ -85,15 +95,17 @@ def _attack(
 ) -> dict[str, float]:
     """Returns the figures of one attack, named after it; `none` means no attack."""
     before = _resident_mb(pid)
+    _reset_peak(pid)
     attacker = None
     if name in ATTACKS:
         attacker = _start("attackers", name, *attacked, seconds + 2 * _LEAD_S)
-        time.sleep(_LEAD_S)
+        time.sleep(0.0 if name in WITNESSED_FROM_START else _LEAD_S)
     witness = _start("witness", rosbridge, seconds)
     found = call_figures(_result(witness, seconds), round(seconds / PERIOD_S))
     if attacker is not None:
         found["sent"] = float(_result(attacker, seconds)["sent"])
-    time.sleep(_SETTLE_S)
+    found["peak_mb"] = _resident_mb(pid, "VmHWM") - before
+    time.sleep(SETTLE_S.get(name, _SETTLE_S))
     found["memory_mb"] = _resident_mb(pid) - before
     return {f"{name}_{figure}": value for figure, value in found.items()}
 
@@ -175,8 +187,13 @@ def _free_mavlink_port() -> int:
     raise VoleryError("hostile: no free UDP ports for MAVLink")
 
 
-def _resident_mb(pid: int) -> float:
+def _reset_peak(pid: int) -> None:
+    """Resets the peak of the resident memory (proc(5), clear_refs)."""
+    Path(f"/proc/{pid}/clear_refs").write_text("5")
+
+
+def _resident_mb(pid: int, which: str = "VmRSS") -> float:
     for line in Path(f"/proc/{pid}/status").read_text().splitlines():
-        if line.startswith("VmRSS:"):
+        if line.startswith(f"{which}:"):
             return float(line.split()[1]) / 1024.0
     raise VoleryError("hostile: the simulation under attack has ended")

@@ -2,13 +2,18 @@
 
 Servers stop reading from a client after each message until the message is processed. They do not
 stop for pings, which they answer even if the client does not read, nor for fragments, which they
-collect. A client that floods a server with them would use up its memory and its time.
+collect. A client that floods a server with them would use up its memory and its time. What has
+arrived of messages counts in the account of `bridges.unfinished`.
 """
 
 from __future__ import annotations
 
 import asyncio
+from collections import deque
+from collections.abc import Callable
 from typing import Any
+
+from volery.bridges.unfinished import ArrivingMessages
 
 MAX_FRAGMENTS = 4096
 """Fragments of one message. Browsers send none below some kilobytes (modelling choice)."""
@@ -17,15 +22,32 @@ FRAMES_PER_S = 500.0
 MAX_FRAMES_AHEAD = 1000
 """Frames that a client may send ahead of that rate."""
 
-_UNREAD, _FAST = "unread answers", "too many frames"
+_FRAGMENT_BYTES = 512
+"""Cost of storing a fragment besides its data."""
+
+_UNREAD, _FAST, _FULL = "unread answers", "too many frames", "no room"
 
 
 class FrameLimits:
-    """Limits one connection. All methods belong to the thread of its loop."""
+    """Limits one connection. All methods belong to the thread of its loop.
 
-    def __init__(self, transport: PausedTransport, loop: asyncio.AbstractEventLoop) -> None:
+    end: closes the connection for a reason.
+    """
+
+    def __init__(
+        self,
+        transport: PausedTransport,
+        loop: asyncio.AbstractEventLoop,
+        end: Callable[[str], None],
+    ) -> None:
         self._transport = transport
         self._loop = loop
+        self._arriving = ArrivingMessages(
+            loop, end, lambda: transport.hold(_FULL), lambda: transport.release(_FULL)
+        )
+        self._incomplete = 0
+        self._whole: deque[int] = deque()
+        """Bytes of each message that the application has not taken."""
         self._num_fragments = 0
         self._frames_ahead = 0.0
         self._counted_s = loop.time()
@@ -51,6 +73,32 @@ class FrameLimits:
     def message(self) -> None:
         """Starts a new message."""
         self._num_fragments = 0
+
+    def whole(self, size: int) -> None:
+        """Notes that a message of `size` bytes is complete, and waits for the application."""
+        self._num_fragments = 0
+        self._whole.append(size)
+        self._arriving.finish()
+
+    def taken(self) -> None:
+        """Notes that the application has taken a message."""
+        if self._whole:
+            self._whole.popleft()
+            self._note()
+
+    def arrived(self, incomplete: int) -> None:
+        """Counts what has arrived of an incomplete message, in bytes, after each read."""
+        self._incomplete = incomplete + _FRAGMENT_BYTES * self._num_fragments
+        self._note()
+
+    def close(self) -> None:
+        """Frees everything after the connection is lost."""
+        self._transport.end()
+        self._whole.clear()
+        self._arriving.close()
+
+    def _note(self) -> None:
+        self._arriving.note(self._incomplete, sum(self._whole))
 
     def _count_frame(self) -> None:
         now_s = self._loop.time()

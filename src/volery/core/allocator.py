@@ -22,3 +22,10 @@ def return_large_blocks() -> None:
     if mallopt is not None:
         mallopt(_M_MMAP_THRESHOLD, MAPPED_BYTES)
         mallopt(_M_TRIM_THRESHOLD, _HEAP_SPARE_BYTES)
+
+
+def return_free_memory() -> None:
+    """Returns free memory between used blocks to the system; has no effect without glibc."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)

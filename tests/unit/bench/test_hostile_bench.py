@@ -22,10 +22,11 @@ def test_the_worst_attack_counts(monkeypatch):
     figures = {
         "none_rtf": 0.5, "a_rtf": 0.9, "b_rtf": 1.0, "a_delay_p99_ms": 3.0, "b_delay_p99_ms": 4.0,
         "a_memory_mb": 6.0, "b_memory_mb": 5.0,
+        "viewers_1000_peak_mb": 170.0, "subscribers_120_stopped_rtf": 0.98,
     }  # fmt: skip
     worst = measuring.worst_figures(figures)
     assert set(worst) == set(BENCHES["hostile"].bounds)
-    assert list(worst.values()) == [0.9, 4.0, 6.0]
+    assert list(worst.values()) == [170.0, 0.98, 0.9, 4.0, 6.0]
 
 
 @pytest.mark.slow
@@ -35,7 +36,22 @@ def test_a_run_is_attacked_and_measured(monkeypatch):
     figures = measuring.measure(quick=True).figures
     assert figures["publisher_10_khz_sent"] > 0
     assert figures["none_rtf"] > 0.0
-    assert set(BENCHES["hostile"].bounds) <= set(figures)
+    assert {"rtf_under_attack", "memory_growth_mb"} <= set(figures)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("attack", "figure"),
+    [
+        ("viewers_1000", "memory_growth_1000_viewers_mb"),
+        ("subscribers_120_stopped", "rtf_120_stopped_subscribers"),
+    ],
+)
+def test_crowds_attack_a_run(monkeypatch, attack, figure):
+    monkeypatch.setattr(measuring, "ATTACKS", {attack: measuring.ATTACKS[attack]})
+    figures = measuring.measure(quick=True).figures
+    assert figures[f"{attack}_sent"] > 0
+    assert figures[figure] > 0.0
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 from volery.bridges.ros_tcp.wire import Bytes, RosTcpFrame, RosTcpFrameParser
+from volery.bridges.unfinished import ArrivingMessages
 from volery.core.errors import BridgeError
 from volery.core.network_access import tend
 from volery.core.preamble import Preamble
@@ -92,6 +93,10 @@ class RosTcpConnection:
         self._unproven = server_end
         self._throttle = throttle
         self._paused: asyncio.TimerHandle | None = None
+        self._has_room = True
+        self._arriving = ArrivingMessages(
+            self._loop, self.close, lambda: self._set_room(False), lambda: self._set_room(True)
+        )
         self._unsent: list[Bytes] = []
         self._blocked = False
         self._chunk_bytes = _CHUNK_BYTES
@@ -128,6 +133,7 @@ class RosTcpConnection:
         self._sock.close()
         self._unsent.clear()
         self.parser.end()
+        self._arriving.close()
         self._closed(reason)
 
     def _readable(self) -> None:
@@ -149,6 +155,9 @@ class RosTcpConnection:
             return
         try:
             frames = self.parser.written(count)
+            if frames:
+                self._arriving.finish()
+            self._arriving.note(self.parser.num_incomplete)
             self._prove(bool(frames))
             flood = len(frames) > _FRAMES_A_TURN
             self._chunk_bytes = (
@@ -199,7 +208,12 @@ class RosTcpConnection:
         pause_s = 0.0 if self._throttle is None else self._throttle.pause_s()
         if pause_s and self._paused is None:
             self._paused = self._loop.call_later(pause_s, self._pause_over)
-        return self._outbox.crowded or bool(pause_s)
+        return self._outbox.crowded or bool(pause_s) or not self._has_room
+
+    def _set_room(self, has_room: bool) -> None:
+        self._has_room = has_room
+        if has_room:
+            self._read_again()
 
     def _pause_over(self) -> None:
         self._paused = None

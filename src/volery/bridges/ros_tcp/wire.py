@@ -80,6 +80,11 @@ class RosTcpFrameParser:
         self.keepalives = 0
         """Number of keepalives."""
 
+    @property
+    def num_incomplete(self) -> int:
+        """Number of bytes of an incomplete frame."""
+        return self._end - self._start if self._apart is None else self._filled
+
     def space(self) -> memoryview:
         """Returns where to write the next bytes; never empty."""
         if self._apart is not None:

@@ -26,6 +26,7 @@ from volery.bridges.rosbridge.wire import (
     decode_png,
     encode_json,
 )
+from volery.bridges.unfinished import UnfinishedMessages
 from volery.core.errors import GraphError, VoleryError
 from volery.graph.codecs.cdr import known
 from volery.graph.codecs.json_codec import JsonCodec
@@ -86,7 +87,7 @@ class ClientState(RemoteTopics):
         self._publications: deque[Frame] = deque()
         self._publication_bytes = 0
         self._numbers = itertools.count(1)
-        self._assembly = Assembly(MOST_MESSAGE_BYTES)
+        self._assembly = _new_assembly()
 
     # --------------------------------------------------------------------------------- connection
 
@@ -95,7 +96,7 @@ class ClientState(RemoteTopics):
         with self._lock:
             self._connected, self._cbor = True, cbor
             self._orders.clear()
-            self._assembly = Assembly(MOST_MESSAGE_BYTES)
+            self._assembly = _new_assembly()
             if self._token is not None:
                 self._order({"op": "auth", "token": self._token})
             self.repeat_topics()
@@ -333,3 +334,8 @@ def _service_type_of(values: Any) -> str:
     """Returns the ROS 2 name of the service type in rosapi's answer; empty if there is none."""
     found = values.get("type") if isinstance(values, dict) else None
     return ros2_name(found, "srv") if isinstance(found, str) and found else ""
+
+
+def _new_assembly() -> Assembly:
+    """Returns an assembly with an account of its own: the server is trusted."""
+    return Assembly(MOST_MESSAGE_BYTES, account=UnfinishedMessages(5 * MOST_MESSAGE_BYTES))

@@ -8,11 +8,12 @@ and a client without a token fills no memory.
 from __future__ import annotations
 
 import asyncio
+from collections import deque
 from typing import Any, cast
 
 from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ProtocolError
-from websockets.frames import Frame, Opcode
+from websockets.frames import CloseCode, Frame, Opcode
 
 from volery.bridges.frame_limits import MAX_FRAGMENTS, FrameLimits, PausedTransport
 from volery.bridges.rosbridge.message_budget import MAX_UNAUTHORIZED_BYTES
@@ -20,6 +21,7 @@ from volery.bridges.rosbridge.message_budget import MAX_UNAUTHORIZED_BYTES
 _READ_BYTES = 32 << 10
 """Bytes read at once; all their frames are parsed before another client has its turn. With the
 default of asyncio, 256 KiB, full of small frames, others would wait for a tenth of a second."""
+_LAST_WORDS_S = 1.0
 _CONTROL = (Opcode.PING, Opcode.PONG)
 _MESSAGES = (Opcode.TEXT, Opcode.BINARY, Opcode.CONT)
 
@@ -34,6 +36,8 @@ class GuardedConnection(ServerConnection):
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
+        self._last_frames: deque[Frame] = deque()
+        """The last frame of each message that the application has not taken."""
         self._recv_unbounded = self.protocol.recv_frame
         self.protocol.recv_frame = self._recv_frame  # type: ignore[method-assign]
         if self.has_token:
@@ -44,7 +48,7 @@ class GuardedConnection(ServerConnection):
         """Implements asyncio's method; reads in small pieces."""
         transport.max_size = _READ_BYTES  # type: ignore[attr-defined]
         self._held = PausedTransport(cast("asyncio.Transport", transport))
-        self._limits = FrameLimits(self._held, self.loop)
+        self._limits = FrameLimits(self._held, self.loop, self._end)
         super().connection_made(cast("asyncio.BaseTransport", self._held))
 
     def resume_writing(self) -> None:
@@ -54,8 +58,28 @@ class GuardedConnection(ServerConnection):
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Implements asyncio's method."""
-        self._held.end()
+        self._limits.close()
         super().connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        """Implements asyncio's method; counts what is incomplete."""
+        super().data_received(data)
+        protocol = self.protocol
+        self._limits.arrived(len(protocol.reader.buffer) + (protocol.current_size or 0))
+
+    async def recv(self, decode: bool | None = None) -> Any:
+        """Receives the next message."""
+        message = await super().recv(decode)
+        self._limits.taken()
+        if self._last_frames:
+            self._last_frames.popleft().data = b""  # the parser refers to it until the next one
+        return message
+
+    def _end(self, reason: str) -> None:
+        """Closes the connection, with the reason if the client reads it soon."""
+        self.protocol.fail(CloseCode.TRY_AGAIN_LATER, reason)
+        self.send_data()
+        self.loop.call_later(_LAST_WORDS_S, self.transport.abort)
 
     def allow(self) -> None:
         """Accepts messages of the server's full size: the client has sent the token."""
@@ -73,6 +97,9 @@ class GuardedConnection(ServerConnection):
                 self._limits.unread_answer()
         else:
             self._limits.message()
+        if frame.fin and frame.opcode in _MESSAGES:
+            self._limits.whole(len(frame.data) + (self.protocol.current_size or 0))
+            self._last_frames.append(frame)
         self._recv_unbounded(frame)
 
     def _recv_first(self, frame: Frame) -> None:

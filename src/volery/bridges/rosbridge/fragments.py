@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from volery.bridges.rosbridge.wire import Operation, encode_json
+from volery.bridges.unfinished import MAX_UNFINISHED_S, NO_ROOM, SHARED, UnfinishedMessages
 from volery.core.errors import BridgeError
 
 MOST_OPEN = 32
 """Messages of one client that may be incomplete at once."""
 MOST_FRAGMENTS = 100_000
 """Fragments of one message."""
-MOST_SECONDS = 30.0
-"""Time from the first to the last fragment of a message."""
-
 _OVERHEAD_BYTES = 64
 """Cost of storing a fragment besides its text, so that empty ones count too."""
 
@@ -38,15 +37,25 @@ class _Open:
     began_s: float
     parts: dict[int, str] = field(default_factory=dict)
     size: int = 0
+    memory_bytes: int = 0
 
 
 class Assembly:
-    """Assembles fragments. Incomplete messages are dropped after a while."""
+    """Assembles fragments. Incomplete messages are dropped after a while, or for lack of room.
 
-    def __init__(self, most_bytes: int) -> None:
+    on_dropped: called in any thread to have `drop_all` called in that of the client.
+    """
+
+    def __init__(
+        self,
+        most_bytes: int,
+        on_dropped: Callable[[], None] = lambda: None,
+        account: UnfinishedMessages = SHARED,
+    ) -> None:
         self._most_bytes = most_bytes
         self._open: dict[str, _Open] = {}
         self._size = 0
+        self._share = account.open(on_dropped)
 
     @property
     def waiting(self) -> int:
@@ -82,6 +91,11 @@ class Assembly:
             if self._size + cost > self._most_bytes:
                 self._forget(key)
                 raise BridgeError(f"fragment: more than {self._most_bytes} bytes are incomplete")
+            memory_bytes = sys.getsizeof(data) + _OVERHEAD_BYTES
+            if not self._share.hold(self._memory_bytes + memory_bytes):
+                self._forget(key)
+                raise BridgeError(f"fragment: {NO_ROOM}")
+            message.memory_bytes += memory_bytes
             message.parts[number] = data
             message.size += cost
             self._size += cost
@@ -92,8 +106,31 @@ class Assembly:
 
     def drop_old(self, now_s: float) -> None:
         """Drops messages that have been incomplete for too long."""
-        for key in [k for k, m in self._open.items() if now_s - m.began_s > MOST_SECONDS]:
+        late_s = now_s - MAX_UNFINISHED_S
+        for key in [k for k, m in self._open.items() if m.began_s < late_s]:
             self._forget(key)
+
+    def due_s(self) -> float | None:
+        """Returns when to call `drop_old`; None: there is nothing to drop."""
+        began_s = (message.began_s for message in self._open.values())
+        return min((s + MAX_UNFINISHED_S for s in began_s), default=None)
+
+    def drop_all(self) -> bool:
+        """Drops all incomplete messages; returns whether there were any."""
+        had_some = bool(self._open)
+        for key in tuple(self._open):
+            self._forget(key)
+        return had_some
+
+    def close(self) -> None:
+        """Frees everything of a client that has left."""
+        self._open.clear()
+        self._size = 0
+        self._share.close()
+
+    @property
+    def _memory_bytes(self) -> int:
+        return sum(message.memory_bytes for message in self._open.values())
 
     def _message(self, key: str, total: int, now_s: float) -> _Open:
         message = self._open.get(key)
@@ -112,3 +149,4 @@ class Assembly:
         message = self._open.pop(key, None)
         if message is not None:
             self._size -= message.size
+            self._share.hold(self._memory_bytes)

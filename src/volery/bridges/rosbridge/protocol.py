@@ -40,6 +40,7 @@ from volery.bridges.rosbridge.wire import (
     encode_json,
     encode_png,
 )
+from volery.bridges.unfinished import NO_ROOM
 from volery.core.errors import BridgeError, VoleryError
 from volery.core.network_access import shows_token
 from volery.graph.read_budget import ReadScope
@@ -110,7 +111,9 @@ class RosbridgePeer:
         self._level = LEVELS[0]
         self._outbox: deque[tuple[int, Iterator[Frame]]] = deque()
         self._waiting_bytes = 0
-        self._assembly = Assembly(min(shared.most_bytes, MAX_TEXT_BYTES))
+        self._assembly = Assembly(
+            min(shared.most_bytes, MAX_TEXT_BYTES), lambda: post(self._drop_fragments)
+        )
         self._max_image_bytes = min(shared.most_bytes, MAX_PICTURE_BYTES)
         self._numbers = itertools.count()
         self._closed = False
@@ -281,7 +284,7 @@ class RosbridgePeer:
 
     def due_s(self, now_s: float) -> float | None:
         """Returns when to call `frames` again without a wake-up; None: not before `wake`."""
-        times = (self._topics.due_s(now_s), self._services.due_s())
+        times = (self._topics.due_s(now_s), self._services.due_s(), self._assembly.due_s())
         return min((time for time in times if time is not None), default=None)
 
     def _answers(self) -> Iterator[Frame]:
@@ -324,6 +327,11 @@ class RosbridgePeer:
         self._session.on_refused = None
         self._session.close()
         self._outbox.clear()
+        self._assembly.close()
+
+    def _drop_fragments(self) -> None:
+        if self._assembly.drop_all():
+            self._complain(f"fragment: {NO_ROOM}")
 
     def _poster(self, post: Post) -> Post:
         """Returns `post` with errors reported as statuses."""

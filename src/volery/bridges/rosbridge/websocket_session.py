@@ -12,7 +12,7 @@ from contextlib import suppress
 from typing import Any, Protocol
 
 from volery.bridges.loop_waker import wake_of
-from volery.bridges.rosbridge.bulk_turns import TURN_S, BulkTurns, Writer
+from volery.bridges.rosbridge.bulk_turns import LARGE_BYTES, TURN_S, BulkTurns, Writer
 from volery.bridges.rosbridge.protocol import RosbridgePeer
 from volery.bridges.rosbridge.token_check import TokenCheck
 from volery.bridges.rosbridge.wire import Frame
@@ -87,7 +87,7 @@ async def converse(
     read = asyncio.Event()
     writer = Writer(bulk)
     tasks = [
-        asyncio.create_task(_read(channel, peer, read, checkpoint)),
+        asyncio.create_task(_read(channel, peer, bulk, read, checkpoint)),
         asyncio.create_task(_write(channel, peer, bell, writer, read)),
     ]
     try:
@@ -104,6 +104,7 @@ async def converse(
 async def _read(
     channel: WebSocketSession,
     peer: RosbridgePeer,
+    bulk: BulkTurns,
     read: asyncio.Event,
     checkpoint: TokenCheck | None,
 ) -> None:
@@ -117,6 +118,8 @@ async def _read(
         except TimeoutError:
             await channel.close(POLICY_VIOLATION, "no token was sent")
             return
+        if len(frame) > LARGE_BYTES:
+            await bulk.large_messages.turn()
         peer.reading.begin()
         if peer.authorized or checkpoint is None:
             peer.receive(frame, time.monotonic())
@@ -124,6 +127,7 @@ async def _read(
             await checkpoint.receive(peer, frame)
             peer.reading.begin()  # the checkpoint gives others their turn
         spent_s += peer.reading.end(1, len(frame))
+        frame = ""  # frees it while the client sends nothing
         if spent_s >= TURN_S:  # `recv` does not wait if a frame is available
             spent_s = 0.0
             await asyncio.sleep(0)

@@ -1,0 +1,353 @@
+"""Unfinished messages of all clients together have one account, in equal parts when it is full."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import socket
+import struct
+import sys
+import time
+import weakref
+from contextlib import ExitStack, suppress
+from pathlib import Path
+
+import pytest
+from live_graph import HandGraph, LiveGraph
+from patient_websockets import connect
+from websockets.frames import Opcode
+
+from volery.bridges import unfinished
+from volery.bridges.bridge_host import BridgeHost
+from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
+from volery.bridges.rosbridge.bulk_turns import LARGE_BYTES, BulkTurns
+from volery.bridges.rosbridge.fragments import Assembly
+from volery.bridges.rosbridge.server import RosbridgeServer
+from volery.bridges.rosbridge.websocket_session import Bell, converse
+from volery.bridges.unfinished import SHARED, UnfinishedMessages
+from volery.core.errors import BridgeError
+from volery.runtime.idle_server import IdleServer
+
+sys.path.append(str(Path(__file__).parents[1] / "unit" / "server"))
+from page_bench import serving
+
+MB = 1 << 20
+PIECE = 1 << 18
+"""What a connection may have read beyond its part before it is paused."""
+LONGEST_S = 120.0
+
+
+class Holder:
+    """A share that records what it is told."""
+
+    def __init__(self, account):
+        self.told = []
+        self.share = account.open(
+            lambda: self.told.append("evict"), lambda: self.told.append("resume")
+        )
+
+    def hold(self, megabytes, *, may_wait=True):
+        return self.share.hold(round(megabytes * MB), may_wait=may_wait)
+
+
+@pytest.fixture
+def account():
+    return UnfinishedMessages(10 * MB)
+
+
+def test_a_lone_client_has_all(account):
+    alone = Holder(account)
+    assert alone.hold(10)
+    assert not alone.hold(10.1)
+    alone.share.close()
+    assert account.num_bytes == 0
+
+
+def test_who_has_less_than_its_part_gets_room_of_the_oldest_that_has_more(account):
+    old, new, small = Holder(account), Holder(account), Holder(account)
+    assert old.hold(5)
+    assert new.hold(5)
+    assert small.hold(1)
+    assert (old.told, new.told) == (["evict"], [])
+    assert account.num_bytes == 6 * MB
+
+
+def test_who_has_more_than_its_part_waits_for_room(account):
+    greedy = [Holder(account) for _ in range(5)]
+    for holder in greedy:
+        assert holder.hold(2)
+    assert not greedy[0].hold(2.1)
+    assert not greedy[1].hold(2.1)
+    assert [holder.told for holder in greedy] == [[]] * 5
+    greedy[4].share.close()
+    assert [holder.told for holder in greedy] == [["resume"], ["resume"], [], [], []]
+
+
+def test_who_cannot_wait_is_refused_and_holds_what_it_had(account):
+    one, other = Holder(account), Holder(account)
+    assert one.hold(5)
+    assert other.hold(5)
+    assert not other.hold(6, may_wait=False)
+    assert account.num_bytes == 10 * MB
+    one.share.close()
+    assert other.hold(6, may_wait=False)
+
+
+def test_short_messages_count_as_none(account):
+    one = Holder(account)
+    assert one.share.hold(100)
+    assert account.num_bytes == 0
+
+
+def fragment(name, data, number=0):
+    return {"op": "fragment", "id": name, "data": data, "num": number, "total": 3}
+
+
+def test_fragments_count_with_what_their_texts_need(account):
+    """Four bytes a character, as Python stores them."""
+    assembly = Assembly(16 * MB, account=account)
+    assembly.add(fragment("a", "\N{ROCKET}" * MB), 0.0)
+    assert account.num_bytes > 4 * MB
+    assembly.add(fragment("a", "\N{ROCKET}" * MB, 1), 0.0)
+    with pytest.raises(BridgeError, match="no room"):
+        assembly.add(fragment("b", "\N{ROCKET}" * MB), 0.0)
+    assert assembly.due_s() == unfinished.MAX_UNFINISHED_S
+    assembly.drop_old(assembly.due_s() + 0.1)
+    assert account.num_bytes == 0
+    assert assembly.due_s() is None
+
+
+def test_fragments_make_room(account):
+    dropped = []
+    greedy = Assembly(16 * MB, lambda: dropped.append(greedy.drop_all()), account)
+    greedy.add(fragment("a", "x" * (9 * MB)), 0.0)
+    modest = Assembly(16 * MB, account=account)
+    modest.add(fragment("a", "x" * (2 * MB)), 0.0)
+    assert dropped == [True]
+    assert greedy.waiting == 0
+    assert account.num_bytes < 3 * MB
+
+
+# ------------------------------------------------------------------------------------ sockets
+
+
+@pytest.fixture
+def small_account(monkeypatch):
+    monkeypatch.setattr(SHARED, "_max_bytes", 8 * MB)
+    yield SHARED
+    until(lambda: SHARED.num_bytes == 0)
+
+
+@pytest.fixture(params=["page", "rosbridge", "ros-tcp"])
+def server(request):
+    if request.param == "page":
+        with serving(IdleServer(lambda _: None)) as page:
+            yield page
+        return
+    live = LiveGraph()
+    server = RosTcpEndpoint(port=0) if request.param == "ros-tcp" else RosbridgeServer(port=0)
+    with BridgeHost(live.gateway) as bridges:
+        bridges.open(server)
+        yield server
+    live.close()
+
+
+def until(condition):
+    ends = time.monotonic() + LONGEST_S
+    while not condition():
+        assert time.monotonic() < ends
+        time.sleep(0.01)
+
+
+def begin(server, size):
+    """A connection that has announced a message of so many bytes."""
+    stranger = socket.create_connection(("127.0.0.1", server.port), 60.0)
+    if isinstance(server, RosTcpEndpoint):
+        stranger.sendall(struct.pack("<I", 2) + b"/x" + struct.pack("<I", size))
+        return stranger
+    stranger.sendall(
+        f"GET /rosbridge HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\nUpgrade: websocket\r\n"
+        "Connection: Upgrade\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
+        "Sec-WebSocket-Version: 13\r\n\r\n".encode()
+    )
+    answer = b""
+    while b"\r\n\r\n" not in answer:
+        answer += stranger.recv(1)
+    stranger.sendall(bytes([0x80 | Opcode.TEXT, 0xFF]) + struct.pack(">Q", size) + bytes(4))
+    return stranger
+
+
+def push(stranger, size):
+    """Sends as much as the server takes within a moment."""
+    stranger.settimeout(0.2)
+    rest = memoryview(bytes(size))
+    with suppress(OSError):
+        while rest:
+            rest = rest[stranger.send(rest) :]
+
+
+def serves(server):
+    if isinstance(server, RosTcpEndpoint):
+        with socket.create_connection(("127.0.0.1", server.port), 60.0) as client:
+            told = json.dumps({}).encode()
+            name = b"__topic_list"
+            lengths = struct.pack("<I", len(name)), struct.pack("<I", len(told))
+            client.sendall(b"".join((lengths[0], name, lengths[1], told)))
+            return bool(client.recv(1))
+    with connect(f"ws://127.0.0.1:{server.port}/rosbridge") as client:
+        client.send('{"op": "call_service", "service": "/nobody", "id": "1"}')
+        return "nobody" in client.recv(60.0)
+
+
+def test_many_clients_share_one_account(server, small_account):
+    with ExitStack() as strangers:
+        for _ in range(12):
+            stranger = strangers.enter_context(begin(server, 9 * MB))
+            push(stranger, 3 * MB)
+            assert small_account.num_bytes < 8 * MB + 12 * PIECE
+        until(lambda: small_account.num_bytes > 4 * MB)
+        assert serves(server)
+    until(lambda: small_account.num_bytes == 0)
+
+
+def test_many_clients_are_read_in_turns(server, small_account):
+    """Each of them gets what it sends to the server, and others are answered meanwhile."""
+    with ExitStack() as strangers:
+        crowd = [strangers.enter_context(begin(server, MB // 4)) for _ in range(24)]
+        for stranger in crowd:
+            push(stranger, MB // 4 - 10)
+        until(lambda: small_account.num_bytes > 5 * MB)
+        assert small_account.is_crowded
+        assert serves(server)
+        for stranger in crowd:
+            stranger.settimeout(60.0)
+            stranger.sendall(bytes(10))
+        until(lambda: small_account.num_bytes == 0)
+        assert serves(server)
+
+
+def test_a_lone_client_sends_its_large_message(server, small_account):
+    with begin(server, 7 * MB) as alone:
+        push(alone, 7 * MB - 10)
+        until(lambda: small_account.num_bytes > 6 * MB)
+        alone.settimeout(60.0)
+        alone.sendall(bytes(10))
+        until(lambda: small_account.num_bytes == 0)
+        assert serves(server)
+
+
+def test_messages_that_do_not_end_are_ended(server, monkeypatch, small_account):
+    monkeypatch.setattr(unfinished, "MAX_UNFINISHED_S", 0.3)
+    with begin(server, MB) as slow:
+        push(slow, MB // 2)
+        slow.settimeout(LONGEST_S)
+        with suppress(ConnectionError):
+            while slow.recv(4096):
+                pass
+        until(lambda: small_account.num_bytes == 0)
+    assert serves(server)
+
+
+# ------------------------------------------------------------------------- whole messages
+
+
+class Text(str):
+    """A text to which weak references are possible."""
+
+    __slots__ = ("__weakref__",)
+
+
+class Channel:
+    """A WebSocket of which messages are taken one by one."""
+
+    def __init__(self):
+        self.messages = asyncio.Queue()
+        self.taken = 0
+
+    async def recv(self):
+        message = await self.messages.get()
+        self.taken += 1
+        return message
+
+    async def send(self, message):
+        """Sends to nobody."""
+
+    async def close(self, code=1000, reason=""):
+        """Ends nothing."""
+
+
+class Peer:
+    """Counts what it receives in each round of the loop."""
+
+    authorized, congested, refused = True, False, None
+
+    def __init__(self, gateway):
+        session = gateway.open("peer")
+        self.reading, self.writing = session.reading, session.writing
+        self.close = session.close
+        self.received = 0
+
+    def receive(self, frame, now_s):
+        self.received += 1
+
+    def frames(self, now_s):
+        return iter(())
+
+    def due_s(self, now_s):
+        return None
+
+
+def serve_each(scene, count):
+    """Run `scene(channels, peers)` while the channels are served in one loop."""
+
+    async def run():
+        gateway = HandGraph().gateway
+        channels = [Channel() for _ in range(count)]
+        peers = [Peer(gateway) for _ in range(count)]
+        loop, bulk = asyncio.get_running_loop(), BulkTurns()
+        tasks = [
+            asyncio.create_task(converse(channel, Bell(loop), peer, bulk))
+            for channel, peer in zip(channels, peers, strict=True)
+        ]
+        await scene(channels, peers)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    asyncio.run(run())
+
+
+async def rounds_until(condition):
+    for _ in range(100_000):
+        if condition():
+            return
+        await asyncio.sleep(0)
+    raise AssertionError("the condition does not hold")
+
+
+def test_a_processed_message_is_freed_while_the_next_does_not_come():
+    async def scene(channels, peers):
+        message = Text("x" * MB)
+        alive = weakref.ref(message)
+        channels[0].messages.put_nowait(message)
+        del message
+        await rounds_until(lambda: peers[0].received == 1)
+        await rounds_until(lambda: alive() is None)
+
+    serve_each(scene, 1)
+
+
+def test_large_messages_of_many_are_processed_one_in_each_round():
+    async def scene(channels, peers):
+        await asyncio.sleep(0)
+        for channel in channels:
+            channel.messages.put_nowait("x" * (LARGE_BYTES + 1))
+        await rounds_until(lambda: all(channel.taken for channel in channels))
+        steps = []
+        while sum(peer.received for peer in peers) < len(peers):
+            before = sum(peer.received for peer in peers)
+            await asyncio.sleep(0)
+            steps.append(sum(peer.received for peer in peers) - before)
+        assert max(steps) == 1
+
+    serve_each(scene, 20)
