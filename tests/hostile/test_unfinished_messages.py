@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import socket
 import struct
 import sys
 import time
+import weakref
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import pytest
-from live_graph import LiveGraph
+from live_graph import HandGraph, LiveGraph
 from patient_websockets import connect
 from websockets.frames import Opcode
 
 from volery.bridges import unfinished
 from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
+from volery.bridges.rosbridge.bulk_turns import LARGE_BYTES, BulkTurns
 from volery.bridges.rosbridge.fragments import Assembly
 from volery.bridges.rosbridge.server import RosbridgeServer
+from volery.bridges.rosbridge.websocket_session import Bell, converse
 from volery.bridges.unfinished import SHARED, UnfinishedMessages
 from volery.core.errors import BridgeError
 from volery.runtime.idle_server import IdleServer
@@ -242,3 +246,108 @@ def test_messages_that_do_not_end_are_ended(server, monkeypatch, small_account):
                 pass
         until(lambda: small_account.num_bytes == 0)
     assert serves(server)
+
+
+# ------------------------------------------------------------------------- whole messages
+
+
+class Text(str):
+    """A text to which weak references are possible."""
+
+    __slots__ = ("__weakref__",)
+
+
+class Channel:
+    """A WebSocket of which messages are taken one by one."""
+
+    def __init__(self):
+        self.messages = asyncio.Queue()
+        self.taken = 0
+
+    async def recv(self):
+        message = await self.messages.get()
+        self.taken += 1
+        return message
+
+    async def send(self, message):
+        """Sends to nobody."""
+
+    async def close(self, code=1000, reason=""):
+        """Ends nothing."""
+
+
+class Peer:
+    """Counts what it receives in each round of the loop."""
+
+    authorized, congested, refused = True, False, None
+
+    def __init__(self, gateway):
+        session = gateway.open("peer")
+        self.reading, self.writing = session.reading, session.writing
+        self.close = session.close
+        self.received = 0
+
+    def receive(self, frame, now_s):
+        self.received += 1
+
+    def frames(self, now_s):
+        return iter(())
+
+    def due_s(self, now_s):
+        return None
+
+
+def serve_each(scene, count):
+    """Run `scene(channels, peers)` while the channels are served in one loop."""
+
+    async def run():
+        gateway = HandGraph().gateway
+        channels = [Channel() for _ in range(count)]
+        peers = [Peer(gateway) for _ in range(count)]
+        loop, bulk = asyncio.get_running_loop(), BulkTurns()
+        tasks = [
+            asyncio.create_task(converse(channel, Bell(loop), peer, bulk))
+            for channel, peer in zip(channels, peers, strict=True)
+        ]
+        await scene(channels, peers)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    asyncio.run(run())
+
+
+async def rounds_until(condition):
+    for _ in range(100_000):
+        if condition():
+            return
+        await asyncio.sleep(0)
+    raise AssertionError("the condition does not hold")
+
+
+def test_a_processed_message_is_freed_while_the_next_does_not_come():
+    async def scene(channels, peers):
+        message = Text("x" * MB)
+        alive = weakref.ref(message)
+        channels[0].messages.put_nowait(message)
+        del message
+        await rounds_until(lambda: peers[0].received == 1)
+        await rounds_until(lambda: alive() is None)
+
+    serve_each(scene, 1)
+
+
+def test_large_messages_of_many_are_processed_one_in_each_round():
+    async def scene(channels, peers):
+        await asyncio.sleep(0)
+        for channel in channels:
+            channel.messages.put_nowait("x" * (LARGE_BYTES + 1))
+        await rounds_until(lambda: all(channel.taken for channel in channels))
+        steps = []
+        while sum(peer.received for peer in peers) < len(peers):
+            before = sum(peer.received for peer in peers)
+            await asyncio.sleep(0)
+            steps.append(sum(peer.received for peer in peers) - before)
+        assert max(steps) == 1
+
+    serve_each(scene, 20)

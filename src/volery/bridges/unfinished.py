@@ -47,10 +47,10 @@ class UnfinishedMessages:
     def __init__(self, max_bytes: int = MAX_UNFINISHED_BYTES) -> None:
         self._max_bytes = max_bytes
         self._lock = threading.Lock()
-        self._shares: dict[UnfinishedShare, int] = {}
+        self._shares: dict[UnfinishedBytes, int] = {}
         """Bytes of each client that has some, in the order in which they began."""
         self._total = 0
-        self._waiting: dict[UnfinishedShare, None] = {}
+        self._waiting: dict[UnfinishedBytes, None] = {}
         self._freed = 0
         """Bytes freed since memory was returned to the system."""
         self._returned_s = 0.0
@@ -67,17 +67,17 @@ class UnfinishedMessages:
 
     def open(
         self, evict: Callable[[], None], resume: Callable[[], None] = lambda: None
-    ) -> UnfinishedShare:
+    ) -> UnfinishedBytes:
         """Returns the share of a client.
 
         evict: drops what the client has sent of its messages. resume: reads from the client again.
         Both may be called in any thread, and must not block.
         """
-        return UnfinishedShare(self, evict, resume)
+        return UnfinishedBytes(self, evict, resume)
 
-    def hold(self, share: UnfinishedShare, size: int, *, may_wait: bool) -> bool:
-        """Counts the bytes of a client; used by `UnfinishedShare`."""
-        evicted: list[UnfinishedShare] = []
+    def hold(self, share: UnfinishedBytes, size: int, *, may_wait: bool) -> bool:
+        """Counts the bytes of a client; used by `UnfinishedBytes`."""
+        evicted: list[UnfinishedBytes] = []
         with self._lock:
             before = self._set(share, size)
             has_room = self._total <= self._max_bytes or size <= before
@@ -100,7 +100,7 @@ class UnfinishedMessages:
             return_free_memory()
         return has_room
 
-    def _set(self, share: UnfinishedShare, size: int) -> int:
+    def _set(self, share: UnfinishedBytes, size: int) -> int:
         """Sets the bytes of a client, and returns those of before."""
         before = self._shares.get(share, 0)
         if size:
@@ -120,7 +120,7 @@ class UnfinishedMessages:
         self._freed, self._returned_s = 0, now_s
         return True
 
-    def _evict_beyond(self, part: int) -> list[UnfinishedShare]:
+    def _evict_beyond(self, part: int) -> list[UnfinishedBytes]:
         """Makes room: removes clients with more than an equal part, oldest messages first."""
         found = []
         for share, size in tuple(self._shares.items()):
@@ -131,7 +131,7 @@ class UnfinishedMessages:
                 found.append(share)
         return found
 
-    def _next_waiting(self) -> list[UnfinishedShare]:
+    def _next_waiting(self) -> list[UnfinishedBytes]:
         """Returns clients for which there is room again, in the order of waiting."""
         room = (self._max_bytes - self._total) // _READ_BYTES
         found = list(self._waiting)[:room] if room > 0 and self._waiting else []
@@ -144,7 +144,7 @@ SHARED = UnfinishedMessages()
 """The account of all servers of the process."""
 
 
-class UnfinishedShare:
+class UnfinishedBytes:
     """Share of one client, or of one kind of its messages, in the account."""
 
     def __init__(
