@@ -68,9 +68,10 @@ def packages(tmp_path_factory):
 def environment(packages, tmp_path_factory):
     """The `bin` folder of an environment that contains the wheel and its dependencies only."""
     folder = tmp_path_factory.mktemp("empty") / "env"
-    venv.create(folder, with_pip=True)
-    pip = [str(folder / "bin" / "python"), "-m", "pip", "install", "--quiet"]
-    subprocess.run([*pip, "--disable-pip-version-check", str(packages.wheel)], check=True)
+    venv.create(folder)
+    pip = [sys.executable, "-m", "pip", "--python", str(folder / "bin" / "python"), "--quiet"]
+    pip += ["--disable-pip-version-check", "install"]
+    subprocess.run([*pip, str(packages.wheel)], check=True)
     return folder / "bin"
 
 
