@@ -11,9 +11,8 @@ docs/api_stability.md names the public modules and how they may change.
 
 from __future__ import annotations
 
+import sys as _sys
 from importlib import import_module
-
-from volery.graph.nodes import late_imports as _late_imports
 
 TYPE_CHECKING = False
 """As in `typing`, whose import takes longer than the rest of this module."""
@@ -126,4 +125,22 @@ def __dir__() -> list[str]:
     return sorted({*globals(), *__all__, "__version__"})
 
 
-_late_imports.offer()
+class _LateFinder:
+    """Finds ROS's packages that nothing else provides: `from avoid import Avoid` in a script.
+
+    The file of a ROS 2 node is then imported before a scenario loads a node; see
+    `graph.nodes.imports`.
+    """
+
+    offers_ros = True
+
+    def find_spec(self, name: str, path: Any, target: Any = None) -> Any:
+        """Imports the stand-ins when the first of them is wanted, as the last of the finders."""
+        starts = ("rclpy", "message_filters", "sensor_msgs_py", "tf2_", "tf_transformations")
+        ends = ("_msgs", "_srvs", "_interfaces")
+        if "." in name or not (name.startswith(starts) or name.endswith(ends)):
+            return None
+        return import_module("volery.graph.nodes.imports").find_stand_in(name, path, target)
+
+
+_sys.meta_path.append(_LateFinder())

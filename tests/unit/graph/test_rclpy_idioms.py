@@ -11,6 +11,7 @@ import pytest
 from volery.core.errors import GraphError, NodeError
 from volery.graph.graph import Graph
 from volery.graph.messages import String, Transform, TransformStamped, Vector3, header
+from volery.graph.nodes import qos_events
 from volery.graph.nodes.node import Context
 from volery.graph.nodes.qos_events import PublisherEventCallbacks, SubscriptionEventCallbacks
 from volery.graph.nodes.rclpy_modules import Node, contents
@@ -25,6 +26,10 @@ TRIGGER = "std_srvs/srv/Trigger"
 @pytest.fixture
 def node():
     return Node("idioms", context=Context(Graph(lambda: 7), SimpleNamespace(), lambda: 7))
+
+
+def contents_of(module):
+    return {**contents(), **qos_events.contents()}[module]
 
 
 def receive(node, callback):
@@ -218,6 +223,16 @@ def test_events_that_never_occur_are_accepted_and_others_refused(node):
         PublisherEventCallbacks(matched=print)
 
 
+def test_services_are_not_introspected(node):
+    state = contents_of("rclpy.service_introspection")["ServiceIntrospectionState"]
+    client = node.create_client(TRIGGER, "ask")
+    service = node.create_service(TRIGGER, "ask", lambda request, response: response)
+    for each in (client, service):
+        each.configure_introspection(node.get_clock(), 10, state.OFF)
+        with pytest.raises(GraphError, match="no service events"):
+            each.configure_introspection(node.get_clock(), 10, state.CONTENTS)
+
+
 def test_a_script_imports_node_files_after_volery(tmp_path):
     """In a process of its own, with no ROS on the path."""
     (tmp_path / "avoid.py").write_text(
@@ -247,9 +262,9 @@ def test_a_script_imports_node_files_after_volery(tmp_path):
             raise AssertionError(name)
     """
     (tmp_path / "fly.py").write_text(textwrap.dedent(program))
-    subprocess.run([sys.executable, "fly.py"], check=True, timeout=120, cwd=tmp_path)
+    subprocess.run([sys.executable, "fly.py"], check=True, timeout=300, cwd=tmp_path)
 
 
 def test_other_missing_modules_stay_missing():
     program = "import volery, importlib.util as u; assert u.find_spec('my_msgs') is None"
-    subprocess.run([sys.executable, "-c", program], check=True, timeout=120)
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=300)

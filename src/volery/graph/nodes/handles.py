@@ -9,6 +9,7 @@ from volery.graph.codecs.cdr import decode_cdr
 from volery.graph.message_copies import message_checker, message_copier
 from volery.graph.messages import message_type
 from volery.graph.nodes.deferred_execution import DeferredExecutor
+from volery.graph.nodes.qos_events import configure_introspection
 from volery.graph.topics import Publisher, Subscription
 
 
@@ -111,6 +112,8 @@ class NodeService:
         self.srv_name = self.service_name = name
         self.srv_type = srv_type
         self._withdraw = withdraw
+
+    configure_introspection = staticmethod(configure_introspection)
 
     def destroy(self) -> None:
         """Destroys the service."""

@@ -20,11 +20,19 @@ from typing import Any
 
 from volery.core.errors import GraphError
 from volery.graph.messages import message_type
-from volery.graph.nodes import late_imports
-from volery.graph.nodes.late_imports import PYTHON_PACKAGES
 from volery.graph.typestore import typestore
 
 _KINDS = ("msg", "srv", "action")
+PYTHON_PACKAGES = (
+    "rclpy",
+    "message_filters",
+    "sensor_msgs_py",
+    "tf2_geometry_msgs",
+    "tf2_py",
+    "tf2_ros",
+    "tf_transformations",
+)
+"""Packages without message types; the stand-ins have the most usual parts of them."""
 
 
 class _Finder(MetaPathFinder):
@@ -92,9 +100,11 @@ def find_stand_in(
 
 def withdraw_ros_imports() -> None:
     """Removes the stand-ins from the import path; imported stand-ins remain usable."""
-    late_imports.withdraw()
-    if _FINDER in sys.meta_path:
-        sys.meta_path.remove(_FINDER)
+    sys.meta_path[:] = [
+        each
+        for each in sys.meta_path
+        if each is not _FINDER and not hasattr(each, "offers_ros")  # that of `import volery`
+    ]
     for name, module in list(sys.modules.items()):
         if isinstance(getattr(getattr(module, "__spec__", None), "loader", None), _Loader):
             del sys.modules[name]

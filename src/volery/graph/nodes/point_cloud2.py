@@ -121,10 +121,11 @@ def dtype_from_fields(fields: Iterable[Any], point_step: int | None = None) -> n
             offsets.append(field.offset + i * size)
     if len(set(names)) < len(names):
         raise ValueError(f"fields with the same name: {', '.join(names)}")
-    described: dict[str, Any] = {"names": names, "formats": formats, "offsets": offsets}
+    described: Any = {"names": names, "formats": formats, "offsets": offsets}
     if point_step is not None:
         described["itemsize"] = point_step
-    return np.dtype(described)
+    kind: np.dtype[np.void] = np.dtype(described)
+    return kind
 
 
 def create_cloud(

@@ -1,11 +1,13 @@
-"""Provides the contents of `rclpy.event_handler` and `rclpy.qos_overriding_options`.
+"""Provides the contents of `rclpy.event_handler` and other modules without effect in Volery.
 
-Inside the simulation no message is lost or late and no profiles disagree: no event occurs.
+Inside the simulation no message is lost or late and no profiles disagree: no event occurs. Services
+are not introspected.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from enum import IntEnum
 from typing import Any
 
 from volery.core.errors import GraphError
@@ -28,6 +30,20 @@ class PublisherEventCallbacks(_EventCallbacks):
 
 class SubscriptionEventCallbacks(_EventCallbacks):
     """See `rclpy.event_handler`."""
+
+
+class ServiceIntrospectionState(IntEnum):
+    """What a service or client would publish of its calls."""
+
+    OFF = 0
+    METADATA = 1
+    CONTENTS = 2
+
+
+def configure_introspection(_clock: Any, _qos_profile: Any, state: int) -> None:
+    """Accepts OFF. Raises `GraphError` for other states."""
+    if state != ServiceIntrospectionState.OFF:
+        raise GraphError("Volery publishes no service events: log the calls in the callback")
 
 
 class QosCallbackResult:
@@ -63,6 +79,7 @@ def contents() -> dict[str, dict[str, Any]]:
             "QoSSubscriptionMatchedInfo": object,
         },
         "rclpy.qos_event": callbacks,
+        "rclpy.service_introspection": {"ServiceIntrospectionState": ServiceIntrospectionState},
         "rclpy.qos_overriding_options": {
             "QosCallbackResult": QosCallbackResult,
             "QoSOverridingOptions": QoSOverridingOptions,

@@ -11,6 +11,7 @@ from volery.graph.codecs.zero import zero_message
 from volery.graph.graph import Graph
 from volery.graph.message_copies import copy_message
 from volery.graph.nodes.deferred_execution import DeferredExecutor
+from volery.graph.nodes.qos_events import configure_introspection
 from volery.graph.service_reply import ServiceReply
 
 Later = Callable[[Callable[[], None]], None]
@@ -118,6 +119,7 @@ class Client:
         return self.service
 
     service_name = srv_name
+    configure_introspection = staticmethod(configure_introspection)
 
     def service_is_ready(self) -> bool:
         """Returns whether the service has a server."""

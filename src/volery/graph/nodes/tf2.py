@@ -258,9 +258,9 @@ class Buffer:
             frame = self._frames[child] = _Frame(parent, is_static)
         frame.add(_Placement(stamp_of(transform), position, attitude / length))
         if self._waiting:
-            self._tell_waiting()
+            self._complete_waiting()
 
-    def _tell_waiting(self) -> None:
+    def _complete_waiting(self) -> None:
         """Completes the futures whose transform is there now."""
         ready = [wait for wait in self._waiting if self.can_transform(*wait[1:])]
         self._waiting = [wait for wait in self._waiting if wait not in ready]
