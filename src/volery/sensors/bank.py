@@ -163,6 +163,12 @@ class NoisyBank:
         self._switch_on(rows, time_ns)
 
 
+def saturate(readings: Array, full_scale: Array) -> None:
+    """Cuts `readings` (S, M) in place at the full scale (M,), inf without one, of each column."""
+    np.minimum(readings, full_scale, out=readings)
+    np.maximum(readings, -full_scale, out=readings)
+
+
 def uav_rows(sensors: Sequence[SensorId]) -> NDArray[np.int64]:
     """Returns the UAV of each sensor, (S,) rows of the fleet."""
     return np.array([sensor.uav for sensor in sensors], dtype=np.int64)

@@ -6,11 +6,12 @@ sea level is that of the scenario's origin plus z.
 
 from __future__ import annotations
 
-from typing import ClassVar
+import math
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import NonNegativeFloat, PositiveFloat
+from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from volery.control.fleet import Fleet
 from volery.core import atmosphere, rotations
@@ -23,7 +24,7 @@ from volery.sensors.samples import PressureSamples
 
 
 class BarometerModel(SensorModel):
-    """Noise and drift in Pa; see the data files in `models/`."""
+    """Noise, drift and range in Pa; see the data files in `models/`."""
 
     sensor_kind: ClassVar = "barometer"
 
@@ -32,6 +33,16 @@ class BarometerModel(SensorModel):
     drift_pa: NonNegativeFloat
     """Long-run standard deviation of the drift, Pa."""
     drift_correlation_s: PositiveFloat
+    range_min_pa: NonNegativeFloat = 0.0
+    """Lowest pressure that the sensor reports."""
+    range_max_pa: PositiveFloat | None = None
+    """Highest pressure that the sensor reports; None: unlimited."""
+
+    @model_validator(mode="after")
+    def _range_is_ordered(self) -> Self:
+        if self.range_max_pa is not None and not self.range_min_pa < self.range_max_pa:
+            raise ValueError("range_min_pa must be less than range_max_pa")
+        return self
 
 
 class BarometerBank(NoisyBank):
@@ -67,6 +78,8 @@ class BarometerBank(NoisyBank):
         noise = self._noise.measurement(k)
         pressure += self._drift + self._model.noise_pa * noise[:, 0]
         self._drift = self._wander.decay * self._drift + self._wander.step * noise[:, 1]
+        np.maximum(pressure, self._model.range_min_pa, out=pressure)
+        np.minimum(pressure, self._model.range_max_pa or math.inf, out=pressure)
         return PressureSamples(
             self.sensors,
             time_ns,

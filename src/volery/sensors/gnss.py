@@ -1,11 +1,14 @@
 """GNSS receivers: delayed fixes with noise and drift, lost where signals are denied.
 
 White noise and a Gauss-Markov drift of the position, white noise of the velocity: the model of
-PX4's Gazebo classic. The drift continues while a fix is lost.
+PX4's Gazebo classic. The drift continues while a fix is lost. Beyond its limits of altitude and
+speed a receiver has no fix; an acceleration beyond its limit ends the tracking of the satellites,
+so that the signals must be acquired again.
 """
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar
 
 import numpy as np
@@ -48,6 +51,12 @@ class GnssModel(SensorModel):
     vertical_velocity_noise_m_s: NonNegativeFloat
     reacquisition_s: NonNegativeFloat
     """Time from the return of the signals to the next fix."""
+    altitude_max_m: PositiveFloat | None = None
+    """Altitude above sea level up to which there is a fix; None: unlimited."""
+    speed_max_m_s: PositiveFloat | None = None
+    """Speed up to which there is a fix; None: unlimited."""
+    acceleration_max_m_s2: PositiveFloat | None = None
+    """Acceleration, mean from fix to fix, that tracking withstands; None: unlimited."""
 
 
 class GnssBank(NoisyBank):
@@ -59,7 +68,13 @@ class GnssBank(NoisyBank):
     """
 
     name = "gnss"
-    _SAVED = ("_drift", "_fix_from_ns", "_denied_from_ns", "_denied_until_ns")
+    _SAVED = (
+        "_drift",
+        "_fix_from_ns",
+        "_denied_from_ns",
+        "_denied_until_ns",
+        "_velocity_before",
+    )
 
     def __init__(
         self,
@@ -88,6 +103,11 @@ class GnssBank(NoisyBank):
             model.drift_correlation_s,
             group.schedule.period_ns / NS_PER_S,
         )
+        self._highest_m = (model.altitude_max_m or math.inf) - frame.altitude_m
+        self._fastest_m_s = model.speed_max_m_s or math.inf
+        period_s = group.schedule.period_ns / NS_PER_S
+        self._largest_change_m_s = (model.acceleration_max_m_s2 or math.inf) * period_s
+        self._velocity_before = np.full((len(group.sensors), 3), np.nan)
         self._drift = self._wander.sigma * self._noise.start()
         self._fix_from_ns = np.zeros(len(group.sensors), np.int64)
         self._denied_from_ns = np.full(len(group.sensors), FOREVER_NS)
@@ -96,7 +116,7 @@ class GnssBank(NoisyBank):
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> GnssSamples:
         """Returns fix number `k` of all receivers, in the map frame; see `Bank`."""
         position, velocity = _antennas(fleet.history, self._rows, self._lever_body, time_ns)
-        has_fix = self._acquire(time_ns, position)
+        has_fix = self._acquire(time_ns, position, velocity)
         noise = self._noise.measurement(k)
         position += self._drift + self._white * noise[:, :3]
         velocity += self._velocity_noise * noise[:, 3:6]
@@ -141,18 +161,22 @@ class GnssBank(NoisyBank):
         """Draws a new drift and provides a fix at once."""
         self._drift[rows] = (self._wander.sigma * self._noise.start())[rows]
         self._fix_from_ns[rows] = 0
+        self._velocity_before[rows] = np.nan
         self._denied_from_ns[rows] = FOREVER_NS
         self._denied_until_ns[rows] = FOREVER_NS
 
-    def _acquire(self, time_ns: int, position: Array) -> NDArray[np.bool_]:
+    def _acquire(self, time_ns: int, position: Array, velocity: Array) -> NDArray[np.bool_]:
         """Returns (S,) whether a receiver has a fix at `time_ns`; records lost fixes.
 
-        `position` (S, 3) m are the antennas' positions in the map frame.
+        `position` (S, 3) m and `velocity` (S, 3) m/s are those of the antennas in the map frame.
         """
-        denied = self._denial.covers(position)
-        denied |= (self._denied_from_ns <= time_ns) & (time_ns < self._denied_until_ns)
-        self._fix_from_ns[denied] = time_ns + self._reacquisition_ns
-        return np.asarray(~denied & (time_ns >= self._fix_from_ns))
+        lost = self._denial.covers(position)
+        lost |= (self._denied_from_ns <= time_ns) & (time_ns < self._denied_until_ns)
+        lost |= _norms(velocity - self._velocity_before) > self._largest_change_m_s
+        self._velocity_before = velocity.copy()
+        self._fix_from_ns[lost] = time_ns + self._reacquisition_ns
+        is_within = (position[:, 2] <= self._highest_m) & (_norms(velocity) <= self._fastest_m_s)
+        return np.asarray(~lost & is_within & (time_ns >= self._fix_from_ns))
 
 
 def _antennas(
@@ -175,3 +199,8 @@ def _places(
 
 def _east_north_up(horizontal: float, vertical: float) -> Array:
     return np.array([horizontal, horizontal, vertical])
+
+
+def _norms(vectors: Array) -> Array:
+    """Returns the lengths (S,) of `vectors` (S, 3)."""
+    return np.asarray(np.sqrt((vectors * vectors).sum(axis=1)))

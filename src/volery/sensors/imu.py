@@ -2,30 +2,31 @@
 
 White noise N / sqrt(dt); bias a first-order Gauss-Markov process with correlation time tau: b+ =
 exp(-dt/tau) b + sigma sqrt(tau/2 (1 - exp(-2 dt/tau))) n. A turn-on bias is drawn once and
-constant. A sensor may also warm up: a bias drawn once that decays as exp(-t / time constant).
+constant. A sensor may also warm up: a bias drawn once that decays as exp(-t / time constant). What
+the sensor reports, errors included, ends at its full scale on each axis.
 """
 
 from __future__ import annotations
 
 import math
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import NonNegativeFloat, PositiveFloat
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from volery.control.fleet import Fleet
 from volery.core.arrays import Array, read_only
 from volery.core.clock import NS_PER_S
-from volery.sensors.bank import NoisyBank, SensorGroup
-from volery.sensors.inertial_kernels import feel_motion
+from volery.sensors.bank import NoisyBank, SensorGroup, saturate
+from volery.sensors.inertial_kernels import GRAVITY, feel_motion
 from volery.sensors.model import SensorModel
 from volery.sensors.noise import gauss_markov
 from volery.sensors.samples import ImuSamples
 
 
 class ImuModel(SensorModel):
-    """Noise of an IMU; see the data files in `models/`."""
+    """Noise and ranges of an IMU; see the data files in `models/`."""
 
     sensor_kind: ClassVar = "IMU"
 
@@ -42,6 +43,10 @@ class ImuModel(SensorModel):
     """Standard deviation of a cold sensor's bias, in addition to the turn-on bias."""
     accel_warm_up_bias_m_s2: NonNegativeFloat = 0.0
     warm_up_time_constant_s: PositiveFloat = 60.0
+    gyro_range_rad_s: PositiveFloat | None = None
+    """Full scale of the gyroscope on each axis; None: unlimited."""
+    accel_range_m_s2: Annotated[float, Field(gt=GRAVITY)] | None = None
+    """Full scale of the accelerometer on each axis, more than gravity; None: unlimited."""
 
 
 class ImuBank(NoisyBank):
@@ -67,6 +72,9 @@ class ImuBank(NoisyBank):
         self._turn_on = _axes(model.gyro_turn_on_bias_rad_s, model.accel_turn_on_bias_m_s2)
         self._cold = _axes(model.gyro_warm_up_bias_rad_s, model.accel_warm_up_bias_m_s2)
         self._warm_up_s = model.warm_up_time_constant_s
+        self._full_scale = _axes(
+            model.gyro_range_rad_s or math.inf, model.accel_range_m_s2 or math.inf
+        )
         self._bias = np.zeros((count, 6))
         self._turn_on_bias = np.zeros((count, 6))
         self._warm_up_bias = np.zeros((count, 6))
@@ -97,6 +105,7 @@ class ImuBank(NoisyBank):
                 age_s = (time_ns - self._start_ns) / NS_PER_S
                 reading += self._warm_up_bias * np.exp(-age_s / self._warm_up_s)[:, None]
             self._bias = self._wander.decay * self._bias + self._wander.step * noise[:, 6:]
+        saturate(reading, self._full_scale)
         return ImuSamples(
             self.sensors,
             time_ns,

@@ -1,4 +1,4 @@
-"""Magnetometers: the earth's field in the sensor frame, iron, noise and a drifting bias."""
+"""Magnetometers: the field in the sensor frame, iron, noise, a drifting bias, full scale."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pydantic import NonNegativeFloat, PositiveFloat
 from volery.control.fleet import Fleet
 from volery.core.arrays import Array, read_only
 from volery.core.clock import NS_PER_S
-from volery.sensors.bank import NoisyBank, SensorGroup
+from volery.sensors.bank import NoisyBank, SensorGroup, saturate
 from volery.sensors.inertial_kernels import feel_vector
 from volery.sensors.model import SensorModel
 from volery.sensors.noise import gauss_markov
@@ -22,7 +22,7 @@ Row = tuple[float, float, float]
 
 
 class MagnetometerModel(SensorModel):
-    """Iron and noise; see the data files in `models/`."""
+    """Iron, noise and range; see the data files in `models/`."""
 
     sensor_kind: ClassVar = "magnetometer"
 
@@ -34,6 +34,8 @@ class MagnetometerModel(SensorModel):
     """Field of magnetised parts, T, in the sensor frame."""
     soft_iron: tuple[Row, Row, Row] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     """Distortion of the outer field by magnetisable parts, in the sensor frame."""
+    range_t: tuple[PositiveFloat, PositiveFloat, PositiveFloat] | None = None
+    """Full scale on each axis, T; None: unlimited."""
 
 
 class MagnetometerBank(NoisyBank):
@@ -56,6 +58,7 @@ class MagnetometerBank(NoisyBank):
         self._white = model.noise_density_t_sqrt_hz / math.sqrt(dt)
         self._wander = gauss_markov(model.random_walk_t_s_sqrt_hz, model.bias_correlation_s, dt)
         self._bias = np.zeros((len(group.sensors), 3))
+        self._full_scale = np.array(model.range_t or 3 * [math.inf])
 
     def sample(self, k: int, time_ns: int, fleet: Fleet) -> MagneticSamples:
         """Returns fields (S, 3) T in the sensor frames, of measurement `k`; see `Bank`."""
@@ -67,6 +70,7 @@ class MagnetometerBank(NoisyBank):
         noise = self._noise.measurement(k)
         field += self._bias + self._white * noise[:, :3]
         self._bias = self._wander.decay * self._bias + self._wander.step * noise[:, 3:]
+        saturate(field, self._full_scale)
         return MagneticSamples(
             self.sensors,
             time_ns,

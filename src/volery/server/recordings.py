@@ -128,7 +128,11 @@ def _version(path: Path) -> tuple[Path, int, int]:
 
 
 def _may_be_growing(path: Path) -> bool:
-    return time.time() - path.stat().st_mtime < _STILL_S  # its end would have to be searched for
+    """Returns whether a log has just changed: its end would have to be searched for.
+
+    A time far ahead is that of a clock that has been set back since.
+    """
+    return abs(time.time() - path.stat().st_mtime) < _STILL_S
 
 
 _durations = _Durations()

@@ -13,8 +13,10 @@ from volery.autonomy.avoidance.stop import Stop
 from volery.autonomy.coverage.flight import CoverageFlight
 from volery.autonomy.coverage.waypoints import WaypointProgress
 from volery.autonomy.perception.scan_points import OdometrySample
+from volery.autonomy.team.task_manager import TaskManager
+from volery.autonomy.team.team_state import MissionPhase
 from volery.graph.codecs.zero import zero_message
-from volery.graph.messages import CameraInfo, Image
+from volery.graph.messages import CameraInfo, Image, Twist, Vector3, message_type
 
 TICK_NS = 20_000_000
 BRAKES_M_S2 = 2.0
@@ -140,6 +142,51 @@ def test_a_depth_course_stops_before_it_lands(bench):
     assert flier.speed_at_landing < STILL_M_S
     assert node.phase is DepthCoursePhase.LAND
     assert 12.0 < flier.landed_at[0] < 12.0 + 4.0**2 / BRAKES_M_S2
+
+
+class Searcher(Flier):
+    """Rises by `take_off_to` and flies to goals at 4 m/s, which it passes before it turns back."""
+
+    def __init__(self, bench):
+        super().__init__(bench)
+        self._goals = bench.listen("/uav1/planning/goal")
+        bench.graph.create_service(
+            "/uav1/take_off_to", "volery_interfaces/srv/TakeOffTo", self._rise
+        )
+
+    def _rise(self, request):
+        self.flies, self.height = True, request.altitude
+        return message_type("volery_interfaces/srv/TakeOffTo_Response")(True, "")
+
+    def tick(self):
+        if self.flies:
+            wanted = np.array([0.0, 0.0, 2.0 * (self.height - self.position[2])])
+            if self._goals:
+                goal = self._goals[-1].pose.position
+                way = np.array([goal.x, goal.y]) - self.position[:2]
+                wanted[:2] = way * min(2.0, 4.0 / max(float(np.hypot(*way)), 1e-9))
+            x, y, z = map(float, np.clip(wanted, -4.0, 4.0))
+            self._commands.append(Twist(Vector3(x, y, z), Vector3(0.0, 0.0, 0.0)))
+        super().tick()
+
+
+def test_a_task_manager_stops_over_home_before_it_lands(bench):
+    """The way home leads past it at 4 m/s: no place to be told to land."""
+    node = bench.start(TaskManager, area_m=[20.0, -10.0, 40.0, 10.0], gather_s=1.0)
+    searcher = Searcher(bench)
+    while node.phase is not MissionPhase.SEARCH and bench.now_ns < 60e9:
+        searcher.tick()
+    searcher.position[:2] = [20.0, 0.0]
+    bench.call("/uav1/task_manager/return_home")
+    passed = False
+    while searcher.landed_at is None and bench.now_ns < 200e9:
+        searcher.tick()
+        speed, away = np.hypot(*searcher.velocity[:2]), np.hypot(*searcher.position[:2])
+        passed = passed or (away < 1.5 and speed > 2.0)
+    assert passed
+    assert searcher.speed_at_landing < STILL_M_S
+    assert node.phase is MissionPhase.LAND
+    assert np.hypot(*searcher.landed_at[:2]) < 1.5
 
 
 def test_a_covered_area_is_left_standing():

@@ -31,6 +31,8 @@ _STAMP_AND_HASH, _HASH = 12, 6
 _SECOND = 0xFD
 """Start of a frame of MAVLink 2."""
 _log = logging.getLogger(__name__)
+_WALL_S = time.time() - time.monotonic()
+"""UNIX time of the monotonic clock's zero, as the wall clock had it at the start."""
 
 
 def key_of(path: Path) -> bytes:
@@ -47,6 +49,15 @@ def key_of(path: Path) -> bytes:
     return hashlib.sha256(text.encode()).digest()
 
 
+def steady_time() -> float:
+    """Returns UNIX time, s, by the wall clock's reading at the start and the time elapsed since.
+
+    A wall clock that is set back would make old frames fresh again, one that is set forward refuse
+    honest ones. Where it was wrong at the start, stamps follow the newest that is received.
+    """
+    return _WALL_S + time.monotonic()
+
+
 class Signing:
     """Signs frames sent over one link and checks received ones; without a key all frames pass.
 
@@ -54,7 +65,7 @@ class Signing:
     """
 
     def __init__(
-        self, key: bytes | None, link: int = 0, clock: Callable[[], float] = time.time
+        self, key: bytes | None, link: int = 0, clock: Callable[[], float] = steady_time
     ) -> None:
         self._key = key
         self._link = link % 256

@@ -15,6 +15,7 @@ import {
   SRGBColorSpace,
   Vector3,
 } from "three";
+import { nowMs } from "../../lib/time.ts";
 import { link } from "../../link/link.ts";
 import type {
   visualization_msgs_Marker,
@@ -68,7 +69,7 @@ export class Markers implements Part {
               type === MANY
                 ? (message as visualization_msgs_MarkerArray).markers
                 : [message as visualization_msgs_Marker];
-            this.store.take(topic, list, Date.now());
+            this.store.take(topic, list, nowMs());
           },
           { depth: 20 },
         ),

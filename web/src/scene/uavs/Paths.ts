@@ -1,5 +1,5 @@
 import { Group } from "three";
-import { secondsOf } from "../../lib/time.ts";
+import { nowMs, secondsOf } from "../../lib/time.ts";
 import { link } from "../../link/link.ts";
 import type {
   geometry_msgs_PoseStamped,
@@ -127,7 +127,7 @@ function read(type: string, message: unknown): { points: Float64Array; untilMs: 
   }
   if (type === "geometry_msgs/msg/PoseStamped") {
     const { header, pose } = message as geometry_msgs_PoseStamped;
-    return { points: inMap(header.frame_id, [pose.position]), untilMs: Date.now() + 30_000 };
+    return { points: inMap(header.frame_id, [pose.position]), untilMs: nowMs() + 30_000 };
   }
   const { header, points } = message as trajectory_msgs_MultiDOFJointTrajectory;
   const places = points.flatMap(({ transforms }) =>
@@ -135,7 +135,7 @@ function read(type: string, message: unknown): { points: Float64Array; untilMs: 
   );
   const last = points.at(-1);
   const seconds = last === undefined ? 0 : secondsOf(last.time_from_start);
-  return { points: inMap(header.frame_id, places), untilMs: Date.now() + 1000 * (seconds + 5) };
+  return { points: inMap(header.frame_id, places), untilMs: nowMs() + 1000 * (seconds + 5) };
 }
 
 /** Three strokes through a goal. */
