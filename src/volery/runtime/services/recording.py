@@ -79,7 +79,9 @@ class RecordingServices:
         if self._folder is None:
             raise RecordingError("this simulation was started without a folder for recordings")
         if not name or plain(name) != name:
-            raise RecordingError("the path of a recording is empty or has control characters")
+            raise RecordingError(
+                "the path of a recording is empty, or not a path: it has control characters"
+            )
         folder = self._folder.resolve()
         path = (folder / name).resolve()
         if path == folder or not path.is_relative_to(folder):
