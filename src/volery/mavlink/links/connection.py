@@ -11,7 +11,7 @@ from volery.mavlink.links.signing import signing_of
 from volery.mavlink.links.vehicle_registry import VehicleRegistry
 
 _NOBODY = 0
-"""Hearer of frames for a vehicle that does not exist, so that they prove a client only once."""
+"""Recipient of frames for a vehicle that does not exist, so that they prove a client only once."""
 
 
 class MavlinkConnection:
@@ -52,11 +52,11 @@ class MavlinkConnection:
         for frame in filter(self._signing.is_genuine, frames):
             target = getattr(self._parser.decode(frame.data), "target_system", 0)
             addressed = self._systems if target == 0 else self._systems & {target}
-            hearers = self._signing.hearers(frame, addressed or {_NOBODY})
-            if not hearers:
+            recipients = self._signing.recipients(frame, addressed or {_NOBODY})
+            if not recipients:
                 continue
             self.has_spoken = True
-            chosen = addressed.intersection(hearers)
+            chosen = addressed.intersection(recipients)
             cost += max(0, len(chosen) - 1)
             for system in chosen:
                 parts.setdefault(system, []).append(frame.data)

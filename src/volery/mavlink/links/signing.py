@@ -92,7 +92,7 @@ class Signing:
 
     def accepts(self, frame: MavlinkFrame, vehicle: int = 0) -> bool:
         """Returns whether a received frame is valid, and new to a vehicle, by its system id."""
-        return self.is_genuine(frame) and bool(self.hearers(frame, (vehicle,)))
+        return self.is_genuine(frame) and bool(self.recipients(frame, (vehicle,)))
 
     def is_genuine(self, frame: MavlinkFrame) -> bool:
         """Returns whether a holder of the key sent a frame, now or earlier."""
@@ -105,7 +105,7 @@ class Signing:
             return self._refuse(frame, "its signature does not match the key")
         return True
 
-    def hearers(self, frame: MavlinkFrame, vehicles: Collection[int]) -> Collection[int]:
+    def recipients(self, frame: MavlinkFrame, vehicles: Collection[int]) -> Collection[int]:
         """Returns those of `vehicles` to which a genuine frame is new, and remembers its stamp."""
         if self._key is None or frame.message == _RADIO_STATUS:
             return vehicles
