@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from volery.core.compiled import cache_root
+from volery.core.private_folders import check_above
 from volery_benchmarks.peers.catalogue import Peer
 from volery_benchmarks.peers.failure import PeerError, last_line
 
@@ -34,6 +35,7 @@ def environment(peer: Peer, root: Path | None = None, timeout_s: float = INSTALL
     python = folder / "bin" / "python"
     try:
         root.mkdir(parents=True, exist_ok=True)
+        check_above(root.resolve())  # an environment is code
         with (root / f"{folder.name}.lock").open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)  # another bench may be installing the same
             if not (folder / _DONE).is_file():

@@ -46,8 +46,14 @@ class Origins:
         # server it connects to; if a token is required, a name is enough.
         return page == name_of(host) and (is_address(page) or self._token_needed)
 
-    def lists(self, host: str) -> bool:
-        """Returns whether a listed origin has this host, such as `studio.example.org:8443`."""
+    def knows(self, host: str) -> bool:
+        """Returns whether a client may call a server on loopback by this name, `Host`.
+
+        DNS rebinding: an attacker may let a host name point to 127.0.0.1; a page under that name
+        then has the same origin as this server. A token keeps it out as well.
+        """
+        if self._token_needed or name_of(host) in LOOPBACK:
+            return True
         return any(origin.partition("//")[2] == host for origin in self._listed)
 
 

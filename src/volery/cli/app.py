@@ -18,6 +18,7 @@ from volery.cli.node_logs import show_node_logs
 from volery.cli.options import PageCommand
 from volery.cli.radio_commands import comms, gcs
 from volery.cli.study_commands import sweep
+from volery.cli.terminal import echo_lines
 
 app = typer.Typer(
     name="volery",
@@ -47,7 +48,7 @@ def volery(
         from volery.cli.build_info import describe_build
 
         build = describe_build()
-        typer.echo(build.to_json() if as_json else str(build))
+        echo_lines(build.to_json() if as_json else str(build))
         raise typer.Exit
     if as_json:
         raise typer.BadParameter("needs --version", param_hint="--json")

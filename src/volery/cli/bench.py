@@ -13,11 +13,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import typer
-
 from volery.cli.build_info import describe_build
 from volery.cli.tables import print_table
+from volery.cli.terminal import echo_line
 from volery.core.errors import VoleryError
+from volery.core.whole_files import write_whole
 from volery_benchmarks.document import render
 from volery_benchmarks.registry import BENCHES, Result, find
 
@@ -47,14 +47,14 @@ def measure_and_show(
             results = [find(name).run(quick=quick, only=only)]
     document = _document(results) if name == "all" else results[0].as_dict()
     if as_json:
-        typer.echo(json.dumps(document))
+        echo_line(json.dumps(document))
     else:
         for result in results:
             _show(result)
     if out is not None:
-        out.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+        write_whole(out, json.dumps(document, indent=2) + "\n")
     if markdown is not None:
-        markdown.write_text(render(results), encoding="utf-8")
+        write_whole(markdown, render(results))
 
 
 def _document(results: Sequence[Result]) -> dict[str, Any]:
@@ -96,4 +96,4 @@ def _show(result: Result) -> None:
         rows.append((figure, f"{value:,.4g}", str(bound or ""), verdict))
     print_table((result.bench, "figure", "bound", ""), rows, right=(1, 2))
     for what, reason in result.failures.items():
-        typer.echo(f"not measured: {what}: {reason}")
+        echo_line(f"not measured: {what}: {reason}")

@@ -7,10 +7,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-import typer
-
 from volery.cli.bridge_checks import BUILT_IN, check_autopilots
 from volery.cli.flight import RunOptions
+from volery.cli.terminal import echo_line
 from volery.core.errors import BridgeError
 
 if TYPE_CHECKING:
@@ -68,7 +67,7 @@ def open_bridges(
     with BridgeHost(gateway) as bridges:
         for bridge in wanted:
             bridges.open(bridge)
-            typer.echo(f"open    {bridge.name}", err=True)
+            echo_line(f"open    {bridge.name}", err=True)
         gateway.use_low_latency()
         with _px4_instances(uavs or {}, wanted, options):
             yield
@@ -81,7 +80,7 @@ def _bridge_options(options: RunOptions) -> BridgeOptions:
         allow_remote=options.allow_remote,
         token=options.token,
         origins=options.origins,
-        report=lambda text: typer.echo(text, err=True),
+        report=lambda text: echo_line(text, err=True),
         domain_id=options.domain_id,
         interfaces=options.interfaces,
         mavlink_key=options.mavlink_key,
@@ -107,7 +106,7 @@ def _px4_instances(
     parameters = [parameters_for(uav.airframe) for uav in uavs.values()]
     bridge = next(bridge for bridge in bridges if isinstance(bridge, Px4Bridge))
     with Px4Instances(build, count, speed=options.speed, parameters=parameters) as instances:
-        typer.echo(f"started {build.binary}, instances 0 to {count - 1}", err=True)
+        echo_line(f"started {build.binary}, instances 0 to {count - 1}", err=True)
         end_s = time.monotonic() + _LONGEST_START_S
         while len(bridge.connected) < count:
             if instances.wait(_LOOK_S) or time.monotonic() > end_s:
@@ -117,7 +116,7 @@ def _px4_instances(
 
 def _missing(names: Iterable[str], bridge: Px4Bridge, instances: Px4Instances) -> str:
     """Returns an error text with the missing PX4s, their addresses and last output."""
-    return "\n".join(
+    return "\n  ".join(
         f"{uav}: PX4 {number} has not connected to {bridge.address(number)} within "
         f"{_LONGEST_START_S:g} s; last output:{instances.words_of(number) or ' nothing'}"
         for number, uav in enumerate(names)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import typer
-
 from volery.cli.flight import RunOptions
+from volery.cli.terminal import echo_line
 from volery.core.errors import ScenarioError
 
 if TYPE_CHECKING:
@@ -45,7 +44,7 @@ def recorded_scenario(flight: RecordedFlight, options: RunOptions) -> Scenario:
     origin = flight.origin
     if origin.version != __version__:
         text = f"the flight was recorded with Volery {origin.version}, this is {__version__}"
-        typer.echo(f"{text}: it may come out differently", err=True)
+        echo_line(f"{text}: it may come out differently", err=True)
     own = None
     if options.scenario != origin.name:
         own = load_scenario(options.scenario, trust=options.trust)

@@ -6,8 +6,7 @@ import asyncio
 import contextlib
 import signal
 
-import typer
-
+from volery.cli.terminal import echo_line
 from volery.comms.server.settings import RouterSettings
 from volery.comms.server.statistics import Statistics
 from volery.comms.server.tcp import CommsServer
@@ -37,7 +36,7 @@ async def _serve(server: CommsServer) -> None:
             continue  # `nohup`
         loop.add_signal_handler(number, end, number)
     await server.start()
-    typer.echo(f"open    {server.name}")
+    echo_line(f"open    {server.name}")
     said = ""
     try:
         while not ended.is_set():
@@ -45,7 +44,7 @@ async def _serve(server: CommsServer) -> None:
                 await asyncio.wait_for(ended.wait(), _TOLD_S)
             line = summary(server.statistics)
             if line != said:
-                typer.echo(line)
+                echo_line(line)
             said = line
     finally:
         await server.stop()

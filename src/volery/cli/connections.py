@@ -6,8 +6,7 @@ import time
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qs, urlsplit
 
-import typer
-
+from volery.cli.terminal import echo_line
 from volery.core.errors import BridgeError, UnreachableError
 
 if TYPE_CHECKING:
@@ -74,7 +73,7 @@ def await_link(via: str, name: str, timeout_s: float = TIMEOUT_S) -> GraphConnec
                 raise
             if not told:
                 told = True
-                typer.echo(f"{error}; waiting up to {timeout_s:.0f} s", err=True)
+                echo_line(f"{error}; waiting up to {timeout_s:.0f} s", err=True)
             time.sleep(_AGAIN_S)
 
 
@@ -103,7 +102,7 @@ class ConnectionOptions:
         if connected != self._was:
             self._was = connected
             what = "is connected again" if connected else "is disconnected; waiting for it"
-            typer.echo(f"the graph at {self._via} {what}", err=True)
+            echo_line(f"the graph at {self._via} {what}", err=True)
         return False
 
 

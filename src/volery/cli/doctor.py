@@ -9,8 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import typer
-
+from volery.cli.terminal import echo_line
 from volery.core.plurals import counted
 
 _PYTHON = (3, 11)
@@ -37,12 +36,12 @@ def examine() -> bool:
     fit = True
     for check in CHECKS:
         try:
-            typer.echo(f"ok    {check.name}: {check.examine()}")
+            echo_line(f"ok    {check.name}: {check.examine()}")
         except Exception as error:  # a broken installation may raise anything
             reason = str(error) if isinstance(error, UnfitError) else f"{error!r}"
             fit = fit and not check.essential
-            typer.echo(f"{'MEND' if check.essential else 'note'}  {check.name}: {reason}")
-    typer.echo("ready to fly" if fit else "not fit to fly: mend the lines marked MEND")
+            echo_line(f"{'MEND' if check.essential else 'note'}  {check.name}: {reason}")
+    echo_line("ready to fly" if fit else "not fit to fly: mend the lines marked MEND")
     return fit
 
 

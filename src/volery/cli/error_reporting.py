@@ -15,7 +15,9 @@ from typing import ParamSpec
 import typer
 
 from volery.cli.interrupt import StopSignals, stop_at_once, stopped_code
+from volery.cli.terminal import echo_line, echo_lines
 from volery.core.errors import VoleryError
+from volery.core.plain_text import plain_message
 
 P = ParamSpec("P")
 
@@ -31,6 +33,10 @@ class _Words(logging.Formatter):
         """Returns `warning: ...`, with the traceback if the record has one."""
         return f"{record.levelname.lower()}: {super().format(record)}"
 
+    def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - of the base class
+        """Returns the message without its traceback, as `complain` prints it."""
+        return plain_message(super().formatMessage(record))
+
 
 def word_logs() -> None:
     """Formats records of the package's loggers like messages of its commands."""
@@ -40,22 +46,22 @@ def word_logs() -> None:
 
 def complain(text: str) -> None:
     """Prints `error: ...` on stderr."""
-    typer.echo(f"error: {text}", err=True)
+    typer.echo(f"error: {plain_message(text)}", err=True)
 
 
 def complain_of(error: BaseException, text: str = "") -> None:
     """Prints an error and its location in the user's code; with `--traceback` all frames."""
     complain(text or str(error))
     if _shows_traceback.get():
-        typer.echo("".join(traceback.format_exception(error)).rstrip(), err=True)
+        echo_lines("".join(traceback.format_exception(error)).rstrip(), err=True)
         return
     for note in getattr(error, "__notes__", ()):
-        typer.echo(note, err=True)
+        echo_lines(note, err=True)
 
 
 def warn(text: str) -> None:
     """Prints `warning: ...` on stderr for a problem that does not end the command."""
-    typer.echo(f"warning: {text}", err=True)
+    typer.echo(f"warning: {plain_message(text)}", err=True)
 
 
 def _was_interrupted(error: BaseException | None) -> bool:
@@ -88,7 +94,7 @@ def guarded(command: Callable[P, None]) -> Callable[P, None]:
                 command(*arguments, **options)
         except (VoleryError, KeyboardInterrupt) as error:
             if _was_interrupted(error):
-                typer.echo("stopped", err=True)
+                echo_line("stopped", err=True)
                 raise typer.Exit(stopped_code()) from None
             complain_of(error)
             raise typer.Exit(USER_ERROR) from None

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 
-import typer
-
 from volery.cli.tables import print_table
+from volery.cli.terminal import echo_line
 
 
 def evaluate_and_show(
@@ -17,7 +16,7 @@ def evaluate_and_show(
 
     found = evaluate(policy, task=task, episodes=episodes, seed=seed, threads=threads)
     if as_json:
-        typer.echo(json.dumps(found.as_dict()))
+        echo_line(json.dumps(found.as_dict()))
         return
     interval = f"{found.success_low:.1%} to {found.success_high:.1%}"
     rows = [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import os
 import shutil
 import subprocess
 import sys
@@ -13,6 +14,7 @@ import typer
 
 from volery.cli.error_reporting import guarded
 from volery.cli.tables import print_table
+from volery.cli.terminal import echo_line
 from volery.core.errors import CommandError, VoleryError, reason_of
 
 
@@ -30,11 +32,11 @@ def examples(
             raise CommandError("--run needs the name of an example; `volery examples` lists them")
         rows = [(path.stem, _summary(path)) for path in all_examples()]
         print_table(("example", "what it does"), rows)
-        typer.echo("volery examples NAME copies one, volery examples NAME --run runs it", err=True)
+        echo_line("volery examples NAME copies one, volery examples NAME --run runs it", err=True)
         return
     path = find_example(name)
     if not run:
-        typer.echo(_copy(path, to))
+        echo_line(_copy(path, to))
         return
     if path.is_dir():
         raise CommandError(
@@ -88,7 +90,7 @@ def _summary(path: Path) -> str:
 
 def _copy(path: Path, folder: Path) -> str:
     target = folder / path.name
-    if target.exists():
+    if os.path.lexists(target):
         raise CommandError(f"{target}: exists already; choose another folder with --to")
     try:
         folder.mkdir(parents=True, exist_ok=True)

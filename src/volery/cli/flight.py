@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
 from volery.cli.error_reporting import USER_ERROR, complain, complain_of
 from volery.cli.interrupt import Interrupts, stopped_code, stopped_how
 from volery.cli.keyboard_control import steer
@@ -17,6 +15,7 @@ from volery.cli.keys import Keys
 from volery.cli.progress import FlightProgress
 from volery.cli.record_size import warn_of_size
 from volery.cli.start_conditions import DEFAULT_TIMEOUT_S, start_paused, wait_for_clients
+from volery.cli.terminal import echo_line
 from volery.core.errors import RecordingError, VoleryError
 from volery.core.plurals import counted
 
@@ -172,7 +171,7 @@ class CommandLineFlight:
         simulation = self._simulation
         if simulation.clock.quitting:
             return
-        typer.echo("the page stays open; Ctrl-C ends it", err=True)
+        echo_line("the page stays open; Ctrl-C ends it", err=True)
         try:
             with self._keys:
                 while not simulation.clock.quitting:
@@ -225,7 +224,7 @@ class CommandLineFlight:
                 machine=describe_machine(),
                 versions=describe_versions(),
             )
-            path = write_report(flight, self._options.report)
+            path = write_report(flight, self._options.report, overwrite=self._options.overwrite)
         except VoleryError as error:
             complain(str(error))
         self._progress.note("")
@@ -238,25 +237,23 @@ class CommandLineFlight:
         count = len(self._simulation.uavs)
         head = f"{problem}: flew" if problem else "Flew"
         since = " since the last reset" if self._before_s else ""
-        typer.echo(
+        echo_line(
             f"{head} {simulated:.1f} s{since} with {counted(count, 'UAV')} "
             f"in {self._wall_s:.1f} s ({factor:.1f} x real time){self._reason(problem)}"
         )
         city = self._simulation.world.city
         if city is not None:
-            typer.echo(f"  {city.report.summary()}")
+            echo_line(f"  {city.report.summary()}")
         events = [
             e
             for e in self._simulation.diagnostics.events
             if str(e.kind) in {"impact", "collision"} or e.detail == "battery empty"
         ]
         for event in events[:_CONTACTS_SHOWN]:
-            typer.echo(f"  {event.describe()}")
+            echo_line(f"  {event.describe()}")
         if len(events) > _CONTACTS_SHOWN:
             counts = Counter(event.uav for event in events)
-            typer.echo(
-                f"  and more: {len(events)} problems of {counted(len(counts), 'UAV')} in all"
-            )
+            echo_line(f"  and more: {len(events)} problems of {counted(len(counts), 'UAV')} in all")
 
     def _reason(self, problem: str) -> str:
         """Returns why a flight ended early without a signal or an error."""
@@ -272,9 +269,9 @@ class CommandLineFlight:
         if self._log is not None:
             size = self._log.path.stat().st_size / 1e6
             messages = counted(self._log.messages, "message")
-            typer.echo(f"log     {self._log.path} ({size:.1f} MB, {messages})")
+            echo_line(f"log     {self._log.path} ({size:.1f} MB, {messages})")
         if report is not None:
-            typer.echo(f"report  {report}")
+            echo_line(f"report  {report}")
         if self._options.digest:
-            typer.echo(f"digest  {self._simulation.diagnostics.digest()}")
-            typer.echo(f"topics  {self._simulation.diagnostics.digest(by_topic=True)}")
+            echo_line(f"digest  {self._simulation.diagnostics.digest()}")
+            echo_line(f"topics  {self._simulation.diagnostics.digest(by_topic=True)}")

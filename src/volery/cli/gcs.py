@@ -10,9 +10,8 @@ import time
 from pathlib import Path
 from typing import TextIO
 
-import typer
-
 from volery.cli.tables import print_table
+from volery.cli.terminal import echo_line, echo_lines
 from volery.comms.addresses import Identity
 from volery.comms.control_payloads import Refusal
 from volery.comms.protocol import StationFrame
@@ -21,6 +20,7 @@ from volery.comms.station.core import FATAL
 from volery.comms.station.ground_station import HEAD, HELP, GroundStation
 from volery.comms.station.tcp import Station
 from volery.core.errors import CommsError
+from volery.core.plain_text import plain
 
 _LEAVE_S = 2.0
 """Wall time for commands in transit after the last input line."""
@@ -117,11 +117,11 @@ class _Desk:
         if not word:
             return
         if word == "help":
-            typer.echo(HELP)
+            echo_lines(HELP)
         elif word == "list":
             print_table(HEAD, self.ground.rows(self._now_ns()), right=(4, 5, 6))
             if not self.ground.has_received:
-                typer.echo("no message of a UAV received so far")
+                echo_line("no message of a UAV received so far")
             sys.stdout.flush()
         else:
             try:
@@ -154,7 +154,8 @@ class _Desk:
         return self._clock_ns + time.monotonic_ns()
 
     def _print(self, line: str) -> None:
-        typer.echo(line)
+        line = plain(line)
+        echo_line(line)
         sys.stdout.flush()
         if self._log is not None:
             stamp = time.strftime("%Y-%m-%dT%H:%M:%S", time.gmtime())

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import typer
-
+from volery.cli.terminal import echo_line
 from volery.core.errors import VoleryError
 from volery.graph.codecs.interface_packages import (
     OWN,
@@ -22,15 +21,15 @@ def write_and_report(folder: Path, names: list[str], *, overwrite: bool, ros1: b
         raise VoleryError(f"{folder}: no such folder; create it with `mkdir -p {folder}`")
     wanted = list(dict.fromkeys(names)) or [OWN]
     for name in wanted:
-        typer.echo(write_package(name, folder, overwrite=overwrite, ros1=ros1))
+        echo_line(str(write_package(name, folder, overwrite=overwrite, ros1=ros1)))
     needed = sorted({other for name in wanted for other in needs(name, ros1=ros1)} - set(wanted))
     if needed:
-        typer.echo(f"needs   {', '.join(needed)}")
+        echo_line(f"needs   {', '.join(needed)}")
     ours = [name for name in needed if name in packages()]
     if ours:
-        typer.echo(
+        echo_line(
             f"Where your ROS {1 if ros1 else 2} lacks {' or '.join(ours)}: --package writes what "
             "Volery knows of it"
         )
     if ros1:
-        typer.echo(f"Without catkin: python3 {write_generator(folder)} makes Python modules")
+        echo_line(f"Without catkin: python3 {write_generator(folder)} makes Python modules")

@@ -8,9 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
-
 from volery.cli.connections import DEFAULT_VIA, ConnectionOptions, await_link, join_late
+from volery.cli.terminal import echo_line
 from volery.cli.trust import may_run_local_nodes
 from volery.core.errors import BridgeError
 from volery.scenario.access import ScenarioAccess
@@ -58,7 +57,7 @@ def launch_profile(
             for node in started:
                 host.announce(node.full_name)
             names = ", ".join(node.get_name() for node in started)
-            typer.echo(f"{names} run on {way}; Ctrl-C ends them", err=True)
+            echo_line(f"{names} run on {way}; Ctrl-C ends them", err=True)
             host.spin(ConnectionOptions(link, way))
         finally:
             for node in started:

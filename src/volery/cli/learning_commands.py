@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from volery.cli.error_reporting import guarded
+from volery.cli.terminal import echo_line
 
 _POLICY = typer.Argument(help="Shipped policy or .npz file.", metavar="POLICY")
 
@@ -86,4 +87,4 @@ def export_policy(
     """Export a policy as ONNX."""
     from volery.learning.training.onnx_export import export_onnx
 
-    typer.echo(export_onnx(policy, file))
+    echo_line(export_onnx(policy, file))

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from volery.cli.error_reporting import guarded, warn
+from volery.cli.terminal import echo_line
 
 
 @guarded
@@ -143,5 +144,5 @@ def report(
     for text in written.warnings:
         warn(text)
     if written.fit:
-        typer.echo(f"fit     {written.fit}")
-    typer.echo(f"report  {written.path}")
+        echo_line(f"fit     {written.fit}")
+    echo_line(f"report  {written.path}")

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import typer
-
 from volery.cli.error_reporting import complain, warn
 from volery.cli.tables import print_table
+from volery.cli.terminal import echo_line
 from volery.core.clock import NS_PER_S
+from volery.core.errors import RecordingError, reason_of
 from volery.core.plurals import counted
+from volery.core.whole_files import new_partial, put_in_place
 
 _FORMATS = {"mcap": "MCAP", "bag": "ROS 1 bag", "ros2bag": "ROS 2 bag", "ulog": "ULog"}
 _RECOVERED = ("mcap", "bag")
@@ -25,13 +26,13 @@ def show_log(path: Path) -> bool:
 
     summary = summarize_log(path)
     start, end = summary.start_ns / NS_PER_S, summary.end_ns / NS_PER_S
-    typer.echo(f"file      {path}")
-    typer.echo(f"format    {_FORMATS[summary.format]}, {summary.size_bytes / 1e6:.2f} MB")
-    typer.echo(f"duration  {summary.duration_s:.3f} s ({start:.3f} to {end:.3f} s)")
-    typer.echo(f"messages  {summary.messages:,}")
+    echo_line(f"file      {path}")
+    echo_line(f"format    {_FORMATS[summary.format]}, {summary.size_bytes / 1e6:.2f} MB")
+    echo_line(f"duration  {summary.duration_s:.3f} s ({start:.3f} to {end:.3f} s)")
+    echo_line(f"messages  {summary.messages:,}")
     rows = [(t.topic, t.msgtype, f"{t.messages:,}", f"{t.rate_hz:.1f} Hz") for t in summary.topics]
     if rows:
-        typer.echo("")
+        echo_line("")
         print_table(("topic", "type", "messages", "rate"), rows, right=(2, 3))
     if summary.problem:
         recovery = f"; `volery recover {path}` writes what is readable"
@@ -46,12 +47,12 @@ def recover_log(path: Path, out: Path | None) -> None:
     from volery.bridges.logs.recovery import recover
 
     if out is None and not summarize(path).problem:
-        typer.echo(f"{path} is whole: nothing to recover")
+        echo_line(f"{path} is whole: nothing to recover")
         return
     recovery = recover(path, out)
     if recovery.problem:
-        typer.echo(f"{path}: {recovery.problem}")
-    typer.echo(
+        echo_line(f"{path}: {recovery.problem}")
+    echo_line(
         f"{counted(recovery.messages, 'message')} up to {recovery.end_ns / NS_PER_S:.3f} s "
         f"written to {recovery.path}"
     )
@@ -66,12 +67,14 @@ def convert_log(path: Path, out: Path, layout: Path, *, overwrite: bool) -> None
 
     check_target(out, overwrite=overwrite)
     scans = TextScans(path, load_data_file(layout, TextLayout))
-    made = out.with_name(f".{out.stem}.part{out.suffix}")
-    log = create_log(made, overwrite=True)
+    made = new_partial(out, out.suffix)
+    log = create_log(made)
     try:
         scans.write_to(log)
         log.close()
-        made.replace(out)
+        put_in_place(made, out, overwrite=overwrite)
+    except OSError as error:
+        raise RecordingError(f"{out}: cannot be written: {reason_of(error)}") from None
     finally:
         log.close()
         made.unlink(missing_ok=True)
@@ -79,6 +82,6 @@ def convert_log(path: Path, out: Path, layout: Path, *, overwrite: bool) -> None
         warn(f"{path}: {counted(scans.left_out, 'line')} left out; {scans.problem}")
     for doubt in scans.doubts:
         warn(f"{path}: {doubt}")
-    typer.echo(
+    echo_line(
         f"{counted(scans.scans, 'scan')}, {counted(log.messages, 'message')} written to {out}"
     )

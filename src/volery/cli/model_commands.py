@@ -9,7 +9,9 @@ import typer
 
 from volery.cli.error_reporting import guarded
 from volery.cli.tables import print_table
+from volery.cli.terminal import echo_line
 from volery.core.errors import VoleryError
+from volery.core.whole_files import write_whole
 
 
 @guarded
@@ -27,7 +29,7 @@ def identify(
     if not out.parent.is_dir():
         raise VoleryError(f"{out}: folder {out.parent} does not exist")
     model = identification.identify(load_airframe(airframe), 1 if order == 1 else 2)
-    out.write_text(identification.to_toml(model), encoding="utf-8")
+    write_whole(out, identification.to_toml(model))
     errors = model.fit_error.model_dump() if model.fit_error else {}
     rows = [(name, f"{value:.4g}") for name, value in errors.items()]
     print_table((str(out), "error (root mean square)"), rows, right=(1,))
@@ -53,7 +55,7 @@ def export(
     if detail not in list(DetailLevel):
         raise VoleryError(f"--detail must be one of {', '.join(DetailLevel)} (found {detail!r})")
     size = export_world(load_scenario(scenario), file, detail=DetailLevel(detail))
-    typer.echo(f"{file} ({size / 1e6:.1f} MB)")
+    echo_line(f"{file} ({size / 1e6:.1f} MB)")
 
 
 @guarded
@@ -92,4 +94,4 @@ def schema(
         typer.echo(schema_text(), nl=False)
         return
     write_schema(out)
-    typer.echo(str(out))
+    echo_line(str(out))

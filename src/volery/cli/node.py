@@ -10,11 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
 from volery.cli.connections import DEFAULT_VIA, ROS2_WAYS, ConnectionOptions, await_link, join_late
 from volery.cli.error_reporting import warn
 from volery.cli.graph_queries import topic_types
+from volery.cli.terminal import echo_line
 from volery.cli.yaml_codec import from_yaml
 from volery.core.errors import BridgeError, VoleryError
 
@@ -81,7 +80,7 @@ def run_node(options: NodeOptions) -> None:
             if options.lock_step_s is not None:
                 host.join_lock_step(node.get_name(), options.lock_step_s)
             host.announce(node.full_name)
-            typer.echo(f"{node.get_name()} runs on {via}; Ctrl-C ends it", err=True)
+            echo_line(f"{node.get_name()} runs on {via}; Ctrl-C ends it", err=True)
             _check_namespace(link, namespace)
             host.spin(ConnectionOptions(link, via))
         finally:

@@ -6,6 +6,7 @@ import logging
 
 import typer
 
+from volery.core.plain_text import plain_message
 from volery.graph.nodes import PYTHON_LOGGER
 
 _LEVELS = {logging.WARNING: "WARN", logging.CRITICAL: "FATAL"}
@@ -18,7 +19,8 @@ class _Terminal(logging.Handler):
         """Implements `logging.Handler`."""
         level = _LEVELS.get(record.levelno, record.levelname)
         time, node = getattr(record, "node_time", ""), getattr(record, "node", record.name)
-        typer.echo(f"[{level}] [{time}] [{node}]: {record.getMessage()}", err=True)
+        text = f"[{level}] [{time}] [{node}]: {record.getMessage()}"
+        typer.echo(plain_message(text), err=True)
 
 
 def show_node_logs() -> None:

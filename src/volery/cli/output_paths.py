@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 from pathlib import Path
 
@@ -13,17 +14,18 @@ def check_record(path: Path, *, overwrite: bool) -> None:
     from volery.bridges.logs.log_writer import check_target
 
     check_target(path, overwrite=True)
-    if path.exists() and not overwrite:
+    if os.path.lexists(path) and not overwrite:
         raise RecordingError(f"{path}: exists already; choose another name or give --overwrite")
     _check_parent(path, "the log")
 
 
-def check_report(folder: Path) -> None:
-    """Raises `VoleryError` if no report can be written into a folder."""
-    from volery.report.page import check_folder
+def check_report(folder: Path, *, overwrite: bool) -> None:
+    """Raises `VoleryError` if no report can be written into a folder, or it holds one already."""
+    from volery.report.page import check_target
 
     _check_parent(folder, "the report")
-    check_folder(folder)
+    check_folder(folder, "the report")
+    check_target(folder, overwrite=overwrite)
 
 
 def check_folder(folder: Path, what: str) -> None:

@@ -9,10 +9,9 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import typer
-
 from volery.cli.error_reporting import warn
 from volery.cli.flight import RunOptions
+from volery.cli.terminal import echo_line
 from volery.core.errors import CommandError
 
 if TYPE_CHECKING:
@@ -65,7 +64,7 @@ def serving(settings: PageSettings, shelf: ScenarioCatalog | None = None) -> Ite
 
     with PageServer(settings, shelf) as server:
         needed = "  (needs the token)" if settings.tokens.needed else ""
-        typer.echo(f"page    {server.url}{needed}", err=True)
+        echo_line(f"page    {server.url}{needed}", err=True)
         if not is_built():
             warn("the page is not built: run `make web`; the other addresses work")
         yield Page(server)
@@ -95,7 +94,7 @@ def usual_port(host: str) -> int:
 
     if not _is_taken(host, DEFAULT_PORT):
         return DEFAULT_PORT
-    typer.echo(f"port {DEFAULT_PORT} is taken; the page takes a free one", err=True)
+    echo_line(f"port {DEFAULT_PORT} is taken; the page takes a free one", err=True)
     return 0
 
 

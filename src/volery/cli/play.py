@@ -6,13 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
 from volery.cli.bridges import open_bridges
 from volery.cli.flight import RunOptions
 from volery.cli.interrupt import Interrupts, stopped_how
 from volery.cli.keyboard_control import steer
 from volery.cli.keys import Keys
+from volery.cli.terminal import echo_line
 from volery.core.plurals import counted
 
 if TYPE_CHECKING:
@@ -48,7 +47,7 @@ def play(
     ):
         interrupts.be_gentle()
         if problem:
-            typer.echo(f"{log}: {problem}", err=True)
+            echo_line(f"{log}: {problem}", err=True)
         _introduce(player)
         with (
             open_bridges(player.gateway, replace(options, bridges=options.bridges or _BRIDGES)),
@@ -67,7 +66,7 @@ def play(
             try:
                 player.run(on_progress=look)
             except _StoppedError:
-                typer.echo(f"Stopped {stopped_how()} at {player.time_s:.3f} s", err=True)
+                echo_line(f"Stopped {stopped_how()} at {player.time_s:.3f} s", err=True)
 
 
 def _introduce(player: LogPlayer) -> None:
@@ -75,7 +74,7 @@ def _introduce(player: LogPlayer) -> None:
     what = f", a flight of '{told['scenario']}'" if told["scenario"] else ""
     span = f"{player.start_s:.3f} to {player.end_s:.3f} s"
     messages = counted(sum(told["counts"]), "message")
-    typer.echo(f"playing {player.path} ({span}, {messages}{what})", err=True)
+    echo_line(f"playing {player.path} ({span}, {messages}{what})", err=True)
     if told["problem"]:
         mend = f"`volery recover {player.path}` writes what is readable"
-        typer.echo(f"        {told['problem']}; {mend}", err=True)
+        echo_line(f"        {told['problem']}; {mend}", err=True)

@@ -6,7 +6,8 @@ import sys
 import time
 from typing import Any
 
-import typer
+from volery.cli.terminal import echo_line
+from volery.core.plain_text import plain
 
 _PLAIN_PERIOD_S = 10.0
 
@@ -15,7 +16,7 @@ class FlightProgress:
     """Shows simulated time and real-time factor during a flight."""
 
     def __init__(self, name: str, duration_s: float) -> None:
-        self._name = name
+        self._name = plain(name)
         self._duration_s = duration_s
         self._bar: Any = None
         self._task: Any = None
@@ -42,7 +43,7 @@ class FlightProgress:
                 state="building the world; a first run compiles its kernels",
             )
         elif not _has_kernels():
-            typer.echo(f"{self._name}: compiling; later runs start at once")
+            echo_line(f"{self._name}: compiling; later runs start at once")
         return self
 
     def __exit__(self, *_exception: object) -> None:
@@ -59,12 +60,12 @@ class FlightProgress:
             self._bar.update(self._task, completed=time_s, state=state)
         elif changed or time.monotonic() - self._shown_at > _PLAIN_PERIOD_S:
             self._shown_at = time.monotonic()
-            typer.echo(f"{self._name}: {state}")
+            echo_line(f"{self._name}: {state}")
 
     def note(self, text: str) -> None:
         """Shows what is done after the flight; an empty text removes the note."""
         if sys.stdout.isatty():
-            sys.stdout.write(f"\r\x1b[2K{text}")
+            sys.stdout.write(f"\r\x1b[2K{plain(text)}")
             sys.stdout.flush()
 
     def finish(self, time_s: float) -> None:

@@ -8,9 +8,8 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
-import typer
-
 from volery.cli.interrupt import StopSignals
+from volery.cli.terminal import echo_line
 from volery.core.errors import BridgeError
 from volery.mavlink.hil.px4_parameters import Px4Airframe, Px4Rotor, px4_parameters
 from volery.mavlink.hil.px4_processes import Px4Instances, find_px4
@@ -57,7 +56,7 @@ def run_px4(
         ) as instances,
     ):
         last = first + count - 1
-        typer.echo(f"started {build.binary}, instances {first} to {last}; Ctrl-C ends them")
+        echo_line(f"started {build.binary}, instances {first} to {last}; Ctrl-C ends them")
         while not ended.is_set() and not instances.wait(_LOOK_S):
             pass
         if instances.failure is not None:

@@ -7,8 +7,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import typer
-
 from volery.cli.bridge_checks import check_bridges, token_gaps
 from volery.cli.bridges import fit_out, open_bridges
 from volery.cli.command_replay import recorded_flight, recorded_scenario
@@ -18,6 +16,7 @@ from volery.cli.interrupt import Interrupts, stopped_code, stopped_how
 from volery.cli.output_paths import check_record, check_report
 from volery.cli.pages import Page, page_of
 from volery.cli.progress import FlightProgress
+from volery.cli.terminal import echo_line
 from volery.cli.trust import with_trust
 from volery.core.allocator import return_large_blocks
 from volery.core.collector import spared_objects
@@ -68,7 +67,7 @@ def fly(options: RunOptions) -> int:
         except KeyboardInterrupt:
             if interrupts.gentle:
                 raise
-            typer.echo(f"Stopped {stopped_how()} before the flight began", err=True)
+            echo_line(f"Stopped {stopped_how()} before the flight began", err=True)
             return stopped_code()
         return code
 
@@ -82,7 +81,7 @@ def _build_and_fly(options: RunOptions, interrupts: Interrupts, page: Page) -> t
     if options.record is not None:
         check_record(options.record, overwrite=options.overwrite)
     if options.report is not None:
-        check_report(options.report)
+        check_report(options.report, overwrite=options.overwrite)
     threads = _THREADS if options.threads is None else options.threads
     change = _Change(options)
     page.building(scenario)
@@ -113,7 +112,7 @@ def _wait_for_world(options: RunOptions, interrupts: Interrupts, page: Page) -> 
 
     change = _Change(options)
     idle = IdleServer(change.ask)
-    typer.echo("no world is loaded; load one with /load_world; Ctrl-C exits", err=True)
+    echo_line("no world is loaded; load one with /load_world; Ctrl-C exits", err=True)
     with open_bridges(idle.gateway, options), page.showing(idle):
         while not (change.asked or idle.quitting or interrupts.pressed):
             idle.wait(_GLANCE_S)

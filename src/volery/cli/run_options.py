@@ -51,7 +51,7 @@ Report = Annotated[Path | None, file_option(help="Write an illustrated report in
 RecordingsDir = Annotated[
     Path | None, file_option(help="Let clients record into this folder (/volery/start_recording).")
 ]
-Overwrite = Annotated[bool, file_option("--overwrite", help="Replace an existing log.")]
+Overwrite = Annotated[bool, file_option("--overwrite", help="Replace an existing log or report.")]
 Digest = Annotated[
     bool,
     file_option(

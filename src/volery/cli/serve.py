@@ -9,14 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
 from volery.cli.bridge_checks import check_bridges, token_gaps
 from volery.cli.bridges import fit_out, open_bridges
 from volery.cli.error_reporting import complain_of, warn
 from volery.cli.flight import RunOptions
 from volery.cli.interrupt import Interrupts
 from volery.cli.pages import Page, serving
+from volery.cli.terminal import echo_line
 from volery.cli.trust import with_trust
 from volery.core.allocator import return_large_blocks
 from volery.core.collector import spared_objects
@@ -70,7 +69,7 @@ def serve(options: ServeOptions) -> None:
         host = _Host(options, page, interrupts, _Wish(first, options.first.speed, shelf))
         while host.goes_on:
             host.go_on()
-    typer.echo("the server has stopped", err=True)
+    echo_line("the server has stopped", err=True)
 
 
 class _Wish:
@@ -170,7 +169,7 @@ class _Host:
             bridges = open_bridges(simulation.gateway, first, simulation.uavs)
             with spared_objects(), bridges, shown:
                 self._problem = ""
-                typer.echo(f"flying  {scenario.name}", err=True)
+                echo_line(f"flying  {scenario.name}", err=True)
                 self._stay(simulation)
             self._quits = simulation.clock.quitting and not self._wish.asked
 
@@ -190,7 +189,7 @@ class _Host:
             shown = page.showing(player, self._problem, player.name)
             with spared_objects(), open_bridges(player.gateway, first), shown:
                 self._problem = ""
-                typer.echo(f"playing {log.name}", err=True)
+                echo_line(f"playing {log.name}", err=True)
                 while not (self._wish.asked or player.quitting or self._interrupts.pressed):
                     player.wait(_GLANCE_S)
                 player.wait(_FAREWELL_S)
@@ -224,7 +223,7 @@ class _Host:
         idle = IdleServer(self._wish.ask, self._wish.shelf)
         bridges = open_bridges(idle.gateway, self._options.first)
         with bridges, self._page.showing(idle, self._problem):
-            typer.echo("no world is loaded", err=True)
+            echo_line("no world is loaded", err=True)
             self._problem = ""
             while not (self._wish.asked or idle.quitting or self._interrupts.pressed):
                 idle.wait(_GLANCE_S)

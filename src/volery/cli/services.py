@@ -5,10 +5,9 @@ from __future__ import annotations
 from contextlib import closing
 from typing import Any
 
-import typer
-
 from volery.cli.connections import open_link
 from volery.cli.graph_queries import service_names, type_of_service
+from volery.cli.terminal import echo_line, echo_lines
 from volery.cli.yaml_codec import read_message, to_yaml
 from volery.core.errors import BridgeError
 from volery.graph.connection import call_and_wait
@@ -20,13 +19,13 @@ def list_services(via: str, *, types: bool) -> None:
     """Prints the services, one per line."""
     with closing(open_link(via, "volery_service_list")) as link:
         for service in service_names(link):
-            typer.echo(f"{service} [{type_of_service(link, service)}]" if types else service)
+            echo_line(f"{service} [{type_of_service(link, service)}]" if types else service)
 
 
 def show_type(via: str, service: str) -> None:
     """Prints a service's type."""
     with closing(open_link(via, "volery_service_type")) as link:
-        typer.echo(type_of_service(link, service))
+        echo_line(type_of_service(link, service))
 
 
 def call(via: str, service: str, values: str | None, *, timeout_s: float) -> None:
@@ -38,7 +37,7 @@ def call(via: str, service: str, values: str | None, *, timeout_s: float) -> Non
         srvtype = type_of_service(link, service)
         request = read_message(values or "{}", f"{srvtype}_Request")
         response = call_and_wait(link, service, request, timeout_s)
-    typer.echo(to_yaml(response, whole=True) or "(an empty response)")
+    echo_lines(to_yaml(response, whole=True) or "(an empty response)")
     reason = refusal_of(response)
     if reason is not None:
         raise BridgeError(f"{service} refuses: {reason or 'no reason given'}")

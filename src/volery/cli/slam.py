@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
 from volery.cli.error_reporting import warn
 from volery.cli.output_paths import check_folder
+from volery.cli.terminal import echo_line
 from volery.core.errors import RecordingError, VoleryError
 from volery.core.plurals import counted
+from volery.core.whole_files import write_whole
 
 if TYPE_CHECKING:
     from volery.runtime.replay.slam.initial_pose import Pose
@@ -80,7 +80,7 @@ def map_log(asked: SlamArguments) -> None:
     )
     run = _run(source, options)
     others = other_uavs(source.topics, run.channels.uav)
-    typer.echo(f"mapping {asked.log}{_beginning(run.start, start)}", err=True)
+    echo_line(f"mapping {asked.log}{_beginning(run.start, start)}", err=True)
     if others and asked.uav is None and asked.scan is None:
         warn(f"mapping {run.channels.uav}; the log also has {', '.join(others)}: select with --uav")
     try:
@@ -133,7 +133,7 @@ class _Progress:
         now = time.monotonic()
         if sys.stderr.isatty() or now - self._shown_at >= _PLAIN_PERIOD_S:
             self._shown_at = now
-            typer.echo(f"{counted(scans, 'scan')}, {seconds:.0f} s of the log", err=True)
+            echo_line(f"{counted(scans, 'scan')}, {seconds:.0f} s of the log", err=True)
 
 
 def _advise(outcome: SlamResult, topics: dict[str, str]) -> None:
@@ -247,7 +247,7 @@ def _summary(
     }
     try:
         text = json.dumps(results, indent=2) + "\n"
-        (asked.out / "summary.json").write_text(text, encoding="utf-8")
+        write_whole(asked.out / "summary.json", text)
     except OSError as error:
         raise RecordingError(f"{asked.out}: {error.strerror}") from None
     return results
@@ -255,25 +255,25 @@ def _summary(
 
 def _print_summary(out: Path, r: dict[str, Any]) -> None:
     share = r["cpu_share"]
-    typer.echo(
+    echo_line(
         f"{counted(r['scans'], 'scan')} over {r['lasted_s']:.1f} s, "
         f"{r['way_m']:.1f} m path length ({'with' if r['mode'] == 'imu' else 'without'} IMU)"
     )
-    typer.echo(
+    echo_line(
         f"{counted(r['keyframes'], 'keyframe')}, {counted(r['closures'], 'closure')}, "
         f"{counted(r['sessions'], 'session')}, {counted(r['refused'], 'message')} refused"
     )
     topics = [topic for topic in r["topics"].values() if topic != "/tf_static"]
-    typer.echo(f"input     {r['uav']}: {', '.join(topics)}")
+    echo_line(f"input     {r['uav']}: {', '.join(topics)}")
     states = ", ".join(f"{name} {_lasting(s)}" for name, s in r["states_s"].items())
-    typer.echo(f"state     {states or 'none'}")
+    echo_line(f"state     {states or 'none'}")
     for problem, seconds in r["problems_s"].items():
-        typer.echo(f"problem   {problem}: {_lasting(seconds)}")
+        echo_line(f"problem   {problem}: {_lasting(seconds)}")
     if share is not None:
-        typer.echo(f"CPU       {r['cpu_s']:.1f} s, {share:.1%} of the log's time")
+        echo_line(f"CPU       {r['cpu_s']:.1f} s, {share:.1%} of the log's time")
     for name in _NAMES:
         if name not in _MAPS or r["cell_m"] is not None:
-            typer.echo(f"written   {out / name}")
+            echo_line(f"written   {out / name}")
 
 
 def _lasting(seconds: float) -> str:

@@ -7,8 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-import typer
-
+from volery.cli.terminal import echo_line
 from volery.core.errors import CommandError
 
 if TYPE_CHECKING:
@@ -36,7 +35,7 @@ def wait_for_clients(
     until = time.monotonic() + timeout_s
     missing = _missing(simulation, names)
     if missing:
-        typer.echo(f"waiting for {', '.join(missing)}, at most {timeout_s:g} s", err=True)
+        echo_line(f"waiting for {', '.join(missing)}, at most {timeout_s:g} s", err=True)
     while missing:
         if is_stopped():
             return False
@@ -51,7 +50,7 @@ def wait_for_clients(
         before, missing = missing, _missing(simulation, names)
         for name in before:
             if name not in missing:
-                typer.echo(f"{name} is connected", err=True)
+                echo_line(f"{name} is connected", err=True)
     return True
 
 
@@ -66,7 +65,7 @@ def start_paused(clock: RunClock, *, can_be_resumed: bool) -> None:
             "(--bridge rosbridge), or start it at a terminal"
         )
     clock.pause()
-    typer.echo(
+    echo_line(
         "paused before the first step: space at this terminal, Play on the page or "
         "/set_simulation_state resumes the run",
         err=True,

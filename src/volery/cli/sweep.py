@@ -6,10 +6,9 @@ import re
 import time
 from pathlib import Path
 
-import typer
-
 from volery.cli.sweep_progress import StudyProgress
 from volery.cli.tables import print_table
+from volery.cli.terminal import echo_line
 from volery.cli.trust import may_run_local_code
 from volery.cluster.errors import StudyError
 from volery.cluster.loading import LoadedStudy, load_study, read_study
@@ -67,7 +66,7 @@ class SweepCommand:
 
             plan = stored_plan(self._loaded, self._results)
             path = write_study_report(self._loaded, table, plan, self._file)
-            typer.echo(f"report  {path}")
+            echo_line(f"report  {path}")
 
     def verify(self, count: int) -> None:
         """Repeats finished runs and compares their results."""
@@ -76,13 +75,13 @@ class SweepCommand:
         options = SweepOptions(self._results, self._workers)
         repeated, differences = verify_study(self._loaded, options, count)
         for each in differences:
-            typer.echo(f"run {each.run}: {each.what}")
+            echo_line(f"run {each.run}: {each.what}")
         if differences:
             raise StudyError(
                 f"{len(differences)} of {counted(repeated, 'repeated run')} differ: a node or a "
                 "metric is not repeatable"
             )
-        typer.echo(f"{counted(repeated, 'run')} repeated alone, with all sensors: equal")
+        echo_line(f"{counted(repeated, 'run')} repeated alone, with all sensors: equal")
 
     def record(self, names: list[str]) -> None:
         """Records logs of finished runs, named by their identities or the beginnings of them."""
@@ -99,12 +98,12 @@ class SweepCommand:
         options = SweepOptions(self._results, self._workers)
         record_runs(self._loaded, options, chosen)
         for run in chosen:
-            typer.echo(f"log     {self._results / 'logs' / f'{run.id}.mcap'}")
-        typer.echo(f"page    volery serve --recordings-dir {self._results / 'logs'}")
+            echo_line(f"log     {self._results / 'logs' / f'{run.id}.mcap'}")
+        echo_line(f"page    volery serve --recordings-dir {self._results / 'logs'}")
 
     def _print_how_to_continue(self) -> None:
         plan = stored_plan(self._loaded, self._results)
-        typer.echo(
+        echo_line(
             f"{len(plan.results):,} of {counted(plan.total, 'run')} are in {self._results}; the "
             "same command flies the others",
             err=True,
@@ -115,18 +114,18 @@ class SweepCommand:
     ) -> None:
         what = "" if part is None else f" (part {part[0]} of {part[1]})"
         rate = f", {flown / seconds:.1f} runs/s" if flown else ""
-        typer.echo(
+        echo_line(
             f"{self._loaded.study.name}{what}: {counted(len(table), 'run')}, "
             f"{table.num_failed:,} failed; {flown:,} flown now in {seconds:.1f} s{rate}"
         )
         for row in [row for row in table if row["status"] == "failed"][:3]:
-            typer.echo(f"  failed: {row['run']}: {row['error']}")
+            echo_line(f"  failed: {row['run']}: {row['error']}")
         if part is not None:
             return
         head, rows = point_rows(table)
         if len(rows) <= _POINTS_SHOWN:
             print_table(head, rows, right=range(len(table.parameters), len(head)))
-        typer.echo(f"table   {self._results / TABLE_FILE}")
+        echo_line(f"table   {self._results / TABLE_FILE}")
 
 
 def _loaded(path: Path, *, trust: bool) -> LoadedStudy:

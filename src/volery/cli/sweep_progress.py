@@ -7,8 +7,7 @@ import sys
 import time
 from typing import Any
 
-import typer
-
+from volery.cli.terminal import echo_line
 from volery.cluster.driver import SweepProgress
 
 _PLAIN_PERIOD_S = 10.0
@@ -45,7 +44,7 @@ class StudyProgress:
             self._live.update(_panel(self._name, progress))
         elif time.monotonic() - self._shown_at > _PLAIN_PERIOD_S:
             self._shown_at = time.monotonic()
-            typer.echo(f"{self._name}: {_words(progress)}")
+            echo_line(f"{self._name}: {_words(progress)}")
 
     def stop(self) -> None:
         """Removes the display; later output is printed below it."""

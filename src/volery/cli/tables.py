@@ -5,13 +5,15 @@ from __future__ import annotations
 import sys
 from collections.abc import Collection, Sequence
 
-import typer
+from volery.cli.terminal import echo_line
+from volery.core.plain_text import plain
 
 
 def print_table(
     head: Sequence[str], rows: Sequence[Sequence[str]], *, right: Collection[int] = ()
 ) -> None:
     """Prints rows below their head; columns whose numbers are in `right` are right-aligned."""
+    rows = [[plain(cell) for cell in row] for row in rows]
     if sys.stdout.isatty():
         from rich import box
         from rich.console import Console
@@ -31,4 +33,4 @@ def print_table(
             cell.rjust(width) if k in right else cell.ljust(width)
             for k, (cell, width) in enumerate(zip(row, widths, strict=True))
         ]
-        typer.echo("  ".join(parts).rstrip())
+        echo_line("  ".join(parts).rstrip())

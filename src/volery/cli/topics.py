@@ -10,10 +10,9 @@ from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
 
-import typer
-
 from volery.cli.connections import ConnectionOptions, open_link
 from volery.cli.graph_queries import topic_types, type_of_topic
+from volery.cli.terminal import echo_line, echo_lines
 from volery.cli.yaml_codec import read_message, to_yaml
 from volery.core.errors import BridgeError
 from volery.graph.connection import GraphConnection
@@ -30,16 +29,16 @@ def list_topics(via: str, *, types: bool) -> None:
         found = topic_types(link)
         if not found:
             where = getattr(link, "where", via)
-            typer.echo(f"no topics found: {where}", err=True)
+            echo_line(f"no topics found: {where}", err=True)
     for topic, msgtype in found.items():
         if "/_" not in topic:
-            typer.echo(f"{topic} [{msgtype}]" if types else topic)
+            echo_line(f"{topic} [{msgtype}]" if types else topic)
 
 
 def show_type(via: str, topic: str) -> None:
     """Prints a topic's type."""
     with closing(open_link(via, "volery_topic_type")) as link:
-        typer.echo(type_of_topic(link, topic))
+        echo_line(type_of_topic(link, topic))
 
 
 def echo(via: str, topic: str, *, count: int | None, whole: bool) -> None:
@@ -48,8 +47,8 @@ def echo(via: str, topic: str, *, count: int | None, whole: bool) -> None:
     for published in _messages(via, topic, "volery_topic_echo"):
         if published is None:
             continue
-        typer.echo(to_yaml(published.message, whole=whole))
-        typer.echo("---")
+        echo_lines(to_yaml(published.message, whole=whole))
+        echo_line("---")
         left -= 1
         if left <= 0:
             return
@@ -113,7 +112,7 @@ def measure(via: str, topic: str, *, window: int, line: Callable[[Window], str])
             seen.add(now, len(published.cdr) if sizes else 0)
         if now - told >= 1.0:
             told = now
-            typer.echo(seen.take_line(line))
+            echo_lines(seen.take_line(line))
 
 
 def publish(

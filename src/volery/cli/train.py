@@ -9,9 +9,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-import typer
-
 from volery.cli.interrupt import StopSignals, stopped_how
+from volery.cli.terminal import echo_line
 
 
 def train_and_write(
@@ -59,12 +58,12 @@ def train_and_write(
         folder.write(result)
     finally:
         trainer.close()
-    typer.echo(
+    echo_line(
         f"{folder.policy}: success {result.success:.1%} in {configuration.evaluation_episodes} "
         f"episodes after {result.steps:,} steps, {result.seconds:.1f} s"
     )
     if result.ending != "target":
-        typer.echo(_advice(result.ending, f"volery train {name} --resume --out {folder.folder}"))
+        echo_line(_advice(result.ending, f"volery train {name} --resume --out {folder.folder}"))
 
 
 def _advice(ending: str, command: str) -> str:

@@ -8,7 +8,6 @@ after a yes at a terminal, which is saved for this file and these modules.
 from __future__ import annotations
 
 import json
-import os
 import sys
 from collections.abc import Iterable
 from dataclasses import replace
@@ -17,8 +16,17 @@ from typing import Any
 
 import typer
 
+from volery.cli.error_reporting import warn
 from volery.cli.flight import RunOptions
+from volery.cli.terminal import echo_line
 from volery.core.errors import ScenarioError
+from volery.core.private_folders import (
+    UnsafeFolderError,
+    check_own_file,
+    private_folder,
+    state_root,
+)
+from volery.core.whole_files import write_whole
 from volery.scenario import library
 from volery.scenario.access import ScenarioAccess
 from volery.scenario.node_names import node_module
@@ -66,8 +74,8 @@ def may_run_local_code(file: Path, modules: list[str]) -> bool:
             raise ScenarioError(
                 f"{file}: runs code that lies beside it ({words}); give --trust if it is yours"
             )
-        typer.echo(f"{file} runs code that lies beside it: {words}.", err=True)
-        typer.echo("It can do whatever you can. Answer yes only if you know the code.", err=True)
+        echo_line(f"{file} runs code that lies beside it: {words}.", err=True)
+        echo_line("It can do whatever you can. Answer yes only if you know the code.", err=True)
         if not typer.confirm("Trust it from now on?", default=False, err=True):
             raise ScenarioError(f"{file}: the code beside it ({words}) is not trusted")
         _remember(file, modules)
@@ -80,16 +88,11 @@ def at_terminal() -> bool:
 
 
 def trust_file() -> Path:
-    """Returns the file of saved answers: below XDG_STATE_HOME, or ~/.local/state.
+    """Returns the file of saved answers.
 
     Raises `OSError` for a user without a home folder, whose answers are not saved.
     """
-    base = os.environ.get("XDG_STATE_HOME")
-    try:
-        root = Path(base) if base else Path.home() / ".local" / "state"
-    except RuntimeError as error:
-        raise FileNotFoundError(str(error)) from None
-    return root / "volery" / "trusted.json"
+    return state_root() / "trusted.json"
 
 
 def _trusted(file: Path) -> set[str]:
@@ -99,7 +102,12 @@ def _trusted(file: Path) -> set[str]:
 
 def _read() -> dict[str, Any]:
     try:
-        found = json.loads(trust_file().read_text(encoding="utf-8"))
+        file = trust_file()
+        check_own_file(file)
+        found = json.loads(file.read_text(encoding="utf-8"))
+    except UnsafeFolderError as error:
+        warn(f"{error}: saved answers about nodes are ignored")
+        return {}
     except (OSError, ValueError):
         return {}
     return found if isinstance(found, dict) else {}
@@ -111,9 +119,7 @@ def _remember(file: Path, modules: Iterable[str]) -> None:
     known[str(file.resolve())] = sorted(_trusted(file) | set(modules))
     try:
         target = trust_file()
-        target.parent.mkdir(parents=True, exist_ok=True)
-        waiting = target.with_suffix(f".{os.getpid()}")
-        waiting.write_text(json.dumps(known, indent=1), encoding="utf-8")
-        waiting.replace(target)
+        private_folder(target.parent.parent, target.parent.name)
+        write_whole(target, json.dumps(known, indent=1), private=True)
     except OSError:
         return

@@ -19,6 +19,7 @@ from volery.cluster.errors import StudyError
 from volery.core.errors import reason_of
 
 LOCK_FILE = "lock"
+_FLAGS = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
 
 
 class FolderLock:
@@ -56,7 +57,7 @@ class FolderLock:
         """Returns the locked file."""
         while True:
             try:
-                file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+                file = os.open(self._path, _FLAGS, 0o644)
             except OSError as error:
                 raise StudyError(f"{self._path}: cannot be locked: {reason_of(error)}") from None
             try:

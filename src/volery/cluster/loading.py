@@ -13,6 +13,7 @@ from volery.cluster.metric_names import check_metrics
 from volery.cluster.points import Point, points_of, values_of
 from volery.cluster.study import Study
 from volery.core.errors import ScenarioError, reason_of
+from volery.core.toml_text import parse_toml
 from volery.scenario.load import list_scenarios, load_scenario
 from volery.scenario.schema import Scenario
 from volery.scenario.validation import validated
@@ -97,7 +98,7 @@ def _read(path: Path) -> dict[str, Any]:
     if path.is_dir():
         raise StudyError(f"{path} is a folder; a study is a .toml file")
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        return parse_toml(path.read_text(encoding="utf-8-sig"))
     except (OSError, UnicodeDecodeError) as error:
         raise StudyError(f"{path}: cannot be read: {reason_of(error)}") from None
     except tomllib.TOMLDecodeError as error:

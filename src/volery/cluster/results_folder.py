@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import os
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -11,8 +10,7 @@ from volery.cluster.errors import StudyError
 from volery.cluster.folder_lock import FolderLock
 from volery.cluster.runs import RunResult, RunSpec
 from volery.core.errors import reason_of
-
-_PARTIAL = ".partial"
+from volery.core.whole_files import write_whole
 
 
 class ResultsFolder:
@@ -71,13 +69,9 @@ class ResultsFolder:
 
     def write_file(self, path: Path, content: bytes) -> None:
         """Writes a file whole or not at all. Raises `StudyError` if that fails."""
-        partial = f"{path}{_PARTIAL}-{os.getpid()}"
         try:
-            with open(partial, "wb", buffering=0) as file:
-                file.write(content)
-            os.replace(partial, path)
+            write_whole(path, content)
         except OSError as error:
-            Path(partial).unlink(missing_ok=True)
             if error.errno == errno.ENOSPC:
                 raise StudyError(disk_full(self.path)) from None
             raise StudyError(f"{path}: cannot be written: {reason_of(error)}") from None

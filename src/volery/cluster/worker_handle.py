@@ -18,6 +18,7 @@ from volery.cluster.errors import StudyError
 from volery.cluster.executor import WorkerState
 from volery.cluster.worker_messages import read_message, write_message
 from volery.core.errors import reason_of
+from volery.core.whole_files import open_new
 
 _THREADS = ("OMP", "OPENBLAS", "MKL", "NUMBA")
 _LOG_LINES = 3
@@ -48,7 +49,7 @@ class WorkerHandle:
         self._began = time.monotonic()
         threads = {f"{name}_NUM_THREADS": "1" for name in _THREADS}
         try:
-            with log.open("wb") as errors:
+            with open_new(log) as errors:
                 self._process = subprocess.Popen(
                     [sys.executable, "-P", "-m", "volery.cluster.worker_process"],
                     env={**os.environ, **threads},

@@ -9,14 +9,14 @@ Where Volery is installed does not matter: installations of equal sources share 
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
 import shutil
-import stat
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -28,6 +28,7 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 import numba
 
 from volery.core.kernel_places import LOCATORS
+from volery.core.private_folders import UnsafeFolderError, private_folder, temporary_folder
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -36,6 +37,7 @@ _TYPES: Any = numba.types
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _KEEP_CACHES = 3
+_log = logging.getLogger(__name__)
 
 
 def _kernel_sources() -> list[Path]:
@@ -77,15 +79,7 @@ def cache_root() -> Path:
 
 @cache
 def _private_folder() -> Path:
-    """Returns a folder for temporary files that no other user can write: caches hold code."""
-    folder = Path(tempfile.gettempdir()) / f"volery-{os.getuid()}"
-    with suppress(OSError):
-        folder.mkdir(mode=0o700, exist_ok=True)
-        found = folder.lstat()
-        is_ours = found.st_uid == os.getuid() and stat.S_ISDIR(found.st_mode)
-        if is_ours and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-            return folder
-    return Path(tempfile.mkdtemp(prefix="volery-"))
+    return temporary_folder("volery-")
 
 
 def _sweep(root: Path, keep: Path) -> None:
@@ -102,18 +96,28 @@ def _sweep(root: Path, keep: Path) -> None:
 
 @cache
 def cache_dir() -> Path:
-    """Returns the folder of compiled kernels; temporary if the cache is not writable."""
-    root = cache_root() / "kernels"
-    folder = root / _cache_key()
+    """Returns the folder of compiled kernels, which only this user can write: kernels are code.
+
+    It is temporary if the cache is not writable, or if another user can write it.
+    """
+    root, key = cache_root(), _cache_key()
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder = private_folder(root.parent, root.name, "kernels", key)
         with tempfile.TemporaryFile(dir=folder):
             pass
-        _sweep(root, folder)
-    except OSError:
-        folder = _private_folder() / "volery-kernels" / folder.name
-        folder.mkdir(parents=True, exist_ok=True)
+        _sweep(folder.parent, folder)
+    except OSError as error:
+        folder = _temporary_cache(key)
+        if isinstance(error, UnsafeFolderError):
+            _log.warning("%s: compiled kernels are in %s instead", error, folder)
     return folder
+
+
+def _temporary_cache(key: str) -> Path:
+    try:
+        return private_folder(_private_folder(), "volery-kernels", key)
+    except UnsafeFolderError:
+        return Path(tempfile.mkdtemp(prefix="volery-kernels-"))
 
 
 def kernel(function: F, **options: Any) -> F:

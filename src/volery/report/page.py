@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import base64
 import math
+import os
 from collections.abc import Iterable
 from html import escape
 from pathlib import Path
 
-from volery.core.errors import VoleryError
+from volery.core.errors import VoleryError, reason_of
 from volery.core.plurals import counted
+from volery.core.whole_files import write_whole
 from volery.figures import charts, maps
 from volery.figures.flight_data import FlightData, UavTrack
 from volery.figures.palette import uav_color
@@ -22,31 +24,33 @@ class ReportError(VoleryError):
     """Raised if the report cannot be written."""
 
 
-def check_folder(folder: Path) -> None:
-    """Checks that the folder can be written to, before a long flight.
+def check_target(folder: Path, *, overwrite: bool = False) -> None:
+    """Raises `ReportError` if `folder` holds a report already, unless `overwrite` is set."""
+    path = folder / "index.html"
+    if os.path.lexists(path) and not overwrite:
+        raise ReportError(f"{path} exists; --overwrite replaces it")
 
-    Leaves no file behind. Raises ReportError with the system's error.
+
+def write_report(flight: FlightData, folder: str | Path, *, overwrite: bool = False) -> Path:
+    """Writes `index.html` into `folder` (created if missing) and returns its path.
+
+    The page appears whole or not at all. Raises `ReportError` if it cannot be written, or exists
+    and `overwrite` is not set.
     """
-    place = folder
-    try:
-        while not place.exists():
-            place = place.parent
-        probe = place / ".volery-probe"
-        probe.write_bytes(b"")
-        probe.unlink()
-    except OSError as error:
-        raise ReportError(f"{folder}: cannot write the report there: {error.strerror}") from None
+    return write_page(page(flight), Path(folder), overwrite=overwrite)
 
 
-def write_report(flight: FlightData, folder: str | Path) -> Path:
-    """Writes `index.html` into `folder` (created if missing) and returns its path."""
-    path = Path(folder) / "index.html"
-    text = page(flight)
+def write_page(text: str, folder: Path, *, overwrite: bool) -> Path:
+    """Writes a page as `index.html` into a folder; see `write_report`."""
+    path = folder / "index.html"
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
+        folder.mkdir(parents=True, exist_ok=True)
+        write_whole(path, text, overwrite=overwrite)
+    except FileExistsError:
+        check_target(folder, overwrite=overwrite)
+        raise ReportError(f"{folder} is not a folder") from None
     except OSError as error:
-        raise ReportError(f"{path}: cannot write the report: {error.strerror}") from None
+        raise ReportError(f"{path}: cannot write the report: {reason_of(error)}") from None
     return path
 
 

@@ -21,7 +21,7 @@ from volery.report.alignment import (
     umeyama,
 )
 from volery.report.logged_flights import LoggedFlight, LoggedUav, read_flight, read_way
-from volery.report.page import ReportError, html_page
+from volery.report.page import ReportError, check_target, html_page, write_page
 from volery.report.trajectories import RecordedTrajectory
 from volery.report.trajectory_charts import (
     ChartLine,
@@ -75,11 +75,10 @@ def write_log_report(
     the only ones. Without compare, `uav` alone is drawn, None: all. Raises VoleryError for logs
     without the requested data.
     """
-    path, warnings, fit = folder / "index.html", list[str](), ""
+    warnings, fit = list[str](), ""
     if compare is None and compare_topic is not None:
         raise ReportError(f"--compare-topic {compare_topic}: name its log by --compare")
-    if path.exists() and not overwrite:
-        raise ReportError(f"{path} exists; --overwrite replaces it")
+    check_target(folder, overwrite=overwrite)
     flight = read_flight(log)
     chosen = _chosen(flight.uavs, uav, log)
     drawn = flight.uavs if uav is None or compare is not None else [chosen]
@@ -93,11 +92,7 @@ def write_log_report(
         parts += _comparison_section(chosen, laid, compare, trunks)
         warnings += laid.doubts(compare)
         fit = laid.fit
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        path.write_text(_page(log.name, _lead(flight), parts), encoding="utf-8")
-    except OSError as error:
-        raise ReportError(f"{path}: cannot write the report: {error.strerror}") from None
+    path = write_page(_page(log.name, _lead(flight), parts), folder, overwrite=overwrite)
     return LogReport(path, warnings, fit)
 
 

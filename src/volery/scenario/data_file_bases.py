@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from volery.core.errors import DataFileError, reason_of
+from volery.core.toml_text import parse_toml
 from volery.scenario.merging import merged
 
 _KEY = "base"
@@ -44,7 +45,7 @@ class FileData:
 def read_toml(path: Path) -> dict[str, Any]:
     """Returns the tables of a TOML file; raises `DataFileError` naming the file."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        return parse_toml(path.read_text(encoding="utf-8-sig"))
     except (OSError, UnicodeDecodeError) as error:
         raise DataFileError(f"{path}: cannot be read: {reason_of(error)}") from None
     except tomllib.TOMLDecodeError as error:

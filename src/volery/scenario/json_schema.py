@@ -12,6 +12,7 @@ from pydantic import BaseModel
 from volery.core.attribute_docs import attribute_docs
 from volery.core.errors import ScenarioError, reason_of
 from volery.core.quantities import quantity_of
+from volery.core.whole_files import write_whole
 from volery.scenario.base import Data
 from volery.scenario.schema import Scenario
 
@@ -40,7 +41,7 @@ def schema_text() -> str:
 def write_schema(path: Path) -> None:
     """Writes the JSON schema of scenario files; raises `ScenarioError` if it cannot."""
     try:
-        path.write_text(schema_text(), encoding="utf-8")
+        write_whole(path, schema_text())
     except OSError as error:
         raise ScenarioError(f"{path}: cannot be written: {reason_of(error)}") from None
 

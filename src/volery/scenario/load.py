@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from volery.core.errors import ScenarioError, reason_of
+from volery.core.toml_text import parse_toml
 from volery.scenario import library
 from volery.scenario.access import ScenarioAccess
 from volery.scenario.schema import Scenario
@@ -30,7 +31,7 @@ def load_scenario(
     except (OSError, UnicodeDecodeError) as error:
         raise ScenarioError(f"{path}: cannot be read: {reason_of(error)}") from None
     try:
-        data = tomllib.loads(text)
+        data = parse_toml(text)
     except tomllib.TOMLDecodeError as error:
         raise ScenarioError(f"{path}: not valid TOML: {error}") from None
     access = ScenarioAccess(path.parent, is_confined=confined, is_trusted=trust and not confined)

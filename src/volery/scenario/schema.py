@@ -14,6 +14,7 @@ from pydantic import Field, PrivateAttr, model_validator
 
 from volery.core.errors import ScenarioError, reason_of
 from volery.core.plurals import counted
+from volery.core.whole_files import write_whole
 from volery.scenario.access import ScenarioAccess
 from volery.scenario.base import Data, Name, renamed
 from volery.scenario.faults import Fault
@@ -189,12 +190,12 @@ class Scenario(Data):
         path = Path(path)
         if path.suffix != ".toml":
             raise ScenarioError(f"{path}: a scenario is a .toml file; name it {path.name}.toml")
-        if path.exists() and not overwrite:
-            raise ScenarioError(f"{path}: the file exists; overwrite=True replaces it")
         data = self.model_dump(exclude_unset=True, exclude_none=True)
         text = toml_text(moved(data, self.access.folder, path.parent))
         try:
-            path.write_text(f"{SCHEMA_DIRECTIVE}\n\n{text}", encoding="utf-8")
+            write_whole(path, f"{SCHEMA_DIRECTIVE}\n\n{text}", overwrite=overwrite)
+        except FileExistsError:
+            raise ScenarioError(f"{path}: the file exists; overwrite=True replaces it") from None
         except OSError as error:
             raise ScenarioError(f"{path}: cannot be written: {reason_of(error)}") from None
 

@@ -18,8 +18,7 @@ from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
-from volery.bridges.origins import Origins, name_of
-from volery.core.network_access import LOOPBACK
+from volery.bridges.origins import Origins
 from volery.core.token_attempts import TokenAttempts
 from volery.server.auth import Role, Sessions, Tokens
 from volery.server.replies import RefusedError, refused
@@ -99,15 +98,9 @@ class AuthMiddleware:
         await self._app(scope, receive, self._polite(send, visitor.ticket))
 
     def _check_place(self, scope: Scope, headers: Headers) -> None:
-        """Refuses requests by other sites' pages, and host names that only point to this machine.
-
-        DNS rebinding: an attacker may let a host name point to 127.0.0.1; a page under that name
-        then has the same origin as this server.
-        """
+        """Refuses other sites' pages, and host names that only point to this machine."""
         host, origin = headers.get("host", ""), headers.get("origin")
-        named = name_of(host)
-        known = named in LOOPBACK or self._origins.lists(host)
-        if self._only_loopback and not self._tokens.needed and not known:
+        if self._only_loopback and not self._origins.knows(host):
             raise RefusedError(
                 421,
                 f"this server is not called '{host[:80]}'; use localhost, or start it with "

@@ -15,6 +15,7 @@ from starlette.responses import FileResponse, JSONResponse, Response
 
 from volery.bridges.logs.recordings_quota import room_left
 from volery.core.errors import RecordingError
+from volery.core.plain_text import plain
 from volery.server.log_check import look_into
 from volery.server.replies import RefusedError
 from volery.server.request_bodies import check_operator, save_body
@@ -54,7 +55,7 @@ async def bring_recording(request: Request) -> Response:
     folder = site.recordings
     if folder is None:
         raise RefusedError(409, "this server stores no recordings; start it with --recordings-dir")
-    called = request.query_params.get("name", "")[:200]
+    called = plain(request.query_params.get("name", "")[:200])
     suffix = PurePosixPath(called.replace("\\", "/")).suffix.lower()
     if suffix not in _SUFFIXES:
         raise RefusedError(415, f"logs are read from {', '.join(_SUFFIXES)}, not '{suffix[:20]}'")

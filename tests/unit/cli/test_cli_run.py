@@ -101,7 +101,7 @@ def test_ros1_log(invoke: Invoke, tmp_path: Path) -> None:
             "a/b/report: cannot.*folder .*a/b does not exist.*mkdir",
         ),
         (("run", "hover", "--report", "/nosuchroot/x"), "folder /nosuchroot does not exist"),
-        (("run", "hover", "--report", "exists.mcap"), "exists.mcap: cannot write the report"),
+        (("run", "hover", "--report", "exists.mcap"), "exists.mcap is not a folder"),
         (("run", "hover", "--record", "exists.mcap/x.bag"), "exists.mcap/x.bag: cannot create"),
     ],
 )

@@ -13,6 +13,7 @@ from volery.core.errors import BridgeError
 from volery.mavlink.autopilot.dialect_extensions import available_modes
 from volery.mavlink.codec import Codec, Parser, dialect
 from volery.mavlink.framing import Framer
+from volery.mavlink.links import stamp_ledger
 from volery.mavlink.links.signing import Signing, key_of
 from volery.mavlink.links.tcp_bridge import MavlinkTcp
 from volery.mavlink.scenario_setup import with_autopilots
@@ -139,7 +140,9 @@ def test_a_key_is_the_text_of_a_file(tmp_path):
         key_of(tmp_path / "nowhere")
 
 
-def test_a_vehicle_hears_only_who_has_the_key(caplog):
+def test_a_vehicle_hears_only_who_has_the_key(caplog, monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    monkeypatch.setattr(stamp_ledger, "_ledgers", {})
     simulation = Simulation(with_autopilots(irises(1)), threads=1)
     run = threading.Thread(target=lambda: simulation.run(60.0, speed=1.0))
     with simulation, BridgeHost(simulation.gateway) as bridges:

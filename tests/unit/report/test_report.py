@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 from report_sample import sample_flight
 
+from volery.cli.output_paths import check_report
+from volery.core.errors import VoleryError
 from volery.figures import charts, maps
 from volery.figures.flight_data import FlightData, Ground
-from volery.report.page import ReportError, check_folder, page, write_report
+from volery.report.page import ReportError, page, write_report
 from volery.report.voxels import VoxelSet
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -161,8 +163,10 @@ def test_numbers() -> None:
 
 def test_folder_that_is_a_file(tmp_path: Path) -> None:
     (tmp_path / "report").write_text("")
-    with pytest.raises(ReportError, match="report: cannot write the report there: Not a directory"):
-        check_folder(tmp_path / "report")
+    with pytest.raises(VoleryError, match="report is not a folder"):
+        check_report(tmp_path / "report", overwrite=False)
+    with pytest.raises(ReportError, match="report is not a folder"):
+        write_report(sample_flight(seconds=2.0), tmp_path / "report")
     with pytest.raises(ReportError, match="Not a directory"):
         write_report(sample_flight(seconds=2.0), tmp_path / "report" / "inner")
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from volery.core.arrays import Array
 from volery.core.errors import DataFileError
+from volery.core.whole_files import write_whole
 
 _FREE, _UNKNOWN, _OCCUPIED = 254, 205, 0
 """Grey values that map_saver writes and map_server reads in mode trinary."""
@@ -40,8 +41,8 @@ def write_grid(stem: Path, values: NDArray[np.int8], origin: Array, cell_m: floa
     )
     try:
         head = f"P5\n# written by Volery\n{columns} {rows}\n255\n".encode()
-        picture.write_bytes(head + shades(values).tobytes())
-        told.write_text(text, encoding="utf-8")
+        write_whole(picture, head + shades(values).tobytes())
+        write_whole(told, text)
     except OSError as error:
         raise DataFileError(f"{stem}: the grid cannot be written: {error.strerror}") from None
     return [picture, told]

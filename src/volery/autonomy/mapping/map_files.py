@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from volery.autonomy.mapping.octomap_stream import Voxels, decode_binary
 from volery.core.errors import DataFileError
 from volery.core.plurals import counted
+from volery.core.whole_files import write_whole
 
 Bytes = NDArray[np.uint8]
 
@@ -44,7 +45,7 @@ def write_map(path: Path, data: Bytes, resolution_m: float) -> None:
     head = f"{_FIRST.decode()}\n# written by Volery\nid OcTree\nsize {node_count(data)}\n"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(head.encode() + f"res {resolution_m:g}".encode() + _DATA + data.tobytes())
+        write_whole(path, f"{head}res {resolution_m:g}".encode() + _DATA + data.tobytes())
     except OSError as error:
         raise DataFileError(f"{path}: the map cannot be written: {error.strerror}") from None
 

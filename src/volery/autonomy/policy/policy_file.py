@@ -10,7 +10,6 @@ import io
 import json
 import lzma
 import math
-import os
 import tokenize
 import warnings
 import zipfile
@@ -26,6 +25,7 @@ from pydantic import ValidationError
 from volery.autonomy.policy.description import FORMAT, PolicyDescription
 from volery.autonomy.policy.network import Network
 from volery.core.errors import DataFileError
+from volery.core.whole_files import write_whole
 from volery.scenario.validation import describe_validation_error
 
 MAX_FILE_BYTES = 1_000_000
@@ -97,13 +97,9 @@ def write_policy(path: str | Path, policy: Policy) -> None:
             f"policy '{path}' has {buffer.tell()} bytes; at most {MAX_FILE_BYTES} are allowed: "
             "use smaller layers"
         )
-    target = Path(path)
-    partial = target.with_name(f".{target.name}.{os.getpid()}.part")
     try:
-        partial.write_bytes(buffer.getvalue())
-        partial.replace(target)
+        write_whole(path, buffer.getvalue())
     except OSError as error:
-        partial.unlink(missing_ok=True)
         raise DataFileError(f"policy '{path}' cannot be written: {error.strerror}") from None
 
 

@@ -13,6 +13,7 @@ The tail of such a file (its index) is missing; `volery.bridges.logs.recovery` w
 from __future__ import annotations
 
 import io
+import os
 import time
 from abc import ABC, abstractmethod
 from pathlib import Path
@@ -90,7 +91,7 @@ def check_target(path: Path, *, overwrite: bool = False) -> type[McapLog] | type
         raise RecordingError(f"{path}: the name of a log must end in .mcap (ROS 2) or .bag (ROS 1)")
     if path.is_dir():
         raise RecordingError(f"{path}: cannot create the log: it is a folder")
-    if path.exists() and not overwrite:
+    if os.path.lexists(path) and not overwrite:
         raise RecordingError(f"{path}: exists already; choose another name or overwrite it")
     with locked_for_replacing(path):
         return kind

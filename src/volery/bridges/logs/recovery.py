@@ -11,10 +11,11 @@ from typing import Any, cast
 
 from volery.bridges.logs.bag_writer import CHUNK_BYTES, bag_writer
 from volery.bridges.logs.disk_file import DiskFile
-from volery.bridges.logs.file_lock import locked_for_reading, locked_for_replacing
+from volery.bridges.logs.file_lock import locked_for_reading
 from volery.bridges.logs.log_writer import LIBRARY
 from volery.bridges.logs.records import LogRecord, LogTopic, LogWalk, log_format
 from volery.core.errors import RecordingError
+from volery.core.whole_files import new_partial, put_in_place
 
 
 @dataclass(frozen=True)
@@ -61,15 +62,15 @@ def recover(path: str | Path, out: str | Path | None = None) -> Recovery:
 
 def _write(kind: str, records: Iterable[LogRecord], out: Path) -> tuple[int, int]:
     """Writes a log under another name first, so that `out` is complete or does not exist."""
-    made = out.with_name(f".{out.stem}.part{out.suffix}")
+    made = new_partial(out, out.suffix)
     try:
-        with locked_for_replacing(made):
-            made.unlink(missing_ok=True)
         try:
             found = (write_mcap if kind == "mcap" else _to_bag)(records, made)
-            made.rename(out)
+            put_in_place(made, out, overwrite=False)
         finally:
             made.unlink(missing_ok=True)
+    except FileExistsError:
+        raise RecordingError(f"{out}: exists already; choose another name") from None
     except OSError as error:
         raise RecordingError(
             f"{out}: cannot write the log: {error.strerror}; no partial file remains"

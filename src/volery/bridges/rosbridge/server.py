@@ -30,7 +30,7 @@ from volery.bridges.rosbridge.wire import CBOR_PROTOCOL
 from volery.bridges.unsent import bound_unsent
 from volery.core.errors import BridgeError
 from volery.core.listener import Listener, Opening, open_listener
-from volery.core.network_access import check_address, check_token, shows_token, tend
+from volery.core.network_access import LOOPBACK, check_address, check_token, shows_token, tend
 from volery.core.pending_connections import look_at_http
 from volery.core.rare_log import RepeatFilter
 from volery.core.token_attempts import TokenAttempts
@@ -205,12 +205,9 @@ class RosbridgeServer:
                 return connection.respond(
                     HTTPStatus.BAD_REQUEST, f"{name} is given more than once\n"
                 )
-        origin = request.headers.get("Origin")
-        if not self._origins.let_in(origin, request.headers.get("Host", "")):
-            return connection.respond(
-                HTTPStatus.FORBIDDEN,
-                f"pages of {origin} are not accepted; start with --origin {origin}\n",
-            )
+        foreign = self._foreign_page(connection, request)
+        if foreign is not None:
+            return foreign
         given = parse_qs(url.query).get("token", [None])[0]
         scheme, _, bearer = request.headers.get("Authorization", "").partition(" ")
         if given is None and scheme.lower() == "bearer":
@@ -222,6 +219,22 @@ class RosbridgeServer:
         if given is not None:
             self._shown.add(connection)
             _allow(connection)
+        return None
+
+    def _foreign_page(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Returns the refusal of another site's page; None: the request is not of such a page."""
+        origin, host = request.headers.get("Origin"), request.headers.get("Host", "")
+        if self.host in LOOPBACK and not self._origins.knows(host):
+            return connection.respond(
+                HTTPStatus.MISDIRECTED_REQUEST,
+                f"this server is not called '{host[:80]}'; use localhost, or start it with "
+                "--origin for a name of a reverse proxy\n",
+            )
+        if not self._origins.let_in(origin, host):
+            return connection.respond(
+                HTTPStatus.FORBIDDEN,
+                f"pages of {origin} are not accepted; start with --origin {origin}\n",
+            )
         return None
 
     async def _is_token(self, given: str, connection: ServerConnection) -> bool:

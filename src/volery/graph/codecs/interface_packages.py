@@ -12,6 +12,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from volery.core.errors import GraphError
+from volery.core.whole_files import write_whole
 from volery.graph.codecs import ros1_package
 from volery.graph.codecs.definition_files import (
     DefinitionFile,
@@ -86,7 +87,7 @@ def write_generator(folder: Path) -> Path:
     """
     target = folder / "generate_python.py"
     try:
-        shutil.copyfile(ros1_package.GENERATOR, target)
+        write_whole(target, ros1_package.GENERATOR.read_bytes())
     except OSError as error:
         raise GraphError(f"{target}: cannot be written: {error.strerror}") from None
     return target

@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import os
 import pickle
 import random
 from dataclasses import dataclass
@@ -21,6 +20,7 @@ import numpy as np
 import torch
 
 from volery.core.errors import VoleryError, reason_of
+from volery.core.whole_files import whole_file
 
 _MAGIC = b"volery checkpoint 1\n"
 _CLASSES = {
@@ -47,7 +47,7 @@ class Checkpoint:
 
 
 def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
-    """Writes a checkpoint under a temporary name, then renames it: never half a file.
+    """Writes a checkpoint whole or not at all.
 
     Raises `VoleryError` if the file cannot be written.
     """
@@ -61,14 +61,10 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
         "length": len(payload),
         "sha256": hashlib.sha256(payload).hexdigest(),
     }
-    temporary = path.with_name(f".{path.name}.part")
     try:
-        with temporary.open("wb") as file:
+        with whole_file(path, durable=True) as file:
             file.write(_MAGIC + json.dumps(header).encode() + b"\n")
             file.write(payload)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(path)
     except OSError as error:
         raise VoleryError(f"{path}: cannot write the checkpoint: {reason_of(error)}") from None
 

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationError
 
 from volery.core.errors import VoleryError, reason_of
+from volery.core.toml_text import parse_toml
 from volery.scenario.base import Bounded
 
 Algorithm = Literal["ppo", "dqn", "sac"]
@@ -136,7 +137,7 @@ def load_configuration(task: str, file: str | Path | None = None) -> TrainingCon
 
 def _parsed(text: str, name: str) -> TrainingConfiguration:
     try:
-        data = tomllib.loads(text)
+        data = parse_toml(text)
     except tomllib.TOMLDecodeError as error:
         raise VoleryError(f"{name}: not TOML: {error}") from None
     return _checked(data, name)

@@ -11,6 +11,7 @@ from volery.autonomy.policy.policy_file import Policy
 from volery.autonomy.policy.shipped_policies import load_policy
 from volery.core.errors import VoleryError, reason_of
 from volery.core.extras import missing_package
+from volery.core.whole_files import write_whole
 
 _OPSET = 17
 _IR_VERSION = 8
@@ -39,7 +40,7 @@ def export_onnx(name: str | Policy, file: Path) -> str:
     )
     onnx.checker.check_model(model, full_check=True)
     try:
-        file.write_bytes(model.SerializeToString())
+        write_whole(file, model.SerializeToString())
     except OSError as error:
         raise VoleryError(f"{file}: {reason_of(error)}") from None
     return (

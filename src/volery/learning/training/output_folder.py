@@ -10,6 +10,7 @@ from pathlib import Path
 
 from volery.autonomy.policy.policy_file import write_policy
 from volery.core.errors import VoleryError, reason_of
+from volery.core.whole_files import write_whole
 from volery.learning.training.trainer import TrainingResult
 
 _PARENT = Path("training")
@@ -62,7 +63,7 @@ class OutputFolder:
                 asdict(point) for point in result.episodes if not math.isnan(point.mean_return)
             ],
         }
-        self.record.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+        write_whole(self.record, json.dumps(record, indent=1) + "\n")
 
 
 def new_folder(task: str, out: Path | None) -> OutputFolder:

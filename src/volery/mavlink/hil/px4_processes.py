@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from volery.core.errors import BridgeError
+from volery.core.whole_files import open_new
 
 AIRFRAME = "none_iris"
 """PX4's airframe 10016: an Iris with an external simulator."""
@@ -184,7 +185,7 @@ class _Instance:
         """Starts the process. Raises `OSError` if that fails."""
         self._folder.mkdir(parents=True, exist_ok=True)
         self._was_linked = False
-        with self._output.open("wb") as output:
+        with open_new(self._output) as output:
             self._process = subprocess.Popen(
                 [self._build.binary, "-i", str(self.number), "-d", self._build.data],
                 cwd=self._folder,

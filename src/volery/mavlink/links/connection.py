@@ -7,8 +7,11 @@ import errno
 from volery.mavlink.codec import Parser
 from volery.mavlink.framing import Framer
 from volery.mavlink.links.rate_limits import RateAccount
-from volery.mavlink.links.signing import Signing
+from volery.mavlink.links.signing import signing_of
 from volery.mavlink.links.vehicle_registry import VehicleRegistry
+
+_NOBODY = 0
+"""Recipient of frames for a vehicle that does not exist, so that they prove a client only once."""
 
 
 class MavlinkConnection:
@@ -29,7 +32,7 @@ class MavlinkConnection:
         self.has_spoken = False
         """Whether a valid frame has arrived."""
         self._account = account
-        self._signing = Signing(key, number)
+        self._signing = signing_of(key, number)
         self._fleet, self._profile = fleet, profile
         self._framer, self._parser = Framer(), Parser()
         self._systems: set[int] = set()
@@ -46,10 +49,14 @@ class MavlinkConnection:
         """
         frames, cost = self._framer.feed(data), 0
         parts: dict[int, list[bytes]] = {}
-        for frame in filter(self._signing.accepts, frames):
-            self.has_spoken = True
+        for frame in filter(self._signing.is_genuine, frames):
             target = getattr(self._parser.decode(frame.data), "target_system", 0)
-            chosen = self._systems if target == 0 else self._systems & {target}
+            addressed = self._systems if target == 0 else self._systems & {target}
+            recipients = self._signing.recipients(frame, addressed or {_NOBODY})
+            if not recipients:
+                continue
+            self.has_spoken = True
+            chosen = addressed.intersection(recipients)
             cost += max(0, len(chosen) - 1)
             for system in chosen:
                 parts.setdefault(system, []).append(frame.data)

@@ -11,12 +11,13 @@ import hashlib
 import hmac
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 
 from volery.core.errors import BridgeError
 from volery.mavlink.codec import check_of, crc_extra_of
 from volery.mavlink.framing import SIGNED, MavlinkFrame, lengths_of
+from volery.mavlink.links.stamp_ledger import StampLedger, Stream, ledger_of
 
 _RADIO_STATUS = 109
 """Message of radios, which have no key."""
@@ -58,20 +59,31 @@ def steady_time() -> float:
     return _WALL_S + time.monotonic()
 
 
+def signing_of(key: bytes | None, link: int) -> Signing:
+    """Returns the signing of one of a run's links, which shares its ledger with all others."""
+    ledger = None if key is None else ledger_of(key, _stamp_of(steady_time()))
+    return Signing(key, link, ledger=ledger)
+
+
 class Signing:
     """Signs frames sent over one link and checks received ones; without a key all frames pass.
 
-    key: (32,) bytes, or None. link: a number from 0 to 255. clock: UNIX time in s.
+    key: (32,) bytes, or None. link: a number from 0 to 255. clock: UNIX time in s. ledger: newest
+    stamps; None: those of this link alone.
     """
 
     def __init__(
-        self, key: bytes | None, link: int = 0, clock: Callable[[], float] = steady_time
+        self,
+        key: bytes | None,
+        link: int = 0,
+        clock: Callable[[], float] = steady_time,
+        ledger: StampLedger | None = None,
     ) -> None:
         self._key = key
         self._link = link % 256
         self._clock = clock
         self._stamp = 0
-        self._newest: dict[tuple[int, int, int], int] = {}
+        self._ledger = StampLedger() if ledger is None else ledger
         self._logged: set[tuple[int, int, str]] = set()
 
     @property
@@ -89,8 +101,12 @@ class Signing:
             at += length
         return b"".join(signed)
 
-    def accepts(self, frame: MavlinkFrame) -> bool:
-        """Returns whether a received frame is valid."""
+    def accepts(self, frame: MavlinkFrame, vehicle: int = 0) -> bool:
+        """Returns whether a received frame is valid, and new to a vehicle, by its system id."""
+        return self.is_genuine(frame) and bool(self.recipients(frame, (vehicle,)))
+
+    def is_genuine(self, frame: MavlinkFrame) -> bool:
+        """Returns whether a holder of the key sent a frame, now or earlier."""
         if self._key is None or frame.message == _RADIO_STATUS:
             return True
         data = frame.data
@@ -98,16 +114,23 @@ class Signing:
             return self._refuse(frame, "it sends unsigned frames")
         if not hmac.compare_digest(_hash(self._key, data[:-_HASH]), data[-_HASH:]):
             return self._refuse(frame, "its signature does not match the key")
-        stamp = int.from_bytes(data[-_STAMP_AND_HASH:-_HASH], "little")
-        stream = (frame.system, frame.component, data[-_STAMP_AND_HASH - 1])
-        before = self._newest.get(stream, self._now() - _FRESH - 1)
-        if stamp <= before:
-            if stream in self._newest:  # a replay, or late
-                return False
-            return self._refuse(frame, "its clock is more than a minute behind")
-        self._newest[stream] = stamp
-        self._stamp = max(self._stamp, stamp)
         return True
+
+    def recipients(self, frame: MavlinkFrame, vehicles: Collection[int]) -> Collection[int]:
+        """Returns those of `vehicles` to which a genuine frame is new, and remembers its stamp."""
+        if self._key is None or frame.message == _RADIO_STATUS:
+            return vehicles
+        data = frame.data
+        stamp = int.from_bytes(data[-_STAMP_AND_HASH:-_HASH], "little")
+        stream = Stream(frame.system, frame.component, data[-_STAMP_AND_HASH - 1])
+        found = self._ledger.take(vehicles, stream, stamp, self._now() - _FRESH)
+        if found:
+            self._stamp = max(self._stamp, stamp)
+        elif all(self._ledger.newest(vehicle, stream) is None for vehicle in vehicles):
+            self._refuse(frame, "its clock is more than a minute behind")
+        else:
+            self._refuse(frame, "its time stamps do not rise; is its link id used twice?")
+        return found
 
     def _refuse(self, frame: MavlinkFrame, why: str) -> bool:
         """Logs why frames of a sender are ignored, once per reason; returns False."""
@@ -127,7 +150,11 @@ class Signing:
         return stamped + _hash(key, stamped)
 
     def _now(self) -> int:
-        return int((self._clock() - _BEGIN_S) * _PER_S)
+        return _stamp_of(self._clock())
+
+
+def _stamp_of(unix_s: float) -> int:
+    return int((unix_s - _BEGIN_S) * _PER_S)
 
 
 def _hash(key: bytes, data: bytes) -> bytes:

@@ -18,7 +18,7 @@ from volery.mavlink.framing import Framer, lengths_of
 from volery.mavlink.links import ports
 from volery.mavlink.links.connection import why_not
 from volery.mavlink.links.rate_limits import RateAccount, RateLimits
-from volery.mavlink.links.signing import Signing
+from volery.mavlink.links.signing import signing_of
 from volery.mavlink.links.udp_reader import UdpReader, connected_socket
 from volery.mavlink.links.vehicle_registry import Sink, VehicleRegistry
 
@@ -144,7 +144,7 @@ class _UdpLink:
         self._fleet, self._system, self._profile = fleet, system, profile
         self._peers = [to]
         self._framer = Framer()
-        self._signing = Signing(key, profile)
+        self._signing = signing_of(key, profile)
         family = socket.AF_INET6 if ":" in to[0] else socket.AF_INET
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
@@ -183,7 +183,8 @@ class _UdpLink:
     ) -> tuple[bytes, float]:
         """Returns the frames of a datagram, and for how many seconds none must be read after it."""
         heard = self._framer.datagram(data)
-        frames = b"".join(frame.data for frame in heard if self._signing.accepts(frame))
+        accepted = (frame for frame in heard if self._signing.accepts(frame, self._system))
+        frames = b"".join(frame.data for frame in accepted)
         noise_bytes = len(data) - sum(len(frame.data) for frame in heard)
         cost_s = account.charge(max(1, len(heard)), noise_bytes)
         pause_s = max(cost_s, self._fleet.pause_s)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from volery.core.whole_files import write_whole
 from volery.runtime.build.worlds import geometry_of
 from volery.scenario.schema import Scenario
 from volery.sensors.cameras.light import base_colours
@@ -27,4 +28,4 @@ def export_world(
         cover=stands.cover,
         detail=detail,
     )
-    return path.write_bytes(content)
+    return write_whole(path, content)

@@ -11,6 +11,7 @@ from volery.bridges.logs.recorded_topics import recorded_topics
 from volery.bridges.logs.recording import Recorder
 from volery.bridges.logs.recordings_quota import room_left
 from volery.core.errors import RecordingError
+from volery.core.plain_text import plain
 from volery.graph.graph import Graph
 from volery.runtime.replay.command_log import CommandLog
 from volery.runtime.services.results import Fields, offer_command
@@ -77,10 +78,14 @@ class RecordingServices:
     def _checked(self, name: str) -> Path:
         if self._folder is None:
             raise RecordingError("this simulation was started without a folder for recordings")
-        if not name or "\0" in name:
-            raise RecordingError("the path of a recording is empty or not a path")
+        if not name or plain(name) != name:
+            raise RecordingError(
+                "the path of a recording is empty, or not a path: it has control characters"
+            )
         folder = self._folder.resolve()
         path = (folder / name).resolve()
         if path == folder or not path.is_relative_to(folder):
             raise RecordingError(f"'{name}' is outside the folder for recordings")
+        if any(part.startswith(".") for part in path.relative_to(folder).parts):
+            raise RecordingError(f"'{name}' is a hidden file, or in a hidden folder")
         return path

@@ -15,6 +15,7 @@ from pathlib import Path, PurePosixPath
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
+from volery.core.plain_text import plain
 from volery.scenario import library
 from volery.scenario.catalog import ScenarioCatalog
 from volery.server.bounded_process import BoundedError, run_bounded
@@ -42,7 +43,7 @@ async def upload(request: Request) -> Response:
     site: ServerState = request.app.state.site
     kind_name = request.query_params.get("kind", "")
     kind = kind_of_upload(kind_name)
-    called = request.query_params.get("name", "")[:200]
+    called = plain(request.query_params.get("name", "")[:200])
     suffix = suffix_of(called, kind)
     image = image_suffix_of(request.query_params.get("image", "")) if suffix == MAP_SERVER else ""
     folder = site.shelf.folder

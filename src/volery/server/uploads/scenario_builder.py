@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from volery.core.arrays import Array
 from volery.core.errors import DataFileError
 from volery.core.geodesy import LocalFrame
 from volery.core.plurals import counted
@@ -21,8 +22,12 @@ from volery.server.uploads.kinds import (
     IMAGES,
     MAP_SERVER,
     MOST_CELLS,
+    MOST_CORNERS,
+    MOST_CROWDING,
+    MOST_OVERLAPS,
     MOST_TREES,
     MOST_TRIANGLES,
+    MOST_WALLS_M,
 )
 from volery.world.city.geojson import read_features
 from volery.world.grid_maps.map_server import read_map_server, write_with_image
@@ -40,6 +45,9 @@ _BESIDE_M = 5.0
 _LEAST_EXTENT_M = 150.0
 _CITY_REACH_M = 2_000.0
 """Half the side of the part of a city that is used."""
+_NEAR_M = 16.0
+_ROWS = 64
+"""Outlines that are compared with all others at once."""
 
 
 class _Part(NamedTuple):
@@ -118,13 +126,15 @@ def _map_server(path: Path) -> _Part:
 def _city(path: Path) -> _Part:
     features = read_features(path)
     rings = [ring for feature in features for polygon in feature.polygons for ring in polygon]
-    if not rings:
+    if not any(len(ring) for ring in rings):
         raise DataFileError(f"{path}: the file holds no polygon")
     corners = np.concatenate(rings)
     longitude, latitude = ((corners.min(axis=0) + corners.max(axis=0)) / 2.0).tolist()
     frame = LocalFrame.from_degrees(latitude, longitude, 0.0)
     radians = np.radians(corners[:, ::-1])
     places = frame.enu_from_geodetic(np.pad(radians, ((0, 0), (0, 1))))
+    ends = np.cumsum([len(ring) for ring in rings])[:-1]
+    _check_outlines(path, [ring for ring in np.split(places[:, :2], ends) if len(ring)])
     reach = min(float(np.abs(places[:, :2]).max()) + 1.0, _CITY_REACH_M)
     world = (
         f"[world.origin]\nlatitude_deg = {latitude!r}\nlongitude_deg = {longitude!r}\n"
@@ -132,6 +142,48 @@ def _city(path: Path) -> _Part:
         f"region_m = {_numbers((-reach, -reach, reach, reach))}\n"
     )
     return _Part(world, reach + _MARGIN_M, (0.0, 0.0), (5.0, 0.0))
+
+
+def _check_outlines(path: Path, rings: list[Array]) -> None:
+    """Raises DataFileError for outlines, as rings (n, 2) in m, that would take minutes to build."""
+    low = np.array([ring.min(axis=0) for ring in rings])
+    high = np.array([ring.max(axis=0) for ring in rings])
+    used = (np.abs(low + high) / 2.0 <= _CITY_REACH_M).all(axis=1)
+    rings = [ring for ring, is_used in zip(rings, used.tolist(), strict=True) if is_used]
+    count = sum(len(ring) for ring in rings)
+    if count > MOST_CORNERS:
+        raise DataFileError(f"{path}: {count} corners; at most {MOST_CORNERS} are allowed")
+    if rings:
+        _check_walls(path, rings)
+        _check_overlaps(path, low[used], high[used])
+
+
+def _check_walls(path: Path, rings: list[Array]) -> None:
+    """Raises DataFileError for walls that are too long, or too many in one place."""
+    start = np.concatenate([ring[:-1] for ring in rings])
+    way = np.concatenate([np.diff(ring, axis=0) for ring in rings])
+    length = np.hypot(way[:, 0], way[:, 1])
+    if length.sum() > MOST_WALLS_M:
+        raise DataFileError(f"{path}: its walls are too long: {length.sum() / 1000.0:.0f} km")
+    pieces = np.maximum(np.ceil(2.0 * length / _NEAR_M), 1.0).astype(np.int64)
+    wall = np.repeat(np.arange(len(pieces)), pieces)
+    number = np.arange(len(wall)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    middle = start[wall] + way[wall] * ((number + 0.5) / pieces[wall])[:, None]
+    cell = np.floor(middle / _NEAR_M).astype(np.int64)
+    _, there = np.unique(cell[:, 0] * (1 << 32) + cell[:, 1], return_counts=True)
+    if float((there.astype(np.float64) ** 2).sum()) > MOST_CROWDING:
+        raise DataFileError(f"{path}: its walls are too dense: simplify the outlines")
+
+
+def _check_overlaps(path: Path, low: Array, high: Array) -> None:
+    """Raises DataFileError for too many boxes (N, 2) that overlap, which are compared in pairs."""
+    overlaps = 0
+    for first in range(0, len(low), _ROWS):
+        rows = slice(first, first + _ROWS)
+        apart = (low[rows, None] > high[None]) | (low[None] > high[rows, None])
+        overlaps += int((~apart.any(axis=2)).sum())
+        if overlaps - len(low) > 2 * MOST_OVERLAPS:
+            raise DataFileError(f"{path}: more than {MOST_OVERLAPS} pairs of outlines overlap")
 
 
 def _mesh(path: Path) -> _Part:

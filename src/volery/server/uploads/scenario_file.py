@@ -10,6 +10,7 @@ import tomllib
 from pathlib import Path
 
 from volery.core.errors import ScenarioError, reason_of
+from volery.core.toml_text import parse_toml
 from volery.runtime.build.node_loading import find_node
 from volery.scenario.schema import Scenario
 from volery.server.uploads.kinds import MAX_UAVS
@@ -25,16 +26,14 @@ def text_of(path: Path, name: str) -> str:
     """
     try:
         text = path.read_text(encoding="utf-8-sig")
-        before = tomllib.loads(text)
+        before = parse_toml(text)
     except (OSError, ValueError) as error:
         raise ScenarioError(f"{path}: not valid TOML: {reason_of(error)}") from None
-    except RecursionError:
-        raise ScenarioError(f"{path}: its lists are nested too deep") from None
     table = _TABLE.search(text)
     top = len(text) if table is None else table.start()
     renamed = _NAME.sub(f'name = "{name}"', text[:top], count=1) + text[top:]
     try:
-        is_renamed = tomllib.loads(renamed) == {**before, "name": name}
+        is_renamed = parse_toml(renamed) == {**before, "name": name}
     except tomllib.TOMLDecodeError:
         is_renamed = False
     if not is_renamed:

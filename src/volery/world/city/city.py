@@ -57,7 +57,7 @@ def build_city(
     """
     outlines, report = read_outlines(path, frame, rule=heights or HeightRule(), region=region)
     if not outlines:
-        raise DataFileError(f"{path}: no building is left\n{report}")
+        raise DataFileError(f"{path}: no building is left\n  {report}")
     x0, y0, x1, y1 = terrain.bounds
     boxes = np.array([outline.footprint.bounds for outline in outlines])
     beyond = ((boxes < (x0, y0, x0, y0)) | (boxes > (x1, y1, x1, y1))).any(axis=1)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from volery.core.arrays import Array
 from volery.core.errors import DataFileError
+from volery.core.whole_files import whole_file
 
 _FREE, _UNKNOWN, _WALL = (255, 255, 255), (226, 228, 230), (20, 24, 28)
 _WAY, _BEGIN, _END = (214, 80, 48), (46, 140, 80), (40, 90, 190)
@@ -42,6 +43,7 @@ def write_image(
     for k, colour in ((0, _BEGIN), (-1, _END)):
         pen.ellipse([x[k] - 5, y[k] - 5, x[k] + 5, y[k] + 5], fill=colour)
     try:
-        image.save(path, format="PNG")
+        with whole_file(path) as file:
+            image.save(file, format="PNG")
     except OSError as error:
         raise DataFileError(f"{path}: the image cannot be written: {error.strerror}") from None

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from volery.core import rotations
 from volery.core.arrays import Array
 from volery.core.errors import DataFileError
+from volery.core.whole_files import whole_file
 
 Times = NDArray[np.int64]
 
@@ -106,12 +107,12 @@ def _laid(
 def write_tum(path: Path, trajectory: EstimatedTrajectory) -> None:
     """Writes the poses as text, one per line: `timestamp x y z qx qy qz qw`, s and m."""
     try:
-        with path.open("w", encoding="utf-8") as file:
-            file.write("# timestamp x y z qx qy qz qw\n")
+        with whole_file(path) as file:
+            file.write(b"# timestamp x y z qx qy qz qw\n")
             for when, place, turn in zip(
                 trajectory.time_ns, trajectory.position, trajectory.attitude, strict=True
             ):
                 numbers = " ".join(f"{number:.6f}" for number in (*place, *turn))
-                file.write(f"{when // 10**9}.{when % 10**9:09d} {numbers}\n")
+                file.write(f"{when // 10**9}.{when % 10**9:09d} {numbers}\n".encode())
     except OSError as error:
         raise DataFileError(f"{path}: the path cannot be written: {error.strerror}") from None
