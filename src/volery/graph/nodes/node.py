@@ -388,7 +388,7 @@ class Node(ParameterMethods):
         timers, now_ns = self._context.timers, self._context.now_ns
         return lambda action: timers.at(now_ns(), lambda: self.__run(action, "first call"))
 
-    def call_soon(self, action: Callable[[], Any]) -> None:
+    def _call_soon(self, action: Callable[[], Any]) -> None:
         """Calls `action` as a callback of its own, at the same simulated time."""
         timers, now_ns = self._context.timers, self._context.now_ns
         timers.at(now_ns(), lambda: self.__run(action, f"later call{_name_of(action)}"))

@@ -291,7 +291,7 @@ class TransformListener:
 
     def __init__(self, buffer: Buffer, node: Any, **_options: Any) -> None:
         self.buffer = buffer
-        buffer.call_soon = node.call_soon
+        buffer.call_soon = node._call_soon
         static = QoSProfile(depth=_DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._subscriptions = (
             node.create_subscription(TFMessage, "/tf", self._on_tf, _DEPTH),
