@@ -6,6 +6,8 @@ from volery.core import rotations
 
 GRAVITY = 9.80665
 UP = np.array([0.0, 0.0, GRAVITY])
+GYRO_CORRELATION_S, ACCEL_CORRELATION_S = 1000.0, 300.0
+"""Of the biases' moving part, in RotorS' ADIS16448."""
 FIELD = np.array([1.13e-6, 2.161e-5, -4.302e-5])
 
 
@@ -69,16 +71,22 @@ class Straight:
 
 
 class GaussMarkov:
-    """A bias that walks: b+ = decay b + spread n."""
+    """A bias that walks, b+ = decay b + spread n, on a constant one."""
 
-    def __init__(self, draw, shape, first, walk, tau, dt):
-        self.draw, self.value = draw, draw.normal(size=shape) * first
+    def __init__(self, draw, shape, first, walk, tau, dt, constant=0.0):
+        self.draw, self.moving = draw, draw.normal(size=shape) * first
+        self.constant = draw.normal(size=shape) * constant if constant else 0.0
         self.decay = np.exp(-dt / tau)
         self.spread = walk * np.sqrt(tau / 2 * (1 - self.decay**2))
 
+    @property
+    def value(self):
+        return self.moving + self.constant
+
     def step(self):
         now = self.value
-        self.value = self.decay * now + self.spread * self.draw.normal(size=now.shape)
+        noise = self.draw.normal(size=self.moving.shape)
+        self.moving = self.decay * self.moving + self.spread * noise
         return now
 
 
@@ -98,18 +106,20 @@ class Sensors:
         self.gyro_bias = GaussMarkov(
             draw,
             (n, 3),
-            s.gyro_turn_on_bias_rad_s,
+            0.0,
             s.gyro_random_walk_rad_s2_sqrt_hz,
-            s.gyro_bias_correlation_s,
+            GYRO_CORRELATION_S,
             dt,
+            s.gyro_turn_on_bias_rad_s,
         )
         self.accel_bias = GaussMarkov(
             draw,
             (n, 3),
-            s.accel_turn_on_bias_m_s2,
+            0.0,
             s.accel_random_walk_m_s3_sqrt_hz,
-            s.accel_bias_correlation_s,
+            ACCEL_CORRELATION_S,
             dt,
+            s.accel_turn_on_bias_m_s2,
         )
         tau = s.gnss_offset_correlation_s
         sigma = np.array(s.gnss_offset_sigma_m)

@@ -163,6 +163,75 @@ def test_an_outage_is_told_and_recovered_from(flight):
     assert jumps[80:].max() < 3.0  # back at once: 0.4 s after the first fix
 
 
+class Wobbling(Motion):
+    """Pitch and yaw swing in quadrature at 6 rad/s: the axis of rotation turns all the while."""
+
+    def __init__(self, count, seed):
+        super().__init__(count, seed)
+        self.turn = np.tile([[0.2], [0.5], [1.0]], count)
+        self.turn_pulse[1:] = 6.0
+        self.turn_phase[1] = self.turn_phase[2] + 0.5 * np.pi
+
+
+def test_aggressive_flight_and_an_outage_of_30_s():
+    """The turning axis makes the mean of two rates drift by half a mrad/s, as a bias does not."""
+    motion = Wobbling(COUNT, seed=12)
+    sensors = Sensors(motion, SETTINGS, seed=13, arms=ARMS)
+    estimator = airborne(motion, seed=14)
+    drive(estimator, sensors, 0, 8)
+    assert_consistent(estimator, sensors, 8.0)
+    drive(estimator, sensors, 8, 38, gnss=False)
+    assert_consistent(estimator, sensors, 38.0)
+
+
+class HardLanding(Straight):
+    """Sinks at 4 m/s, and stops within 10 ms, with 41 g, at 2 s."""
+
+    AT, LASTS, SPEED = 2.0, 0.01, 4.0
+
+    def at(self, t):
+        position, velocity, level, omega, force = super().at(t)
+        stopped = np.clip((t - self.AT) / self.LASTS, 0.0, 1.0)
+        velocity[:, 2] = -self.SPEED * (1.0 - stopped)
+        way = min(t, self.AT) + self.LASTS * (stopped - 0.5 * stopped**2)
+        position[:, 2] = -self.SPEED * way
+        if 0.0 < stopped < 1.0:
+            force[:, 2] += self.SPEED / self.LASTS
+        return position, velocity, level, omega, force
+
+
+class Saturated(Sensors):
+    """The accelerometer ends at 18 g."""
+
+    FULL_SCALE = 176.52
+
+    def imu(self, t):
+        gyro, accel = super().imu(t)
+        return gyro, np.clip(accel, -self.FULL_SCALE, self.FULL_SCALE)
+
+
+def test_a_shock_beyond_full_scale_is_doubted_and_corrected():
+    """It hides 3 m/s. A filter that knows the full scale doubts its velocity, and takes fixes."""
+    told = SETTINGS.model_copy(update={"accel_range_m_s2": Saturated.FULL_SCALE})
+    ratios, refused = [], []
+    for settings in (told, SETTINGS):
+        motion = HardLanding(8, 0.0)
+        sensors = Saturated(motion, settings, seed=15)
+        estimator = airborne(motion, seed=16, settings=settings, mounting=Mounting())
+        drive(estimator, sensors, 0, 2.02)
+        variance = estimator.covariance(np.arange(8))[:, r.VELOCITY + 2, r.VELOCITY + 2]
+        wrong = np.abs(errors(estimator, sensors, 2.02)[:, r.VELOCITY + 2])
+        assert wrong.min() > 2.0
+        ratios.append(wrong / np.sqrt(variance))
+        drive(estimator, sensors, 2.02, 3.5)
+        assert np.abs(errors(estimator, sensors, 3.5)[:, r.VELOCITY + 2]).max() < 0.8
+        assert np.isfinite(estimator.covariance(np.arange(8))).all()
+        assert estimator.restarts.sum() == 0
+        refused.append(estimator.gate(r.AidingSource.GNSS_VELOCITY).rejected.sum())
+    assert ratios[0].max() < 5.0 < ratios[1].min()
+    assert refused[0] == 0 < refused[1]
+
+
 def test_lever_arm_of_the_imu():
     """Far from the centre of mass, as consistent as in it."""
     arms = {"imu": (0.3, -0.2, 0.1), **ARMS}

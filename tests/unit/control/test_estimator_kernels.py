@@ -246,7 +246,6 @@ def test_carried_covariance_is_the_dense_product():
     P = P.reshape(N, N)
     t = 0.13
     rate = np.zeros(N)
-    rate[9:12], rate[12:15] = 1 / 1000, 1 / 300
     rate[16], rate[17:] = 1 / 600, 1 / 60
     keep = np.exp(-rate * t)
     noise = np.zeros((N, N))
@@ -255,8 +254,7 @@ def test_carried_covariance_is_the_dense_product():
     noise[i, i], noise[i + 3, i + 3] = accel * t**3 / 3, accel * t
     noise[i, i + 3] = noise[i + 3, i] = accel * t**2 / 2
     noise[i + 6, i + 6] = settings.gyro_noise_density_rad_s_sqrt_hz**2 * t
-    noise[i + 9, i + 9] = 3.879e-5**2 * 500 * (1 - keep[9] ** 2)
-    noise[i + 12, i + 12] = 0.006**2 * 150 * (1 - keep[12] ** 2)
+    noise[i + 9, i + 9], noise[i + 12, i + 12] = 3.879e-5**2 * t, 0.006**2 * t
     noise[15, 15] = 0.05**2 * t
     noise[16, 16] = 0.02**2 * (1 - keep[16] ** 2)
     noise[i + 17, i + 17] = np.square([0.5, 0.5, 0.8]) * (1 - keep[17] ** 2)

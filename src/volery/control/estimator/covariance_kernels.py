@@ -43,34 +43,31 @@ def carry(P: Array, flow: Any, tuning: Any, keep: Array) -> None:
         for i in range(STATES):
             P[i * STATES + j] *= keep_j * keep[i]
     _mirror(P)
-    for i in range(3):
-        _spread(P, GYRO_BIAS + i, tuning.bias_variance[0], keep)
-        _spread(P, ACCEL_BIAS + i, tuning.bias_variance[1], keep)
     for i in range(OFFSETS):
         _spread(P, PRESSURE_OFFSET + i, tuning.offset_variance[i], keep)
     duration = flow.duration
+    for i in range(3):
+        P[(GYRO_BIAS + i) * (STATES + 1)] += tuning.bias_walk[0] * duration
+        P[(ACCEL_BIAS + i) * (STATES + 1)] += tuning.bias_walk[1] * duration
     P[PRESSURE_OFFSET * (STATES + 1)] += tuning.pressure_walk * duration
-    # White noise of the IMU. The effect of the gyroscope's on velocity is left out: in a tenth
-    # of a second it is three orders of magnitude below the accelerometer's.
-    speed = tuning.accel_noise * duration
+    # White noise of the IMU, and what its saturated readings left out. The effect of the
+    # gyroscope's noise on velocity is not counted: in a tenth of a second it is three orders of
+    # magnitude below the accelerometer's.
+    speed = tuning.accel_noise * duration + flow.lost_speed
     for k in range(3):
         p, v, r = POSITION + k, VELOCITY + k, ROTATION + k
         P[v * STATES + v] += speed
         P[p * STATES + p] += speed * duration * duration / 3.0
         P[p * STATES + v] += 0.5 * speed * duration
         P[v * STATES + p] = P[p * STATES + v]
-        P[r * STATES + r] += tuning.gyro_noise * duration
+        P[r * STATES + r] += tuning.gyro_noise * duration + flow.lost_turn
 
 
 @part_kernel
 def decay(tuning: Any, duration: float, keep: Array) -> None:
     """Computes `keep` (STATES,): fraction of each state's mean that is left after `duration` s."""
-    for i in range(GYRO_BIAS):
+    for i in range(PRESSURE_OFFSET):
         keep[i] = 1.0
-    gyro = math.exp(-tuning.bias_rate[0] * duration)
-    accel = math.exp(-tuning.bias_rate[1] * duration)
-    for i in range(3):
-        keep[GYRO_BIAS + i], keep[ACCEL_BIAS + i] = gyro, accel
     for i in range(OFFSETS):
         keep[PRESSURE_OFFSET + i] = math.exp(-tuning.offset_rate[i] * duration)
 

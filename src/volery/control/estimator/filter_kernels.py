@@ -26,7 +26,13 @@ from volery.control.estimator.covariance_kernels import (
     turn_errors,
 )
 from volery.control.estimator.measurement_kernels import linearise
-from volery.control.estimator.motion_kernels import flow_on, motion_at_horizon, still, travelled
+from volery.control.estimator.motion_kernels import (
+    add_saturation,
+    flow_on,
+    motion_at_horizon,
+    still,
+    travelled,
+)
 from volery.control.estimator.output_predictor import renew_present
 from volery.control.estimator.records import (
     ACCEL_BIAS,
@@ -91,7 +97,7 @@ def predict_rows(
         while state.waiting_readings > 0 and (
             ring[state.first_reading].stamp_ns <= horizon_ns or state.waiting_readings == capacity
         ):
-            _move_horizon(state, ring[state.first_reading])
+            _move_horizon(state, tuning, ring[state.first_reading])
             state.first_reading = (state.first_reading + 1) % capacity
             state.waiting_readings -= 1
             _fuse_due(state, tuning, queue, work)
@@ -107,22 +113,33 @@ def _store(slot: Any, tuning: Any, stamp_ns: int, gyro: Array, accel: Array) -> 
     slot.gyro[0], slot.gyro[1], slot.gyro[2] = rotate_vector(x, y, z, w, a, b, c)
     a, b, c = three(accel)
     slot.accel[0], slot.accel[1], slot.accel[2] = rotate_vector(x, y, z, w, a, b, c)
+    slot.gyro_cut = _is_cut(gyro, tuning.gyro_range)
+    slot.accel_cut = _is_cut(accel, tuning.accel_range)
     slot.stamp_ns = stamp_ns
+
+
+@inner_kernel
+def _is_cut(values: Array, full_scale: float) -> int:
+    """Returns 1 if one of (3,) values is at full scale, else 0."""
+    return int(max(abs(values[0]), abs(values[1]), abs(values[2])) >= full_scale)
 
 
 @inner_kernel
 def _copy_reading(target: Any, source: Any, stamp_ns: int) -> None:
     for k in range(3):
         target.gyro[k], target.accel[k] = source.gyro[k], source.accel[k]
+    target.gyro_cut, target.accel_cut = source.gyro_cut, source.accel_cut
     target.stamp_ns = stamp_ns
 
 
 @inner_kernel
-def _move_horizon(state: Any, reading: Any) -> None:
+def _move_horizon(state: Any, tuning: Any, reading: Any) -> None:
     before = motion_at_horizon(state)
     gyro_bias, accel_bias = three(state.gyro_bias), three(state.accel_bias)
     after = travelled(before, state.reading, reading, gyro_bias, accel_bias)
-    flow_on(state.flow, (reading.stamp_ns - state.reading.stamp_ns) * 1e-9, before, after)
+    duration = (reading.stamp_ns - state.reading.stamp_ns) * 1e-9
+    flow_on(state.flow, duration, before, after)
+    add_saturation(state.flow, duration, reading, tuning)
     for k in range(3):
         state.position[k] = after[0][k]
         state.velocity[k] = after[1][k]
@@ -155,9 +172,6 @@ def _catch_up(state: Any, tuning: Any, work: Any) -> None:
     decay(tuning, state.flow.duration, keep)
     carry(state.covariance, state.flow, tuning, keep)
     still(state.flow)
-    for k in range(3):
-        state.gyro_bias[k] *= keep[GYRO_BIAS + k]
-        state.accel_bias[k] *= keep[ACCEL_BIAS + k]
     for k in range(OFFSETS):
         state.offset[k] *= keep[PRESSURE_OFFSET + k]
 

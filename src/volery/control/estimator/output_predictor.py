@@ -9,7 +9,13 @@ from numpy.typing import NDArray
 
 from volery.control.estimator.compiled import part_kernel
 from volery.control.estimator.covariance_kernels import carry, decay, transform, transpose
-from volery.control.estimator.motion_kernels import flow_on, motion_at_horizon, still, travelled
+from volery.control.estimator.motion_kernels import (
+    add_saturation,
+    flow_on,
+    motion_at_horizon,
+    still,
+    travelled,
+)
 from volery.control.estimator.records import STATES
 from volery.core.arrays import Array
 from volery.core.rotation_kernels import cross, rotate_vector
@@ -75,7 +81,9 @@ def present_covariances(
         for n in range(state.waiting_readings):
             reading = ring[(state.first_reading + n) % len(ring)]
             after = travelled(motion, before, reading, gyro_bias, accel_bias)
-            flow_on(flow, (reading.stamp_ns - before.stamp_ns) * 1e-9, motion, after)
+            duration = (reading.stamp_ns - before.stamp_ns) * 1e-9
+            flow_on(flow, duration, motion, after)
+            add_saturation(flow, duration, reading, tuning)
             motion = after
             before = reading
         decay(tuning, flow.duration, keep)
@@ -89,6 +97,7 @@ def present_covariances(
 @inner_kernel
 def _copy_flow(target: Any, source: Any) -> None:
     target.duration = source.duration
+    target.lost_turn, target.lost_speed = source.lost_turn, source.lost_speed
     for i in range(3):
         target.speed[i], target.way[i] = source.speed[i], source.way[i]
         for j in range(3):

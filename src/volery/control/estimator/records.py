@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from enum import IntEnum
 
 import numpy as np
@@ -39,8 +40,17 @@ class AidingSource(IntEnum):
 
 AIDS = PARTS * 6
 
-READING = np.dtype([("stamp_ns", "i8"), ("gyro", "f8", 3), ("accel", "f8", 3)], align=True)
-"""An IMU measurement, body axes: rad/s, m/s^2."""
+READING = np.dtype(
+    [
+        ("stamp_ns", "i8"),
+        ("gyro", "f8", 3),
+        ("accel", "f8", 3),
+        ("gyro_cut", "i8"),
+        ("accel_cut", "i8"),
+    ],
+    align=True,
+)
+"""An IMU measurement, body axes: rad/s, m/s^2; 1: an axis is at the sensor's full scale."""
 
 MEASUREMENT = np.dtype(
     [("stamp_ns", "i8"), ("kind", "i8"), ("value", "f8", 7), ("variance", "f8", 6)], align=True
@@ -56,6 +66,8 @@ FLOW = np.dtype(
         ("turn_way", "f8", (3, 3)),  # and of that, s^2
         ("gyro_speed", "f8", (3, 3)),  # velocity by gyro bias, m
         ("gyro_way", "f8", (3, 3)),  # position by gyro bias, m s
+        ("lost_turn", "f8"),  # variances of what saturated readings left out, rad^2
+        ("lost_speed", "f8"),  # m^2/s^2
     ],
     align=True,
 )
@@ -127,8 +139,9 @@ TUNING = np.dtype(
         ("pose_restart_ns", "i8"),
         ("gyro_noise", "f8"),  # spectral densities: rad^2/s, m^2/s^3
         ("accel_noise", "f8"),
-        ("bias_rate", "f8", 2),  # 1/s, gyro and accelerometer
-        ("bias_variance", "f8", 2),  # stationary
+        ("gyro_range", "f8"),  # full scale of the IMU: rad/s, m/s^2
+        ("accel_range", "f8"),
+        ("bias_walk", "f8", 2),  # of the biases: rad^2/s^3, m^2/s^5
         ("offset_rate", "f8", OFFSETS),
         ("offset_variance", "f8", OFFSETS),
         ("pressure_walk", "f8"),  # m^2/s
@@ -162,12 +175,11 @@ def tuning_of(settings: EstimatorSettings, mounting: Mounting) -> NDArray[np.voi
     row["pose_restart_ns"] = round(settings.pose_restart_after_s * 1e9)
     row["gyro_noise"] = settings.gyro_noise_density_rad_s_sqrt_hz**2
     row["accel_noise"] = settings.accel_noise_density_m_s2_sqrt_hz**2
-    correlation = np.array([settings.gyro_bias_correlation_s, settings.accel_bias_correlation_s])
-    walk = np.array(
+    row["gyro_range"] = settings.gyro_range_rad_s or math.inf
+    row["accel_range"] = settings.accel_range_m_s2 or math.inf
+    row["bias_walk"] = np.square(
         [settings.gyro_random_walk_rad_s2_sqrt_hz, settings.accel_random_walk_m_s3_sqrt_hz]
     )
-    row["bias_rate"] = 1.0 / correlation
-    row["bias_variance"] = walk**2 * correlation / 2.0
     row["offset_rate"] = [
         0.0,
         1.0 / settings.heading_offset_correlation_s,

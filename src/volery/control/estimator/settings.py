@@ -22,17 +22,21 @@ class EstimatorSettings(Bounded):
     """Noise models and limits of one UAV's filter.
 
     The keys of the IMU are those of an IMU's data file, so that a sensor's own numbers can be
-    passed on; the defaults are the ADIS16448's as RotorS simulates it.
+    passed on; the defaults are the ADIS16448's as RotorS simulates it. The filter's biases walk and
+    do not decay, as PX4's: the larger part of a bias, that of the turn-on, is constant.
     """
 
     gyro_noise_density_rad_s_sqrt_hz: Density = 3.394e-4
     gyro_random_walk_rad_s2_sqrt_hz: NonNegativeFloat = 3.879e-5
-    gyro_bias_correlation_s: PositiveFloat = 1000.0
     gyro_turn_on_bias_rad_s: NonNegativeFloat = 0.00873
     accel_noise_density_m_s2_sqrt_hz: Density = 0.004
     accel_random_walk_m_s3_sqrt_hz: NonNegativeFloat = 0.006
-    accel_bias_correlation_s: PositiveFloat = 300.0
     accel_turn_on_bias_m_s2: NonNegativeFloat = 0.196
+    gyro_range_rad_s: PositiveFloat | None = None
+    """Full scale of the gyroscope; None: unlimited. What a reading at full scale leaves out is
+    taken to be as large as the full scale itself (modelling choice)."""
+    accel_range_m_s2: PositiveFloat | None = None
+    """The same for the accelerometer."""
     imu_rate_hz: PositiveFloat = 200.0
     """Sizes the buffer; a higher actual rate shortens the horizon."""
 
