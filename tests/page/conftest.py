@@ -9,6 +9,7 @@ MISSING = [name for name in ("playwright", "roslibpy") if importlib.util.find_sp
 if not MISSING:
     from page_browsing import Browsing
     from page_serving import Served
+    from truth import set_speed
 
     from volery_benchmarks.page.browser import browser_path, open_browser
 
@@ -45,11 +46,24 @@ def scenario(request):
     return getattr(request.module, "SCENARIO", "hover")
 
 
-@pytest.fixture(scope="module")
-def served(scenario, chromium):
-    """A running `volery serve`."""
-    with Served(scenario) as server:
+@pytest.fixture(scope="session")
+def hover(chromium):
+    """A running `volery serve hover` for all modules that need no server of their own."""
+    with Served("hover") as server:
         yield server
+
+
+@pytest.fixture(scope="module")
+def served(request, scenario, chromium):
+    """A running `volery serve`, in real time; `hover` is reset for each module."""
+    if scenario == "hover":
+        server = request.getfixturevalue("hover")
+        server.call("/reset_simulation", "simulation_interfaces/srv/ResetSimulation")
+        set_speed(server, 1.0)
+        yield server
+    else:
+        with Served(scenario) as server:
+            yield server
 
 
 @pytest.fixture

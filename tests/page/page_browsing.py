@@ -12,6 +12,37 @@ HANG_S = 180.0
 SMALL = {"width": 640, "height": 360}
 COARSE = "Object.defineProperty(window, 'devicePixelRatio', { get: () => 0.25 })"
 """The scene gets one pixel for sixteen of the page: software draws slowly."""
+SPARSE = """
+(() => {
+  const ask = window.requestAnimationFrame.bind(window);
+  const forget = window.cancelAnimationFrame.bind(window);
+  const drawn = new WeakMap(), waits = new Map();
+  let requests = 0;
+  window.requestAnimationFrame = (draw) => {
+    const id = ++requests;
+    const begin = () => {
+      const frame = ask((now) => {
+        waits.delete(id);
+        drawn.set(draw, performance.now());
+        draw(now);
+      });
+      waits.set(id, () => forget(frame));
+    };
+    const restMs = (drawn.get(draw) ?? -Infinity) + 90 - performance.now();
+    if (restMs > 0) {
+      const timer = setTimeout(begin, restMs);
+      waits.set(id, () => clearTimeout(timer));
+    } else begin();
+    return id;
+  };
+  window.cancelAnimationFrame = (id) => {
+    waits.get(id)?.();
+    waits.delete(id);
+  };
+})()
+"""
+"""What is drawn again and again, such as the scene, is drawn at most eleven times a second, so that
+pages leave time to one another. Steps of its movements are as long as that at most."""
 HARMLESS = (
     r"GPU stall due to ReadPixels",
     r"GroupMarkerNotSet",
@@ -37,6 +68,7 @@ class Browsing:
         opened = self._chromium.new_context(viewport=viewport or SMALL, **context)
         opened.set_default_timeout(1000 * HANG_S)
         self._contexts.append(opened)
+        opened.add_init_script(SPARSE)
         if "quality=" not in url:
             url = with_fragment(url, "quality=minimal")
             opened.add_init_script(COARSE)

@@ -3,6 +3,7 @@
 import pytest
 import roslibpy
 from page_browsing import keep_picture
+from scene_reading import wait_until
 from truth import (
     VEHICLES,
     first_after_return,
@@ -165,9 +166,31 @@ SLOW_FRAMES = """
 () => {
   const work = (ms) => { for (const from = performance.now(); performance.now() - from < ms; ); };
   window.slow = setInterval(() => work(700), 710);
-  window.hang = (ms) => { setTimeout(() => work(ms), 0); };
 }
 """
+HANG = """
+() => {
+  clearInterval(window.slow);
+  setTimeout(() => {
+    const request = new XMLHttpRequest();
+    request.open("GET", "./hang", false);
+    request.send();
+  }, 0);
+}
+"""
+"""The page's script stands still until the test answers its request."""
+
+
+def flies_on(states):
+    """Whether the last states, over more than one slow frame, have no hold among them.
+
+    Where another process holds up the page for longer than its commands count, it holds rightly,
+    and flies on later. A page without repetitions holds within each frame.
+    """
+    last = states[-25:]
+    return len(last) == 25 and all(
+        uav["mode"] == "VELOCITY" and uav["velocity"]["x"] < -2.0 for uav in last
+    )
 
 
 def test_flight_goes_on_while_frames_are_slow_and_ends_when_the_page_hangs(page, served):
@@ -177,12 +200,19 @@ def test_flight_goes_on_while_frames_are_slow_and_ends_when_the_page_hangs(page,
     page.get_by_role("group", name="Manual control").wait_for()
     page.evaluate(SLOW_FRAMES)
     page.keyboard.down("KeyS")
-    vehicle(served, "uav2", lambda uav: uav["velocity"]["x"] < -2.0)
-    seen = [vehicle(served, "uav2") for _ in range(20)]
-    assert {uav["mode"] for uav in seen} == {"VELOCITY"}  # no hold in between
-    assert max(uav["velocity"]["x"] for uav in seen) < -2.0
-    page.evaluate("clearInterval(window.slow); window.hang(4000)")
-    vehicle(served, "uav2", lambda uav: abs(uav["velocity"]["x"]) < 0.2, timeout_s=20.0)
+    with heard_vehicles(served) as heard:
+        until(lambda: flies_on(of_uav(heard, "uav2")))
+    hanging = []
+
+    def hang(route):  # a plain function: Playwright sets an attribute of it
+        hanging.append(route)
+
+    page.route("**/hang", hang)
+    page.evaluate(HANG)
+    vehicle(served, "uav2", lambda uav: abs(uav["velocity"]["x"]) < 0.2)
+    wait_until(page, lambda _: hanging)
+    hanging[0].fulfill(body="")
+    page.unroute("**/hang")
     vehicle(served, "uav2", lambda uav: uav["velocity"]["x"] < -1.0)  # the key is still down
     page.keyboard.up("KeyS")
     vehicle(served, "uav2", lambda uav: abs(uav["velocity"]["x"]) < 0.2)

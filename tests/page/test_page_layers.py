@@ -1,6 +1,7 @@
 """What programs publish beside the sensors is in the picture: maps, voxels, markers, paths."""
 
 import threading
+from contextlib import ExitStack
 
 import numpy as np
 import pytest
@@ -55,12 +56,15 @@ class Telling:
         self._topic.unadvertise()
 
 
-def colour_at(page, place):
-    """(3,) what is seen at a place of the map, 0 to 1."""
+def colours_at(page, places):
+    """What is seen at places of the map: a colour (3,) each, 0 to 1."""
     box = page.get_by_label("Scene", exact=True).bounding_box()
-    x, y = project(page, place)
-    column, row = round(x - box["x"]), round(y - box["y"])
-    return pixels(page)[row - 2 : row + 3, column - 2 : column + 3].mean(axis=(0, 1))
+    picture, seen = pixels(page), {}
+    for name, place in places.items():
+        x, y = project(page, place)
+        column, row = round(x - box["x"]), round(y - box["y"])
+        seen[name] = picture[row - 2 : row + 3, column - 2 : column + 3].mean(axis=(0, 1))
+    return seen
 
 
 def marker():
@@ -114,19 +118,20 @@ def test_markers_maps_and_voxels_stand_where_they_are(page, served):
         "/octomap": ("octomap_msgs/msg/Octomap", voxels, middle),
         "/plan": ("nav_msgs/msg/Path", path(), (-3.0, 1.5, 0.5)),
     }
-    before = {topic: colour_at(page, place) for topic, (_, _, place) in layers.items()}
-    seen = {}
-    for topic, (msgtype, message, place) in layers.items():
-        with Telling(served, topic, msgtype, message):
-            wait_until(
-                page,
-                lambda page, topic=topic, place=place: (
-                    np.abs(colour_at(page, place) - before[topic]).max() > 0.1
-                ),
-            )
-            wait_for_frames(page, 2)
-            seen[topic] = colour_at(page, place)
-    keep_picture(page, "layers")
+    places = {topic: place for topic, (_, _, place) in layers.items()}
+    before = colours_at(page, places)
+
+    def changed(page):
+        return [t for t, c in colours_at(page, places).items() if np.abs(c - before[t]).max() > 0.1]
+
+    with ExitStack() as published:
+        for number, (topic, (msgtype, message, _)) in enumerate(layers.items()):
+            published.enter_context(Telling(served, topic, msgtype, message))
+            expected = list(layers)[: number + 1]  # and nothing where the others will be
+            wait_until(page, lambda page, expected=expected: changed(page) == expected)
+        wait_for_frames(page, 2)
+        seen = colours_at(page, places)
+        keep_picture(page, "layers")
     red, green, blue = seen["/marker"]
     assert min(red, blue) > green + 0.2
     assert np.ptp(seen["/map"]) < 0.15  # occupied is black or grey, on green

@@ -5,7 +5,7 @@ import pytest
 from page_browsing import keep_picture
 from page_serving import Served
 from scene_reading import eye, pixels, wait_for_frames, wait_for_picture, wait_until
-from truth import place, vehicle
+from truth import hurried, place, vehicle
 from working import SMALL, press_canvas, pull
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
@@ -53,7 +53,8 @@ def served(chromium, tmp_path_factory):
     (folder / "blocks.csv").write_text(BLOCKS)
     (folder / "scanned.toml").write_text(SCANNED)
     with Served(str(folder / "scanned.toml")) as server:
-        vehicle(server, "uav1", lambda told: told["mode"] == "HOLD")
+        with hurried(server):
+            vehicle(server, "uav1", lambda told: told["mode"] == "HOLD")
         yield server
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from page_browsing import keep_picture
 from scene_reading import pixels, wait_for_frames, wait_for_picture, wait_until
-from truth import place, vehicle, weather
+from truth import heard_vehicles, hurried, of_uav, place, until, vehicle, weather
 from working import SMALL, open_panel, set_slider
 
 pytestmark = pytest.mark.slow
@@ -82,15 +82,19 @@ def test_what_falls_is_seen_to_fall(page, served, kind):
 
 
 def test_wind_and_gusts_move_a_uav(page, served):
-    vehicle(served, "uav1", lambda uav: uav["mode"] == "HOLD" and uav["airborne"])
+    with hurried(served):
+        vehicle(served, "uav1", lambda uav: uav["mode"] == "HOLD" and uav["airborne"])
     before = place(served, "uav1")
     set_slider(page, "Wind from", "Home")
     set_slider(page, "Wind from", "ArrowRight", 18)  # 90 degrees: from the east
-    set_slider(page, "Wind", "ArrowRight", 12)
-    weather(served, lambda told: told["wind"]["x"] == pytest.approx(-6.0))
-    vehicle(served, "uav1", lambda uav: uav["position"]["x"] < before[0] - 0.05)
+    with heard_vehicles(served) as heard:
+        set_slider(page, "Wind", "ArrowRight", 12)
+        weather(served, lambda told: told["wind"]["x"] == pytest.approx(-6.0))
+        until(lambda: any(uav["position"]["x"] < before[0] - 0.05 for uav in of_uav(heard, "uav1")))
     page.get_by_role("button", name="Clear weather").click()
     weather(served, lambda told: told["wind"]["x"] == 0.0)
-    vehicle(served, "uav1", lambda uav: abs(uav["velocity"]["x"]) < 0.05)
-    page.get_by_role("button", name="Add a gust").click()
-    vehicle(served, "uav1", lambda uav: abs(uav["velocity"]["x"]) > 0.1)
+    with hurried(served):
+        vehicle(served, "uav1", lambda uav: abs(uav["velocity"]["x"]) < 0.05)
+    with heard_vehicles(served) as heard:
+        page.get_by_role("button", name="Add a gust").click()
+        until(lambda: any(abs(uav["velocity"]["x"]) > 0.1 for uav in of_uav(heard, "uav1")))
