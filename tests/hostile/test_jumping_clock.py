@@ -30,6 +30,7 @@ DATES = {
     "comms/station/tcp.py": "send time of the protocol; its receivers estimate the offset",
     "core/compiled.py": "age of a file",
     "graph/nodes/rclpy_modules.py": "stamps of log lines",
+    "graph/nodes/ros_time.py": "a system clock of a node file",
     "mavlink/links/signing.py": "read once; the elapsed time is added",
     "mavlink/offboard/connection.py": "arrival of a message from an autopilot",
     "runtime/monitoring/status.py": "the wall time of a status, for people",

@@ -6,6 +6,8 @@ import pytest
 from page_browsing import keep_picture
 from page_serving import Served
 
+pytestmark = pytest.mark.slow
+
 LARGE = {"width": 1440, "height": 900}
 PHONE = {"width": 390, "height": 844}
 OVERFLOWS = "elements => elements.filter(e => e.scrollWidth > e.clientWidth + 1).length"

@@ -201,7 +201,7 @@ def test_a_full_disk_leaves_whole_files_only(tmp_path, monkeypatch):
             raise OSError(28, "No space left on device")
         os.rename(source, target)
 
-    monkeypatch.setattr("volery.cluster.results_folder.os.replace", full)
+    monkeypatch.setattr("volery.core.whole_files.os.replace", full)
     with pytest.raises(StudyError, match="no space is left on the disk; finished runs are kept"):
         fake_study(metrics, tmp_path)
     files = [path for path in tmp_path.rglob("*") if path.is_file()]
