@@ -192,7 +192,7 @@ def test_returns_of_scanners_are_blue_and_red(page, served):
 
 def show_returns(page, shown):
     page.get_by_role("button", name="Layers").click()
-    page.get_by_label("LIDAR returns").set_checked(shown)
+    page.get_by_role("checkbox", name="LIDAR returns").set_checked(shown)
     page.keyboard.press("Escape")
-    page.get_by_label("LIDAR returns").wait_for(state="hidden")
+    page.get_by_role("checkbox", name="LIDAR returns").wait_for(state="hidden")
     wait_for_frames(page, 3)
