@@ -204,6 +204,30 @@ def call(world, service):
     return come
 
 
+def test_a_flood_of_one_publisher_delays_no_other(world, other, router):
+    stranger, _ = zenoh_session.open_session(router)
+    world.graph.create_service("/calm", TRIGGER, lambda _q: Triggered(True, "calm"))
+    flooded, stop = [], threading.Event()
+    world.do(lambda: world.graph.subscribe("/flooded", flooded.append, STRING))
+    key = topic_key(DOMAIN, "/flooded", STRING)
+
+    def flood():
+        while not stop.is_set():
+            stranger.put(key, b"\0\1\0\0\2\0\0\0w\0")
+
+    thread = threading.Thread(target=flood)
+    thread.start()
+    try:
+        until(lambda: len(flooded) > 1000)
+        for _ in range(7):  # the flood itself never ends: a call that waited for that would fail
+            assert other.call("/calm", TRIGGER).message == "calm"
+    finally:
+        stop.set()
+        thread.join()
+        stranger.close()
+    world.do(lambda: None)  # what waits is bounded, and the graph is soon through with it
+
+
 def test_strangers_do_no_harm(world, other, router):
     """Queries without attachment, bytes that are no message, another hash."""
     stranger, _ = zenoh_session.open_session(router)
