@@ -6,7 +6,6 @@ import io
 import sys
 import time
 from collections.abc import Callable
-from functools import cache
 from typing import Any
 
 from volery.core.errors import GraphError
@@ -30,43 +29,9 @@ def read_message(text: str, msgtype: str, now_ns: Callable[[], int] = time.time_
     As in ROS 2, `header: auto` and a time `now` mean the present time, `now_ns()`.
     """
     from volery.graph.codecs.json_decoding import decode_plain
-    from volery.graph.typestore import typestore
+    from volery.graph.codecs.present_times import with_present_times
 
-    plain = from_yaml(text) or {}
-    if msgtype in typestore().fielddefs:
-        plain = _with_times(plain, msgtype, cache(now_ns))
-    return decode_plain(plain, msgtype)
-
-
-def _with_times(plain: Any, msgtype: str, now_ns: Callable[[], int]) -> Any:
-    """Returns plain values with `auto` and `now` replaced where the type has headers and times."""
-    from rosbags.interfaces import Nodetype
-
-    from volery.core.clock import stamp_from_ns
-    from volery.graph.typestore import typestore
-
-    def now() -> dict[str, int]:
-        sec, nanosec = stamp_from_ns(now_ns())
-        return {"sec": sec, "nanosec": nanosec}
-
-    if msgtype == "std_msgs/msg/Header" and plain == "auto":
-        return {"stamp": now()}
-    if msgtype == "builtin_interfaces/msg/Time" and plain == "now":
-        return now()
-    if not isinstance(plain, dict):
-        return plain
-    filled = dict(plain)
-    detail: Any
-    for name, (kind, detail) in typestore().fielddefs[msgtype][1]:
-        if name not in filled:
-            continue
-        if kind == Nodetype.NAME:
-            filled[name] = _with_times(filled[name], detail, now_ns)
-        elif kind != Nodetype.BASE and detail[0][0] == Nodetype.NAME:
-            parts, inner = filled[name], detail[0][1]
-            if isinstance(parts, list):
-                filled[name] = [_with_times(part, inner, now_ns) for part in parts]
-    return filled
+    return decode_plain(with_present_times(from_yaml(text) or {}, msgtype, now_ns), msgtype)
 
 
 def from_yaml(text: str) -> Any:

@@ -144,6 +144,26 @@ def test_stamps_of_both_generations(bench, client, stamp):
     assert seen[0].message.header.stamp.nanosec == 2
 
 
+def test_headers_without_a_stamp_and_times_that_are_now_get_the_present_time(bench, client):
+    """As in rosbridge_suite: in nested headers too, but not where a header is left out."""
+    present = divmod(TIME_NS, 10**9)
+    seen = []
+    bench.graph.subscribe("/path", seen.append, "nav_msgs/msg/Path")
+    poses = [{"header": {"frame_id": "a"}}, {"header": {"stamp": "now"}}, {"header": "auto"}, {}]
+    client.send("publish", topic="/path", msg={"header": {"stamp": {"secs": 3}}, "poses": poses})
+    path = seen[0].message
+    assert path.header.stamp.sec == 3
+    stamps = [(pose.header.stamp.sec, pose.header.stamp.nanosec) for pose in path.poses]
+    assert stamps == [present, present, present, (0, 0)]
+    assert path.poses[0].header.frame_id == "a"
+    bench.graph.subscribe("/stamp", seen.append, "std_msgs/msg/Header")
+    client.send("publish", topic="/stamp", msg={"stamp": "now", "frame_id": "b"})
+    stamp = seen[1].message.stamp
+    assert (stamp.sec, stamp.nanosec) == present
+    client.send("publish", topic="/stamp", msg={"stamp": "later"}, id="p")
+    assert "stamp must be an object, not 'later'" in client.read()[0]["msg"]
+
+
 def test_subscriptions_of_one_topic_share_a_stream(bench, client):
     client.send("subscribe", topic="/out", type=STRING, id="a", throttle_rate=1000)
     client.send("subscribe", topic="/out", id="b", compression="cbor")

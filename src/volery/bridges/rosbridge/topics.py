@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
 
 from volery.bridges.rosbridge.fields import (
     Id,
@@ -19,22 +18,19 @@ from volery.bridges.rosbridge.fields import (
 )
 from volery.bridges.rosbridge.message_encoder import COMPRESSIONS
 from volery.bridges.rosbridge.wire import Operation
-from volery.core.clock import stamp_from_ns
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.codecs.json_decoding import decode_plain
+from volery.graph.codecs.present_times import with_present_times
 from volery.graph.codecs.ros1_names import ros2_name
 from volery.graph.messages import Published
 from volery.graph.qos import DEFAULT_DEPTH, MOST_DEPTH
 from volery.graph.session import Session
 from volery.graph.subscription_queue import SubscriptionQueue
-from volery.graph.typestore import typestore
 
 MOST_STREAMS = 10_000
 """Largest number of topics that a client may subscribe to, and publish."""
 MOST_REQUESTS = 1000
 """Largest number of subscriptions of one topic by one client."""
-
-_HEADER = "std_msgs/msg/Header"
 
 
 @dataclass(frozen=True)
@@ -234,21 +230,10 @@ class RosbridgeTopics:
                 raise BridgeError(f"publish: no topic '{topic}'; advertise it first")
             advertised = self._advertise(topic, known)
         msgtype = advertised.msgtype
-        plain = operation.get("msg", {})
-        message = decode_plain(plain, msgtype)
-        if isinstance(plain, dict):
-            self._stamp(message, plain, msgtype)
-        self._session.publish(topic, message)
-
-    def _stamp(self, message: Any, plain: dict[str, Any], msgtype: str) -> None:
-        """Sets the stamp of a header without one to the current time, as rosbridge does."""
-        fields = typestore().fielddefs[msgtype][1]
-        if not fields or fields[0][0] != "header" or fields[0][1][1] != _HEADER:
-            return
-        given = plain.get("header")
-        if not given or "stamp" not in given:
-            stamp = message.header.stamp
-            stamp.sec, stamp.nanosec = stamp_from_ns(self._now_ns())
+        plain = with_present_times(
+            operation.get("msg", {}), msgtype, self._now_ns, stamps_headers=True
+        )
+        self._session.publish(topic, decode_plain(plain, msgtype))
 
     def subscribe(self, operation: Operation) -> None:
         """Subscribes to a topic, or adapts its stream to one more request."""
