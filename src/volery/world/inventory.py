@@ -1,13 +1,17 @@
 """Reads tree inventories: CSV files with a header row and one tree per row.
 
 Columns `x_m` and `y_m` are required; `dbh_cm`, `height_m` and `species` may follow in any order,
-and an empty field means "not measured". Species may have any name (see `species_map`). All invalid
-rows are reported together, with their row numbers in the file (the header is row 1).
+and an empty field, or `NA` as R writes it, means "not measured". A column without a name, as the row
+numbers of pandas, is ignored. Species may have any name (see `species_map`). All invalid
+rows are reported together, with their row numbers in the file (the header is row 1). Fields are
+separated by commas, or by semicolons or tabs, as spreadsheets of many countries export them; then a
+number may have a decimal comma.
 """
 
 from __future__ import annotations
 
 import csv
+import io
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,7 +25,10 @@ from volery.world.inventory_doubts import question
 
 _REQUIRED = ("x_m", "y_m")
 _OPTIONAL = ("dbh_cm", "height_m", "species")
+_SEPARATORS = ",;\t"
+_NOT_MEASURED = "NA"
 _SHOWN_FAULTS = 20
+_SHOWN_LETTERS = 40
 _THICKEST_CM, _TALLEST_M = 1500.0, 130.0
 """Limits beyond any living tree: larger numbers are errors of units."""
 
@@ -63,11 +70,14 @@ def read_inventory(path: str | Path) -> Inventory:
     """Reads an inventory; raises one `DataFileError` that lists every invalid row."""
     path = Path(path)
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = list(csv.reader(file))
+        text = path.read_text(encoding="utf-8-sig")
+        separator = _separator(text.partition("\n")[0])
+        rows = list(csv.reader(io.StringIO(text, newline=""), delimiter=separator))
     except FileNotFoundError:
         raise DataFileError(f"inventory {path} does not exist") from None
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+    except UnicodeDecodeError:
+        raise DataFileError(f"inventory {path} is not UTF-8; save it as CSV in UTF-8") from None
+    except (OSError, csv.Error) as error:
         raise DataFileError(f"inventory {path} cannot be read: {error}") from None
     if not rows or not any(field.strip() for field in rows[0]):
         raise DataFileError(f"inventory {path} is empty; its first row must name the columns")
@@ -79,6 +89,8 @@ def read_inventory(path: str | Path) -> Inventory:
     for number, row in enumerate(rows[1:], start=2):
         if not any(field.strip() for field in row):
             continue
+        if separator != ",":
+            row = [field.replace(",", ".") for field in row]
         fault, values, name = _parse(row, columns, len(rows[0]))
         if fault:
             faults.append(f"row {number}: {fault}")
@@ -97,20 +109,27 @@ def read_inventory(path: str | Path) -> Inventory:
     return Inventory(table[:, :2], table[:, 2], table[:, 3], tuple(names))
 
 
+def _separator(heading: str) -> str:
+    """Returns what separates the names of the columns."""
+    return max(_SEPARATORS, key=heading.count)
+
+
 def _columns(path: Path, heading: list[str]) -> dict[str, int]:
     allowed = ", ".join((*_REQUIRED, *_OPTIONAL))
-    for name in heading:
+    named = [name for name in heading if name]
+    for name in named:
         if name not in _REQUIRED + _OPTIONAL:
             at = heading.index(name) + 1
             raise DataFileError(
-                f"inventory {path}: row 1, column {at}: unknown name; allowed: {allowed}"
+                f"inventory {path}: row 1, column {at}: unknown name {name[:_SHOWN_LETTERS]!r}; "
+                f"allowed: {allowed}"
             )
         if heading.count(name) > 1:
             raise DataFileError(f"inventory {path}: column {name!r} occurs twice")
     for name in _REQUIRED:
         if name not in heading:
             raise DataFileError(f"inventory {path}: column {name!r} is missing; allowed: {allowed}")
-    return {name: heading.index(name) for name in heading}
+    return {name: heading.index(name) for name in named}
 
 
 def _parse(row: list[str], columns: dict[str, int], width: int) -> tuple[str, list[float], str]:
@@ -120,7 +139,7 @@ def _parse(row: list[str], columns: dict[str, int], width: int) -> tuple[str, li
     values: list[float] = []
     for column in ("x_m", "y_m", "dbh_cm", "height_m"):
         text = row[columns[column]].strip() if column in columns else ""
-        if not text:
+        if text in ("", _NOT_MEASURED):
             if column in _REQUIRED:
                 return f"{column} is empty", [], ""
             values.append(math.nan)
@@ -134,7 +153,7 @@ def _parse(row: list[str], columns: dict[str, int], width: int) -> tuple[str, li
             return f"{column} {value:g} {fault}", [], ""
         values.append(value / 100.0 if column == "dbh_cm" else value)
     name = row[columns["species"]].strip() if "species" in columns else ""
-    return "", values, name
+    return "", values, "" if name == _NOT_MEASURED else name
 
 
 def _wrong(column: str, value: float) -> str:

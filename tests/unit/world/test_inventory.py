@@ -31,6 +31,32 @@ def test_reads_what_ships(forest_data):
     assert np.isfinite(longleaf.dbh_m).all()
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "x_m;y_m;dbh_cm;species\n1,5;2;30,5;oak\n3;4,25;NA;NA\n",  # a spreadsheet in German
+        "x_m\ty_m\tdbh_cm\tspecies\n1.5\t2\t30.5\toak\n3\t4.25\t\t\n",
+        ",x_m,y_m,dbh_cm,species\n0,1.5,2.0,30.5,oak\n1,3.0,4.25,,\n",  # pandas
+        '"x_m","y_m","dbh_cm","species"\r\n1.5,2,30.5,"oak"\r\n3,4.25,NA,NA\r\n',  # R
+    ],
+)
+def test_what_spreadsheets_pandas_and_r_write(tmp_path, text):
+    path = tmp_path / "trees.csv"
+    path.write_text(text, encoding="utf-8", newline="")
+    trees = read_inventory(path)
+    assert trees.position.tolist() == [[1.5, 2.0], [3.0, 4.25]]
+    assert trees.dbh_m[0] == pytest.approx(0.305)
+    assert np.isnan(trees.dbh_m[1])
+    assert trees.species == ("oak", "")
+
+
+def test_another_encoding_is_named(tmp_path):
+    path = tmp_path / "trees.csv"
+    path.write_text("x_m,y_m,species\n1,2,h\u00eatre\n", encoding="latin-1")
+    with pytest.raises(DataFileError, match="not UTF-8; save it as CSV in UTF-8"):
+        read_inventory(path)
+
+
 def test_every_bad_row_is_listed_in_one_error(tmp_path):
     rows = [
         "x_m,y_m,dbh_cm,height_m,species",
@@ -71,7 +97,7 @@ def test_beyond_twenty_bad_rows_only_their_numbers_are_told(tmp_path):
     [
         ("", "is empty"),
         ("x_m,dbh_cm\n1,2\n", "column 'y_m' is missing"),
-        ("x_m,y_m,dbh\n1,2,3\n", "row 1, column 3: unknown name"),
+        ("x_m,y_m,dbh\n1,2,3\n", "row 1, column 3: unknown name 'dbh'"),
         ("x_m,y_m,x_m\n1,2,3\n", "column 'x_m' occurs twice"),
     ],
 )
