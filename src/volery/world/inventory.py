@@ -1,8 +1,8 @@
 """Reads tree inventories: CSV files with a header row and one tree per row.
 
-Columns `x_m` and `y_m` are required; `dbh_cm`, `height_m` and `species` may follow in any order,
-and an empty field, or `NA` as R writes it, means "not measured". A column without a name, as the row
-numbers of pandas, is ignored. Species may have any name (see `species_map`). All invalid
+Columns `x_m` and `y_m` are required; `dbh_cm`, `height_m` and `species` may follow in any order.
+An empty field means "not measured", as does `NA`, which R writes. A column without a name, such as
+the row numbers of pandas, is ignored. Species may have any name (see `species_map`). All invalid
 rows are reported together, with their row numbers in the file (the header is row 1). Fields are
 separated by commas, or by semicolons or tabs, as spreadsheets of many countries export them; then a
 number may have a decimal comma.
@@ -89,9 +89,7 @@ def read_inventory(path: str | Path) -> Inventory:
     for number, row in enumerate(rows[1:], start=2):
         if not any(field.strip() for field in row):
             continue
-        if separator != ",":
-            row = [field.replace(",", ".") for field in row]
-        fault, values, name = _parse(row, columns, len(rows[0]))
+        fault, values, name = _parse(row, columns, len(rows[0]), separator)
         if fault:
             faults.append(f"row {number}: {fault}")
         else:
@@ -132,7 +130,9 @@ def _columns(path: Path, heading: list[str]) -> dict[str, int]:
     return {name: heading.index(name) for name in named}
 
 
-def _parse(row: list[str], columns: dict[str, int], width: int) -> tuple[str, list[float], str]:
+def _parse(
+    row: list[str], columns: dict[str, int], width: int, separator: str
+) -> tuple[str, list[float], str]:
     """Returns the error of a row ("" if none), x, y, dbh and height in m, species."""
     if len(row) != width:
         return f"{counted(len(row), 'field')}, the heading has {width}", [], ""
@@ -145,7 +145,7 @@ def _parse(row: list[str], columns: dict[str, int], width: int) -> tuple[str, li
             values.append(math.nan)
             continue
         try:
-            value = float(text)
+            value = float(text if separator == "," else text.replace(",", "."))
         except ValueError:
             return f"{column} is not a number", [], ""
         fault = _wrong(column, value)
