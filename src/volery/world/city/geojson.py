@@ -48,9 +48,14 @@ def read_features(path: str | Path) -> tuple[Feature, ...]:
     path = Path(path)
     data = _load(path)
     kind = data.get("type") if isinstance(data, dict) else None
-    if kind != "FeatureCollection":
+    if kind in ("Polygon", "MultiPolygon"):
+        data = {"type": "Feature", "geometry": data, "crs": data.get("crs")}
+    if kind in ("Feature", "Polygon", "MultiPolygon"):
+        data = {"type": "FeatureCollection", "features": [data], "crs": data.get("crs")}
+    elif kind != "FeatureCollection":
         raise DataFileError(
-            f"{path}: outlines must be a GeoJSON FeatureCollection; this file has another 'type'"
+            f"{path}: outlines must be GeoJSON: a FeatureCollection, Feature, Polygon or "
+            "MultiPolygon; this file has another 'type'"
         )
     _check_crs(path, data.get("crs"))
     features = data.get("features")

@@ -9,6 +9,7 @@ import shapely
 
 from volery.core.errors import DataFileError
 from volery.core.geodesy import LocalFrame
+from volery.world.city.geojson import read_features
 from volery.world.city.heights import HeightRule, height_of
 from volery.world.city.outlines import LEAST_AREA_M2, read_outlines
 
@@ -227,6 +228,25 @@ def _set(key, value):
         data["features"][0]["geometry"][key] = value
 
     return change
+
+
+def test_a_feature_or_a_geometry_alone_is_geojson_as_well(tmp_path):
+    """RFC 7946, section 2."""
+    path = tmp_path / "one.geojson"
+    alone = feature(square(), own="way/7")
+    path.write_text(json.dumps(alone))
+    (found,) = read_features(path)
+    assert found.id == "way/7"
+    path.write_text(json.dumps(alone["geometry"]))
+    (bare,) = read_features(path)
+    assert [ring.tolist() for ring in bare.polygons[0]] == [
+        ring.tolist() for ring in found.polygons[0]
+    ]
+    path.write_text(
+        json.dumps({**alone["geometry"], "crs": {"properties": {"name": "EPSG:32632"}}})
+    )
+    with pytest.raises(DataFileError, match="WGS 84"):
+        read_features(path)
 
 
 @pytest.mark.parametrize(
