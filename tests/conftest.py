@@ -36,8 +36,13 @@ PURE = (
 
 
 def pytest_collection_modifyitems(items):
-    """Marks pure tests by their files."""
+    """Marks pure tests by their files, and puts the page's tests last.
+
+    From the first of them on, Playwright's event loop runs in the worker's thread, where
+    `asyncio.run` of other tests fails.
+    """
     tests = Path(__file__).parent
+    items.sort(key=lambda item: item.path.is_relative_to(tests / "page"))
     for item in items:
         if item.path.relative_to(tests).as_posix().startswith(PURE):
             item.add_marker("pure")
