@@ -22,18 +22,24 @@ class SqliteSource:
         self._path, self._files = path, files
         self._is_closed = False
         index = sqlite_index(files)
-        self.problem = index.problem
+        self._problems = index.problems
         self.start_ns, self.end_ns = index.start_ns, index.end_ns
         self.topics = {
             name: TopicCount(msgtype, index.counts[name])
             for name, msgtype in sorted(index.types.items())
         }
 
+    @property
+    def problem(self) -> str:
+        """Problems of the files, as far as they were read; empty for whole ones."""
+        return "; ".join(self._problems)
+
     def records(self, topics: Set[str], start_ns: int, end_ns: int) -> Iterator[LogRecord]:
         """Yields the records of `topics` from `start_ns` to before `end_ns`."""
         if self._is_closed:
             raise RecordingError(f"{self._path}: the log is closed; open it again")
-        yield from sqlite_records(self._files, bag_size(self._path), topics, start_ns, end_ns)
+        size, range_ns = bag_size(self._path), (start_ns, end_ns)
+        yield from sqlite_records(self._files, size, topics, range_ns, self._problems)
 
     def close(self) -> None:
         """Removes unpacked files."""

@@ -137,7 +137,8 @@ def _rows(
         if fault:
             faults.append(f"row {number}, {fault}")
         rows.append(values)
-    if shape is not None and not faults and math.prod(shape) == sum(map(len, rows)) > 0:
+    total = sum(map(len, rows))
+    if shape and not faults and math.prod(shape) == total > 0 and shape[1] in range(1, total + 1):
         columns = int(shape[1])
         rows = np.concatenate(rows).reshape(-1, columns).tolist()
     else:

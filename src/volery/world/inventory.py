@@ -30,7 +30,7 @@ _SEPARATORS = ",;\t"
 _NOT_MEASURED = ("", "na", "n/a", "nan", "null", "none", "-", ".")
 _MARKS = (-999.0, -9999.0, -99999.0)
 """Numbers that stand for values that were not measured."""
-_EXCEL = re.compile(r"sep=(.)", re.IGNORECASE)
+_EXCEL = re.compile(r"sep=([,;\t|])", re.IGNORECASE)
 """First row that Excel understands, and other programs do not write."""
 _NUMBERS = ("x_m", "y_m", "dbh_cm", "height_m")
 _SHOWN_FAULTS = 20

@@ -18,6 +18,7 @@ from volery.cli.app import app
 from volery.core.errors import LogWarning, RecordingError
 from volery.graph import messages as m
 from volery.graph.graph import Graph
+from volery.graph.typestore import typestore
 from volery.logs import open_log
 
 runner = CliRunner()
@@ -165,6 +166,29 @@ def test_a_file_that_is_cut_off_is_read_up_to_there(tmp_path, share):
         found = log["/uav1/odom"]["pose.pose.position.x"].tolist()
         assert 2 < len(found) == log.topics["/uav1/odom"].messages < COUNT
         assert found == pytest.approx([0.1 * k for k in range(len(found))])
+
+
+def test_damage_within_a_message_ends_the_reading_there(tmp_path):
+    """The index counts the messages; reading one of them fails."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+
+    folder = tmp_path / "bag"
+    with Writer(folder, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        channel = writer.add_connection("/note", "std_msgs/msg/String", typestore=typestore())
+        for k in range(5):
+            text = m.Published("/note", "std_msgs/msg/String", k, m.String(str(k) * 50_000))
+            writer.write(channel, k, text.cdr)
+    data = bytearray(_file(folder).read_bytes())
+    page = (data.index(b"3" * 100) + 20_000) // 4096 * 4096
+    data[page : page + 4] = b"\xff" * 4  # number of the next page of the text
+    _file(folder).write_bytes(data)
+    with open_log(folder) as log:
+        assert log.topics["/note"].messages == 5
+        assert 2 <= len(log["/note"]["data"]) <= 3
+        assert "bag.db3 is cut off or damaged, the rest is not read" in log.problem
+    walk = BagWalk(folder)
+    assert 2 <= sum(1 for _ in walk) <= 3
+    assert "bag.db3 is cut off or damaged" in walk.problem
 
 
 @pytest.mark.parametrize(

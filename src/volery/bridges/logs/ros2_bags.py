@@ -21,7 +21,7 @@ class BagIndex(NamedTuple):
     counts: dict[str, int]
     start_ns: int
     end_ns: int
-    problem: str = ""
+    problems: list[str]
     """What is missing or not read; empty for a whole bag."""
 
 
@@ -59,15 +59,20 @@ def sqlite_index(files: BagFiles) -> BagIndex:
     start_ns = min((file.start_ns for file in filled), default=0)
     end_ns = max((file.end_ns for file in filled), default=0)
     problems += [file.problem for file in found if file.problem]
-    return BagIndex(types, counts, start_ns, end_ns, "; ".join(problems))
+    return BagIndex(types, counts, start_ns, end_ns, problems)
 
 
 def sqlite_records(
-    files: BagFiles, size: int, topics: Set[str] | None, start_ns: int, end_ns: int | None
+    files: BagFiles,
+    size: int,
+    topics: Set[str] | None,
+    range_ns: tuple[int, int | None],
+    problems: list[str],
 ) -> Iterator[LogRecord]:
     """Yields the records of a bag's SQLite files, file by file.
 
-    size: bytes of the bag. topics: None for all. Raises `RecordingError` beyond the limits of logs.
+    size: bytes of the bag. topics: None for all. range_ns: from the first to before the second time
+    (None: all). Adds what is damaged to `problems`. Raises `RecordingError` beyond the limits.
     """
     budget = UnpackingBudget(files.sqlite[0], size)
     for part in files.sqlite:
@@ -75,9 +80,11 @@ def sqlite_records(
             file = SqliteFile(part)
         except RecordingError:
             continue  # named by `sqlite_index`
-        for record in file.records(topics, start_ns, end_ns):
+        for record in file.records(topics, *range_ns):
             budget.spend(len(record.data))
             yield record
+        if file.problem and file.problem not in problems:
+            problems.append(file.problem)
 
 
 class BagWalk:
@@ -95,5 +102,7 @@ class BagWalk:
                 yield from walk
                 self.problem = self.problem or walk.problem
             if not files.mcap:
-                self.problem = sqlite_index(files).problem
-                yield from sqlite_records(files, bag_size(self._path), None, 0, None)
+                problems = sqlite_index(files).problems
+                self.problem = "; ".join(problems)
+                yield from sqlite_records(files, bag_size(self._path), None, (0, None), problems)
+                self.problem = "; ".join(problems)

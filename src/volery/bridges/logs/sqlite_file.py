@@ -63,9 +63,12 @@ class SqliteFile:
                     " ORDER BY timestamp, id",
                     (*wanted, first, last),
                 )
-            for topic, time_ns, data in rows:
-                if isinstance(data, bytes):
-                    yield LogRecord(self.topics[topic], time_ns, data, 0)
+            try:
+                for topic, time_ns, data in rows:
+                    if isinstance(data, bytes):
+                        yield LogRecord(self.topics[topic], time_ns, data, 0)
+            except sqlite3.DatabaseError as error:  # of the data of a message
+                self._damaged(error)
 
     def _open(self) -> sqlite3.Connection:
         base = sqlite3.connect(f"{self._path.resolve().as_uri()}?mode=ro&immutable=1", uri=True)
@@ -83,7 +86,7 @@ class SqliteFile:
             for row in found:
                 self._add(*row)
         except sqlite3.DatabaseError as error:
-            self.problem = f"{self._path.name} is cut off or damaged, the rest is not read: {error}"
+            self._damaged(error)
             for topic, time_ns, _ in _rows_before_damage(base):
                 self._add(topic, 1, time_ns, time_ns)
 
@@ -91,6 +94,9 @@ class SqliteFile:
         if topic in self.topics:
             self.counts[topic] = self.counts.get(topic, 0) + count
             self.start_ns, self.end_ns = min(self.start_ns, first_ns), max(self.end_ns, last_ns)
+
+    def _damaged(self, error: sqlite3.DatabaseError) -> None:
+        self.problem = f"{self._path.name} is cut off or damaged, the rest is not read: {error}"
 
 
 def _rows_before_damage(base: sqlite3.Connection) -> Iterator[tuple[int, int, Any]]:
