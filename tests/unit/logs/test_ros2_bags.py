@@ -75,6 +75,15 @@ def test_a_bag_compressed_by_zstd(tmp_path, storage, mode):
         assert (result.exit_code, result.stderr) == (0, "")
 
 
+@pytest.mark.parametrize("storage", ["SQLITE3", "MCAP"])
+@pytest.mark.filterwarnings("ignore::volery.core.errors.LogWarning")
+def test_a_compressed_bag_without_metadata(tmp_path, storage):
+    folder = write_ros2_bag(tmp_path / "bag", storage, "FILE")
+    (folder / "metadata.yaml").unlink()
+    with open_log(folder) as log:
+        assert log["/note"]["data"].tolist() == [f"note {k}" for k in range(COUNT)]
+
+
 def test_unpacked_files_are_removed(tmp_path, monkeypatch):
     folder = write_ros2_bag(tmp_path / "bag", "MCAP", "FILE")
     (tmp_path / "temporary").mkdir()
