@@ -180,8 +180,8 @@ def test_a_definition_that_is_cut_off_does_not_hide_the_known_type(one):
     [
         ("q::Thing", "omgidl", "struct Thing { long a; };", cdr(1), "log defines it as 'omgidl'"),
         ("", "", "", TEXT, "the log names no type: a channel without schema"),
-        ("new_probe_msgs/msg/C", "unknown", "", cdr(1), "C is not known, and the log does not define"),
-        ("new_probe_msgs/msg/C", "ros2msg", "", cdr(1), "C is not known, and the log does not define"),
+        ("new_probe_msgs/msg/C", "unknown", "", cdr(1), "C is not known, and the log does not"),
+        ("new_probe_msgs/msg/C", "ros2msg", "", cdr(1), "C is not known, and the log does not"),
         ("new_probe_msgs/msg/A", "ros2msg", "wstring a\n", cdr(0), "A:1: wstring is not supported"),
         ("std_msgs/msg/Int32", "ros2msg", "int32 data\n", b"\0\7\0\0" + bytes(4),
          "none of its 1 message can be decoded; the first: std_msgs/msg/Int32: not CDR of "),
