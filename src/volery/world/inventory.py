@@ -4,8 +4,9 @@ Columns `x_m` and `y_m` are required; `dbh_cm`, `height_m` and `species` may fol
 other units (see `inventory_columns`); others are ignored. An empty field means "not measured", as
 do the marks of R, pandas and GIS programs (`NA`, `nan`, -9999). Species may have any name (see
 `species_map`). All invalid rows are reported together, with their row numbers in the file. Fields
-are separated by commas, or by semicolons or tabs, as spreadsheets of many countries export them;
-then a number may have a decimal comma, and all have the same mark.
+are separated by commas, or by semicolons, tabs or bars, as spreadsheets of many countries export
+them; then a number may have a decimal comma, and all have the same mark. Rows above the heading may
+be comments, which begin with `#`.
 """
 
 from __future__ import annotations
@@ -22,11 +23,13 @@ from numpy.typing import NDArray
 
 from volery.core.errors import DataFileError
 from volery.core.plurals import counted
-from volery.core.text_files import read_text
+from volery.core.text_files import decode_text
 from volery.world.inventory_columns import REQUIRED, ColumnOf, columns_of
 from volery.world.inventory_doubts import question
 
-_SEPARATORS = ",;\t"
+_SEPARATORS = ",;\t|"
+_SPREADSHEETS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
+"""First bytes of .xlsx, .ods and .xls files."""
 _NOT_MEASURED = ("", "na", "n/a", "nan", "null", "none", "-", ".")
 _MARKS = (-999.0, -9999.0, -99999.0)
 """Numbers that stand for values that were not measured."""
@@ -109,8 +112,12 @@ def read_inventory(path: str | Path) -> Inventory:
 def _rows_of(path: Path) -> tuple[list[str], list[tuple[int, list[str]]], str]:
     """Returns the names of the columns, the other rows with their numbers, and the separator."""
     try:
-        text = read_text(path)
-        heading = next(iter(text.splitlines()), "")
+        data = path.read_bytes()
+        if data.startswith(_SPREADSHEETS):
+            raise DataFileError(f"inventory {path} is a spreadsheet; save it as CSV in UTF-8")
+        text = decode_text(data)
+        plain = (line for line in text.splitlines() if line.strip() and not line.startswith("#"))
+        heading = next(plain, "")
         excel = _EXCEL.fullmatch(heading)
         separator = excel[1] if excel else max(_SEPARATORS, key=heading.count)
         lines = csv.reader(io.StringIO(text, newline=""), delimiter=separator)
@@ -121,6 +128,8 @@ def _rows_of(path: Path) -> tuple[list[str], list[tuple[int, list[str]]], str]:
         raise DataFileError(f"inventory {path} is not UTF-8; save it as CSV in UTF-8") from None
     except (OSError, csv.Error) as error:
         raise DataFileError(f"inventory {path} cannot be read: {error}") from None
+    while rows and rows[0][1][0].startswith("#"):  # comments above the heading
+        rows.pop(0)
     rows = rows[1:] if excel else rows
     if not rows:
         raise DataFileError(f"inventory {path} is empty; its first row must name the columns")

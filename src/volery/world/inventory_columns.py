@@ -70,7 +70,8 @@ def columns_of(heading: Sequence[str], where: str) -> dict[str, ColumnOf]:
             found[name] = ColumnOf(position, factor)
     for name in REQUIRED:
         if name not in found:
-            raise ValueError(f"column {name!r} is missing; allowed: {ALLOWED}")
+            others = f"the file has {', '.join(ignored)}; " if ignored else ""
+            raise ValueError(f"column {name!r} is missing; {others}allowed: {ALLOWED}")
     if ignored:
         _warn(f"{where}: columns that are not read: {', '.join(ignored)}")
     return found

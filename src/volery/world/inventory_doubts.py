@@ -37,7 +37,14 @@ def question(where: str, rows: NDArray[np.int64], table: NDArray[np.float64]) ->
                 + (f", with a height of {height[first]:g} m" if height[first] > 0.0 else "")
                 + f"; is it in {unit}? ({counted(int(doubtful.sum()), 'tree')} of {len(rows)})"
             )
-    in_degrees = len(x) > 1 and np.abs(x).max() <= 180.0 and np.abs(y).max() <= 90.0
+    _, first_of = np.unique(table, axis=0, return_index=True, equal_nan=True)
+    repeated = np.setdiff1d(np.arange(len(x)), first_of)
+    if len(repeated):
+        _warn(
+            f"{where}: row {rows[repeated[0]]} repeats a row above it; does the file hold trees "
+            f"twice? ({counted(len(repeated), 'tree')} of {len(rows)})"
+        )
+    in_degrees = len(first_of) > 1 and np.abs(x).max() <= 180.0 and np.abs(y).max() <= 90.0
     if in_degrees and max(np.ptp(x), np.ptp(y)) < _TOGETHER_M:
         _warn(f"{where}: all {len(rows)} trees are within 1 m; are x_m and y_m in degrees?")
 

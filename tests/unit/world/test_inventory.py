@@ -41,6 +41,7 @@ def test_reads_what_ships(forest_data):
         '"x_m","y_m","dbh_cm","species"\r\n1.5,2,30.5,"oak"\r\n3,4.25,NA,NA\r\n',  # R
         "sep=;\r\nx_m;y_m;dbh_cm;species\r\n1,5;2;30,5;oak\r\n3;4,25;-;-\r\n",  # Excel
         "x_m,y_m,dbh_cm,species\r1.5,2,30.5,oak\r3,4.25,nan,nan\r",
+        "# plot 7, 2021\n# by hand\nx_m|y_m|dbh_cm|species\n1.5|2|30.5|oak\n3|4.25||\n",
         "Tree ID,X (m),Y (m),DBH (mm),Species,Notes\n7,1.5,2,305,oak,a\n7,3,4.25,-9999,null,\n",
         "id,easting_m,Northing [m],dbh_in,SPECIES\n1,1.5,2,12.0078740157,oak\n2,3,4.25,N/A,n/a\n",
         "x_ft,y_ft,girth_cm,species\n4.92125984252,6.56167979003,95.8185759345,oak\n"
@@ -136,6 +137,11 @@ def test_beyond_twenty_bad_rows_only_their_numbers_are_told(tmp_path):
     ("text", "message"),
     [
         ("", "is empty"),
+        (
+            "gx,gy,dbh_mm\n1,2,3\n",
+            "column 'x_m' is missing; the file has gx, gy; allowed: x_m, y_m",
+        ),
+        ("PK\x03\x04", "is a spreadsheet; save it as CSV in UTF-8"),
         ("x_m,dbh_cm\n1,2\n", "column 'y_m' is missing"),
         ("x_m,y_m,dbh\n1,2,3\n", "row 1, column 3: unknown name 'dbh'"),
         ("x_m,y_m,x_m\n1,2,3\n", "column 'x_m' occurs twice"),

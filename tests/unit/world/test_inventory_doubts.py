@@ -34,6 +34,8 @@ def doubts(tmp_path, caplog):
          " (1 tree of 2)"),
         (("0,0,550,21",), "row 2: dbh_cm is 550, with a height of 21 m; is it in mm?"
          " (1 tree of 1)"),
+        (("0,0,30,20", "5,9,25,18", "0,0,30,20"), "row 4 repeats a row above it; does the file hold "
+         "trees twice? (1 tree of 3)"),
         (("7.1,46.2,30,20", "7.1002,46.2001,30,"), "all 2 trees are within 1 m; are x_m and y_m"
          " in degrees?"),
     ],
@@ -43,5 +45,5 @@ def test_another_unit_is_questioned(doubts, rows, warning):
 
 
 def test_usual_trees_are_not(doubts):
-    assert doubts("0,0,1,2.5", "5,5,390,80", "9,9,,", "9,8,30,20", "7,7,10,") == []
+    assert doubts("0,0,1,2.5", "5,5,390,80", "9,9,,", "9,8,30,20", "7,7,10,", "7,7,12,") == []
     assert doubts("7.1,46.2,30,20") == []
