@@ -34,8 +34,8 @@ def doubts(tmp_path, caplog):
          " (1 tree of 2)"),
         (("0,0,550,21",), "row 2: dbh_cm is 550, with a height of 21 m; is it in mm?"
          " (1 tree of 1)"),
-        (("0,0,30,20", "5,9,25,18", "0,0,30,20"), "row 4 repeats a row above it; does the file hold "
-         "trees twice? (1 tree of 3)"),
+        (("0,0,30,20", "5,9,25,18", "0,0,30,20"), "row 4 repeats a row above it; does the file "
+         "hold trees twice? (1 tree of 3)"),
         (("7.1,46.2,30,20", "7.1002,46.2001,30,"), "all 2 trees are within 1 m; are x_m and y_m"
          " in degrees?"),
     ],
