@@ -102,6 +102,20 @@ def test_a_bag_whose_first_record_does_not_count_its_spaces(bag):
     assert sum(1 for _ in LogWalk(path)) == 1
 
 
+def test_stray_bytes_before_the_index_of_a_bag(bag):
+    """As a published sample of PlotJuggler has them."""
+    path = bag("/probe", "std_msgs/msg/Int32", "int32 data\n", "7" * 32, b"\6\0\0\0")
+    data = path.read_bytes()
+    at = data.index(b"index_pos=") + 10
+    index = int.from_bytes(data[at : at + 8], "little")
+    moved = data[:at] + (index + 1).to_bytes(8, "little") + data[at + 8 :]
+    path.write_bytes(moved[:index] + b"\0" + moved[index:])
+    with open_log(path) as log:
+        assert (log.problem, log["/probe"]["data"].tolist()) == ("", [6])
+    walk = LogWalk(path)
+    assert (sum(1 for _ in walk), walk.problem) == (1, "")
+
+
 def test_frame_names():
     assert m.frame_name("/map") == m.frame_name("map") == "map"
     assert m.frame_of(m.PoseStamped(header=m.header(0, "/uav1/odom"))) == "uav1/odom"

@@ -56,6 +56,7 @@ def test_text_and_deep_images(write, tmp_path):
     deep = b"P5 3 2 65535\n" + (PIXELS.astype(">u2") * 257).tobytes()
     (tmp_path / "room.pgm").write_bytes(deep)
     np.testing.assert_array_equal(read_map_server(path).blocked[::-1], PIXELS == 0)
+    np.testing.assert_array_equal(read_map_server(path).unknown[::-1], PIXELS == 205)
     np.testing.assert_array_equal(read_cells(tmp_path / "room.pgm")[::-1], PIXELS == 0)
 
 

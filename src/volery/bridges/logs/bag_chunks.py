@@ -39,6 +39,9 @@ class BagChunks(ChunkedLog):
         index = BagIndex()
         while position < self.size:
             record = self._record(position)
+            if record is None and (begin := index.after_stray_bytes(position, self.size)):
+                position = begin
+                continue
             if record is None:
                 self._cut = cut_at(position)
                 break

@@ -28,15 +28,29 @@ class BagIndex:
     def __init__(self) -> None:
         self._is_begun = False
         self._missing = 0
+        self._chunks = 0
+        self.position = 0
+        """Where the index begins; 0 without one."""
 
     def pass_record(self, fields: dict[bytes, bytes]) -> None:
         """Reads the header fields of the next record of the file."""
         kind = fields.get(b"op")
         if kind == HEADER:
-            self._is_begun = any(fields.get(b"index_pos", b""))
+            self.position = int.from_bytes(fields.get(b"index_pos", b""), "little")
+            self._is_begun = self.position > 0
             self._missing = int.from_bytes(fields.get(b"chunk_count", b""), "little")
+            self._chunks = self._missing
+        elif kind == CHUNK:
+            self._chunks -= 1
         elif kind == CHUNK_INFO:
             self._missing -= 1
+
+    def after_stray_bytes(self, position: int, size: int) -> int | None:
+        """Returns where the index begins, if no record begins at `position` before it.
+
+        Some recorders leave bytes there. None if chunks before it lack, or the index does.
+        """
+        return self.position if self._chunks <= 0 and position < self.position < size else None
 
     @property
     def is_whole(self) -> bool:

@@ -197,6 +197,9 @@ class LogWalk:
         index = BagIndex()
         while (begin := file.tell()) < size:
             record = _bag_record(file, size)
+            if record is None and (start := index.after_stray_bytes(begin, size)):
+                file.seek(start)
+                continue
             if record is None:
                 self.problem = cut_at(begin)
                 return
