@@ -76,6 +76,26 @@ def test_thresholds_negation_and_modes(write):
     assert cells(occupied_thresh=None, free_thresh=None, negate=None) == "##?.."
 
 
+@pytest.mark.parametrize("negate", ["1", '"1"', "yes", "True"])
+def test_numbers_in_quotes_and_words_of_yaml(write, negate):
+    file = read_map_server(write(negate=negate, occupied_thresh='"0.65"', resolution="'0.25'"))
+    np.testing.assert_array_equal(file.blocked[::-1], PIXELS > 200)
+    assert file.cell_m == 0.25
+
+
+def test_colours_are_as_dark_as_for_map_server(write):
+    """Green: a mean of 1/3, but 59 % of the luminance."""
+    green = np.zeros((1, 1, 3), np.uint8)
+    green[0, 0, 1] = 255
+    assert read_map_server(write(green, "room.png")).blocked.all()
+
+
+def test_a_yaml_file_in_utf_16(write):
+    path = write()
+    path.write_text(path.read_text("utf-8-sig"), encoding="utf-16")
+    assert read_map_server(path).blocked.any()
+
+
 def test_transparent_pixels_are_unknown(write):
     shades = np.zeros((1, 2, 4), np.uint8)
     shades[0, 0, 3] = 255
