@@ -89,7 +89,7 @@ def as_type(message: Any, msgtype: str) -> Any:
 def _texts(name: str, definition: str, form: str) -> dict[str, str]:
     """Returns the definitions in a log by the names of their types, which are valid."""
     unknown = "" if name in typestore().types else f"type {name} is not known, and "
-    if form in ("", "unknown"):
+    if not form:
         raise GraphError(f"{unknown}the log does not define it")
     if form not in _DEFINITION_FORMATS:
         raise GraphError(
