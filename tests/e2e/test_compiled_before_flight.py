@@ -67,7 +67,9 @@ def test_what_happens_rarely_in_flight_is_compiled_too(tmp_path: Path) -> None:
         "receding_horizon",
     )
     files = [str(folder / f"test_{name}.py") for name in names]
-    _run("-m", "pytest", "-q", "-p", "compile_watch", "-m", "not slow", *files, NEEDED_TO=str(needed))
+    _run(
+        "-m", "pytest", "-q", "-p", "compile_watch", "-m", "not slow", *files, NEEDED_TO=str(needed)
+    )
     assert {*json.loads(needed.read_text())} <= _PARTS, _REASON
 
 
