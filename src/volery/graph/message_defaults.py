@@ -117,6 +117,8 @@ def _sequence_maker(
     if base == "string":
         texts = [""] * length if default is None else list(default)
         return lambda: list(texts)
+    if base == "byte" and default is not None:  # octets in ROS 2, numbers with a sign in ROS 1
+        default = [value - 256 if value > 127 else value for value in default]
     if kind == Nodetype.ARRAY:
         dtype = np.dtype({"byte": "int8", "char": "uint8"}.get(base, base))
         numbers = np.zeros(length, dtype) if default is None else np.array(default, dtype)

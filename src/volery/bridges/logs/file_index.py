@@ -91,10 +91,13 @@ def _mcap_statistics(file: BinaryIO, path: Path, counts: Counts) -> tuple[int, i
     first_ns, last_ns = numbers.message_start_time, numbers.message_end_time
     if not 0 <= first_ns <= last_ns <= MAX_TIME_NS:
         return None
+    found = numbers.channel_message_counts
+    if sum(found.values()) != numbers.message_count or not found.keys() <= channels.keys():
+        return None  # writers may leave out counts and channels
     for number, channel in channels.items():
         topic = LogTopic.of_mcap(channel, schemas.get(channel.schema_id))
         key = (topic.topic, topic.msgtype)
-        counts[key] = counts.get(key, 0) + numbers.channel_message_counts.get(number, 0)
+        counts[key] = counts.get(key, 0) + found.get(number, 0)
     return first_ns, last_ns
 
 

@@ -30,8 +30,11 @@ from volery.graph.typestore import typestore
 
 _SEPARATOR = re.compile(r"^=+\s*$", re.MULTILINE)
 _NESTED = re.compile(r"\s*MSG:\s*(\S+)[^\n]*\n?")
-_TYPE = re.compile(r"([A-Za-z]\w{0,99})/(?:msg/)?([A-Za-z]\w{0,99})", re.ASCII)
-_DEFINITION_FORMATS = {"ros1msg", "ros2msg", "ros2idl"}
+_TYPE = re.compile(
+    r"([A-Za-z]\w{0,99})/(?:(msg|srv|action)/)?([A-Za-z]\w{0,99})", re.ASCII
+)
+_DEFINITION_FORMATS = ("ros1msg", "ros2msg", "ros2idl")
+_HEADER = re.compile(r"^(\s*)Header\b", re.MULTILINE)
 _FIELD_TYPE = re.compile(r"^(\s*)([A-Za-z][\w/]*)", re.ASCII)
 
 
@@ -73,8 +76,14 @@ def as_type(message: Any, msgtype: str) -> Any:
 
 def _texts(name: str, definition: str, form: str) -> dict[str, str]:
     """Returns the definitions in a log by the names of their types, which are valid."""
-    if form not in _DEFINITION_FORMATS or not definition.strip():
+    if not definition.strip() or form in ("", "unknown"):
         raise GraphError(f"type {name} is not known, and the log does not define it")
+    if form not in _DEFINITION_FORMATS:
+        raise GraphError(
+            f"type {name} is not known, and the log defines it as '{form[:20]}'; definitions are "
+            f"read as {', '.join(_DEFINITION_FORMATS)}"
+        )
+    definition = definition.encode(errors="surrogateescape").decode(errors="replace")
     if len(definition) > MAX_DEFINITION_BYTES:
         raise GraphError(
             f"the definition of {name} has more than {MAX_DEFINITION_BYTES} characters"
@@ -87,10 +96,22 @@ def _texts(name: str, definition: str, form: str) -> dict[str, str]:
         parts = _TYPE.fullmatch(long_name)
         if parts is None:
             raise GraphError(f"the log has a type with the name '{long_name[:100]}'")
-        texts[f"{parts[1]}/msg/{parts[2]}"] = text
+        texts[f"{parts[1]}/{parts[2] or 'msg'}/{parts[3]}"] = text
     if name not in texts:
         raise GraphError(f"type {name} is not known, and the log defines others in its place")
-    return texts
+    if form == "ros1msg":
+        return texts
+    return {full: _with_own_header(full, text, texts) for full, text in texts.items()}
+
+
+def _with_own_header(name: str, text: str, texts: Mapping[str, str]) -> str:
+    """Returns a definition in which `Header` is the package's own type, if it has one.
+
+    In ROS 1 it is always that of std_msgs.
+    """
+    package = name.partition("/")[0]
+    own = f"{package}/msg/Header"
+    return _HEADER.sub(rf"\1{own}", text) if own in texts else text
 
 
 def _parts(name: str, definition: str) -> dict[str, str]:
@@ -105,9 +126,16 @@ def _parts(name: str, definition: str) -> dict[str, str]:
 
 
 def _renamed(texts: Mapping[str, str], *, is_ros1: bool) -> dict[str, str]:
-    """Returns new names of the types that differ from the local ones, or contain such types."""
-    found = {name: parse_definition(text, name, name)[0] for name, text in texts.items()}
-    others = {name for name, definition in found.items() if _differs(definition, is_ros1=is_ros1)}
+    """Returns new names of the types that differ from the local ones, or contain such types.
+
+    Parts of services and actions, such as the events of services, become messages.
+    """
+    found = {name: parse_definition(text, _as_message(name), name)[0] for name, text in texts.items()}
+    others = {
+        name
+        for name, definition in found.items()
+        if "/msg/" not in name or _differs(definition, is_ros1=is_ros1)
+    }
     before = -1
     while len(others) > before:
         before = len(others)
@@ -115,6 +143,11 @@ def _renamed(texts: Mapping[str, str], *, is_ros1: bool) -> dict[str, str]:
     digest = sha256("\0".join(f"{n}\0{texts[n]}" for n in sorted(texts)).encode()).hexdigest()[:8]
     parts = {name: name.split("/") for name in others}
     return {name: f"{package}_{digest}/msg/{base}" for name, (package, _, base) in parts.items()}
+
+
+def _as_message(name: str) -> str:
+    package, _, base = name.split("/")
+    return f"{package}/msg/{base}"
 
 
 def _differs(definition: Definition, *, is_ros1: bool) -> bool:
@@ -153,7 +186,7 @@ def _with_names(texts: Mapping[str, str], name: str, renamed: Mapping[str, str])
         parts = match[2].split("/")
         if len(parts) == 1:
             parts = ["std_msgs" if parts == ["Header"] else package, *parts]
-        full = f"{parts[0]}/msg/{parts[-1]}"
+        full = f"{parts[0]}/{parts[1] if len(parts) == 3 else 'msg'}/{parts[-1]}"
         is_type = full in texts or full in typestore().types
         return match[1] + (renamed.get(full, full) if is_type else match[2])
 
