@@ -61,7 +61,7 @@ def test_messages_that_sqlite_has_not_moved_are_named(bag):
 
 
 def test_a_folder_that_is_no_bag(tmp_path):
-    with pytest.raises(RecordingError, match=r"holds no metadata\.yaml, no \.mcap and no "):
+    with pytest.raises(RecordingError, match=r"holds no \.mcap and no \.db3 file"):
         open_log(tmp_path)
 
 
@@ -121,7 +121,7 @@ def test_a_bag_without_messages_is_not_played(tmp_path):
         base.commit()
     with pytest.raises(RecordingError, match="holds no readable message"), one_file(folder):
         pass
-    with pytest.raises(RecordingError, match="holds no metadata"), one_file(tmp_path):
+    with pytest.raises(RecordingError, match="holds no .mcap"), one_file(tmp_path):
         pass
 
 

@@ -136,17 +136,19 @@ def _files_of(path: Path) -> tuple[list[Path], str, str]:
     """
     if not path.is_dir():
         return [path], "", ""
-    present = _in_order(file for file in path.iterdir() if file.is_file() and _is_part(file.name))
-    if not present:
-        raise RecordingError(f"{path}: the folder holds no {_METADATA}, no .mcap and no .db3 file")
     names, doubt = _listed(path / _METADATA)
     files = [path / name for name in names]
     missing = [file.name for file in files if not file.is_file()]
+    if files and not missing:
+        return files, "", ""
+    present = _in_order(file for file in path.iterdir() if file.is_file() and _is_part(file.name))
+    if not present:
+        raise RecordingError(f"{path}: the folder holds no .mcap and no .db3 file of a ROS 2 bag")
     instead = f"; read without it: {', '.join(file.name for file in present)}"
-    if missing:
-        lost = f"{_METADATA} names files that are missing: {', '.join(missing)}{instead}"
-        return present, lost, ""
-    return (files, "", "") if files else (present, "", doubt + instead)
+    if not missing:
+        return present, "", doubt + instead
+    lost = f"{_METADATA} names files that are missing: {', '.join(missing)}{instead}"
+    return present, lost, ""
 
 
 def _listed(file: Path) -> tuple[list[str], str]:

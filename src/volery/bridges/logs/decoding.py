@@ -59,11 +59,14 @@ class LogDecoder:
 
         """
         logged, msgtype = self._types_of(record.topic)
-        if record.topic.encoding == "ros1":
-            message = ros1_codec().decode(record.data, logged)
-        else:
-            packed = record.data.startswith(_ZSTD)
-            message = decode_cdr(_unpacked(record.data) if packed else record.data, logged)
+        decode = ros1_codec().decode if record.topic.encoding == "ros1" else _decode_cdr
+        try:
+            message = decode(record.data, logged)
+        except GraphError:
+            if logged == msgtype:
+                raise
+            # some recorders cut definitions off, so that only the first fields are left
+            return Decoded(msgtype, decode(record.data, msgtype))
         return Decoded(msgtype, message if logged == msgtype else as_type(message, msgtype))
 
     def _types_of(self, topic: LogTopic) -> _Types:
@@ -73,6 +76,10 @@ class LogDecoder:
         if isinstance(found, GraphError):
             raise found
         return found
+
+
+def _decode_cdr(data: bytes, msgtype: str) -> Any:
+    return decode_cdr(_unpacked(data) if data.startswith(_ZSTD) else data, msgtype)
 
 
 def _unpacked(data: bytes) -> bytes:
@@ -109,12 +116,13 @@ def _types_of(topic: LogTopic) -> _Types | GraphError:
         is_known = name in typestore().types
         if is_known and is_ros1 and topic.digest == ros1_codec().md5(name):
             return _Types(name, name)
-        logged = learn_type(name, topic)
-        if logged == name and is_ros1 and topic.digest:
+        logged, doubt = learn_type(name, topic)
+        if doubt and is_ros1 and topic.digest:
             ours = ros1_codec().md5(name)
             if ours != topic.digest:
                 raise GraphError(
-                    f"the log's {name} differs from the local one: md5 {topic.digest}, not {ours}"
+                    f"the log's {name} differs from the local one (md5 {topic.digest}, not {ours})"
+                    f", and its own definition cannot be used: {doubt}"
                 )
         is_local = is_known and logged != name and is_part_of(logged, name)
     except GraphError as error:

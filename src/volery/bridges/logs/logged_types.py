@@ -14,7 +14,7 @@ from dataclasses import fields
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from rosbags.interfaces import Nodetype
 
@@ -28,37 +28,54 @@ from volery.graph.codecs.ros1 import ros1_codec
 from volery.graph.messages import add_definitions
 from volery.graph.typestore import typestore
 
+_MD5_OF_NOTHING = "d41d8cd98f00b204e9800998ecf8427e"
 _SEPARATOR = re.compile(r"^=+\s*$", re.MULTILINE)
 _NESTED = re.compile(r"\s*MSG:\s*(\S+)[^\n]*\n?")
 _TYPE = re.compile(
     r"([A-Za-z]\w{0,99})/(?:(msg|srv|action)/)?([A-Za-z]\w{0,99})", re.ASCII
 )
 _DEFINITION_FORMATS = ("ros1msg", "ros2msg", "ros2idl")
+_DASHES = re.compile(r"^---\s*$", re.MULTILINE)
 _HEADER = re.compile(r"^(\s*)Header\b", re.MULTILINE)
 _FIELD_TYPE = re.compile(r"^(\s*)([A-Za-z][\w/]*)", re.ASCII)
 
 
-def learn_type(name: str, topic: LogTopic) -> str:
-    """Returns the name of the type that decodes a topic; registers what the log defines.
+class LearnedType(NamedTuple):
+    """The type that decodes a topic's bytes."""
+
+    name: str
+    doubt: str
+    """Why it is not from the log's definition; empty if it is."""
+
+
+def learn_type(name: str, topic: LogTopic) -> LearnedType:
+    """Returns the type that decodes a topic; registers what the log defines.
 
     name: the topic's type in ROS 2 style. Raises `GraphError` if the log does not define an
     unknown type, or its definition is invalid.
     """
-    return _learned(name, topic.definition, topic.schema_encoding, topic.encoding == "ros1")
+    is_ros1 = topic.encoding == "ros1"
+    form = topic.schema_encoding
+    if not topic.definition.strip():
+        # a type without fields has no text, and recorders write none if they lack the definition
+        has_no_fields = topic.digest == _MD5_OF_NOTHING if is_ros1 else form == "ros2msg"
+        if name in typestore().types or not has_no_fields:
+            form = ""
+    return _learned(name, topic.definition, form, is_ros1)
 
 
 @lru_cache(256)
-def _learned(name: str, definition: str, form: str, is_ros1: bool) -> str:
+def _learned(name: str, definition: str, form: str, is_ros1: bool) -> LearnedType:
     is_known = name in typestore().types
     try:
         texts = _texts(name, definition, form)
         renamed = _renamed(texts, is_ros1=is_ros1)
         _register(texts, renamed)
-    except GraphError:
-        if is_known:
-            return name  # the local definition is the best that there is
+    except GraphError as error:
+        if is_known:  # the local definition is the best that there is
+            return LearnedType(name, str(error))
         raise
-    return renamed.get(name, name)
+    return LearnedType(renamed.get(name, name), "")
 
 
 def is_part_of(name: str, other: str) -> bool:
@@ -76,12 +93,13 @@ def as_type(message: Any, msgtype: str) -> Any:
 
 def _texts(name: str, definition: str, form: str) -> dict[str, str]:
     """Returns the definitions in a log by the names of their types, which are valid."""
-    if not definition.strip() or form in ("", "unknown"):
-        raise GraphError(f"type {name} is not known, and the log does not define it")
+    unknown = "" if name in typestore().types else f"type {name} is not known, and "
+    if form in ("", "unknown"):
+        raise GraphError(f"{unknown}the log does not define it")
     if form not in _DEFINITION_FORMATS:
         raise GraphError(
-            f"type {name} is not known, and the log defines it as '{form[:20]}'; definitions are "
-            f"read as {', '.join(_DEFINITION_FORMATS)}"
+            f"{unknown}the log defines it as '{form[:20]}'; definitions are read as "
+            f"{', '.join(_DEFINITION_FORMATS)}"
         )
     definition = definition.encode(errors="surrogateescape").decode(errors="replace")
     if len(definition) > MAX_DEFINITION_BYTES:
@@ -98,10 +116,34 @@ def _texts(name: str, definition: str, form: str) -> dict[str, str]:
             raise GraphError(f"the log has a type with the name '{long_name[:100]}'")
         texts[f"{parts[1]}/{parts[2] or 'msg'}/{parts[3]}"] = text
     if name not in texts:
-        raise GraphError(f"type {name} is not known, and the log defines others in its place")
+        raise GraphError(f"{unknown}the log defines others in its place")
+    texts |= _interface_parts(name, texts[name])
     if form == "ros1msg":
         return texts
     return {full: _with_own_header(full, text, texts) for full, text in texts.items()}
+
+
+def _interface_parts(name: str, text: str) -> dict[str, str]:
+    """Returns the parts of a service or an action, whose file a log holds for each of them.
+
+    Such are the events of services (REP 2012, service introspection) and feedback of actions.
+    """
+    kind = name.split("/")[1]
+    sections = _DASHES.split(text)
+    base = name.rpartition("_")[0]
+    if kind == "srv" and len(sections) == 2:
+        request, response = f"{base}_Request", f"{base}_Response"
+        event = f"service_msgs/ServiceEventInfo info\n{request}[<=1] request\n"
+        event += f"{response}[<=1] response\n"
+        return {request: sections[0], response: sections[1], f"{base}_Event": event}
+    if kind == "action" and len(sections) == 3:
+        feedback = f"unique_identifier_msgs/UUID goal_id\n{base}_Feedback feedback\n"
+        names = (f"{base}_Goal", f"{base}_Result", f"{base}_Feedback")
+        return {
+            **dict(zip(names, sections, strict=True)),
+            f"{base}_FeedbackMessage": feedback,
+        }
+    return {}
 
 
 def _with_own_header(name: str, text: str, texts: Mapping[str, str]) -> str:

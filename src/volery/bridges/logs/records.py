@@ -280,13 +280,16 @@ def _bag_record(file: BinaryIO, size: int) -> tuple[dict[bytes, bytes], bytes] |
     large records are skipped and returned empty.
     """
     parts = []
+    begin = file.tell()
     for most in (MAX_HEAD_BYTES, MAX_CHUNK_BYTES):
         head = file.read(4)
         if len(head) < 4:
             return None
         (length,) = struct.unpack("<I", head)
         if length > size - file.tell():
-            return None
+            if begin > len(BAG_MAGIC) or not parts:
+                return None
+            length = max(begin + bag_format.FIRST_BYTES - file.tell(), 0)
         parts.append(file.read(length) if length <= most else b"")
         if length > most:
             file.seek(length, 1)

@@ -94,9 +94,9 @@ def write_mcap(records: Iterable[LogRecord], out: Path) -> tuple[int, int]:
             if topic not in channels:
                 key = (topic.msgtype, topic.definition, topic.schema_encoding)
                 if key not in schemas:
-                    data = topic.definition.encode(errors="surrogateescape")
+                    text = topic.definition.encode(errors="surrogateescape")
                     schemas[key] = (
-                        writer.register_schema(topic.msgtype, topic.schema_encoding, data)
+                        writer.register_schema(topic.msgtype, topic.schema_encoding, text)
                         if any(key)
                         else 0  # a channel without schema
                     )

@@ -6,6 +6,7 @@ import sqlite3
 from collections.abc import Iterator, Set
 from contextlib import closing, suppress
 from pathlib import Path
+from typing import Any
 
 from volery.bridges.logs.budgets import MAX_CHUNK_BYTES, MAX_TIME_NS, TopicBudget
 from volery.bridges.logs.records import LogRecord, LogTopic
@@ -13,9 +14,6 @@ from volery.core.errors import RecordingError
 
 _TABLES = ("messages", "topics", "message_definitions", "metadata", "schema")
 _IS_TIME = f"typeof(timestamp) = 'integer' AND timestamp BETWEEN 0 AND {MAX_TIME_NS}"
-
-_IN_ORDER = ("messages NOT INDEXED", "id")
-"""Table and order for reading a damaged file from its begin."""
 
 
 class SqliteFile:
@@ -50,20 +48,22 @@ class SqliteFile:
 
         In the order of their times; those of a damaged file in the order of the file.
         """
-        wanted = [k for k, topic in self.topics.items() if topics is None or topic.topic in topics]
-        source, order = ("messages", "timestamp, id") if not self.problem else _IN_ORDER
-        query = (
-            f"SELECT topic_id, timestamp, data FROM {source} WHERE {_IS_TIME} AND topic_id IN "
-            f"({','.join('?' * len(wanted))}) AND timestamp >= ? AND timestamp < ? ORDER BY {order}"
-        )
+        wanted = {k for k, topic in self.topics.items() if topics is None or topic.topic in topics}
         first, last = start_ns or 0, MAX_TIME_NS + 1 if end_ns is None else end_ns
         with closing(self._open()) as base:
-            try:
-                for topic, time_ns, data in base.execute(query, (*wanted, first, last)):
-                    if isinstance(data, bytes):
-                        yield LogRecord(self.topics[topic], time_ns, data, 0)
-            except sqlite3.DatabaseError as error:
-                self._damaged(error)
+            if self.problem:
+                rows = _rows_before_damage(base)
+                rows = (row for row in rows if row[0] in wanted and first <= row[1] < last)
+            else:
+                rows = base.execute(
+                    f"SELECT topic_id, timestamp, data FROM messages WHERE {_IS_TIME} AND topic_id"
+                    f" IN ({','.join('?' * len(wanted))}) AND timestamp >= ? AND timestamp < ?"
+                    " ORDER BY timestamp, id",
+                    (*wanted, first, last),
+                )
+            for topic, time_ns, data in rows:
+                if isinstance(data, bytes):
+                    yield LogRecord(self.topics[topic], time_ns, data, 0)
 
     def _open(self) -> sqlite3.Connection:
         base = sqlite3.connect(f"{self._path.resolve().as_uri()}?mode=ro&immutable=1", uri=True)
@@ -81,20 +81,23 @@ class SqliteFile:
             for row in found:
                 self._add(*row)
         except sqlite3.DatabaseError as error:
-            self._damaged(error)
-            source, order = _IN_ORDER
-            query = f"SELECT topic_id, timestamp FROM {source} WHERE {_IS_TIME} ORDER BY {order}"
-            with suppress(sqlite3.DatabaseError):  # the messages before it can be read
-                for topic, time_ns in base.execute(query):
-                    self._add(topic, 1, time_ns, time_ns)
+            self.problem = (
+                f"{self._path.name} is cut off or damaged, the rest is not read: {error}"
+            )
+            for topic, time_ns, _ in _rows_before_damage(base):
+                self._add(topic, 1, time_ns, time_ns)
 
     def _add(self, topic: int, count: int, first_ns: int, last_ns: int) -> None:
         if topic in self.topics:
             self.counts[topic] = self.counts.get(topic, 0) + count
             self.start_ns, self.end_ns = min(self.start_ns, first_ns), max(self.end_ns, last_ns)
 
-    def _damaged(self, error: sqlite3.DatabaseError) -> None:
-        self.problem = f"{self._path.name} is cut off or damaged, the rest is not read: {error}"
+
+def _rows_before_damage(base: sqlite3.Connection) -> Iterator[tuple[int, int, Any]]:
+    """Yields topic, time and data of the messages of a damaged file, in its order."""
+    query = f"SELECT topic_id, timestamp, data FROM messages NOT INDEXED WHERE {_IS_TIME} ORDER BY id"
+    with suppress(sqlite3.DatabaseError):
+        yield from base.execute(query)
 
 
 def _check_tables(path: Path, base: sqlite3.Connection) -> None:
