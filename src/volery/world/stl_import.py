@@ -19,7 +19,9 @@ _HEAD = 84
 _MOST_WORDS = 5
 _ENDS = (b"endloop", b"end", b"endfacet", b"facet", b"endsolid")
 """Statements that end a facet; some programs write `end loop`, or leave one out."""
-_STATEMENT = re.compile(rb"\b(?:facet|outer|vertex|end\s*loop|end\s*facet|endsolid)\b", re.IGNORECASE)
+_STATEMENT = re.compile(
+    rb"\b(?:facet|outer|vertex|end\s*loop|end\s*facet|endsolid)\b", re.IGNORECASE
+)
 _PADDING = b"\0\x1a"
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])

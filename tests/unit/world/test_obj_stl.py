@@ -74,7 +74,10 @@ def test_faces_as_programs_write_them(read, text):
         (SQUARE + "f 1 2 3\nf 1 2 -5\n", r"line 6: 'f 1 2 -5'.* back to -4"),
         (SQUARE + "f 0 1 2\n", r"line 5: 'f 0 1 2'"),
         (SQUARE + "f 1 2 x\n", r"line 5: 'f 1 2 x'"),
-        ("v 0,5 0 0\n" + SQUARE + "f 1 2 3\n", r"line 1: 'v 0,5 0 0'; a vertex needs three numbers with"),
+        (
+            "v 0,5 0 0\n" + SQUARE + "f 1 2 3\n",
+            r"line 1: 'v 0,5 0 0'; a vertex needs three numbers with",
+        ),
         ("v 0 0\n", r"line 1: 'v 0 0'"),
         (SQUARE.encode("utf-16"), "it is text in UTF-16; save it as UTF-8"),
     ],
@@ -138,7 +141,10 @@ def test_binary_files_as_programs_write_them(read, content, triangles):
         (bytes(20), "20 bytes are too few"),
         ("solid a\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n", "'endloop' is missing"),
         ("solid a\nouter loop\nvertex 0 0 0\nendloop\n", "line 4: a facet of 1 corners"),
-        ("solid a\nouter loop\nvertex 0,5 0 0\n", "line 3: a vertex needs three numbers with decimal"),
+        (
+            "solid a\nouter loop\nvertex 0,5 0 0\n",
+            "line 3: a vertex needs three numbers with decimal",
+        ),
         ("solid a\nouter loop\nvertex 0 0\n", "line 3: a vertex needs three numbers$"),
         ("solid a\nouter loop\n".encode("utf-16"), "it is text in UTF-16; save it as UTF-8"),
     ],

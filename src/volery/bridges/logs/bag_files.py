@@ -91,7 +91,9 @@ class BagFiles:
                     "in this folder moves them"
                 )
         else:
-            hint = "" if packed is file else f"; `zstd -d {packed.name}` unpacks a log of another kind"
+            hint = (
+                "" if packed is file else f"; `zstd -d {packed.name}` unpacks a log of another kind"
+            )
             self._problems.append(
                 f"{packed}: cannot be read as a ROS 2 bag: neither MCAP nor SQLite{hint}"
             )

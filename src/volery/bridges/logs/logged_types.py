@@ -31,9 +31,7 @@ from volery.graph.typestore import typestore
 _MD5_OF_NOTHING = "d41d8cd98f00b204e9800998ecf8427e"
 _SEPARATOR = re.compile(r"^=+\s*$", re.MULTILINE)
 _NESTED = re.compile(r"\s*MSG:\s*(\S+)[^\n]*\n?")
-_TYPE = re.compile(
-    r"([A-Za-z]\w{0,99})/(?:(msg|srv|action)/)?([A-Za-z]\w{0,99})", re.ASCII
-)
+_TYPE = re.compile(r"([A-Za-z]\w{0,99})/(?:(msg|srv|action)/)?([A-Za-z]\w{0,99})", re.ASCII)
 _DEFINITION_FORMATS = ("ros1msg", "ros2msg", "ros2idl")
 _DASHES = re.compile(r"^---\s*$", re.MULTILINE)
 _HEADER = re.compile(r"^(\s*)Header\b", re.MULTILINE)
@@ -172,7 +170,9 @@ def _renamed(texts: Mapping[str, str], *, is_ros1: bool) -> dict[str, str]:
 
     Parts of services and actions, such as the events of services, become messages.
     """
-    found = {name: parse_definition(text, _as_message(name), name)[0] for name, text in texts.items()}
+    found = {
+        name: parse_definition(text, _as_message(name), name)[0] for name, text in texts.items()
+    }
     others = {
         name
         for name, definition in found.items()

@@ -37,7 +37,9 @@ class SqliteFile:
                 self.topics = _topics(path, base)
                 self._count(base)
         except UnicodeDecodeError:  # in the text of SQLite's own error
-            raise RecordingError(f"{path}: the tables are damaged; this is no bag of ROS 2") from None
+            raise RecordingError(
+                f"{path}: the tables are damaged; this is no bag of ROS 2"
+            ) from None
         except sqlite3.Error as error:
             raise RecordingError(f"{path}: cannot be read as a ROS 2 bag: {error}") from None
 
@@ -81,9 +83,7 @@ class SqliteFile:
             for row in found:
                 self._add(*row)
         except sqlite3.DatabaseError as error:
-            self.problem = (
-                f"{self._path.name} is cut off or damaged, the rest is not read: {error}"
-            )
+            self.problem = f"{self._path.name} is cut off or damaged, the rest is not read: {error}"
             for topic, time_ns, _ in _rows_before_damage(base):
                 self._add(topic, 1, time_ns, time_ns)
 
@@ -95,7 +95,9 @@ class SqliteFile:
 
 def _rows_before_damage(base: sqlite3.Connection) -> Iterator[tuple[int, int, Any]]:
     """Yields topic, time and data of the messages of a damaged file, in its order."""
-    query = f"SELECT topic_id, timestamp, data FROM messages NOT INDEXED WHERE {_IS_TIME} ORDER BY id"
+    query = (
+        f"SELECT topic_id, timestamp, data FROM messages NOT INDEXED WHERE {_IS_TIME} ORDER BY id"
+    )
     with suppress(sqlite3.DatabaseError):
         yield from base.execute(query)
 
@@ -122,7 +124,9 @@ def _topics(path: Path, base: sqlite3.Connection) -> dict[int, LogTopic]:
             "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
         )
         definitions = {name: (str(form), str(text)) for name, form, text in rows}
-    coding = "serialization_format" if "serialization_format" in _columns(base, "topics") else "'cdr'"
+    coding = (
+        "serialization_format" if "serialization_format" in _columns(base, "topics") else "'cdr'"
+    )
     budget = TopicBudget(path)
     topics = {}
     for number, name, msgtype, encoding in base.execute(
