@@ -302,7 +302,7 @@ def test_metadata_of_a_ros2_bag_names_no_file_elsewhere(tmp_path, name):
     (tmp_path / "bag_0.db3").write_bytes(b"SQLite format 3\0")
     text = f"rosbag2_bagfile_information:\n  relative_file_paths: ['{name}']\n"
     (folder / "metadata.yaml").write_text(text)
-    with pytest.raises(RecordingError, match="holds no .mcap and no .db3 file"):
+    with pytest.raises(RecordingError, match=r"holds no \.mcap and no \.db3 file"):
         open_log(folder)
 
 

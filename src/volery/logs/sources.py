@@ -1,8 +1,8 @@
 """Reads the records of selected topics from logs of each format, without reading the others.
 
 MCAP files and ROS 1 bags are read chunk by chunk; a ROS 2 bag is a folder of MCAP or SQLite files;
-ULog is PX4's format. The first bytes of a file tell its format. A file is closed with its source, at
-the latest when the last user of the source ends.
+ULog is PX4's format. The first bytes of a file show its format. A file is closed with its source,
+at the latest when the last user of the source ends.
 """
 
 from __future__ import annotations

@@ -73,7 +73,7 @@ def test_a_known_type_of_another_version_without_a_usable_definition_is_refused(
     path = bag("/probe", "std_msgs/msg/Int32", "int32 da(ta\n", "4" * 32, b"\6\0\0\0")
     with (
         open_log(path) as log,
-        pytest.raises(RecordingError, match="and its own definition cannot be used: .*'int32 da"),
+        pytest.raises(RecordingError, match=r"and its own definition cannot be used: .*'int32 da"),
     ):
         len(log["/probe"])
 

@@ -172,7 +172,7 @@ def test_a_file_that_is_cut_off_is_read_up_to_there(tmp_path, share):
     [
         (b"\x1f\x8b\x08\0" + bytes(20), "it is compressed by gzip: `gunzip` unpacks it"),
         (b"PK\x03\x04" + bytes(20), "it is compressed by zip: `unzip`"),
-        (b"#ROSBAG V1.2\n" + bytes(20), "a bag of an older version, which `rosbag filter"),
+        (b"#ROSBAG V1.2\n" + bytes(20), "a bag of an older version: `rosbag filter"),
         (b"\xa3\x95\x80\x80" + bytes(20), "a dataflash log of ArduPilot"),
         (b"\x28\xb5\x2f\xfd" + bytes(20), "nothing can be unpacked"),
         (
@@ -257,7 +257,7 @@ def test_a_bag_without_messages_is_not_played(tmp_path):
         base.commit()
     with pytest.raises(RecordingError, match="holds no readable message"), one_file(folder):
         pass
-    with pytest.raises(RecordingError, match="holds no .mcap"), one_file(tmp_path):
+    with pytest.raises(RecordingError, match=r"holds no \.mcap"), one_file(tmp_path):
         pass
 
 

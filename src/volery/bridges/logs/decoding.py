@@ -17,7 +17,6 @@ from volery.graph.codecs.cdr import decode_cdr
 from volery.graph.codecs.ros1 import ros1_codec, ros2_name
 from volery.graph.typestore import typestore
 
-
 _ZSTD = b"\x28\xb5\x2f\xfd"
 """First bytes of what zstd compressed; those of CDR are zero."""
 

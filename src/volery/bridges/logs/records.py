@@ -45,9 +45,9 @@ _MARKS = {
 """Formats by the first bytes of a file."""
 _MARK_BYTES = 16
 _HINTS = {
-    "bag 1": "; it is a bag of an older version, which `rosbag filter OLD.bag NEW.bag True` of ROS 1 converts",
+    "bag 1": "; it is a bag of an older version: `rosbag filter OLD NEW True` of ROS 1 converts it",
     "ulog": "; it is a ULog, which `open_log` and `volery info` read",
-    "sqlite": "; it is an SQLite file of a ROS 2 bag, which `open_log`, `volery info` and `play` read",
+    "sqlite": "; it is a file of a ROS 2 bag, which `open_log`, `volery info` and `play` read",
     **{
         kind: f"; it is compressed by {kind}: `{tool}` unpacks it"
         for kind, tool in (
@@ -279,7 +279,7 @@ def _bag_record(file: BinaryIO, size: int) -> tuple[dict[bytes, bytes], bytes] |
     size: bytes of the whole file. A longer read would allocate memory for any announced length. Too
     large records are skipped and returned empty.
     """
-    parts = []
+    parts: list[bytes] = []
     begin = file.tell()
     for most in (MAX_HEAD_BYTES, MAX_CHUNK_BYTES):
         head = file.read(4)

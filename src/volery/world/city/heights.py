@@ -120,8 +120,9 @@ def _length_m(given: Any) -> float | None:
 
 def _is_given(value: Any) -> bool:
     """Returns whether a property has a value: tables write empty texts and NaN for none."""
-    is_empty = isinstance(value, str) and not value.strip()
-    return value is not None and not is_empty and value == value
+    if isinstance(value, str):
+        return bool(value.strip())
+    return value is not None and not (isinstance(value, float) and math.isnan(value))
 
 
 def _one_length_m(text: str) -> float | None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path, PurePosixPath
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -115,10 +116,8 @@ def _number(
     """Returns a number, which may be in quotes; words: others that YAML 1.1 knows."""
     value = settings.get(key, default)
     if isinstance(value, str):
-        try:
+        with suppress(ValueError):  # is shown below
             value = words[value.lower()] if value.lower() in words else float(value)
-        except ValueError:
-            pass  # is shown
     if not isinstance(value, int | float) or not least <= value <= most:
         shown = "missing" if value is None else f"{value!r}"[:40]
         raise DataFileError(f"{path}: {key} is {shown}; allowed are {least:g} to {most:g}")
