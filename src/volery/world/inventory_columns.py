@@ -72,7 +72,7 @@ def columns_of(heading: Sequence[str], where: str) -> dict[str, ColumnOf]:
         if name not in found:
             raise ValueError(f"column {name!r} is missing; allowed: {ALLOWED}")
     if ignored:
-        _tell(f"{where}: columns that are not read: {', '.join(ignored)}")
+        _warn(f"{where}: columns that are not read: {', '.join(ignored)}")
     return found
 
 
@@ -102,6 +102,6 @@ def _named(written: str) -> tuple[str, float]:
 
 
 @lru_cache(maxsize=100)
-def _tell(text: str) -> None:
+def _warn(text: str) -> None:
     """Logs a warning once, however often the same file is read."""
     _log.warning("%s", text)

@@ -84,7 +84,7 @@ def test_what_could_be_read_in_two_ways_is_refused(tmp_path, text, message):
 
 
 def test_columns_that_are_not_read_are_named(tmp_path, caplog):
-    inventory_columns._tell.cache_clear()
+    inventory_columns._warn.cache_clear()
     read_inventory(write(tmp_path, "tree_id,x_m,y_m,dhb_cm\n1,2,3,4\n"))
     (record,) = caplog.records
     assert record.getMessage() == "inventory trees.csv: columns that are not read: tree_id, dhb_cm"
