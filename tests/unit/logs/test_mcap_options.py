@@ -164,10 +164,6 @@ def test_events_of_services(one):
     assert (message.info.sequence_number, message.request[0].a, message.response) == (77, 4, [])
 
 
-def test_a_type_without_fields(one):
-    assert len(one("empty_probe_msgs/msg/Nothing", "ros2msg", "", b"\0\1\0\0\0")) == 1
-
-
 def test_a_definition_that_is_cut_off_does_not_hide_the_known_type(one):
     """`string name` alone would be 20 of the bytes."""
     store = get_typestore(Stores.ROS2_JAZZY)

@@ -145,3 +145,5 @@ def test_transforms_of_the_first_tf(bag, topic):
     md5 = "94810edda583a504dfda3829e70d7eec"  # of tf/tfMessage and of tf2_msgs/TFMessage
     with open_log(bag(topic, "tf/msg/tfMessage", _TF_MESSAGE, md5, data)) as log:
         assert log.tf.lookup("a", "b", [1.0]).position.tolist() == [[2.0, 0.0, 0.0]]
+        (found,) = log.messages(topic)
+        assert type(found.message) is m.TFMessage

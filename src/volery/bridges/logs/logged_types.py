@@ -54,11 +54,8 @@ def learn_type(name: str, topic: LogTopic) -> LearnedType:
     """
     is_ros1 = topic.encoding == "ros1"
     form = topic.schema_encoding
-    if not topic.definition.strip():
-        # a type without fields has no text, and recorders write none if they lack the definition
-        has_no_fields = topic.digest == _MD5_OF_NOTHING if is_ros1 else form == "ros2msg"
-        if name in typestore().types or not has_no_fields:
-            form = ""
+    if not topic.definition.strip() and not (is_ros1 and topic.digest == _MD5_OF_NOTHING):
+        form = ""  # recorders write nothing, too, if they lack the definition
     return _learned(name, topic.definition, form, is_ros1)
 
 
