@@ -15,18 +15,19 @@ import lz4.frame
 import pytest
 import zstandard
 
-from volery.bridges.logs import budgets, content, mcap_format, recordings_quota, unpacking
+from volery.bridges.logs import budgets, content, decoding, mcap_format, recordings_quota, unpacking
 from volery.bridges.logs.decoding import LogDecoder
 from volery.bridges.logs.log_writer import create_log
 from volery.bridges.logs.playback import Playback
 from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.recorded_flight import read_flight
-from volery.bridges.logs.records import BAG_MAGIC, MCAP_MAGIC, LogTopic, LogWalk
+from volery.bridges.logs.records import BAG_MAGIC, MCAP_MAGIC, LogRecord, LogTopic, LogWalk
 from volery.bridges.logs.recovery import recover
 from volery.core.errors import GraphError, RecordingError
 from volery.graph.codecs import definition_store
 from volery.graph.graph import Graph
 from volery.graph.messages import Published, String
+from volery.logs import open_log
 from volery.runtime.replay.command_log import CommandLog
 from volery.runtime.replay.slam.sources import open_source
 from volery.runtime.services.recording import RecordingServices
@@ -271,11 +272,36 @@ def test_a_ros2_bag_whose_tables_have_no_readable_names_is_refused(tmp_path):
         open_source(path)
 
 
-@pytest.mark.parametrize("line", ["compression_mode: FILE", "storage_identifier: mcap"])
-def test_a_ros2_bag_that_others_would_unpack_is_refused(tmp_path, line):
-    (tmp_path / "metadata.yaml").write_text(f"rosbag2_bagfile_information:\n  {line}\n")
-    with pytest.raises(RecordingError, match="is compressed, or of files that are not named"):
-        open_source(tmp_path)
+def test_a_compressed_file_of_a_ros2_bag_unpacks_within_the_limits(tmp_path, monkeypatch):
+    monkeypatch.setattr(budgets, "_FREE_BYTES", 8 << 20)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    bag = tmp_path / "bag"
+    bag.mkdir()
+    (bag / "bag_0.db3.zstd").write_bytes(zstandard.compress(bytes(64 << 20)))
+    for path in (bag, bag / "bag_0.db3.zstd"):
+        with pytest.raises(RecordingError, match="unpacks to more than"):
+            open_log(path)
+    assert list(tmp_path.iterdir()) == [bag]
+
+
+def test_a_compressed_message_of_a_ros2_bag_unpacks_within_the_limits(monkeypatch):
+    monkeypatch.setattr(decoding, "MAX_CHUNK_BYTES", 1 << 20)
+    topic = LogTopic("/bomb", "std_msgs/msg/String", "string data\n", "cdr", "ros2msg")
+    small = zstandard.ZstdCompressionParameters(window_log=17)
+    data = zstandard.ZstdCompressor(compression_params=small).compress(bytes(64 << 20))
+    with pytest.raises(GraphError, match="unpacks to more than 1048576 bytes"):
+        LogDecoder().decode(LogRecord(topic, 0, data, 0))
+
+
+@pytest.mark.parametrize("name", ["../bag_0.db3", "/etc/passwd", "..\\bag_0.db3"])
+def test_metadata_of_a_ros2_bag_names_no_file_elsewhere(tmp_path, name):
+    folder = tmp_path / "bag"
+    folder.mkdir()
+    (tmp_path / "bag_0.db3").write_bytes(b"SQLite format 3\0")
+    text = f"rosbag2_bagfile_information:\n  relative_file_paths: ['{name}']\n"
+    (folder / "metadata.yaml").write_text(text)
+    with pytest.raises(RecordingError, match=r"holds no \.mcap and no \.db3 file"):
+        open_log(folder)
 
 
 # ------------------------------------------------------------------------------------- the server

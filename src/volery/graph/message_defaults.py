@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 from rosbags.interfaces import Nodetype
+from rosbags.typesys.base import normalize_fieldname
 
 Maker = Callable[[], Any]
 DefaultOf = Callable[[str, str], Any]
@@ -50,7 +51,8 @@ def make_arguments_optional(
         return
 
     def first(self: Any, *values: Any, **named: Any) -> None:
-        described = dict(fielddefs[name][1])
+        # a field with the name of a keyword, `from`, is an attribute `from_`
+        described = {normalize_fieldname(f[0]): f for f in fielddefs[name][1]}
         cls.__init__ = _constructor(name, cls, described, types, default_of)
         cls.__init__(self, *values, **named)
 
@@ -66,18 +68,22 @@ def is_plain_name(name: str) -> bool:
 def _constructor(
     name: str,
     cls: type[Any],
-    described: dict[str, Any],
+    described: Mapping[str, tuple[str, Any]],
     types: Mapping[str, type[Any]],
     default_of: DefaultOf,
 ) -> Callable[..., None]:
-    """Returns `__init__` of a class: immutable defaults shared, others made for each message."""
+    """Returns `__init__` of a class: immutable defaults shared, others made for each message.
+
+    described: names in the definition and types, by the names of the attributes.
+    """
     scope: dict[str, Any] = {"_not_given": _NOT_GIVEN}
     arguments, lines = [], []
     for own in (field.name for field in fields(cls)):
         if own not in described:  # a constant of the class; `dataclasses.replace` passes it
             arguments.append(f"{own}=None")
             continue
-        make, is_plain = _maker(described[own], default_of(name, own), types)
+        field, kind = described[own]
+        make, is_plain = _maker(kind, default_of(name, field), types)
         if is_plain:
             scope[f"_default_{own}"] = make()
             arguments.append(f"{own}=_default_{own}")
@@ -117,6 +123,8 @@ def _sequence_maker(
     if base == "string":
         texts = [""] * length if default is None else list(default)
         return lambda: list(texts)
+    if base == "byte" and default is not None:  # octets in ROS 2, numbers with a sign in ROS 1
+        default = [value - 256 if value > 127 else value for value in default]
     if kind == Nodetype.ARRAY:
         dtype = np.dtype({"byte": "int8", "char": "uint8"}.get(base, base))
         numbers = np.zeros(length, dtype) if default is None else np.array(default, dtype)

@@ -34,6 +34,8 @@ class Columns(NamedTuple):
     """Columns by names of fields."""
     refused: int
     """Number of messages that cannot be decoded, or have another type."""
+    problem: str
+    """Why the first of them cannot be decoded."""
 
 
 def read_columns(
@@ -45,10 +47,9 @@ def read_columns(
     for record in source.records(wanted.keys(), start_ns, end_ns):
         collector = collectors[record.topic.topic]
         try:
-            msgtype, message = decoder.decode(record)
-        except GraphError:
-            msgtype, message = "", None
-        collector.add(record.time_ns, msgtype, message)
+            collector.add(record.time_ns, *decoder.decode(record))
+        except GraphError as error:
+            collector.refuse(str(error))
     return {topic: collector.columns() for topic, collector in collectors.items()}
 
 
@@ -66,21 +67,27 @@ class _Collector:
         ]
         self._times = array("q")
         self._refused = 0
+        self._problem = ""
 
     def add(self, time_ns: int, msgtype: str, message: Any) -> None:
         """Adds a message; counts it if its type is another."""
         if msgtype != self._msgtype:
-            self._refused += 1
+            self.refuse(f"its type is {msgtype}")
             return
         self._times.append(time_ns)
         for read, append in self._reads:
             append(read(message))
 
+    def refuse(self, problem: str) -> None:
+        """Counts a message that is left out."""
+        self._refused += 1
+        self._problem = self._problem or problem
+
     def columns(self) -> Columns:
         """Returns what was collected."""
         pairs = zip(self._fields, self._values, strict=True)
         found = {field.name: _column(field, values) for field, values in pairs}
-        return Columns(np.array(self._times, np.int64), found, self._refused)
+        return Columns(np.array(self._times, np.int64), found, self._refused, self._problem)
 
 
 def _empty(field: Field) -> Any:

@@ -1,8 +1,8 @@
 """Reads the records of selected topics from logs of each format, without reading the others.
 
-MCAP files and ROS 1 bags are read chunk by chunk; a ROS 2 bag is a folder of MCAP files or an
-SQLite file; ULog is PX4's format. A file is closed with its source, at the latest when the last
-user of the source ends.
+MCAP files and ROS 1 bags are read chunk by chunk; a ROS 2 bag is a folder of MCAP or SQLite files;
+ULog is PX4's format. The first bytes of a file show its format. A file is closed with its source,
+at the latest when the last user of the source ends.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from collections.abc import Iterator, Set
 from pathlib import Path
 from typing import Protocol
 
+from volery.bridges.logs.bag_files import BagFiles
 from volery.bridges.logs.chunks import Chunk, ChunkedLog
 from volery.bridges.logs.log_formats import open_chunks
-from volery.bridges.logs.records import LogRecord
-from volery.bridges.logs.ros2_bags import mcap_parts
+from volery.bridges.logs.records import LogRecord, file_signature, log_format
 from volery.core.errors import RecordingError
 from volery.logs.sqlite_source import SqliteSource
 from volery.logs.topic_count import TopicCount
@@ -47,9 +47,9 @@ class LogSource(Protocol):
 class ChunkSource:
     """Reads an MCAP file or a ROS 1 bag, or the MCAP files of one ROS 2 bag."""
 
-    def __init__(self, parts: list[ChunkedLog]) -> None:
-        self._parts = parts
-        self._closing = weakref.finalize(self, _close, parts)
+    def __init__(self, parts: list[ChunkedLog], files: BagFiles | None = None) -> None:
+        self._parts, self._files = parts, files
+        self._closing = weakref.finalize(self, _close, parts, files)
         chunks = [chunk for part in parts for chunk in part.chunks]
         self.start_ns = min((chunk.start_ns for chunk in chunks), default=0)
         self.end_ns = max((chunk.end_ns for chunk in chunks), default=0)
@@ -58,7 +58,8 @@ class ChunkSource:
     @property
     def problem(self) -> str:
         """Problems of the files, as far as they were read; empty for whole ones."""
-        return "; ".join(part.problem for part in self._parts if part.problem)
+        problems = [self._files.problem if self._files else "", *(p.problem for p in self._parts)]
+        return "; ".join(filter(None, problems))
 
     def records(self, topics: Set[str], start_ns: int, end_ns: int) -> Iterator[LogRecord]:
         """Yields the records of `topics` from `start_ns` to before `end_ns`."""
@@ -81,23 +82,40 @@ class ChunkSource:
 
 def open_source(path: Path) -> LogSource:
     """Opens a log of any format. Raises `RecordingError` if the file is missing or no log."""
-    if path.suffix.lower() == ".ulg":
+    kind = log_kind(path)
+    if kind == "ulog":
         return UlogSource(path)
-    files = mcap_parts(path)
-    if not files and (path.is_dir() or path.suffix.lower() == ".db3"):
-        return SqliteSource(path)
-    parts: list[ChunkedLog] = []
+    if kind != "ros2bag":
+        return ChunkSource([open_chunks(path)])
+    files, parts = BagFiles(path), list[ChunkedLog]()
     try:
-        parts += [open_chunks(file) for file in files or [path]]
-        return ChunkSource(parts)
+        if not files.mcap:
+            return SqliteSource(path, files)
+        parts += [open_chunks(file) for file in files.mcap]
+        return ChunkSource(parts, files)
     except BaseException:
-        _close(parts)
+        _close(parts, files)
         raise
 
 
-def _close(parts: list[ChunkedLog]) -> None:
+def log_kind(path: Path) -> str:
+    """Returns `mcap`, `bag`, `ros2bag` or `ulog`, by the first bytes of a file.
+
+    A file of another format has the kind of its suffix, whose reader says what is wrong with it.
+    Raises `RecordingError` if the file is missing, or neither says what it is.
+    """
+    if path.is_dir():
+        return "ros2bag"
+    by_suffix = {".ulg": "ulog", ".db3": "ros2bag"}.get(path.suffix.lower(), "")
+    kind = {"sqlite": "ros2bag", "zstd": "ros2bag"}.get(found := file_signature(path), found)
+    return kind or by_suffix or log_format(path)
+
+
+def _close(parts: list[ChunkedLog], files: BagFiles | None = None) -> None:
     for part in parts:
         part.close()
+    if files is not None:
+        files.close()
 
 
 def _topics_of(parts: list[ChunkedLog]) -> dict[str, TopicCount]:

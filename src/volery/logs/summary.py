@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from volery.bridges.logs.bag_files import bag_size
 from volery.bridges.logs.reader import LogSummary, TopicSummary, summarize
-from volery.bridges.logs.ros2_bags import bag_size
 from volery.core.clock import NS_PER_S
-from volery.logs.sources import open_source
+from volery.logs.sources import log_kind, open_source
 
 
 def summarize_log(path: Path) -> LogSummary:
@@ -15,8 +15,8 @@ def summarize_log(path: Path) -> LogSummary:
 
     Raises `RecordingError` if the file cannot be read, is no log, or exceeds the limits of logs.
     """
-    suffix = path.suffix.lower()
-    if not path.is_dir() and suffix not in (".db3", ".ulg"):
+    kind = log_kind(path)
+    if kind in ("mcap", "bag"):
         return summarize(path)
     source = open_source(path)
     try:
@@ -31,7 +31,6 @@ def summarize_log(path: Path) -> LogSummary:
             for name, count in source.topics.items()
         )
         messages = sum(topic.messages for topic in topics)
-        kind = "ulog" if suffix == ".ulg" and not path.is_dir() else "ros2bag"
         return LogSummary(
             path, kind, bag_size(path), source.start_ns, source.end_ns, messages, topics,
             source.problem,

@@ -13,6 +13,7 @@ from volery.bridges.logs.decoding import LogDecoder
 from volery.core.arrays import Array
 from volery.core.clock import NS_PER_S, ns_from_s
 from volery.core.errors import GraphError, RecordingError, VoleryError
+from volery.core.plurals import counted
 from volery.graph.codecs.cdr import known
 from volery.graph.codecs.ros1_names import ros2_name
 from volery.logs.columns import Columns, Wanted, read_columns
@@ -260,7 +261,10 @@ class TopicData:
 
 
 def load_numbers(topics: Sequence[TopicData]) -> None:
-    """Reads the numbers of topics of one log and range of times, in one pass over the log."""
+    """Reads the numbers of topics of one log and range of times, in one pass over the log.
+
+    Raises `RecordingError` if a topic has messages of which none can be decoded.
+    """
     missing = {data.topic: data for data in topics if data._kept is None}
     if not missing:
         return
@@ -268,7 +272,13 @@ def load_numbers(topics: Sequence[TopicData]) -> None:
     wanted = {name: data._wanted_numbers() for name, data in missing.items()}
     found = read_columns(first._source, wanted, *first._range_ns)
     for name, data in missing.items():
-        data._kept = found[name]
+        columns = found[name]
+        if columns.refused and not len(columns.times_ns):
+            raise RecordingError(
+                f"{name} cannot be read: none of its {counted(columns.refused, 'message')} can be "
+                f"decoded; the first: {columns.problem}"
+            )
+        data._kept = columns
 
 
 def clipped(range_ns: tuple[int, int], start_s: float, end_s: float) -> tuple[int, int]:

@@ -85,6 +85,8 @@ class UlogTopic:
         # PX4's topics change between versions, and types of one name cannot
         package = f"ulog_{sha256(text.encode()).hexdigest()[:8]}"
         number = f"_{instance}" if instance else ""
+        if name + number in formats and number:  # the name of another topic
+            number = f"/{instance}"
         self.topic = LogTopic(
             f"/{name}{number}", f"{package}/msg/{_camel(name)}", text, "cdr", "ros2msg"
         )

@@ -95,8 +95,13 @@ class UlogSource:
                     layouts[number] = UlogTopic(name, instance, formats)
                 except ValueError as error:
                     self._problems[str(error)] = None
-            if sample is not None and sample.time_ns <= MAX_TIME_NS:
+            if sample is None:
+                continue
+            if sample.time_ns <= MAX_TIME_NS:
                 yield sample
+            else:
+                name = sample.topic.topic
+                self._problems[f"{name} has times later than ROS can represent; left out"] = None
 
     def _messages(self) -> Iterator[_Message]:
         """Yields all messages; notes where the file is cut off or damaged."""

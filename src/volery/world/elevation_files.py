@@ -2,7 +2,8 @@
 
 A matrix has no header; its first row is at the lowest y. Entries are separated by commas,
 semicolons, tabs or blanks; with semicolons a comma is a decimal point. An ESRI ASCII grid begins
-with `ncols`, `nrows`, ... and its first row is at the highest y (Esri, "ESRI ASCII raster format").
+with `ncols`, `nrows`, ... and its first row is at the highest y (Esri, "ESRI ASCII raster format");
+its entries are separated by blanks, in lines of any length, and may have decimal commas.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from volery.core.errors import DataFileError
 from volery.core.plurals import counted
+from volery.core.text_files import decode_text
 
 _SHOWN_FAULTS = 20
 _DEEPEST_M, _HIGHEST_M = -12_000.0, 9_000.0
@@ -22,7 +24,10 @@ _DEEPEST_M, _HIGHEST_M = -12_000.0, 9_000.0
 _NO_DATA = (-9999.0, -99999.0, -32767.0, -32768.0)
 """Common marks of cells without data."""
 _ESRI_KEYS = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize",
-              "nodata_value")  # fmt: skip
+              "dx", "dy", "nodata_value")  # fmt: skip
+_WORDS = ("nan", "null", "na", "nodata")
+"""Words that stand for no data."""
+_TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 _SAME = 1e-6
 """Relative tolerance of two spacings."""
 
@@ -33,20 +38,17 @@ def read_elevations(path: Path, spacing_m: float) -> NDArray[np.float64]:
     spacing_m: of the grid; an ESRI grid must have it, too. Raises `DataFileError`, naming the file
     and every invalid row.
     """
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except FileNotFoundError:
-        raise DataFileError(f"elevation grid {path} does not exist") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise DataFileError(f"elevation grid {path} cannot be read: {error}") from None
+    lines = _lines(path)
     head = _esri_head(path, lines)
-    cell_m = head.get("cellsize", spacing_m)
-    if abs(cell_m - spacing_m) > _SAME * spacing_m:
-        raise DataFileError(
-            f"elevation grid {path}: its cellsize is {cell_m:g}, spacing_m is {spacing_m:g}"
-        )
-    heights = _rows(path, lines, len(head), head.get("nodata_value"))
+    for key in ("cellsize", "dx", "dy"):
+        if abs(head.get(key, spacing_m) - spacing_m) > _SAME * spacing_m:
+            raise DataFileError(
+                f"elevation grid {path}: its {key} is {head[key]:g}, spacing_m is {spacing_m:g}"
+            )
+    shape = (head.get("nrows", 0.0), head.get("ncols", 0.0))
+    heights = _rows(path, lines, len(head), head.get("nodata_value"), shape if head else None)
     if not head:
+        _refuse_points(path, heights)
         return heights
     for key, own, what in zip(("nrows", "ncols"), heights.shape, ("row", "value"), strict=True):
         if key in head and head[key] != own:
@@ -56,6 +58,36 @@ def read_elevations(path: Path, spacing_m: float) -> NDArray[np.float64]:
     return heights[::-1].copy()
 
 
+def _lines(path: Path) -> list[str]:
+    try:
+        data = path.read_bytes()
+        if data.startswith(_TIFF):
+            raise DataFileError(
+                f"elevation grid {path} is a GeoTIFF; `gdal_translate -of AAIGrid` writes an ESRI "
+                "ASCII grid, which can be read"
+            )
+        return decode_text(data).splitlines()
+    except FileNotFoundError:
+        raise DataFileError(f"elevation grid {path} does not exist") from None
+    except UnicodeDecodeError:
+        raise DataFileError(f"elevation grid {path} is not text in UTF-8") from None
+    except OSError as error:
+        raise DataFileError(f"elevation grid {path} cannot be read: {error.strerror}") from None
+
+
+def _refuse_points(path: Path, heights: NDArray[np.float64]) -> None:
+    """Raises `DataFileError` for a list of x y z, which is no matrix of heights."""
+    if heights.shape[1] != 3 or len(heights) < 4:
+        return
+    axes = [np.unique(heights[:, k]) for k in (0, 1)]
+    is_grid = len(axes[0]) * len(axes[1]) == len(heights) and min(map(len, axes)) > 1
+    if is_grid and len(np.unique(heights[:, :2], axis=0)) == len(heights):
+        raise DataFileError(
+            f"elevation grid {path} is a list of x y z, as its three columns show: write the "
+            "heights as a matrix, or as an ESRI ASCII grid (`gdal_translate -of AAIGrid`)"
+        )
+
+
 def _esri_head(path: Path, lines: list[str]) -> dict[str, float]:
     """Returns the header of an ESRI ASCII grid by lower-case keys; empty for a plain matrix."""
     head: dict[str, float] = {}
@@ -63,8 +95,10 @@ def _esri_head(path: Path, lines: list[str]) -> dict[str, float]:
         words = line.split()
         if not words or words[0].lower() not in _ESRI_KEYS:
             break
+        key, value = words[0].lower(), words[1] if len(words) > 1 else ""
         try:
-            head[words[0].lower()] = float(words[1])
+            is_word = key == "nodata_value" and value.lower() in _WORDS
+            head[key] = math.nan if is_word else float(value.replace(",", "."))
         except (IndexError, ValueError):
             raise DataFileError(
                 f"elevation grid {path}: row {number}: '{words[0]}' needs a number"
@@ -72,24 +106,42 @@ def _esri_head(path: Path, lines: list[str]) -> dict[str, float]:
     return head
 
 
-def _rows(path: Path, lines: list[str], skipped: int, no_data: float | None) -> NDArray[np.float64]:
+def _rows(
+    path: Path,
+    lines: list[str],
+    skipped: int,
+    no_data: float | None,
+    shape: tuple[float, float] | None,
+) -> NDArray[np.float64]:
+    """Returns the numbers of lines; shape: of an ESRI grid, None for a matrix."""
     rows: list[list[float]] = []
     faults: list[str] = []
+    uneven: list[str] = []
     columns = 0
+    comma = shape is not None and not any("." in line for line in lines[skipped:])
     for number, line in enumerate(lines[skipped:], start=skipped + 1):
         if not line.strip():
             continue
-        fields = _fields(line)
+        if shape is None or len(line.split()) == 1:
+            fields = _fields(line)
+        else:
+            fields = (line.replace(",", ".") if comma else line).split()
         columns = columns or len(fields)
         if len(fields) != columns:
-            faults.append(
+            uneven.append(
                 f"row {number} has {counted(len(fields), 'value')}, the first row {columns}"
             )
-            continue
+            if shape is None:
+                continue
         values, fault = _values(fields, no_data)
         if fault:
             faults.append(f"row {number}, {fault}")
         rows.append(values)
+    if shape is not None and not faults and math.prod(shape) == sum(map(len, rows)) > 0:
+        columns = int(shape[1])
+        rows = np.concatenate(rows).reshape(-1, columns).tolist()
+    else:
+        faults += uneven
     if faults:
         more = len(faults) - _SHOWN_FAULTS
         shown = "; ".join(faults[:_SHOWN_FAULTS]) + (f"; and {more} more" if more > 0 else "")
@@ -119,7 +171,7 @@ def _values(fields: list[str], no_data: float | None) -> tuple[list[float], str]
     values: list[float] = []
     for column, text in enumerate(fields, start=1):
         try:
-            value = float(text)
+            value = math.nan if text.strip().lower() in _WORDS else float(text)
         except ValueError:
             return [], f"column {column}: not a number"
         fault = _wrong(value, no_data)
@@ -130,10 +182,10 @@ def _values(fields: list[str], no_data: float | None) -> tuple[list[float], str]
 
 
 def _wrong(value: float, no_data: float | None) -> str:
+    if value == no_data or value in _NO_DATA or math.isnan(value):
+        return f"{value:g} marks a place without data; fill such places first"
     if not math.isfinite(value):
         return "not finite"
-    if value == no_data or value in _NO_DATA:
-        return f"{value:g} marks a place without data; fill such places first"
     if not _DEEPEST_M <= value <= _HIGHEST_M:
         return (
             f"{value:g} is no elevation in m, which lie between {_DEEPEST_M:g} and {_HIGHEST_M:g}"

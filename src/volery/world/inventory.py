@@ -1,11 +1,11 @@
 """Reads tree inventories: CSV files with a header row and one tree per row.
 
-Columns `x_m` and `y_m` are required; `dbh_cm`, `height_m` and `species` may follow in any order.
-An empty field means "not measured", as does `NA`, which R writes. A column without a name, such as
-the row numbers of pandas, is ignored. Species may have any name (see `species_map`). All invalid
-rows are reported together, with their row numbers in the file (the header is row 1). Fields are
-separated by commas, or by semicolons or tabs, as spreadsheets of many countries export them; then a
-number may have a decimal comma.
+Columns `x_m` and `y_m` are required; `dbh_cm`, `height_m` and `species` may follow in any order, in
+other units (see `inventory_columns`); others are ignored. An empty field means "not measured", as
+do the marks of R, pandas and GIS programs (`NA`, `nan`, -9999). Species may have any name (see
+`species_map`). All invalid rows are reported together, with their row numbers in the file. Fields
+are separated by commas, or by semicolons or tabs, as spreadsheets of many countries export them;
+then a number may have a decimal comma, and all have the same mark.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -21,14 +22,19 @@ from numpy.typing import NDArray
 
 from volery.core.errors import DataFileError
 from volery.core.plurals import counted
+from volery.core.text_files import read_text
+from volery.world.inventory_columns import REQUIRED, ColumnOf, columns_of
 from volery.world.inventory_doubts import question
 
-_REQUIRED = ("x_m", "y_m")
-_OPTIONAL = ("dbh_cm", "height_m", "species")
 _SEPARATORS = ",;\t"
-_NOT_MEASURED = "NA"
+_NOT_MEASURED = ("", "na", "n/a", "nan", "null", "none", "-", ".")
+_MARKS = (-999.0, -9999.0, -99999.0)
+"""Numbers that stand for values that were not measured."""
+_EXCEL = re.compile(r"sep=(.)", re.IGNORECASE)
+"""First row that Excel understands, and other programs do not write."""
+_NUMBERS = ("x_m", "y_m", "dbh_cm", "height_m")
 _SHOWN_FAULTS = 20
-_SHOWN_LETTERS = 40
+_SHOWN_LETTERS = 20
 _THICKEST_CM, _TALLEST_M = 1500.0, 130.0
 """Limits beyond any living tree: larger numbers are errors of units."""
 
@@ -69,27 +75,20 @@ class Inventory:
 def read_inventory(path: str | Path) -> Inventory:
     """Reads an inventory; raises one `DataFileError` that lists every invalid row."""
     path = Path(path)
+    heading, rows, separator = _rows_of(path)
     try:
-        text = path.read_text(encoding="utf-8-sig")
-        separator = _separator(text.partition("\n")[0])
-        rows = list(csv.reader(io.StringIO(text, newline=""), delimiter=separator))
-    except FileNotFoundError:
-        raise DataFileError(f"inventory {path} does not exist") from None
-    except UnicodeDecodeError:
-        raise DataFileError(f"inventory {path} is not UTF-8; save it as CSV in UTF-8") from None
-    except (OSError, csv.Error) as error:
-        raise DataFileError(f"inventory {path} cannot be read: {error}") from None
-    if not rows or not any(field.strip() for field in rows[0]):
-        raise DataFileError(f"inventory {path} is empty; its first row must name the columns")
-    columns = _columns(path, [field.strip() for field in rows[0]])
+        columns = columns_of(heading, f"inventory {path.name}")
+    except ValueError as error:
+        raise DataFileError(f"inventory {path}: {error}") from None
+    fields = [row[c.position] for _, row in rows for k, c in columns.items()
+              if k in _NUMBERS and len(row) == len(heading)]  # fmt: skip
+    comma = separator != "," and any("," in field for field in fields)
     faults: list[str] = []
     numbers: list[list[float]] = []
     names: list[str] = []
     sound: list[int] = []
-    for number, row in enumerate(rows[1:], start=2):
-        if not any(field.strip() for field in row):
-            continue
-        fault, values, name = _parse(row, columns, len(rows[0]), separator)
+    for number, row in rows:
+        fault, values, name = _parse(row, columns, len(heading), comma=comma)
         if fault:
             faults.append(f"row {number}: {fault}")
         else:
@@ -107,61 +106,79 @@ def read_inventory(path: str | Path) -> Inventory:
     return Inventory(table[:, :2], table[:, 2], table[:, 3], tuple(names))
 
 
-def _separator(heading: str) -> str:
-    """Returns what separates the names of the columns."""
-    return max(_SEPARATORS, key=heading.count)
-
-
-def _columns(path: Path, heading: list[str]) -> dict[str, int]:
-    allowed = ", ".join((*_REQUIRED, *_OPTIONAL))
-    named = [name for name in heading if name]
-    for name in named:
-        if name not in _REQUIRED + _OPTIONAL:
-            at = heading.index(name) + 1
-            raise DataFileError(
-                f"inventory {path}: row 1, column {at}: unknown name {name[:_SHOWN_LETTERS]!r}; "
-                f"allowed: {allowed}"
-            )
-        if heading.count(name) > 1:
-            raise DataFileError(f"inventory {path}: column {name!r} occurs twice")
-    for name in _REQUIRED:
-        if name not in heading:
-            raise DataFileError(f"inventory {path}: column {name!r} is missing; allowed: {allowed}")
-    return {name: heading.index(name) for name in named}
+def _rows_of(path: Path) -> tuple[list[str], list[tuple[int, list[str]]], str]:
+    """Returns the names of the columns, the other rows with their numbers, and the separator."""
+    try:
+        text = read_text(path)
+        heading = next(iter(text.splitlines()), "")
+        excel = _EXCEL.fullmatch(heading)
+        separator = excel[1] if excel else max(_SEPARATORS, key=heading.count)
+        lines = csv.reader(io.StringIO(text, newline=""), delimiter=separator)
+        rows = [(k, row) for k, row in enumerate(lines, start=1) if any(f.strip() for f in row)]
+    except FileNotFoundError:
+        raise DataFileError(f"inventory {path} does not exist") from None
+    except UnicodeDecodeError:
+        raise DataFileError(f"inventory {path} is not UTF-8; save it as CSV in UTF-8") from None
+    except (OSError, csv.Error) as error:
+        raise DataFileError(f"inventory {path} cannot be read: {error}") from None
+    rows = rows[1:] if excel else rows
+    if not rows:
+        raise DataFileError(f"inventory {path} is empty; its first row must name the columns")
+    return [field.strip() for field in rows[0][1]], rows[1:], separator
 
 
 def _parse(
-    row: list[str], columns: dict[str, int], width: int, separator: str
+    row: list[str], columns: dict[str, ColumnOf], width: int, *, comma: bool
 ) -> tuple[str, list[float], str]:
     """Returns the error of a row ("" if none), x, y, dbh and height in m, species."""
     if len(row) != width:
         return f"{counted(len(row), 'field')}, the heading has {width}", [], ""
     values: list[float] = []
-    for column in ("x_m", "y_m", "dbh_cm", "height_m"):
-        text = row[columns[column]].strip() if column in columns else ""
-        if text in ("", _NOT_MEASURED):
-            if column in _REQUIRED:
-                return f"{column} is empty", [], ""
+    last = math.nan
+    for name in _NUMBERS:
+        column = columns.get(name)
+        text = "" if column is None else row[column.position].strip()
+        value = _value(text, comma=comma)
+        shown = repr(text[:_SHOWN_LETTERS])
+        if value is None:
+            other = f", other rows have decimal commas: {shown}" if comma and "." in text else ""
+            return f"{name} is not a number{other or f': {shown}'}", [], ""
+        if name in REQUIRED:
+            if math.isnan(value):
+                return f"{name} is empty" + (f": {shown}" if text else ""), [], ""
+            if value in _MARKS and value == last:
+                return f"x_m and y_m are {value:g}, which marks what is not measured", [], ""
+        elif math.isnan(value) or value in _MARKS:
             values.append(math.nan)
             continue
-        try:
-            value = float(text if separator == "," else text.replace(",", "."))
-        except ValueError:
-            return f"{column} is not a number", [], ""
-        fault = _wrong(column, value)
+        last = value
+        value *= 1.0 if column is None else column.factor
+        fault = _wrong(name, value)
         if fault:
-            return f"{column} {value:g} {fault}", [], ""
-        values.append(value / 100.0 if column == "dbh_cm" else value)
-    name = row[columns["species"]].strip() if "species" in columns else ""
-    return "", values, "" if name == _NOT_MEASURED else name
+            return f"{name} {value:g} {fault}", [], ""
+        values.append(value / 100.0 if name == "dbh_cm" else value)
+    species = row[columns["species"].position].strip() if "species" in columns else ""
+    return "", values, "" if species.lower() in _NOT_MEASURED else species
+
+
+def _value(text: str, *, comma: bool) -> float | None:
+    """Returns a number, NaN where nothing was measured; None for other text."""
+    if text.lower() in _NOT_MEASURED:
+        return math.nan
+    if comma and "." in text:
+        return None
+    try:
+        return float(text.replace(",", ".") if comma else text)
+    except ValueError:
+        return None
 
 
 def _wrong(column: str, value: float) -> str:
     if not math.isfinite(value):
         return "is not finite"
-    if column in _REQUIRED:
+    if column in REQUIRED:
         return ""
     if value <= 0.0:
-        return "must be above 0"
+        return "must be above 0; an empty field means not measured"
     highest = _THICKEST_CM if column == "dbh_cm" else _TALLEST_M
     return f"is above {highest:g}" if value > highest else ""

@@ -43,7 +43,8 @@ def read_obj(data: bytes, material_file: Callable[[str], bytes], most_triangles:
     none. Raises `ValueError` with the line for broken content.
     """
     if b"\0" in data:
-        raise ValueError("it is no text")
+        is_utf_16 = data.startswith((b"\xff\xfe", b"\xfe\xff"))
+        raise ValueError("it is text in UTF-16; save it as UTF-8" if is_utf_16 else "it is no text")
     faces = _Faces()
     material = 0
     for number, line in _lines(data):
@@ -67,8 +68,8 @@ def _lines(data: bytes) -> Iterator[tuple[int, bytes]]:
     """Yields lines with their numbers; continued ones are joined under the number of the first."""
     begun, joined = 0, b""
     for number, line in enumerate(data.removeprefix(_BYTE_ORDER_MARK).splitlines(), 1):
-        if line.endswith(b"\\") and not line.lstrip().startswith(b"#"):
-            begun, joined = begun or number, joined + line[:-1] + b" "
+        if line.rstrip().endswith(b"\\") and not line.lstrip().startswith(b"#"):
+            begun, joined = begun or number, joined + line.rstrip()[:-1] + b" "
             continue
         yield (begun, joined + line) if begun else (number, line)
         begun, joined = 0, b""
@@ -81,8 +82,9 @@ def _point(number: int, words: list[bytes]) -> tuple[float, float, float]:
     try:
         return float(words[1]), float(words[2]), float(words[3])
     except (ValueError, IndexError):
+        hint = " with decimal points" if any(b"," in word for word in words) else ""
         raise ValueError(
-            f"line {number}: '{_shown(words)}'; a vertex needs three numbers"
+            f"line {number}: '{_shown(words)}'; a vertex needs three numbers{hint}"
         ) from None
 
 

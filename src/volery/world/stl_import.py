@@ -8,12 +8,22 @@ are ignored.
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from volery.world.gltf_import import Part
 from volery.world.polygons import triangulated
 
 _HEAD = 84
+_MOST_WORDS = 5
+_ENDS = (b"endloop", b"end", b"endfacet", b"facet", b"endsolid")
+"""Statements that end a facet; some programs write `end loop`, or leave one out."""
+_STATEMENT = re.compile(
+    rb"\b(?:facet|outer|vertex|end\s*loop|end\s*facet|endsolid)\b", re.IGNORECASE
+)
+_PADDING = b"\0\x1a"
+_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -21,9 +31,12 @@ def read_stl(data: bytes, most_triangles: int) -> list[Part]:
     """Returns the surface of a file's content; raises `ValueError` for damaged ones."""
     corners = _binary(data, most_triangles)
     if corners is None:
-        if b"\0" in data:
+        if data.startswith(_UTF_16):
+            raise ValueError("it is text in UTF-16; save it as UTF-8")
+        text = data.rstrip(_PADDING)
+        if b"\0" in text or (text != data and b"vertex" not in text.lower()):
             raise ValueError(_not_whole(data))
-        return _text(data, most_triangles)
+        return _text(text, most_triangles)
     return [Part(corners, np.arange(len(corners)).reshape(-1, 3), None)]
 
 
@@ -65,23 +78,19 @@ def _text(data: bytes, most_triangles: int) -> list[Part]:
     sizes: list[int] = []
     first = triangles = 0
     for number, line in enumerate(data.splitlines(), 1):
-        words = line.split()
-        key = words[0].lower() if words else b""
-        if key == b"vertex":
-            try:
-                x, y, z = map(float, words[1:])
-            except ValueError:
-                raise ValueError(f"line {number}: a vertex needs three numbers") from None
-            points.append((x, y, z))
-        elif key == b"endloop":
-            size = len(points) - first
-            if size < 3:
-                raise ValueError(f"line {number}: a facet of {size} corners; 3 are needed")
-            sizes.append(size)
-            triangles += size - 2
-            first = len(points)
-            if triangles > most_triangles:
-                raise ValueError(f"it has more than {most_triangles:,} triangles")
+        for words in _statements(line):
+            key = words[0].lower() if words else b""
+            if key == b"vertex":
+                points.append(_vertex(number, words))
+            elif key in _ENDS and len(points) > first:
+                size = len(points) - first
+                if size < 3:
+                    raise ValueError(f"line {number}: a facet of {size} corners; 3 are needed")
+                sizes.append(size)
+                triangles += size - 2
+                first = len(points)
+                if triangles > most_triangles:
+                    raise ValueError(f"it has more than {most_triangles:,} triangles")
     if first < len(points):
         raise ValueError("it ends within a facet: 'endloop' is missing")
     if not sizes:
@@ -91,3 +100,24 @@ def _text(data: bytes, most_triangles: int) -> list[Part]:
         return [Part(places, np.array([[0, 1, 2]]), None)]
     rows, _ = triangulated(places, np.arange(len(places)), np.array(sizes))
     return [Part(places, rows, None)]
+
+
+def _statements(line: bytes) -> list[list[bytes]]:
+    """Returns the words of each statement: usually one a line, of at most five words."""
+    words = line.split()
+    if len(words) <= _MOST_WORDS:
+        return [words]
+    begins = [m.start() for m in _STATEMENT.finditer(line)]
+    if words[0].lower() in (b"solid", b"endsolid") and len(begins) < _MOST_WORDS:
+        return [words]  # words of a name
+    begins = [0, *begins]
+    return [line[a:b].split() for a, b in zip(begins, [*begins[1:], len(line)], strict=True)]
+
+
+def _vertex(number: int, words: list[bytes]) -> tuple[float, float, float]:
+    try:
+        x, y, z = map(float, words[1:])
+    except ValueError:
+        hint = " with decimal points" if any(b"," in word for word in words) else ""
+        raise ValueError(f"line {number}: a vertex needs three numbers{hint}") from None
+    return x, y, z

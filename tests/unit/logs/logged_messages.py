@@ -88,11 +88,22 @@ def write_log(path: Path) -> Path:
 
 def write_sqlite_bag(folder: Path) -> Path:
     """Writes the messages to a ROS 2 bag with an SQLite file."""
-    from rosbags.rosbag2 import StoragePlugin, Writer
+    return write_ros2_bag(folder, "SQLITE3")
+
+
+def write_ros2_bag(folder: Path, storage: str, compression: str = "NONE") -> Path:
+    """Writes the messages to a ROS 2 bag.
+
+    storage: `SQLITE3` or `MCAP`. compression: `NONE`, `FILE` or `MESSAGE`, by zstd.
+    """
+    from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
     from volery.graph.typestore import typestore
 
-    with Writer(folder, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+    writer = Writer(folder, version=9, storage_plugin=StoragePlugin[storage])
+    if compression != "NONE":
+        writer.set_compression(CompressionMode[compression], CompressionFormat.ZSTD)
+    with writer:
         connections = {}
         for message in published():
             if message.topic not in connections:

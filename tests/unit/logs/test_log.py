@@ -369,7 +369,7 @@ def test_a_missing_file_and_no_log(tmp_path):
     with pytest.raises(RecordingError, match="neither an MCAP log nor a ROS 1 bag"):
         open_log(tmp_path / "text.mcap")
     (tmp_path / "empty").mkdir()
-    with pytest.raises(RecordingError, match=r"the folder holds no metadata\.yaml"):
+    with pytest.raises(RecordingError, match=r"the folder holds no \.mcap and no \.db3"):
         open_log(tmp_path / "empty")
 
 

@@ -110,6 +110,18 @@ def test_a_nested_type_that_differs(logged):
     assert (found.message.points[0].x, found.message.points[0].plain.count) == (1.5, 7)
 
 
+def test_a_known_type_whose_nested_type_differs(logged):
+    name = "geometry_msgs/msg/Polygon"
+    nested = {"geometry_msgs/msg/Point32": "float64 x\nfloat64 y\nfloat64 z\n"}
+
+    def values(store):
+        point = store.types["geometry_msgs/msg/Point32"]
+        return store.types[name]([point(1.1, 2.2, 3.3), point(4.4, 5.5, 6.6)])
+
+    (found,) = logged(name, "geometry_msgs/Point32[] points\n", nested, values).messages("/probe")
+    assert [point.z for point in found.message.points] == [3.3, 6.6]
+
+
 IDL = f"""{LINE}IDL: idl_probe_msgs/msg/Level
 // generated from rosidl_adapter/resource/msg.idl.em
 #include "std_msgs/msg/Header.idl"

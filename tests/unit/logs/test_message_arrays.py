@@ -79,3 +79,55 @@ def test_unknown_encodings_and_damaged_clouds():
     field = m.PointField("x", 0, m.PointField.FLOAT32, 1)
     with pytest.raises(VoleryError, match="the point cloud cannot be decoded"):
         cloud_array(m.PointCloud2(HEAD, 1, 2, [field], False, 4, 8, np.zeros(7, np.uint8), True))
+
+
+def padded(height, width, row_step, more=0, fields=None, big=False):
+    """Points x = 0, 1, 2, ... with 8 bytes, in rows of `row_step` bytes."""
+    points = np.zeros((height, row_step), np.uint8)
+    x = np.arange(height * width, dtype=">f4" if big else "<f4").reshape(height, width)
+    for k in range(width):
+        points[:, 8 * k : 8 * k + 4] = x[:, k : k + 1].view(np.uint8)
+    data = np.concatenate([points.reshape(-1), np.zeros(more, np.uint8)])
+    fields = [m.PointField("x", 0, m.PointField.FLOAT32, 1)] if fields is None else fields
+    return m.PointCloud2(HEAD, height, width, fields, big, 8, row_step, data, True)
+
+
+NAMELESS = m.PointField("", 4, m.PointField.UINT8, 4)
+X = m.PointField("x", 0, m.PointField.FLOAT32, 1)
+
+
+@pytest.mark.parametrize(
+    ("cloud", "count"),
+    [
+        (padded(2, 3, 24), 6),
+        (padded(2, 3, 28), 6),
+        (padded(1, 3, 28), 3),  # one row, padded
+        (padded(2, 3, 24, more=5), 6),
+        (padded(1, 3, 24, more=5), 3),
+        (padded(2, 2, 20, big=True), 4),
+        (padded(1, 2, 16, fields=[X, NAMELESS, NAMELESS]), 2),  # padding of several names
+        (padded(0, 0, 0), 0),
+        (padded(3, 0, 0), 0),
+    ],
+)
+def test_clouds_as_drivers_lay_them_out(cloud, count):
+    points = cloud_array(cloud)
+    assert points["x"].tolist() == list(range(count))
+
+
+def test_clouds_without_points_and_with_unknown_fields():
+    assert cloud_array(m.PointCloud2()).shape == (0,)
+    with pytest.raises(VoleryError, match="field 'x' has the unknown datatype 9"):
+        cloud_array(padded(1, 2, 16, fields=[m.PointField("x", 0, 9, 1)]))
+
+
+@pytest.mark.parametrize("encoding", ["8UC5", "16SC1", "bayer_rggb16"])
+def test_further_encodings(encoding):
+    found = image_array(m.Image(HEAD, 1, 1, encoding, 0, 0, np.arange(5 if "5" in encoding else 2,
+                                                                     dtype=np.uint8)))  # fmt: skip
+    assert found.ravel().tolist() == ([0, 1, 2, 3, 4] if "5" in encoding else [256])
+
+
+def test_bytes_after_the_last_row_of_an_image():
+    found = image_array(m.Image(HEAD, 2, 2, "mono8", 0, 3, np.arange(8, dtype=np.uint8)))
+    assert found.tolist() == [[0, 1], [3, 4]]

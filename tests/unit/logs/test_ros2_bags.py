@@ -7,7 +7,8 @@ import sqlite3
 from contextlib import closing
 
 import pytest
-from logged_messages import COUNT, write_log, write_sqlite_bag
+import zstandard
+from logged_messages import COUNT, write_log, write_ros2_bag, write_sqlite_bag
 from typer.testing import CliRunner
 
 from volery.bridges.logs.one_file import one_file
@@ -48,10 +49,145 @@ def test_a_folder_without_metadata(bag):
 def test_several_files_without_metadata(bag):
     shutil.copy(_file(bag), bag / "bag_10.db3")
     (bag / "bag_2.db3").write_bytes(b"")  # the last file may be empty
-    with pytest.warns(LogWarning, match=r"bag_2\.db3: cannot be read as a ROS 2 bag"):
+    with pytest.warns(LogWarning, match=r"bag_2\.db3: the file is empty"):
         log = open_log(bag)
     assert log.topics["/note"].messages == 2 * COUNT
     assert log["/note"]["data"].tolist() == 2 * [f"note {k}" for k in range(COUNT)]
+
+
+@pytest.mark.parametrize("storage", ["SQLITE3", "MCAP"])
+@pytest.mark.parametrize("mode", ["FILE", "MESSAGE"])
+def test_a_bag_compressed_by_zstd(tmp_path, storage, mode):
+    """`ros2 bag record --compression-mode file` or `message`."""
+    folder = write_ros2_bag(tmp_path / "bag", storage, mode)
+    packed = list(folder.glob("*.zstd"))
+    assert len(packed) == (mode == "FILE")
+    for path in (folder, *packed):
+        with open_log(path) as log:
+            assert log.problem == ""
+            assert log.topics["/uav1/odom"].messages == COUNT
+            assert log["/note"]["data"].tolist() == [f"note {k}" for k in range(COUNT)]
+        assert sum(record.topic.topic == "/note" for record in BagWalk(path)) == COUNT
+        with one_file(path) as whole, closing(Playback(whole.path)) as playback:
+            assert {t.name: t.messages for t in playback.topics}["/note"] == COUNT
+        result = runner.invoke(app, ["info", str(path)])
+        assert (result.exit_code, result.stderr) == (0, "")
+
+
+def test_unpacked_files_are_removed(tmp_path, monkeypatch):
+    folder = write_ros2_bag(tmp_path / "bag", "MCAP", "FILE")
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
+    with open_log(folder) as log:
+        assert log["/note"]["data"][0] == "note 0"
+        assert len(list((tmp_path / "temporary").iterdir())) == 1
+    assert not list((tmp_path / "temporary").iterdir())
+
+
+def _renamed(folder):
+    _file(folder).rename(folder / "other.db3")
+
+
+def _newer(folder):
+    path = folder / "metadata.yaml"
+    path.write_text(path.read_text().replace("version: 9", "version: 99", 1))
+
+
+def _without_definitions(folder):
+    with closing(sqlite3.connect(_file(folder))) as base:
+        base.execute("UPDATE message_definitions SET encoding='unknown', "
+                     "encoded_message_definition=''")  # fmt: skip
+        base.commit()
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        (
+            _renamed,
+            "metadata.yaml names files that are missing: bag.db3; read without it: other.db3",
+        ),
+        (_newer, ""),
+        (
+            lambda folder: (folder / "metadata.yaml").write_text(""),
+            "metadata.yaml cannot be read (",
+        ),
+        (lambda folder: (folder / "metadata.yaml").write_text("a: [\n"), "metadata.yaml cannot be"),
+        (_without_definitions, ""),  # as recorders write that do not find them
+    ],
+)
+@pytest.mark.filterwarnings("ignore::volery.core.errors.LogWarning")
+def test_a_bag_that_others_refuse(tmp_path, change, problem):
+    folder = write_sqlite_bag(tmp_path / "bag")
+    change(folder)
+    with open_log(folder) as log:
+        assert log.problem.startswith(problem)
+        assert bool(log.problem) == bool(problem)
+        assert log["/note"]["data"].tolist() == [f"note {k}" for k in range(COUNT)]
+
+
+def test_the_files_that_metadata_names_are_read_in_their_order(tmp_path):
+    folder = write_sqlite_bag(tmp_path / "bag")
+    _file(folder).rename(folder / "part.b")
+    write_log(folder / "part.a.mcap")
+    shutil.copy(folder / "part.b", folder / "left_over.db3")
+    text = "rosbag2_bagfile_information:\n  relative_file_paths: [old/part.b]\n"
+    (folder / "metadata.yaml").write_text(text)
+    with open_log(folder) as log:
+        assert (log.problem, log.topics["/note"].messages) == ("", COUNT)
+
+
+@pytest.mark.parametrize("name", ["run #3 100% ok?", "b\u00e4g"])
+def test_a_folder_of_any_name(tmp_path, name):
+    with open_log(write_sqlite_bag(tmp_path / "bag").rename(tmp_path / name)) as log:
+        assert len(log["/uav1/odom"]) == COUNT
+
+
+@pytest.mark.parametrize("name", ["flight", "flight.db3.active", "flight.bag"])
+def test_the_content_tells_the_format(tmp_path, name):
+    path = tmp_path / name
+    shutil.copy(_file(write_sqlite_bag(tmp_path / "bag")), path)
+    with open_log(path) as log:
+        assert len(log["/note"]) == COUNT
+    result = runner.invoke(app, ["info", str(path)])
+    assert (result.exit_code, "format    ROS 2 bag" in result.stdout) == (0, True)
+
+
+@pytest.mark.parametrize("share", [0.6, 0.8])
+def test_a_file_that_is_cut_off_is_read_up_to_there(tmp_path, share):
+    """As a full disk leaves it; SQLite itself refuses it."""
+    path = _file(write_sqlite_bag(tmp_path / "bag"))
+    data = path.read_bytes()
+    path.write_bytes(data[: int(share * len(data))])
+    with pytest.warns(LogWarning, match=r"bag\.db3 is cut off or damaged, the rest is not read"):
+        log = open_log(path)
+    with log:
+        found = log["/uav1/odom"]["pose.pose.position.x"].tolist()
+        assert 2 < len(found) == log.topics["/uav1/odom"].messages < COUNT
+        assert found == pytest.approx([0.1 * k for k in range(len(found))])
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"\x1f\x8b\x08\0" + bytes(20), "it is compressed by gzip: `gunzip` unpacks it"),
+        (b"PK\x03\x04" + bytes(20), "it is compressed by zip: `unzip`"),
+        (b"#ROSBAG V1.2\n" + bytes(20), "a bag of an older version: `rosbag filter"),
+        (b"\xa3\x95\x80\x80" + bytes(20), "a dataflash log of ArduPilot"),
+        (b"\x28\xb5\x2f\xfd" + bytes(20), "nothing can be unpacked"),
+        (
+            zstandard.compress(b"#ROSBAG V2.0\n" + bytes(40)),
+            "`zstd -d flight.log` unpacks a log of",
+        ),
+    ],
+)
+def test_what_is_no_log_is_named_with_its_remedy(tmp_path, content, words):
+    path = tmp_path / "flight.log"
+    path.write_bytes(content)
+    with pytest.raises(RecordingError) as caught:
+        open_log(path)
+    assert words in str(caught.value)
+    assert str(path) in str(caught.value)
 
 
 def test_messages_that_sqlite_has_not_moved_are_named(bag):
@@ -61,7 +197,7 @@ def test_messages_that_sqlite_has_not_moved_are_named(bag):
 
 
 def test_a_folder_that_is_no_bag(tmp_path):
-    with pytest.raises(RecordingError, match=r"holds no metadata\.yaml, no \.mcap and no "):
+    with pytest.raises(RecordingError, match=r"holds no \.mcap and no \.db3 file"):
         open_log(tmp_path)
 
 
@@ -121,7 +257,7 @@ def test_a_bag_without_messages_is_not_played(tmp_path):
         base.commit()
     with pytest.raises(RecordingError, match="holds no readable message"), one_file(folder):
         pass
-    with pytest.raises(RecordingError, match="holds no metadata"), one_file(tmp_path):
+    with pytest.raises(RecordingError, match=r"holds no \.mcap"), one_file(tmp_path):
         pass
 
 

@@ -207,6 +207,33 @@ def test_no_ulog_and_unknown_features(path):
         open_log(path.with_name("none.ulg"))
 
 
+@pytest.mark.parametrize("name", ["flight.ulog", "flight", "flight.bin"])
+def test_the_content_tells_the_format(path, name):
+    with open_log(path.rename(path.with_name(name))) as log:
+        assert len(log["/odd"]) == 50
+
+
+def test_an_instance_that_is_named_like_another_topic(path, whole):
+    at = len(MAGIC) + 8 + len(flags())
+    added = [
+        message("F", b"odd_1:uint64_t timestamp;int32_t q;"),
+        message("A", struct.pack("<BH", 0, 30) + b"odd_1"),
+        message("D", struct.pack("<HQi", 30, 5, 6)),
+    ]
+    path.write_bytes(whole[:at] + b"".join(added) + whole[at:])
+    with open_log(path) as log:
+        assert [counts(log, name) for name in ("/odd", "/odd/1", "/odd_1")] == [50, 50, 1]
+        assert log["/odd_1"]["q"].tolist() == [6]
+
+
+def test_times_that_ros_cannot_represent_are_named(path, whole):
+    late = message("D", struct.pack("<HBQhd4s", 7, 1, 1 << 62, 0, 0.0, b""))
+    path.write_bytes(whole + late)
+    with pytest.warns(LogWarning, match="/odd has times later than ROS can represent; left out"):
+        log = open_log(path)
+    assert counts(log) == 50
+
+
 def test_a_suffix_in_capitals(path):
     renamed = path.rename(path.with_name("FLIGHT.ULG"))
     with open_log(renamed) as log:

@@ -33,6 +33,13 @@ def read(tmp_path):
         "1.5\t2.0\t-3.25\n4\t0\t6\n",
         " 1.5e0  2 -3.25\n\n 4 0 6 \n\n",
         ESRI + "4 0 6\n1.5 2 -3.25\n",  # from north to south
+        ESRI + "4 0 6 1.5\n2 -3.25\n",  # lines of any length
+        ESRI + "4\n0\n6\n1.5\n2\n-3.25\n",
+        ESRI + "4 0 6 1.5 2 -3.25\n",
+        ESRI.replace("00.5", "00,5").replace(" 5\n", " 5,0\n") + "4 0 6\n1,5 2 -3,25\n",
+        ESRI.replace("cellsize 5", "DX 5.0\nDY 5.0").replace("-7", "nan") + "4 0 6\n1.5 2 -3.25\n",
+        ESRI.replace("corner", "center") + " 4  0 6 \r\n 1.5 2 -3.25 \r\n",
+        "1.5,2.0,-3.25\r\n4,0,6\r\n".encode("utf-16"),  # PowerShell
     ],
 )
 def test_matrices_and_esri_grids(read, content):
@@ -48,7 +55,14 @@ def test_matrices_and_esri_grids(read, content):
         ("412000,2\n3,4\n", r"row 1, column 1: 412000 is no elevation in m"),
         ("1,2\n-12500,4\n", r"row 2, column 1: -12500 is no elevation"),
         ("1,2\n3,x\n", r"row 2, column 2: not a number"),
-        ("1,2\n3,nan\n", r"row 2, column 2: not finite"),
+        ("1,2\n3,nan\n", r"row 2, column 2: nan marks a place without data"),
+        ("1,2\n3,inf\n", r"row 2, column 2: not finite"),
+        (ESRI.replace("-7", "null") + "4 0 6\n1.5 null 3\n", r"row 8, column 2: nan marks a place"),
+        (ESRI.replace("cellsize 5", "dx 5\ndy 4"), r"its dy is 4, spacing_m is 5"),
+        (ESRI + "4 0\n6 1.5 2 x\n", r"row 8, column 4: not a number"),
+        (b"II*\0" + bytes(80), r"is a GeoTIFF; `gdal_translate -of AAIGrid` writes"),
+        (b"\xff\xd8\xff\xe0", "is not text in UTF-8"),
+        ("0,0,7\n0,5,7\n5,0,8\n5,5,9\n", "is a list of x y z"),
         ("1,2\n3\n", r"row 2 has 1 value, the first row 2"),
         ("x,y,z\n0,0,1\n", r"row 1, column 1: not a number"),
         (ESRI + "4 0 6\n1.5 2 -7\n", r"row 8, column 3: -7 marks a place without data"),

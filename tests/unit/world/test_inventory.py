@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from volery.core.errors import DataFileError
+from volery.world import inventory_columns
 from volery.world.inventory import read_inventory
 
 
@@ -38,16 +39,55 @@ def test_reads_what_ships(forest_data):
         "x_m\ty_m\tdbh_cm\tspecies\n1.5\t2\t30.5\toak\n3\t4.25\t\t\n",
         ",x_m,y_m,dbh_cm,species\n0,1.5,2.0,30.5,oak\n1,3.0,4.25,,\n",  # pandas
         '"x_m","y_m","dbh_cm","species"\r\n1.5,2,30.5,"oak"\r\n3,4.25,NA,NA\r\n',  # R
+        "sep=;\r\nx_m;y_m;dbh_cm;species\r\n1,5;2;30,5;oak\r\n3;4,25;-;-\r\n",  # Excel
+        "x_m,y_m,dbh_cm,species\r1.5,2,30.5,oak\r3,4.25,nan,nan\r",
+        "Tree ID,X (m),Y (m),DBH (mm),Species,Notes\n7,1.5,2,305,oak,a\n7,3,4.25,-9999,null,\n",
+        "id,easting_m,Northing [m],dbh_in,SPECIES\n1,1.5,2,12.0078740157,oak\n2,3,4.25,N/A,n/a\n",
+        "x_ft,y_ft,girth_cm,species\n4.92125984252,6.56167979003,95.8185759345,oak\n"
+        "9.84251968504,13.9435695538,.,\n",
     ],
 )
-def test_what_spreadsheets_pandas_and_r_write(tmp_path, text):
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_what_spreadsheets_pandas_and_r_write(tmp_path, text, encoding):
     path = tmp_path / "trees.csv"
-    path.write_text(text, encoding="utf-8", newline="")
+    path.write_text(text, encoding=encoding, newline="")
     trees = read_inventory(path)
-    assert trees.position.tolist() == [[1.5, 2.0], [3.0, 4.25]]
+    np.testing.assert_allclose(trees.position, [[1.5, 2.0], [3.0, 4.25]], rtol=1e-9)
     assert trees.dbh_m[0] == pytest.approx(0.305)
     assert np.isnan(trees.dbh_m[1])
     assert trees.species == ("oak", "")
+
+
+def test_feet_are_metres(tmp_path):
+    trees = read_inventory(write(tmp_path, "x_m,y_m,Ht_ft,dbh_m\n1,2,50,0.5\n"))
+    assert (trees.height_m[0], trees.dbh_m[0]) == pytest.approx((15.24, 0.5))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("x_m;y_m;dbh_cm\n1,5;2;30,5\n1.432,5;2;3\n", "row 3: x_m is not a number, other rows have "
+         "decimal commas: '1.432,5'"),
+        ("x_m\ty_m\n1,234\t987.5\n", "row 2: y_m is not a number, other rows have decimal commas"),
+        ('x_m,y_m\n"432,111.25",5\n', "row 2: x_m is not a number: '432,111.25'"),
+        ("x_m,y_m\n1,2\n-9999,-9999\n", "row 3: x_m and y_m are -9999, which marks what is not"),
+        ("x_m,y_m,dbh_cm\n1,2,3-Jan\n", "row 2: dbh_cm is not a number: '3-Jan'"),
+        ("lat,lon,dbh_cm\n47,8,30\n", "row 1, column 1: unknown name 'lat': positions are x_m and"),
+        ("x_m,y_m,DBH\n1,2,3\n", "row 1, column 3: unknown name 'DBH': it needs its unit"),
+        ("x_m,y_m,dbh_cm,DBH (in)\n1,2,3,4\n", "column 'dbh_cm' occurs twice"),
+    ],
+)  # fmt: skip
+def test_what_could_be_read_in_two_ways_is_refused(tmp_path, text, message):
+    with pytest.raises(DataFileError) as caught:
+        read_inventory(write(tmp_path, text))
+    assert message in str(caught.value)
+
+
+def test_columns_that_are_not_read_are_named(tmp_path, caplog):
+    inventory_columns._warn.cache_clear()
+    read_inventory(write(tmp_path, "tree_id,x_m,y_m,dhb_cm\n1,2,3,4\n"))
+    (record,) = caplog.records
+    assert record.getMessage() == "inventory trees.csv: columns that are not read: tree_id, dhb_cm"
 
 
 def test_another_encoding_is_named(tmp_path):
@@ -74,8 +114,8 @@ def test_every_bad_row_is_listed_in_one_error(tmp_path):
     message = str(caught.value)
     assert "trees.csv has 7 bad rows" in message
     for part in (
-        "row 3: x_m is not a number",
-        "row 4: y_m nan is not finite",
+        "row 3: x_m is not a number: 'x'",
+        "row 4: y_m is empty: 'nan'",
         "row 5: dbh_cm -3 must be above 0",
         "row 6: height_m 0 must be above 0",
         "row 7: 3 fields, the heading has 5",

@@ -47,6 +47,8 @@ def test_negative_indices_count_back_from_their_face(read):
         SQUARE + "f 1 2 3 4 # a comment\n",
         SQUARE + "f 1/1/1 2/2/1 3//1 4/4\n",
         SQUARE + "f 1 2 \\\n  3 \\\n 4\n",
+        SQUARE + "f 1 2 \\ \r\n  3 4\n",  # a blank after the backslash
+        SQUARE + "f 1 1 2 3 3 4 1\n",  # repeated corners, a closed ring
         SQUARE + "fo 1 2 3 4\n",
         SQUARE.replace(" ", "\t") + "f\t1\t2\t3\t4",
         (SQUARE + "f 1 2 3 4\n").replace("\n", "\r"),
@@ -72,9 +74,12 @@ def test_faces_as_programs_write_them(read, text):
         (SQUARE + "f 1 2 3\nf 1 2 -5\n", r"line 6: 'f 1 2 -5'.* back to -4"),
         (SQUARE + "f 0 1 2\n", r"line 5: 'f 0 1 2'"),
         (SQUARE + "f 1 2 x\n", r"line 5: 'f 1 2 x'"),
-        ("v 0,5 0 0\n" + SQUARE + "f 1 2 3\n", r"line 1: 'v 0,5 0 0'; a vertex needs three"),
+        (
+            "v 0,5 0 0\n" + SQUARE + "f 1 2 3\n",
+            r"line 1: 'v 0,5 0 0'; a vertex needs three numbers with",
+        ),
         ("v 0 0\n", r"line 1: 'v 0 0'"),
-        (SQUARE.encode("utf-16"), "no text"),
+        (SQUARE.encode("utf-16"), "it is text in UTF-16; save it as UTF-8"),
     ],
 )
 def test_broken_faces_are_refused_with_their_line(read, text, message):
@@ -136,7 +141,12 @@ def test_binary_files_as_programs_write_them(read, content, triangles):
         (bytes(20), "20 bytes are too few"),
         ("solid a\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n", "'endloop' is missing"),
         ("solid a\nouter loop\nvertex 0 0 0\nendloop\n", "line 4: a facet of 1 corners"),
-        ("solid a\nouter loop\nvertex 0,5 0 0\n", "line 3: a vertex needs three numbers"),
+        (
+            "solid a\nouter loop\nvertex 0,5 0 0\n",
+            "line 3: a vertex needs three numbers with decimal",
+        ),
+        ("solid a\nouter loop\nvertex 0 0\n", "line 3: a vertex needs three numbers$"),
+        ("solid a\nouter loop\n".encode("utf-16"), "it is text in UTF-16; save it as UTF-8"),
     ],
 )
 def test_broken_stl_says_what_is_missing(read, content, message):
@@ -151,6 +161,30 @@ def test_text_of_any_case_and_with_facets_of_four_corners(read, ending):
              "ENDSOLID", "solid b", "endsolid b", ""]  # fmt: skip
     file = read(ending.join(lines).encode("latin-1"), "a.STL")
     assert file.mesh.area == pytest.approx(4.0)
+
+
+FACETS = "".join(f"facet normal 0 0 1\nouter loop\nvertex 0 0 {k}\nvertex 2 0 {k}\nvertex 0 2 {k}\n"
+                 "endloop\nendfacet\n" for k in range(3))  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        FACETS.replace("endloop", "end loop").replace("endfacet", "end facet"),
+        FACETS.replace("endloop\n", ""),
+        FACETS.replace("\n", " "),  # all in one line
+        FACETS.replace("\n", " ").replace("facet n", "\nfacet n"),  # a facet a line
+        FACETS.replace("1\nouter", "1 outer").upper(),
+        FACETS.replace("2", "2.000000E+000").replace("\n", "\r\n"),
+        FACETS + "\x1a",  # of CP/M and DOS
+        FACETS + 200 * "\0",
+    ],
+)
+@pytest.mark.parametrize("name", ["a", "facet of an outer vertex, in ten words of a name"])
+def test_text_in_the_spellings_of_programs(read, text, name):
+    for mark in (b"", b"\xef\xbb\xbf"):
+        file = read(mark + f"solid {name}\n{text}".encode(), "a.stl")
+        assert (len(file.triangles), file.mesh.area) == (3, pytest.approx(6.0))
 
 
 # ------------------------------------------------------------------------- far from the origin

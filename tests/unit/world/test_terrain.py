@@ -70,7 +70,7 @@ def test_reads_the_barro_colorado_grid(forest_data):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("1,2\n3,nan\n", "row 2, column 2: not finite"),
+        ("1,2\n3,nan\n", "row 2, column 2: nan marks a place"),
         ("1,2\n3,inf\n", "row 2, column 2: not finite"),
         ("1,2\n3\n", "row 2 has 1 value, the first row 2"),
         ("1,2\n3,x\n1,2,3\n", "row 2, column 2: not a number; row 3 has 3 values"),

@@ -118,6 +118,8 @@ class BagChunks(ChunkedLog):
             return None
         head = self._read(position + 4, length) if length <= MAX_HEAD_BYTES else b""
         after = body + 4 + _LENGTH.unpack(self._read(body, 4))[0]
+        if after > self.size and position == len(BAG_MAGIC):
+            after = position + bag_format.FIRST_BYTES
         return None if after > self.size else (bag_fields(head), body + 4, after)
 
     def _parse(self, data: bytes) -> Content:

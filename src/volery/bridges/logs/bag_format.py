@@ -16,6 +16,8 @@ from volery.core.clock import NS_PER_S
 
 MESSAGE, HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = (bytes([k]) for k in (2, 3, 4, 5, 6, 7))
 """Values of a record's field `op`."""
+FIRST_BYTES = 4096
+"""Size of a bag's first record, which spaces fill up; some writers leave out the spaces' number."""
 _LENGTH = struct.Struct("<I")
 _TIME = struct.Struct("<II")
 

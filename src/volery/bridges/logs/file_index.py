@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import os
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import BinaryIO
 
@@ -86,16 +86,25 @@ def _mcap_statistics(file: BinaryIO, path: Path, counts: Counts) -> tuple[int, i
                 channels[record.id] = record
         elif opcode == Opcode.STATISTICS:
             numbers = Statistics.read(ReadDataStream(io.BytesIO(data)))
-    if numbers is None:
+    if numbers is None or not _is_complete(numbers, channels):
         return None
-    first_ns, last_ns = numbers.message_start_time, numbers.message_end_time
-    if not 0 <= first_ns <= last_ns <= MAX_TIME_NS:
-        return None
+    found = numbers.channel_message_counts
     for number, channel in channels.items():
         topic = LogTopic.of_mcap(channel, schemas.get(channel.schema_id))
         key = (topic.topic, topic.msgtype)
-        counts[key] = counts.get(key, 0) + numbers.channel_message_counts.get(number, 0)
-    return first_ns, last_ns
+        counts[key] = counts.get(key, 0) + found.get(number, 0)
+    return numbers.message_start_time, numbers.message_end_time
+
+
+def _is_complete(numbers: Statistics, channels: Mapping[int, Channel]) -> bool:
+    """Returns whether times are valid and all messages are counted.
+
+    Writers may leave out counts and channels.
+    """
+    counts = numbers.channel_message_counts
+    if not 0 <= numbers.message_start_time <= numbers.message_end_time <= MAX_TIME_NS:
+        return False
+    return sum(counts.values()) == numbers.message_count and counts.keys() <= channels.keys()
 
 
 def _mcap_records(data: bytes) -> Iterator[tuple[int, bytes]]:

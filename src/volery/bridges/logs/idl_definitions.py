@@ -42,7 +42,8 @@ def msg_texts(definition: str) -> dict[str, str]:
         try:
             found = get_types_from_idl(_INCLUDE.sub("", part))
         except Exception as error:  # the parser's errors on any text
-            raise GraphError(f"a definition in IDL is not readable: {error}"[:300]) from None
+            reason = " ".join(str(error).split())[:250]
+            raise GraphError(f"a definition in IDL is not readable: {reason}") from None
         for name, (_, fields) in found.items():
             texts[name] = "".join(f"{_type(kind)} {field}\n" for field, kind in fields)
     return texts

@@ -80,16 +80,17 @@ class McapChunks(ChunkedLog):
 
         Without a valid index the chunk is read.
         """
-        count = (span.length - _HEAD.size - _INDEX.size) // _ENTRIES.itemsize
+        begin = span.position + _HEAD.size
+        head = self._read(begin, min(span.length - _HEAD.size, _INDEX.size))
+        channel, length = _INDEX.unpack(head) if len(head) == _INDEX.size else (0, 1)
+        count, rest = divmod(length, _ENTRIES.itemsize)
         known = sum(len(entries) for entries in self._entries.values())
-        data = b""
-        if 0 <= count <= MAX_CHUNK_MESSAGES - known:
-            data = self._read(span.position + _HEAD.size, span.length - _HEAD.size)
-        if len(data) != _INDEX.size + count * _ENTRIES.itemsize:
+        # later versions of the format may add fields at the end of a record
+        fits = length <= span.length - _HEAD.size - _INDEX.size
+        if rest or not fits or count > MAX_CHUNK_MESSAGES - known:
             self._forget_index()
             raise ValueError("the index of a chunk is damaged or too long")
-        channel, _ = _INDEX.unpack_from(data)
-        entries = np.frombuffer(data[_INDEX.size :], _ENTRIES)
+        entries = np.frombuffer(self._read(begin + _INDEX.size, length), _ENTRIES)
         if len(entries) and entries["time"].max() > MAX_TIME_NS:
             self._forget_index()
             raise ValueError("the index of a chunk has a time later than ROS can represent")

@@ -29,6 +29,39 @@ from volery.core.errors import RecordingError
 MCAP_MAGIC = b"\x89MCAP0\r\n"
 BAG_MAGIC = b"#ROSBAG V2.0\n"
 
+_MARKS = {
+    MCAP_MAGIC: "mcap",
+    BAG_MAGIC: "bag",
+    b"#ROSBAG V1": "bag 1",
+    b"ULog": "ulog",
+    b"SQLite format 3\0": "sqlite",
+    b"\x28\xb5\x2f\xfd": "zstd",
+    b"\x1f\x8b": "gzip",
+    b"BZh": "bzip2",
+    b"\xfd7zXZ\0": "xz",
+    b"PK\x03\x04": "zip",
+    b"\xa3\x95": "dataflash",
+}
+"""Formats by the first bytes of a file."""
+_MARK_BYTES = 16
+_HINTS = {
+    "bag 1": "; it is a bag of an older version: `rosbag filter OLD NEW True` of ROS 1 converts it",
+    "ulog": "; it is a ULog, which `open_log` and `volery info` read",
+    "sqlite": "; it is a file of a ROS 2 bag, which `open_log`, `volery info` and `play` read",
+    **{
+        kind: f"; it is compressed by {kind}: `{tool}` unpacks it"
+        for kind, tool in (
+            ("zstd", "zstd -d"),
+            ("gzip", "gunzip"),
+            ("bzip2", "bunzip2"),
+            ("xz", "unxz"),
+            ("zip", "unzip"),
+        )
+    },
+    "dataflash": "; it is a dataflash log of ArduPilot, which is not read",
+}
+"""What a file of another format is, and what reads it."""
+
 CUT_OFF = "cut off: the index at its end is missing"
 
 
@@ -45,8 +78,9 @@ class LogTopic:
     msgtype: str
     """Name in ROS 2 style, `sensor_msgs/msg/LaserScan`."""
     definition: str
+    """Text of the schema; bytes that are not UTF-8 as surrogates."""
     encoding: str
-    """`cdr` or `ros1`."""
+    """`cdr`, `ros1`, or another one that is not decoded."""
     schema_encoding: str = ""
     digest: str = ""
     """MD5 of the definition (ROS 1)."""
@@ -57,7 +91,7 @@ class LogTopic:
         return cls(
             channel.topic,
             schema.name if schema else "",
-            schema.data.decode(errors="replace") if schema else "",
+            schema.data.decode(errors="surrogateescape") if schema else "",
             channel.message_encoding,
             schema.encoding if schema else "",
         )
@@ -197,6 +231,25 @@ class LogWalk:
 _WALKS = {"mcap": LogWalk._mcap, "bag": LogWalk._bag}
 
 
+def file_signature(path: Path) -> str:
+    """Returns the format that the first bytes of a file show: `mcap`, `bag`, `zstd`...
+
+    Empty for an unknown format. Raises `RecordingError` if the file is missing, empty, or ends
+    within the mark of its format.
+    """
+    try:
+        with path.open("rb") as file:
+            start = file.read(_MARK_BYTES)
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot read the log: {error.strerror}") from None
+    if not start:
+        raise RecordingError(f"{path}: the file is empty")
+    found = next((kind for mark, kind in _MARKS.items() if start.startswith(mark)), "")
+    if not found and (BAG_MAGIC.startswith(start) or MCAP_MAGIC.startswith(start)):
+        raise RecordingError(f"{path}: cut off in its first {len(start)} bytes")
+    return found
+
+
 def log_format(path: Path) -> str:
     """Returns `mcap` or `bag`, by the file's first bytes.
 
@@ -206,20 +259,11 @@ def log_format(path: Path) -> str:
         There is no such file, or it is no log.
 
     """
-    try:
-        with path.open("rb") as file:
-            start = file.read(len(BAG_MAGIC))
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot read the log: {error.strerror}") from None
-    if not start:
-        raise RecordingError(f"{path}: the file is empty")
-    if start.startswith(MCAP_MAGIC):
-        return "mcap"
-    if start == BAG_MAGIC:
-        return "bag"
-    if BAG_MAGIC.startswith(start) or MCAP_MAGIC.startswith(start):
-        raise RecordingError(f"{path}: cut off in its first {len(start)} bytes")
-    raise RecordingError(f"{path}: neither an MCAP log nor a ROS 1 bag (version 2.0)")
+    found = file_signature(path)
+    if found in _WALKS:
+        return found
+    hint = _HINTS.get(found, "")
+    raise RecordingError(f"{path}: neither an MCAP log nor a ROS 1 bag (version 2.0){hint}")
 
 
 def _body(file: BinaryIO, length: int) -> bytes:
@@ -235,14 +279,17 @@ def _bag_record(file: BinaryIO, size: int) -> tuple[dict[bytes, bytes], bytes] |
     size: bytes of the whole file. A longer read would allocate memory for any announced length. Too
     large records are skipped and returned empty.
     """
-    parts = []
+    parts: list[bytes] = []
+    begin = file.tell()
     for most in (MAX_HEAD_BYTES, MAX_CHUNK_BYTES):
         head = file.read(4)
         if len(head) < 4:
             return None
         (length,) = struct.unpack("<I", head)
         if length > size - file.tell():
-            return None
+            if begin > len(BAG_MAGIC) or not parts:
+                return None
+            length = max(begin + bag_format.FIRST_BYTES - file.tell(), 0)
         parts.append(file.read(length) if length <= most else b"")
         if length > most:
             file.seek(length, 1)

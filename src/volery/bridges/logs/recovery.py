@@ -87,15 +87,18 @@ def write_mcap(records: Iterable[LogRecord], out: Path) -> tuple[int, int]:
         stream = cast("io.BufferedWriter", file)
         writer: Any = Writer(stream, chunk_size=CHUNK_BYTES, compression=CompressionType.LZ4)
         writer.start(profile="ros2", library=LIBRARY)
-        schemas: dict[tuple[str, str], int] = {}
+        schemas: dict[tuple[str, str, str], int] = {}
         channels: dict[LogTopic, int] = {}
         count = end_ns = 0
         for topic, time_ns, data, sequence in records:
             if topic not in channels:
-                key = (topic.msgtype, topic.definition)
+                key = (topic.msgtype, topic.definition, topic.schema_encoding)
                 if key not in schemas:
-                    schemas[key] = writer.register_schema(
-                        topic.msgtype, topic.schema_encoding, topic.definition.encode()
+                    text = topic.definition.encode(errors="surrogateescape")
+                    schemas[key] = (
+                        writer.register_schema(topic.msgtype, topic.schema_encoding, text)
+                        if any(key)
+                        else 0  # a channel without schema
                     )
                 channels[topic] = writer.register_channel(
                     topic.topic, topic.encoding, schemas[key], {}

@@ -48,7 +48,7 @@ def read_points(
     kind = dtype_from_fields(cloud.fields, cloud.point_step)
     if cloud.is_bigendian != (sys.byteorder == "big"):
         kind = kind.newbyteorder()
-    points = _rows(cloud, kind).reshape(-1)
+    points = cloud_rows(cloud, kind).reshape(-1)
     if field_names is not None:
         names = list(field_names)
         unknown = [name for name in names if name not in (kind.names or ())]
@@ -174,8 +174,11 @@ def _check(cloud: Any) -> None:
         raise TypeError(f"{type(cloud).__name__} is no sensor_msgs.msg.PointCloud2")
 
 
-def _rows(cloud: Any, kind: np.dtype[np.void]) -> Any:
-    """Returns the points as (height, width), without a copy. Raises `ValueError` if some lack."""
+def cloud_rows(cloud: Any, kind: np.dtype[np.void]) -> Any:
+    """Returns the points as (height, width), without a copy.
+
+    Rows may be padded, and bytes may follow the last one. Raises `ValueError` if points lack.
+    """
     data = cloud.data
     if not isinstance(data, np.ndarray):  # of a cloud that was not published
         data = np.frombuffer(bytes(data), np.uint8)

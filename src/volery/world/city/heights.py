@@ -25,7 +25,9 @@ _QUOTES = str.maketrans("\u2032\u2019\u2018\u00b4`\u2033\u201d\u201c", "'" * 5 +
 _UNITS_M = {
     **dict.fromkeys(("", "m", "metre", "metres", "meter", "meters"), 1.0),
     **dict.fromkeys(("cm", "centimetres", "centimeters"), 0.01),
+    **dict.fromkeys(("mm", "millimetres", "millimeters"), 0.001),
     **dict.fromkeys(("ft", "feet", "foot"), 0.3048),
+    **dict.fromkeys(("yd", "yard", "yards"), 0.9144),
 }
 _HEIGHTS = ("height", "building:height", "est_height")
 _MOST_LEVELS = 300.0
@@ -69,7 +71,7 @@ def height_of(properties: Mapping[str, Any], rule: HeightRule) -> Height:
     point on the ground to the top.
     """
     faults = []
-    given = next((properties[key] for key in _HEIGHTS if properties.get(key) is not None), None)
+    given = next((properties[key] for key in _HEIGHTS if _is_given(properties.get(key))), None)
     levels, fault = _levels(properties)
     if fault:
         faults.append(fault)
@@ -88,7 +90,7 @@ def height_of(properties: Mapping[str, Any], rule: HeightRule) -> Height:
 def _levels(properties: Mapping[str, Any]) -> tuple[float | None, str]:
     for key in ("building:levels", "levels"):
         given = properties.get(key)
-        if given is None:
+        if not _is_given(given):
             continue
         # "3;4": parts of different height in one outline; the tallest counts
         parts = str(given).split(";") if isinstance(given, str | int | float) else []
@@ -114,6 +116,13 @@ def _length_m(given: Any) -> float | None:
     lengths = [_one_length_m(part.strip()) for part in text.split(";")]
     known = [length for length in lengths if length is not None and 0.0 < length <= TALLEST_M]
     return max(known) if len(known) == len(lengths) else None
+
+
+def _is_given(value: Any) -> bool:
+    """Returns whether a property has a value: tables write empty texts and NaN for none."""
+    if isinstance(value, str):
+        return bool(value.strip())
+    return value is not None and not (isinstance(value, float) and math.isnan(value))
 
 
 def _one_length_m(text: str) -> float | None:

@@ -20,6 +20,7 @@ _HEAD = struct.Struct(">8sI4sII")
 _MOST_BYTES = 8 * MOST_CELLS
 _LUMA = (0.299, 0.587, 0.114)
 """Weights of red, green and blue: ITU-R BT.601."""
+_MEAN = (1.0 / 3.0,) * 3
 
 
 def parse_image(data: bytes, where: str, threshold: float = 0.5) -> NDArray[np.bool_]:
@@ -41,7 +42,9 @@ def parse_pgm(data: bytes, where: str, threshold: float = 0.5) -> NDArray[np.boo
 
 
 def read_image(path: Path) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Returns grey from 0 to 1 and whether a pixel is opaque (rows, columns), row 0: the top.
+    """Returns lightness from 0 to 1 and whether a pixel is opaque (rows, columns), row 0: the top.
+
+    The lightness of a colour is the mean of red, green and blue, as map_server computes it.
 
     The image is PGM, PNG or BMP. Raises `DataFileError` for other files.
     """
@@ -52,7 +55,7 @@ def read_image(path: Path) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
         data = path.read_bytes()
     except OSError as error:
         raise DataFileError(f"{path}: cannot be read: {error.strerror}") from None
-    grey, alpha = _decode(data, str(path), "PPM", "PNG", "BMP")
+    grey, alpha = _decode(data, str(path), "PPM", "PNG", "BMP", weights=_MEAN)
     return grey, alpha >= 0.5
 
 
@@ -68,7 +71,7 @@ def _check_size(data: bytes, where: str) -> None:
 
 
 def _decode(
-    data: bytes, where: str, *formats: str
+    data: bytes, where: str, *formats: str, weights: tuple[float, ...] = _LUMA
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Returns grey and alpha (rows, columns), 0 to 1."""
     from PIL import Image, UnidentifiedImageError
@@ -97,6 +100,6 @@ def _decode(
     except (OSError, SyntaxError, ValueError, EOFError, struct.error, zlib.error) as error:
         raise DataFileError(f"{where}: the image is damaged: {error}") from None
     grey = np.zeros(colours.shape[:2], dtype=np.float32)
-    for channel, weight in enumerate(_LUMA):
+    for channel, weight in enumerate(weights):
         grey += np.float32(weight / 255.0) * colours[:, :, channel]
     return grey, colours[:, :, 3].astype(np.float32) / 255.0

@@ -1,24 +1,30 @@
 """Maps of ROS' map_server: a `.yaml` beside an image, as map_saver and `volery slam` write them.
 
 Keys and modes are those of nav2_map_server (and ROS 1): a pixel's darkness is compared with
-`occupied_thresh` and `free_thresh`, unless `mode` is `raw`, where a pixel is an occupancy value.
+`occupied_thresh` and `free_thresh`, unless `mode` is `raw`, where a pixel is an occupancy value. A
+transparent pixel is unknown; the lightness of a colour is the mean of red, green and blue.
 """
 
 from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path, PurePosixPath
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.errors import DataFileError
+from volery.core.text_files import read_text
 from volery.world.grid_maps.image_files import read_image
 
 _MOST_BYTES = 64_000
 _MODES = ("trinary", "scale", "raw")
+_FLAGS = {"no": 0.0, "off": 0.0, "false": 0.0, "yes": 1.0, "on": 1.0, "true": 1.0}
 _BLOCKED_FROM = 50.0
 """Occupancy from which a cell is blocked, as of `nav_msgs/OccupancyGrid`."""
 
@@ -58,7 +64,7 @@ def read_map_server(path: Path) -> MapServerFile:
         unknown |= value > 100.0
         blocked = (value >= _BLOCKED_FROM) & ~unknown
     else:
-        negate = bool(_number(path, settings, "negate", 0.0, 0.0, 1.0))
+        negate = bool(_number(path, settings, "negate", 0.0, 0.0, 1.0, _FLAGS))
         dark = light if negate else 1.0 - light
         blocked = (dark > occupied) & seen
         if mode == "trinary":
@@ -86,7 +92,7 @@ def _settings(path: Path) -> dict[str, Any]:
     try:
         if path.stat().st_size > _MOST_BYTES:
             raise DataFileError(f"{path}: too large for a map's .yaml")
-        read = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8-sig"))
+        read = YAML(typ="safe", pure=True).load(read_text(path))
     except OSError as error:
         raise DataFileError(f"{path}: cannot be read: {error.strerror}") from None
     except DataFileError:
@@ -105,8 +111,13 @@ def _number(
     default: float | None,
     least: float,
     most: float,
+    words: Mapping[str, float] = MappingProxyType({}),
 ) -> float:
+    """Returns a number, which may be in quotes; words: others that YAML 1.1 knows."""
     value = settings.get(key, default)
+    if isinstance(value, str):
+        with suppress(ValueError):  # is shown below
+            value = words[value.lower()] if value.lower() in words else float(value)
     if not isinstance(value, int | float) or not least <= value <= most:
         shown = "missing" if value is None else f"{value!r}"[:40]
         raise DataFileError(f"{path}: {key} is {shown}; allowed are {least:g} to {most:g}")

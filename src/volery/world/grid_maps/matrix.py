@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from volery.core.errors import DataFileError
 from volery.core.plurals import counted
+from volery.core.text_files import decode_text
 from volery.world.grid_maps.grid_map import MOST_CELLS
 
 _ZERO, _ONE, _COMMA = (ord(character) for character in "01,")
@@ -42,7 +43,7 @@ def parse_matrix(data: bytes, where: str) -> NDArray[np.bool_]:
 
 def _text(data: bytes, where: str) -> str:
     try:
-        return data.decode("utf-8-sig")
+        return decode_text(data)
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise DataFileError(

@@ -8,6 +8,7 @@ of a regular grid per row, both in any order. An .npz file holds `velocity_m_s` 
 from __future__ import annotations
 
 import csv
+import io
 import zipfile
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from volery.core.arrays import Array
 from volery.core.errors import DataFileError
 from volery.core.plurals import counted
+from volery.core.text_files import read_text
 from volery.scenario.wind import MAX_WIND_M_S
 
 Field = tuple[Array, tuple[float, float, float], tuple[float, float, float]]
@@ -120,8 +122,7 @@ def _read_csv(path: Path) -> Field:
 def _rows_of(path: Path) -> tuple[list[int], Array]:
     """Returns row numbers in the file (the header is row 1) and the table (M, 6) of `_COLUMNS`."""
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = list(csv.reader(file))
+        rows = list(csv.reader(io.StringIO(read_text(path), newline="")))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise DataFileError(f"wind field {path} cannot be read: {error}") from None
     heading = [name.strip() for name in rows[0]] if rows else []

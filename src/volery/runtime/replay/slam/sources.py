@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from volery.bridges.logs.decoding import LogDecoder
 from volery.bridges.logs.reader import summarize
-from volery.bridges.logs.records import LogWalk, log_format
+from volery.bridges.logs.records import LogWalk, file_signature, log_format
 from volery.bridges.logs.ros2_bags import BagWalk, bag_topics
 from volery.bridges.logs.text_layout import TextLayout
 from volery.bridges.logs.text_scans import TextScans
@@ -104,7 +104,7 @@ def open_source(path: Path, layout: TextLayout | None = None) -> LogSource | Tex
     """
     if layout is not None:
         return TextSource(path, layout)
-    if path.is_dir() or path.suffix == ".db3":
+    if path.is_dir() or file_signature(path) in ("sqlite", "zstd"):
         return LogSource(path, bag_topics(path), _walk=BagWalk)
     try:
         log_format(path)
