@@ -142,6 +142,8 @@ def _base_checker(where: str, base: str) -> Copy:
         return partial(_check_value, where, base, (bool, np.bool_), None)
     if base in ("float32", "float64"):
         return partial(_check_value, where, base, (float, int, np.floating, np.integer), None)
+    if base == "byte":
+        return partial(_check_byte, where)
     limits = np.iinfo(DTYPES[base])
     return partial(_check_value, where, base, (int, np.integer), (int(limits.min), int(limits.max)))
 
@@ -154,6 +156,14 @@ def _check_value(
     if limits is not None and not limits[0] <= value <= limits[1]:
         raise GraphError(f"{where} must be a {base}, {limits[0]} to {limits[1]}, not {value}")
     return value
+
+
+def _check_byte(where: str, value: Any) -> Any:
+    """Returns the number of a byte, which rclpy has as `bytes` of length 1."""
+    if isinstance(value, bytes) and len(value) == 1:
+        value = value[0]
+    number = _check_value(where, "byte", (int, np.integer), (-128, 255), value)
+    return number - 256 if number > 127 else number
 
 
 def _nested(where: str, copy: Copy, value: Any) -> Any:
@@ -198,6 +208,8 @@ def _numbers(where: str, dtype: np.dtype[Any], length: int, values: Any) -> NDAr
         values = values if type(values) is np.ndarray else values.view(np.ndarray)
         if values.flags.writeable:
             values = values.copy()
+    elif isinstance(values, list) and values and isinstance(values[0], bytes):  # of `byte[]`
+        return _numbers(where, dtype, length, b"".join(values))
     elif isinstance(values, bytes | bytearray | memoryview):
         values = np.frombuffer(bytes(values), np.uint8).astype(dtype)
     else:

@@ -109,6 +109,7 @@ class Client:
         self._later = later
         self._run = run
         self._receive = receive
+        self.srv_type = srvtype
         self._request_type = f"{srvtype}_Request"
         self._looks = (0, 0)  # number of waits, and their time
         self.service = service
