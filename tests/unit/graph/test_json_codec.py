@@ -88,7 +88,14 @@ def test_arrays() -> None:
 
 
 def test_bytes_are_read_in_every_form() -> None:
-    for given_ in ([1, 2, 255], "AQL/", "AQ\r\nL/\n", b"\1\2\xff", np.array([1, 2, 255]), np.uint8([1, 2, 255])):
+    for given_ in (
+        [1, 2, 255],
+        "AQL/",
+        "AQ\r\nL/\n",
+        b"\1\2\xff",
+        np.array([1, 2, 255]),
+        np.uint8([1, 2, 255]),
+    ):
         got = decode_plain({"data": given_}, "sensor_msgs/msg/Image").data
         assert got.dtype == np.uint8
         assert got.tolist() == [1, 2, 255]

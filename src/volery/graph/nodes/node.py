@@ -204,9 +204,7 @@ class Node(ParameterMethods):
         who do not control them cannot publish on it.
         """
         name, graph, profile = self.resolve(topic), self._context.graph, profile_of(qos_profile)
-        handle = NodeSubscription(
-            name, msg_type, callback, profile, lambda: graph.publishers(name)
-        )
+        handle = NodeSubscription(name, msg_type, callback, profile, lambda: graph.publishers(name))
         occasion = f"message on {name}{_name_of(callback)}"
 
         def receive(published: Published) -> None:

@@ -129,7 +129,9 @@ class Node(VoleryNode):
         """The group of callbacks without a group."""
         return _DEFAULT_GROUP
 
-    create_rate = _refusal("a rate waits, and simulated time stands still in a callback: use a timer")
+    create_rate = _refusal(
+        "a rate waits, and simulated time stands still in a callback: use a timer"
+    )
     create_guard_condition = _refusal(
         "Volery has no guard conditions: publish on a topic, or use a timer"
     )

@@ -71,10 +71,15 @@ class Duration:
     def __mul__(self, factor: float) -> Duration:
         if not isinstance(factor, int | float):
             return NotImplemented
-        return Duration(nanoseconds=int(self._ns * factor)) if math.isfinite(factor) else INFINITE
+        if math.isnan(factor):
+            raise ValueError("a duration times nan")
+        return INFINITE if math.isinf(factor) else Duration(nanoseconds=int(self._ns * factor))
 
     def __repr__(self) -> str:
         return f"Duration(nanoseconds={self._ns})"
+
+    def __str__(self) -> str:
+        return "Infinite" if self == INFINITE else f"{self._ns} nanoseconds"
 
 
 INFINITE = Duration(nanoseconds=_LONGEST_NS - 1)
@@ -207,7 +212,9 @@ class Clock:
 
     def sleep_until(self, *_arguments: Any, **_options: Any) -> bool:
         """Raises `GraphError`: no callback can wait."""
-        raise GraphError("a clock waits, and simulated time stands still in a callback: use a timer")
+        raise GraphError(
+            "a clock waits, and simulated time stands still in a callback: use a timer"
+        )
 
     sleep_for = sleep_until
 

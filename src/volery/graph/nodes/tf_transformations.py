@@ -20,9 +20,7 @@ _DEGENERATE = 1e-12
 """Sine or cosine below which two axes of a turn coincide."""
 
 
-def euler_from_quaternion(
-    quaternion: ArrayLike, axes: str = "sxyz"
-) -> tuple[float, float, float]:
+def euler_from_quaternion(quaternion: ArrayLike, axes: str = "sxyz") -> tuple[float, float, float]:
     """Returns the three angles of x y z w; by default roll, pitch and yaw."""
     return euler_from_matrix(quaternion_matrix(quaternion), axes)
 
