@@ -337,8 +337,14 @@ def test_methods_that_are_refused_say_what_to_use(node, method, words):
 
 @pytest.mark.parametrize(
     ("name", "topic"),
-    [("~", "/uav1/idioms"), ("~/a", "/uav1/idioms/a"), ("{node}/a", "/uav1/idioms/a")]
-    + [("{ns}/a", "/uav1/a"), ("{namespace}/a", "/uav1/a"), ("/a", "/a")],
+    [
+        ("~", "/uav1/idioms"),
+        ("~/a", "/uav1/idioms/a"),
+        ("{node}/a", "/uav1/idioms/a"),
+        ("{ns}/a", "/uav1/a"),
+        ("{namespace}/a", "/uav1/a"),
+        ("/a", "/a"),
+    ],
 )
 def test_names_are_expanded(name, topic):
     context = Context(Graph(lambda: 7), SimpleNamespace(), lambda: 7)

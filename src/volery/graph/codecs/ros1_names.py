@@ -46,7 +46,8 @@ def ros2_name(name: str, kind: Literal["msg", "srv", "action"] = "msg") -> str:
     """Returns the ROS 2 name of a type given in either spelling.
 
     name: `std_msgs/String` or `std_msgs/msg/String`, with more slashes as rosbridge accepts them.
-    kind: the kind of a name with two parts. Raises `GraphError` if the text is not the name of a type, or names another kind.
+    kind: the kind of a name with two parts. Raises `GraphError` if the text is not the name of a
+    type, or names another kind.
     """
     if isinstance(name, str):
         name = re.sub("/+", "/", name).removeprefix("/")

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.errors import GraphError
-from volery.graph.messages import CompressedImage, Image
+from volery.graph.messages import CompressedImage, Header, Image, Time
 
 Pixels = NDArray[Any]
 
@@ -74,7 +74,8 @@ class CvBridge:
         if (np.dtype(code), channels) != (np.dtype(_KINDS[found[:-2]]), int(found[-1])):
             raise CvBridgeError(f"an array of {found} is no image in {encoding}")
         pixels = np.ascontiguousarray(cvim)
-        message = Image(
+        return Image(
+            header=header or Header(Time(0, 0), ""),
             height=pixels.shape[0],
             width=pixels.shape[1],
             encoding=encoding,
@@ -82,9 +83,6 @@ class CvBridge:
             step=pixels.strides[0],
             data=np.frombuffer(pixels.tobytes(), np.uint8),
         )
-        if header is not None:
-            message.header = header
-        return message
 
     def compressed_imgmsg_to_cv2(
         self, cmprs_img_msg: Any, desired_encoding: str = "passthrough"
@@ -116,8 +114,9 @@ class CvBridge:
             raise CvBridgeError(f"an array of {_kind_of(cvim)} cannot be compressed")
         file = BytesIO()
         picture = Picture.fromarray(cvim if cvim.ndim == 2 else cvim[:, :, 2::-1])
+        header = Header(Time(0, 0), "")
         picture.save(file, "JPEG" if dst_format in ("jpg", "jpeg") else dst_format.upper())
-        return CompressedImage(format=dst_format, data=np.frombuffer(file.getvalue(), np.uint8))
+        return CompressedImage(header, dst_format, np.frombuffer(file.getvalue(), np.uint8))
 
 
 def _layout(encoding: str) -> tuple[str, int]:
@@ -140,9 +139,9 @@ def _kind_of(pixels: Pixels) -> str:
 
 def _converted(pixels: Pixels, encoding: str, wanted: str) -> Pixels:
     """Returns pixels (height, width, channels) in another encoding, without an axis of one."""
-    if wanted not in ("passthrough", encoding) and _layout(wanted) != _layout(encoding):
-        pixels = _recoloured(pixels, encoding, wanted)
-    elif wanted in _COLOURS and encoding in _COLOURS and wanted != encoding:
+    both_mean_colours = wanted in _COLOURS and encoding in _COLOURS
+    is_other = wanted not in ("passthrough", encoding)
+    if is_other and (both_mean_colours or _layout(wanted) != _layout(encoding)):
         pixels = _recoloured(pixels, encoding, wanted)
     return pixels[:, :, 0] if pixels.shape[2] == 1 else pixels
 
@@ -157,7 +156,8 @@ def _recoloured(pixels: Pixels, encoding: str, wanted: str) -> Pixels:
     planes = dict(zip(old, np.moveaxis(pixels, 2, 0), strict=True))
     if new == "y" and old != "y":
         colours = np.stack([planes[name] for name in "rgb"], axis=-1)
-        return np.rint(colours @ _LUMA).astype(new_code)[:, :, None]
+        grey: Pixels = np.rint(colours @ _LUMA).astype(new_code)[:, :, None]
+        return grey
     if old == "y":
         planes = dict.fromkeys("rgb", planes["y"]) | {"y": planes["y"]}
     opaque = np.full(pixels.shape[:2], np.iinfo(new_code).max, new_code)

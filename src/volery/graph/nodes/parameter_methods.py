@@ -150,8 +150,8 @@ class ParameterMethods:
         found = self.__find(name)
         if not found.is_initialized:
             raise ParameterUninitializedError(
-                f"node {self.__name}: parameter '{name}' is declared without a value: set it in the "
-                "scenario"
+                f"node {self.__name}: parameter '{name}' is declared without a value: set it in "
+                "the scenario"
             )
         return found
 
