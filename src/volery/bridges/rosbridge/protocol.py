@@ -21,7 +21,12 @@ from typing import Any
 from volery.bridges.rosbridge.access_policy import AccessPolicy, refusal
 from volery.bridges.rosbridge.actions import RosbridgeActions
 from volery.bridges.rosbridge.cbor_codec import encode_cbor
-from volery.bridges.rosbridge.fields import read_choice, read_id, with_id
+from volery.bridges.rosbridge.fields import (
+    NeedlessOperationError,
+    read_choice,
+    read_id,
+    with_id,
+)
 from volery.bridges.rosbridge.fragments import MOST_FRAGMENTS, Assembly, split
 from volery.bridges.rosbridge.message_budget import (
     MAX_MESSAGE_BYTES,
@@ -172,7 +177,7 @@ class RosbridgePeer:
             operation = decode_frame(frame, limited=True)
             self._handle(operation, now_s, 0)
         except VoleryError as error:
-            self._status("error", str(error), operation)
+            self._status(_level_of(error), str(error), operation)
         except Exception as error:
             # An error of ours in serving one client must not end the service of others.
             self._status("error", f"internal error: {type(error).__name__}: {error}", operation)
@@ -220,7 +225,7 @@ class RosbridgePeer:
         try:
             self._handle(operation, now_s, depth + 1)
         except VoleryError as error:
-            self._status("error", str(error), operation)
+            self._status(_level_of(error), str(error), operation)
 
     def _set_level(self, operation: Operation) -> None:
         self._level = read_choice(operation, "level", LEVELS)
@@ -346,3 +351,7 @@ class RosbridgePeer:
             post(act)
 
         return guarded
+
+
+def _level_of(error: VoleryError) -> str:
+    return "warning" if isinstance(error, NeedlessOperationError) else "error"

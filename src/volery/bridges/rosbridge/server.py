@@ -49,6 +49,10 @@ _ONCE = ("Host", "Origin", "Authorization")
 """Headers that identify a request's origin; a repeated one is ambiguous."""
 
 
+_FOXGLOVE = "foxglove."
+_USE_ROSBRIDGE = "this is rosbridge: choose the connection 'Rosbridge' in place of 'Foxglove WebSocket'"
+
+
 class RosbridgeServer:
     """Serves clients of the graph over WebSocket.
 
@@ -113,6 +117,8 @@ class RosbridgeServer:
         self._server: Server | None = None
         self._listener: Listener | None = None
         self._attempts = TokenAttempts()
+        self._refused_foxglove = False
+        """Whether that has been logged, which happens once."""
         self._rosapi: RosApi | None = None
         self._transforms: TfRepublisher | None = None
         self._clients: set[ServerConnection] = set()
@@ -205,6 +211,12 @@ class RosbridgeServer:
                 return connection.respond(
                     HTTPStatus.BAD_REQUEST, f"{name} is given more than once\n"
                 )
+        offered = ",".join(request.headers.get_all("Sec-WebSocket-Protocol")).split(",")
+        if any(name.strip().startswith(_FOXGLOVE) for name in offered):
+            if not self._refused_foxglove:
+                self._refused_foxglove = True
+                _log.warning("a Foxglove client was refused: %s", _USE_ROSBRIDGE)
+            return connection.respond(HTTPStatus.BAD_REQUEST, f"{_USE_ROSBRIDGE}\n")
         foreign = self._foreign_page(connection, request)
         if foreign is not None:
             return foreign

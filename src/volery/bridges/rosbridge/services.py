@@ -7,11 +7,12 @@ from collections.abc import Callable
 from typing import Any
 
 from volery.bridges.rosbridge.fields import (
+    MAX_FRAGMENT,
     Id,
     absolute,
     read_choice,
     read_id,
-    read_number,
+    read_limit,
     read_text,
     with_id,
 )
@@ -53,10 +54,10 @@ class RosbridgeServices:
     def call(self, operation: Operation, now_s: float) -> None:
         """Calls a service for the client."""
         name, key = read_text(operation, "service"), read_id(operation)
-        fragment_size = int(read_number(operation, "fragment_size", 0, 0, 1e9)) or None
+        fragment_size = int(read_limit(operation, "fragment_size", MAX_FRAGMENT)) or None
         compression = read_choice(operation, "compression", ("none", "png", "cbor", "cbor-raw"))
         compression = "cbor" if compression == "cbor-raw" else compression
-        timeout_s = read_number(operation, "timeout", 0, 0, 1e9)
+        timeout_s = read_limit(operation, "timeout", 1e9)
 
         def respond(values: Any, success: bool) -> None:
             response = {"op": "service_response", "service": name, "values": values}
