@@ -355,4 +355,3 @@ def _ends(fault: Fault, active: LastingFault) -> bool:
         same_rotor = fault.rotor == active.rotor
         return same_rotor and fault.thrust_factor == active.thrust_factor
     return True
-

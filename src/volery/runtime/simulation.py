@@ -6,12 +6,12 @@ import math
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from volery.core.clock import s_from_ns
 from volery.core.errors import CommandError, ScenarioError
 from volery.core.plurals import counted
+from volery.core.uncopied import Uncopied
 from volery.engine.events import Event
 from volery.engine.lock_step import Partner
 from volery.engine.pacing import Pacer
@@ -58,6 +58,7 @@ from volery.runtime.snapshot import Snapshot
 from volery.runtime.snapshot_manager import SnapshotManager
 from volery.runtime.vehicles.control_authority import ControlAuthority
 from volery.runtime.vehicles.uav import Uav
+from volery.runtime.vehicles.uav_table import UavView
 from volery.runtime.warmup.parallel_compilation import compiled
 from volery.runtime.warmup.requirements import needs_of
 from volery.scenario.catalog import ScenarioCatalog
@@ -71,7 +72,7 @@ if TYPE_CHECKING:
     from volery.results import FlightResult
 
 
-class Simulation:
+class Simulation(Uncopied):
     """World, fleet, sensors, graph and nodes of a scenario, on one clock.
 
     `threads` share the ray casting; results do not depend on their number. `recordings` is the
@@ -142,7 +143,7 @@ class Simulation:
         grid_map = GridMapManager(scenario, engine, lambda: self.post(world_topic.tell))
         self._manager = manager = build_vehicles(scenario, connected, world, self._runs)
         self._snapshots = SnapshotManager(manager, self._loop, self._partners, grid_map)
-        self.uavs = MappingProxyType(manager.uavs)
+        self.uavs = UavView(manager.uavs)
         self.operators = ControlAuthority(lambda: tuple(self.uavs), self.graph.moved_uavs.of)
         self.gateway = build_gateway(graph, engine, pacer, self.commands, self.uavs, self._partners)
         self.clock = SimulationClock(engine, pacer, self._loop, self._partners, self._check_open)

@@ -15,6 +15,7 @@ from volery.control.setpoints import MAX_COORDINATE, checked
 from volery.control.trajectory import Trajectory
 from volery.core.arrays import Array
 from volery.core.errors import CommandError
+from volery.core.uncopied import Uncopied
 from volery.runtime.vehicles.flight_future import CommandResult, FlightFuture
 from volery.runtime.vehicles.flight_futures import FlightFutures
 from volery.runtime.vehicles.low_battery import check_charge
@@ -26,7 +27,7 @@ CheckGoal = Callable[[Array, Airframe], None]
 """Raises `CommandError` if a UAV cannot be at a position (3,), m, in the map frame."""
 
 
-class Uav:
+class Uav(Uncopied):
     """Reads the true state of a UAV and its sensors, and commands it.
 
     Commands act from the next physics step and raise `CommandError` if they are rejected. Flight
