@@ -16,7 +16,7 @@ class Uncopied:
         """Raises `CommandError`."""
         name = type(self).__name__
         raise CommandError(
-            f"a {name} is neither copied nor pickled, as part of a running simulation; make another "
+            f"a {name} is neither copied nor pickled, as part of a simulation; make another "
             "simulation of its scenario, or pickle the arrays of state() and fly()"
         )
 

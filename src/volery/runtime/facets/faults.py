@@ -20,7 +20,7 @@ class SimulationFaults:
         self._plan, self._graph, self._check_open = plan, graph, check_open
 
     def __repr__(self) -> str:
-        kinds = ", ".join(f"{fault.kind} of {fault.uav}" for fault in self.active)
+        kinds = ", ".join(f"{fault.model_dump()['kind']} of {fault.uav}" for fault in self.active)
         return f"<active faults: {kinds or 'none'}>"
 
     @property
