@@ -22,8 +22,7 @@ from volery.runtime.build.engine import build_engine
 from volery.runtime.build.gateway import build_gateway
 from volery.runtime.build.geometry import Geometry, WorldTopic
 from volery.runtime.build.graph import all_down, plan_faults
-from volery.runtime.build.message_loading import learn_messages
-from volery.runtime.build.node_loading import check_nodes
+from volery.runtime.build.start_check import check_start
 from volery.runtime.build.vehicles import build_vehicles
 from volery.runtime.build.worlds import build_world
 from volery.runtime.checks import check_reset_seed, check_seconds, check_steps
@@ -62,7 +61,6 @@ from volery.runtime.vehicles.uav_table import UavView
 from volery.runtime.warmup.parallel_compilation import compiled
 from volery.runtime.warmup.requirements import needs_of
 from volery.scenario.catalog import ScenarioCatalog
-from volery.scenario.node_packages import check_packages
 from volery.scenario.schema import Scenario
 from volery.world.ground_cover import BARE_GROUND
 
@@ -123,9 +121,7 @@ class Simulation(Uncopied):
         self._replays: list[Replay] = []
         self._command_replay: CommandReplay | None = None
         self._geometry: Geometry | None = None
-        check_packages(scenario)
-        learn_messages(scenario)  # modules of nodes may import them
-        check_nodes(scenario)
+        check_start(scenario)
         with compiled(needs_of(scenario)):
             world = build_world(scenario, threads)
         self._pacer = pacer = Pacer()
