@@ -106,7 +106,7 @@ async def _serve(
         authorized=True,
         gate=gate,
     )
-    conversation = asyncio.create_task(converse(channel, bell, peer, world.bulk))
+    conversation = asyncio.create_task(converse(channel, bell, peer, world.queue))
     client = Client(channel, conversation)
     site.clients.add(client)
     try:

@@ -241,6 +241,11 @@ class RosbridgePeer:
         """Whether so many bytes wait for the client that reading from it should pause."""
         return self._waiting_bytes > MOST_WAITING_BYTES
 
+    @property
+    def has_answers(self) -> bool:
+        """Whether the next frame is an answer or a status, not a message of a topic."""
+        return bool(self._outbox)
+
     def send(self, operation: Operation, fragment_size: int | None, compression: str) -> None:
         """Queues an operation for the client.
 

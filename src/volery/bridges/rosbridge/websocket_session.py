@@ -1,6 +1,6 @@
 """Exchanges frames between one client's WebSocket and its peer.
 
-await converse(channel, bell, peer, bulk)
+await converse(channel, bell, peer, queue)
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from contextlib import suppress
 from typing import Any, Protocol
 
 from volery.bridges.loop_waker import wake_of
-from volery.bridges.rosbridge.bulk_turns import LARGE_BYTES, TURN_S, BulkTurns, Writer
+from volery.bridges.rosbridge.fair_queue import REQUESTS, FairQueue, Flow
 from volery.bridges.rosbridge.protocol import RosbridgePeer
 from volery.bridges.rosbridge.token_check import TokenCheck
 from volery.bridges.rosbridge.wire import Frame
@@ -75,26 +75,25 @@ async def converse(
     channel: WebSocketSession,
     bell: Bell,
     peer: RosbridgePeer,
-    bulk: BulkTurns,
+    queue: FairQueue,
     checkpoint: TokenCheck | None = None,
 ) -> Exception | None:
     """Serves a client until it leaves or must be disconnected, then closes its peer.
 
-    bell: rung by the peer's `wake`. bulk: turns of all clients of this loop. checkpoint: of a
+    bell: rung by the peer's `wake`. queue: of all clients of this loop. checkpoint: of a
     client that must send a token. Returns the exception that ended the service, usually the closed
     connection.
     """
     read = asyncio.Event()
-    writer = Writer(bulk)
+    requests, messages = queue.flow(REQUESTS), queue.flow()
     tasks = [
-        asyncio.create_task(_read(channel, peer, bulk, read, checkpoint)),
-        asyncio.create_task(_write(channel, peer, bell, writer, read)),
+        asyncio.create_task(_read(channel, peer, requests, read, checkpoint)),
+        asyncio.create_task(_write(channel, peer, bell, requests, messages, read)),
     ]
     try:
         await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
     finally:
         peer.close()
-        writer.close()
         for task in tasks:
             task.cancel()
         outcomes = await asyncio.gather(*tasks, return_exceptions=True)
@@ -104,12 +103,11 @@ async def converse(
 async def _read(
     channel: WebSocketSession,
     peer: RosbridgePeer,
-    bulk: BulkTurns,
+    flow: Flow,
     read: asyncio.Event,
     checkpoint: TokenCheck | None,
 ) -> None:
     """Passes the client's frames to its peer until it leaves or must be disconnected."""
-    spent_s = 0.0
     while peer.refused is None:
         silence_s = None if peer.authorized else _LONGEST_SILENCE_S
         try:
@@ -118,19 +116,16 @@ async def _read(
         except TimeoutError:
             await channel.close(POLICY_VIOLATION, "no token was sent")
             return
-        if len(frame) > LARGE_BYTES:
-            await bulk.large_messages.turn()
+        await flow.begin()
         peer.reading.begin()
         if peer.authorized or checkpoint is None:
             peer.receive(frame, time.monotonic())
         else:
             await checkpoint.receive(peer, frame)
             peer.reading.begin()  # the checkpoint gives others their turn
-        spent_s += peer.reading.end(1, len(frame))
+        cost_s = peer.reading.end(1, len(frame))
         frame = ""  # frees it while the client sends nothing
-        if spent_s >= TURN_S:  # `recv` does not wait if a frame is available
-            spent_s = 0.0
-            await asyncio.sleep(0)
+        await flow.spend(cost_s)  # `recv` does not wait if a frame is available
         while (pause_s := peer.reading.pause_s()) and peer.refused is None:
             await asyncio.sleep(pause_s)
         while peer.congested:  # the client requests more than it reads
@@ -142,14 +137,20 @@ async def _read(
 
 
 async def _write(
-    channel: WebSocketSession, peer: RosbridgePeer, bell: Bell, turns: Writer, read: asyncio.Event
+    channel: WebSocketSession,
+    peer: RosbridgePeer,
+    bell: Bell,
+    requests: Flow,
+    messages: Flow,
+    read: asyncio.Event,
 ) -> None:
     """Sends the peer's frames, as fast as the client reads."""
     while True:
         bell.silence()
-        await turns.begin()
+        await (requests if peer.has_answers else messages).begin()
         frames = peer.frames(time.monotonic())
         while True:
+            flow = requests if peer.has_answers else messages
             frame, cost_s = _next(peer, frames)
             if frame is None:
                 break
@@ -157,7 +158,7 @@ async def _write(
             read.set()
             while pause_s := peer.writing.pause_s():
                 await asyncio.sleep(pause_s)
-            await turns.spend(cost_s)
+            await flow.spend(cost_s)
         read.set()
         now_s = time.monotonic()
         due_s = peer.due_s(now_s)
