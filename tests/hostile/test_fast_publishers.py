@@ -121,7 +121,7 @@ class Flood:
         self.read += 1
         return PUBLISH
 
-    async def send(self, message):
+    async def send_all(self, messages):
         pass
 
     async def close(self, code=1000, reason=""):

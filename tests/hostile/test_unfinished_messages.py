@@ -269,7 +269,7 @@ class Channel:
         self.taken += 1
         return message
 
-    async def send(self, message):
+    async def send_all(self, messages):
         """Sends to nobody."""
 
     async def close(self, code=1000, reason=""):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from typing import Any, Protocol
 
@@ -24,6 +24,9 @@ SERVICE_RESTART = 1012
 
 _LONGEST_SILENCE_S = 10.0
 """Time within which a client must send its token."""
+_MAX_FRAMES = 6
+_MAX_BYTES = 32 << 10
+"""Limits of the frames of one client that are sent together, with one call of the system."""
 
 
 class WebSocketSession(Protocol):
@@ -32,8 +35,8 @@ class WebSocketSession(Protocol):
     async def recv(self) -> Frame:
         """Waits for a message."""
 
-    async def send(self, message: Frame, /) -> None:
-        """Sends a message; returns when the network is ready for the next one."""
+    async def send_all(self, messages: Sequence[Frame], /) -> None:
+        """Sends messages; returns when the network is ready for the next ones."""
 
     async def close(self, code: int = ..., reason: str = ...) -> None:
         """Closes the connection."""
@@ -131,8 +134,7 @@ async def _read(
         while peer.congested:  # the client requests more than it reads
             read.clear()
             await read.wait()
-    for answer in peer.frames(time.monotonic()):
-        await channel.send(answer)
+    await channel.send_all(list(peer.frames(time.monotonic())))
     await channel.close(POLICY_VIOLATION, peer.refused[:100])
 
 
@@ -151,10 +153,10 @@ async def _write(
         frames = peer.frames(time.monotonic())
         while True:
             flow = requests if peer.has_answers else messages
-            frame, cost_s = _next(peer, frames)
-            if frame is None:
+            batch, cost_s = _next(peer, frames)
+            if not batch:
                 break
-            await channel.send(frame)
+            await channel.send_all(batch)
             read.set()
             while pause_s := peer.writing.pause_s():
                 await asyncio.sleep(pause_s)
@@ -167,8 +169,13 @@ async def _write(
                 await bell.received.wait()
 
 
-def _next(peer: RosbridgePeer, frames: Iterator[Frame]) -> tuple[Frame | None, float]:
-    """Returns the next frame and the time to make it, s, charged to the client."""
+def _next(peer: RosbridgePeer, frames: Iterator[Frame]) -> tuple[list[Frame], float]:
+    """Returns the next frames and the time to make them, s, charged to the client."""
     peer.writing.begin()
-    frame = next(frames, None)
-    return frame, peer.writing.end(1, 0 if frame is None else len(frame))
+    batch, size = [], 0
+    for frame in frames:
+        batch.append(frame)
+        size += len(frame)
+        if len(batch) >= _MAX_FRAMES or size >= _MAX_BYTES:
+            break
+    return batch, peer.writing.end(len(batch), size)
