@@ -107,10 +107,7 @@ class RosbridgeServices:
     def _find(self, name: str) -> tuple[str, str]:
         """Returns name in the graph and type of a client's `/add` or, in old clients, `/add#3`."""
         service = absolute(name.partition("#")[0])
-        srvtype = self._session.graph.services().get(service)
-        if srvtype is None:
-            raise GraphError(f"service '{service}' has no server")
-        return service, srvtype
+        return service, self._session.graph.service_type(service)
 
     def expire(self, now_s: float) -> None:
         """Fails calls that have timed out."""

@@ -12,7 +12,7 @@ from contextlib import suppress
 from typing import Any, Protocol
 
 from volery.bridges.loop_waker import wake_of
-from volery.bridges.rosbridge.fair_queue import REQUESTS, FairQueue, Flow
+from volery.bridges.rosbridge.fair_queue import MESSAGES, REQUESTS, FairQueue, Flow
 from volery.bridges.rosbridge.protocol import RosbridgePeer
 from volery.bridges.rosbridge.token_check import TokenCheck
 from volery.bridges.rosbridge.wire import Frame
@@ -88,7 +88,7 @@ async def converse(
     connection.
     """
     read = asyncio.Event()
-    requests, messages = queue.flow(REQUESTS), queue.flow()
+    requests, messages = queue.flow(REQUESTS), queue.flow(MESSAGES)
     tasks = [
         asyncio.create_task(_read(channel, peer, requests, read, checkpoint)),
         asyncio.create_task(_write(channel, peer, bell, requests, messages, read)),
