@@ -7,9 +7,9 @@
 
 A loop runs all ready callbacks in order, so an answer to one client would wait, at each of its
 steps, for the frames of all others. In one round of the loop clients therefore get `ROUND_S`
-together; the others wait, and the one that has received the least for its weight goes first
-(start-time fair queueing: Goyal, Vin and Cheng, 1996). A client with little traffic is ahead of
-those with much, and behind no more than one turn of each client that begins at the same time.
+together; the others wait, and the one whose turn would end first, for what it has received and
+its weight, goes first (self-clocked fair queueing: Golestani, 1994). A client with little traffic
+is ahead of those with much.
 
 The simulation's thread needs Python's lock too, several times in each step, and waits for a switch
 interval each time while the loop is busy. So a loop that sends the messages of topics to a crowd of
@@ -38,7 +38,7 @@ _SMOOTHING = 0.1
 _MIN_TURN_S = 1e-5
 
 _Key = tuple[float, int]
-"""Virtual time at which a turn starts, s, and its number in order of arrival."""
+"""Virtual time at which a turn is expected to end, s, and its number in order of arrival."""
 _Waiting = list[tuple[_Key, asyncio.Future[None]]]
 
 
@@ -78,7 +78,7 @@ class FairQueue:
     async def turn(self, start_s: float, weight: float) -> None:
         """Waits for a turn that starts at a virtual time; used by `Flow`."""
         if self.must_wait(weight):
-            key = (start_s, next(self._numbers))
+            key = (start_s + self._turn_s / weight, next(self._numbers))
             await self._wait(key, weight)
             while self.is_full:  # others were quicker; the key goes first next time
                 await self._wait(key, weight)
