@@ -58,9 +58,13 @@ class GuardedConnection(ServerConnection):
         self._limits.answers_read()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Implements asyncio's method."""
+        """Implements asyncio's method; resolves cycles of references, see `core.collector`."""
         self._limits.close()
         super().connection_lost(exc)
+        protocol = self.protocol
+        protocol.parser.close()
+        protocol.select_subprotocol = None
+        protocol.recv_frame = self._recv_unbounded = _ignore  # type: ignore[method-assign]
 
     def data_received(self, data: bytes) -> None:
         """Implements asyncio's method; counts what is incomplete."""
@@ -128,6 +132,10 @@ class GuardedConnection(ServerConnection):
     def _unguard(self) -> None:
         self.protocol.max_message_size = self.max_bytes
         self.protocol.recv_frame = self._recv_frame  # type: ignore[method-assign]
+
+
+def _ignore(_frame: Frame) -> None:
+    """Does nothing."""
 
 
 def guarded(token: str | None, max_bytes: int) -> type[GuardedConnection]:

@@ -333,6 +333,11 @@ class RosbridgePeer:
         self._session.close()
         self._outbox.clear()
         self._assembly.close()
+        # Without cycles of references its memory is free at once, see `core.collector`.
+        self._handlers.clear()
+        self._topics.close()
+        self._services.close()
+        self.on_authorized = lambda: None
 
     def _drop_fragments(self) -> None:
         if self._assembly.drop_all():

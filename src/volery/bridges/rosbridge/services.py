@@ -120,6 +120,12 @@ class RosbridgeServices:
         deadline_s = min((deadline_s for deadline_s, _ in self._calls.values()), default=None)
         return None if deadline_s == float("inf") else deadline_s
 
+    def close(self) -> None:
+        """Forgets the client, which has left; its session fails what is open."""
+        self._calls.clear()
+        self._requests.clear()
+        self._send, self._post = send_nothing, post_nothing
+
     # ----------------------------------------------------------------------------------- servers
 
     def advertise(self, operation: Operation) -> None:
@@ -183,6 +189,14 @@ class RosbridgeServices:
             reply.fail(GraphError(f"service '{service}' sent a wrong response: {error}"))
             raise
         reply.answer(response)
+
+
+def send_nothing(_operation: Operation, _fragment_size: int | None, _compression: str) -> None:
+    """Stands for the `Send` of a client that has left."""
+
+
+def post_nothing(_action: Callable[[], None]) -> None:
+    """Stands for the `Post` of a client that has left."""
 
 
 def _arguments(operation: Operation, msgtype: str) -> Any:
