@@ -23,7 +23,7 @@ from volery.bridges.rosbridge.fields import (
     with_id,
 )
 from volery.bridges.rosbridge.message_encoder import MessageEncoder
-from volery.bridges.rosbridge.services import Post, Send
+from volery.bridges.rosbridge.services import Post, Send, post_nothing, send_nothing
 from volery.bridges.rosbridge.wire import Operation
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.actions import Goal, GoalStatus
@@ -239,6 +239,7 @@ class RosbridgeActions:
         self._offers.clear()
         self._acting.clear()
         self._asked.clear()
+        self._send, self._post = send_nothing, post_nothing
 
 
 def _cancel(asked: _Asked) -> None:

@@ -246,6 +246,11 @@ class RosbridgePeer:
         """Whether so many bytes wait for the client that reading from it should pause."""
         return self._waiting_bytes > MOST_WAITING_BYTES
 
+    @property
+    def has_answers(self) -> bool:
+        """Whether the next frame is an answer or a status, not a message of a topic."""
+        return bool(self._outbox)
+
     def send(self, operation: Operation, fragment_size: int | None, compression: str) -> None:
         """Queues an operation for the client.
 
@@ -333,6 +338,11 @@ class RosbridgePeer:
         self._session.close()
         self._outbox.clear()
         self._assembly.close()
+        # Without cycles of references its memory is free at once, see `core.collector`.
+        self._handlers.clear()
+        self._topics.close()
+        self._services.close()
+        self.on_authorized = lambda: None
 
     def _drop_fragments(self) -> None:
         if self._assembly.drop_all():

@@ -16,7 +16,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from volery.bridges.origins import Origins
-from volery.bridges.rosbridge.bulk_turns import BulkTurns
+from volery.bridges.rosbridge.fair_queue import FairQueue
 from volery.bridges.rosbridge.first_message import GuardedConnection, guarded
 from volery.bridges.rosbridge.message_budget import MAX_MESSAGE_BYTES
 from volery.bridges.rosbridge.message_encoder import Generation, MessageEncoder
@@ -126,7 +126,7 @@ class RosbridgeServer:
         """Clients whose request for a connection carried the token."""
         self._gateway: Gateway | None = None
         self._shared = ServerContext()
-        self._bulk = BulkTurns()
+        self._queue = FairQueue()
 
     @property
     def name(self) -> str:
@@ -288,7 +288,7 @@ class RosbridgeServer:
         if peer.authorized:
             prove()
         try:
-            problem = await converse(connection, bell, peer, self._bulk, checkpoint)
+            problem = await converse(connection, bell, peer, self._queue, checkpoint)
         finally:
             self._clients.discard(connection)
         if problem is not None and not isinstance(problem, ConnectionClosed):

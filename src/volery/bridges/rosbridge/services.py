@@ -108,10 +108,7 @@ class RosbridgeServices:
     def _find(self, name: str) -> tuple[str, str]:
         """Returns name in the graph and type of a client's `/add` or, in old clients, `/add#3`."""
         service = absolute(name.partition("#")[0])
-        srvtype = self._session.graph.services().get(service)
-        if srvtype is None:
-            raise GraphError(f"service '{service}' has no server")
-        return service, srvtype
+        return service, self._session.graph.service_type(service)
 
     def expire(self, now_s: float) -> None:
         """Fails calls that have timed out."""
@@ -123,6 +120,12 @@ class RosbridgeServices:
         """Returns the time of the next timeout; None if there is none."""
         deadline_s = min((deadline_s for deadline_s, _ in self._calls.values()), default=None)
         return None if deadline_s == float("inf") else deadline_s
+
+    def close(self) -> None:
+        """Forgets the client, which has left; its session fails what is open."""
+        self._calls.clear()
+        self._requests.clear()
+        self._send, self._post = send_nothing, post_nothing
 
     # ----------------------------------------------------------------------------------- servers
 
@@ -187,6 +190,14 @@ class RosbridgeServices:
             reply.fail(GraphError(f"service '{service}' sent a wrong response: {error}"))
             raise
         reply.answer(response)
+
+
+def send_nothing(_operation: Operation, _fragment_size: int | None, _compression: str) -> None:
+    """Stands for the `Send` of a client that has left."""
+
+
+def post_nothing(_action: Callable[[], None]) -> None:
+    """Stands for the `Post` of a client that has left."""
 
 
 def _arguments(operation: Operation, msgtype: str) -> Any:

@@ -285,6 +285,15 @@ class RosbridgeTopics:
         if stream.queue is not None:
             self._session.unsubscribe(stream.queue)
 
+    def close(self) -> None:
+        """Drops all streams of a client that has left."""
+        for stream in self._streams.values():
+            stream.queue = None  # its `wake` refers to the stream
+        self._streams.clear()
+        self._ready.clear()
+        self._held.clear()
+        self._complain = _ignore
+
     def take(self, now_s: float) -> Iterator[tuple[TopicStream, Published]]:
         """Yields due messages, one of every stream in turn."""
         ready = [self._ready.popleft() for _ in range(len(self._ready))]
@@ -318,3 +327,7 @@ class RosbridgeTopics:
 
         stream.tune(self._session, wake, is_new=is_new)
         wake()  # latched messages, and those of the previous queue, are available already
+
+
+def _ignore(_text: str) -> None:
+    """Does nothing."""
