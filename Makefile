@@ -85,7 +85,8 @@ test-page-units:
 
 test: lint test-installation test-page-units ## install what tests need, check everything, run the tests; failed ones once more
 	$(BIN)/python -m volery.runtime.warmup
-	$(BIN)/pytest --cache-clear -n 2 --dist loadfile --no-loadscope-reorder -m 'not slow' tests || { [ $$? -eq 1 ] && .ci/second_run; }
+	rm -rf .pytest_cache
+	$(BIN)/pytest -n 4 --dist loadfile --no-loadscope-reorder -m 'not slow' tests || { [ $$? -eq 1 ] && .ci/second_run; }
 
 docs: $(VENV)/.installed-docs ## build the documentation site: build/site/index.html
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet

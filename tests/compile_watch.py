@@ -1,4 +1,7 @@
-"""Notes which of Volery's kernels a process needs; as a pytest plugin, which it compiles."""
+"""Notes which of Volery's kernels a process compiles or needs.
+
+As a pytest plugin: which kernels tests need beyond those of `python -m volery.runtime.warmup`.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,9 @@ from typing import Any
 
 from numba.core import event
 from numba.core.caching import FunctionCache
+
+from volery.runtime.warmup.requirements import all_needs
+from volery.runtime.warmup.tasks import do
 
 
 class CompileWatch(event.Listener):
@@ -49,8 +55,10 @@ def _note(found: list[str], function: Any, types: Any) -> None:
 
 
 def pytest_configure(config: Any) -> None:
-    config.compile_watch = CompileWatch()
+    for task in all_needs():
+        do(task)
+    config.needs_watch = NeedsWatch()
 
 
 def pytest_unconfigure(config: Any) -> None:
-    Path(os.environ["COMPILED_TO"]).write_text(json.dumps(config.compile_watch.compiled))
+    Path(os.environ["NEEDED_TO"]).write_text(json.dumps(config.needs_watch.needed))

@@ -36,7 +36,7 @@ PURE = (
 
 
 def pytest_collection_modifyitems(items):
-    """Marks pure tests by their files, and puts the page's tests last.
+    """Marks pure tests by their files and slow tests of the page, and puts the page's tests last.
 
     From the first of them on, Playwright's event loop runs in the worker's thread, where
     `asyncio.run` of other tests fails.
@@ -46,6 +46,8 @@ def pytest_collection_modifyitems(items):
     for item in items:
         if item.path.relative_to(tests).as_posix().startswith(PURE):
             item.add_marker("pure")
+        if item.path.is_relative_to(tests / "page") and item.get_closest_marker("slow"):
+            item.add_marker("browser")
 
 
 LIDARS = [

@@ -232,12 +232,14 @@ def output_of(program, *words, timeout_s):
     return done.stdout
 
 
+@pytest.mark.slow
 def test_the_example_flies_a_square(run):
     volery(run, "service", "call", "/uav1/hold")
     said = output_of(ROOT / "examples/06_fly_over_rosbridge.py", run.ports[0], 1.5, timeout_s=60)
     assert 0.8 < float(re.search(r"([\d.]+) m wide", said)[1]) < 2.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bridge", ["rosbridge", "ros-tcp"])
 def test_a_planner_from_outside_gets_the_map_and_sends_waypoints(bridge):
     name = {"rosbridge": "", "ros-tcp": "_ros_tcp"}[bridge]
@@ -252,6 +254,7 @@ def test_a_planner_from_outside_gets_the_map_and_sends_waypoints(bridge):
     assert "import volery" not in program.read_text()
 
 
+@pytest.mark.slow
 def test_a_program_for_mavros_flies_unchanged():
     run = Run("rosbridge", "mavlink-tcp", scenario="plug_in", seconds=300, more=("--uavs", "1"))
     try:

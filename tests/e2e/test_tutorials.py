@@ -20,6 +20,8 @@ def tutorial():
     del sys.modules["tutorial"]
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(600)
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_tutorial(tutorial, page, tmp_path):
     port = own_port()

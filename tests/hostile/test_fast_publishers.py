@@ -12,7 +12,7 @@ from ros_tcp_client import frame
 
 from volery.bridges.ros_tcp.connection import RosTcpConnection
 from volery.bridges.ros_tcp.wire import RosTcpFrameParser
-from volery.bridges.rosbridge.bulk_turns import BulkTurns
+from volery.bridges.rosbridge.fair_queue import FairQueue
 from volery.bridges.rosbridge.protocol import RosbridgePeer, ServerContext
 from volery.bridges.rosbridge.websocket_session import Bell, converse, post_to
 from volery.core.errors import GraphError
@@ -121,7 +121,7 @@ class Flood:
         self.read += 1
         return PUBLISH
 
-    async def send(self, message):
+    async def send_all(self, messages):
         pass
 
     async def close(self, code=1000, reason=""):
@@ -143,7 +143,7 @@ def test_rosbridge_reads_on_when_the_simulation_has_taken_enough(monkeypatch):
         loop = asyncio.get_running_loop()
         bell, session = Bell(loop), graph.gateway.open("flood")
         peer = RosbridgePeer(session, ServerContext(), wake=bell.ring, post=post_to(loop))
-        talk = asyncio.create_task(converse(flood, bell, peer, BulkTurns()))
+        talk = asyncio.create_task(converse(flood, bell, peer, FairQueue()))
         while flood.read <= MAX_WAITING - 2:
             await asyncio.sleep(0.001)
         for _ in range(50):
@@ -168,7 +168,7 @@ def test_rosbridge_reads_no_more_of_a_client_over_its_share(monkeypatch):
         peer = RosbridgePeer(
             graph.gateway.open("flood"), ServerContext(), wake=bell.ring, post=post_to(loop)
         )
-        talk = asyncio.create_task(converse(flood, bell, peer, BulkTurns()))
+        talk = asyncio.create_task(converse(flood, bell, peer, FairQueue()))
         for _ in range(50):
             await asyncio.sleep(0.001)
         talk.cancel()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import bz2
-import gc
 import os
 import sqlite3
 import struct
@@ -104,7 +103,6 @@ def small_chunks(monkeypatch):
 
 def peak_of(job):
     """Bytes that a job takes at most; `RecordingError` may end it."""
-    gc.collect()
     tracemalloc.start()
     try:
         job()

@@ -20,12 +20,13 @@ from websockets.frames import Opcode
 from volery.bridges import unfinished
 from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.ros_tcp.endpoint import RosTcpEndpoint
-from volery.bridges.rosbridge.bulk_turns import LARGE_BYTES, BulkTurns
+from volery.bridges.rosbridge.fair_queue import ROUND_S, FairQueue
 from volery.bridges.rosbridge.fragments import Assembly
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.bridges.rosbridge.websocket_session import Bell, converse
 from volery.bridges.unfinished import SHARED, UnfinishedMessages
 from volery.core.errors import BridgeError
+from volery.graph.read_budget import BYTE_S
 from volery.runtime.idle_server import IdleServer
 
 sys.path.append(str(Path(__file__).parents[1] / "unit" / "server"))
@@ -269,7 +270,7 @@ class Channel:
         self.taken += 1
         return message
 
-    async def send(self, message):
+    async def send_all(self, messages):
         """Sends to nobody."""
 
     async def close(self, code=1000, reason=""):
@@ -279,7 +280,7 @@ class Channel:
 class Peer:
     """Counts what it receives in each round of the loop."""
 
-    authorized, congested, refused = True, False, None
+    authorized, congested, refused, has_answers = True, False, None, False
 
     def __init__(self, gateway):
         session = gateway.open("peer")
@@ -304,9 +305,9 @@ def serve_each(scene, count):
         gateway = HandGraph().gateway
         channels = [Channel() for _ in range(count)]
         peers = [Peer(gateway) for _ in range(count)]
-        loop, bulk = asyncio.get_running_loop(), BulkTurns()
+        loop, queue = asyncio.get_running_loop(), FairQueue()
         tasks = [
-            asyncio.create_task(converse(channel, Bell(loop), peer, bulk))
+            asyncio.create_task(converse(channel, Bell(loop), peer, queue))
             for channel, peer in zip(channels, peers, strict=True)
         ]
         await scene(channels, peers)
@@ -338,10 +339,12 @@ def test_a_processed_message_is_freed_while_the_next_does_not_come():
 
 
 def test_large_messages_of_many_are_processed_one_in_each_round():
+    large = "x" * round(1.5 * ROUND_S / BYTE_S)
+
     async def scene(channels, peers):
         await asyncio.sleep(0)
         for channel in channels:
-            channel.messages.put_nowait("x" * (LARGE_BYTES + 1))
+            channel.messages.put_nowait(large)
         await rounds_until(lambda: all(channel.taken for channel in channels))
         steps = []
         while sum(peer.received for peer in peers) < len(peers):

@@ -160,7 +160,7 @@ def test_impossible_actions_are_refused(make):
         env.step(env.action_space.sample())
     env.reset(seed=0)
     for seed in (-1, "x"):
-        with pytest.raises(CommandError, match="a whole number from 0 on is needed"):
+        with pytest.raises(CommandError, match="a whole number from 0 on, up to"):
             env.reset(seed=seed)
     with pytest.raises(CommandError, match=r"actions have shape \(3, 4\), not \(2, 4\)"):
         env.step(np.zeros((2, 4)))

@@ -6,7 +6,7 @@ import pytest
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.wrappers import vector as wrappers
 
-from volery.core.errors import ScenarioError
+from volery.core.errors import CommandError, ScenarioError
 from volery.learning.registration import register_tasks
 
 
@@ -66,6 +66,50 @@ def test_rendering_is_refused_and_none_is_accepted(make):
     for mode in ("rgb_array", "human"):
         with pytest.raises(ScenarioError, match=f"'{mode}'.*do not render, only None"):
             make("volery/Hover-v0", render_mode=mode)
+
+
+@pytest.mark.parametrize("make", [gymnasium.make, gymnasium.make_vec])
+def test_render_warns_and_returns_none(make):
+    env = make("volery/Hover-v0")
+    try:
+        env.reset(seed=0)
+        with pytest.warns(UserWarning, match="do not render; .*film_episode"):
+            assert env.render() is None
+    finally:
+        env.close()
+
+
+def test_actions_of_a_single_environment_are_described_as_its_own():
+    env = gymnasium.make("volery/Hover-v0", disable_env_checker=True)
+    try:
+        assert repr(env.unwrapped) == "<TaskEnv 'hover'>"
+        env.reset(seed=0)
+        for wrong, shape in (
+            (np.zeros(3), r"\(3,\)"),
+            (0.5, r"\(\)"),
+            (np.zeros((1, 4)), r"\(1, 4\)"),
+        ):
+            with pytest.raises(CommandError, match=rf"an action has shape \(4,\), not {shape}"):
+                env.step(wrong)
+    finally:
+        env.close()
+
+
+@pytest.mark.parametrize("seed", [2**70, 1.5, "a", [2**70, 0]])
+def test_seeds_that_are_none_are_refused(seed):
+    envs = gymnasium.make_vec("volery/Hover-v0", num_envs=2)
+    try:
+        with pytest.raises(CommandError, match="a whole number from 0 on, up to 2"):
+            envs.reset(seed=seed)
+        assert envs.reset(seed=[2**62, None])[0].shape == (2, 22)
+    finally:
+        envs.close()
+
+
+@pytest.mark.parametrize("num_envs", [0, -1])
+def test_environments_are_at_least_one(num_envs):
+    with pytest.raises(ScenarioError, match=f"num_envs = {num_envs}: at least 1 is needed"):
+        gymnasium.make_vec("volery/Hover-v0", num_envs=num_envs)
 
 
 @pytest.mark.parametrize("make", [gymnasium.make, gymnasium.make_vec])

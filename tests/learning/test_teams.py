@@ -110,8 +110,32 @@ def test_actions_of_other_agents_are_refused(team):
     env.reset(seed=0)
     with pytest.raises(CommandError, match="actions of uav1, uav2, uav3 are needed, not of uav1"):
         env.step({"uav1": np.zeros(3)})
-    with pytest.raises(CommandError, match=r"actions have shape \(3, 3\), not \(3, 2\)"):
+    with pytest.raises(CommandError, match=r"action of uav1 has shape \(3,\), not \(2,\)"):
         env.step({agent: np.zeros(2) for agent in env.agents})
+
+
+@pytest.mark.parametrize("name", TEAMS)
+def test_no_agents_act_after_an_episode(team, name):
+    """Wrappers such as SuperSuit's black_death step on with the agents that are left, none."""
+    env = team(name)
+    with pytest.raises(CommandError, match="call reset"):
+        env.step({})
+    env.reset(seed=0)
+    while env.agents:
+        env.step({agent: env.action_space(agent).sample() for agent in env.agents})
+    assert env.step({}) == ({}, {}, {}, {}, {})
+    with pytest.raises(CommandError, match="call reset"):
+        env.step({agent: env.action_space(agent).sample() for agent in env.possible_agents})
+
+
+def test_the_action_of_a_wrong_shape_is_named(team):
+    env = team("formation")
+    env.reset(seed=0)
+    actions = {agent: np.zeros(3) for agent in env.agents} | {"uav2": np.zeros(2)}
+    with pytest.raises(CommandError, match=r"action of uav2 has shape \(3,\), not \(2,\)"):
+        env.step(actions)
+    with pytest.warns(UserWarning, match="do not render"):
+        assert env.render() is None
 
 
 def test_the_code_of_the_documentation_runs():

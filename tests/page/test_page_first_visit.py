@@ -6,6 +6,9 @@ import pytest
 from page_browsing import keep_picture
 from page_serving import Served
 
+from volery.scenario import library
+from volery.server.gallery import title_of
+
 pytestmark = pytest.mark.slow
 
 LARGE = {"width": 1440, "height": 900}
@@ -62,3 +65,29 @@ def test_a_phone_shows_whole_cards_and_an_empty_plot_with_its_hint_alone(browsin
     page.get_by_text("Choose a topic and a field below to add a line.").wait_for()
     assert not page.locator("[data-empty] canvas").first.is_visible()
     keep_picture(page, "phone_empty_plot")
+
+
+@pytest.mark.parametrize("width", [390, 360])
+def test_a_phone_shows_whole_titles_in_two_rows_of_the_top_bar(browsing, served, width):
+    """Each shipped title has room beside the buttons, in at most two lines."""
+    viewport = {"width": width, "height": 844}
+    page = browsing.open(served.url, viewport=viewport, is_mobile=True, has_touch=True)
+    title = page.locator(".top-scenario .mantine-Text-root")
+    title.wait_for()
+    page.get_by_role("group", name="Time").wait_for()
+    heights = page.evaluate(
+        """titles => {
+      const text = document.querySelector(".top-scenario .mantine-Text-root");
+      return titles.map((title) => {
+        text.textContent = title;
+        const isWhole = text.scrollHeight <= text.clientHeight + 1
+          && text.scrollWidth <= text.clientWidth + 1;
+        return [title, isWhole, document.querySelector(".top").clientHeight];
+      });
+    }""",
+        [title_of(name) for name in library.names()],
+    )
+    assert len(heights) > 10
+    assert [title for title, is_whole, _ in heights if not is_whole] == []
+    assert max(height for *_, height in heights) < 90
+    keep_picture(page, f"phone_title_{width}")

@@ -41,6 +41,8 @@ UNCHECKED = (
 )
 """Files and folders whose functions, parameters and attributes may still contain them."""
 
+_NAMED = (ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef, ast.arg, ast.Attribute)
+
 
 def parts_of(name: str) -> list[str]:
     """The words of a name in snake_case, kebab-case or CamelCase, in lower case."""
@@ -48,9 +50,9 @@ def parts_of(name: str) -> list[str]:
 
 
 @functools.cache
-def tree_of(path: Path) -> ast.Module:
-    """The syntax tree of a file: parsing takes most of the time of these tests."""
-    return ast.parse(path.read_text())
+def nodes_of(path: Path) -> list[ast.AST]:
+    """The named nodes of a file: parsing and walking take most of the time of these tests."""
+    return [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, _NAMED)]
 
 
 def names() -> Iterator[tuple[str, str]]:
@@ -59,7 +61,7 @@ def names() -> Iterator[tuple[str, str]]:
     for source, path in paths:
         where = path.relative_to(source)
         yield from ((part, str(where)) for part in where.with_suffix("").parts)
-        for node in ast.walk(tree_of(path)):
+        for node in nodes_of(path):
             if isinstance(node, ast.ClassDef):
                 yield node.name, f"{where}: class {node.name}"
 
@@ -70,7 +72,7 @@ def inner_names() -> Iterator[tuple[str, str]]:
         where = path.relative_to(_SOURCES[0]).as_posix()
         if where.startswith(UNCHECKED):
             continue
-        for node in ast.walk(tree_of(path)):
+        for node in nodes_of(path):
             if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
                 yield node.name, f"{where}:{node.lineno} {node.name}"
             elif isinstance(node, ast.arg):

@@ -8,11 +8,11 @@ installed packages add.
 
 from __future__ import annotations
 
-import difflib
 import pkgutil
 
 from volery.core.entry_points import EntryPoints
 from volery.core.errors import BridgeError
+from volery.core.near_names import near_miss
 from volery.graph.bridge_kind import (
     LOOPBACK,
     NO_PORT,
@@ -74,8 +74,7 @@ def _unknown(name: str, names: list[str]) -> str:
             f"no bridge '{name}': the installed packages register no bridges; install Volery "
             "again (from its source folder: pip install -e .)"
         )
-    near = difflib.get_close_matches(name, names, n=1)
-    hint = f" Did you mean '{near[0]}'?" if near else ""
+    hint = near_miss(name, names)
     return f"no bridge '{name}'.{hint} Bridges: {', '.join(names)}"
 
 

@@ -140,6 +140,14 @@ class UnfinishedMessages:
         return found
 
 
+def _nothing() -> None:
+    """Does nothing."""
+
+
+def _ignore(_reason: str) -> None:
+    """Does nothing."""
+
+
 SHARED = UnfinishedMessages()
 """The account of all servers of the process."""
 
@@ -169,9 +177,10 @@ class UnfinishedBytes:
         return has_room
 
     def close(self) -> None:
-        """Frees the bytes of a client that has left."""
+        """Frees the bytes of a client that has left; later calls of `hold` must not follow."""
         self._account.hold(self, 0, may_wait=False)
         self._size = 0
+        self.evict = self.resume = _nothing  # they refer to the client
 
 
 class _ReadTurns:
@@ -274,6 +283,8 @@ class ArrivingMessages:
             self._timer.cancel()
             self._timer = None
         self._share.close()
+        self._end = _ignore
+        self._pause = self._resume = _nothing
 
     def _check(self) -> None:
         self._timer = None
@@ -287,8 +298,9 @@ class ArrivingMessages:
 
     def _end_once(self, reason: str) -> None:
         if not self._has_ended:
+            end, self._end = self._end, _ignore
             self.close()
-            self._end(reason)
+            end(reason)
 
     def _post(self, action: Callable[[], None]) -> None:
         with suppress(RuntimeError):  # the loop has ended

@@ -8,8 +8,9 @@ import sys
 import threading
 import time
 from pathlib import Path
-from typing import TextIO
+from typing import BinaryIO
 
+from volery.cli.error_reporting import warn
 from volery.cli.tables import print_table
 from volery.cli.terminal import echo_line, echo_lines
 from volery.comms.addresses import Identity
@@ -19,8 +20,9 @@ from volery.comms.server.tcp import PORT
 from volery.comms.station.core import FATAL
 from volery.comms.station.ground_station import HEAD, HELP, GroundStation
 from volery.comms.station.tcp import Station
-from volery.core.errors import CommsError
+from volery.core.errors import CommsError, reason_of
 from volery.core.plain_text import plain
+from volery.core.whole_files import open_to_append
 
 _LEAVE_S = 2.0
 """Wall time for commands in transit after the last input line."""
@@ -44,7 +46,7 @@ def command_station(
     """Joins a server, prints received messages and sends the commands of the input lines."""
     host, port = parse_server(server)
     with contextlib.ExitStack() as stack:
-        file = None if log is None else stack.enter_context(log.open("a", encoding="utf-8"))
+        file = None if log is None else stack.enter_context(open_to_append(log))
         desk = _Desk(file)
         station = Station(
             Identity.ground(number),
@@ -69,7 +71,7 @@ class _Desk:
 
     ground: GroundStation
 
-    def __init__(self, log: TextIO | None) -> None:
+    def __init__(self, log: BinaryIO | None) -> None:
         self._log = log
         self._clock_ns = time.time_ns() - time.monotonic_ns()
         self._has_joined = False
@@ -157,10 +159,21 @@ class _Desk:
         line = plain(line)
         echo_line(line)
         sys.stdout.flush()
-        if self._log is not None:
-            stamp = time.strftime("%Y-%m-%dT%H:%M:%S", time.gmtime())
-            self._log.write(f"{stamp}Z {line}\n")
+        self._write(line)
+
+    def _write(self, line: str) -> None:
+        """Appends a line to the log; a full disk ends the log, not the station."""
+        if self._log is None:
+            return
+        stamp = time.strftime("%Y-%m-%dT%H:%M:%S", time.gmtime())
+        try:
+            self._log.write(f"{stamp}Z {line}\n".encode())
             self._log.flush()
+        except OSError as error:
+            with contextlib.suppress(OSError):  # what is buffered cannot be written either
+                self._log.close()
+            self._log = None
+            warn(f"the log ends here: {reason_of(error)}")
 
 
 def _read_into(queue: asyncio.Queue[str | None], loop: asyncio.AbstractEventLoop) -> None:

@@ -7,7 +7,6 @@ that, SIGTERM and SIGHUP have the system's default effect.
 
 from __future__ import annotations
 
-import _thread
 import os
 import signal
 import stat
@@ -138,7 +137,9 @@ class Interrupts:
             return
         self._forget_retry()
         if _is_compiling(frame):
-            self._retry = threading.Timer(_RETRY_S, _thread.interrupt_main)
+            # Unlike `_thread.interrupt_main`, this ends a system call of the main thread.
+            again = (threading.main_thread().ident, signal.SIGINT)
+            self._retry = threading.Timer(_RETRY_S, signal.pthread_kill, again)
             self._retry.daemon = True
             self._retry.start()
         else:

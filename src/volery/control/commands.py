@@ -279,7 +279,8 @@ class FleetCommands:
         position: (3,) m, map; attitude: (4,), map from body. The pose holds until the next command.
         velocity: (3,) m/s, map, and omega_body: (3,) rad/s, FLU, are the motion that its sensors
         measure; one alone leaves the other zero. Without both, they measure the motion between the
-        poses of a stream, see `control.pose_stream`; stamp_ns: simulated time of the pose, ns.
+        poses of a stream, see `control.pose_stream`; stamp_ns: simulated time of the pose, ns. A
+        pose that is older than the last one is ignored.
         """
         self._refuse_plants(i, "poses", RigidBody, IdentifiedModel)
         position = checked("position", position, (3,), MAX_COORDINATE)
@@ -292,7 +293,7 @@ class FleetCommands:
         control_state = self._enter_low_level(i, ControlLevel.POSE)
         if implied:
             limits = self.airframes[i].limits
-            follow_pose(
+            is_present = follow_pose(
                 control_state,
                 position,
                 attitude,
@@ -302,6 +303,8 @@ class FleetCommands:
                 dt=self._dt,
                 limits=limits,
             )
+            if not is_present:
+                return
         else:
             control_state["start_step"] = self.step
             control_state["pose_stamp"] = stamp_ns

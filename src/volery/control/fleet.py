@@ -349,6 +349,8 @@ class Fleet(FleetCommands):
 
     def rest(self, i: int) -> None:
         """Lets the landed UAV `i` rest where it stands, without motion, until the next command."""
+        for name in ("velocity_map", "omega_body", "acceleration_map", "angular_acceleration_body"):
+            self._bodies[name][i] = 0.0
         self._bodies["on_ground"][i] = self._bodies["asleep"][i] = True
 
     def push(self, i: int, velocity: ArrayLike, omega_body: ArrayLike) -> None:

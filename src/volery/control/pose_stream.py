@@ -18,9 +18,11 @@ from volery.vehicle.airframe import Limits
 
 NO_STAMP = -1
 """Stamp of a pose that has none, ns."""
+_COARSE_STAMP = -2
+"""Stamp of a stream whose poses share stamps: a clock that ticks more slowly than they come."""
 NO_DEADLINE = 2**62
 """Step until which a motion that was commanded with its velocity lasts."""
-_MAX_GAP_S = 1.0
+_MAX_GAP_S = 3.0
 """Poses farther apart begin a new stream."""
 _CLOCK_TOLERANCE_NS = NS_PER_S
 """Stamps within it of the simulated time are taken as simulated time."""
@@ -34,7 +36,9 @@ _MIN_TELEPORT_M_S = 20.0
 _MIN_TELEPORT_RAD_S = math.radians(1000.0)
 _MISSED_POSES = 3.0
 _MIN_PATIENCE_S = 0.1
-"""The UAV stands still when no pose came for this time and for `_MISSED_POSES` periods."""
+"""The UAV stands still when no new pose came for this time and for `_MISSED_POSES` periods."""
+_SAME_POSE = 1e-9
+"""Change, m and rad, below which a pose repeats the last one."""
 STOP_S = 0.1
 """Time in which the measured motion ends after the last pose of a stream."""
 
@@ -49,45 +53,68 @@ def follow_pose(
     step: int,
     dt: float,
     limits: Limits,
-) -> None:
+) -> bool:
     """Sets velocity and rates of a `CONTROL_STATE` from its last pose and the next one.
 
     position: (3,) m, map; attitude: (4,), map from body. stamp_ns: time of the pose; it counts if
     it is simulated time, else the time of arrival does, and the jitter of arrival is smoothed.
     in_stream: whether the last command was a pose, too. step: of arrival; dt: physics step, s.
+    Returns whether the pose is the present one: a pose that is older than the last one is not. A
+    pose that repeats a moving UAV's last one, as engines send it that draw faster than they move,
+    ends the motion only if no other one follows.
     """
-    now_ns = round(step * dt * NS_PER_S)
-    if stamp_ns < 0 or abs(stamp_ns - now_ns) > _CLOCK_TOLERANCE_NS:
-        stamp_ns = NO_STAMP
-    arrival_s = (step - int(control_state["start_step"])) * dt
-    last_ns = int(control_state["pose_stamp"])
-    stamped = min(stamp_ns, last_ns) >= 0 and stamp_ns > last_ns
-    gap_s = (stamp_ns - last_ns) / NS_PER_S if stamped else arrival_s
-    period_s = max(gap_s, dt if stamped else _MIN_PERIOD_S)
-
+    last_ns = int(control_state["pose_stamp"]) if in_stream else NO_STAMP
+    stamp_ns = _trusted(stamp_ns, last_ns, round(step * dt * NS_PER_S))
+    is_timed = min(stamp_ns, last_ns) > 0
+    if is_timed and stamp_ns < last_ns:
+        return False
     way = position - control_state["position_target"]
     turn = rotations.logarithm(
         rotations.multiply(rotations.conjugate(control_state["attitude"]), attitude)
     )
+    deadline = int(control_state["deadline_step"])
+    is_repeated = max(np.linalg.norm(way), np.linalg.norm(turn)) < _SAME_POSE
+    if in_stream and is_repeated and deadline != NO_DEADLINE:
+        return True
+    if is_timed and stamp_ns == last_ns:
+        stamp_ns, is_timed = _COARSE_STAMP, False
+    arrival_s = (step - int(control_state["start_step"])) * dt
+    gap_s = (stamp_ns - last_ns) / NS_PER_S if is_timed else arrival_s
+    period_s = max(gap_s, dt if is_timed else _MIN_PERIOD_S)
     control_state["start_step"] = step
     control_state["pose_stamp"] = stamp_ns
     if not in_stream or gap_s > _MAX_GAP_S or _is_teleport(way, turn, period_s, limits):
         control_state["velocity_target"] = control_state["rates"] = 0.0
         control_state["pose_steps"] = 0
         control_state["deadline_step"] = NO_DEADLINE
-        return
-    if stamped:
+        return True
+    if is_timed:
         control_state["velocity_target"] = way / gap_s
         control_state["rates"] = turn / gap_s
     else:
-        # A first-order filter, of several poses at one instant as well.
+        # A first-order filter. Poses that arrive together share the time since those before.
         share = 1.0 - math.exp(-gap_s / _SMOOTHING_S)
-        a_second = share / gap_s if gap_s > 0.0 else 1.0 / _SMOOTHING_S
+        if gap_s > 0.0:
+            a_second = share / gap_s
+        else:
+            period_s = max(period_s, int(control_state["pose_steps"]) * dt)
+            a_second = (1.0 - math.exp(-period_s / _SMOOTHING_S)) / period_s
         for name, change in (("velocity_target", way), ("rates", turn)):
             control_state[name] = (1.0 - share) * control_state[name] + a_second * change
     control_state["pose_steps"] = max(1, round(period_s / dt))
-    patience_s = max(_MISSED_POSES * period_s, _MIN_PATIENCE_S)
-    control_state["deadline_step"] = step + max(1, round(patience_s / dt))
+    patience_s = max(_MISSED_POSES * max(period_s, arrival_s), _MIN_PATIENCE_S)
+    end = step + max(1, round(patience_s / dt))
+    is_burst = arrival_s < _MIN_PERIOD_S and deadline != NO_DEADLINE
+    control_state["deadline_step"] = max(end, deadline) if is_burst else end
+    return True
+
+
+def _trusted(stamp_ns: int, last_ns: int, now_ns: int) -> int:
+    """Returns the stamp of a pose if it is simulated time, else `NO_STAMP` or `_COARSE_STAMP`."""
+    if last_ns == _COARSE_STAMP:
+        return _COARSE_STAMP
+    is_simulated = stamp_ns > 0 and abs(stamp_ns - now_ns) <= _CLOCK_TOLERANCE_NS
+    return stamp_ns if is_simulated else NO_STAMP
 
 
 def _is_teleport(way: Array, turn: Array, period_s: float, limits: Limits) -> bool:

@@ -46,6 +46,20 @@ class Trajectory:
     faces: bool
     """Whether the trajectory has headings; otherwise a UAV's heading is unchanged."""
 
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Trajectory):
+            return NotImplemented
+        return self.faces == other.faces and np.array_equal(self.segments, other.segments)
+
+    def __hash__(self) -> int:
+        return hash((self.faces, self.segments.tobytes()))
+
+    def __repr__(self) -> str:
+        begin_s, end_s = float(self.segments[0, 0]), float(self.segments[-1, 1])
+        ends = [self.at(time_s).position_map.tolist() for time_s in (begin_s, end_s)]
+        first, last = (", ".join(f"{number:.2f}" for number in end) for end in ends)
+        return f"<Trajectory: {begin_s:g} to {end_s:g} s, from ({first}) to ({last}) m>"
+
     @classmethod
     def from_samples(
         cls,

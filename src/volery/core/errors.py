@@ -134,6 +134,9 @@ def reason_of(error: Exception) -> str:
 
     asyncio reports a refused connection as "Connect call failed ('127.0.0.1', 9090)".
     """
+    if isinstance(error, UnicodeDecodeError):
+        byte = error.object[error.start]
+        return f"not UTF-8 text (byte 0x{byte:02x} at {error.start}): save it as UTF-8"
     number = error.errno if isinstance(error, OSError) else None
     if number is not None and number > 0:  # those of failed name look-ups are negative
         return os.strerror(number)

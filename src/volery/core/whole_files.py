@@ -18,6 +18,7 @@ from typing import BinaryIO
 PARTIAL = ".part"
 """Ending of the names of unfinished files."""
 _NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
+_CONTINUED = os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW | os.O_CLOEXEC
 
 
 def write_whole(
@@ -88,6 +89,18 @@ def open_new(path: Path) -> BinaryIO:
     """
     path.unlink(missing_ok=True)
     return os.fdopen(os.open(path, _NEW, 0o666), "wb")
+
+
+def open_to_append(path: Path) -> BinaryIO:
+    """Opens a file for output that continues it; a link of its name is replaced by a new file.
+
+    Devices and pipes are written directly. Raises `OSError` if it cannot be opened.
+    """
+    if _is_stream(path):
+        return path.open("ab")
+    if path.is_symlink():
+        path.unlink()
+    return os.fdopen(os.open(path, _CONTINUED, 0o666), "ab")
 
 
 def new_partial(path: Path, ending: str = PARTIAL) -> Path:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Collection
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from volery.control.fleet import Fleet
 from volery.control.setpoints import MAX_COORDINATE, checked
@@ -44,6 +44,13 @@ class Radios(Protocol):
         """Restores a radio."""
 
 
+class _ActiveFault(NamedTuple):
+    """A fault that has begun; `number` is that of its plan."""
+
+    number: int
+    fault: LastingFault
+
+
 class FaultPlan:
     """Schedules faults of an engine's UAVs; the scheduled faults are part of its state.
 
@@ -58,7 +65,9 @@ class FaultPlan:
         """(rotors,) health without faults, by UAV, wear included."""
         self._weak: dict[tuple[str, int], list[float]] = {}
         """Thrust factors of the active faults, by UAV and rotor."""
-        self._active: tuple[LastingFault, ...] = ()
+        self._active: tuple[_ActiveFault, ...] = ()
+        self._planned = 0
+        """Number of faults so far; a number, unlike a description, belongs to one fault alone."""
         self.enlist(engine.names)
 
     def enlist(self, uavs: Collection[str]) -> None:
@@ -76,38 +85,35 @@ class FaultPlan:
         """
         begin, end = self._actions(fault)
         uav = getattr(fault, "uav", None)
-        until_s = getattr(fault, "until_s", None)
+        self._planned += 1
+        number = self._planned
 
-        def begin_it() -> None:
+        def begin_it() -> bool:
             begin()
             if isinstance(fault, LastingFault):
-                self._list(fault)
+                self._list(number, fault)
+            return True
+
+        def end_it() -> bool:
+            return self._finish([one for one in self._active if one.number == number], end)
 
         self._at(fault.at_s, begin_it, uav, f"fault: {fault.kind}", client)
-        if until_s is not None:
-            ends_by_itself = isinstance(fault, GnssFault)
-            action = end if end is not None and not ends_by_itself else _nothing
-
-            def end_it() -> None:
-                action()
-                self._strike(fault)
-
-            self._at(until_s, end_it, uav, f"fault over: {fault.kind}", client)
+        if isinstance(fault, LastingFault) and fault.until_s is not None:
+            self._at(fault.until_s, end_it, uav, f"fault over: {fault.kind}", client)
 
     def end(self, fault: Fault, *, client: str = "") -> None:
         """Ends an active fault at the next tick; has no effect without such a fault.
 
-        The fault's times are ignored. Raises `CommandError` as `add`, and for a gust or a
-        displacement.
+        The fault's times are ignored: of faults alike, the oldest ends. Raises `CommandError` as
+        `add`, and for a gust or a displacement.
         """
         _, end = self._actions(fault)
         if end is None:
             raise CommandError(f"fault: a {fault.kind} cannot be ended: it ends by itself")
         uav = getattr(fault, "uav", None)
 
-        def end_it() -> None:
-            end()
-            self._strike(fault)
+        def end_it() -> bool:
+            return self._finish([one for one in self._active if _ends(fault, one.fault)][:1], end)
 
         self._at(0.0, end_it, uav, f"fault over: {fault.kind}", client)
 
@@ -118,27 +124,32 @@ class FaultPlan:
         `at_s` is the time at which they began. Gusts and displacements are not among them.
         """
         present = set(self._engine.names)
-        return tuple(fault for fault in self._active if fault.uav in present)
+        return tuple(one.fault for one in self._active if one.fault.uav in present)
 
-    def _list(self, fault: LastingFault) -> None:
-        if isinstance(fault, SensorFault):
-            self._strike(fault)  # a sensor has one fault at a time
+    def _list(self, number: int, fault: LastingFault) -> None:
+        if isinstance(fault, SensorFault):  # a sensor has one fault at a time
+            self._strike([one for one in self._active if _ends(fault, one.fault)])
         began = fault.model_copy(update={"at_s": s_from_ns(self._engine.time_ns)})
-        self._active = (*self._active, began)
+        self._active = (*self._active, _ActiveFault(number, began))
 
-    def _strike(self, fault: Fault) -> None:
-        """Removes what a fault's end ends: one fault, or all of a sensor or of the GNSS."""
-        like = [one for one in self._active if _ends(fault, one)]
-        if not isinstance(fault, SensorFault | GnssFault):
-            like = like[:1]
-        self._active = tuple(one for one in self._active if not any(one is x for x in like))
+    def _finish(self, ended: list[_ActiveFault], end: Callable[[], Any] | None) -> bool:
+        """Ends active faults; returns whether there are any: one may have ended before."""
+        self._strike(ended)
+        if ended and end is not None:
+            end()
+        return bool(ended)
+
+    def _strike(self, ended: list[_ActiveFault]) -> None:
+        """Removes faults from the list of active ones."""
+        numbers = {one.number for one in ended}
+        self._active = tuple(one for one in self._active if one.number not in numbers)
 
     def mend(self, uav: str) -> None:
         """Clears the rotor faults and radio faults of a UAV that restarts."""
         if self._radios is not None:
             self._radios.restore_all(uav)
         self._weak = {key: shares for key, shares in self._weak.items() if key[0] != uav}
-        self._active = tuple(fault for fault in self._active if fault.uav != uav)
+        self._active = tuple(one for one in self._active if one.fault.uav != uav)
 
     def get_state(self) -> dict[str, Any]:
         """Returns the active faults, for a snapshot; engine, fleet and sensors save the rest."""
@@ -155,14 +166,17 @@ class FaultPlan:
         return self._engine.fleet
 
     def _at(
-        self, time_s: float, action: Callable[[], Any], uav: str | None, what: str, client: str
+        self, time_s: float, action: Callable[[], bool], uav: str | None, what: str, client: str
     ) -> None:
+        """Schedules an action, and an event if it returns that it had an effect."""
+
         def act() -> None:
             if uav is not None and uav not in self._engine.names:
                 return
             told = what
             try:
-                action()
+                if not action():
+                    return
             except Exception as error:
                 if not client:
                     raise
@@ -242,19 +256,23 @@ class FaultPlan:
         if not self._receivers(self._row(fault.uav)):
             raise CommandError(f"{fault.uav} has no GNSS receiver to lose its fix")
         since = ns_from_s(fault.at_s)
-        until = {} if fault.until_s is None else {"until_ns": ns_from_s(fault.until_s)}
 
         def deny() -> None:
             row = self._row(fault.uav)
-            for receiver in self._receivers(row):
-                receiver.deny(row, max(since, self._engine.time_ns), **until)
+            for receiver in [] if self._is_denied(fault.uav) else self._receivers(row):
+                receiver.deny(row, max(since, self._engine.time_ns))
 
         def allow() -> None:
             row = self._row(fault.uav)
-            for receiver in self._receivers(row):
+            for receiver in [] if self._is_denied(fault.uav) else self._receivers(row):
                 receiver.allow(row, self._engine.time_ns)
 
         return deny, allow
+
+    def _is_denied(self, uav: str) -> bool:
+        """Returns whether an active fault denies a UAV the satellites' signals."""
+        faults = (one.fault for one in self._active)
+        return any(isinstance(one, GnssFault) and one.uav == uav for one in faults)
 
     def _receivers(self, row: int) -> list[GnssBank]:
         inner = [b.bank for b in self._engine.banks if isinstance(b, FaultableBank)]
@@ -337,7 +355,3 @@ def _ends(fault: Fault, active: LastingFault) -> bool:
         same_rotor = fault.rotor == active.rotor
         return same_rotor and fault.thrust_factor == active.thrust_factor
     return True
-
-
-def _nothing() -> None:
-    """Does nothing, for a fault that ends by itself."""

@@ -12,20 +12,20 @@ may modify them.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence, Set
 from dataclasses import fields
 from enum import Enum
 from functools import cache, partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from rosbags.interfaces import Nodetype
 
 from volery.core.errors import GraphError
 from volery.graph.codecs.zero import DTYPES
 from volery.graph.lazy_list import LazyList
 from volery.graph.message_defaults import is_plain_name
+from volery.graph.message_numbers import numbers_of
 from volery.graph.number_sequence import received
 from volery.graph.typestore import typestore
 
@@ -88,6 +88,9 @@ def _copier(msgtype: str, purpose: _Purpose) -> Copy:
             f"_copy_{name}(message.{name})"
             if usual is None
             else f"(v if (v := message.{name}).__class__ is {usual} else _copy_{name}(v))"
+            if usual != "str"  # a text beyond ASCII may have half a surrogate pair
+            else f"(v if (v := message.{name}).__class__ is str and v.isascii() "
+            f"else _copy_{name}(v))"
         )
     most = len(described)
     is_odd = f"message.__class__ is not _cls or len(message.__dict__) > {most}"
@@ -130,18 +133,20 @@ def _field_copier(where: str, described: Any, purpose: _Purpose) -> Copy | None:
         return partial(_copy_list, where, check, False)
     if purpose is _RECEIVED:
         return received if kind == Nodetype.SEQUENCE else _writeable
-    copy = _look_at_numbers if purpose is _LOOKED_AT else _numbers
+    copy = _look_at_numbers if purpose is _LOOKED_AT else numbers_of
     return partial(copy, where, DTYPES[inner_detail[0]], length)
 
 
 def _base_checker(where: str, base: str) -> Copy:
     """Returns the function that returns a value of a base type, or raises `GraphError`."""
     if base in ("string", "wstring"):
-        return partial(_check_value, where, base, str, None)
+        return partial(_check_text, where, base)
     if base == "bool":
         return partial(_check_value, where, base, (bool, np.bool_), None)
     if base in ("float32", "float64"):
         return partial(_check_value, where, base, (float, int, np.floating, np.integer), None)
+    if base == "byte":
+        return partial(_check_byte, where)
     limits = np.iinfo(DTYPES[base])
     return partial(_check_value, where, base, (int, np.integer), (int(limits.min), int(limits.max)))
 
@@ -150,10 +155,28 @@ def _check_value(
     where: str, base: str, classes: Any, limits: tuple[int, int] | None, value: Any
 ) -> Any:
     if not isinstance(value, classes):
-        raise GraphError(f"{where} must be a {base}, not {value!r:.80} ({type(value).__name__})")
+        kind = f"{'an' if base[0] == 'i' else 'a'} {base}"
+        raise GraphError(f"{where} must be {kind}, not {value!r:.80} ({type(value).__name__})")
     if limits is not None and not limits[0] <= value <= limits[1]:
         raise GraphError(f"{where} must be a {base}, {limits[0]} to {limits[1]}, not {value}")
     return value
+
+
+def _check_text(where: str, base: str, value: Any) -> Any:
+    _check_value(where, base, str, None, value)
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        raise GraphError(f"{where} contains half a surrogate pair, not UTF-8") from None
+    return value
+
+
+def _check_byte(where: str, value: Any) -> Any:
+    """Returns the number of a byte, which rclpy has as `bytes` of length 1."""
+    if isinstance(value, bytes) and len(value) == 1:
+        value = value[0]
+    number = _check_value(where, "byte", (int, np.integer), (-128, 255), value)
+    return number - 256 if number > 127 else number
 
 
 def _nested(where: str, copy: Copy, value: Any) -> Any:
@@ -180,9 +203,9 @@ def _holds(msgtype: str) -> bool:
 
 def _copy_list(where: str, copy: Copy | None, is_shared: bool, values: Any) -> Any:
     """Returns a list of copied parts; `is_shared`: of the parts themselves, after `copy`."""
-    if not isinstance(values, list | tuple):
-        if isinstance(values, LazyList):  # built when read, and so immutable
-            return values
+    if isinstance(values, LazyList):  # built when read, and so immutable
+        return values
+    if not isinstance(values, Sequence | Set) or isinstance(values, str | bytes):
         raise GraphError(f"{where} must be a list, not {values!r:.80} ({type(values).__name__})")
     if copy is None:
         return list(values)
@@ -193,27 +216,8 @@ def _copy_list(where: str, copy: Copy | None, is_shared: bool, values: Any) -> A
     return list(values) if is_shared else copied
 
 
-def _numbers(where: str, dtype: np.dtype[Any], length: int, values: Any) -> NDArray[Any]:
-    if isinstance(values, np.ndarray) and values.dtype == dtype:
-        values = values if type(values) is np.ndarray else values.view(np.ndarray)
-        if values.flags.writeable:
-            values = values.copy()
-    elif isinstance(values, bytes | bytearray | memoryview):
-        values = np.frombuffer(bytes(values), np.uint8).astype(dtype)
-    else:
-        try:
-            values = np.array(values, dtype)
-        except (ValueError, TypeError, OverflowError) as error:
-            raise GraphError(f"{where}: {error}") from None
-    if length and values.size != length:
-        raise GraphError(f"{where}: must have {length} numbers, not {values.size}")
-    values.setflags(write=False)
-    array: NDArray[Any] = values
-    return array
-
-
 def _look_at_numbers(where: str, dtype: np.dtype[Any], length: int, values: Any) -> None:
-    """Raises `GraphError` if `_numbers` would; copies no array."""
-    fits = isinstance(values, np.ndarray) and values.dtype == dtype
+    """Raises `GraphError` if `numbers_of` would; copies no array."""
+    fits = isinstance(values, np.ndarray) and values.dtype == dtype and values.ndim == 1
     if not fits or length not in (0, values.size):
-        _numbers(where, dtype, length, values)
+        numbers_of(where, dtype, length, values)

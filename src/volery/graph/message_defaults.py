@@ -95,7 +95,7 @@ def _constructor(
     text = f"def __init__(self, {', '.join(arguments)}):\n" + "\n".join(lines or ["    pass"])
     exec(text, scope)  # field names only, as in dataclasses
     made: Callable[..., None] = scope["__init__"]
-    made.__qualname__ = f"{cls.__qualname__}.__init__"
+    made.__qualname__ = f"{cls.__name__}.__init__"
     return made
 
 

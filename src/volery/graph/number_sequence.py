@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 MAX_COPIED_BYTES = 64 * 1024
 """Largest array that `received` copies, so that a node may write into it as in rclpy."""
 
+_GROWING = ("append", "extend", "fromlist", "frombytes", "insert", "pop", "remove")
+
 Plain = NDArray[Any]
 
 
@@ -106,7 +108,7 @@ class NumberSequence(np.ndarray):
     __rmul__ = __mul__
 
     def __eq__(self, other: Any) -> Any:
-        """Compares two sequences as a whole; anything else element by element."""
+        """Compares sequences as a whole; anything else element by element."""
         return self._compared(other, operator.eq)
 
     def __ne__(self, other: Any) -> Any:
@@ -123,6 +125,11 @@ class NumberSequence(np.ndarray):
         """Returns a writeable copy."""
         return self.__copy__()
 
+    def __getattr__(self, name: str) -> Any:
+        """Raises `AttributeError`: the sequence cannot grow or shrink."""
+        hint = ": its length is fixed; use list(values)" if name in _GROWING else ""
+        raise AttributeError(f"a received sequence has no '{name}'{hint}")
+
     def __repr__(self) -> str:
         """Shows the sequence as `array.array` does."""
         return f"array('{self.typecode}', {_plain(self).tolist()})"
@@ -132,6 +139,8 @@ class NumberSequence(np.ndarray):
     def _compared(self, other: Any, compare: Callable[[Any, Any], Any]) -> Any:
         if self._joins(other):
             return compare(self.tolist(), list(other))
+        if self._is_field and isinstance(other, list | tuple):
+            return compare is operator.ne  # an `array.array` equals no list
         return compare(_plain(self), _plain(other))
 
     def _joins(self, other: Any) -> bool:

@@ -44,6 +44,10 @@ class ParameterNotDeclaredError(GraphError):
     """Raised when a node has no such parameter."""
 
 
+class ParameterUninitializedError(GraphError):
+    """Raised when a parameter was declared with a type, and nothing has given it a value."""
+
+
 class ParameterAlreadyDeclaredError(GraphError):
     """Raised when a node has declared the parameter already."""
 
@@ -162,8 +166,14 @@ class Parameter(ParameterSetting):
         self._set_with = set_with
         self._like = like
         self._within = within
-        self._check(value)
+        if value is not None:
+            self._check(value)
         self.value = self._of_kind(value)
+
+    @property
+    def is_initialized(self) -> bool:
+        """Whether it has a value, or none was to be given at its declaration."""
+        return self.value is not None or self._like is None
 
     def set(self, value: Any) -> None:
         """Sets the value. Raises `GraphError` if read-only, or if the value does not fit."""
@@ -213,7 +223,7 @@ class Parameter(ParameterSetting):
 
     def _of_kind(self, value: Any) -> Any:
         """Converts an integer to a float if the parameter is a float."""
-        return float(value) if isinstance(self._like, float) else value
+        return float(value) if isinstance(self._like, float) and value is not None else value
 
     def _check(self, value: Any) -> None:
         if not same_kind(value, self._like):

@@ -18,7 +18,59 @@ def check_depth(depth: int) -> None:
         raise GraphError(f"queue depth must be 1 to {MOST_DEPTH}, not {depth}")
 
 
-class ReliabilityPolicy(StrEnum):
+class _Policy(StrEnum):
+    """Policy of rclpy, which a program may also name by its number or by its old name."""
+
+    @classmethod
+    def _missing_(cls, value: object) -> _Policy | None:
+        numbers = _NUMBERS[cls.__name__]
+        known = isinstance(value, int) and value in numbers
+        return cls[numbers[value]] if known else None  # type: ignore[index]
+
+    @property
+    def short_key(self) -> str:
+        """Name in lower case."""
+        return self.name.lower()
+
+    @classmethod
+    def short_keys(cls) -> list[str]:
+        """Returns the names in lower case."""
+        return [policy.short_key for policy in cls]
+
+    @classmethod
+    def get_from_short_key(cls, name: str) -> _Policy:
+        """Returns the policy of a name, whatever its case."""
+        return cls[name.upper()]
+
+
+_NUMBERS = {
+    "ReliabilityPolicy": {
+        0: "SYSTEM_DEFAULT",
+        1: "RELIABLE",
+        2: "BEST_EFFORT",
+        3: "UNKNOWN",
+        4: "BEST_AVAILABLE",
+    },
+    "DurabilityPolicy": {
+        0: "SYSTEM_DEFAULT",
+        1: "TRANSIENT_LOCAL",
+        2: "VOLATILE",
+        3: "UNKNOWN",
+        4: "BEST_AVAILABLE",
+    },
+    "HistoryPolicy": {0: "SYSTEM_DEFAULT", 1: "KEEP_LAST", 2: "KEEP_ALL", 3: "UNKNOWN"},
+    "LivelinessPolicy": {
+        0: "SYSTEM_DEFAULT",
+        1: "AUTOMATIC",
+        3: "MANUAL_BY_TOPIC",
+        4: "UNKNOWN",
+        5: "BEST_AVAILABLE",
+    },
+}
+"""Numbers of the policies in `rmw/types.h`."""
+
+
+class ReliabilityPolicy(_Policy):
     """What happens when a subscriber is too slow."""
 
     SYSTEM_DEFAULT = "system_default"
@@ -27,24 +79,54 @@ class ReliabilityPolicy(StrEnum):
     RELIABLE = "reliable"
     """No message is dropped; the subscription of a client that never catches up ends with a
     reason."""
+    UNKNOWN = "unknown"
+    BEST_AVAILABLE = "best_available"
+    RMW_QOS_POLICY_RELIABILITY_SYSTEM_DEFAULT = SYSTEM_DEFAULT
+    RMW_QOS_POLICY_RELIABILITY_BEST_EFFORT = BEST_EFFORT
+    RMW_QOS_POLICY_RELIABILITY_RELIABLE = RELIABLE
+    RMW_QOS_POLICY_RELIABILITY_UNKNOWN = UNKNOWN
 
 
-class DurabilityPolicy(StrEnum):
+class DurabilityPolicy(_Policy):
     """Which messages late subscribers receive."""
 
     SYSTEM_DEFAULT = "system_default"
     VOLATILE = "volatile"
     TRANSIENT_LOCAL = "transient_local"
     """The publisher's last message."""
+    UNKNOWN = "unknown"
+    BEST_AVAILABLE = "best_available"
+    RMW_QOS_POLICY_DURABILITY_SYSTEM_DEFAULT = SYSTEM_DEFAULT
+    RMW_QOS_POLICY_DURABILITY_VOLATILE = VOLATILE
+    RMW_QOS_POLICY_DURABILITY_TRANSIENT_LOCAL = TRANSIENT_LOCAL
+    RMW_QOS_POLICY_DURABILITY_UNKNOWN = UNKNOWN
 
 
-class HistoryPolicy(StrEnum):
+class HistoryPolicy(_Policy):
     """How many messages are queued."""
 
     KEEP_LAST = "keep_last"
     KEEP_ALL = "keep_all"
     """As many as possible; the depth has no effect."""
     SYSTEM_DEFAULT = "system_default"
+    UNKNOWN = "unknown"
+    RMW_QOS_POLICY_HISTORY_KEEP_LAST = KEEP_LAST
+    RMW_QOS_POLICY_HISTORY_KEEP_ALL = KEEP_ALL
+    RMW_QOS_POLICY_HISTORY_SYSTEM_DEFAULT = SYSTEM_DEFAULT
+    RMW_QOS_POLICY_HISTORY_UNKNOWN = UNKNOWN
+
+
+class LivelinessPolicy(_Policy):
+    """Has no effect."""
+
+    AUTOMATIC = "automatic"
+    MANUAL_BY_TOPIC = "manual_by_topic"
+    SYSTEM_DEFAULT = "system_default"
+    UNKNOWN = "unknown"
+    BEST_AVAILABLE = "best_available"
+    RMW_QOS_POLICY_LIVELINESS_AUTOMATIC = AUTOMATIC
+    RMW_QOS_POLICY_LIVELINESS_MANUAL_BY_TOPIC = MANUAL_BY_TOPIC
+    RMW_QOS_POLICY_LIVELINESS_SYSTEM_DEFAULT = SYSTEM_DEFAULT
 
 
 @dataclass
@@ -58,7 +140,7 @@ class QoSProfile:
     """
 
     depth: int = DEFAULT_DEPTH
-    """Maximum number of queued messages with best effort."""
+    """Maximum number of queued messages with best effort; 0: the default, as in rclpy."""
     reliability: ReliabilityPolicy = ReliabilityPolicy.BEST_EFFORT
     durability: DurabilityPolicy = DurabilityPolicy.VOLATILE
     history: HistoryPolicy = HistoryPolicy.KEEP_LAST
@@ -69,8 +151,12 @@ class QoSProfile:
     avoid_ros_namespace_conventions: bool = False
 
     def __post_init__(self) -> None:
+        self.reliability = ReliabilityPolicy(self.reliability)
+        self.durability = DurabilityPolicy(self.durability)
+        self.history = HistoryPolicy(self.history)
         if self.history == HistoryPolicy.KEEP_ALL:
             self.depth = MOST_DEPTH
+        self.depth = self.depth or DEFAULT_DEPTH
         check_depth(self.depth)
 
     @property

@@ -166,3 +166,4 @@ class ReadScope:
     def close(self) -> None:
         """Clears the debt of a client that has disconnected."""
         self._budget.close()
+        self._waiting = int  # the function before refers to the client

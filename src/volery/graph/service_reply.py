@@ -32,12 +32,16 @@ class ServiceReply:
     def answer(self, response: Any) -> None:
         """Gives the response; has no effect on a settled reply."""
         if self._finish():
-            self._on_response(response)
+            on_response = self._on_response
+            self._forget()
+            on_response(response)
 
     def fail(self, error: GraphError) -> None:
         """Gives a failure; has no effect on a settled reply."""
         if self._finish():
-            self._on_failure(error)
+            on_failure = self._on_failure
+            self._forget()
+            on_failure(error)
 
     def when_done(self, callback: Callable[[], None]) -> None:
         """Calls `callback` before the response is passed on; at once if it has been."""
@@ -55,3 +59,12 @@ class ServiceReply:
         for callback in self._afterwards:
             callback()
         return True
+
+    def _forget(self) -> None:
+        """Drops the callbacks, which often refer to the reply: its memory is free at once."""
+        self._afterwards.clear()
+        self._on_response = self._on_failure = _ignore
+
+
+def _ignore(_what: object) -> None:
+    """Does nothing."""

@@ -117,7 +117,8 @@ class Publisher:
         """Raises `GraphError` if the message is not of the topic's type."""
         name = getattr(message, "__msgtype__", None)
         if name != self.msgtype:
-            raise GraphError(f"topic '{self.topic}' carries {self.msgtype}, not {name}")
+            found = name or f"a {type(message).__name__}"
+            raise GraphError(f"topic '{self.topic}' carries {self.msgtype}, not {found}")
 
     def publish_posted(self, message: Any) -> None:
         """Queues a message published before `cancel` that arrives later, even after `cancel`."""

@@ -10,6 +10,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from volery.graph.codecs.definition_store import DefinitionStore
 from volery.graph.message_defaults import make_arguments_optional
+from volery.graph.message_methods import add_methods
 
 _DEFINITIONS = Path(__file__).parent / "definitions"
 _MODULE = "volery.graph.messages"
@@ -33,10 +34,11 @@ def _base_default(msgtype: str, field: str) -> Any:
     return _BASE_DEFAULTS.get((msgtype, field))
 
 
-def _make_base_arguments_optional() -> None:
+def _complete_base_types() -> None:
     base = get_typestore(Stores.ROS2_JAZZY)
     for name, cls in base.types.items():
         make_arguments_optional(name, cls, base.types, base.fielddefs, _base_default)
+        add_methods(name, cls, base.fielddefs)
 
 
-_make_base_arguments_optional()
+_complete_base_types()

@@ -11,6 +11,7 @@ from typing import Any
 import gymnasium
 
 from volery.core.errors import ScenarioError
+from volery.learning.rendering import refuse_rendering
 from volery.learning.single_env import TaskEnv
 from volery.learning.task import Task
 from volery.learning.tasks import TASKS, load_task
@@ -34,9 +35,9 @@ def register_tasks() -> None:
 def make_single(task: str, *, render_mode: str | None = None, **options: Any) -> TaskEnv:
     """Returns one environment of a task for `gymnasium.make`; options are those of `TaskEnv`.
 
-    Raises `ScenarioError` for a `render_mode` other than None.
+    Raises `RenderingError` for a `render_mode` other than None.
     """
-    _refuse_rendering(render_mode)
+    refuse_rendering(render_mode)
     return TaskEnv(load_task(task), **options)
 
 
@@ -50,10 +51,10 @@ def make_many(
 ) -> TaskVectorEnv:
     """Returns environments for `gymnasium.make_vec`; options are those of `TaskVectorEnv`.
 
-    max_episode_steps: of decisions, at most those of the task. Raises `ScenarioError` for a
-    `render_mode` other than None, or an episode without decisions.
+    max_episode_steps: of decisions, at most those of the task. Raises `RenderingError`
+    for a `render_mode` other than None, and `ScenarioError` for an episode without decisions.
     """
-    _refuse_rendering(render_mode)
+    refuse_rendering(render_mode)
     chosen = load_task(task)
     if max_episode_steps is not None:
         chosen = shortened_task(task, max_episode_steps)
@@ -71,11 +72,3 @@ def shortened_task(name: str, max_episode_steps: int) -> Task:
     episode_s = min(task.episode_s, max_episode_steps / task.decision_rate_hz)
     shortened = replace(task, episode_s=episode_s)
     return shortened.made_by(shortened_task, name, max_episode_steps)
-
-
-def _refuse_rendering(render_mode: str | None) -> None:
-    if render_mode is not None:
-        raise ScenarioError(
-            f"render_mode = {render_mode!r}: these environments do not render, only None is "
-            "possible; volery.learning.training.video.film_episode films an episode"
-        )

@@ -10,7 +10,8 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import ArrayLike, NDArray
 
 from volery.core.arrays import Array
-from volery.core.errors import ScenarioError
+from volery.core.errors import CommandError, ScenarioError
+from volery.learning.rendering import render_nothing
 from volery.learning.spaces import action_space, observation_space
 from volery.learning.task import Task
 from volery.learning.vector_env import TaskVectorEnv
@@ -47,13 +48,23 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], Array]):
         The last step of an episode has `info["success"]`, the name `info["end_name"]` of what ended
         it ("time_limit" or a termination's) and the sums `info["reward_terms"]`.
         """
-        observation, reward, terminated, truncated, info = self._many.step(np.asarray(action)[None])
+        chosen = np.asarray(action)
+        if chosen.shape != self.action_space.shape:
+            raise CommandError(f"an action has shape {self.action_space.shape}, not {chosen.shape}")
+        observation, reward, terminated, truncated, info = self._many.step(chosen[None])
         own: dict[str, Any] = {}
         if "success" in info:
             own["success"] = bool(info["success"][0])
             own["end_name"] = str(info["end_name"][0])
             own["reward_terms"] = {k: float(v[0]) for k, v in info["reward_terms"].items()}
         return observation[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), own
+
+    def render(self) -> None:
+        """Warns that there is no image."""
+        render_nothing()
+
+    def __repr__(self) -> str:
+        return f"<TaskEnv '{self.task.name}'>"
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Returns how to make the same environment, with its state, for `pickle`."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from volery.core.errors import CommandError, VoleryError
 from volery.core.extras import missing_package
+from volery.learning.rendering import render_nothing
 from volery.learning.spaces import action_space, observation_space
 from volery.learning.task import Task
 from volery.learning.tasks import load_task
@@ -49,6 +50,7 @@ class TeamEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo has no type hint
         names = self._rows.episodes.envs.uav_names
         self.possible_agents = list(names[: task.num_agents])
         self.agents: list[str] = []
+        self._has_begun = False
         self.observation_spaces = {name: observation_space(task) for name in self.possible_agents}
         self.action_spaces = {name: action_space(task) for name in self.possible_agents}
 
@@ -70,6 +72,7 @@ class TeamEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo has no type hint
         del options
         rows, _ = self._rows.reset(seed=seed)
         self.agents = list(self.possible_agents)
+        self._has_begun = True
         return self._by_agent(rows), {name: {} for name in self.agents}
 
     def step(
@@ -84,8 +87,11 @@ class TeamEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo has no type hint
         """Acts and returns observations, rewards, terminated, truncated and infos by agent.
 
         The last infos of an episode have `success` and the sums `reward_terms`. Raises
-        `CommandError` for actions that are missing or impossible, and without an episode.
+        `CommandError` for actions that are missing or impossible, and without an episode; after
+        an episode, no actions of no agents have no results, as in PettingZoo's environments.
         """
+        if not self.agents and not actions and self._has_begun:
+            return {}, {}, {}, {}, {}
         if not self.agents:
             raise CommandError("no episode is running; call reset()")
         if set(actions) != set(self.agents):
@@ -93,8 +99,12 @@ class TeamEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo has no type hint
                 f"actions of {', '.join(self.agents)} are needed, not of "
                 f"{', '.join(map(str, actions)) or 'none'}"
             )
-        taken = [actions[name] for name in self.possible_agents]
-        rows, rewards, terminated, truncated, info = self._rows.step(taken)
+        taken = [np.asarray(actions[name]) for name in self.possible_agents]
+        for name, action in zip(self.possible_agents, taken, strict=True):
+            wanted = self.action_spaces[name].shape
+            if action.shape != wanted:
+                raise CommandError(f"the action of {name} has shape {wanted}, not {action.shape}")
+        rows, rewards, terminated, truncated, info = self._rows.step(np.array(taken))
         own: dict[str, dict[str, Any]] = {name: {} for name in self.agents}
         if "success" in info:
             for k, name in enumerate(self.agents):
@@ -111,6 +121,10 @@ class TeamEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo has no type hint
         if (terminated | truncated).all():
             self.agents = []
         return result
+
+    def render(self) -> None:
+        """Warns that there is no image."""
+        render_nothing()
 
     def close(self) -> None:
         """Releases the simulation."""

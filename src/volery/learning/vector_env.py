@@ -11,12 +11,14 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
 from volery.core.arrays import Array
-from volery.core.errors import CommandError
+from volery.core.errors import CommandError, ScenarioError
 from volery.learning.episodes import Episodes, Outcome, check_action
+from volery.learning.rendering import render_nothing
 from volery.learning.spaces import action_space, observation_space
 from volery.learning.task import Task
 
 Observations = NDArray[np.float32]
+_LARGEST_SEED = 2**62
 _NEEDS_RESET = "the episodes of environments {} have ended; reset them"
 
 
@@ -41,6 +43,8 @@ class TaskVectorEnv(VectorEnv[Observations, Array, Any]):
         autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
         threads: int = 2,
     ) -> None:
+        if num_envs < 1:
+            raise ScenarioError(f"num_envs = {num_envs}: at least 1 is needed")
         self.task = task
         self.num_envs = num_envs * task.num_agents
         self._num_teams, self._threads = num_envs, threads
@@ -141,6 +145,10 @@ class TaskVectorEnv(VectorEnv[Observations, Array, Any]):
         state = self.get_state() if self._has_begun else None
         return _remade, (self.task, self._num_teams, self.autoreset_mode, self._threads, state)
 
+    def render(self) -> None:
+        """Warns that there is no image."""
+        render_nothing()
+
     def close_extras(self, **_: Any) -> None:
         """Releases the simulation."""
         self.episodes.close()
@@ -209,16 +217,24 @@ class TaskVectorEnv(VectorEnv[Observations, Array, Any]):
     def _seed(self, seed: int | Sequence[int | None] | None, chosen: NDArray[np.int64]) -> None:
         if seed is None:
             return
-        if not isinstance(seed, list | tuple) and not (
-            isinstance(seed, int | np.integer) and seed >= 0
-        ):
-            raise CommandError(f"seed = {seed!r}: a whole number from 0 on is needed")
         envs = self.num_envs // self.task.num_agents
-        seeds = range(seed, seed + envs) if isinstance(seed, int | np.integer) else list(seed)
+        if isinstance(seed, list | tuple):
+            seeds = list(seed)
+        else:
+            seeds = list(range(seed, seed + envs)) if _is_seed(seed) else [seed]
+        for one in seeds:
+            if one is not None and not _is_seed(one):
+                raise CommandError(
+                    f"seed = {one!r}: a whole number from 0 on, up to 2^62, is needed"
+                )
         if len(seeds) != envs:
             raise CommandError(f"{len(seeds)} seeds for {envs} environments")
         rows = np.array([k for k in chosen.tolist() if seeds[k] is not None], np.int64)
         self.episodes.seed(np.array([seeds[k] for k in rows.tolist()], np.int64), rows)
+
+
+def _is_seed(seed: object) -> bool:
+    return isinstance(seed, int | np.integer) and 0 <= seed <= _LARGEST_SEED
 
 
 def _remade(

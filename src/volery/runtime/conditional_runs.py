@@ -7,7 +7,8 @@ import math
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from textwrap import shorten
 from typing import Any, TypeAlias
 
 from volery.core.clock import NS_PER_S, s_from_ns
@@ -263,13 +264,13 @@ def _kind_of(name: str) -> EventKind:
 
 def _futures_of(awaited: Any) -> tuple[FlightFuture, ...]:
     try:
-        futures = tuple(awaited)
+        futures = tuple(awaited.values() if isinstance(awaited, Mapping) else awaited)
     except TypeError:
         futures = (awaited,)
     if not all(isinstance(future, FlightFuture) for future in futures):
         raise CommandError(
             "run_until takes a function without arguments, an EventKind or its name, or what "
-            f"take_off(), go_to(), ... return, not {awaited!r}"
+            f"take_off(), go_to(), ... return, not {shorten(repr(awaited), 60, placeholder=' ...')}"
         )
     if not futures:
         raise CommandError(

@@ -6,12 +6,12 @@ import math
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from volery.core.clock import s_from_ns
 from volery.core.errors import CommandError, ScenarioError
 from volery.core.plurals import counted
+from volery.core.uncopied import Uncopied
 from volery.engine.events import Event
 from volery.engine.lock_step import Partner
 from volery.engine.pacing import Pacer
@@ -22,8 +22,7 @@ from volery.runtime.build.engine import build_engine
 from volery.runtime.build.gateway import build_gateway
 from volery.runtime.build.geometry import Geometry, WorldTopic
 from volery.runtime.build.graph import all_down, plan_faults
-from volery.runtime.build.message_loading import learn_messages
-from volery.runtime.build.node_loading import check_nodes
+from volery.runtime.build.start_check import check_start
 from volery.runtime.build.vehicles import build_vehicles
 from volery.runtime.build.worlds import build_world
 from volery.runtime.checks import check_reset_seed, check_seconds, check_steps
@@ -58,10 +57,10 @@ from volery.runtime.snapshot import Snapshot
 from volery.runtime.snapshot_manager import SnapshotManager
 from volery.runtime.vehicles.control_authority import ControlAuthority
 from volery.runtime.vehicles.uav import Uav
+from volery.runtime.vehicles.uav_table import UavView
 from volery.runtime.warmup.parallel_compilation import compiled
 from volery.runtime.warmup.requirements import needs_of
 from volery.scenario.catalog import ScenarioCatalog
-from volery.scenario.node_packages import check_packages
 from volery.scenario.schema import Scenario
 from volery.world.ground_cover import BARE_GROUND
 
@@ -71,7 +70,7 @@ if TYPE_CHECKING:
     from volery.results import FlightResult
 
 
-class Simulation:
+class Simulation(Uncopied):
     """World, fleet, sensors, graph and nodes of a scenario, on one clock.
 
     `threads` share the ray casting; results do not depend on their number. `recordings` is the
@@ -122,9 +121,7 @@ class Simulation:
         self._replays: list[Replay] = []
         self._command_replay: CommandReplay | None = None
         self._geometry: Geometry | None = None
-        check_packages(scenario)
-        learn_messages(scenario)  # modules of nodes may import them
-        check_nodes(scenario)
+        check_start(scenario)
         with compiled(needs_of(scenario)):
             world = build_world(scenario, threads)
         self._pacer = pacer = Pacer()
@@ -142,7 +139,7 @@ class Simulation:
         grid_map = GridMapManager(scenario, engine, lambda: self.post(world_topic.tell))
         self._manager = manager = build_vehicles(scenario, connected, world, self._runs)
         self._snapshots = SnapshotManager(manager, self._loop, self._partners, grid_map)
-        self.uavs = MappingProxyType(manager.uavs)
+        self.uavs = UavView(manager.uavs)
         self.operators = ControlAuthority(lambda: tuple(self.uavs), self.graph.moved_uavs.of)
         self.gateway = build_gateway(graph, engine, pacer, self.commands, self.uavs, self._partners)
         self.clock = SimulationClock(engine, pacer, self._loop, self._partners, self._check_open)

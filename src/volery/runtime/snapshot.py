@@ -12,6 +12,7 @@ from volery.core.clock import s_from_ns
 from volery.core.errors import SnapshotError
 from volery.core.plurals import counted
 from volery.core.saved_state import Stateful
+from volery.core.uncopied import Uncopied
 from volery.engine.lock_step import Partner
 from volery.graph.nodes.node import Node
 from volery.runtime.build.placement import StartPose
@@ -22,7 +23,7 @@ NodeStates = dict[NodeKey, Any]
 
 
 @dataclass(frozen=True)
-class Snapshot:
+class Snapshot(Uncopied):
     """Holds the state of one simulation at `time_ns`; only that simulation can restore it.
 
     The state contains plants and controllers, sensors and their noise, wind, contacts, faults,

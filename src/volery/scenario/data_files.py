@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 from pathlib import Path
 
 from pydantic import ValidationError
 
 from volery.core.errors import DataFileError
+from volery.core.near_names import near_miss
 from volery.scenario.base import Bounded, implausible
 from volery.scenario.data_file_bases import FileData, read_toml, read_with_bases
 from volery.scenario.validation import Model, describe_validation_error
@@ -46,6 +46,5 @@ def find_data_file(name: str, shipped: Path, what: str, folder: Path | None = No
     known = sorted(p.stem for p in shipped.glob("*.toml"))
     if name in known:
         return shipped / f"{name}.toml"
-    near = difflib.get_close_matches(name, known, n=1)
-    hint = f" Did you mean '{near[0]}'?" if near else ""
+    hint = near_miss(name, known)
     raise DataFileError(f"no {what} '{name}'.{hint} Known: {', '.join(known)}, or a .toml path")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from starlette.types import Message
@@ -41,10 +41,11 @@ class _Channel:
         data: bytes = message.get("bytes") or b""
         return data if text is None else text
 
-    async def send(self, message: Frame) -> None:
-        kind = "text" if isinstance(message, str) else "bytes"
-        async with asyncio.timeout(LONGEST_STALL_S):
-            await self._websocket.send({"type": "websocket.send", kind: message})
+    async def send_all(self, messages: Sequence[Frame]) -> None:
+        for message in messages:
+            kind = "text" if isinstance(message, str) else "bytes"
+            async with asyncio.timeout(LONGEST_STALL_S):
+                await self._websocket.send({"type": "websocket.send", kind: message})
 
     async def close(self, code: int = 1000, reason: str = "") -> None:
         await self._websocket.close(code, reason[:100])
@@ -106,7 +107,7 @@ async def _serve(
         authorized=True,
         gate=gate,
     )
-    conversation = asyncio.create_task(converse(channel, bell, peer, world.bulk))
+    conversation = asyncio.create_task(converse(channel, bell, peer, world.queue))
     client = Client(channel, conversation)
     site.clients.add(client)
     try:

@@ -12,7 +12,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Protocol
 
-from volery.bridges.rosbridge.bulk_turns import BulkTurns
+from volery.bridges.rosbridge.fair_queue import FairQueue
 from volery.bridges.rosbridge.message_encoder import MessageEncoder
 from volery.bridges.rosbridge.protocol import ServerContext
 from volery.bridges.rosbridge.rosapi import RosApi
@@ -86,7 +86,7 @@ class JoinedWorld:
         self.scenario = world.scenario
         self.operators = world.operators
         self.shared = ServerContext(MessageEncoder("ros2"), now_ns)
-        self.bulk = BulkTurns()
+        self.queue = FairQueue()
         self._world = world
         self._rosapi = RosApi(world.gateway, "ros2", now_ns)
         self._rosapi.start()

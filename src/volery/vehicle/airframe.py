@@ -15,6 +15,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from volery.core.arrays import Array
+from volery.core.plurals import counted
 from volery.scenario.data_files import find_data_file, load_data_file
 from volery.vehicle.battery import Battery, open_circuit_voltage
 from volery.vehicle.tables import NotNegative, Positive, PositiveVector, Table, Vector
@@ -159,6 +160,12 @@ class Airframe(Table):
     control: Bandwidths = Bandwidths()
     battery: Battery | None = None
     """Omitted: an ideal supply with constant voltage."""
+
+    def __repr__(self) -> str:
+        rotors = counted(len(self.rotors.places), "rotor")
+        return f"<Airframe '{self.name}': {self.title}, {rotors}, {self.body.mass_kg:g} kg>"
+
+    __str__ = __repr__
 
     @model_validator(mode="after")
     def _can_fly(self) -> Self:

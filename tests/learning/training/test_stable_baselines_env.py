@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+from stable_baselines3 import PPO
+from stable_baselines3.common.env_util import make_vec_env
 
 from volery.core.errors import CommandError, ScenarioError
 from volery.learning.adapters.stable_baselines import StableBaselinesEnv
+from volery.learning.registration import register_tasks
 from volery.learning.tasks import load_task
 from volery.learning.vector_env import TaskVectorEnv
 
@@ -93,3 +96,17 @@ def test_there_are_no_single_environments(pair):
         adapted.env_method("reset")
     with pytest.raises(CommandError, match="rows of one simulation"):
         adapted.set_attr("task", None)
+
+
+@pytest.mark.parametrize("name", ["volery/Hover-v0", "volery/Homing-v0"])
+def test_environments_are_made_by_name(name):
+    """The library asks for a render mode, and makes them without one where that is a TypeError."""
+    register_tasks()
+    envs = make_vec_env(name, 2, seed=1)
+    model = PPO("MlpPolicy", name, n_steps=8, batch_size=8)
+    try:
+        assert envs.reset().shape == (2, *envs.observation_space.shape)
+        model.learn(8)
+    finally:
+        envs.close()
+        model.get_env().close()

@@ -17,6 +17,7 @@ class CountingLoop:
         self.calls = 0
         self._loop = loop
         self.call_exception_handler = loop.call_exception_handler
+        self.call_soon = loop.call_soon
 
     def call_soon_threadsafe(self, callback):
         self.calls += 1
@@ -46,6 +47,20 @@ def test_one_system_call_wakes_a_busy_loop_for_all_callbacks():
         in_thread(lambda: waker.run(lambda: ran.append("later")))
         await asyncio.sleep(0.01)
         assert (ran[-1], counting.calls) == ("later", 2)
+
+    asyncio.run(run())
+
+
+def test_a_busy_loop_is_not_woken_again_while_it_finds_callbacks():
+    async def run():
+        counting = CountingLoop(asyncio.get_running_loop())
+        waker, ran = LoopWaker(counting), []
+        for number in range(100):  # one in each round
+            in_thread(lambda number=number: waker.run(lambda: ran.append(number)))
+            await asyncio.sleep(0)
+        assert counting.calls == 1
+        await asyncio.sleep(0)
+        assert ran == list(range(100))
 
     asyncio.run(run())
 

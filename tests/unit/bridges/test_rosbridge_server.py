@@ -307,6 +307,17 @@ def as_binary_json(operation) -> bytes:
     return json.dumps(operation).encode()
 
 
+def test_clients_of_the_foxglove_protocol_learn_what_to_choose(server, caplog):
+    for offered in (["foxglove.websocket.v1"], ["foxglove.sdk.v1", "foxglove.websocket.v1"]):
+        with pytest.raises(InvalidStatus) as refused, connect(url_of(server), subprotocols=offered):
+            pass
+        assert refused.value.response.status_code == 400
+        assert b"choose the connection 'Rosbridge'" in refused.value.response.body
+    assert "choose the connection 'Rosbridge'" in caplog.text
+    with connect(url_of(server), subprotocols=["rosbridge-cbor"]) as client:
+        assert client.subprotocol == "rosbridge-cbor"
+
+
 def test_one_path_only(bridges):
     server = RosbridgeServer(port=0, path="/rosbridge")
     bridges.open(server)

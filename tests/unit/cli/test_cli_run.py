@@ -243,7 +243,7 @@ class Compiled:
         compiler = {{"__name__": "llvmlite.binding", "interrupt": interrupt}}
         exec("interrupt()", compiler)  # where it is compiled, an interrupt has to wait
         print("compiled")
-        time.sleep(30)
+        time.sleep(600)  # a system call, which the repeated interrupt ends
         print("not interrupted")
 class Builds(FakeSimulation):
     def __init__(self, *arguments, **options):

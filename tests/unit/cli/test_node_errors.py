@@ -107,7 +107,7 @@ def test_the_users_frames_are_shown_and_recorded(run):
 
 def test_errors_of_volery_and_of_libraries_point_to_the_users_line_too(run):
     told = run("Wrong")[0].output
-    assert "carries std_msgs/msg/String, not None (broken_wrong.py:22)" in told
+    assert "carries std_msgs/msg/String, not a str (broken_wrong.py:22)" in told
     told = run("Deep")[0].output
     assert "JSONDecodeError" in told
     assert "(broken_deep.py:27)" in told

@@ -328,6 +328,76 @@ def test_poses_without_time_in_bursts_have_the_mean_velocity():
     assert max(felt) < 100.0
 
 
+def _arrive_together(t):
+    return 100 * (t // 100) + 99
+
+
+def _swapped(poses):
+    """Every tenth pose is overtaken by the next one."""
+    for k in range(10, len(poses) - 1, 10):
+        (at, *older), (_, *newer) = poses[k : k + 2]
+        poses[k], poses[k + 1] = (at, *newer), (at + 1, *older)
+    return poses
+
+
+STREAMS = {  # (arrival, ms; time of the pose, ms; stamp, ms, or none) of a motion at 2 m/s
+    "drawn twice": [(t, t - t % 20, t) for t in range(1, 3000, 10)],
+    "drawn twice, without stamps": [(t, t - t % 20, None) for t in range(0, 3000, 10)],
+    "sent twice": [(t, t - t % 20, t - t % 20) for t in range(0, 3000, 10)],
+    "stamps of a slow clock": [(t, t, t - t % 100) for t in range(0, 3000, 20)],
+    "bursts": [(_arrive_together(t), t, t) for t in range(1, 3000, 20)],
+    "bursts without stamps": [(_arrive_together(t), t, None) for t in range(0, 3000, 20)],
+    "overtaken": _swapped([(t, t, t) for t in range(1, 3000, 20)]),
+    "a second apart": [(t + 30 * (t // 1000 % 2), t, None) for t in range(0, 8000, 1000)],
+}
+
+
+@pytest.mark.parametrize("name", STREAMS)
+def test_streams_of_others_have_the_motion_that_they_show(name):
+    """Poses that repeat, come in bursts, late or in disorder; attitudes of either sign."""
+    fleet, poses = flying(KINEMATIC), list(STREAMS[name])
+    slowest, fastest, felt = math.inf, 0.0, 0.0
+    last, sign = poses[-1][0], 1.0
+    for step in range(last):
+        while poses[0][0] <= step:
+            _, t, stamp = poses.pop(0)
+            stamped = {} if stamp is None else {"stamp_ns": stamp * 1_000_000}
+            turned = sign * rotations.from_rpy(0.0, 0.0, 2e-3 * t)
+            fleet.command_pose(0, (2e-3 * t, 0, 50), turned, **stamped)
+            sign = -sign
+        fleet.advance(1, FLAT.grid)
+        if step > max(1000, last - 2000):
+            speed = float(fleet.state.velocity_map[0, 0])
+            slowest, fastest = min(slowest, speed), max(fastest, speed)
+            felt = max(felt, float(np.abs(fleet.state.acceleration_map[0]).max()))
+            assert float(fleet.state.omega_body[0, 2]) == pytest.approx(speed, abs=1e-6)
+    assert slowest == pytest.approx(2.0, abs=0.1)
+    assert fastest == pytest.approx(2.0, abs=0.1)
+    assert felt < 1.0
+
+
+def test_a_pose_older_than_the_last_one_moves_nothing():
+    fleet = flying(KINEMATIC)
+    for t in (100, 120, 110):
+        fleet.command_pose(0, (1e-3 * t, 0, 50), LEVEL, stamp_ns=t * 1_000_000)
+        fleet.advance(1, FLAT.grid)
+    assert fleet.state.position_map[0, 0] == pytest.approx(0.12)
+    fleet.hold(0)  # another command ends the stream: the next one begins anew
+    fleet.command_pose(0, (0.5, 0, 50), LEVEL, stamp_ns=110_000_000)
+    fleet.advance(1, FLAT.grid)
+    assert fleet.state.position_map[0, 0] == pytest.approx(0.5)
+
+
+def test_poses_that_only_repeat_end_the_motion():
+    fleet = flying(KINEMATIC)
+    for step in range(2000):
+        if step % 20 == 1:
+            x = 2e-3 * min(step, 1000)
+            fleet.command_pose(0, (x, 0, 50), LEVEL, stamp_ns=step * 1_000_000)
+        fleet.advance(1, FLAT.grid)
+    np.testing.assert_array_equal(fleet.state.velocity_map[0], 0.0)
+
+
 @pytest.mark.parametrize("stamped", [True, False])
 def test_a_teleport_is_no_speed(stamped):
     fleet = flying(KINEMATIC)

@@ -88,11 +88,28 @@ def test_arrays() -> None:
 
 
 def test_bytes_are_read_in_every_form() -> None:
-    for given_ in ([1, 2, 255], "AQL/", b"\1\2\xff", np.array([1, 2, 255]), np.uint8([1, 2, 255])):
+    for given_ in (
+        [1, 2, 255],
+        "AQL/",
+        "AQ\r\nL/\n",
+        b"\1\2\xff",
+        np.array([1, 2, 255]),
+        np.uint8([1, 2, 255]),
+    ):
         got = decode_plain({"data": given_}, "sensor_msgs/msg/Image").data
         assert got.dtype == np.uint8
         assert got.tolist() == [1, 2, 255]
         assert not got.flags.writeable
+
+
+def test_floats_by_name() -> None:
+    """As JSON writers of .NET have them; other texts are no numbers."""
+    ranges = decode_plain({"ranges": ["NaN", "Infinity", "-Infinity", 1]}, SCAN).ranges
+    np.testing.assert_array_equal(ranges, [np.nan, np.inf, -np.inf, 1.0])
+    assert decode_plain({"data": "-Infinity"}, "std_msgs/msg/Float64").data == -np.inf
+    for text in ("nan", "inf", "1.5"):
+        with pytest.raises(GraphError, match="must be a number"):
+            decode_plain({"data": text}, "std_msgs/msg/Float64")
 
 
 def test_arrays_for_cbor() -> None:

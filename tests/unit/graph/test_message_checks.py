@@ -1,6 +1,8 @@
 """A value of another type than its field's is an error that names the field."""
 
+import array
 import math
+from collections import deque
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from volery.graph.messages import (
     PathMessage,
     Pose,
     PoseStamped,
+    PoseWithCovariance,
     String,
     Temperature,
     Twist,
@@ -53,6 +56,24 @@ def nested():
         (lambda: LaserScan(ranges=["near"]), "ranges"),
         (lambda: message_type("sensor_msgs/msg/JointState")(name=[1]), "name[...]"),
         (lambda: message_type("sensor_msgs/msg/JointState")(name="ab"), "must be a list"),
+        (lambda: String("\ud800"), "data contains half a surrogate pair"),
+        (lambda: LaserScan(ranges=np.ones((2, 2), np.float32)), "an array of shape (2, 2)"),
+        (lambda: LaserScan(ranges=np.ones((2, 2))), "an array of shape (2, 2)"),
+        (lambda: LaserScan(ranges=[[1.0], [2.0]]), "ranges[0] must be a number of float32"),
+        (lambda: LaserScan(ranges=[1.0, "2"]), "ranges[1] must be a number of float32, not '2'"),
+        (lambda: LaserScan(ranges=[1.0, None]), "ranges[1]"),
+        (lambda: LaserScan(ranges=3.0), "ranges must be a sequence of numbers, not 3.0"),
+        (lambda: LaserScan(ranges="123"), "ranges must be a sequence of numbers, not '123'"),
+        (lambda: Image(data=[1, 256]), "data must be uint8, 0 to 255, not 256"),
+        (lambda: Image(data=[1.5]), "data[0] must be a number of uint8"),
+        (
+            lambda: Image(data=np.array([1.5, 300.0])),
+            "data must be numbers of uint8, not of float64",
+        ),
+        (lambda: Image(data=np.array([-1])), "not -1"),
+        (lambda: Image(data=[np.int64(300)]), "not 300"),
+        (lambda: Image(data=[2**70]), "data"),
+        (lambda: PoseWithCovariance(covariance=np.eye(5)), "must have 36 numbers, not 25"),
     ],
 )
 def test_wrong_types(make, words):
@@ -71,6 +92,38 @@ def test_what_fits():
         message_type("std_msgs/msg/Bool")(data=np.bool_(True)),
         LaserScan(ranges=[1, 2.5]),
         PathMessage(poses=(PoseStamped(),)),
+        PathMessage(poses=deque([PoseStamped()])),
+        message_type("sensor_msgs/msg/JointState")(name={"a"}, position=range(3)),
+        String("grüße"),
+        Image(data=np.array([1, 255])),
+        Image(data=[True, np.uint8(2)]),
+        Image(data=[]),
+        LaserScan(ranges=np.arange(3)),
     ):
         assert copy_message(message) is not message
         message_checker(message.__msgtype__)(message)
+
+
+def test_fixed_arrays_may_have_any_shape():
+    """As in rclpy, which compares sizes: a covariance is often a matrix."""
+    copied = copy_message(PoseWithCovariance(covariance=np.eye(6)))
+    assert copied.covariance.tolist() == np.eye(6).ravel().tolist()
+
+
+@pytest.mark.parametrize("values", [np.zeros(36), np.zeros((6, 6)), array.array("d", [0.0] * 36)])
+def test_a_copy_has_arrays_of_its_own(values):
+    copied = copy_message(PoseWithCovariance(covariance=values))
+    values[0] = 7.0
+    assert copied.covariance[0] == 0.0
+    assert not copied.covariance.flags.writeable
+
+
+@pytest.mark.parametrize("level", [b"\x02", 2])
+def test_a_byte_is_bytes_or_a_number(level):
+    """`byte` of rclpy is `bytes` of length 1."""
+    status = message_type("diagnostic_msgs/msg/DiagnosticStatus")
+    assert copy_message(status(level=level)).level == 2
+    many = message_type("std_msgs/msg/ByteMultiArray")(data=[b"\x01", b"\x02"])
+    assert copy_message(many).data.tolist() == [1, 2]
+    with pytest.raises(GraphError, match="level must be a byte"):
+        copy_message(status(level=b"no"))

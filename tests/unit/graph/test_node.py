@@ -82,7 +82,7 @@ def test_timers_and_services(context):
     assert client.service_is_ready()
     assert client.call().success
     with pytest.raises(GraphError, match="queue depth"):
-        node.create_publisher(String, "t", 0)
+        node.create_publisher(String, "t", -1)
 
 
 def test_a_parameter_is_declared_once(context):

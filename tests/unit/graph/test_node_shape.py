@@ -58,14 +58,32 @@ def test_timers_are_cancelled_restarted_and_destroyed(made):
     assert len(rings) == 4
 
 
-def test_snapshots_hold_what_timers_do(made):
+def test_the_period_of_a_timer_may_change(made):
     simulation, node = made
     rings = []
     timer = node.create_timer(0.1, lambda: rings.append(simulation.time_ns // 10**6))
+    assert timer.clock.now() == node.get_clock().now()
+    simulation.run(0.15)
+    timer.timer_period_ns = 20_000_000
+    simulation.run(0.05)
+    timer.cancel()
+    timer.timer_period_ns = 10_000_000
+    simulation.run(0.05)
+    assert rings == [100, 170, 190]
+    with pytest.raises(GraphError, match="timer period"):
+        timer.timer_period_ns = 0
+
+
+def test_snapshots_hold_what_timers_do(made):
+    simulation, node = made
+    rings = []
+    timer = node.create_timer(0.3, lambda: rings.append(simulation.time_ns // 10**6))
+    timer.timer_period_ns = 100_000_000
     simulation.run(0.05)
     timer.reset()
     state, base = simulation._engine.get_state(), node.save_base_state()
     simulation.run(0.2)
+    timer.timer_period_ns = 300_000_000
     timer.cancel()
     first = list(rings)
     rings.clear()

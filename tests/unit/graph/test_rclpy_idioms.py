@@ -1,5 +1,6 @@
 """Nodes written for rclpy: coroutines, bytes, waiting for transforms, clocks, late imports."""
 
+import math
 import subprocess
 import sys
 import textwrap
@@ -10,12 +11,20 @@ import pytest
 
 from volery.core.errors import GraphError, NodeError
 from volery.graph.graph import Graph
-from volery.graph.messages import String, Transform, TransformStamped, Vector3, header
+from volery.graph.messages import (
+    LaserScan,
+    String,
+    Transform,
+    TransformStamped,
+    Vector3,
+    header,
+    message_type,
+)
 from volery.graph.nodes import qos_events
 from volery.graph.nodes.node import Context
 from volery.graph.nodes.qos_events import PublisherEventCallbacks, SubscriptionEventCallbacks
 from volery.graph.nodes.rclpy_modules import Node, contents
-from volery.graph.nodes.ros_time import Clock, ClockType, ROSClock
+from volery.graph.nodes.ros_time import Clock, ClockType, Duration, ROSClock
 from volery.graph.nodes.service_client import Future
 from volery.graph.nodes.tf2 import Buffer, TransformListener
 from volery.graph.parameters import ParameterSetting
@@ -268,3 +277,149 @@ def test_a_script_imports_node_files_after_volery(tmp_path):
 def test_other_missing_modules_stay_missing():
     program = "import volery, importlib.util as u; assert u.find_spec('my_msgs') is None"
     subprocess.run([sys.executable, "-c", program], check=True, timeout=300)
+
+
+def test_a_callback_with_two_arguments_receives_the_times_too(node):
+    heard = []
+    node.create_subscription(String, "text", lambda message, info: heard.append(info), 1)
+    node.create_subscription(String, "text", lambda message, more=3: heard.append(more), 1)
+    node.create_subscription(String, "text", heard.append, 1)
+    node.create_publisher(String, "text").publish(String("go"))
+    node._context.graph.deliver()
+    info, more, message = heard
+    assert (info["source_timestamp"], info["received_timestamp"]) == (7, 7)
+    assert (more, message.data) == (3, "go")
+
+
+def test_a_callback_may_be_replaced(node):
+    heard = []
+    subscription = node.create_subscription(String, "text", print, 1)
+    subscription.callback = lambda message, info: heard.append(message.data)
+    node.create_publisher(String, "text").publish(String("go"))
+    node._context.graph.deliver()
+    assert heard == ["go"]
+    assert subscription.get_publisher_count() == 1
+
+
+def test_what_a_node_has_created_can_be_listed(node):
+    out = node.create_publisher(String, "text", 5)
+    inside = node.create_subscription(String, "text", print, 1)
+    service = node.create_service(TRIGGER, "ask", lambda request, response: response)
+    assert [*node.publishers][1:] == [out]
+    assert [*node.subscriptions] == [inside]
+    assert [*node.services] == [service]
+    assert (out.qos_profile.depth, inside.msg_type, out.wait_for_all_acked()) == (5, String, True)
+    assert node.count_services("ask") == 1
+    assert node.get_fully_qualified_node_names() == ["/idioms"]
+    assert node.wait_for_node("/idioms", 1.0)
+    assert node.context.ok()
+    with out, node:
+        pass
+    assert node.count_publishers("text") == 0
+    assert not node.wait_for_node("/idioms", 1.0)
+
+
+@pytest.mark.parametrize(
+    ("method", "words"),
+    [
+        ("create_rate", "use a timer"),
+        ("create_guard_condition", "use a timer"),
+        ("get_publishers_info_by_topic", "count_publishers"),
+        ("get_client_names_and_types_by_node", "get_topic_names_and_types"),
+        ("set_descriptor", "declare_parameter"),
+        ("add_waitable", "use a timer"),
+    ],
+)
+def test_methods_that_are_refused_say_what_to_use(node, method, words):
+    with pytest.raises(GraphError, match=words):
+        getattr(node, method)("x")
+
+
+@pytest.mark.parametrize(
+    ("name", "topic"),
+    [
+        ("~", "/uav1/idioms"),
+        ("~/a", "/uav1/idioms/a"),
+        ("{node}/a", "/uav1/idioms/a"),
+        ("{ns}/a", "/uav1/a"),
+        ("{namespace}/a", "/uav1/a"),
+        ("/a", "/a"),
+    ],
+)
+def test_names_are_expanded(name, topic):
+    context = Context(Graph(lambda: 7), SimpleNamespace(), lambda: 7)
+    assert Node("idioms", context=context, namespace="/uav1").resolve_topic_name(name) == topic
+
+
+def test_a_parameter_with_a_type_alone_has_no_value(node):
+    errors = contents()["rclpy.exceptions"]
+    uninitialized = errors["ParameterUninitializedException"]
+    node.declare_parameter("speed", ParameterSetting.Type.DOUBLE)
+    with pytest.raises(uninitialized, match="'speed' is declared without a value"):
+        node.get_parameter("speed")
+    assert issubclass(uninitialized, errors["ParameterException"])
+    assert node.get_parameter_or("speed", ParameterSetting("speed", value=1.0)).value == 1.0
+    (result,) = node.set_parameters([ParameterSetting("speed", value="fast")])
+    assert not result.successful
+    node.set_parameters([ParameterSetting("speed", value=2)])
+    assert node.get_parameter("speed").value == 2.0
+    node.declare_parameter("any")
+    assert node.get_parameter("any").value is None
+
+
+def test_profiles_by_number_and_by_old_and_short_names():
+    names = contents_of("rclpy.qos")
+    profile, reliability = names["QoSProfile"], names["ReliabilityPolicy"]
+    old = reliability.RMW_QOS_POLICY_RELIABILITY_RELIABLE
+    assert (
+        old is reliability.RELIABLE is reliability(1) is reliability.get_from_short_key("Reliable")
+    )
+    numbered = profile(depth=1, reliability=1, durability=1, history=1)
+    assert (numbered.reliable, numbered.latched) == (True, True)
+    assert profile(depth=0).depth == profile().depth
+    with pytest.raises(ValueError, match="9 is not a valid"):
+        profile(reliability=9)
+    presets = names["QoSPresetProfiles"]
+    assert presets.get_from_short_key("sensor_data") is names["qos_profile_sensor_data"]
+    assert names["qos_profile_action_status_default"].latched
+
+
+def test_durations_are_multiplied():
+    assert Duration(seconds=2) * 1.5 == Duration(seconds=3)
+    assert str(Duration(seconds=1) * math.inf) == "Infinite"
+    with pytest.raises(ValueError, match="nan"):
+        Duration(seconds=1) * math.nan
+
+
+def test_clocks_do_not_wait_and_do_not_jump(node):
+    clock = node.get_clock()
+    assert clock.ros_time_is_active
+    assert not ROSClock().ros_time_is_active
+    with pytest.raises(GraphError, match="use a timer"):
+        clock.sleep_for(Duration(seconds=1))
+    clock.create_jump_callback(None, post_callback=print).unregister()
+
+
+def test_waiting_for_a_message_is_refused():
+    with pytest.raises(GraphError, match="subscribe"):
+        contents()["rclpy.wait_for_message"]["wait_for_message"](String, None, "text")
+
+
+def test_requests_of_another_service_are_refused(node):
+    node.create_service(TRIGGER, "ask", lambda request, response: response)
+    client = node.create_client(TRIGGER, "ask")
+    other = message_type("std_srvs/srv/SetBool_Request")()
+    for wrong, found in ((other, "SetBool_Request"), ({}, "a dict")):
+        with pytest.raises(GraphError, match=f"takes {TRIGGER}_Request, not .*{found}"):
+            client.call(wrong)
+
+
+def test_a_received_sequence_cannot_grow(node):
+    heard = []
+    node.create_subscription(LaserScan, "scan", heard.append, 1)
+    node.create_publisher(LaserScan, "scan").publish(LaserScan(ranges=[1.0, 2.0]))
+    node._context.graph.deliver()
+    ranges = heard[0].ranges
+    with pytest.raises(AttributeError, match="its length is fixed"):
+        ranges.append(3.0)
+    assert (ranges == [1.0, 2.0], ranges != [1.0, 2.0]) == (False, True)  # as `array.array`

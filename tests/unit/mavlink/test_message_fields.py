@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from flying_bench import NAN, Station, fly
+from flying_bench import LINK, NAN, Station, fly
 
 from volery.core import rotations
 from volery.mavlink.autopilot.status_messages import status_texts
@@ -72,6 +72,26 @@ def test_unused_axes_are_centred_and_the_others_act(air):
     steer(station, 1.0, x=5000, z=-1000)  # out of the range that the definition gives
     assert uav.position_map[2] == pytest.approx(height, abs=0.3)
     assert station.present_mode == (3, 0)
+
+
+def test_a_second_joystick_waits_until_the_first_is_silent(air):
+    """Two ground stations: their sticks must not mix."""
+    station, uav = air
+    other = Station(station.simulation, system=254, link=LINK + 1)
+    steer(station, 0.2)
+    assert station.mode(3) == ACCEPTED
+    start = uav.position_map.copy()
+    for _ in range(30):
+        steer(station, 0.05, z=500)
+        other.send("manual_control", 1, 1000, 0, 500, 0, 0)
+    assert uav.position_map == pytest.approx(start, abs=0.3)
+    told = [text for text in station.texts if "Manual control of system 254 ignored" in text]
+    assert len(told) == 1
+    station.seconds(0.6)  # COM_RC_LOSS_T is 0.5 s
+    steer(other, 0.2)
+    assert station.mode(3) == ACCEPTED
+    steer(other, 2.0, x=300, z=500)
+    assert uav.velocity_map[0] > 1.5
 
 
 # -------------------------------------------------------------------------------------- STATUSTEXT
@@ -275,6 +295,19 @@ def test_modes_without_a_custom_mode(ground):
     ):
         assert station.command(176, *params) == ACCEPTED
         assert station.present_mode == mode
+
+
+def test_standard_modes_that_are_offered_can_be_set(air):
+    """AVAILABLE_MODES names them, MAV_CMD_DO_SET_STANDARD_MODE (262) selects them."""
+    station, _ = air
+    assert station.command(262, 5.0) == ACCEPTED  # safe recovery
+    assert station.present_mode == (4, 5)
+    assert station.command(262, 7.0) == ACCEPTED
+    assert station.present_mode == (4, 6)
+    assert station.command(262, 1.0) == REJECTED  # without sticks
+    for unknown in (0.0, 3.0, 99.0, NAN):
+        assert station.command(262, unknown) == FAILED
+    assert any("standard mode is not offered" in text for text in station.texts)
 
 
 def whole(station, number, params, x, y, z, frame):

@@ -1,5 +1,7 @@
 """Commands to all UAVs at once equal the commands to each, in a simulation and in environments."""
 
+import asyncio
+
 import numpy as np
 import pytest
 
@@ -156,6 +158,52 @@ def test_all_uavs_wait_within_one_timeout(simulate, three_data):
     assert [one.mode for one in simulation.vehicles.wait()] == [FlightMode.HOLD]
     with pytest.raises(CommandError, match="timeout_s must be a number"):
         simulation.vehicles.wait(-1.0)
+
+
+def test_futures_of_a_batch_are_waited_for_like_that_of_one_uav(simulate, three_data):
+    simulation = simulate(three_data)
+    vehicles = simulation.vehicles
+    (climbed,) = vehicles.take_off(2.0).wait()
+    assert climbed.mode is FlightMode.HOLD
+    with pytest.raises(WaitTimeoutError, match=r"go_to of uav1 is not done within 1 s"):
+        vehicles.go_to([[9.0, 9.0, 3.0], [4.0, 1.0, 3.0], [8.0, 1.0, 3.0]]).wait(1.0)
+    assert simulation.time_s == pytest.approx(climbed.time_s + 1.0, abs=0.05)
+
+    async def fly():
+        held = await vehicles.hold()
+        stopped, landed = await asyncio.gather(simulation.uavs["uav1"].hold(), vehicles_of(1, 2))
+        return held, stopped, landed
+
+    async def vehicles_of(*rows):
+        uavs = list(simulation.uavs.values())
+        return [await uavs[row].land() for row in rows]
+
+    held, stopped, landed = asyncio.run(fly())
+    assert [one.mode for one in held] == 3 * [FlightMode.HOLD]
+    assert stopped.mode is FlightMode.HOLD
+    assert [one.mode for one in landed] == 2 * [FlightMode.LANDED]
+    assert [one.mode for one in vehicles.return_home().wait()] == [FlightMode.LANDED]
+
+
+def test_futures_are_awaited_in_any_collection(simulate, three_data):
+    simulation = simulate(three_data)
+    uavs = [simulation.uavs["uav1"], simulation.uavs["uav3"]]
+    for collect in (list, tuple, set, np.array, lambda those: {one.uav: one for one in those}):
+        simulation.run_until(collect([uav.go_to(uav.position_map + 0.2) for uav in uavs]))
+        assert {uav.mode for uav in uavs} == {FlightMode.HOLD}
+    line = Trajectory.from_samples([0.0, 1.0], [[0.0, 0.0, 3.0], [1.0, 0.0, 3.0]])
+    assert len(simulation.vehicles.follow_trajectory(line for _ in range(3))) == 2
+    with pytest.raises(CommandError) as caught:
+        simulation.run_until([[uav.hold()] for uav in uavs])
+    assert len(str(caught.value)) < 190
+
+
+def test_single_uavs_are_not_sought_among_the_vehicles(simulate, three_data):
+    vehicles = simulate(three_data).vehicles
+    assert len(vehicles) == 3
+    for look in (lambda: vehicles["uav1"], lambda: vehicles[:2], lambda: list(vehicles)):
+        with pytest.raises(CommandError, match=r"simulation\.uavs has each by its name"):
+            look()
 
 
 def test_environments_wait_together_and_ignore_streams_that_reach_none(three_data):

@@ -5,6 +5,7 @@ import logging
 
 import pytest
 
+from volery.core.errors import CommandError
 from volery.graph.messages import String
 
 PACK = 'base = "f450"\n[battery]\ncapacity_ah = 1.2\n'
@@ -83,3 +84,47 @@ def test_a_later_command_replaces_the_action(simulate, weak):
     uav.hold()
     simulation.run(0.2)
     assert uav.mode.name == "HOLD"
+
+
+@pytest.mark.parametrize(
+    ("charge", "action", "reason"),
+    [
+        (0.06, "land", r'its battery is critical \(6 %\), at which low_battery_action = "land"'),
+        (0.04, "return", r"its battery is emergency \(4 %\)"),
+        (0.0001, "warn", r"its battery is empty \(0 %\); a reset charges it"),
+    ],
+)
+def test_a_take_off_that_could_not_last_is_refused(simulate, weak, charge, action, reason):
+    weak["types"]["f450"] |= {"battery_charge": charge, "flight": {"low_battery_action": action}}
+    weak["uavs"][0]["position_m"] = [0.0, 0.0]
+    simulation = simulate(weak)
+    simulation.run(3.0)
+    for take_off in (simulation.uavs["uav1"].take_off, simulation.vehicles.take_off):
+        with pytest.raises(CommandError, match=f"uav1 cannot take off: {reason}"):
+            take_off(2.0)
+    assert simulation.uavs["uav1"].mode.name == "LANDED"
+
+
+def test_a_low_battery_that_only_warns_takes_off(simulate, weak):
+    weak["types"]["f450"]["battery_charge"] = 0.06
+    weak["uavs"][0]["position_m"] = [0.0, 0.0]
+    simulation = simulate(weak)
+    simulation.run(1.0)
+    simulation.uavs["uav1"].take_off(1.0).wait()
+    assert simulation.uavs["uav1"].mode.name == "HOLD"
+
+
+@pytest.mark.parametrize(
+    ("position_m", "plant", "ending"),
+    [
+        ([0.0, 0.0], "rigid_body", "0 % left"),
+        ([0.0, 0.0, 3.0], "kinematic", "its plant flies on without it"),
+    ],
+)
+def test_rotors_stop_only_where_they_turn(simulate, weak, caplog, position_m, plant, ending):
+    weak["types"]["f450"] |= {"battery_charge": 0.0001, "plant": plant}
+    weak["uavs"][0]["position_m"] = position_m
+    simulation = simulate(weak)
+    with caplog.at_level(logging.WARNING):
+        simulation.run(3.0)
+    assert caplog.records[-1].getMessage().endswith(ending)

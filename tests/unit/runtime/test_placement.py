@@ -88,6 +88,96 @@ def test_a_standing_uav_rests_from_the_first_step(simulate, flat_data, tmp_path,
     assert uav.position_map[2] - start[2] > 0.8
 
 
+def gravity_alone(simulation, uav):
+    """Runs for a while; asserts that the IMU of a UAV measures gravity alone and that it stands."""
+    felt = []
+    simulation.graph.subscribe(
+        f"/{uav.name}/imu",
+        lambda p: felt.append([getattr(p.message.linear_acceleration, axis) for axis in "xyz"]),
+        Imu,
+    )
+    simulation.run(0.3)
+    assert len(felt) >= 290
+    np.testing.assert_allclose(np.linalg.norm(felt, axis=1), 9.80665, atol=1e-5)
+    feet = rotations.rotate(uav.attitude, np.array(uav.airframe.ground.feet_m)) + uav.position_map
+    gaps = feet[:, 2] - simulation.world.terrain.height(feet[:, 0], feet[:, 1])
+    np.testing.assert_allclose(gaps, 0.0, atol=1e-6)
+    assert uav.mode.name == "LANDED"
+
+
+@pytest.fixture
+def still(flat_data, tmp_path):
+    """Makes a scenario with a UAV on a slope towards x, which begins at `level_m`."""
+
+    def make(slope, position_m, level_m=0, **uav_type):
+        heights = ",".join(f"{slope * max(0, x - level_m):.6f}" for x in range(13))
+        rows = 13 * [heights]
+        (tmp_path / "slope.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+        ground = {"kind": "grid", "file": str(tmp_path / "slope.csv"), "spacing_m": 1.0}
+        flat_data["world"] = {"terrain": ground}
+        imu = {"kind": "imu", "noise": False, "rate_hz": 1000}
+        flat_data["types"] = {"still": {"airframe": "f450", "sensors": [imu], **uav_type}}
+        flat_data["uavs"] = [{"type": "still", "position_m": position_m}]
+        return flat_data
+
+    return make
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.3])
+@pytest.mark.parametrize("height_m", [0.0, 0.001, 0.05, 0.25])
+def test_wherever_a_landed_uav_is_put_on_the_ground_it_rests(simulate, still, slope, height_m):
+    """At the start, by a spawn and by a teleport, with a height that is about right."""
+    standing_m = 0.12 + 0.13 * slope + 1e-6
+
+    def just_above(x):
+        return [x, 3.0, slope * x + standing_m + height_m]
+
+    simulation = simulate(still(slope, just_above(2.0)))
+    uav = simulation.uavs["uav1"]
+    gravity_alone(simulation, uav)
+    gravity_alone(simulation, simulation.vehicles.spawn("other", "still", just_above(5.0)))
+    simulation.vehicles.set_pose("uav1", just_above(8.0), (0.0, 0.0, 0.0, 1.0))
+    gravity_alone(simulation, uav)
+    ground = [9.0, 6.0, slope * 9.0]
+    simulation.vehicles.set_pose("uav1", ground, (0.0, 0.0, 0.0, 1.0))
+    gravity_alone(simulation, uav)
+
+
+def test_ground_on_which_it_would_slide_is_refused(simulate, still):
+    """The slope is 0.9 from x = 6 m on, and level before."""
+    data = still(0.9, [9.0, 6.0], level_m=6)
+    with pytest.raises(PlacementError, match=r"uav1\).*steeper than the 36 degrees on which it st"):
+        simulate(data)
+    data["uavs"][0]["position_m"] = [3.0, 3.0]
+    simulation = simulate(data)
+    steep = [9.0, 6.0, 2.7]
+    with pytest.raises(PlacementError, match="other: the ground is steeper"):
+        simulation.vehicles.spawn("other", "still", steep)
+    with pytest.raises(PlacementError, match="uav1: the ground is steeper"):
+        simulation.vehicles.set_pose("uav1", steep, (0.0, 0.0, 0.0, 1.0))
+    gravity_alone(simulation, simulation.uavs["uav1"])
+
+
+def test_nearest_free_finds_ground_that_holds(simulate, still):
+    data = still(0.9, [8.6, 6.0], level_m=6)
+    data["uavs"][0]["placement"] = "nearest_free"
+    simulation = simulate(data)
+    uav = simulation.uavs["uav1"]
+    start = uav.position_map
+    assert start[0] < 7.0
+    simulation.run(0.3)
+    assert uav.mode.name == "LANDED"
+    np.testing.assert_array_equal(uav.position_map, start)
+
+
+def test_a_kinematic_uav_stands_on_any_slope(simulate, still):
+    simulation = simulate(still(0.9, [6.0, 6.0], plant="kinematic"))
+    uav = simulation.uavs["uav1"]
+    simulation.run(0.3)
+    assert uav.mode.name == "LANDED"
+    np.testing.assert_array_equal(uav.velocity_map, 0.0)
+
+
 def test_missing_files_name_the_places_looked_at(simulate, flat_data):
     flat_data["world"] = {"terrain": {"kind": "grid", "file": "no.csv", "spacing_m": 5.0}}
     with pytest.raises(DataFileError, match=r"no file 'no\.csv'"):

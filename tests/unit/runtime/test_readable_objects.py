@@ -1,7 +1,11 @@
 """What people print and look at in notebooks says in a line what it is."""
 
+import copy
+import pickle
+
 import pytest
 
+import volery
 from volery.control.flight_modes import FlightMode
 from volery.runtime import VectorizedSimulation
 from volery.scenario.load import load_scenario, parse_scenario
@@ -56,3 +60,66 @@ def test_a_uav_in_a_notebook(simulate, flat_data, words):
     uav = simulate(flat_data).uavs["uav1"]
     uav.hold()
     assert words in uav._repr_html_()
+
+
+def test_facets_airframes_and_trajectories_print_as_a_line(simulate, flat_data):
+    flat_data["uavs"][0]["position_m"] = [0.0, 0.0, 3.0]
+    simulation = simulate(flat_data)
+    simulation.faults.inject({"kind": "motor", "uav": "uav1", "rotor": 0, "thrust_factor": 0.9})
+    simulation.run(0.5)
+    assert repr(simulation.clock) == "<clock: 0.500 s, as fast as possible>"
+    simulation.clock.set_speed(2.0)
+    assert repr(simulation.clock) == "<clock: 0.500 s, 2 times real time>"
+    simulation.clock.pause()
+    assert repr(simulation.clock) == "<clock: 0.500 s, paused>"
+    assert repr(simulation.faults) == "<active faults: motor of uav1>"
+    assert repr(simulation.diagnostics) == "<diagnostics: 1 event>"
+    airframe = simulation.uavs["uav1"].airframe
+    assert str(airframe) == "<Airframe 'f450': DJI F450 (OpenUAV), 4 rotors, 2.065 kg>"
+    line = volery.Trajectory.from_samples([0.0, 2.0], [[0.0, 0.0, 3.0], [1.0, 0.0, 3.0]])
+    assert str(line) == "<Trajectory: 0 to 2 s, from (0.00, 0.00, 3.00) to (1.00, 0.00, 3.00) m>"
+
+
+def test_trajectories_of_equal_numbers_are_equal():
+    def line(end):
+        return volery.Trajectory.from_samples([0.0, 2.0], [[0.0, 0.0, 3.0], [end, 0.0, 3.0]])
+
+    assert line(1.0) == line(1.0)
+    assert line(1.0) != line(2.0)
+    assert line(1.0) != "a line"
+    assert len({line(1.0), line(1.0), line(2.0)}) == 2
+
+
+@pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_parts_of_a_running_simulation_are_not_copied(simulate, flat_data, duplicate):
+    flat_data["uavs"][0]["position_m"] = [0.0, 0.0, 3.0]
+    simulation = simulate(flat_data)
+    uav = simulation.uavs["uav1"]
+    running = (
+        simulation,
+        simulation.vehicles,
+        uav,
+        uav.sensors,
+        uav.sensors["imu"],
+        uav.hold(),
+        simulation.snapshot(),
+    )
+    for one in running:
+        with pytest.raises(volery.CommandError, match="is neither copied nor pickled"):
+            duplicate(one)
+    with (
+        volery.VectorizedSimulation(simulation.scenario, 2) as envs,
+        pytest.raises(volery.CommandError, match="a VectorizedSimulation is neither"),
+    ):
+        duplicate(envs)
+    simulation.run(0.1)
+    for data in (simulation.scenario, uav.sensors["imu"].latest, simulation.vehicles.state()):
+        duplicate(data)
+
+
+def test_tab_completes_names_of_uavs_and_sensors(simulate, flat_data):
+    simulation = simulate(flat_data)
+    names = simulation.uavs._ipython_key_completions_()
+    assert names == ["uav1"]
+    assert "imu" in simulation.uavs["uav1"].sensors._ipython_key_completions_()
+    assert repr(simulation.uavs).startswith("{'uav1': <Uav 'uav1' (f450): LANDED")

@@ -11,8 +11,9 @@ from volery.core.errors import CommandError
 from volery.runtime import Simulation
 from volery.runtime.build.worlds import build_forest, build_terrain
 from volery.scenario import library
+from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.changes import Changes, WorldRequest, apply
-from volery.scenario.load import load_scenario
+from volery.scenario.load import load_scenario, parse_scenario
 from volery.vehicle.airframe import airframe_names
 
 
@@ -86,6 +87,25 @@ def test_a_scenario_whose_packages_are_missing_does_not_end_the_flight(
     assert message == (
         'forest_search: slam needs gtsam, global_planner needs ompl: pip install "volery[autonomy]"'
     )
+    assert asked == []
+
+
+@pytest.mark.parametrize("service", ["/volery/load_scenario", "/load_world"])
+def test_a_scenario_whose_node_cannot_be_imported_does_not_end_the_flight(
+    simulate, flat_data, service, monkeypatch
+):
+    """A package may be there and broken: its module is found, and its import fails."""
+    monkeypatch.setitem(sys.modules, "broken_module", None)
+    nodes = [{"node": "broken_module:Node"}]
+    given = parse_scenario({**flat_data, "name": "own", "nodes": nodes})
+    asked = []
+    simulation = simulate(flat_data, on_load=asked.append, shelf=ScenarioCatalog(given=given))
+    if service == "/load_world":
+        message = ask(simulation, service, world_resource={"uri": "own"}).result.error_message
+    else:
+        message = ask(simulation, service, scenario="own").message
+    assert message.startswith("own: nodes[0]: ")
+    assert "cannot be imported" in message
     assert asked == []
 
 

@@ -273,3 +273,15 @@ def test_a_sensor_is_found_by_its_kind_where_it_is_the_only_one(simulate, flat_d
     with VectorizedSimulation(parse_scenario(flat_data), 2) as envs:
         assert envs.sensors["uav1"]["gnss"].name == "fix"
         assert envs.uav(1, "uav1").sensors["gnss"].name == "fix"
+
+
+@pytest.mark.parametrize(
+    ("wanted", "meant"),
+    [("IMU", "imu"), ("gps", "gnss"), ("Ground Truth", "ground_truth"), ("barometr", "barometer")],
+)
+def test_a_misspelt_sensor_is_suggested(simulate, all_data, wanted, meant):
+    sensors = simulate(all_data).uavs["uav1"].sensors
+    with pytest.raises(SensorError, match=rf"no sensor '{wanted}'; .*Did you mean '{meant}'\?$"):
+        sensors[wanted]
+    with pytest.raises(SensorError, match=r"known: .*front$"):
+        sensors["xyz"]

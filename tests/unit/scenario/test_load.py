@@ -163,3 +163,11 @@ def test_overrides():
     two["uavs"] = two["uavs"] * 2
     with pytest.raises(ScenarioError, match="2 groups"):
         apply(parse_scenario(two), uavs=3)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "latin-1"])
+def test_files_in_another_encoding_say_what_to_do(tmp_path, encoding):
+    """PowerShell writes UTF-16."""
+    (tmp_path / "other.toml").write_text('name = "grün"\n', encoding=encoding)
+    with pytest.raises(ScenarioError, match=r"not UTF-8 text \(byte 0x.. at \d+\): save it as UTF-8"):
+        load_scenario(tmp_path / "other.toml")

@@ -67,6 +67,7 @@ def leads_somewhere(folder, target):
     return known or path.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", GENERATED)
 def test_generated_page(name):
     text = generated(name)
@@ -81,11 +82,13 @@ def test_git_holds_no_generated_page():
     assert not [page for page in GENERATED_PAGES if (DOCS / page).exists()]
 
 
+@pytest.mark.slow
 def test_gallery_has_every_shipped_scenario():
     titles = re.findall(r"^## (\w+)$", generated("gallery"), flags=re.MULTILINE)
     assert titles == list(library.names())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["topics", "services"])
 def test_types_of_topics_and_services_are_in_the_reference_of_messages(name):
     anchors = set(re.findall(r"\{ #([\w-]+) \}", generated("messages")))
@@ -96,6 +99,7 @@ def test_types_of_topics_and_services_are_in_the_reference_of_messages(name):
     assert used <= anchors
 
 
+@pytest.mark.slow
 def test_every_sensor_has_its_topics():
     section = generated("topics").partition("\n## Sensors\n")[2].partition("\n## ")[0]
     parts = dict(re.findall(r"^### `(\w+)`\n(.*?)(?=^### |\Z)", section, flags=re.S | re.M))
@@ -121,6 +125,7 @@ def documented_options(text):
             yield from ((path, name) for name in re.findall(r"--[a-z0-9-]+", line))
 
 
+@pytest.mark.slow
 def test_reference_of_the_command_line_has_every_option():
     text = generated("cli")
     options = {pair for pair in options_of(get_command(app)) if pair[0]}

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 from pathlib import Path
 
 from volery.autonomy.policy.policy_file import Policy, read_policy
 from volery.core.errors import DataFileError
+from volery.core.near_names import near_miss
 
 _FOLDER = Path(__file__).resolve().parents[2] / "learning" / "baselines"
 
@@ -29,8 +29,7 @@ def find_policy(name: str, folder: Path | None = None) -> Path:
     known = shipped_policies()
     if name in known:
         return _FOLDER / f"{name}.npz"
-    near = difflib.get_close_matches(name, known, n=1)
-    hint = f" Did you mean '{near[0]}'?" if near else ""
+    hint = near_miss(name, known)
     listed = ", ".join(known) or "none ship"
     raise DataFileError(f"no policy '{name}'.{hint} Known: {listed}, or the path of a .npz file")
 

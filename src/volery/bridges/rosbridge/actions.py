@@ -12,16 +12,18 @@ from dataclasses import dataclass
 from typing import Any
 
 from volery.bridges.rosbridge.fields import (
+    MAX_FRAGMENT,
     Id,
     absolute,
     read_choice,
     read_id,
+    read_limit,
     read_number,
     read_text,
     with_id,
 )
 from volery.bridges.rosbridge.message_encoder import MessageEncoder
-from volery.bridges.rosbridge.services import Post, Send
+from volery.bridges.rosbridge.services import Post, Send, post_nothing, send_nothing
 from volery.bridges.rosbridge.wire import Operation
 from volery.core.errors import BridgeError, GraphError
 from volery.graph.actions import Goal, GoalStatus
@@ -79,7 +81,7 @@ class RosbridgeActions:
     def send_goal(self, operation: Operation) -> None:
         """Forwards a goal of the client."""
         action, key = read_text(operation, "action"), read_id(operation)
-        size = int(read_number(operation, "fragment_size", 0, 0, 1e9)) or None
+        size = int(read_limit(operation, "fragment_size", MAX_FRAGMENT)) or None
         compression = read_choice(operation, "compression", ("none", "png", "cbor"))
 
         def reply(op: str, more: dict[str, Any]) -> None:
@@ -237,6 +239,7 @@ class RosbridgeActions:
         self._offers.clear()
         self._acting.clear()
         self._asked.clear()
+        self._send, self._post = send_nothing, post_nothing
 
 
 def _cancel(asked: _Asked) -> None:

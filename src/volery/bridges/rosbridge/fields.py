@@ -18,6 +18,8 @@ from volery.graph.qos import (
 Id = str | int | float | None
 """Client's name of an operation, returned unchanged."""
 
+MAX_FRAGMENT = 1e9
+"""Largest size of fragments, characters; no message is as long."""
 MOST_NAME = 1000
 """Largest number of characters of a name or an id."""
 
@@ -47,6 +49,19 @@ def read_id(operation: Operation) -> Id:
     if isinstance(value, (int, float)) and abs(value) < 2**63:
         return value
     raise BridgeError(f"{operation['op']}: 'id' must be text or a number")
+
+
+class NeedlessOperationError(BridgeError):
+    """An operation ends what does not exist: no harm is done, and rosbridge warns at most."""
+
+
+def read_limit(operation: Operation, key: str, greatest: float) -> float:
+    """Returns a limit that the client sets, 0 if missing; at most `greatest`.
+
+    Clients such as ROS# send the largest integer where they set no limit. Raises `BridgeError` for
+    a negative number, NaN and other values.
+    """
+    return min(read_number(operation, key, 0.0, 0.0, math.inf), greatest)
 
 
 def read_number(

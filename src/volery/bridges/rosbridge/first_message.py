@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
+from collections.abc import Sequence
 from typing import Any, cast
 
 from websockets.asyncio.server import ServerConnection
@@ -57,9 +58,13 @@ class GuardedConnection(ServerConnection):
         self._limits.answers_read()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Implements asyncio's method."""
+        """Implements asyncio's method; resolves cycles of references, see `core.collector`."""
         self._limits.close()
         super().connection_lost(exc)
+        protocol = self.protocol
+        protocol.parser.close()
+        protocol.select_subprotocol = None
+        protocol.recv_frame = self._recv_unbounded = _ignore  # type: ignore[method-assign]
 
     def data_received(self, data: bytes) -> None:
         """Implements asyncio's method; counts what is incomplete."""
@@ -74,6 +79,22 @@ class GuardedConnection(ServerConnection):
         if self._last_frames:
             self._last_frames.popleft().data = b""  # the parser refers to it until the next one
         return message
+
+    async def send_all(self, messages: Sequence[str | bytes]) -> None:
+        """Sends messages with one call of the system; returns when there is room for more."""
+        async with self.send_context():
+            for message in messages:
+                if isinstance(message, str):
+                    self.protocol.send_text(message.encode())
+                else:
+                    self.protocol.send_binary(message)
+
+    def send_data(self) -> None:
+        """Implements the method of `websockets`; joins what it would write piece by piece."""
+        pieces = self.protocol.writes
+        if len(pieces) > 1 and all(pieces):  # an empty one is the end of the stream
+            self.protocol.writes = [b"".join(pieces)]
+        super().send_data()
 
     def _end(self, reason: str) -> None:
         """Closes the connection, with the reason if the client reads it soon."""
@@ -111,6 +132,10 @@ class GuardedConnection(ServerConnection):
     def _unguard(self) -> None:
         self.protocol.max_message_size = self.max_bytes
         self.protocol.recv_frame = self._recv_frame  # type: ignore[method-assign]
+
+
+def _ignore(_frame: Frame) -> None:
+    """Does nothing."""
 
 
 def guarded(token: str | None, max_bytes: int) -> type[GuardedConnection]:

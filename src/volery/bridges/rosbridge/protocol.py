@@ -21,7 +21,12 @@ from typing import Any
 from volery.bridges.rosbridge.access_policy import AccessPolicy, refusal
 from volery.bridges.rosbridge.actions import RosbridgeActions
 from volery.bridges.rosbridge.cbor_codec import encode_cbor
-from volery.bridges.rosbridge.fields import read_choice, read_id, with_id
+from volery.bridges.rosbridge.fields import (
+    NeedlessOperationError,
+    read_choice,
+    read_id,
+    with_id,
+)
 from volery.bridges.rosbridge.fragments import MOST_FRAGMENTS, Assembly, split
 from volery.bridges.rosbridge.message_budget import (
     MAX_MESSAGE_BYTES,
@@ -172,7 +177,7 @@ class RosbridgePeer:
             operation = decode_frame(frame, limited=True)
             self._handle(operation, now_s, 0)
         except VoleryError as error:
-            self._status("error", str(error), operation)
+            self._status(_level_of(error), str(error), operation)
         except Exception as error:
             # An error of ours in serving one client must not end the service of others.
             self._status("error", f"internal error: {type(error).__name__}: {error}", operation)
@@ -220,7 +225,7 @@ class RosbridgePeer:
         try:
             self._handle(operation, now_s, depth + 1)
         except VoleryError as error:
-            self._status("error", str(error), operation)
+            self._status(_level_of(error), str(error), operation)
 
     def _set_level(self, operation: Operation) -> None:
         self._level = read_choice(operation, "level", LEVELS)
@@ -240,6 +245,11 @@ class RosbridgePeer:
     def congested(self) -> bool:
         """Whether so many bytes wait for the client that reading from it should pause."""
         return self._waiting_bytes > MOST_WAITING_BYTES
+
+    @property
+    def has_answers(self) -> bool:
+        """Whether the next frame is an answer or a status, not a message of a topic."""
+        return bool(self._outbox)
 
     def send(self, operation: Operation, fragment_size: int | None, compression: str) -> None:
         """Queues an operation for the client.
@@ -328,6 +338,11 @@ class RosbridgePeer:
         self._session.close()
         self._outbox.clear()
         self._assembly.close()
+        # Without cycles of references its memory is free at once, see `core.collector`.
+        self._handlers.clear()
+        self._topics.close()
+        self._services.close()
+        self.on_authorized = lambda: None
 
     def _drop_fragments(self) -> None:
         if self._assembly.drop_all():
@@ -346,3 +361,7 @@ class RosbridgePeer:
             post(act)
 
         return guarded
+
+
+def _level_of(error: VoleryError) -> str:
+    return "warning" if isinstance(error, NeedlessOperationError) else "error"

@@ -16,7 +16,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from volery.bridges.origins import Origins
-from volery.bridges.rosbridge.bulk_turns import BulkTurns
+from volery.bridges.rosbridge.fair_queue import FairQueue
 from volery.bridges.rosbridge.first_message import GuardedConnection, guarded
 from volery.bridges.rosbridge.message_budget import MAX_MESSAGE_BYTES
 from volery.bridges.rosbridge.message_encoder import Generation, MessageEncoder
@@ -47,6 +47,10 @@ HANDSHAKE_TIMEOUT_S = 10.0
 """Timeout of a WebSocket's request, including the wait for the check of its token."""
 _ONCE = ("Host", "Origin", "Authorization")
 """Headers that identify a request's origin; a repeated one is ambiguous."""
+
+
+_FOXGLOVE = "foxglove."
+_USE_ROSBRIDGE = "this is rosbridge: choose the connection 'Rosbridge' in place of 'Foxglove WebSocket'"
 
 
 class RosbridgeServer:
@@ -113,6 +117,8 @@ class RosbridgeServer:
         self._server: Server | None = None
         self._listener: Listener | None = None
         self._attempts = TokenAttempts()
+        self._refused_foxglove = False
+        """Whether that has been logged, which happens once."""
         self._rosapi: RosApi | None = None
         self._transforms: TfRepublisher | None = None
         self._clients: set[ServerConnection] = set()
@@ -120,7 +126,7 @@ class RosbridgeServer:
         """Clients whose request for a connection carried the token."""
         self._gateway: Gateway | None = None
         self._shared = ServerContext()
-        self._bulk = BulkTurns()
+        self._queue = FairQueue()
 
     @property
     def name(self) -> str:
@@ -205,6 +211,12 @@ class RosbridgeServer:
                 return connection.respond(
                     HTTPStatus.BAD_REQUEST, f"{name} is given more than once\n"
                 )
+        offered = ",".join(request.headers.get_all("Sec-WebSocket-Protocol")).split(",")
+        if any(name.strip().startswith(_FOXGLOVE) for name in offered):
+            if not self._refused_foxglove:
+                self._refused_foxglove = True
+                _log.warning("a Foxglove client was refused: %s", _USE_ROSBRIDGE)
+            return connection.respond(HTTPStatus.BAD_REQUEST, f"{_USE_ROSBRIDGE}\n")
         foreign = self._foreign_page(connection, request)
         if foreign is not None:
             return foreign
@@ -276,7 +288,7 @@ class RosbridgeServer:
         if peer.authorized:
             prove()
         try:
-            problem = await converse(connection, bell, peer, self._bulk, checkpoint)
+            problem = await converse(connection, bell, peer, self._queue, checkpoint)
         finally:
             self._clients.discard(connection)
         if problem is not None and not isinstance(problem, ConnectionClosed):

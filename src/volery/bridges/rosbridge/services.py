@@ -7,11 +7,12 @@ from collections.abc import Callable
 from typing import Any
 
 from volery.bridges.rosbridge.fields import (
+    MAX_FRAGMENT,
     Id,
     absolute,
     read_choice,
     read_id,
-    read_number,
+    read_limit,
     read_text,
     with_id,
 )
@@ -53,10 +54,10 @@ class RosbridgeServices:
     def call(self, operation: Operation, now_s: float) -> None:
         """Calls a service for the client."""
         name, key = read_text(operation, "service"), read_id(operation)
-        fragment_size = int(read_number(operation, "fragment_size", 0, 0, 1e9)) or None
+        fragment_size = int(read_limit(operation, "fragment_size", MAX_FRAGMENT)) or None
         compression = read_choice(operation, "compression", ("none", "png", "cbor", "cbor-raw"))
         compression = "cbor" if compression == "cbor-raw" else compression
-        timeout_s = read_number(operation, "timeout", 0, 0, 1e9)
+        timeout_s = read_limit(operation, "timeout", 1e9)
 
         def respond(values: Any, success: bool) -> None:
             response = {"op": "service_response", "service": name, "values": values}
@@ -107,10 +108,7 @@ class RosbridgeServices:
     def _find(self, name: str) -> tuple[str, str]:
         """Returns name in the graph and type of a client's `/add` or, in old clients, `/add#3`."""
         service = absolute(name.partition("#")[0])
-        srvtype = self._session.graph.services().get(service)
-        if srvtype is None:
-            raise GraphError(f"service '{service}' has no server")
-        return service, srvtype
+        return service, self._session.graph.service_type(service)
 
     def expire(self, now_s: float) -> None:
         """Fails calls that have timed out."""
@@ -122,6 +120,12 @@ class RosbridgeServices:
         """Returns the time of the next timeout; None if there is none."""
         deadline_s = min((deadline_s for deadline_s, _ in self._calls.values()), default=None)
         return None if deadline_s == float("inf") else deadline_s
+
+    def close(self) -> None:
+        """Forgets the client, which has left; its session fails what is open."""
+        self._calls.clear()
+        self._requests.clear()
+        self._send, self._post = send_nothing, post_nothing
 
     # ----------------------------------------------------------------------------------- servers
 
@@ -186,6 +190,14 @@ class RosbridgeServices:
             reply.fail(GraphError(f"service '{service}' sent a wrong response: {error}"))
             raise
         reply.answer(response)
+
+
+def send_nothing(_operation: Operation, _fragment_size: int | None, _compression: str) -> None:
+    """Stands for the `Send` of a client that has left."""
+
+
+def post_nothing(_action: Callable[[], None]) -> None:
+    """Stands for the `Post` of a client that has left."""
 
 
 def _arguments(operation: Operation, msgtype: str) -> Any:

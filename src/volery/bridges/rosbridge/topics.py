@@ -7,11 +7,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from volery.bridges.rosbridge.fields import (
+    MAX_FRAGMENT,
     Id,
+    NeedlessOperationError,
     absolute,
     read_choice,
     read_id,
-    read_number,
+    read_limit,
     read_optional_text,
     read_qos,
     read_text,
@@ -57,11 +59,11 @@ class SubscriptionOptions:
 
 def read_wishes(operation: Operation) -> SubscriptionOptions:
     """Reads the options of a `subscribe` operation. Raises `BridgeError` for invalid values."""
-    size = read_number(operation, "fragment_size", 0, 0, 1e9)
+    size = read_limit(operation, "fragment_size", MAX_FRAGMENT)
     qos = read_qos(operation)
-    length = int(read_number(operation, "queue_length", 0, 0, MOST_DEPTH))
+    length = int(read_limit(operation, "queue_length", MOST_DEPTH))
     return SubscriptionOptions(
-        read_number(operation, "throttle_rate", 0, 0, 1e9) / 1000.0,
+        read_limit(operation, "throttle_rate", 1e9) / 1000.0,
         length or (0 if qos is None else qos.depth),
         int(size) or None,
         read_choice(operation, "compression", COMPRESSIONS),
@@ -211,9 +213,10 @@ class RosbridgeTopics:
         topic, key = absolute(read_text(operation, "topic")), read_id(operation)
         found = self._published.get(topic)
         if found is None:
-            raise BridgeError(f"unadvertise: {self._session.name} does not publish '{topic}'")
+            name = self._session.name
+            raise NeedlessOperationError(f"unadvertise: {name} does not publish '{topic}'")
         if key is not None and found.ids and key not in found.ids:
-            raise BridgeError(f"unadvertise: no such advertisement of '{topic}'")
+            raise NeedlessOperationError(f"unadvertise: no such advertisement of '{topic}'")
         found.ids.discard(key)
         if found.ids and key is not None:
             return
@@ -265,7 +268,7 @@ class RosbridgeTopics:
         name, key = read_text(operation, "topic"), read_id(operation)
         stream = self._streams.get(name)
         if stream is None or (key is not None and key not in stream.requests):
-            raise BridgeError(f"unsubscribe: no such subscription of '{name}'")
+            raise NeedlessOperationError(f"unsubscribe: no such subscription of '{name}'")
         if key is None:
             stream.requests.clear()
         else:
@@ -281,6 +284,15 @@ class RosbridgeTopics:
         self._streams.pop(stream.name, None)
         if stream.queue is not None:
             self._session.unsubscribe(stream.queue)
+
+    def close(self) -> None:
+        """Drops all streams of a client that has left."""
+        for stream in self._streams.values():
+            stream.queue = None  # its `wake` refers to the stream
+        self._streams.clear()
+        self._ready.clear()
+        self._held.clear()
+        self._complain = _ignore
 
     def take(self, now_s: float) -> Iterator[tuple[TopicStream, Published]]:
         """Yields due messages, one of every stream in turn."""
@@ -315,3 +327,7 @@ class RosbridgeTopics:
 
         stream.tune(self._session, wake, is_new=is_new)
         wake()  # latched messages, and those of the previous queue, are available already
+
+
+def _ignore(_text: str) -> None:
+    """Does nothing."""

@@ -1,18 +1,18 @@
 """Exchanges frames between one client's WebSocket and its peer.
 
-await converse(channel, bell, peer, bulk)
+await converse(channel, bell, peer, queue)
 """
 
 from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from typing import Any, Protocol
 
 from volery.bridges.loop_waker import wake_of
-from volery.bridges.rosbridge.bulk_turns import LARGE_BYTES, TURN_S, BulkTurns, Writer
+from volery.bridges.rosbridge.fair_queue import MESSAGES, REQUESTS, FairQueue, Flow
 from volery.bridges.rosbridge.protocol import RosbridgePeer
 from volery.bridges.rosbridge.token_check import TokenCheck
 from volery.bridges.rosbridge.wire import Frame
@@ -24,6 +24,9 @@ SERVICE_RESTART = 1012
 
 _LONGEST_SILENCE_S = 10.0
 """Time within which a client must send its token."""
+_MAX_FRAMES = 6
+_MAX_BYTES = 32 << 10
+"""Limits of the frames of one client that are sent together, with one call of the system."""
 
 
 class WebSocketSession(Protocol):
@@ -32,8 +35,8 @@ class WebSocketSession(Protocol):
     async def recv(self) -> Frame:
         """Waits for a message."""
 
-    async def send(self, message: Frame, /) -> None:
-        """Sends a message; returns when the network is ready for the next one."""
+    async def send_all(self, messages: Sequence[Frame], /) -> None:
+        """Sends messages; returns when the network is ready for the next ones."""
 
     async def close(self, code: int = ..., reason: str = ...) -> None:
         """Closes the connection."""
@@ -75,26 +78,25 @@ async def converse(
     channel: WebSocketSession,
     bell: Bell,
     peer: RosbridgePeer,
-    bulk: BulkTurns,
+    queue: FairQueue,
     checkpoint: TokenCheck | None = None,
 ) -> Exception | None:
     """Serves a client until it leaves or must be disconnected, then closes its peer.
 
-    bell: rung by the peer's `wake`. bulk: turns of all clients of this loop. checkpoint: of a
+    bell: rung by the peer's `wake`. queue: of all clients of this loop. checkpoint: of a
     client that must send a token. Returns the exception that ended the service, usually the closed
     connection.
     """
     read = asyncio.Event()
-    writer = Writer(bulk)
+    requests, messages = queue.flow(REQUESTS), queue.flow(MESSAGES)
     tasks = [
-        asyncio.create_task(_read(channel, peer, bulk, read, checkpoint)),
-        asyncio.create_task(_write(channel, peer, bell, writer, read)),
+        asyncio.create_task(_read(channel, peer, requests, read, checkpoint)),
+        asyncio.create_task(_write(channel, peer, bell, requests, messages, read)),
     ]
     try:
         await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
     finally:
         peer.close()
-        writer.close()
         for task in tasks:
             task.cancel()
         outcomes = await asyncio.gather(*tasks, return_exceptions=True)
@@ -104,12 +106,11 @@ async def converse(
 async def _read(
     channel: WebSocketSession,
     peer: RosbridgePeer,
-    bulk: BulkTurns,
+    flow: Flow,
     read: asyncio.Event,
     checkpoint: TokenCheck | None,
 ) -> None:
     """Passes the client's frames to its peer until it leaves or must be disconnected."""
-    spent_s = 0.0
     while peer.refused is None:
         silence_s = None if peer.authorized else _LONGEST_SILENCE_S
         try:
@@ -118,46 +119,48 @@ async def _read(
         except TimeoutError:
             await channel.close(POLICY_VIOLATION, "no token was sent")
             return
-        if len(frame) > LARGE_BYTES:
-            await bulk.large_messages.turn()
+        await flow.begin()
         peer.reading.begin()
         if peer.authorized or checkpoint is None:
             peer.receive(frame, time.monotonic())
         else:
             await checkpoint.receive(peer, frame)
             peer.reading.begin()  # the checkpoint gives others their turn
-        spent_s += peer.reading.end(1, len(frame))
+        cost_s = peer.reading.end(1, len(frame))
         frame = ""  # frees it while the client sends nothing
-        if spent_s >= TURN_S:  # `recv` does not wait if a frame is available
-            spent_s = 0.0
-            await asyncio.sleep(0)
+        await flow.spend(cost_s)  # `recv` does not wait if a frame is available
         while (pause_s := peer.reading.pause_s()) and peer.refused is None:
             await asyncio.sleep(pause_s)
         while peer.congested:  # the client requests more than it reads
             read.clear()
             await read.wait()
-    for answer in peer.frames(time.monotonic()):
-        await channel.send(answer)
+    await channel.send_all(list(peer.frames(time.monotonic())))
     await channel.close(POLICY_VIOLATION, peer.refused[:100])
 
 
 async def _write(
-    channel: WebSocketSession, peer: RosbridgePeer, bell: Bell, turns: Writer, read: asyncio.Event
+    channel: WebSocketSession,
+    peer: RosbridgePeer,
+    bell: Bell,
+    requests: Flow,
+    messages: Flow,
+    read: asyncio.Event,
 ) -> None:
     """Sends the peer's frames, as fast as the client reads."""
     while True:
         bell.silence()
-        await turns.begin()
+        await (requests if peer.has_answers else messages).begin()
         frames = peer.frames(time.monotonic())
         while True:
-            frame, cost_s = _next(peer, frames)
-            if frame is None:
+            flow = requests if peer.has_answers else messages
+            batch, cost_s = _next(peer, frames)
+            if not batch:
                 break
-            await channel.send(frame)
+            await channel.send_all(batch)
             read.set()
             while pause_s := peer.writing.pause_s():
                 await asyncio.sleep(pause_s)
-            await turns.spend(cost_s)
+            await flow.spend(cost_s)
         read.set()
         now_s = time.monotonic()
         due_s = peer.due_s(now_s)
@@ -166,8 +169,13 @@ async def _write(
                 await bell.received.wait()
 
 
-def _next(peer: RosbridgePeer, frames: Iterator[Frame]) -> tuple[Frame | None, float]:
-    """Returns the next frame and the time to make it, s, charged to the client."""
+def _next(peer: RosbridgePeer, frames: Iterator[Frame]) -> tuple[list[Frame], float]:
+    """Returns the next frames and the time to make them, s, charged to the client."""
     peer.writing.begin()
-    frame = next(frames, None)
-    return frame, peer.writing.end(1, 0 if frame is None else len(frame))
+    batch, size = [], 0
+    for frame in frames:
+        batch.append(frame)
+        size += len(frame)
+        if len(batch) >= _MAX_FRAMES or size >= _MAX_BYTES:
+            break
+    return batch, peer.writing.end(len(batch), size)

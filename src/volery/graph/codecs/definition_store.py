@@ -25,6 +25,7 @@ from volery.graph.codecs.definition_files import (
     read_definition_file,
 )
 from volery.graph.message_defaults import make_arguments_optional
+from volery.graph.message_methods import add_methods
 
 EMPTY_MEMBER = definition_budget.EMPTY_MEMBER
 """The byte of a message without fields, in ROS 2 only."""
@@ -177,6 +178,7 @@ class DefinitionStore(Typestore):
             make_arguments_optional(
                 name, self.types[name], self.types, self.fielddefs, self.default_of
             )
+            add_methods(name, self.types[name], self.fielddefs)
 
 
 def _shape(fields: Any) -> Any:

@@ -33,6 +33,8 @@ ROS1_TIME = {"sec": "secs", "nanosec": "nsecs"}
 """Names of a time's fields in rosbridge for ROS 1."""
 _LARGEST_FLOAT32 = float(np.finfo(np.float32).max)
 _SHOWN_LETTERS = 40
+_NAMED_FLOATS = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}
+"""Texts that JSON writers of .NET, such as that of ROS#, put in place of a number."""
 
 
 class _Mismatch(Exception):  # noqa: N818 - becomes a GraphError once its path is known
@@ -237,6 +239,8 @@ def _decode_float(value: Any) -> float:
         return value
     if value is None:
         return math.nan
+    if isinstance(value, str) and value in _NAMED_FLOATS:
+        return _NAMED_FLOATS[value]
     if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
         try:
             return float(value)
@@ -338,5 +342,9 @@ def _bytes_of(values: Any) -> bytes:
         return bytes(values)
     try:
         return base64.b64decode(values, validate=True)
+    except (binascii.Error, ValueError):
+        pass  # in lines, as MIME has it (RFC 2045)
+    try:
+        return base64.b64decode("".join(values.split()), validate=True)
     except (binascii.Error, ValueError):
         raise _Mismatch("must be base64 text (RFC 4648) or a list") from None

@@ -19,8 +19,8 @@ def with_present_times(
 ) -> Any:
     """Returns plain values with `now_ns()` for a time `now` and a header `auto`, as in ROS 2.
 
-    stamps_headers: headers without a stamp get one as well, as in rosbridge; the message's own also
-    if it is omitted.
+    stamps_headers: headers without a stamp, or with an empty one, get one as well, as in rosbridge;
+    the message's own also if it is omitted.
     """
     if stamps_headers and isinstance(plain, dict) and "header" not in plain:
         own = [member for member in _timed_members(msgtype) if member[0] == "header"]
@@ -35,7 +35,7 @@ def _filled(plain: Any, msgtype: str, now_ns: Callable[[], int], stamps_headers:
     if msgtype == _HEADER:
         if plain == "auto":
             return {"stamp": _stamp(now_ns)}
-        if stamps_headers and isinstance(plain, dict) and "stamp" not in plain:
+        if stamps_headers and isinstance(plain, dict) and plain.get("stamp", {}) == {}:
             return {**plain, "stamp": _stamp(now_ns)}
     members = _timed_members(msgtype)
     if not members or not isinstance(plain, dict):

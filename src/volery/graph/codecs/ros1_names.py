@@ -20,6 +20,7 @@ _OLD_TYPES = {
     **{old.replace("/", "/msg/"): new for new, old in _TYPES.items()},
     "tf/tfMessage": "tf2_msgs/msg/TFMessage",
     "tf/msg/tfMessage": "tf2_msgs/msg/TFMessage",
+    "roslib/Header": "std_msgs/msg/Header",
 }
 _NAME = re.compile(r"([A-Za-z]\w*)/(?:(msg|srv|action)/)?([A-Za-z]\w*)", re.ASCII)
 _PART = re.compile(r"(.+)_(Request|Response|Goal|Result|Feedback)")
@@ -44,9 +45,12 @@ def ros1_name(msgtype: str) -> str:
 def ros2_name(name: str, kind: Literal["msg", "srv", "action"] = "msg") -> str:
     """Returns the ROS 2 name of a type given in either spelling.
 
-    name: `std_msgs/String` or `std_msgs/msg/String`. kind: the kind of a name with two parts.
-    Raises `GraphError` if the text is not the name of a type, or names another kind.
+    name: `std_msgs/String` or `std_msgs/msg/String`, with more slashes as rosbridge accepts them.
+    kind: the kind of a name with two parts. Raises `GraphError` if the text is not the name of a
+    type, or names another kind.
     """
+    if isinstance(name, str):
+        name = re.sub("/+", "/", name).removeprefix("/")
     if name in _OLD_TYPES:
         return _OLD_TYPES[name]
     package, given, base = _split(name)

@@ -2,25 +2,45 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Self
 
 from volery.graph.codecs.cdr import decode_cdr
 from volery.graph.message_copies import message_checker, message_copier
 from volery.graph.messages import message_type
 from volery.graph.nodes.deferred_execution import DeferredExecutor
 from volery.graph.nodes.qos_events import configure_introspection
+from volery.graph.qos import QoSProfile
 from volery.graph.topics import Publisher, Subscription
 
+Callback = Callable[..., Any]
 
-class NodePublisher(Publisher):
+
+class Handle:
+    """A handle that a `with` statement destroys, as in rclpy."""
+
+    def destroy(self) -> None:
+        """Destroys what the handle stands for."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        self.destroy()
+
+
+class NodePublisher(Publisher, Handle):
     """Publishes copies of messages, so that the node may change a message after publishing it.
 
     Messages that a node with a latency publishes in a callback leave when the latency has passed.
     """
 
-    def __init__(self, publisher: Publisher, executor: DeferredExecutor | None) -> None:
+    def __init__(
+        self, publisher: Publisher, executor: DeferredExecutor | None, qos_profile: QoSProfile
+    ) -> None:
         self._publisher = publisher
+        self.qos_profile = qos_profile
         self._executor = executor
         self._copy = message_copier(publisher.msgtype)
         self._check = message_checker(publisher.msgtype)
@@ -76,6 +96,10 @@ class NodePublisher(Publisher):
     def assert_liveliness(self) -> None:
         """Does nothing: no publisher loses its liveliness."""
 
+    def wait_for_all_acked(self, timeout: Any = None) -> bool:  # noqa: ARG002
+        """Returns True: inside the simulation no message is lost."""
+        return True
+
     def cancel(self) -> None:
         """Stops publishing."""
         self._publisher.cancel()
@@ -83,15 +107,54 @@ class NodePublisher(Publisher):
     destroy = cancel
 
 
-class NodeSubscription:
-    """A subscription of a node."""
+class NodeSubscription(Handle):
+    """A subscription of a node; `callback` may be replaced, as in rclpy."""
 
     def __init__(
-        self, subscription: Subscription, topic: str, callback: Callable[[Any], Any]
+        self,
+        topic: str,
+        msg_type: type[Any],
+        callback: Callback,
+        qos_profile: QoSProfile,
+        num_publishers: Callable[[], int],
     ) -> None:
-        self._subscription = subscription
         self.topic = topic
+        self.msg_type = msg_type
+        self.qos_profile = qos_profile
+        self._num_publishers = num_publishers
+        self._subscription: Subscription | None = None
+        self._wants_info = False
         self.callback = callback
+
+    @property
+    def callback(self) -> Callback:
+        """Receives the message, or the message and a dict of its times."""
+        return self._callback
+
+    @callback.setter
+    def callback(self, callback: Callback) -> None:
+        self._callback = callback
+        self._wants_info = not _accepts(callback, 1) and _accepts(callback, 2)
+
+    def attach(self, subscription: Subscription) -> None:
+        """Sets the subscription of the graph, which `cancel` ends."""
+        self._subscription = subscription
+
+    def call(self, message: Any, source_ns: int, received_ns: int) -> Any:
+        """Calls the callback; times of publication and arrival, ns, are rclpy's message info."""
+        if not self._wants_info:
+            return self._callback(message)
+        info = {
+            "source_timestamp": source_ns,
+            "received_timestamp": received_ns,
+            "publication_sequence_number": None,
+            "reception_sequence_number": None,
+        }
+        return self._callback(message, info)
+
+    def get_publisher_count(self) -> int:
+        """Returns the number of publishers of the topic."""
+        return self._num_publishers()
 
     @property
     def topic_name(self) -> str:
@@ -100,12 +163,13 @@ class NodeSubscription:
 
     def cancel(self) -> None:
         """Stops receiving."""
-        self._subscription.cancel()
+        if self._subscription is not None:
+            self._subscription.cancel()
 
     destroy = cancel
 
 
-class NodeService:
+class NodeService(Handle):
     """A service of a node."""
 
     def __init__(self, name: str, srv_type: str, withdraw: Callable[[], None]) -> None:
@@ -118,3 +182,14 @@ class NodeService:
     def destroy(self) -> None:
         """Destroys the service."""
         self._withdraw()
+
+
+def _accepts(callback: Callback, count: int) -> bool:
+    """Returns whether a callback may be called with `count` arguments; True if it does not say."""
+    try:
+        inspect.signature(callback).bind(*[None] * count)
+    except TypeError:
+        return False
+    except ValueError:  # a function of C
+        return True
+    return True

@@ -24,12 +24,14 @@ from volery.graph.typestore import typestore
 
 _KINDS = ("msg", "srv", "action")
 PYTHON_PACKAGES = (
+    "cv_bridge",
     "rclpy",
     "message_filters",
     "sensor_msgs_py",
     "tf2_geometry_msgs",
     "tf2_py",
     "tf2_ros",
+    "tf2_sensor_msgs",
     "tf_transformations",
 )
 """Packages without message types; the stand-ins have the most usual parts of them."""
@@ -138,15 +140,20 @@ def _filler(package: str, rest: str) -> Callable[[ModuleType], None] | None:
 @cache
 def _modules() -> dict[str, dict[str, Any]]:
     from volery.graph.nodes import (  # import the node
+        cv_bridge,
         message_filters,
         point_cloud2,
         qos_events,
         rclpy_modules,
         tf2,
+        tf_transformations,
+        transformed_messages,
     )
 
+    parts: tuple[Any, ...] = (rclpy_modules, qos_events, tf2, transformed_messages)
+    parts += (tf_transformations, message_filters, point_cloud2, cv_bridge)
     joined: dict[str, dict[str, Any]] = {}
-    for part in (rclpy_modules, qos_events, tf2, message_filters, point_cloud2):
+    for part in parts:
         joined |= part.contents()
     return joined
 

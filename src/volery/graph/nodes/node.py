@@ -170,10 +170,11 @@ class Node(ParameterMethods):
 
         `latched`, or durability TRANSIENT_LOCAL: later subscribers receive the last message.
         """
-        latched = profile_of(qos_profile).latched or latched
+        profile = profile_of(qos_profile)
+        latched = profile.latched or latched
         publisher = self._context.graph.advertise(self.resolve(topic), msg_type, latched=latched)
         publisher.owner = self.full_name
-        handle = NodePublisher(publisher, self.__executor)
+        handle = NodePublisher(publisher, self.__executor, profile)
         self.__handles[handle] = handle.cancel
         return handle
 
@@ -190,6 +191,9 @@ class Node(ParameterMethods):
     ) -> NodeSubscription:
         """Calls `callback(message)` for each message of `topic`.
 
+        A callback with two required arguments also receives a dict with the times of publication
+        and arrival, as in rclpy.
+
         raw: passes the message's bytes in CDR.
 
         qos_profile: has an effect where messages arrive faster than the node processes them, which
@@ -199,20 +203,20 @@ class Node(ParameterMethods):
         moves: UAVs that the messages move, if their names are not in that of the topic; operators
         who do not control them cannot publish on it.
         """
-        name = self.resolve(topic)
+        name, graph, profile = self.resolve(topic), self._context.graph, profile_of(qos_profile)
+        handle = NodeSubscription(name, msg_type, callback, profile, lambda: graph.publishers(name))
         occasion = f"message on {name}{_name_of(callback)}"
 
         def receive(published: Published) -> None:
-            client = self._context.graph.acting_client
+            client = graph.acting_client
             if client:
                 self.__last_client = f"{client} on {name}"
             received = published.cdr if raw else self.__received(published.message)
-            self.__run(partial(callback, received), occasion)
+            call = partial(handle.call, received, published.time_ns, self.__now_ns())
+            self.__run(call, occasion)
 
-        subscription: Subscription = self._context.graph.subscribe(
-            name, receive, msg_type, qos=profile_of(qos_profile)
-        )
-        handle = NodeSubscription(subscription, name, callback)
+        subscription: Subscription = graph.subscribe(name, receive, msg_type, qos=profile)
+        handle.attach(subscription)
         self.__handles[handle] = handle.cancel
         if moves:
             self.__declare_moves(name, moves)
@@ -237,6 +241,7 @@ class Node(ParameterMethods):
             self.__now_ns,
             self.__defer,
             autostart=autostart,
+            clock=self.get_clock(),
         )
         self.__handles[timer] = timer.destroy
         self.__timers.append(timer)
@@ -369,6 +374,10 @@ class Node(ParameterMethods):
         if self.__executor is not None:
             self.__executor.join()
 
+    def _handles(self, kind: type[Any]) -> list[Any]:
+        """Returns the node's handles of a kind, in the order of their creation."""
+        return [handle for handle in self.__handles if isinstance(handle, kind)]
+
     def __declare_moves(self, name: str, uavs: Sequence[str]) -> None:
         withdraw = self._context.graph.moved_uavs.declare(name, uavs)
         self.__handles[withdraw] = withdraw
@@ -466,8 +475,12 @@ class Node(ParameterMethods):
 
     def resolve(self, name: str) -> str:
         """Returns the absolute, remapped name of a topic or service."""
-        if name.startswith("~/"):
-            name = f"{self.__namespace}/{self.__name}/{name[2:]}"
+        if "{" in name:
+            for part, value in (("node", self.__name), ("ns", ns := self.get_namespace())):
+                name = name.replace(f"{{{part}}}", value)
+            name = name.replace("{namespace}", ns).replace("//", "/")
+        if name == "~" or name.startswith("~/"):
+            name = f"{self.__namespace}/{self.__name}{name[1:]}"
         elif not name.startswith("/"):
             name = f"{self.__namespace}/{name}"
         return self._context.remap.get(name, name)

@@ -14,6 +14,7 @@ from volery.graph.parameters import (
     Parameters,
     ParameterSetting,
     ParameterType,
+    ParameterUninitializedError,
     Within,
     like_of,
 )
@@ -92,8 +93,8 @@ class ParameterMethods:
             parameter = Parameter(
                 name,
                 start,
-                like=None if start is None else like,
-                within=None if start is None else within,
+                like=None if start is None and not isinstance(value, ParameterType) else like,
+                within=within,
                 read_only=read_only,
                 before_set=self.__before_set,
                 agrees=self.__call_callbacks,
@@ -139,10 +140,20 @@ class ParameterMethods:
         return name in self.__parameters
 
     def get_parameter(self, name: str) -> Parameter:
-        """Returns a parameter. Raises `ParameterNotDeclaredError` if it is not declared."""
+        """Returns a parameter.
+
+        Raises `ParameterNotDeclaredError` if it is not declared, `ParameterUninitializedError` if
+        it was declared with a type alone and has no value.
+        """
         if self.__allow_undeclared and name not in self.__parameters:
             return Parameter(name, None)
-        return self.__find(name)
+        found = self.__find(name)
+        if not found.is_initialized:
+            raise ParameterUninitializedError(
+                f"node {self.__name}: parameter '{name}' is declared without a value: set it in "
+                "the scenario"
+            )
+        return found
 
     def get_parameters(self, names: Sequence[str]) -> list[Parameter]:
         """Returns parameters in the order of `names`."""
@@ -150,7 +161,7 @@ class ParameterMethods:
 
     def get_parameter_or(self, name: str, alternative_value: Any = None) -> Any:
         """Returns a declared parameter, or the alternative."""
-        if name in self.__parameters:
+        if name in self.__parameters and self.__parameters[name].is_initialized:
             return self.__parameters[name]
         return Parameter(name, None) if alternative_value is None else alternative_value
 

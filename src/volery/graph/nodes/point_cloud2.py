@@ -205,6 +205,7 @@ def contents() -> dict[str, dict[str, Any]]:
     )
     return {
         "sensor_msgs_py": {},
+        "sensor_msgs_py.numpy_compat": {"structured_to_unstructured": structured_to_unstructured},
         "sensor_msgs_py.point_cloud2": {
             "DUMMY_FIELD_PREFIX": DUMMY_FIELD_PREFIX,
             "PointCloud2": PointCloud2,

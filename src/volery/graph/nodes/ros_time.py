@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from enum import IntEnum
 from functools import total_ordering
 from typing import Any
 
 from volery.core.clock import NS_PER_S
+from volery.core.errors import GraphError
 from volery.graph.messages import Time as TimeMessage
 from volery.graph.messages import message_type
 
@@ -65,8 +68,22 @@ class Duration:
             return NotImplemented
         return Duration(nanoseconds=self._ns - other._ns)
 
+    def __mul__(self, factor: float) -> Duration:
+        if not isinstance(factor, int | float):
+            return NotImplemented
+        if math.isnan(factor):
+            raise ValueError("a duration times nan")
+        return INFINITE if math.isinf(factor) else Duration(nanoseconds=int(self._ns * factor))
+
     def __repr__(self) -> str:
         return f"Duration(nanoseconds={self._ns})"
+
+    def __str__(self) -> str:
+        return "Infinite" if self == INFINITE else f"{self._ns} nanoseconds"
+
+
+INFINITE = Duration(nanoseconds=_LONGEST_NS - 1)
+"""rclpy's `Infinite`."""
 
 
 class Time:
@@ -162,6 +179,7 @@ class Clock:
     def __init__(
         self, now_ns: Callable[[], int] | None = None, *, clock_type: ClockType | None = None
     ) -> None:
+        self._of_node = now_ns is not None
         if clock_type is None:
             clock_type = ClockType.SYSTEM_TIME if now_ns is None else ClockType.ROS_TIME
         if now_ns is None:
@@ -183,9 +201,51 @@ class Clock:
         """Returns the current time, ns since the start of the run."""
         return self._now_ns()
 
+    @property
+    def ros_time_is_active(self) -> bool:
+        """Whether the clock has simulated time: that of a node."""
+        return self._of_node
+
+    def create_jump_callback(self, *_arguments: Any, **_options: Any) -> JumpHandle:
+        """Returns a handle; a clock does not jump, because a reset creates nodes again."""
+        return JumpHandle()
+
+    def sleep_until(self, *_arguments: Any, **_options: Any) -> bool:
+        """Raises `GraphError`: no callback can wait."""
+        raise GraphError(
+            "a clock waits, and simulated time stands still in a callback: use a timer"
+        )
+
+    sleep_for = sleep_until
+
 
 class ROSClock(Clock):
     """`rclpy.clock.ROSClock`, which belongs to no node."""
 
     def __init__(self) -> None:
         super().__init__(clock_type=ClockType.ROS_TIME)
+
+
+class ClockChange(IntEnum):
+    """Why a clock jumps."""
+
+    ROS_TIME_NO_CHANGE = 1
+    ROS_TIME_ACTIVATED = 2
+    ROS_TIME_DEACTIVATED = 3
+    SYSTEM_TIME_NO_CHANGE = 4
+
+
+@dataclass
+class JumpThreshold:
+    """Jumps of a clock that a callback is interested in."""
+
+    min_forward: Duration | None
+    min_backward: Duration | None
+    on_clock_change: bool = True
+
+
+class JumpHandle:
+    """A callback of `Clock.create_jump_callback`; none is ever called."""
+
+    def unregister(self) -> None:
+        """Does nothing."""

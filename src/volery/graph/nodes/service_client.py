@@ -109,6 +109,7 @@ class Client:
         self._later = later
         self._run = run
         self._receive = receive
+        self.srv_type = srvtype
         self._request_type = f"{srvtype}_Request"
         self._looks = (0, 0)  # number of waits, and their time
         self.service = service
@@ -198,4 +199,7 @@ class Client:
         if request is None:
             return zero_message(self._request_type)
         name = getattr(request, "__msgtype__", None)
-        return copy_message(request) if name == self._request_type else request
+        if name != self._request_type:
+            found = name or f"a {type(request).__name__}"
+            raise GraphError(f"service '{self.service}' takes {self._request_type}, not {found}")
+        return copy_message(request)

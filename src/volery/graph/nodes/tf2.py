@@ -1,4 +1,4 @@
-"""Provides the contents of the stand-ins for `tf2_ros`, `tf2_geometry_msgs`, `tf_transformations`.
+"""Provides the contents of the stand-ins for `tf2_ros` and `tf2_py`.
 
 Transforms are `T_parent_child`; quaternions are x y z w. A buffer keeps each frame's transforms of
 10 s. No lookup waits: in a callback the simulated time stands still.
@@ -16,10 +16,6 @@ import numpy as np
 from volery.core import rotations
 from volery.core.arrays import Array
 from volery.graph.messages import (
-    Point,
-    PointStamped,
-    Pose,
-    PoseStamped,
     Quaternion,
     TFMessage,
     Transform,
@@ -30,6 +26,7 @@ from volery.graph.messages import (
     stamp_of,
 )
 from volery.graph.nodes.service_client import Future
+from volery.graph.nodes.transformed_messages import BY_TYPE
 from volery.graph.qos import DurabilityPolicy, QoSProfile
 
 CACHE_NS = 10_000_000_000
@@ -55,6 +52,10 @@ class ExtrapolationException(TransformException):
 
 class InvalidArgumentException(TransformException):
     """An argument is invalid."""
+
+
+class TypeException(Exception):  # noqa: N818
+    """A message of this type cannot be transformed."""
 
 
 class TimeoutException(TransformException):
@@ -207,17 +208,19 @@ class Buffer:
         return self.lookup_transform(target_frame, source_frame, time)
 
     def transform(self, stamped: Any, target_frame: str, timeout: Any = None) -> Any:
-        """Returns a PointStamped or PoseStamped in another frame; raises `TransformException`."""
+        """Returns a stamped message in another frame.
+
+        Raises `TransformException`, `TypeException` for a message that is not in
+        `transformed_messages.BY_TYPE`.
+        """
+        move = BY_TYPE.get(getattr(stamped, "__msgtype__", ""))
+        if move is None:
+            known = ", ".join(name.rpartition("/")[2] for name in BY_TYPE)
+            raise TypeException(f"{type(stamped).__name__} cannot be transformed, but {known}")
         found = self.lookup_transform(
             target_frame, stamped.header.frame_id, stamped.header.stamp, timeout
         )
-        if isinstance(stamped, PointStamped):
-            return do_transform_point(stamped, found)
-        if isinstance(stamped, PoseStamped):
-            return do_transform_pose_stamped(stamped, found)
-        raise InvalidArgumentException(
-            f"{type(stamped).__name__} is no PointStamped or PoseStamped"
-        )
+        return move(stamped, found)
 
     def clear(self) -> None:
         """Forgets all transforms."""
@@ -339,55 +342,8 @@ class StaticTransformBroadcaster:
         self._publisher.publish(TFMessage(list(self._sent.values())))
 
 
-def do_transform_point(point: Any, transform: Any) -> Any:
-    """Returns a PointStamped in the transform's frame."""
-    moved = _placement(transform).then(_at(point.point))
-    return PointStamped(transform.header, Point(*moved.position.tolist()))
-
-
-def do_transform_pose(pose: Any, transform: Any) -> Any:
-    """Returns a Pose in the transform's frame."""
-    q = pose.orientation
-    inner = _at(pose.position)._replace(attitude=np.array([q.x, q.y, q.z, q.w]))
-    moved = _placement(transform).then(inner)
-    return Pose(Point(*moved.position.tolist()), Quaternion(*moved.attitude.tolist()))
-
-
-def do_transform_pose_stamped(pose: Any, transform: Any) -> Any:
-    """Returns a PoseStamped in the transform's frame."""
-    return PoseStamped(transform.header, do_transform_pose(pose.pose, transform))
-
-
-def euler_from_quaternion(quaternion: Any, axes: str = "sxyz") -> tuple[float, float, float]:
-    """Returns roll, pitch and yaw, rad, of x y z w. Raises `ValueError` for other axes."""
-    _check_axes(axes)
-    roll, pitch, yaw = rotations.to_rpy(quaternion).tolist()
-    return roll, pitch, yaw
-
-
-def quaternion_from_euler(roll: float, pitch: float, yaw: float, axes: str = "sxyz") -> Array:
-    """Returns x y z w of roll, pitch and yaw, rad. Raises `ValueError` for other axes."""
-    _check_axes(axes)
-    return rotations.from_rpy(roll, pitch, yaw)
-
-
-def _check_axes(axes: str) -> None:
-    if axes != "sxyz":
-        raise ValueError(f"Volery's tf_transformations has the axes 'sxyz', not '{axes}'")
-
-
 def _call(action: Callable[[], Any]) -> None:
     action()
-
-
-def _placement(transform: Any) -> _Placement:
-    q = transform.transform.rotation
-    attitude = np.array([q.x, q.y, q.z, q.w])
-    return _at(transform.transform.translation)._replace(attitude=attitude)
-
-
-def _at(place: Any) -> _Placement:
-    return _Placement(0, np.array([place.x, place.y, place.z]), np.array([0.0, 0.0, 0.0, 1.0]))
 
 
 def _ns_of(time: Any) -> int:
@@ -409,6 +365,7 @@ def contents() -> dict[str, dict[str, Any]]:
             ExtrapolationException,
             InvalidArgumentException,
             TimeoutException,
+            TypeException,
         )
     }
     parts: dict[str, dict[str, Any]] = {
@@ -421,17 +378,6 @@ def contents() -> dict[str, dict[str, Any]]:
     return {
         "tf2_ros": {**joined, **errors, "BufferInterface": Buffer},
         **{f"tf2_ros.{name}": {**part, **errors} for name, part in parts.items()},
+        "tf2_ros.buffer_interface": {"BufferInterface": Buffer, **errors},
         "tf2_py": errors,
-        "tf2_geometry_msgs": {
-            "do_transform_point": do_transform_point,
-            "do_transform_pose": do_transform_pose,
-            "do_transform_pose_stamped": do_transform_pose_stamped,
-        },
-        "tf_transformations": {
-            "euler_from_quaternion": euler_from_quaternion,
-            "quaternion_from_euler": quaternion_from_euler,
-            "quaternion_multiply": rotations.multiply,
-            "quaternion_conjugate": rotations.conjugate,
-            "quaternion_inverse": rotations.conjugate,
-        },
     }

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from volery.core.clock import ns_from_s
+from volery.core.clock import NS_PER_S, ns_from_s
+from volery.graph.graph import check_period
 from volery.graph.nodes.deferred_execution import Deferred
 
 
@@ -41,9 +42,12 @@ class Timer:
         defer: Callable[[Callable[[], Any]], Any],
         *,
         autostart: bool = True,
+        clock: Any = None,
     ) -> None:
         """Creates the timer; `ring()` runs the callback; `defer` delays changes to the release."""
         self.callback = callback
+        self.clock = clock
+        """Clock of the node."""
         self._ring = ring
         self._timers = timers
         self._now_ns = now_ns
@@ -62,8 +66,19 @@ class Timer:
 
     @property
     def timer_period_ns(self) -> int:
-        """Period, ns."""
+        """Period, ns; another one counts from the present time."""
         return self._period_ns
+
+    @timer_period_ns.setter
+    def timer_period_ns(self, period_ns: int) -> None:
+        check_period(period_ns / NS_PER_S)
+
+        def change() -> None:
+            self._period_ns = int(period_ns)
+            if not self._cancelled:
+                self._restart()
+
+        self._defer(change)
 
     def cancel(self) -> None:
         """Stops the timer until `reset`."""
@@ -135,8 +150,8 @@ class Timer:
 
     def get_state(self) -> Any:
         """Returns the state for a snapshot."""
-        return self._cancelled, self._due_ns, self._is_armed, self._last_ns
+        return self._cancelled, self._due_ns, self._is_armed, self._last_ns, self._period_ns
 
     def set_state(self, state: Any) -> None:
         """Restores a saved state."""
-        self._cancelled, self._due_ns, self._is_armed, self._last_ns = state
+        self._cancelled, self._due_ns, self._is_armed, self._last_ns, self._period_ns = state

@@ -9,6 +9,7 @@ from volery.core.errors import CommandError
 from volery.mavlink.autopilot import (
     arming,
     calibration,
+    dialect_extensions,
     failure_injection,
     feasibility,
     gripper,
@@ -126,6 +127,14 @@ def _set_mode(context: AutopilotContext, _source: Source, command: Command) -> i
     if mode is None:
         context.say(4, "This flight mode is not offered")
         return UNSUPPORTED
+    return _switch(context, mode)
+
+
+def _set_standard_mode(context: AutopilotContext, _source: Source, command: Command) -> int:
+    mode = dialect_extensions.standard_mode(_whole(command.params[0]))
+    if mode is None:
+        context.say(4, "This standard mode is not offered")
+        return FAILED
     return _switch(context, mode)
 
 
@@ -318,6 +327,7 @@ _HANDLERS: dict[int, Callable[[AutopilotContext, Source, Command], int]] = {
     224: _jump,
     calibration.CALIBRATE: calibration.start,
     246: _reboot,
+    262: _set_standard_mode,
     300: _start_mission,
     400: _arm,
     401: _check,

@@ -95,6 +95,11 @@ def current_mode(context: AutopilotContext) -> Any:
     )
 
 
+def standard_mode(number: float) -> Mode | None:
+    """Returns the mode of a MAV_STANDARD_MODE; None if there is no such mode."""
+    return next((mode for mode, standard in _STANDARD.items() if standard == number), None)
+
+
 def available_modes(which: float) -> list[Any]:
     """Returns the mode of an index from 1, all modes for 0, none for other numbers."""
     index = round(which) if math.isfinite(which) else 0

@@ -6,9 +6,9 @@ import math
 from typing import Any
 
 from volery.core.rotations import from_rpy
-from volery.mavlink.autopilot import mode_transitions
+from volery.mavlink.autopilot import mode_requirements, mode_transitions
 from volery.mavlink.autopilot.context import AutopilotContext
-from volery.mavlink.autopilot.state import ManualInput
+from volery.mavlink.autopilot.state import ManualInput, Source
 from volery.mavlink.autopilot.vehicle import FlightState
 
 _DEAD = 0.1
@@ -24,19 +24,26 @@ _LIFT_M = 1.0
 """Height of a take-off by manual control (modelling choice)."""
 
 
-def take(context: AutopilotContext, _source: object, message: Any) -> None:
-    """Handles MANUAL_CONTROL.
+def take(context: AutopilotContext, source: Source, message: Any) -> None:
+    """Handles MANUAL_CONTROL of the first sender, and of another one when that is silent.
 
     An axis out of range is unused, as INT16_MAX by MAVLink's definition, and centred, as in PX4.
     """
     if message.target not in (0, context.system):
+        return
+    memory = context.memory
+    if memory.sticks.source not in (None, source) and mode_requirements.sticks_are_there(memory):
+        told = f"MANUAL_CONTROL of {source}"
+        if told not in memory.refused_messages:
+            memory.refused_messages.add(told)
+            context.say(4, f"Manual control of system {source[1]} ignored: another one controls")
         return
     forward, right, turn = (
         part / 1000.0 if -1000 <= part <= 1000 else 0.0
         for part in (message.x, message.y, message.r)
     )
     up = message.z / 500.0 - 1.0 if 0 <= message.z <= 1000 else 0.0
-    context.memory.sticks = ManualInput(forward, right, up, turn, context.memory.now_ns)
+    memory.sticks = ManualInput(forward, right, up, turn, memory.now_ns, source)
 
 
 def fly_position(context: AutopilotContext, state: FlightState) -> None:

@@ -25,6 +25,8 @@ class ManualInput:
     up: float = 0.0
     turn: float = 0.0
     time_ns: int = -(1 << 62)
+    source: Source | None = None
+    """Sender; others are ignored until this one is silent."""
 
 
 @dataclass

@@ -22,12 +22,12 @@ _ROOM_TO_STAND_M = 1.5
 _TOLERANCE_M = 0.002
 """Depth of the feet below the ground that counts as none, m."""
 _AT_REST_M = 0.005
-"""Maximum distance of a given height from that at rest at which a UAV stands there, m."""
+"""Depth of the feet in the ground at which a UAV starts on the ground all the same, m."""
 _TILT_SWEEPS = 4
 _GRIP_FRACTION = 0.9
 """Fraction of the feet's friction up to which a UAV rests on a slope."""
 _DROP_M = 0.3
-"""Max height above the ground at which a UAV still counts as landed, m."""
+"""Height above the ground below which a landed UAV is put onto it, m."""
 _PRESSED_M = 0.02
 """Max depth of the feet below the ground, more than after any landing, m."""
 _HINT = ' (placement = "nearest_free" finds a free position)'
@@ -67,20 +67,19 @@ def place_uavs(
             name = f"uav{len(starts) + 1}"
             where = f"{scenario.name}: uavs[{g}] ({name})"
             place = _nominal_place(group, k, airframe, terrain)
+            slides = scenario.types[group.type].plant != "kinematic"
             if group.placement == "nearest_free":
-                place = _nearest_free(place, airframe, altitude, scene, terrain, starts, where)
-            rest = _rest_of(group, place, yaw, airframe, terrain)
-            place, attitude = (place, yaw) if rest is None else rest
-            check_place(
-                place,
-                airframe,
-                scene,
-                terrain,
-                starts,
-                where,
-                hint=_HINT,
-                at_rest=rest is not None,
-            )
+                place = _nearest_free(
+                    place, yaw, airframe, altitude, scene, terrain, starts, where, slides=slides
+                )
+            attitude, at_rest = yaw, False
+            feet = _standing(place[:2], airframe, terrain)[2]
+            if place[2] >= feet - _AT_REST_M and _is_on_terrain(place, terrain):
+                what = f"{where}: {_at(place)}"
+                place, attitude, at_rest = put_down(
+                    place, yaw, airframe, terrain, what, slides=slides, hint=_HINT
+                )
+            check_place(place, airframe, scene, terrain, starts, where, hint=_HINT, at_rest=at_rest)
             starts.append(
                 StartPose(
                     name,
@@ -88,9 +87,9 @@ def place_uavs(
                     airframe,
                     place,
                     attitude,
-                    on_ground=rest is not None or stands_on_ground(place, airframe, terrain),
+                    on_ground=at_rest or stands_on_ground(place, airframe, terrain),
                     takes_off=group.on_start == "take_off",
-                    at_rest=rest is not None,
+                    at_rest=at_rest,
                 )
             )
     return tuple(starts)
@@ -114,17 +113,13 @@ def _standing(xy: Array, airframe: Airframe, terrain: Terrain) -> Array:
     return np.array([xy[0], xy[1], z])
 
 
-def _rest_of(
-    group: UavGroup, place: Array, yaw: Array, airframe: Airframe, terrain: Terrain
-) -> tuple[Array, Array] | None:
-    """Returns the pose at rest of a UAV that starts on the ground; None: it starts elsewhere."""
-    given = len(group.position_m) == 3 and group.placement == "exact"
-    if given and abs(place[2] - _standing(place[:2], airframe, terrain)[2]) > _AT_REST_M:
-        return None
+def _is_on_terrain(place: Array, terrain: Terrain) -> bool:
     x0, y0, x1, y1 = terrain.bounds
-    if not (x0 <= place[0] <= x1 and y0 <= place[1] <= y1):
-        return None
-    return resting(place[:2], yaw, airframe, terrain)
+    return bool(x0 <= place[0] <= x1 and y0 <= place[1] <= y1)
+
+
+def _at(place: Array) -> str:
+    return f"position_m ({place[0]:.2f}, {place[1]:.2f}, {place[2]:.2f})"
 
 
 def resting(
@@ -158,14 +153,20 @@ def resting(
 
 def _nearest_free(
     place: Array,
+    yaw: Array,
     airframe: Airframe,
     altitude: float,
     scene: Scene,
     terrain: Terrain,
     others: list[StartPose],
     where: str,
+    *,
+    slides: bool,
 ) -> Array:
-    """Returns the nearest position on a spiral with room to stand, to climb and to other UAVs."""
+    """Returns the nearest position on a spiral with room to stand, to climb and to other UAVs.
+
+    slides: whether the UAV slides on ground that is too steep; it then stands elsewhere.
+    """
     for radius in np.arange(0.0, _SEARCH_RADIUS_M, _SEARCH_STEP_M):
         around = max(1, int(2.0 * math.pi * radius / _SEARCH_STEP_M))
         for i in range(around):
@@ -178,7 +179,9 @@ def _nearest_free(
                 np.linalg.norm(candidate - other.position_map) > 2.0 * _ROOM_TO_STAND_M
                 for other in others
             )
-            if apart and room.min() >= _ROOM_TO_STAND_M and scene.enclosing(candidate[None])[0] < 0:
+            free = room.min() >= _ROOM_TO_STAND_M and scene.enclosing(candidate[None])[0] < 0
+            holds = not slides or resting(xy, yaw, airframe, terrain) is not None
+            if apart and free and holds:
                 return candidate
     raise PlacementError(
         f"{where}: no free position within {_SEARCH_RADIUS_M:g} m of "
@@ -191,17 +194,43 @@ def stands_on_ground(place: Array, airframe: Airframe, terrain: Terrain) -> bool
     return bool(place[2] - _standing(place[:2], airframe, terrain)[2] < _DROP_M)
 
 
-def lifted(place: Array, airframe: Airframe, terrain: Terrain) -> Array:
-    """Returns `place` (3,), m, raised onto the ground if the feet are at most 2 cm below it."""
-    standing = _standing(place[:2], airframe, terrain)
-    return standing if 0.0 < standing[2] - place[2] < _PRESSED_M else place
-
-
-def on_ground(place: Array, airframe: Airframe, terrain: Terrain) -> Array:
+def raised(place: Array, airframe: Airframe, terrain: Terrain) -> Array:
     """Returns `place` (3,), m, raised onto its feet if it lies between feet and ground."""
     ground = float(terrain.height(place[0], place[1]))
     standing = _standing(place[:2], airframe, terrain)
     return standing if ground - _PRESSED_M <= place[2] < standing[2] else place
+
+
+def put_down(
+    place: Array,
+    attitude: Array,
+    airframe: Airframe,
+    terrain: Terrain,
+    what: str,
+    *,
+    slides: bool,
+    hint: str = "",
+) -> tuple[Array, Array, bool]:
+    """Returns position (3,), m, attitude (4,) and whether it rests, of a UAV that is landed.
+
+    It rests if `place` is between the ground and 0.3 m above its height at rest, and keeps its
+    heading. slides: whether ground can be too steep for it; `PlacementError`, which begins with
+    `what` and ends with `hint`, is raised there.
+    """
+    place = raised(place, airframe, terrain)
+    depth = _standing(place[:2], airframe, terrain)[2] - place[2]
+    if depth > _AT_REST_M or not stands_on_ground(place, airframe, terrain):
+        return place, attitude, False
+    yaw = rotations.from_rpy(0.0, 0.0, rotations.yaw_of(attitude))
+    rest = resting(place[:2], yaw, airframe, terrain)
+    if rest is not None:
+        return (*rest, True)
+    if slides:
+        most = math.degrees(math.atan(_GRIP_FRACTION * airframe.ground.friction))
+        raise PlacementError(
+            f"{what}: the ground is steeper than the {most:.0f} degrees on which it stands{hint}"
+        )
+    return _standing(place[:2], airframe, terrain), yaw, False
 
 
 def check_place(
@@ -220,9 +249,9 @@ def check_place(
     `where` begins the message; `hint` ends it with a remedy. at_rest: the place is one of
     `resting`, where a tilted UAV may be lower than a level one.
     """
-    at = f"position_m ({place[0]:.2f}, {place[1]:.2f}, {place[2]:.2f})"
-    x0, y0, x1, y1 = terrain.bounds
-    if not (x0 <= place[0] <= x1 and y0 <= place[1] <= y1):
+    at = _at(place)
+    if not _is_on_terrain(place, terrain):
+        x0, y0, x1, y1 = terrain.bounds
         raise PlacementError(
             f"{where}: {at} is beyond the terrain, which extends from ({x0:g}, {y0:g}) to "
             f"({x1:g}, {y1:g}) m"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Literal, Protocol
 
+from volery.core.clock import s_from_ns
 from volery.core.errors import CommandError
 from volery.engine.engine import Engine
 from volery.engine.lock_step import Partner, check_terms
@@ -57,6 +58,11 @@ class SimulationClock:
         self._loop = loop
         self._partners = partners
         self._check_open = check_open
+
+    def __repr__(self) -> str:
+        speed = "as fast as possible" if self.speed is None else f"{self.speed:g} times real time"
+        state = "paused" if self.paused else speed
+        return f"<clock: {s_from_ns(self._engine.time_ns):.3f} s, {state}>"
 
     @property
     def finished(self) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from volery.core.errors import CommandError
+from volery.core.plurals import counted
 from volery.engine.events import Event
 from volery.engine.lock_step import Partner
 from volery.graph.nodes.presence import outside_nodes
@@ -23,6 +24,9 @@ class SimulationDiagnostics:
     ) -> None:
         self._manager, self._gateway, self._partners = manager, gateway, partners
         self._engine, self._outlet = manager.engine, manager.outlet
+
+    def __repr__(self) -> str:
+        return f"<diagnostics: {counted(len(self._outlet.events), 'event')}>"
 
     @property
     def events(self) -> tuple[Event, ...]:

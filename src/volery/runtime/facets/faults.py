@@ -19,6 +19,10 @@ class SimulationFaults:
     def __init__(self, plan: FaultPlan, graph: Graph, check_open: Callable[[], None]) -> None:
         self._plan, self._graph, self._check_open = plan, graph, check_open
 
+    def __repr__(self) -> str:
+        kinds = ", ".join(f"{fault.model_dump()['kind']} of {fault.uav}" for fault in self.active)
+        return f"<active faults: {kinds or 'none'}>"
+
     @property
     def active(self) -> tuple[LastingFault, ...]:
         """Faults that have begun and not ended, oldest first; `at_s` is when they began.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -176,6 +177,17 @@ class SimulationVehicles(BatchCommands):
         )
         more = f" and {len(self.names) - 3} more" if len(self.names) > 3 else ""
         raise CommandError(f"{command} reaches no UAV: {modes}{more}; take off and wait() first")
+
+    def __len__(self) -> int:
+        """Number of UAVs."""
+        return len(self._manager.uavs)
+
+    def __getitem__(self, key: object) -> NoReturn:
+        """Raises `CommandError`: single UAVs are in `Simulation.uavs`."""
+        raise CommandError(
+            "simulation.vehicles commands all UAVs; simulation.uavs has each by its name: "
+            "simulation.uavs['uav1'], or [uav.hold() for uav in list(simulation.uavs.values())[:2]]"
+        )
 
     def __repr__(self) -> str:
         uavs = self._manager.uavs.values()

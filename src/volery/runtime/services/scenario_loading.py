@@ -9,11 +9,10 @@ from typing import Any
 
 from volery.core.errors import CommandError
 from volery.graph.graph import Graph
-from volery.runtime.build.fleet import check_types
+from volery.runtime.build.start_check import check_start
 from volery.runtime.services.results import Fields, offer_command
 from volery.scenario import changes as scenario_changes
 from volery.scenario.changes import Changes, WorldRequest
-from volery.scenario.node_packages import check_packages
 from volery.scenario.schema import Scenario
 from volery.scenario.sensor_sets import SENSOR_SETS, describe
 from volery.vehicle.airframe import airframe_names
@@ -39,8 +38,7 @@ def offer_choices(
         changes = scenario_changes.parse_changes(request.changes)
         _check_airframe(changes)
         scenario = scenario_changes.apply(find(request.scenario), changes)
-        check_types(scenario)
-        check_packages(scenario)
+        check_start(scenario)
         change(WorldRequest(request.scenario, changes))
         return {"message": f"{request.scenario} is being loaded"}
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from volery.core.errors import ScenarioError, VoleryError
 from volery.graph.graph import Graph
-from volery.runtime.build.fleet import check_types
+from volery.runtime.build.start_check import check_start
 from volery.runtime.services.filters import tag_filter
 from volery.runtime.services.results import (
     Fields,
@@ -24,7 +24,6 @@ from volery.scenario import library
 from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.changes import LogRequest, WorldRequest
 from volery.scenario.load import load_scenario
-from volery.scenario.node_packages import check_packages
 from volery.scenario.schema import Scenario
 
 _SRV = "simulation_interfaces/srv"
@@ -100,8 +99,7 @@ def offer_worlds(
 def _check_start(scenario: Scenario) -> None:
     """Refuses a scenario that cannot be built here, while the present one flies on."""
     try:
-        check_types(scenario)
-        check_packages(scenario)
+        check_start(scenario)
     except VoleryError as error:
         raise RefusedError(ResultCode.OPERATION_FAILED, str(error)) from None
 

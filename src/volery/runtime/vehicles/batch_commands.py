@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from itertools import zip_longest
 
 import numpy as np
@@ -17,8 +17,10 @@ from volery.control.trajectory import Trajectory
 from volery.core.arrays import Array
 from volery.core.clock import s_from_ns
 from volery.core.errors import CommandError
+from volery.core.uncopied import Uncopied
 from volery.runtime.checks import check_timeout
 from volery.runtime.vehicles.flight_future import CommandResult, FlightFuture
+from volery.runtime.vehicles.flight_future_list import FlightFutureList
 from volery.runtime.vehicles.flight_futures import FlightFutures
 from volery.runtime.vehicles.uav import Uav
 from volery.vehicle.fleet import FleetState
@@ -28,7 +30,7 @@ _NOT_GUIDED = (FlightMode.LANDED, FlightMode.TAKE_OFF, FlightMode.CRASHED)
 _NOT_LOW_LEVEL = (FlightMode.CRASHED,)
 
 
-class BatchCommands(ABC):
+class BatchCommands(Uncopied, ABC):
     """Commands with the names of `Uav`'s, for all UAVs at once.
 
     Arrays have the shape (n, ...) of the UAVs in fleet order, or (K, n, ...) in K environments, and
@@ -44,18 +46,22 @@ class BatchCommands(ABC):
 
     # ------------------------------------------------------------------------------ flight modes
 
-    def take_off(self, altitude_m: float | None = None) -> list[FlightFuture]:
+    def take_off(self, altitude_m: float | None = None) -> FlightFutureList:
         """Takes off with all UAVs on the ground, by `altitude_m`, m; returns their futures."""
         landed = [uav for uav in self._handles() if uav.mode is FlightMode.LANDED]
         return self._begin_all("take_off", landed, lambda uav: uav.take_off(altitude_m))
 
-    def hold(self) -> list[FlightFuture]:
+    def hold(self) -> FlightFutureList:
         """Stops all flying UAVs, which then hold; returns their futures."""
         return self._begin_all("hold", self._flying(), lambda uav: uav.hold())
 
-    def land(self) -> list[FlightFuture]:
+    def land(self) -> FlightFutureList:
         """Lands all flying UAVs; returns their futures."""
         return self._begin_all("land", self._flying(), lambda uav: uav.land())
+
+    def return_home(self) -> FlightFutureList:
+        """Returns all flying UAVs to their take-off positions; returns their futures."""
+        return self._begin_all("return_home", self._flying(), lambda uav: uav.return_home())
 
     def wait(self, timeout_s: float = 60.0) -> list[CommandResult]:
         """Waits for the present flight commands of all UAVs, such as the take-off at the start.
@@ -65,13 +71,9 @@ class BatchCommands(ABC):
         """
         check_timeout(timeout_s)
         pending = [future for uav in self._handles() if (future := uav.pending_command)]
-        if not pending:
-            return []
-        fleet = self._fleets()[0][0]
-        end_s = s_from_ns(fleet.time_ns) + timeout_s
-        return [future.wait(max(0.0, end_s - s_from_ns(fleet.time_ns))) for future in pending]
+        return FlightFutureList(pending, self._now_s).wait(timeout_s)
 
-    def go_to(self, position_map: ArrayLike, yaw: ArrayLike | None = None) -> list[FlightFuture]:
+    def go_to(self, position_map: ArrayLike, yaw: ArrayLike | None = None) -> FlightFutureList:
         """Flies to positions (n, 3), m, in the map frame, with headings `yaw` (n,), rad.
 
         Returns the futures of the UAVs that fly. Raises `CommandError` at the first position that
@@ -88,12 +90,14 @@ class BatchCommands(ABC):
         return self._begin_all("go_to", self._flying(), go)
 
     def follow_trajectory(
-        self, trajectories: Trajectory | Sequence[Trajectory]
-    ) -> list[FlightFuture]:
+        self, trajectories: Trajectory | Iterable[Trajectory]
+    ) -> FlightFutureList:
         """Flies along trajectories, one for all UAVs or one for each; returns their futures."""
         handles = self._handles()
         several = (
-            [trajectories] * len(handles) if isinstance(trajectories, Trajectory) else trajectories
+            [trajectories] * len(handles)
+            if isinstance(trajectories, Trajectory)
+            else list(trajectories)
         )
         if len(several) != len(handles):
             raise CommandError(
@@ -226,7 +230,7 @@ class BatchCommands(ABC):
 
     def _begin_all(
         self, command: str, uavs: Sequence[Uav], begin: Callable[[Uav], FlightFuture]
-    ) -> list[FlightFuture]:
+    ) -> FlightFutureList:
         """Begins a flight mode of `uavs`, which accept it; raises `CommandError` without any."""
         if not uavs and self._handles():
             try:
@@ -235,11 +239,12 @@ class BatchCommands(ABC):
                 raise CommandError(
                     f"{command} reaches no UAV: {error}; wait() waits for their present commands"
                 ) from None
-        return [begin(uav) for uav in uavs]
+        return FlightFutureList([begin(uav) for uav in uavs], self._now_s)
 
-    def _check_reach(  # noqa: B027 - environments have nothing to check
-        self, command: str, deaf: Collection[FlightMode]
-    ) -> None:
+    def _now_s(self) -> float:
+        return s_from_ns(self._fleets()[0][0].time_ns)
+
+    def _check_reach(self, command: str, deaf: Collection[FlightMode]) -> None:
         """Refuses a command that streams if all UAVs are in `deaf` modes; environments do not."""
 
     def _guided(self) -> list[tuple[int, Uav]]:

@@ -11,9 +11,11 @@ from collections.abc import Callable
 from volery.control.flight_modes import FlightMode
 from volery.engine.engine import Engine
 from volery.engine.events import Event, EventKind
+from volery.runtime.vehicles.low_battery import level_of, mode_at
 from volery.runtime.vehicles.uav import Uav
 from volery.scenario.schema import Scenario
 from volery.vehicle.battery import BatteryLevel
+from volery.vehicle.plant_types import RigidBody
 
 _DOWN = (FlightMode.LANDED, FlightMode.CRASHED)
 
@@ -36,11 +38,12 @@ class BatteryFailsafe:
         if uav is None:
             return
         row = self._engine.names.index(uav.name)
-        level = BatteryLevel(int(self._engine.fleet.state.battery_level[row]))
+        level = level_of(self._engine.fleet, row)
         mode = self._action(scenario.types[uav.type_name].flight.low_battery_action, level, uav)
-        consequence = _FALLS if level is BatteryLevel.EMPTY else ""
-        if mode is not None:
-            consequence = _CONSEQUENCES[mode]
+        consequence = "" if mode is None else _CONSEQUENCES[mode]
+        if level is BatteryLevel.EMPTY and uav.mode not in _DOWN:
+            has_rotors = isinstance(self._engine.fleet.plants[row], RigidBody)
+            consequence = ": its rotors stop" if has_rotors else ": its plant flies on without it"
         _log.warning(
             "%.1f s: %s: %s, %.0f %% left%s",
             event.time_ns * 1e-9,
@@ -58,17 +61,10 @@ class BatteryFailsafe:
 
     def _action(self, action: str, level: BatteryLevel, uav: Uav) -> FlightMode | None:
         """Returns the mode that a UAV enters at a battery level; landings continue."""
-        mode = _ACTIONS.get((action, level))
+        mode = mode_at(level, action)
         if mode is None or uav.mode in (*_DOWN, FlightMode.LAND, mode):
             return None
         return mode
 
 
-_ACTIONS = {
-    ("land", BatteryLevel.CRITICAL): FlightMode.LAND,
-    ("land", BatteryLevel.EMERGENCY): FlightMode.LAND,
-    ("return", BatteryLevel.CRITICAL): FlightMode.RETURN,
-    ("return", BatteryLevel.EMERGENCY): FlightMode.LAND,
-}
 _CONSEQUENCES = {FlightMode.LAND: ": it lands", FlightMode.RETURN: ": it returns home"}
-_FALLS = ": its rotors stop"

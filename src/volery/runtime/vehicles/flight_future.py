@@ -18,6 +18,7 @@ from typing import Any, Protocol
 from volery.control.flight_modes import FlightMode
 from volery.core.clock import s_from_ns
 from volery.core.errors import CommandError, FlightError, WaitTimeoutError
+from volery.core.uncopied import Uncopied
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ class FlightSource(Protocol):
         """Waits like `wait`, without a limit, and lets other coroutines run in between."""
 
 
-class FlightFuture:
+class FlightFuture(Uncopied):
     """Completion of one flight command of one UAV, such as a take-off.
 
     It is done when the command has completed, and also when it has failed: the UAV crashed, was

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from volery.control.setpoints import checked_attitude
-from volery.core import rotations
 from volery.core.errors import (
     CommandError,
     DataFileError,
@@ -22,8 +21,7 @@ from volery.core.errors import (
 from volery.runtime.build.placement import (
     StartPose,
     check_place,
-    on_ground,
-    resting,
+    put_down,
     stands_on_ground,
 )
 from volery.runtime.snapshot_manager import SnapshotManager
@@ -131,13 +129,8 @@ class Spawner:
             turn = checked_attitude(attitude)
         except CommandError as error:
             raise PlacementError(str(error)) from None
-        raised = on_ground(place, airframe, self._terrain)
-        rest = None
-        if not np.array_equal(raised, place):
-            yaw = rotations.from_rpy(0.0, 0.0, rotations.yaw_of(turn))
-            rest = resting(place[:2], yaw, airframe, self._terrain)
-        place, turn = (raised, turn) if rest is None else rest
-        at_rest = rest is not None
+        slides = self._manager.scenario.types[kind].plant != "kinematic"
+        place, turn, at_rest = put_down(place, turn, airframe, self._terrain, name, slides=slides)
         others = near(self._manager.starts, self._manager.engine.fleet.state.position_map, place)
         check_place(place, airframe, self._scene, self._terrain, others, name, at_rest=at_rest)
         stands = at_rest or stands_on_ground(place, airframe, self._terrain)

@@ -8,11 +8,20 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from volery.control.flight_modes import FlightMode
+from volery.control.setpoints import checked_attitude
 from volery.core import rotations
 from volery.core.arrays import Array
 from volery.core.errors import CommandError, PlacementError
-from volery.runtime.build.placement import StartPose, check_place, lifted, stands_on_ground
+from volery.runtime.build.placement import (
+    StartPose,
+    check_place,
+    put_down,
+    raised,
+    stands_on_ground,
+)
 from volery.runtime.vehicles.manager import VehicleManager
+from volery.vehicle.kinematic import Kinematic
 
 _REACH_M = 10.0
 """Larger than the distance at which any two UAVs touch, m."""
@@ -30,7 +39,8 @@ class Teleporter:
     def place(self, row: int, position_map: ArrayLike, attitude: ArrayLike) -> None:
         """Teleports UAV `row` to (3,), m, and (4,), x y z w, map from body; its velocity continues.
 
-        A flying UAV holds there; a landed one hovers if the position is in the air. Its estimate
+        A flying UAV holds there; a landed one hovers if the position is in the air, and rests on
+        the ground if it is between its feet and the ground. Its estimate
         restarts. Raises `PlacementError` with the reason if the pose is not possible.
         """
         position = np.asarray(position_map, dtype=np.float64)
@@ -38,10 +48,19 @@ class Teleporter:
             raise PlacementError(f"a position is three finite numbers, not {position_map!r}")
         fleet, start = self._engine.fleet, self._manager.starts[row]
         try:
-            position = lifted(position, start.airframe, self._terrain)
-            self._check(row, position)
-            in_air = not stands_on_ground(position, start.airframe, self._terrain)
-            fleet.put(row, position, attitude, in_air=in_air)
+            turn, at_rest = checked_attitude(attitude), False
+            if fleet.mode(row) is FlightMode.LANDED:
+                slides = not isinstance(fleet.plants[row], Kinematic)
+                position, turn, at_rest = put_down(
+                    position, turn, start.airframe, self._terrain, start.name, slides=slides
+                )
+            else:
+                position = raised(position, start.airframe, self._terrain)
+            self._check(row, position, at_rest)
+            stands = at_rest or stands_on_ground(position, start.airframe, self._terrain)
+            fleet.put(row, position, turn, in_air=not stands)
+            if at_rest:
+                fleet.rest(row)
         except CommandError as error:
             raise PlacementError(str(error)) from None
         self._engine.collisions.forget(np.array([row]))
@@ -58,12 +77,13 @@ class Teleporter:
         omega_body = rotations.rotate(rotations.conjugate(attitude), np.asarray(omega_map))
         self._engine.fleet.push(row, velocity_map, omega_body)
 
-    def _check(self, row: int, position: Array) -> None:
+    def _check(self, row: int, position: Array, at_rest: bool) -> None:
         start = self._manager.starts[row]
         present = self._engine.fleet.state.position_map
         around = near(self._manager.starts, present, position)
         others = [other for other in around if other.name != start.name]
-        check_place(position, start.airframe, self._scene, self._terrain, others, start.name)
+        scene, terrain = self._scene, self._terrain
+        check_place(position, start.airframe, scene, terrain, others, start.name, at_rest=at_rest)
 
 
 def near(starts: Sequence[StartPose], present: Array, position: Array) -> list[StartPose]:

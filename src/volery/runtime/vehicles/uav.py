@@ -15,8 +15,10 @@ from volery.control.setpoints import MAX_COORDINATE, checked
 from volery.control.trajectory import Trajectory
 from volery.core.arrays import Array
 from volery.core.errors import CommandError
+from volery.core.uncopied import Uncopied
 from volery.runtime.vehicles.flight_future import CommandResult, FlightFuture
 from volery.runtime.vehicles.flight_futures import FlightFutures
+from volery.runtime.vehicles.low_battery import check_charge
 from volery.runtime.vehicles.uav_sensors import UavSensors
 from volery.scenario.schema import Flight
 from volery.vehicle.airframe import Airframe
@@ -25,7 +27,7 @@ CheckGoal = Callable[[Array, Airframe], None]
 """Raises `CommandError` if a UAV cannot be at a position (3,), m, in the map frame."""
 
 
-class Uav:
+class Uav(Uncopied):
     """Reads the true state of a UAV and its sensors, and commands it.
 
     Commands act from the next physics step and raise `CommandError` if they are rejected. Flight
@@ -203,7 +205,13 @@ class Uav:
         return self._futures.pending(self._path)
 
     def take_off(self, altitude_m: float | None = None) -> FlightFuture:
-        """Climbs by `altitude_m` (default: the scenario's) and holds; done when it holds."""
+        """Climbs by `altitude_m` (default: the scenario's) and holds; done when it holds.
+
+        Raises `CommandError` if its battery is empty, or so low that its type's
+        `low_battery_action` would end the flight.
+        """
+        if self.mode is FlightMode.LANDED:
+            check_charge(self._fleet, self._row, self._flight.low_battery_action)
         altitude = self._flight.take_off_altitude_m if altitude_m is None else altitude_m
         self._fleet.take_off(self._row, float(checked("altitude", altitude, (), MAX_COORDINATE)))
         return self._begun("take_off", (FlightMode.TAKE_OFF,))

@@ -6,12 +6,17 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Protocol
 
 from volery.core.errors import CommandError, SensorError
+from volery.core.near_names import near_miss
+from volery.core.uncopied import Uncopied
 from volery.runtime.checks import check_seconds
 from volery.runtime.vehicles.sample_stream import SampleStream
 from volery.sensors.sensor_samples import SensorSample
 
 _NAMED_ONLY = ("lidar", "camera")
 """Kinds without a usual name: which one is meant may change with the next that is added."""
+
+_OTHER_NAMES = {"gps": "gnss", "fix": "gnss", "baro": "barometer", "mag": "magnetometer"}
+"""Names by which others know kinds of sensors."""
 
 
 class UnknownSensorError(SensorError, KeyError):
@@ -56,7 +61,7 @@ class StreamRuns(Protocol):
         """Simulated time, s."""
 
 
-class UavSensor:
+class UavSensor(Uncopied):
     """One sensor of a UAV: its latest sample, and loops over new samples."""
 
     def __init__(self, source: SampleSource, runs: StreamRuns | None, uav: str, name: str) -> None:
@@ -139,7 +144,7 @@ class UavSensor:
         return f"<sensor '{self.name}' of {self._uav}>"
 
 
-class UavSensors(Mapping[str, UavSensor]):
+class UavSensors(Uncopied, Mapping[str, UavSensor]):
     """Sensors of one UAV by name, in the order of its type."""
 
     def __init__(self, source: SampleSource, runs: StreamRuns | None, uav: str) -> None:
@@ -162,6 +167,10 @@ class UavSensors(Mapping[str, UavSensor]):
     def __len__(self) -> int:
         return len(self._source.names(self._uav))
 
+    def _ipython_key_completions_(self) -> list[str]:
+        """Returns the names that Tab offers after `uav.sensors["`."""
+        return list(self)
+
     def __repr__(self) -> str:
         return f"<sensors of {self._uav}: {', '.join(self)}>"
 
@@ -178,7 +187,10 @@ def find_sensor(uav: str, wanted: str, kinds: Mapping[str, str]) -> str:
         return found[0]
     known = ", ".join(kinds) or "none"
     of_kind = f", and {' and '.join(found)} of this kind" if found else ""
-    raise UnknownSensorError(f"{uav} has no sensor '{wanted}'; known: {known}{of_kind}")
+    hint = near_miss(_OTHER_NAMES.get(str(wanted).lower(), wanted), [*kinds, *kinds.values()])
+    raise UnknownSensorError(
+        f"{uav} has no sensor '{wanted}'; known: {known}{of_kind}{'.' if hint else ''}{hint}"
+    )
 
 
 def _check_exists(source: SampleSource, uav: str, name: str) -> None:

@@ -9,14 +9,8 @@ from typing import Any
 from rosbags.interfaces import Nodetype
 
 from volery.core.errors import GraphError
+from volery.graph.message_methods import field_types
 from volery.graph.typestore import typestore
-
-_WORDS = {"bool": "boolean", "byte": "octet", "char": "uint8", "float32": "float"}
-_WORDS |= {"float64": "double"}
-"""Names of base types in `rosidl_generator_py`; other names are equal."""
-_NESTED_IN = "/msg/"
-_FILLER = "structure_needs_at_least_one_member"
-"""Encoded field of messages without fields; classes of ROS 2 do not list it."""
 
 
 @cache
@@ -41,22 +35,7 @@ def service_class(srvtype: str) -> Any:
 
 def described(msgtype: str) -> dict[str, str]:
     """Returns fields and types in the form of `get_fields_and_field_types` of ROS 2's classes."""
-    fields = typestore().fielddefs[msgtype][1]
-    return {name: _word(kind) for name, kind in fields if name != _FILLER}
-
-
-def _word(described_type: Any) -> str:
-    kind, detail = described_type
-    if kind == Nodetype.NAME:
-        return str(detail).replace(_NESTED_IN, "/")
-    if kind == Nodetype.BASE:
-        base, limit = detail
-        word = _WORDS.get(base, base)
-        return f"{word}<{limit}>" if limit else word
-    element, size = _word(detail[0]), detail[1]
-    if kind == Nodetype.ARRAY:
-        return f"{element}[{size}]"
-    return f"sequence<{element}, {size}>" if size else f"sequence<{element}>"
+    return field_types(typestore().fielddefs[msgtype][1])
 
 
 def _found(name: str) -> Any:
@@ -66,7 +45,10 @@ def _found(name: str) -> Any:
         found = getattr(import_module(f"{package}.{kind}"), short)
     except (ImportError, AttributeError):
         raise GraphError(missing) from None
-    if not hasattr(getattr(found, "Request", found), "get_fields_and_field_types"):
+    found_part = getattr(found, "Request", found)
+    if hasattr(found_part, "__msgtype__"):  # a stand-in of Volery
+        raise GraphError(missing)
+    if not hasattr(found_part, "get_fields_and_field_types"):
         raise GraphError(f"{missing}: the package '{package}' found is of ROS 1")
     return found
 
