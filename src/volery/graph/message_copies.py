@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 from rosbags.interfaces import Nodetype
+from rosbags.typesys.base import normalize_fieldname
 
 from volery.core.errors import GraphError
 from volery.graph.codecs.zero import DTYPES
@@ -71,7 +72,8 @@ _USUAL = {"float32": "float", "float64": "float", "string": "str", "bool": "bool
 def _copier(msgtype: str, purpose: _Purpose) -> Copy:
     store = typestore()
     cls: Any = store.types[msgtype]
-    described = dict(store.fielddefs[msgtype][1])
+    # a field with the name of a keyword, `from`, is an attribute `from_`
+    described = {normalize_fieldname(name): kind for name, kind in store.fielddefs[msgtype][1]}
     if not all(is_plain_name(name) for name in described):
         raise GraphError(f"{msgtype}: a field's name is not a Python identifier")
     scope: dict[str, Any] = {"_cls": cls, "_check": partial(_check_class, msgtype, cls)}

@@ -13,7 +13,8 @@ from rosbags.typesys import Stores, get_typestore
 
 from volery.bridges.logs.reader import summarize
 from volery.bridges.logs.recovery import recover
-from volery.core.errors import RecordingError
+from volery.core.errors import GraphError, RecordingError
+from volery.graph.message_copies import message_checker
 from volery.logs import open_log
 
 TEXT = b"\0\1\0\0" + struct.pack("<I", 3) + b"hi\0"
@@ -146,6 +147,16 @@ def test_definitions_as_writers_hold_them(one, name, text, data, field, value):
     found = one(name, "ros2msg", text, data)
     assert found[field].tolist() == [value]
     assert found.refused == 0
+
+
+def test_messages_with_keywords_as_fields_are_checked_before_they_are_published(one):
+    found = one("word_probe_msgs/msg/Thing", "ros2msg", "int32 from\nint32 lambda 3\n", cdr(9, 8))
+    (logged,) = found.messages()
+    check = message_checker("word_probe_msgs/msg/Thing")
+    check(logged.message)
+    logged.message.from_ = "nine"
+    with pytest.raises(GraphError, match="from_ must be an int32"):
+        check(logged.message)
 
 
 def test_events_of_services(one):
