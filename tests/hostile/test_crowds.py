@@ -91,7 +91,9 @@ def test_a_round_is_short_however_many_have_their_first_frame(weight, monkeypatc
             await asyncio.sleep(0)
             rounds.append(many.total - before)
         assert max(rounds) <= 9  # eight fill it; the ninth was before it was full
-        assert max(many.turns[1:]) - min(many.turns[1:]) <= 2  # the first was alone in the first round
+        assert (
+            max(many.turns[1:]) - min(many.turns[1:]) <= 2
+        )  # the first was alone in the first round
 
     in_loop(scene)
 
@@ -226,9 +228,7 @@ def test_a_server_sends_them_with_one_call_of_the_system(monkeypatch):
     with BridgeHost(live.gateway) as bridges:
         server = RosbridgeServer(port=0)
         bridges.open(server)
-        publisher = live.do(
-            lambda: live.graph.advertise("/a", "std_msgs/msg/String", latched=True)
-        )
+        publisher = live.do(lambda: live.graph.advertise("/a", "std_msgs/msg/String", latched=True))
         live.do(lambda: publisher.publish(m.String("first")))
         with connect(f"ws://127.0.0.1:{server.port}") as client:
             client.send(json.dumps({"op": "subscribe", "topic": "/a", "queue_length": 10}))

@@ -58,7 +58,7 @@ WRITERS: dict[str, Callable[[Path], Any]] = {
     "flight.bag": lambda path: create_log(path, overwrite=True).close(),
     "generate_python.py": lambda path: write_generator(path.parent),
     "worker_1.log": lambda path: open_new(path).close(),
-    "gcs.log": lambda path: station_log(path),
+    "gcs.log": station_log,
     "run.json": lambda path: ResultsFolder(path.parent).write_file(path, b"{}"),
 }
 """What writes a file of this name."""

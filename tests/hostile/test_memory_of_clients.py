@@ -37,9 +37,7 @@ def server():
     with BridgeHost(live.gateway) as bridges:
         server = RosbridgeServer(port=0)
         bridges.open(server)
-        publisher = live.do(
-            lambda: live.graph.advertise("/a", "std_msgs/msg/String", latched=True)
-        )
+        publisher = live.do(lambda: live.graph.advertise("/a", "std_msgs/msg/String", latched=True))
         live.do(lambda: publisher.publish(m.String("text")))
         yield server
     live.close()
@@ -54,7 +52,9 @@ def visit(server):
         client.send(json.dumps(call))
         assert "/a" in client.recv(60.0)
         client.send(json.dumps({"op": "advertise", "topic": "/b", "type": "std_msgs/String"}))
-        client.send(json.dumps({"op": "advertise_service", "service": "/s", "type": "std_srvs/Empty"}))
+        client.send(
+            json.dumps({"op": "advertise_service", "service": "/s", "type": "std_srvs/Empty"})
+        )
         client.send(json.dumps({"op": "bogus"}))
         assert "unknown operation" in client.recv(60.0)
         part = {"op": "fragment", "id": "f", "data": "x" * 100_000, "num": 0, "total": 3}
@@ -100,24 +100,21 @@ def test_memory_is_returned_when_the_last_has_left(server, monkeypatch):
     assert len(returned) == 1
 
 
-def test_a_settled_reply_refers_to_nothing():
+@pytest.mark.parametrize("settle", [lambda r: r.answer(1), lambda r: r.fail(None)])
+def test_a_settled_reply_refers_to_nothing(settle):
     class Held:
-        """Something that a callback refers to."""
+        """Something to which callbacks refer."""
 
+    held, told = Held(), []
     gc.disable()
     try:
-        for settle in (lambda reply: reply.answer(1), lambda reply: reply.fail(None)):
-            held, told = Held(), []
-            reply = ServiceReply(
-                lambda _, held=held: told.append(held is not None),
-                lambda _, held=held: told.append(held is not None),
-            )
-            reply.when_done(lambda held=held: told.append(held is not None))
-            gone = weakref.ref(held)
-            del held
-            settle(reply)
-            settle(reply)
-            assert told == [True, True]
-            assert gone() is None
+        reply = ServiceReply(*[lambda _, held=held: told.append(held is not None)] * 2)
+        reply.when_done(lambda held=held: told.append(held is not None))
+        gone = weakref.ref(held)
+        del held
+        settle(reply)
+        settle(reply)
+        assert told == [True, True]
+        assert gone() is None
     finally:
         gc.enable()
