@@ -13,6 +13,8 @@ from volery.graph import messages as m
 from volery.mavlink.codec import Codec, dialect
 from volery.mavlink.framing import Framer
 from volery.mavlink.links.signing import Signing, steady_time
+from volery.runtime import Simulation
+from volery.scenario.load import load_scenario
 from volery.server.recordings import _Durations
 
 HOUR_S = 3600.0
@@ -24,16 +26,14 @@ DATES = {
     "bridges/ros2/client.py": "stamps of parameter events",
     "bridges/ros2/subscriptions.py": "the same",
     "bridges/ros2/zenoh/endpoints.py": "source time stamps of the protocol",
-    "cli/gcs.py": "read once; the elapsed time is added",
     "cli/topics.py": "stamps of published messages where the graph has no clock",
     "cli/yaml_codec.py": "stamps of published messages",
     "comms/station/tcp.py": "send time of the protocol; its receivers estimate the offset",
     "core/compiled.py": "age of a file",
+    "core/wall_time.py": "read once; the elapsed time is added",
     "graph/nodes/rclpy_modules.py": "stamps of log lines",
     "graph/nodes/ros_time.py": "a system clock of a node file",
-    "mavlink/links/signing.py": "read once; the elapsed time is added",
     "mavlink/offboard/connection.py": "arrival of a message from an autopilot",
-    "runtime/monitoring/status.py": "the wall time of a status, for people",
     "server/recordings.py": "age of a file",
 }
 """Modules that read the wall clock, and what for."""
@@ -70,6 +70,25 @@ def test_steady_time_is_wall_time_that_does_not_jump(set_clock):
     set_clock()
     assert abs(time.time() - truly) > HOUR_S - 60.0
     assert steady_time() == pytest.approx(truly, abs=60.0)
+
+
+def test_statuses_of_a_run_are_as_far_apart_as_they_were_published(set_clock):
+    """The page estimates from them how old what it shows is."""
+    with Simulation(load_scenario("hover")) as simulation:
+        session = simulation.gateway.open("viewer")
+        queue = session.subscribe("/volery/status", wake=lambda: None)
+
+        def next_wall_s():
+            for _ in range(3000):
+                simulation.run(0.1, speed=1.0)
+                if found := queue.take():
+                    stamp = found[-1].message.wall
+                    return stamp.sec + 1e-9 * stamp.nanosec
+            raise AssertionError("no status")
+
+        before_s = next_wall_s()
+        set_clock()
+        assert next_wall_s() == pytest.approx(before_s, abs=HOUR_S - 60.0)
 
 
 def ping_by(sender):

@@ -8,6 +8,7 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from typer.testing import CliRunner
 from volery.autonomy.mapping.grid_files import write_grid
 from volery.autonomy.mapping.map_files import write_map
 from volery.bridges.logs.log_writer import create_log
+from volery.cli import gcs
 from volery.cli.app import app
 from volery.cli.examples import _copy
 from volery.cluster.errors import StudyError
@@ -23,7 +25,7 @@ from volery.cluster.folder_lock import FolderLock
 from volery.cluster.results_folder import ResultsFolder
 from volery.core import whole_files
 from volery.core.errors import VoleryError
-from volery.core.whole_files import open_new, whole_file, write_whole
+from volery.core.whole_files import open_new, open_to_append, whole_file, write_whole
 from volery.graph.codecs.interface_packages import write_generator
 from volery.report.page import write_page
 from volery.runtime.replay.slam.map_image import write_image
@@ -35,6 +37,14 @@ GRID = np.zeros((2, 2), np.int8)
 PATH = EstimatedTrajectory(
     np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros((1, 3)), np.zeros((1, 4))
 )
+
+
+def station_log(path: Path) -> None:
+    """Starts a ground station that ends before it connects."""
+    with patch.object(gcs.asyncio, "run", lambda work: work.close()):
+        gcs.command_station("127.0.0.1:1", 0, None, 4, path)
+
+
 WRITERS: dict[str, Callable[[Path], Any]] = {
     "index.html": lambda path: write_page("page", path.parent, overwrite=True),
     "s.toml": lambda path: load_scenario("hover").save(path, overwrite=True),
@@ -48,10 +58,11 @@ WRITERS: dict[str, Callable[[Path], Any]] = {
     "flight.bag": lambda path: create_log(path, overwrite=True).close(),
     "generate_python.py": lambda path: write_generator(path.parent),
     "worker_1.log": lambda path: open_new(path).close(),
+    "gcs.log": station_log,
     "run.json": lambda path: ResultsFolder(path.parent).write_file(path, b"{}"),
 }
 """What writes a file of this name."""
-GROWING = ("flight", "worker_1")
+GROWING = ("flight", "worker_1", "gcs")
 """Files that hold what was written before a disk was full."""
 
 
@@ -134,6 +145,26 @@ def test_the_lock_of_a_study_empties_no_other_file(precious: Path, tmp_path: Pat
     with pytest.raises(StudyError, match="cannot be locked"):
         FolderLock(study)
     assert precious.read_text() == "precious"
+
+
+def test_a_ground_station_continues_its_log(tmp_path: Path) -> None:
+    log = tmp_path / "gcs.log"
+    for line in ("first", "second"):
+        with open_to_append(log) as file:
+            gcs._Desk(file)._print(line)
+    assert [text.split(" ")[1] for text in log.read_text().splitlines()] == ["first", "second"]
+
+
+def test_a_full_disk_ends_the_log_of_a_ground_station_only(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with open_to_append(Path("/dev/full")) as file:
+        desk = gcs._Desk(file)
+        desk._print("first")
+        desk._print("second")
+    told = capsys.readouterr()
+    assert told.out == "first\nsecond\n"
+    assert told.err == "warning: the log ends here: No space left on device\n"
 
 
 def test_a_link_that_leads_nowhere_counts_as_a_file(tmp_path: Path) -> None:

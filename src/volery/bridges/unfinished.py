@@ -39,6 +39,8 @@ _RETURNED_BYTES = 16 << 20
 _RETURN_PERIOD_S = 0.5
 """Freed bytes and time after which free memory is returned to the system: blocks of many clients
 leave holes between each other."""
+_LEFT_BYTES = 1 << 20
+"""Freed bytes that are returned after clients have left."""
 
 
 class UnfinishedMessages:
@@ -120,6 +122,16 @@ class UnfinishedMessages:
         self._freed, self._returned_s = 0, now_s
         return True
 
+    def owes_memory(self) -> bool:
+        """Returns whether much was freed since memory was last returned to the system."""
+        return self._freed >= _LEFT_BYTES
+
+    def return_memory(self) -> None:
+        """Returns free memory to the system."""
+        with self._lock:
+            self._freed, self._returned_s = 0, time.monotonic()
+        return_free_memory()
+
     def _evict_beyond(self, part: int) -> list[UnfinishedBytes]:
         """Makes room: removes clients with more than an equal part, oldest messages first."""
         found = []
@@ -189,6 +201,19 @@ class _ReadTurns:
     def __init__(self) -> None:
         self._waiting: deque[Callable[[], None]] = deque()
         self._is_granting = False
+        self._is_returning = False
+
+    def return_memory_soon(
+        self, loop: asyncio.AbstractEventLoop, account: UnfinishedMessages
+    ) -> None:
+        """Returns free memory when those that leave at the same time have left."""
+        if not self._is_returning:
+            self._is_returning = True
+            loop.call_later(_RETURN_PERIOD_S, self._return, account)
+
+    def _return(self, account: UnfinishedMessages) -> None:
+        self._is_returning = False
+        account.return_memory()
 
     def wait(self, loop: asyncio.AbstractEventLoop, resume: Callable[[], None]) -> None:
         """Calls `resume` when it is the connection's turn."""
@@ -283,6 +308,8 @@ class ArrivingMessages:
             self._timer.cancel()
             self._timer = None
         self._share.close()
+        if self._account.owes_memory():
+            self._turns.return_memory_soon(self._loop, self._account)
         self._end = _ignore
         self._pause = self._resume = _nothing
 

@@ -22,6 +22,7 @@ from volery.comms.station.ground_station import HEAD, HELP, GroundStation
 from volery.comms.station.tcp import Station
 from volery.core.errors import CommsError, reason_of
 from volery.core.plain_text import plain
+from volery.core.wall_time import steady_time_ns
 from volery.core.whole_files import open_to_append
 
 _LEAVE_S = 2.0
@@ -73,7 +74,6 @@ class _Desk:
 
     def __init__(self, log: BinaryIO | None) -> None:
         self._log = log
-        self._clock_ns = time.time_ns() - time.monotonic_ns()
         self._has_joined = False
         self._is_sent_away = False
         self._lines: asyncio.Queue[str | None] = asyncio.Queue()
@@ -121,7 +121,7 @@ class _Desk:
         if word == "help":
             echo_lines(HELP)
         elif word == "list":
-            print_table(HEAD, self.ground.rows(self._now_ns()), right=(4, 5, 6))
+            print_table(HEAD, self.ground.rows(steady_time_ns()), right=(4, 5, 6))
             if not self.ground.has_received:
                 echo_line("no message of a UAV received so far")
             sys.stdout.flush()
@@ -133,7 +133,7 @@ class _Desk:
 
     def on_message(self, frame: StationFrame) -> None:
         """Prints a received message."""
-        if line := self.ground.take(frame, self._now_ns()):
+        if line := self.ground.take(frame, steady_time_ns()):
             self._print(line)
 
     def on_refusal(self, refusal: Refusal) -> None:
@@ -150,10 +150,6 @@ class _Desk:
             self._print("the server is back")
         elif not joined and not self._is_sent_away:
             self._print("the connection to the server is lost; trying again")
-
-    def _now_ns(self) -> int:
-        """Returns a clock that never goes back, set by the time of day at the start."""
-        return self._clock_ns + time.monotonic_ns()
 
     def _print(self, line: str) -> None:
         line = plain(line)

@@ -7,6 +7,8 @@ messages of clients then leave holes in the heap that are never returned to the 
 from __future__ import annotations
 
 import ctypes
+from functools import cache
+from typing import Any
 
 MAPPED_BYTES = 4 << 20
 """Blocks of this size or more are mapped from the system one by one, and returned when they are
@@ -18,7 +20,7 @@ _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # malloc.h of glibc
 
 def return_large_blocks() -> None:
     """Returns large blocks to the system when they are freed; has no effect without glibc."""
-    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    mallopt = _function("mallopt")
     if mallopt is not None:
         mallopt(_M_MMAP_THRESHOLD, MAPPED_BYTES)
         mallopt(_M_TRIM_THRESHOLD, _HEAP_SPARE_BYTES)
@@ -26,6 +28,12 @@ def return_large_blocks() -> None:
 
 def return_free_memory() -> None:
     """Returns free memory between used blocks to the system; has no effect without glibc."""
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    trim = _function("malloc_trim")
     if trim is not None:
         trim(0)
+
+
+@cache
+def _function(name: str) -> Any:
+    """Returns a function of the C library, None where it has none of this name."""
+    return getattr(ctypes.CDLL(None), name, None)

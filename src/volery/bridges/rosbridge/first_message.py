@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, cast
 
 from websockets.asyncio.server import ServerConnection
@@ -39,7 +39,7 @@ class GuardedConnection(ServerConnection):
         super().__init__(*args, **options)
         self._last_frames: deque[Frame] = deque()
         """The last frame of each message that the application has not taken."""
-        self._recv_unbounded = self.protocol.recv_frame
+        self._recv_unbounded: Callable[[Frame], None] = self.protocol.recv_frame
         self.protocol.recv_frame = self._recv_frame  # type: ignore[method-assign]
         if self.has_token:
             self.protocol.max_message_size = MAX_UNAUTHORIZED_BYTES
@@ -63,8 +63,9 @@ class GuardedConnection(ServerConnection):
         super().connection_lost(exc)
         protocol = self.protocol
         protocol.parser.close()
-        protocol.select_subprotocol = None
-        protocol.recv_frame = self._recv_unbounded = _ignore  # type: ignore[method-assign]
+        protocol.select_subprotocol = None  # type: ignore[method-assign, assignment]
+        protocol.recv_frame = _ignore  # type: ignore[method-assign, assignment]
+        self._recv_unbounded = _ignore
 
     def data_received(self, data: bytes) -> None:
         """Implements asyncio's method; counts what is incomplete."""

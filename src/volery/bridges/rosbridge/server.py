@@ -265,6 +265,7 @@ class RosbridgeServer:
 
     async def _serve(self, connection: ServerConnection) -> None:
         assert self._gateway is not None
+        assert isinstance(connection, GuardedConnection)
         loop = asyncio.get_running_loop()
         address = connection.remote_address or ("?", 0)
         sock = connection.transport.get_extra_info("socket")

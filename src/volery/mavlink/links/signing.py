@@ -10,11 +10,11 @@ from __future__ import annotations
 import hashlib
 import hmac
 import logging
-import time
 from collections.abc import Callable, Collection
 from pathlib import Path
 
 from volery.core.errors import BridgeError
+from volery.core.wall_time import steady_time_ns
 from volery.mavlink.codec import check_of, crc_extra_of
 from volery.mavlink.framing import SIGNED, MavlinkFrame, lengths_of
 from volery.mavlink.links.stamp_ledger import StampLedger, Stream, ledger_of
@@ -32,8 +32,6 @@ _STAMP_AND_HASH, _HASH = 12, 6
 _SECOND = 0xFD
 """Start of a frame of MAVLink 2."""
 _log = logging.getLogger(__name__)
-_WALL_S = time.time() - time.monotonic()
-"""UNIX time of the monotonic clock's zero, as the wall clock had it at the start."""
 
 
 def key_of(path: Path) -> bytes:
@@ -56,7 +54,7 @@ def steady_time() -> float:
     A wall clock that is set back would make old frames fresh again, one that is set forward refuse
     honest ones. Where it was wrong at the start, stamps follow the newest that is received.
     """
-    return _WALL_S + time.monotonic()
+    return 1e-9 * steady_time_ns()
 
 
 def signing_of(key: bytes | None, link: int) -> Signing:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import resource
-import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from volery.core.clock import NS_PER_S
+from volery.core.wall_time import steady_time_ns
 from volery.engine.engine import Engine
 from volery.graph.messages import message_type, time_from_ns
 from volery.graph.session import Gateway
@@ -119,7 +119,7 @@ class Status:
         load.flags.writeable = False
         return message_type(_TYPE)(
             time_from_ns(self._engine.time_ns),
-            time_from_ns(time.time_ns()),
+            time_from_ns(steady_time_ns()),
             scenario.name,
             sources.state(),
             sources.speed() or 0.0,

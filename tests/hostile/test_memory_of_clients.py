@@ -1,0 +1,120 @@
+"""Clients that have left leave no memory behind: nothing for the collector, and no free blocks."""
+
+from __future__ import annotations
+
+import gc
+import json
+import time
+import weakref
+
+import pytest
+from live_graph import LiveGraph
+from patient_websockets import connect
+
+from volery.bridges import unfinished
+from volery.bridges.bridge_host import BridgeHost
+from volery.bridges.rosbridge import server as server_module
+from volery.bridges.rosbridge.protocol import RosbridgePeer
+from volery.bridges.rosbridge.server import RosbridgeServer
+from volery.bridges.unfinished import SHARED
+from volery.graph import messages as m
+from volery.graph.service_reply import ServiceReply
+
+LONGEST_S = 120.0
+MB = 1 << 20
+
+
+def until(condition):
+    ends = time.monotonic() + LONGEST_S
+    while not condition():
+        assert time.monotonic() < ends
+        time.sleep(0.01)
+
+
+@pytest.fixture
+def server():
+    live = LiveGraph()
+    with BridgeHost(live.gateway) as bridges:
+        server = RosbridgeServer(port=0)
+        bridges.open(server)
+        publisher = live.do(lambda: live.graph.advertise("/a", "std_msgs/msg/String", latched=True))
+        live.do(lambda: publisher.publish(m.String("text")))
+        yield server
+    live.close()
+
+
+def visit(server):
+    """A client that uses a bit of everything, and leaves with an incomplete message."""
+    with connect(f"ws://127.0.0.1:{server.port}") as client:
+        client.send(json.dumps({"op": "subscribe", "topic": "/a"}))
+        assert "text" in client.recv(60.0)
+        call = {"op": "call_service", "service": "/rosapi/topics", "id": "1"}
+        client.send(json.dumps(call))
+        assert "/a" in client.recv(60.0)
+        client.send(json.dumps({"op": "advertise", "topic": "/b", "type": "std_msgs/String"}))
+        client.send(
+            json.dumps({"op": "advertise_service", "service": "/s", "type": "std_srvs/Empty"})
+        )
+        client.send(json.dumps({"op": "bogus"}))
+        assert "unknown operation" in client.recv(60.0)
+        part = {"op": "fragment", "id": "f", "data": "x" * 100_000, "num": 0, "total": 3}
+        client.send(json.dumps(part))
+        until(lambda: SHARED.num_bytes > 0)
+        return weakref.ref(next(iter(server._clients)))
+
+
+def test_a_client_that_has_left_waits_for_no_collection(server, monkeypatch):
+    peers = []
+
+    class Peer(RosbridgePeer):
+        def __init__(self, *args, **options):
+            super().__init__(*args, **options)
+            peers.append(weakref.ref(self))
+
+    monkeypatch.setattr(server_module, "RosbridgePeer", Peer)
+    gc.collect()
+    gc.disable()
+    try:
+        connection = visit(server)
+        until(lambda: not server.clients)
+        until(lambda: connection() is None)
+        until(lambda: peers[0]() is None)
+    finally:
+        gc.enable()
+
+
+def test_memory_is_returned_when_the_last_has_left(server, monkeypatch):
+    """Less than what is returned at once while others are there."""
+    returned = []
+    monkeypatch.setattr(unfinished, "return_free_memory", lambda: returned.append(server.clients))
+    monkeypatch.setattr(unfinished, "_RETURNED_BYTES", 1 << 60)
+    monkeypatch.setattr(SHARED, "_freed", 0)
+    with connect(f"ws://127.0.0.1:{server.port}") as client:
+        part = {"op": "fragment", "id": "f", "data": "x" * (2 * MB), "num": 0, "total": 3}
+        client.send(json.dumps(part))
+        until(lambda: SHARED.num_bytes > 2 * MB)
+    until(lambda: returned)
+    assert returned == [0]
+    visit(server)  # leaves with little
+    until(lambda: not server.clients)
+    assert len(returned) == 1
+
+
+@pytest.mark.parametrize("settle", [lambda r: r.answer(1), lambda r: r.fail(None)])
+def test_a_settled_reply_refers_to_nothing(settle):
+    class Held:
+        """Something to which callbacks refer."""
+
+    held, told = Held(), []
+    gc.disable()
+    try:
+        reply = ServiceReply(*[lambda _, held=held: told.append(held is not None)] * 2)
+        reply.when_done(lambda held=held: told.append(held is not None))
+        gone = weakref.ref(held)
+        del held
+        settle(reply)
+        settle(reply)
+        assert told == [True, True]
+        assert gone() is None
+    finally:
+        gc.enable()
