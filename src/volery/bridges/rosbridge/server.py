@@ -50,7 +50,9 @@ _ONCE = ("Host", "Origin", "Authorization")
 
 
 _FOXGLOVE = "foxglove."
-_USE_ROSBRIDGE = "this is rosbridge: choose the connection 'Rosbridge' in place of 'Foxglove WebSocket'"
+_USE_ROSBRIDGE = (
+    "this is rosbridge: choose the connection 'Rosbridge' in place of 'Foxglove WebSocket'"
+)
 
 
 class RosbridgeServer:
