@@ -131,9 +131,9 @@ def test_a_missing_frame_says_what_publishes_it():
     fixed = TransformStamped(Header(frame_id="uav1/base_link"), "uav1/laser", Transform())
     buffer = Buffer()
     buffer.set_transform_static(fixed, "")
-    with pytest.raises(LookupException, match="no frame 'map'.*odometry sensor publishes"):
+    with pytest.raises(LookupException, match=r"no frame 'map'.*odometry sensor publishes"):
         buffer.lookup_transform("map", "uav1/base_link")
     fixed.child_frame_id = "probe"
     buffer.set_transform(fixed, "")
-    with pytest.raises(LookupException, match="no frame 'map'$"):
+    with pytest.raises(LookupException, match=r"no frame 'map'$"):
         buffer.lookup_transform("map", "uav1/base_link")
