@@ -31,6 +31,9 @@ def numbers_of(where: str, dtype: np.dtype[Any], length: int, values: Any) -> ND
     length: of a fixed array, which may have any shape; 0: any. Raises `GraphError` with `where` if
     the values do not fit.
     """
+    is_plain = values.__class__ is np.ndarray and values.dtype == dtype and values.ndim == 1
+    if is_plain and length in (0, values.size):  # the usual case
+        return _own(values)
     found = _array_of(where, dtype, values)
     if length and found.size != length:
         raise GraphError(f"{where}: must have {length} numbers, not {found.size}")
@@ -42,10 +45,18 @@ def numbers_of(where: str, dtype: np.dtype[Any], length: int, values: Any) -> ND
     if found.dtype != dtype:
         _check_range(where, dtype, found)
         found = found.astype(dtype)
-    elif found.flags.writeable and isinstance(values, np.ndarray):
-        found = found.copy()  # the node may write into its own
+    elif isinstance(values, np.ndarray):
+        return _own(found)
     found.setflags(write=False)
     return found
+
+
+def _own(values: NDArray[Any]) -> NDArray[Any]:
+    """Returns a read-only copy of an array into which the node may write, or the array."""
+    if values.flags.writeable:
+        values = values.copy()
+        values.setflags(write=False)
+    return values
 
 
 def _array_of(where: str, dtype: np.dtype[Any], values: Any) -> NDArray[Any]:

@@ -9,9 +9,10 @@ from volery.learning.training.configuration import TrainingConfiguration, load_c
 from volery.learning.training.task_loading import find_task
 
 
-def test_a_file_sets_options(tmp_path):
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
+def test_a_file_sets_options(tmp_path, encoding):
     path = tmp_path / "training.toml"
-    path.write_text('algorithm = "sac"\nhidden = [32]\n[sac]\ntau = 0.5\n')
+    path.write_text('algorithm = "sac"\nhidden = [32]\n[sac]\ntau = 0.5\n', encoding=encoding)
     found = load_configuration("homing", path)
     assert (found.algorithm, found.hidden, found.sac.tau) == ("sac", (32,), 0.5)
     assert found.sac.batch == TrainingConfiguration().sac.batch

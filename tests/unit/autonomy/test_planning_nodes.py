@@ -150,6 +150,13 @@ def test_a_path_that_is_none_is_refused(bad):
     assert glade.plans == []
 
 
+def test_a_path_in_the_map_with_a_slash_is_flown():
+    glade = Glade()
+    glade.bench.send("/uav1/planning/path", path((8.0, 0.0), frame="/map"))
+    glade.go_on(0.6)
+    assert glade.plans
+
+
 def report(name, time_ns, place, velocity=(0.0, 0.0, 0.0)):
     """What a teammate says over the radio."""
     message = zero_message("volery_interfaces/msg/TeamReport")
@@ -261,6 +268,14 @@ def test_plans_that_are_none_are_refused():
     assert commands == []
 
 
+def test_a_plan_in_the_frame_with_a_slash_is_flown():
+    bench, commands, _ = follower()
+    bench.send("/uav1/odom", odometry(0, (0.0, 0.0, HEIGHT)))
+    bench.send("/uav1/planning/trajectory", plan_message(0, frame="/uav1/odom"))
+    bench.run_to(S)
+    assert commands
+
+
 # --------------------------------------------------------------------------------- global planner
 
 
@@ -365,6 +380,14 @@ def test_it_searches_until_all_is_seen():
     assert state["area_m2"] == 1000.0
     assert state["searched_m2"] == pytest.approx(1000.0 * state["covered"], rel=0.01)
     assert (np.asarray(searched[-1].data) == 100).mean() > 0.5
+
+
+def test_an_area_in_the_map_with_a_slash_is_searched():
+    bench, goals, status = exploring()
+    bench.send("/uav1/search_area", polygon((0, 0), (40, 0), (40, 25), frame="/map"))
+    bench.run_to(S)
+    assert told(status)["state"] != "waiting"
+    assert goals
 
 
 def test_areas_that_are_none_are_refused():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from volery.cluster.errors import StudyError
-from volery.cluster.loading import parse_study
+from volery.cluster.loading import parse_study, read_study
 from volery.cluster.points import points_of
 
 LOW_HIGH = {"key": "seed", "distribution": "uniform", "low": 2.0, "high": 4.0}
@@ -69,3 +69,9 @@ def test_a_study_has_a_largest_number_of_runs():
     many = {name: {"key": "x", "range": [0.0, 1.0], "steps": 100_000} for name in "ab"}
     with pytest.raises(StudyError, match="10,000,000,000 runs; a study has at most 10,000,000"):
         points(many)
+
+
+def test_a_study_may_begin_with_a_byte_order_mark(tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_text('name = "a"\nscenario = "hover"\n', encoding="utf-8-sig")
+    assert read_study(path).scenario == "hover"

@@ -19,7 +19,7 @@ from volery.graph.messages import (
 )
 from volery.graph.nodes import point_cloud2
 from volery.graph.nodes import tf_transformations as tf
-from volery.graph.nodes.tf2 import Buffer, TypeException
+from volery.graph.nodes.tf2 import Buffer, LookupException, TypeException
 
 AXES = [
     kind + "".join(turns)
@@ -124,3 +124,16 @@ def test_a_cloud_keeps_its_other_fields(buffer):
 def test_other_messages_are_refused(buffer):
     with pytest.raises(TypeException, match="Twist cannot be transformed, but PointStamped"):
         buffer.transform(message_type("geometry_msgs/msg/Twist")(), "map")
+
+
+def test_a_missing_frame_says_what_publishes_it():
+    """Without an odometry sensor a UAV has static frames alone."""
+    fixed = TransformStamped(Header(frame_id="uav1/base_link"), "uav1/laser", Transform())
+    buffer = Buffer()
+    buffer.set_transform_static(fixed, "")
+    with pytest.raises(LookupException, match=r"no frame 'map'.*odometry sensor publishes"):
+        buffer.lookup_transform("map", "uav1/base_link")
+    fixed.child_frame_id = "probe"
+    buffer.set_transform(fixed, "")
+    with pytest.raises(LookupException, match=r"no frame 'map'$"):
+        buffer.lookup_transform("map", "uav1/base_link")

@@ -245,11 +245,16 @@ def test_rates_without_a_yaw_rate_keep_the_present_one(air):
     """PX4's rate controller holds the present rate of an axis whose setpoint is nan."""
     station, uav = air
     enter(station)
+    for _ in range(25):
+        station.send("set_attitude_target", 0, 1, 1, 128, (1, 0, 0, 0), 0.0, 0.0, 0.8, 0.536)
+        station.seconds(0.02)
+    turning = uav.omega_body[2]
+    assert turning < -0.5  # to the right
     for _ in range(10):
         station.send("set_attitude_target", 0, 1, 1, 128 | 4, (1, 0, 0, 0), 0.3, 0.0, 9.0, 0.536)
         station.seconds(0.02)
     assert uav.omega_body[0] == pytest.approx(0.3, abs=0.1)
-    assert uav.omega_body[2] == pytest.approx(0.0, abs=0.1)
+    assert uav.omega_body[2] == pytest.approx(turning, abs=0.15)
 
 
 # ---------------------------------------------------------------------------------------- commands
@@ -328,7 +333,9 @@ def test_positions_of_commands_have_known_frames_and_markers_of_their_message(ai
     assert any("frame 11 is not supported" in text for text in station.texts)
     # the bits of a nan in an integer, and INT32_MAX in a float
     assert whole(station, 192, nothing, 0x7FF80000, 0x7FF80000, 5.0, 6) == DENIED
+    assert "x and y are nan, not INT32_MAX" in station.texts[-1]
     assert station.command(192, *nothing, float(unset), float(unset), 500.0) == DENIED
+    assert "param5 and param6 are INT32_MAX, not nan" in station.texts[-1]
     here = uav.position_map[:2].copy()
     assert whole(station, 192, nothing, unset, unset, 7.0, 6) == ACCEPTED
     station.seconds(5.0)

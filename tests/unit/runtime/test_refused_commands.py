@@ -4,9 +4,13 @@ import json
 import math
 
 import pytest
+from ros_tcp_client import frame
 from rosbridge_bench import TIME_NS
 
+from volery.bridges.ros_tcp.session import EndpointSession
+from volery.bridges.ros_tcp.wire import RosTcpFrameParser
 from volery.bridges.rosbridge.protocol import RosbridgePeer, ServerContext
+from volery.graph.codecs.cdr import encode_cdr
 from volery.graph.codecs.zero import zero_message
 from volery.graph.command_records import TOPIC, TYPE
 from volery.runtime import Simulation
@@ -118,6 +122,24 @@ def test_weather_that_cannot_be(flying):
     message.rain = math.nan
     told, _ = told_about(flying, "/weather_command", message)
     assert len(told) == 1
+
+
+def test_a_client_of_ros_tcp_receives_an_error(flying):
+    session = EndpointSession(flying.gateway, "ros-tcp", "ros2", 10, lambda: None)
+    parser = RosTcpFrameParser()
+    announced = {"topic": "/uav1/goal_pose", "message_name": POSE}
+    sent = frame("__publish", json.dumps(announced).encode())
+    sent += frame("/uav1/goal_pose", bytes(encode_cdr(goal("moon"), POSE)))
+    for one in parser.feed(sent):
+        session.take(one)
+    flying.run(0.1)
+    received, reader = [], RosTcpFrameParser()
+    while parts := session.outbox.gather():
+        for part in parts:
+            received += reader.feed(part)
+    session.close()
+    (error,) = [one for one in received if one.destination == "__error"]
+    assert "'moon'" in json.loads(bytes(error.payload))["text"]
 
 
 def test_a_client_of_rosbridge_receives_a_status(flying):

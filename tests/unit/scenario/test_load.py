@@ -169,5 +169,7 @@ def test_overrides():
 def test_files_in_another_encoding_say_what_to_do(tmp_path, encoding):
     """PowerShell writes UTF-16."""
     (tmp_path / "other.toml").write_text('name = "grün"\n', encoding=encoding)
-    with pytest.raises(ScenarioError, match=r"not UTF-8 text \(byte 0x.. at \d+\): save it as UTF-8"):
+    with pytest.raises(
+        ScenarioError, match=r"not UTF-8 text \(byte 0x.. at \d+\): save it as UTF-8"
+    ):
         load_scenario(tmp_path / "other.toml")

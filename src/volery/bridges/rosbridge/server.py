@@ -50,7 +50,9 @@ _ONCE = ("Host", "Origin", "Authorization")
 
 
 _FOXGLOVE = "foxglove."
-_USE_ROSBRIDGE = "this is rosbridge: choose the connection 'Rosbridge' in place of 'Foxglove WebSocket'"
+_USE_ROSBRIDGE = (
+    "this is rosbridge: choose the connection 'Rosbridge' in place of 'Foxglove WebSocket'"
+)
 
 
 class RosbridgeServer:
@@ -211,13 +213,8 @@ class RosbridgeServer:
                 return connection.respond(
                     HTTPStatus.BAD_REQUEST, f"{name} is given more than once\n"
                 )
-        offered = ",".join(request.headers.get_all("Sec-WebSocket-Protocol")).split(",")
-        if any(name.strip().startswith(_FOXGLOVE) for name in offered):
-            if not self._refused_foxglove:
-                self._refused_foxglove = True
-                _log.warning("a Foxglove client was refused: %s", _USE_ROSBRIDGE)
-            return connection.respond(HTTPStatus.BAD_REQUEST, f"{_USE_ROSBRIDGE}\n")
-        foreign = self._foreign_page(connection, request)
+        foreign = self._foreign_protocol(connection, request)
+        foreign = foreign or self._foreign_page(connection, request)
         if foreign is not None:
             return foreign
         given = parse_qs(url.query).get("token", [None])[0]
@@ -232,6 +229,16 @@ class RosbridgeServer:
             self._shown.add(connection)
             _allow(connection)
         return None
+
+    def _foreign_protocol(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Returns the refusal of a client of Foxglove's own protocol, which would hear nothing."""
+        offered = ",".join(request.headers.get_all("Sec-WebSocket-Protocol")).split(",")
+        if not any(name.strip().startswith(_FOXGLOVE) for name in offered):
+            return None
+        if not self._refused_foxglove:
+            self._refused_foxglove = True
+            _log.warning("a Foxglove client was refused: %s", _USE_ROSBRIDGE)
+        return connection.respond(HTTPStatus.BAD_REQUEST, f"{_USE_ROSBRIDGE}\n")
 
     def _foreign_page(self, connection: ServerConnection, request: Request) -> Response | None:
         """Returns the refusal of another site's page; None: the request is not of such a page."""

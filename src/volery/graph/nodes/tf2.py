@@ -163,7 +163,7 @@ class Buffer:
             if name not in self._frames and not any(
                 frame.parent == name for frame in self._frames.values()
             ):
-                raise LookupException(f"there is no frame '{name}'")
+                raise LookupException(f"there is no frame '{name}'{self._hint()}")
         ups, downs = self._chain(source), self._chain(target)
         common = next((name for name in ups if name in downs), None)
         if common is None:
@@ -269,6 +269,12 @@ class Buffer:
         self._waiting = [wait for wait in self._waiting if wait not in ready]
         for future, *_ in ready:
             future.set_result(True)
+
+    def _hint(self) -> str:
+        """Returns why frames may be missing: nothing moves as yet."""
+        if not all(frame.is_static for frame in self._frames.values()):
+            return ""
+        return ": nothing has arrived on /tf, where a UAV's odometry sensor publishes its frames"
 
     def _chain(self, name: str) -> list[str]:
         """Returns a frame and its ancestors."""
