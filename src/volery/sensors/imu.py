@@ -24,7 +24,6 @@ from volery.sensors.model import SensorModel
 from volery.sensors.noise import gauss_markov
 from volery.sensors.samples import ImuSamples
 
-
 _MIN_ACCEL_RANGE_M_S2 = 19.6
 """2 g, the smallest full scale of data sheets; so a range in g, such as 16, is refused."""
 _MAX_GYRO_RANGE_RAD_S = 349.1
