@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from volery.cli.bridge_checks import check_bridges, token_gaps
 from volery.cli.bridges import fit_out, open_bridges
 from volery.cli.error_reporting import complain_of, warn
+from volery.cli.first_flight import FirstFlight
 from volery.cli.flight import RunOptions
 from volery.cli.interrupt import Interrupts
 from volery.cli.pages import Page, serving
@@ -124,6 +125,9 @@ class _Host:
         self._problem = ""
         """Last problem, for the page."""
         self._quits = False
+        self._is_unasked = options.page.unasked
+        """Whether nobody has chosen the world that is built next."""
+        self._first_flight: FirstFlight | None = None
 
     @property
     def goes_on(self) -> bool:
@@ -170,7 +174,10 @@ class _Host:
             with spared_objects(), bridges, shown:
                 self._problem = ""
                 echo_line(f"flying  {scenario.name}", err=True)
+                self._first_flight = FirstFlight(simulation) if self._is_unasked else None
+                self._is_unasked = False
                 self._stay(simulation)
+                self._first_flight = None
             self._quits = simulation.clock.quitting and not self._wish.asked
 
     def _play(self, log: Path) -> None:
@@ -215,6 +222,8 @@ class _Host:
     def _look(self, _progress: Any = None) -> None:
         if self._interrupts.pressed:
             raise _StoppedError
+        if self._first_flight is not None:
+            self._first_flight.look()
 
     def _wait(self) -> None:
         """Runs the bridges without a world."""

@@ -218,10 +218,9 @@ class TaskVectorEnv(VectorEnv[Observations, Array, Any]):
         if seed is None:
             return
         envs = self.num_envs // self.task.num_agents
-        if isinstance(seed, list | tuple):
-            seeds = list(seed)
-        else:
-            seeds = list(range(seed, seed + envs)) if _is_seed(seed) else [seed]
+        seeds: list[Any] = list(seed) if isinstance(seed, list | tuple) else [seed]
+        if isinstance(seed, int | np.integer) and _is_seed(seed):
+            seeds = list(range(int(seed), int(seed) + envs))
         for one in seeds:
             if one is not None and not _is_seed(one):
                 raise CommandError(
@@ -234,7 +233,7 @@ class TaskVectorEnv(VectorEnv[Observations, Array, Any]):
 
 
 def _is_seed(seed: object) -> bool:
-    return isinstance(seed, int | np.integer) and 0 <= seed <= _LARGEST_SEED
+    return isinstance(seed, int | np.integer) and 0 <= int(seed) <= _LARGEST_SEED
 
 
 def _remade(

@@ -19,10 +19,15 @@ from volery.control.fleet import Fleet
 from volery.core.arrays import Array, read_only
 from volery.core.clock import NS_PER_S
 from volery.sensors.bank import NoisyBank, SensorGroup, saturate
-from volery.sensors.inertial_kernels import GRAVITY, feel_motion
+from volery.sensors.inertial_kernels import feel_motion
 from volery.sensors.model import SensorModel
 from volery.sensors.noise import gauss_markov
 from volery.sensors.samples import ImuSamples
+
+_MIN_ACCEL_RANGE_M_S2 = 19.6
+"""2 g, the smallest full scale of data sheets; so a range in g, such as 16, is refused."""
+_MAX_GYRO_RANGE_RAD_S = 349.1
+"""20,000 deg/s, the largest full scale (ADXRS649); so one in deg/s, such as 2000, is refused."""
 
 
 class ImuModel(SensorModel):
@@ -43,10 +48,10 @@ class ImuModel(SensorModel):
     """Standard deviation of a cold sensor's bias, in addition to the turn-on bias."""
     accel_warm_up_bias_m_s2: NonNegativeFloat = 0.0
     warm_up_time_constant_s: PositiveFloat = 60.0
-    gyro_range_rad_s: PositiveFloat | None = None
-    """Full scale of the gyroscope on each axis; None: unlimited."""
-    accel_range_m_s2: Annotated[float, Field(gt=GRAVITY)] | None = None
-    """Full scale of the accelerometer on each axis, more than gravity; None: unlimited."""
+    gyro_range_rad_s: Annotated[float, Field(gt=0.0, le=_MAX_GYRO_RANGE_RAD_S)] | None = None
+    """Full scale of the gyroscope on each axis, up to 20,000 deg/s; None: unlimited."""
+    accel_range_m_s2: Annotated[float, Field(ge=_MIN_ACCEL_RANGE_M_S2)] | None = None
+    """Full scale of the accelerometer on each axis, from 2 g on; None: unlimited."""
 
 
 class ImuBank(NoisyBank):

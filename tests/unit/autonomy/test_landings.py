@@ -11,6 +11,7 @@ from volery.autonomy.avoidance.depth_course import DepthCourse, DepthCoursePhase
 from volery.autonomy.avoidance.gap_following import GapFollowing
 from volery.autonomy.avoidance.stop import Stop
 from volery.autonomy.coverage.flight import CoverageFlight
+from volery.autonomy.coverage.planner_node import CoveragePlanner
 from volery.autonomy.coverage.waypoints import WaypointProgress
 from volery.autonomy.perception.scan_points import OdometrySample
 from volery.autonomy.team.task_manager import TaskManager
@@ -95,7 +96,8 @@ def test_gap_following_lands_nowhere_that_has_turned_out_overgrown(bench):
     flier, node = along_a_route(bench)
     while not node._stop.has_begun:
         flier.tick()
-    x, y = flier.position[:2] + np.array([0.5, 0.0])
+    velocity = flier.velocity[:2]  # it stops right there
+    x, y = flier.position[:2] + velocity * np.hypot(*velocity) / (2.0 * BRAKES_M_S2)
     for k in range(6):
         node._low_obstacles.add(np.array([[x, y, 1.5]]), bench.now_ns + k)
     flier.fly(60.0)
@@ -199,6 +201,49 @@ def test_a_covered_area_is_left_standing():
     assert flight.has_stopped(1_000_000_000)
     flight.moved(np.zeros(3), 0.0, 0, speed_m_s=0.9)
     assert flight.has_stopped(9_000_000_000)  # in gusts
+
+
+def test_the_coverage_planner_stops_at_its_last_goal_before_it_lands(bench):
+    """A UAV that is at each goal at once, and fast: it lands when it has stopped there."""
+    landed = []
+
+    def land(_request):
+        landed.append(bench.now_ns)
+        return answer()
+
+    bench.graph.create_service("/uav1/land", "std_srvs/srv/Trigger", land)
+    bench.graph.create_service("/uav1/take_off", "std_srvs/srv/Trigger", lambda _: answer())
+    node = bench.start(CoveragePlanner, uavs=["uav1"])
+    goals = bench.listen("/uav1/goal_pose")
+    grid = zero_message("nav_msgs/msg/OccupancyGrid")
+    grid.header.frame_id = "map"
+    grid.info.resolution, grid.info.width, grid.info.height = 2.0, 2, 2
+    grid.info.origin.orientation.w = 1.0
+    grid.data = np.zeros(4, np.int8)
+    bench.send("/map", grid)
+    place, speed = np.array([1.0, 1.0, 0.1]), 0.0
+
+    def fly(seconds):
+        nonlocal place
+        for _ in range(round(seconds / 0.1)):
+            if goals:
+                last = goals[-1].pose.position
+                place = np.array([last.x, last.y, last.z])
+            now = bench.now_ns + 100_000_000
+            bench.send("/uav1/odom", odometry(now, place, (speed, 0.0, 0.0), frame="map"))
+            bench.run_to(now)
+
+    fly(0.5)
+    place, speed = np.array([1.0, 1.0, 2.5]), 3.0  # it has taken off
+    flight = node._flights[0]
+    while flight.waypoints is None or flight.goal(0.3, bench.now_ns) is not None:
+        fly(0.1)
+        assert bench.now_ns < 60e9
+    fly(1.0)
+    assert not landed
+    speed = 0.1
+    fly(0.3)
+    assert len(landed) == 1
 
 
 def test_a_stop_in_gusts_ends_all_the_same():

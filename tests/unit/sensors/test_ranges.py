@@ -76,11 +76,31 @@ def test_sensors_of_a_batch_are_cut_as_alone():
         assert alone.angular_velocity.tobytes() == many.angular_velocity[i : i + 1].tobytes()
 
 
-def test_an_accelerometer_must_measure_more_than_gravity(tmp_path):
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("accel_range_m_s2", "8.0"),
+        ("accel_range_m_s2", "18.0"),  # in g
+        ("accel_range_m_s2", "nan"),
+        ("gyro_range_rad_s", "1000.0"),  # in deg/s
+        ("gyro_range_rad_s", "0.0"),
+        ("gyro_range_rad_s", "nan"),
+    ],
+)
+def test_ranges_of_another_unit_are_refused(tmp_path, key, value):
     path = tmp_path / "imu.toml"
-    path.write_text('base = "adis16448"\naccel_range_m_s2 = 8.0\n', encoding="utf-8")
-    with pytest.raises(DataFileError, match="accel_range_m_s2"):
+    path.write_text(f'base = "adis16448"\n{key} = {value}\n', encoding="utf-8")
+    with pytest.raises(DataFileError, match=key):
         ImuModel.load(str(path))
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("accel_range_m_s2", 19.613), ("gyro_range_rad_s", 349)]
+)
+def test_ranges_of_data_sheets_are_possible(tmp_path, key, value):
+    path = tmp_path / "imu.toml"
+    path.write_text(f'base = "adis16448"\n{key} = {value}\n', encoding="utf-8")
+    assert getattr(ImuModel.load(str(path)), key) == value
 
 
 def test_magnetometer_is_cut_at_full_scale():

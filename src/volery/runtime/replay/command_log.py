@@ -54,6 +54,8 @@ class CommandLog:
         self._has_lost_some = False
         self._next_number = 0
         self._ended = False
+        self.has_changes = False
+        """Whether a command has changed the results of the flight."""
         self.repeats = False
         """Whether a replay is running: clients may observe, and change nothing."""
 
@@ -77,6 +79,7 @@ class CommandLog:
             self._publisher.publish(_message(kept))
         self._keep(kept)
         if weight is CommandEffect.CHANGES:
+            self.has_changes = True
             self._engine.count_command()
 
     def end(self) -> None:
