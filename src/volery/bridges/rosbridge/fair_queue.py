@@ -75,10 +75,11 @@ class FairQueue:
             return True
         return bool(weight == MESSAGES and (self._is_paused or self._waiting[MESSAGES]))
 
-    async def turn(self, start_s: float, weight: float) -> None:
+    async def turn(self, start_s: float, weight: float, cost_s: float | None) -> None:
         """Waits for a turn that starts at a virtual time; used by `Flow`."""
         if self.must_wait(weight):
-            key = (start_s + self._turn_s / weight, next(self._numbers))
+            cost_s = self._turn_s if cost_s is None else cost_s
+            key = (start_s + cost_s / weight, next(self._numbers))
             await self._wait(key, weight)
             while self.is_full:  # others were quicker; the key goes first next time
                 await self._wait(key, weight)
@@ -161,14 +162,17 @@ class Flow:
         """Virtual time at which the client's next turn may start."""
         self._turn_s = 0.0
 
-    async def begin(self) -> None:
-        """Waits until it is the client's turn."""
+    async def begin(self, cost_s: float | None = None) -> None:
+        """Waits until it is the client's turn.
+
+        cost_s: expected cost of the turn; None: that of others.
+        """
         queue = self._queue
         if self._turn_s:
             queue.note_turn(self._turn_s)
             self._turn_s = 0.0
         self._end_s = max(self._end_s, queue.virtual_s)
-        await queue.turn(self._end_s, self._weight)
+        await queue.turn(self._end_s, self._weight, cost_s)
 
     async def spend(self, cost_s: float) -> None:
         """Adds the cost of a frame, s of CPU time; waits if it is the turn of others."""
