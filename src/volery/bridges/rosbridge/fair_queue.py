@@ -36,6 +36,8 @@ BUSY_S, PAUSE_S = 2e-3, 1e-3
 _SMOOTHING = 0.1
 """Weight of a turn in the mean cost of turns."""
 _MIN_TURN_S = 1e-5
+_MIN_TURNS = 16
+"""Turns granted in a round at least: many may cost nothing."""
 
 _Key = tuple[float, int]
 """Virtual time at which a turn is expected to end, s, and its number in order of arrival."""
@@ -117,7 +119,7 @@ class FairQueue:
         self._is_scheduled = False
         self._round_s = 0.0
         self._pause_in_crowds()
-        num_turns = max(1, int(ROUND_S / max(self._turn_s, _MIN_TURN_S)))
+        num_turns = max(_MIN_TURNS, int(ROUND_S / max(self._turn_s, _MIN_TURN_S)))
         while self._num_granted < num_turns and (waiting := self._next()):
             _, granted = heapq.heappop(waiting)
             if not granted.done():  # not cancelled
@@ -174,10 +176,14 @@ class Flow:
         self._end_s = max(self._end_s, queue.virtual_s)
         await queue.turn(self._end_s, self._weight, cost_s)
 
-    async def spend(self, cost_s: float) -> None:
-        """Adds the cost of a frame, s of CPU time; waits if it is the turn of others."""
+    def charge(self, cost_s: float) -> None:
+        """Adds the cost of a frame, s of CPU time, to a turn that ends."""
         self._turn_s += cost_s
         self._end_s += cost_s / self._weight
         self._queue.spend(cost_s)
+
+    async def spend(self, cost_s: float) -> None:
+        """Adds the cost of a frame, s of CPU time; waits if it is the turn of others."""
+        self.charge(cost_s)
         if self._queue.is_full or (self._turn_s >= TURN_S and self._queue.must_wait(self._weight)):
             await self.begin()

@@ -129,9 +129,8 @@ async def _read(
         else:
             await checkpoint.receive(peer, frame)
             peer.reading.begin()  # the checkpoint gives others their turn
-        cost_s = peer.reading.end(1, len(frame))
+        flow.charge(peer.reading.end(1, len(frame)))
         frame = ""  # frees it while the client sends nothing
-        await flow.spend(cost_s)  # `recv` does not wait if a frame is available
         while (pause_s := peer.reading.pause_s()) and peer.refused is None:
             await asyncio.sleep(pause_s)
         while peer.congested:  # the client requests more than it reads
