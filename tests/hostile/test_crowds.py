@@ -115,6 +115,27 @@ def test_a_request_goes_before_the_messages_of_a_crowd(monkeypatch):
     in_loop(scene)
 
 
+def test_a_short_request_goes_before_the_large_ones_of_a_crowd():
+    async def scene(crowd):
+        queue, done = crowd(1, REQUESTS).queue, []
+
+        async def send(name, cost_s):
+            flow = queue.flow(REQUESTS)
+            await flow.begin(cost_s)
+            done.append(name)
+            await flow.spend(cost_s)
+
+        await rounds_until(lambda: queue.must_wait(REQUESTS))
+        tasks = [asyncio.create_task(send("large", 2 * ROUND_S)) for _ in range(CROWDED)]
+        await asyncio.sleep(0)
+        tasks.append(asyncio.create_task(send("short", ROUND_S / 100)))
+        await asyncio.gather(*tasks)
+        assert done.index("short") <= 3
+        assert len(done) == CROWDED + 1
+
+    in_loop(scene)
+
+
 def test_clients_with_equal_traffic_have_equal_shares_and_none_starves(monkeypatch):
     monkeypatch.setattr(fair_queue, "BUSY_S", 1e9)
 

@@ -36,6 +36,8 @@ BUSY_S, PAUSE_S = 2e-3, 1e-3
 _SMOOTHING = 0.1
 """Weight of a turn in the mean cost of turns."""
 _MIN_TURN_S = 1e-5
+_MIN_TURNS = 16
+"""Turns granted in a round at least: many may cost nothing."""
 
 _Key = tuple[float, int]
 """Virtual time at which a turn is expected to end, s, and its number in order of arrival."""
@@ -75,10 +77,11 @@ class FairQueue:
             return True
         return bool(weight == MESSAGES and (self._is_paused or self._waiting[MESSAGES]))
 
-    async def turn(self, start_s: float, weight: float) -> None:
+    async def turn(self, start_s: float, weight: float, cost_s: float | None) -> None:
         """Waits for a turn that starts at a virtual time; used by `Flow`."""
         if self.must_wait(weight):
-            key = (start_s + self._turn_s / weight, next(self._numbers))
+            cost_s = self._turn_s if cost_s is None else cost_s
+            key = (start_s + cost_s / weight, next(self._numbers))
             await self._wait(key, weight)
             while self.is_full:  # others were quicker; the key goes first next time
                 await self._wait(key, weight)
@@ -116,7 +119,7 @@ class FairQueue:
         self._is_scheduled = False
         self._round_s = 0.0
         self._pause_in_crowds()
-        num_turns = max(1, int(ROUND_S / max(self._turn_s, _MIN_TURN_S)))
+        num_turns = max(_MIN_TURNS, int(ROUND_S / max(self._turn_s, _MIN_TURN_S)))
         while self._num_granted < num_turns and (waiting := self._next()):
             _, granted = heapq.heappop(waiting)
             if not granted.done():  # not cancelled
@@ -161,19 +164,26 @@ class Flow:
         """Virtual time at which the client's next turn may start."""
         self._turn_s = 0.0
 
-    async def begin(self) -> None:
-        """Waits until it is the client's turn."""
+    async def begin(self, cost_s: float | None = None) -> None:
+        """Waits until it is the client's turn.
+
+        cost_s: expected cost of the turn; None: that of others.
+        """
         queue = self._queue
         if self._turn_s:
             queue.note_turn(self._turn_s)
             self._turn_s = 0.0
         self._end_s = max(self._end_s, queue.virtual_s)
-        await queue.turn(self._end_s, self._weight)
+        await queue.turn(self._end_s, self._weight, cost_s)
 
-    async def spend(self, cost_s: float) -> None:
-        """Adds the cost of a frame, s of CPU time; waits if it is the turn of others."""
+    def charge(self, cost_s: float) -> None:
+        """Adds the cost of a frame, s of CPU time, to a turn that ends."""
         self._turn_s += cost_s
         self._end_s += cost_s / self._weight
         self._queue.spend(cost_s)
+
+    async def spend(self, cost_s: float) -> None:
+        """Adds the cost of a frame, s of CPU time; waits if it is the turn of others."""
+        self.charge(cost_s)
         if self._queue.is_full or (self._turn_s >= TURN_S and self._queue.must_wait(self._weight)):
             await self.begin()

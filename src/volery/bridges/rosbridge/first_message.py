@@ -63,6 +63,9 @@ class GuardedConnection(ServerConnection):
         super().connection_lost(exc)
         protocol = self.protocol
         protocol.parser.close()
+        for error in (protocol.parser_exc, protocol.handshake_exc, self.connection_exc):
+            if error is not None:
+                error.__traceback__ = None  # its frames hold what was read last
         protocol.select_subprotocol = None  # type: ignore[method-assign, assignment]
         protocol.recv_frame = _ignore  # type: ignore[method-assign, assignment]
         self._recv_unbounded = _ignore

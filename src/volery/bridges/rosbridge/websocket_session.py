@@ -16,6 +16,7 @@ from volery.bridges.rosbridge.fair_queue import MESSAGES, REQUESTS, FairQueue, F
 from volery.bridges.rosbridge.protocol import RosbridgePeer
 from volery.bridges.rosbridge.token_check import TokenCheck
 from volery.bridges.rosbridge.wire import Frame
+from volery.graph.read_budget import FRAME_S
 
 POLICY_VIOLATION = 1008
 """RFC 6455, 7.4.1: the client violated a policy, such as to send a token."""
@@ -24,6 +25,8 @@ SERVICE_RESTART = 1012
 
 _LONGEST_SILENCE_S = 10.0
 """Time within which a client must send its token."""
+_JSON_BYTE_S = 5e-9
+"""Cost of a byte of JSON, s, by which large messages wait for short ones."""
 _MAX_FRAMES = 6
 _MAX_BYTES = 32 << 10
 """Limits of the frames of one client that are sent together, with one call of the system."""
@@ -119,16 +122,15 @@ async def _read(
         except TimeoutError:
             await channel.close(POLICY_VIOLATION, "no token was sent")
             return
-        await flow.begin()
+        await flow.begin(FRAME_S + len(frame) * _JSON_BYTE_S)
         peer.reading.begin()
         if peer.authorized or checkpoint is None:
             peer.receive(frame, time.monotonic())
         else:
             await checkpoint.receive(peer, frame)
             peer.reading.begin()  # the checkpoint gives others their turn
-        cost_s = peer.reading.end(1, len(frame))
+        flow.charge(peer.reading.end(1, len(frame)))
         frame = ""  # frees it while the client sends nothing
-        await flow.spend(cost_s)  # `recv` does not wait if a frame is available
         while (pause_s := peer.reading.pause_s()) and peer.refused is None:
             await asyncio.sleep(pause_s)
         while peer.congested:  # the client requests more than it reads
