@@ -86,7 +86,7 @@ def _study(work: Path, name: str, runs: int, *, vectorized: bool) -> Path:
 
 def _command(study: Path, out: Path) -> list[str]:
     words = ["sweep", str(study), "--out", str(out), "--workers", "1"]
-    return [sys.executable, "-P", "-m", "volery.cli", *words]
+    return [sys.executable, "-P", "-m", "volery", *words]
 
 
 def _sweep(study: Path, work: Path, folder: str | None = None) -> float:

@@ -48,7 +48,7 @@ def _first_frame_s(cache: Path) -> float:
 
 def _main_job(folder: Path, cache: Path) -> tuple[float, float]:
     """Returns wall time, s, and peak resident memory (MB, 1e6 bytes) of the main job's process."""
-    command = [sys.executable, "-P", "-m", "volery.cli", "run", "forest_survey"]
+    command = [sys.executable, "-P", "-m", "volery", "run", "forest_survey"]
     command += ["--record", str(folder / "flight.mcap"), "--report", str(folder / "report")]
     before = time.perf_counter()
     process = subprocess.Popen(command, env=_environment(cache), stdout=subprocess.DEVNULL)

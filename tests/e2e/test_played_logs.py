@@ -18,7 +18,7 @@ from volery.graph.connection import call_and_wait
 from volery.runtime import Simulation
 from volery.scenario.load import load_scenario
 
-PLAY = [sys.executable, "-m", "volery.cli", "play"]
+PLAY = [sys.executable, "-m", "volery", "play"]
 
 
 @pytest.fixture

@@ -47,7 +47,7 @@ def test_the_volery_commands_exist():
     named = set(re.findall(r"^volery ([a-z]+)", "\n".join(blocks("sh")), flags=re.MULTILINE))
     assert {"run", "list", "info", "bench", "doctor"} <= named
     helped = subprocess.run(
-        [sys.executable, "-m", "volery.cli", "--help"], capture_output=True, text=True, check=True
+        [sys.executable, "-m", "volery", "--help"], capture_output=True, text=True, check=True
     ).stdout
     for command in named:
         assert command in helped
@@ -65,7 +65,7 @@ def test_the_volery_commands_run_as_they_stand(tmp_path):
         added = ["--exit-at-end"] if "--page" in command else []
         added += ["--quick"] if command[1] == "bench" else []
         done = subprocess.run(
-            [sys.executable, "-m", "volery.cli", *command[1:], *added],
+            [sys.executable, "-m", "volery", *command[1:], *added],
             check=False,
             cwd=tmp_path,
             capture_output=True,

@@ -317,7 +317,7 @@ def test_without_its_commands_the_flight_is_another_one(tmp_path):
 def test_a_flight_of_the_command_line_is_repeated(tmp_path):
     """Quit by a client; repeated by another process, without bridges."""
     path = tmp_path / "flight.mcap"
-    words = [sys.executable, "-m", "volery.cli", "run", "hover", "--digest"]
+    words = [sys.executable, "-m", "volery", "run", "hover", "--digest"]
     with subprocess.Popen(
         [*words, "--uavs", "2", "--bridge", "rosbridge=0", "--record", path],
         stdout=subprocess.PIPE,

@@ -71,7 +71,7 @@ def digests(text):
 
 
 def fly_with_node_outside():
-    volery = [sys.executable, "-m", "volery.cli"]
+    volery = [sys.executable, "-m", "volery"]
     bridge = [
         "--bridge",
         "rosbridge=0",

@@ -27,7 +27,7 @@ from volery.scenario.changes import Changes, WorldRequest
 
 pytest.importorskip("roslibpy")
 ROOT = Path(__file__).parents[2]
-VOLERY = [sys.executable, "-m", "volery.cli"]
+VOLERY = [sys.executable, "-m", "volery"]
 
 
 class Run:

@@ -192,7 +192,7 @@ def start_node(via, name):
     words = [word for one in given for word in ("-p", one)]
     return subprocess.Popen(
         [
-            *(sys.executable, "-m", "volery.cli", "node", NODE),
+            *(sys.executable, "-m", "volery", "node", NODE),
             *("--via", via, "--namespace", f"/{name}", *words),
         ],
         stderr=subprocess.DEVNULL,

@@ -17,7 +17,7 @@ import pytest
 from child_process import start_child
 
 roslibpy = pytest.importorskip("roslibpy")
-VOLERY = [sys.executable, "-m", "volery.cli"]
+VOLERY = [sys.executable, "-m", "volery"]
 OWN = """
 name = "{name}"
 duration_s = 0.4

@@ -31,7 +31,7 @@ from volery.scenario.catalog import ScenarioCatalog
 from volery.scenario.load import load_scenario, parse_scenario
 from volery.scenario.schema import NodeEntry, Scenario
 
-VOLERY = [sys.executable, "-m", "volery.cli"]
+VOLERY = [sys.executable, "-m", "volery"]
 EVIL = """
 from pathlib import Path
 Path({mark!r}).write_text("run")
@@ -383,7 +383,7 @@ def test_helper_processes_import_nothing_from_the_working_folder(
 @pytest.mark.slow
 @pytest.mark.parametrize("cwd", ["beside", "elsewhere"])
 def test_a_process_starts_no_code(trap: Trap, tmp_path: Path, cwd: str) -> None:
-    """`python -m volery.cli` has the working folder on its path."""
+    """`python -m volery` has the working folder on its path."""
     words = ("run", "stranger", "--replay-commands", trap.log()), ("run", trap.file)
     for each in words:
         done = subprocess.run(

@@ -107,7 +107,7 @@ def test_replayed_commands_repeat_the_flight_of_the_page(page, served, tmp_path)
         "/volery/inject_fault",
     }
     again = tmp_path / "again.mcap"
-    words = [sys.executable, "-m", "volery.cli", "run", "hover", "--replay-commands", log]
+    words = [sys.executable, "-m", "volery", "run", "hover", "--replay-commands", log]
     told = subprocess.run(
         [*words, "--record", again],
         check=False,
@@ -125,7 +125,7 @@ def test_replayed_commands_repeat_the_flight_of_the_page(page, served, tmp_path)
     # And it is these commands that make it so.
     alone = tmp_path / "alone.mcap"
     seconds = max(time_ns for _, time_ns in first) / 1e9
-    words = [sys.executable, "-m", "volery.cli", "run", "hover", "--uavs", "2"]
+    words = [sys.executable, "-m", "volery", "run", "hover", "--uavs", "2"]
     words += ["--seconds", str(seconds), "--record", alone]
     subprocess.run(words, check=True, capture_output=True, timeout=REPEATED_S)
     idle = states(alone)

@@ -106,7 +106,7 @@ def _commands(text: str, replaced: dict[str, str]) -> list[list[str]]:
             line = line.replace(old, new)  # noqa: PLW2901
         words = shlex.split(line, comments=True)
         if words[:1] == ["volery"]:
-            commands.append([sys.executable, "-m", "volery.cli", *words[1:]])
+            commands.append([sys.executable, "-m", "volery", *words[1:]])
         elif words[:1] == ["python"]:
             commands.append([sys.executable, *words[1:]])
     return commands

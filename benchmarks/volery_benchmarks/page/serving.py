@@ -39,7 +39,7 @@ class PageProcess:
     def __init__(self, scenario: str | None, *options: str, port: int = 0) -> None:
         self.port = port
         named = () if scenario is None else (scenario,)
-        self._command = [sys.executable, "-P", "-m", "volery.cli", "serve", *named, *options]
+        self._command = [sys.executable, "-P", "-m", "volery", "serve", *named, *options]
         self._process: subprocess.Popen[str] | None = None
         self._reader = threading.Thread()
         self._said: deque[str] = deque(maxlen=50)

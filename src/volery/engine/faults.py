@@ -68,11 +68,14 @@ class FaultPlan:
         self._active: tuple[_ActiveFault, ...] = ()
         self._planned = 0
         """Number of faults so far; a number, unlike a description, belongs to one fault alone."""
+        self._enlisted: dict[str, int] = {}
+        """Number of faults that had been planned when a UAV was added, by name."""
         self.enlist(engine.names)
 
     def enlist(self, uavs: Collection[str]) -> None:
         """Records the present rotor health of UAVs as their health without faults."""
         for name in uavs:
+            self._enlisted[name] = self._planned
             self._sound[name] = self._fleet.state.rotor_health[self._row(name)].copy()
             self.mend(name)
 
@@ -81,7 +84,8 @@ class FaultPlan:
 
         Raises `CommandError` for an unknown UAV, rotor or sensor, and for a fault that is
         impossible in this world. client: external client that injects the fault; if its fault turns
-        out to be impossible at its time, it has no effect and is logged; otherwise the run ends.
+        out to be impossible at its time, it has no effect and is logged, as is a fault of a UAV
+        that was deleted and spawned again as another type; otherwise the run ends.
         """
         begin, end = self._actions(fault)
         uav = getattr(fault, "uav", None)
@@ -169,6 +173,7 @@ class FaultPlan:
         self, time_s: float, action: Callable[[], bool], uav: str | None, what: str, client: str
     ) -> None:
         """Schedules an action, and an event if it returns that it had an effect."""
+        planned = self._planned
 
         def act() -> None:
             if uav is not None and uav not in self._engine.names:
@@ -178,10 +183,11 @@ class FaultPlan:
                 if not action():
                     return
             except Exception as error:
-                if not client:
+                was_respawned = uav is not None and self._enlisted[uav] >= planned
+                if not client and not was_respawned:
                     raise
                 told = f"{what} is not possible: {error}"
-                _log.warning("%s (requested by %s)", told, client)
+                _log.warning("%s (%s)", told, f"requested by {client}" if client else "planned")
             if uav is not None:
                 self._engine.note(self._row(uav), EventKind.FAULT, told)
 

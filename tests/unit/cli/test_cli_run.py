@@ -198,7 +198,7 @@ def test_ctrl_c_while_kernels_compile(tmp_path: Path) -> None:
     """One line, no traceback, nothing left behind: the real simulation with an empty cache."""
     log, report = tmp_path / "new" / "flight.mcap", tmp_path / "report"
     cache = tmp_path / "cache"
-    command = [sys.executable, "-m", "volery.cli", "run", "hover"]
+    command = [sys.executable, "-m", "volery", "run", "hover"]
     command += ["--record", str(log), "--report", str(report)]
     with start_child(
         command,

@@ -64,7 +64,7 @@ class Terminal:
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 def test_keys_steer_a_flight() -> None:
     terminal = Terminal(
-        sys.executable, "-m", "volery.cli", "run", "hover", "--seconds", "900", "--speed", "1"
+        sys.executable, "-m", "volery", "run", "hover", "--seconds", "900", "--speed", "1"
     )
     terminal.expect(r"1\.\d of 900 s", 240.0)
     assert not terminal.local_flags() & (termios.ICANON | termios.ECHO)

@@ -95,7 +95,7 @@ def test_a_killed_study_continues_to_the_table_of_an_uninterrupted_one(tmp_path)
     text = "repetitions = 200\nvectorized = false\nmetrics = ['waiting.py:height_m']\n"
     path = study_file(tmp_path, text)
     out = tmp_path / "cut"
-    command = [sys.executable, "-m", "volery.cli", "sweep", str(path), "--workers", "1", "--trust"]
+    command = [sys.executable, "-m", "volery", "sweep", str(path), "--workers", "1", "--trust"]
     with subprocess.Popen([*command, "--out", str(out)], stdout=subprocess.DEVNULL) as driver:
         try:
             until = time.monotonic() + 120.0

@@ -171,3 +171,17 @@ def test_faults_of_a_snapshot_end_at_their_time(simulate, quick_fix):
         assert after(simulation)["rotor"] == 0.9
         simulation.run(1.0)
         assert after(simulation) == SOUND
+
+
+def test_a_fault_planned_for_a_uav_that_is_of_another_type_by_then_does_no_harm(
+    simulate, flat_data, caplog
+):
+    flat_data["uavs"][0] |= {"count": 2, "position_m": [0.0, 0.0, 5.0]}
+    flat_data["faults"] = [{**IMU, "sensor": "range", "at_s": 0.3}, {**IMU, "at_s": 0.3}]
+    simulation = simulate(flat_data)
+    simulation.vehicles.delete("uav1")
+    simulation.run(0.1)
+    simulation.vehicles.spawn("uav1", "crazyflie", [0.0, 9.0, 5.0])
+    simulation.run(0.3)
+    assert "fault: sensor is not possible: uav1 has no sensor 'range'" in caplog.text
+    assert listed(simulation) == [("sensor", "uav1", 0.3)]

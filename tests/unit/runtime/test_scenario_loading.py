@@ -109,6 +109,30 @@ def test_a_scenario_whose_node_cannot_be_imported_does_not_end_the_flight(
     assert asked == []
 
 
+@pytest.mark.parametrize(
+    ("world", "where"),
+    [
+        (
+            {"forest": {"kind": "inventory", "file": "gone.csv", "species": "conifer"}},
+            "world.forest",
+        ),
+        ({"terrain": {"kind": "grid", "file": "gone.csv", "spacing_m": 1.0}}, "world.terrain"),
+        ({"grid_map": {"maps": [{"file": "gone.csv", "name": "a"}]}}, "world.grid_map.maps"),
+        ({"wind": {"field": "gone.csv"}}, "world.wind.field"),
+    ],
+)
+def test_a_scenario_whose_world_file_is_gone_does_not_end_the_flight(
+    simulate, flat_data, world, where
+):
+    given = parse_scenario({**flat_data, "name": "own", "world": world})
+    asked = []
+    simulation = simulate(flat_data, on_load=asked.append, shelf=ScenarioCatalog(given=given))
+    message = ask(simulation, "/volery/load_scenario", scenario="own").message
+    assert message.startswith(f"own: {where}: ")
+    assert "gone.csv" in message
+    assert asked == []
+
+
 def test_loading_is_the_owners_business(simulate, flat_data):
     answer = ask(simulate(flat_data), "/volery/load_scenario", scenario="hover")
     assert not answer.success

@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Any
+
+from pydantic import BaseModel
+
+from volery.core.errors import DataFileError
 from volery.runtime.build.fleet import check_types
 from volery.runtime.build.message_loading import learn_messages
 from volery.runtime.build.node_loading import check_nodes
@@ -10,11 +16,35 @@ from volery.scenario.schema import Scenario
 
 
 def check_start(scenario: Scenario) -> None:
-    """Raises `VoleryError` if a type, a package or the class of a node of a scenario is missing.
+    """Raises `VoleryError` if a type, package, world file or node's class of a scenario is missing.
 
     It imports the nodes' modules, and learns the messages that these may import.
     """
     check_types(scenario)
     check_packages(scenario)
+    _check_world_files(scenario)
     learn_messages(scenario)
     check_nodes(scenario)
+
+
+def _check_world_files(scenario: Scenario) -> None:
+    for key, name in _files(scenario.world, "world"):
+        try:
+            scenario.access.find_file(name)
+        except DataFileError as error:
+            raise DataFileError(f"{scenario.name}: {key}: {error}") from None
+
+
+def _files(part: Any, key: str) -> Iterator[tuple[str, str]]:
+    """Yields the key of each table with a file, and the file's name."""
+    if isinstance(part, BaseModel):
+        for name, value in part:
+            if isinstance(value, str) and (
+                name == "file" or (key, name) == ("world.wind", "field")
+            ):
+                yield (key if name == "file" else f"{key}.{name}"), value
+            else:
+                yield from _files(value, f"{key}.{name}")
+    elif isinstance(part, tuple | list):
+        for value in part:
+            yield from _files(value, key)
