@@ -160,7 +160,7 @@ def test_an_installed_one_counts_before_one_beside(
 
 @pytest.mark.parametrize(
     "node",
-    ["volery.cli.__main__:main", "volery_benchmarks.search_peer:Calling", "volery.graph:Node"],
+    ["volery.__main__:main", "volery_benchmarks.search_peer:Calling", "volery.graph:Node"],
 )
 def test_programs_of_volery_are_no_nodes(trap: Trap, node: str) -> None:
     """Importing some of them would start them."""

@@ -1,4 +1,4 @@
-"""The flight behind the first page of `volery serve`, before anybody has chosen one."""
+"""The flight behind the first page of `volery serve`, until a client chooses a scenario."""
 
 from __future__ import annotations
 

@@ -126,7 +126,7 @@ class _Host:
         """Last problem, for the page."""
         self._quits = False
         self._is_unasked = options.page.unasked
-        """Whether nobody has chosen the world that is built next."""
+        """Whether no client has chosen the world that is built next."""
         self._first_flight: FirstFlight | None = None
 
     @property
