@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import gc
 import json
+import socket
+import struct
 import time
 import weakref
+from asyncio import Transport
 
 import pytest
 from live_graph import LiveGraph
@@ -14,11 +17,13 @@ from patient_websockets import connect
 from volery.bridges import unfinished
 from volery.bridges.bridge_host import BridgeHost
 from volery.bridges.rosbridge import server as server_module
+from volery.bridges.rosbridge.first_message import GuardedConnection
 from volery.bridges.rosbridge.protocol import RosbridgePeer
 from volery.bridges.rosbridge.server import RosbridgeServer
 from volery.bridges.unfinished import SHARED
 from volery.graph import messages as m
 from volery.graph.service_reply import ServiceReply
+from volery_benchmarks.hostile.websocket import BINARY, frame, frame_head, open_websocket
 
 LONGEST_S = 120.0
 MB = 1 << 20
@@ -39,6 +44,8 @@ def server():
         bridges.open(server)
         publisher = live.do(lambda: live.graph.advertise("/a", "std_msgs/msg/String", latched=True))
         live.do(lambda: publisher.publish(m.String("text")))
+        large = live.do(lambda: live.graph.advertise("/large", "std_msgs/msg/String", latched=True))
+        live.do(lambda: large.publish(m.String("x" * (8 * MB))))
         yield server
     live.close()
 
@@ -81,6 +88,72 @@ def test_a_client_that_has_left_waits_for_no_collection(server, monkeypatch):
         until(lambda: peers[0]() is None)
     finally:
         gc.enable()
+
+
+def reset(sock):
+    """Ends a connection without a farewell."""
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    sock.close()
+
+
+def send_part(server):
+    """Returns a client with an unfinished message."""
+    sock = open_websocket(server.port)
+    sock.sendall(frame_head(9_900_000, BINARY) + bytes(100_000))
+    until(lambda: SHARED.num_bytes > 50_000)
+    return sock
+
+
+def leave(server):
+    open_websocket(server.port).close()
+
+
+def break_off(server):
+    reset(send_part(server))
+
+
+def be_refused(server):
+    with socket.create_connection(("127.0.0.1", server.port)) as sock:
+        sock.sendall(b"PUT / HTTP/1.1\r\nHost: localhost\r\n\r\n")
+        while sock.recv(1000):
+            pass
+
+
+def be_ended(server):
+    """The server has no room; the client does not read, and leaves later."""
+    sock = send_part(server)
+    for share in tuple(SHARED._shares):
+        share.evict()
+    until(lambda: not server.clients)
+    sock.close()
+
+
+def read_nothing(server):
+    """More waits for the client than the system buffers."""
+    sock = open_websocket(server.port)
+    sock.sendall(frame(json.dumps({"op": "subscribe", "topic": "/large"}).encode()))
+    until(lambda: any(connection.paused for connection in server._clients))
+    reset(sock)
+
+
+@pytest.mark.parametrize("visit", [leave, break_off, be_refused, be_ended, read_nothing])
+def test_no_end_of_a_connection_leaves_garbage(server, visit):
+    kinds = GuardedConnection, Transport
+    leave(server)  # the first one imports modules
+    until(lambda: not server.clients)
+    gc.collect()
+    gc.disable()
+    try:
+        gc.set_debug(gc.DEBUG_SAVEALL)
+        visit(server)
+        until(lambda: not server.clients and not server._listener._open)
+        gc.collect()
+        kept = [type(found) for found in gc.garbage if issubclass(type(found), kinds)]
+    finally:
+        gc.set_debug(0)
+        gc.garbage.clear()
+        gc.enable()
+    assert not kept
 
 
 def test_memory_is_returned_when_the_last_has_left(server, monkeypatch):

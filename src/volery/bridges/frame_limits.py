@@ -151,7 +151,9 @@ class PausedTransport:
         self._timers[reason] = loop.call_later(wait_s, self.release, reason)
 
     def end(self) -> None:
-        """Cancels all timers after the connection is lost."""
+        """Cancels all timers after the connection is lost, and resolves the transport's cycle."""
         for timer in self._timers.values():
             timer.cancel()
         self._timers.clear()
+        if hasattr(self._transport, "_read_ready_cb"):  # as asyncio does from Python 3.12 on
+            self._transport._read_ready_cb = None

@@ -65,7 +65,8 @@ def find_example(name: str) -> Path:
     wanted = name.removesuffix(".py")
     paths = all_examples()
     exact = [path for path in paths if wanted in (path.stem, _without_number(path))]
-    found = exact or [path for path in paths if path.stem.startswith(wanted)]
+    start = f"{int(wanted):02d}_" if wanted.isdecimal() else wanted
+    found = exact or [path for path in paths if path.stem.startswith(start)]
     if len(found) != 1:
         names = ", ".join(path.stem for path in found or paths)
         which = f"'{name}' may be one of" if found else f"there is no example '{name}'; known"

@@ -156,6 +156,7 @@ class SnapshotManager:
             "graph": self._graph.get_state(),
             "faults": self._manager.faults.get_state(),
             "publisher": self._manager.publisher.get_state(),
+            "transforms": self._manager.transforms.get_state(),
             "nodes": keep_nodes(self._manager.nodes),
             "digest": None if digest is None else digest.get_state(),
             "events": list(self._outlet.events),
@@ -175,6 +176,7 @@ class SnapshotManager:
         self._graph.set_state(state["graph"])
         self._manager.faults.set_state(state["faults"])
         self._manager.publisher.set_state(state["publisher"])
+        self._manager.transforms.set_state(state["transforms"])
         if self._outlet.digest is not None:
             self._outlet.digest.set_state(state["digest"])
         self._outlet.events[:] = state["events"]

@@ -27,7 +27,7 @@ def test_all_examples_are_listed_with_what_they_do():
     assert "studies" in result.stdout
 
 
-@pytest.mark.parametrize("name", ["01", "01_fly_one_uav", "fly_one_uav", "01_fly_one_uav.py"])
+@pytest.mark.parametrize("name", ["1", "01", "01_fly_one_uav", "fly_one_uav", "01_fly_one_uav.py"])
 def test_an_example_is_copied_once(tmp_path, name):
     copied = tmp_path / "new" / "01_fly_one_uav.py"
     result = RUNNER.invoke(app, ["examples", name, "--to", str(copied.parent)])
@@ -44,7 +44,7 @@ def test_a_folder_is_copied_as_a_whole(tmp_path):
 
 
 def test_unclear_names_list_what_there_is():
-    for name, words in (("09", "09_bring_your_own_planner_ros_tcp"), ("zeppelin", "known: 01_fly")):
+    for name, words in (("9", "09_bring_your_own_planner_ros_tcp"), ("zeppelin", "known: 01_fly")):
         result = RUNNER.invoke(app, ["examples", name])
         assert result.exit_code == 2
         assert words in result.stderr

@@ -126,12 +126,12 @@ def test_other_messages_are_refused(buffer):
         buffer.transform(message_type("geometry_msgs/msg/Twist")(), "map")
 
 
-def test_a_missing_frame_says_what_publishes_it():
-    """Without an odometry sensor a UAV has static frames alone."""
+def test_a_missing_frame_says_that_nothing_moves_yet():
+    """Before the first sample of its odometry a UAV has static frames alone."""
     fixed = TransformStamped(Header(frame_id="uav1/base_link"), "uav1/laser", Transform())
     buffer = Buffer()
     buffer.set_transform_static(fixed, "")
-    with pytest.raises(LookupException, match=r"no frame 'map'.*odometry sensor publishes"):
+    with pytest.raises(LookupException, match=r"no frame 'map'.*nothing has arrived on /tf"):
         buffer.lookup_transform("map", "uav1/base_link")
     fixed.child_frame_id = "probe"
     buffer.set_transform(fixed, "")

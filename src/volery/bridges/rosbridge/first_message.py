@@ -63,12 +63,18 @@ class GuardedConnection(ServerConnection):
         super().connection_lost(exc)
         protocol = self.protocol
         protocol.parser.close()
-        for error in (protocol.parser_exc, protocol.handshake_exc, self.connection_exc):
+        for error in (protocol.parser_exc, protocol.handshake_exc):
             if error is not None:
                 error.__traceback__ = None  # its frames hold what was read last
         protocol.select_subprotocol = None  # type: ignore[method-assign, assignment]
         protocol.recv_frame = _ignore  # type: ignore[method-assign, assignment]
         self._recv_unbounded = _ignore
+
+    def set_connection_exc(self, exc: BaseException | None) -> None:
+        """Implements the method of `websockets`; drops the frames, which hold this connection."""
+        super().set_connection_exc(exc)
+        if exc is not None:
+            exc.__traceback__ = None
 
     def data_received(self, data: bytes) -> None:
         """Implements asyncio's method; counts what is incomplete."""

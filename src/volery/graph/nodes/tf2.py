@@ -274,7 +274,7 @@ class Buffer:
         """Returns why frames may be missing: nothing moves as yet."""
         if not all(frame.is_static for frame in self._frames.values()):
             return ""
-        return ": nothing has arrived on /tf, where a UAV's odometry sensor publishes its frames"
+        return ": nothing has arrived on /tf as yet"
 
     def _chain(self, name: str) -> list[str]:
         """Returns a frame and its ancestors."""

@@ -5,23 +5,14 @@ It is for pages and renderers. Autonomy must not subscribe: a real robot has no 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from volery.core.arrays import Array
 from volery.engine.engine import Engine
 from volery.graph.graph import Graph
-from volery.graph.lazy_list import LazyList
-from volery.graph.messages import (
-    Quaternion,
-    TFMessage,
-    Transform,
-    TransformStamped,
-    Vector3,
-    header,
-)
+from volery.graph.messages import TFMessage
+from volery.publishing.transforms import transforms_in_map
 from volery.runtime.monitoring.live_topic import LiveTopic
 
 TOPIC = "/ground_truth/tf"
@@ -45,15 +36,7 @@ def _message(engine: Engine) -> TFMessage:
     if actors is not None:
         frames += actors.names
         poses = np.vstack([poses, actors.poses_at(engine.time_ns)])
-    stamp = header(engine.time_ns, "map")
-    transforms: Any = LazyList(len(frames), lambda: _transforms(stamp, frames, poses))
-    return TFMessage(transforms)
-
-
-def _transforms(stamp: Any, frames: list[str], poses: Array) -> Iterator[TransformStamped]:
-    """Yields one transform per frame; poses (N, 7) are x y z qx qy qz qw, m."""
-    for frame, (x, y, z, *turn) in zip(frames, poses.tolist(), strict=True):
-        yield TransformStamped(stamp, frame, Transform(Vector3(x, y, z), Quaternion(*turn)))
+    return transforms_in_map(engine.time_ns, frames, poses)
 
 
 def _content(engine: Engine) -> tuple[Any, ...]:

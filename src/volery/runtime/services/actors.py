@@ -7,17 +7,8 @@ from typing import Any
 
 from volery.core.errors import CommandError
 from volery.graph.graph import Graph
-from volery.graph.messages import (
-    PoseStamped,
-    Published,
-    Quaternion,
-    TFMessage,
-    Transform,
-    TransformStamped,
-    Vector3,
-    frame_of,
-    header,
-)
+from volery.graph.messages import PoseStamped, Published, TFMessage, frame_of
+from volery.publishing.transforms import transforms_in_map
 from volery.runtime.facets.world import SimulationWorld
 from volery.world.actors import MovingActors
 from volery.world.actors.motions import GivenMotion
@@ -36,22 +27,11 @@ def offer_actors(
     """
     transforms = graph.advertise("/tf", TFMessage)
 
-    def tell() -> None:
+    def publish() -> None:
         time_ns = graph.now_ns()
-        stamp = header(time_ns, "map")
-        poses = actors.poses_at(time_ns).tolist()
-        transforms.publish(
-            TFMessage(
-                [
-                    TransformStamped(
-                        stamp, name, Transform(Vector3(*pose[:3]), Quaternion(*pose[3:]))
-                    )
-                    for name, pose in zip(actors.names, poses, strict=True)
-                ]
-            )
-        )
+        transforms.publish(transforms_in_map(time_ns, actors.names, actors.poses_at(time_ns)))
 
-    every(_PERIOD_S, tell, wanted=lambda: transforms.has_subscribers)
+    every(_PERIOD_S, publish, wanted=lambda: transforms.has_subscribers)
     for actor in actors.actors:
         if isinstance(actor.motion, GivenMotion):
             topic = f"/actors/{actor.name}/pose"

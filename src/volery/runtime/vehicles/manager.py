@@ -35,10 +35,11 @@ from volery.runtime.vehicles.command_interface import open_commands
 from volery.runtime.vehicles.external_odometry import ExternalOdometry
 from volery.runtime.vehicles.flight_futures import CHECK_PERIOD_S, FlightFutures
 from volery.runtime.vehicles.flight_states import FlightStates
+from volery.runtime.vehicles.pose_transforms import PoseTransforms
 from volery.runtime.vehicles.uav import Uav
 from volery.runtime.vehicles.uav_sensors import UavSensors
 from volery.runtime.vehicles.uav_table import UavTable
-from volery.scenario.schema import Scenario, Sensor
+from volery.scenario.schema import Scenario
 from volery.sensors.cameras.camera import EVERY_PART, Part
 from volery.sensors.samples import SensorId
 from volery.vehicle.airframe import Airframe
@@ -86,6 +87,7 @@ class VehicleManager:
     beginnings: dict[str, InitialState] = field(default_factory=dict)
     flight_states: FlightStates = field(init=False)
     pose_aids: ExternalOdometry = field(init=False)
+    transforms: PoseTransforms = field(init=False)
     futures: FlightFutures = field(init=False)
     """Futures of the UAVs' flight commands."""
     _battery_failsafe: BatteryFailsafe = field(init=False)
@@ -96,6 +98,7 @@ class VehicleManager:
         origin = self.scenario.world.origin
         self.pose_aids = ExternalOdometry(self.graph, self.engine)
         self.flight_states = FlightStates(self.graph, self.engine, origin)
+        self.transforms = PoseTransforms(self.graph, self.engine)
         self.futures = FlightFutures(self._fleet_row_of, self.runs)
         self._battery_failsafe = BatteryFailsafe(self.engine, self.uavs.get)
         self.outlet.on_event = self._on_event
@@ -104,6 +107,7 @@ class VehicleManager:
         """Connects the engine's first UAVs to the graph."""
         self.flight_states.start(self.engine.every)
         self.pose_aids.start(self.engine.every)
+        self.transforms.start(self.engine.every)
         futures = self.futures
         self.engine.every(CHECK_PERIOD_S, futures.check, wanted=lambda: futures.needs_checks)
         self._join(parts, self.starts, parts.fleet.get_state())
@@ -275,8 +279,10 @@ class VehicleManager:
         opened.add_each(open_commands(self.graph, uav, self._now_ns))
         opened.add_each(offer_uav_services(self.graph, uav))
         opened.add_each(self.flight_states.open(uav))
-        opened.add_each(self.pose_aids.open(start.name, self._sensors_of(start)))
-        if self.radio is not None and self.scenario.types[start.type_name].radio:
+        uav_type = self.scenario.types[start.type_name]
+        opened.add_each(self.pose_aids.open(start.name, uav_type.sensors))
+        opened.add_each(self.transforms.open(start.name, uav_type))
+        if self.radio is not None and uav_type.radio:
             opened.add(self.radio.join(start.name))
 
     def _requested_parts(self, cameras: Sequence[SensorId]) -> Collection[Part]:
@@ -302,9 +308,6 @@ class VehicleManager:
             check_room(position, airframe, scene, terrain, f"the goal ({at}) m")
         except PlacementError as error:
             raise CommandError(str(error)) from None
-
-    def _sensors_of(self, start: StartPose) -> Sequence[Sensor]:
-        return self.scenario.types[start.type_name].sensors
 
     def _dismiss(self, name: str) -> None:
         """Removes a UAV, as far as it was made; what fails is tried again before a new one."""
