@@ -8,11 +8,20 @@ busy clients cause one about every two seconds.
 from __future__ import annotations
 
 import gc
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 _THRESHOLDS = (700, 10, 100)
 """Python's defaults, but with full collections a tenth as often."""
+_lock = threading.Lock()
+
+
+class _Contexts:
+    """Number of contexts that have not ended, and the thresholds before the first of them."""
+
+    num_open = 0
+    thresholds = gc.get_threshold()
 
 
 @contextmanager
@@ -20,13 +29,20 @@ def spared_objects() -> Iterator[None]:
     """Context in which full collections are rare and skip the objects that exist at its start.
 
     Enter the context when a simulation has been built: its objects live as long as the simulation.
+    Contexts of several threads may overlap: the last one to end restores the collector.
     """
-    before = gc.get_threshold()
     gc.collect()
-    gc.freeze()
-    gc.set_threshold(*_THRESHOLDS)
+    with _lock:
+        if not _Contexts.num_open:
+            _Contexts.thresholds = gc.get_threshold()
+        _Contexts.num_open += 1
+        gc.freeze()
+        gc.set_threshold(*_THRESHOLDS)
     try:
         yield
     finally:
-        gc.set_threshold(*before)
-        gc.unfreeze()
+        with _lock:
+            _Contexts.num_open -= 1
+            if not _Contexts.num_open:
+                gc.set_threshold(*_Contexts.thresholds)
+                gc.unfreeze()
