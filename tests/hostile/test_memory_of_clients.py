@@ -13,6 +13,7 @@ from asyncio import Transport
 import pytest
 from live_graph import LiveGraph
 from patient_websockets import connect
+from websockets.protocol import State
 
 from volery.bridges import unfinished
 from volery.bridges.bridge_host import BridgeHost
@@ -25,7 +26,7 @@ from volery.graph import messages as m
 from volery.graph.service_reply import ServiceReply
 from volery_benchmarks.hostile.websocket import BINARY, frame, frame_head, open_websocket
 
-LONGEST_S = 120.0
+LONGEST_S = 60.0
 MB = 1 << 20
 
 
@@ -37,10 +38,10 @@ def until(condition):
 
 
 @pytest.fixture
-def server():
+def server(request):
     live = LiveGraph()
     with BridgeHost(live.gateway) as bridges:
-        server = RosbridgeServer(port=0)
+        server = RosbridgeServer(port=0, **getattr(request, "param", {}))
         bridges.open(server)
         publisher = live.do(lambda: live.graph.advertise("/a", "std_msgs/msg/String", latched=True))
         live.do(lambda: publisher.publish(m.String("text")))
@@ -136,7 +137,25 @@ def read_nothing(server):
     reset(sock)
 
 
-@pytest.mark.parametrize("visit", [leave, break_off, be_refused, be_ended, read_nothing])
+def answer_no_ping(server):
+    with open_websocket(server.port):
+        until(lambda: server.clients)
+        until(lambda: not server.clients)
+
+
+def leave_when_a_pong_is_late(server):
+    """The server waits for the client's answer to its close frame."""
+    sock = open_websocket(server.port)
+    until(lambda: any(connection.state is State.CLOSING for connection in server._clients))
+    reset(sock)
+
+
+SOON = {"keepalive_s": 0.2}
+ENDS = [({}, visit) for visit in (leave, break_off, be_refused, be_ended, read_nothing)]
+ENDS += [(SOON, visit) for visit in (answer_no_ping, leave_when_a_pong_is_late)]
+
+
+@pytest.mark.parametrize(("server", "visit"), ENDS, indirect=["server"])
 def test_no_end_of_a_connection_leaves_garbage(server, visit):
     kinds = GuardedConnection, Transport
     leave(server)  # the first one imports modules

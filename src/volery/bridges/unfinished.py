@@ -263,20 +263,26 @@ class ArrivingMessages:
         self._has_ended = False
 
     def note(self, incomplete: int, waiting: int = 0) -> None:
-        """Sets the bytes of an incomplete message, and of whole ones that are not processed."""
-        if self._has_ended:
-            return
+        """Sets the bytes of an incomplete message, and of whole ones that are not processed.
+
+        What a client sends after its end is read in turns too.
+        """
+        if not self._has_ended:
+            self._count(incomplete, waiting)
+        is_large = self._has_ended or incomplete >= _IGNORED_BYTES
+        if is_large and self._has_turn and self._account.is_crowded:
+            self._has_turn = False
+            self._turns.wait(self._loop, self._turn)
+        if not (self._has_room and self._has_turn):
+            self._pause()
+
+    def _count(self, incomplete: int, waiting: int) -> None:
         if not incomplete:
             self._began_s = None
         elif self._began_s is None:
             self.restart()
         if not self._share.hold(incomplete + waiting, may_wait=True):
             self._has_room = False
-        if incomplete > _READ_BYTES and self._has_turn and self._account.is_crowded:
-            self._has_turn = False
-            self._turns.wait(self._loop, self._turn)
-        if not (self._has_room and self._has_turn):
-            self._pause()
 
     def _room(self) -> None:
         self._has_room = True
@@ -287,7 +293,7 @@ class ArrivingMessages:
         self._read_on()
 
     def _read_on(self) -> None:
-        if self._has_room and self._has_turn and not self._has_ended:
+        if self._has_room and self._has_turn:
             self._resume()
 
     def restart(self) -> None:
@@ -303,6 +309,11 @@ class ArrivingMessages:
 
     def close(self) -> None:
         """Frees everything after the connection is lost."""
+        self._free()
+        self._end = _ignore
+        self._pause = self._resume = _nothing
+
+    def _free(self) -> None:
         self._has_ended = True
         if self._timer is not None:
             self._timer.cancel()
@@ -310,8 +321,6 @@ class ArrivingMessages:
         self._share.close()
         if self._account.owes_memory():
             self._turns.return_memory_soon(self._loop, self._account)
-        self._end = _ignore
-        self._pause = self._resume = _nothing
 
     def _check(self) -> None:
         self._timer = None
@@ -326,7 +335,7 @@ class ArrivingMessages:
     def _end_once(self, reason: str) -> None:
         if not self._has_ended:
             end, self._end = self._end, _ignore
-            self.close()
+            self._free()
             end(reason)
 
     def _post(self, action: Callable[[], None]) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 from collections import deque
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any, cast
 
 from websockets.asyncio.server import ServerConnection
@@ -74,7 +75,12 @@ class GuardedConnection(ServerConnection):
         """Implements the method of `websockets`; drops the frames, which hold this connection."""
         super().set_connection_exc(exc)
         if exc is not None:
-            exc.__traceback__ = None
+            exc.__traceback__ = exc.__context__ = None
+
+    async def keepalive(self) -> None:
+        """Implements the method of `websockets`; its task keeps no error, as its frames do too."""
+        with suppress(asyncio.CancelledError):
+            await super().keepalive()
 
     def data_received(self, data: bytes) -> None:
         """Implements asyncio's method; counts what is incomplete."""
