@@ -211,6 +211,42 @@ def test_many_clients_share_one_account(server, small_account):
     until(lambda: small_account.num_bytes == 0)
 
 
+@pytest.mark.parametrize("event", ["room", "end"])
+def test_a_crowd_that_may_go_on_at_once_is_read_in_turns(event):
+    """A few clients in each round of the loop, also those that were ended."""
+    account = UnfinishedMessages(100 * MB)
+    num = 3 * unfinished._FEW
+
+    async def scene():
+        loop, read = asyncio.get_running_loop(), []
+        crowd = [Holder(account) for _ in range(num)]
+        for holder in crowd:
+            holder.hold(1)
+        arriving = [
+            unfinished.ArrivingMessages(
+                loop, lambda _: None, lambda: None, lambda k=k: read.append(k), account
+            )
+            for k in range(num)
+        ]
+        for each in arriving:
+            if event == "room":
+                each._room()
+            else:
+                each._end_once("no room")
+                each.note(0)
+        assert not read
+        rounds = 0
+        while len(read) < num:
+            before = len(read)
+            await asyncio.sleep(0)
+            assert len(read) - before <= unfinished._READS_A_ROUND
+            rounds += 1
+        assert read == list(range(num))
+        assert rounds >= num // unfinished._READS_A_ROUND
+
+    asyncio.run(asyncio.wait_for(scene(), LONGEST_S))
+
+
 def test_many_clients_are_read_in_turns(server, small_account):
     """Each of them gets what it sends to the server, and others are answered meanwhile."""
     with ExitStack() as strangers:

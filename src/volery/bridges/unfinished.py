@@ -270,9 +270,8 @@ class ArrivingMessages:
         if not self._has_ended:
             self._count(incomplete, waiting)
         is_large = self._has_ended or incomplete >= _IGNORED_BYTES
-        if is_large and self._has_turn and self._account.is_crowded:
-            self._has_turn = False
-            self._turns.wait(self._loop, self._turn)
+        if is_large:
+            self._take_turns()
         if not (self._has_room and self._has_turn):
             self._pause()
 
@@ -284,8 +283,15 @@ class ArrivingMessages:
         if not self._share.hold(incomplete + waiting, may_wait=True):
             self._has_room = False
 
+    def _take_turns(self) -> None:
+        """Waits for a turn among many clients."""
+        if self._has_turn and self._account.is_crowded:
+            self._has_turn = False
+            self._turns.wait(self._loop, self._turn)
+
     def _room(self) -> None:
         self._has_room = True
+        self._take_turns()  # others have got room at the same time
         self._read_on()
 
     def _turn(self) -> None:

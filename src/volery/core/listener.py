@@ -25,6 +25,7 @@ import time
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from volery.core.collector import collect_young
 from volery.core.connection_limits import SHARED, ConnectionLimits
 from volery.core.pending_connections import Look, PendingConnection, PendingConnections
 from volery.core.rare_log import RareLog
@@ -37,6 +38,8 @@ _READY_A_TURN = 4
 """New connections passed to the server before its existing ones get their turn again."""
 _EVICTIONS_A_TURN = 16
 """After this number the server gets its turn, to close the ended connections."""
+_ADMISSIONS_A_COLLECTION = 16
+"""A client of rosbridge consists of some 230 objects: a collection takes some milliseconds."""
 _NO_DESCRIPTORS = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
 _PAUSE_S = 0.001
 """Pause of a server without any descriptor, which would spin otherwise."""
@@ -85,6 +88,7 @@ class Listener(socket.socket):
         """Number of ended connections that are not closed yet."""
         self._num_given = 0
         """Number of connections that the server has got in this turn."""
+        self._num_admitted = 0
         self._reserve: int | None = os.open(os.devnull, os.O_RDONLY)
         self.refusals = RareLog(_log)
         """Refused and ended connections, by reason."""
@@ -112,6 +116,9 @@ class Listener(socket.socket):
             self._num_given = 0
             raise BlockingIOError(errno.EAGAIN, "none is ready, or others have their turn")
         self._num_given += 1
+        self._num_admitted += 1
+        if self._num_admitted % _ADMISSIONS_A_COLLECTION == 0:
+            collect_young()
         return accepted
 
     def prove(self, connection: Any) -> None:

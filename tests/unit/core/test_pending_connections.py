@@ -8,6 +8,7 @@ import socket
 
 import pytest
 
+from volery.core import listener
 from volery.core.connection_limits import ConnectionLimits
 from volery.core.listener import Opening, open_listener
 from volery.core.pending_connections import (
@@ -132,6 +133,22 @@ def test_new_connections_come_a_few_at_a_turn():
                 sock.close()
 
     played(scene)
+
+
+def test_young_objects_are_collected_as_connections_come(monkeypatch):
+    collections = []
+    monkeypatch.setattr(listener, "collect_young", lambda: collections.append(0))
+
+    async def scene():
+        async with Server(HTTP) as server:
+            num = 2 * listener._ADMISSIONS_A_COLLECTION + 1
+            for k in range(num):
+                with socket.create_connection(("127.0.0.1", server.port)) as sock:
+                    sock.sendall(REQUEST)
+                    await server.until(lambda k=k: server.num_connections == k + 1)
+
+    played(scene)
+    assert len(collections) == 2
 
 
 def test_the_timeout_ends_a_connection():
