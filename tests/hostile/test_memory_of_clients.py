@@ -17,6 +17,7 @@ from websockets.protocol import State
 
 from volery.bridges import unfinished
 from volery.bridges.bridge_host import BridgeHost
+from volery.bridges.rosbridge import first_message
 from volery.bridges.rosbridge import server as server_module
 from volery.bridges.rosbridge.first_message import GuardedConnection
 from volery.bridges.rosbridge.protocol import RosbridgePeer
@@ -129,12 +130,16 @@ def be_ended(server):
     sock.close()
 
 
-def read_nothing(server):
-    """More waits for the client than the system buffers."""
+def stop_reading(server):
+    """Returns a client for which more waits than the system buffers."""
     sock = open_websocket(server.port)
     sock.sendall(frame(json.dumps({"op": "subscribe", "topic": "/large"}).encode()))
     until(lambda: any(connection.paused for connection in server._clients))
-    reset(sock)
+    return sock
+
+
+def read_nothing(server):
+    reset(stop_reading(server))
 
 
 def answer_no_ping(server):
@@ -173,6 +178,30 @@ def test_no_end_of_a_connection_leaves_garbage(server, visit):
         gc.garbage.clear()
         gc.enable()
     assert not kept
+
+
+def test_a_client_that_reads_nothing_is_ended(server, monkeypatch):
+    monkeypatch.setattr(first_message, "_MAX_BLOCKED_S", 0.2)
+    with stop_reading(server):
+        until(lambda: not server.clients)
+
+
+def test_a_client_that_reads_slowly_stays(server):
+    with stop_reading(server):
+        (connection,) = server._clients
+        unsent, ended = connection.transport.get_write_buffer_size(), []
+
+        def check():
+            before = connection._progress_check
+            connection._check_progress(unsent + 1)
+            ended.append(connection.transport.is_closing() or connection._progress_check is before)
+            connection._check_progress(unsent)
+            ended.append(connection.transport.is_closing())
+
+        connection.loop.call_soon_threadsafe(check)
+        until(lambda: len(ended) == 2)
+        assert ended == [False, True]
+        until(lambda: not server.clients)
 
 
 def test_memory_is_returned_when_the_last_has_left(server, monkeypatch):

@@ -24,6 +24,8 @@ _READ_BYTES = 32 << 10
 """Bytes read at once; all their frames are parsed before another client has its turn. With the
 default of asyncio, 256 KiB, full of small frames, others would wait for a tenth of a second."""
 _LAST_WORDS_S = 1.0
+_MAX_BLOCKED_S = 60.0
+"""Time in which a client must read some of what waits for it. Pings would wait behind that."""
 _CONTROL = (Opcode.PING, Opcode.PONG)
 _MESSAGES = (Opcode.TEXT, Opcode.BINARY, Opcode.CONT)
 
@@ -40,6 +42,8 @@ class GuardedConnection(ServerConnection):
         super().__init__(*args, **options)
         self._last_frames: deque[Frame] = deque()
         """The last frame of each message that the application has not taken."""
+        self._progress_check: asyncio.TimerHandle | None = None
+        """While more waits for the client than the system buffers."""
         self._recv_unbounded: Callable[[Frame], None] = self.protocol.recv_frame
         self.protocol.recv_frame = self._recv_frame  # type: ignore[method-assign]
         if self.has_token:
@@ -53,14 +57,21 @@ class GuardedConnection(ServerConnection):
         self._limits = FrameLimits(self._held, self.loop, self._end)
         super().connection_made(cast("asyncio.BaseTransport", self._held))
 
+    def pause_writing(self) -> None:
+        """Implements asyncio's method; ends the connection if the client reads nothing."""
+        super().pause_writing()
+        self._expect_progress()
+
     def resume_writing(self) -> None:
         """Implements asyncio's method: the client has read."""
         super().resume_writing()
         self._limits.answers_read()
+        self._cancel_progress_check()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Implements asyncio's method; resolves cycles of references, see `core.collector`."""
         self._limits.close()
+        self._cancel_progress_check()
         super().connection_lost(exc)
         protocol = self.protocol
         protocol.parser.close()
@@ -111,6 +122,21 @@ class GuardedConnection(ServerConnection):
         if len(pieces) > 1 and all(pieces):  # an empty one is the end of the stream
             self.protocol.writes = [b"".join(pieces)]
         super().send_data()
+
+    def _expect_progress(self) -> None:
+        unsent = self.transport.get_write_buffer_size()
+        self._progress_check = self.loop.call_later(_MAX_BLOCKED_S, self._check_progress, unsent)
+
+    def _check_progress(self, unsent: int) -> None:
+        if self.transport.get_write_buffer_size() < unsent:
+            self._expect_progress()
+        else:
+            self.transport.abort()
+
+    def _cancel_progress_check(self) -> None:
+        if self._progress_check is not None:
+            self._progress_check.cancel()
+            self._progress_check = None
 
     def _end(self, reason: str) -> None:
         """Closes the connection, with the reason if the client reads it soon."""

@@ -68,7 +68,7 @@ class RosbridgeServer:
     and from `origins` are accepted. Programs without an origin are accepted.
 
     A client that does not read loses its own messages; it does not delay others, and the server
-    disconnects it when it answers no pings.
+    disconnects it when it answers no pings, or reads nothing for a minute.
 
     Parameters
     ----------
