@@ -49,9 +49,9 @@ def spared_objects() -> Iterator[None]:
 
 
 def collect_young() -> None:
-    """Collects the objects that were made recently, which takes a few microseconds for each ten.
+    """Collects garbage among the objects that were made recently.
 
     Python does so by itself when many more objects are made than freed. Where clients come as fast
-    as others go, it does not notice; a later collection of all of them would take too long.
+    as others go, it does not notice, and a later collection of all of them takes too long.
     """
     gc.collect(1)

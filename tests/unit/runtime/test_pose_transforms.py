@@ -107,3 +107,13 @@ def test_a_spawned_and_deleted_uav(simulate, flat_data):
     received.clear()
     simulation.run(0.1)
     assert {t.child_frame_id for t in received} == {"uav1/base_link"}
+
+
+def test_the_last_uav_without_odometry_takes_its_subscription_with_it(simulate, flat_data):
+    flat_data["types"]["probe"] = {"airframe": "f450", "sensors": [FLAT_LIDAR]}
+    simulation = simulate(flat_data)
+    before = simulation.graph.subscribers("/tf")
+    simulation.vehicles.spawn("late", "probe", (5.0, 5.0, 0.0))
+    assert simulation.graph.subscribers("/tf") == before + 1
+    simulation.vehicles.delete("late")
+    assert simulation.graph.subscribers("/tf") == before

@@ -89,7 +89,7 @@ class GuardedConnection(ServerConnection):
             exc.__traceback__ = exc.__context__ = None
 
     async def keepalive(self) -> None:
-        """Implements the method of `websockets`; its task keeps no error, as its frames do too."""
+        """Implements the method of `websockets`; its task keeps no error, which would hold it."""
         with suppress(asyncio.CancelledError):
             await super().keepalive()
 
