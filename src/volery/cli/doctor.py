@@ -135,15 +135,19 @@ def _extras() -> str:
     from volery.core.errors import VoleryError
     from volery.scenario import library
     from volery.scenario.load import load_scenario
-    from volery.scenario.node_packages import missing_packages
+    from volery.scenario.node_packages import check_packages
 
     lacking = []
     for name in library.names():
         try:
-            missing = missing_packages(load_scenario(name))
+            scenario = load_scenario(name)
         except VoleryError:
             continue  # the check of scenarios reports it
-        lacking += [f"{name} does not start: {missing}"] if missing else []
+        try:
+            check_packages(scenario)
+        except VoleryError as error:
+            reason = str(error).removeprefix(f"{name}: ")
+            lacking.append(f"{name} does not start: {reason}")
     if lacking:
         raise UnfitError("; ".join(lacking))
     return "all shipped scenarios have the packages that they need"

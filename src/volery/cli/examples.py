@@ -23,6 +23,9 @@ def examples(
     name: Annotated[
         str, typer.Argument(help="Example to copy: its name, the start of it or its number.")
     ] = "",
+    arguments: Annotated[
+        list[str] | None, typer.Argument(help="With --run: arguments of the example.")
+    ] = None,
     run: Annotated[bool, typer.Option("--run", help="Run it instead of copying it.")] = False,
     to: Annotated[Path, typer.Option(metavar="DIR", help="Copy it into this folder.")] = Path(),
 ) -> None:
@@ -36,13 +39,16 @@ def examples(
         return
     path = find_example(name)
     if not run:
+        if arguments:
+            raise CommandError(f"arguments need --run: volery examples {name} --run ...")
         echo_line(_copy(path, to))
         return
     if path.is_dir():
         raise CommandError(
             f"{path.name} is a folder of files; copy it: volery examples {path.name}"
         )
-    code = subprocess.run([sys.executable, str(path)], check=False).returncode
+    command = [sys.executable, str(path), *(arguments or ())]
+    code = subprocess.run(command, check=False).returncode
     if code:
         raise typer.Exit(code)
 

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from volery.core.errors import VoleryError
-from volery.core.extras import missing_package
+from volery.core.extras import import_extra
 
 
 @dataclass(frozen=True)
@@ -64,8 +63,5 @@ def _wilson(mean: float, count: int, confidence: float) -> tuple[float, float]:
 
 def _student(freedom: int, confidence: float) -> float:
     """Returns the two-sided quantile of Student's distribution."""
-    try:
-        from scipy.special import stdtrit
-    except ImportError:
-        raise VoleryError(missing_package("a confidence interval", "scipy", "sweep")) from None
-    return float(stdtrit(freedom, 0.5 + confidence / 2.0))
+    special = import_extra("a confidence interval", "scipy.special", "scipy", "sweep")
+    return float(special.stdtrit(freedom, 0.5 + confidence / 2.0))

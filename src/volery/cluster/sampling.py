@@ -9,8 +9,7 @@ import numpy as np
 
 from volery.cluster.study import StudyParameter, StudySampling
 from volery.core.arrays import Array
-from volery.core.errors import VoleryError
-from volery.core.extras import missing_package
+from volery.core.extras import import_extra
 
 _INSIDE = 1e-12
 """Distance of a fraction from 0 and 1, where the normal distribution is infinite."""
@@ -31,11 +30,7 @@ def _fractions(dimensions: int, sampling: StudySampling) -> Array:
     random = np.random.Generator(np.random.PCG64(sampling.seed))
     if sampling.method == "random":
         return random.random((sampling.samples, dimensions))
-    try:
-        from scipy.stats import qmc
-    except ImportError:
-        what = f"sampling by {sampling.method}"
-        raise VoleryError(missing_package(what, "scipy", "sweep")) from None
+    qmc = import_extra(f"sampling by {sampling.method}", "scipy.stats.qmc", "scipy", "sweep")
     # scipy renamed `seed` to `rng`; as the only keyword left, it is passed by whichever exists
     kind = qmc.LatinHypercube if sampling.method == "latin_hypercube" else qmc.Sobol
     try:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from volery.cluster.metric_names import UNREPEATABLE
 from volery.cluster.runs import RunResult, RunSpec
 from volery.core.errors import VoleryError
-from volery.core.extras import missing_package
+from volery.core.extras import import_extra
 
 if TYPE_CHECKING:
     import pandas
@@ -99,11 +99,7 @@ class StudyTable:
 
 def arrow_module(what: str) -> Any:
     """Imports pyarrow. Raises `VoleryError` with the command that installs it."""
-    try:
-        import pyarrow
-    except ImportError:
-        raise VoleryError(missing_package(what, "pyarrow", "sweep")) from None
-    return pyarrow
+    return import_extra(what, "pyarrow", "pyarrow", "sweep")
 
 
 def _metric_names(results: Sequence[RunResult], metrics: Sequence[str]) -> tuple[str, ...]:

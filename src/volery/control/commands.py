@@ -335,10 +335,17 @@ class FleetCommands:
         control_state["braking"] = control_state["hurried"] = True
 
     def land(self, i: int) -> None:
-        """Stops UAV `i`, lands it straight below and stops its rotors on the ground."""
+        """Stops UAV `i`, lands it straight below and stops its rotors on the ground.
+
+        The descent begins once the UAV has nearly stopped, or at the latest after three times the
+        time that braking needs, where gusts or an estimate that drifts keep it in motion.
+        """
         if self.mode(i) is FlightMode.LANDED:
             raise CommandError(f"{self.names[i]} is on the ground already")
         control_state = self._enter_guided(i, FlightMode.LAND)
+        vx, vy, _ = self._believed(i).velocity
+        braking_s = math.hypot(vx, vy) / self.airframes[i].limits.acceleration_m_s2
+        control_state["deadline_step"] = self.step + round((1.0 + 3.0 * braking_s) / self._dt)
         control_state["braking"] = True
         control_state["sink"] = 0.0
 

@@ -154,11 +154,11 @@ def plan(
             brake_level(control_state, estimate, gains)
         else:
             lead_level(control_state, estimate, gains, gains.speed)
-        if control_state.mode == LAND:
+        if control_state.braking:
+            brake_height(control_state, estimate, gains)
+        elif control_state.mode == LAND:
             sink = control_state.sink if control_state.sink > 0.0 else gains.landing
             steer_height(control_state, estimate, gains, -sink)
-        elif control_state.braking:
-            brake_height(control_state, estimate, gains)
         else:
             climb = gains.take_off if control_state.mode == TAKE_OFF else gains.climb
             lead_height(control_state, estimate, gains, climb, gains.descent)
@@ -191,8 +191,10 @@ def _end_what_ended(
             control_state.heading[1],
         )
     vx, vy, vz = three(estimate.velocity_map)
-    slow = vx * vx + vy * vy + (0.0 if control_state.mode == LAND else vz * vz)
-    if control_state.braking and slow < _STOPPED_M_S**2:
+    landing = control_state.mode == LAND
+    slow = vx * vx + vy * vy + (0.0 if landing else vz * vz)
+    overdue = landing and step >= control_state.deadline_step
+    if control_state.braking and (slow < _STOPPED_M_S**2 or overdue):
         _lock_place(control_state, estimate, gains)
     elif not control_state.braking:
         _change_mode(control_state, estimate)

@@ -7,7 +7,6 @@ minimise the squared difference. Other flights, in which all inputs move at once
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import Any, Literal
 
 import numpy as np
@@ -21,8 +20,7 @@ from volery.control.identification_flights import (
     velocity_errors,
 )
 from volery.core.arrays import Array
-from volery.core.errors import VoleryError
-from volery.core.extras import missing_package
+from volery.core.extras import import_extra
 from volery.vehicle.airframe import GRAVITY, Airframe
 from volery.vehicle.identified import (
     FirstOrder,
@@ -195,8 +193,5 @@ def _shown(value: Any) -> str:
 
 
 def _scipy(part: str) -> Any:
-    """Returns a module of scipy; raises `VoleryError` if scipy is not installed."""
-    try:
-        return import_module(f"scipy.{part}")
-    except ImportError:
-        raise VoleryError(missing_package("identification", "scipy", "identify")) from None
+    """Returns a module of scipy; raises `VoleryError` if it cannot be imported."""
+    return import_extra("identification", f"scipy.{part}", "scipy", "identify")

@@ -60,7 +60,7 @@ CONTROL_STATE = np.dtype(
         # state of guidance and attitude
         ("phase", "i8"),  # of a flight mode that has several
         ("calm_ticks", "i8"),  # guidance ticks for which a condition of the mode has held
-        ("deadline_step", "i8"),  # a velocity or trajectory setpoint holds until this step
+        ("deadline_step", "i8"),  # the setpoint holds, or a landing brakes, until this step
         ("timeout_steps", "i8"),  # ... and is renewed by this many
         ("start_step", "i8"),  # when a trajectory or a trajectory setpoint began
         ("path_first", "i8"),  # rows of the trajectory's segments; of none: 0, -1

@@ -83,7 +83,7 @@ def _private_folder() -> Path:
 
 
 def _sweep(root: Path, keep: Path) -> None:
-    """Removes the compiled kernels of older versions, except the newest few."""
+    """Removes the compiled kernels of other versions, except the few that were used last."""
     others = sorted(
         (p for p in root.iterdir() if p.is_dir() and p != keep),
         key=lambda p: p.stat().st_mtime,
@@ -105,6 +105,7 @@ def cache_dir() -> Path:
         folder = private_folder(root.parent, root.name, "kernels", key)
         with tempfile.TemporaryFile(dir=folder):
             pass
+        os.utime(folder)  # it is in use: others do not delete it
         _sweep(folder.parent, folder)
     except OSError as error:
         folder = _temporary_cache(key)

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from volery.core.errors import VoleryError
-from volery.core.extras import missing_package
+from volery.core.extras import import_extra
 
 if TYPE_CHECKING:
     import pandas
@@ -14,8 +13,7 @@ if TYPE_CHECKING:
 
 def data_frame(columns: Mapping[str, Any], what: str = "to_pandas()") -> pandas.DataFrame:
     """Returns columns as a table. Raises `VoleryError` without pandas; `what` names the caller."""
-    try:
-        import pandas
-    except ImportError:
-        raise VoleryError(missing_package(what, "pandas", "pandas")) from None
-    return pandas.DataFrame(dict(columns))
+    table: pandas.DataFrame = import_extra(what, "pandas", "pandas", "pandas").DataFrame(
+        dict(columns)
+    )
+    return table

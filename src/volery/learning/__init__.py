@@ -4,10 +4,6 @@ Belongs here: tasks as data, the terms that they are made of, and the interface 
 `pip install "volery[learning]"`.
 """
 
-from volery.core.errors import VoleryError
-from volery.core.extras import missing_package
+from volery.core.extras import import_extra
 
-try:
-    import gymnasium  # noqa: F401  (each module needs it)
-except ImportError:
-    raise VoleryError(missing_package("volery.learning", "gymnasium", "learning")) from None
+import_extra("volery.learning", "gymnasium", "gymnasium", "learning")  # each module needs it

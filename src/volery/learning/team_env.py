@@ -10,25 +10,20 @@ from gymnasium.spaces import Space
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from volery.core.errors import CommandError, VoleryError
-from volery.core.extras import missing_package
+from volery.core.errors import CommandError
+from volery.core.extras import import_extra
 from volery.learning.rendering import render_nothing
 from volery.learning.spaces import action_space, observation_space
 from volery.learning.task import Task
 from volery.learning.tasks import load_task
 from volery.learning.vector_env import TaskVectorEnv
 
-try:
-    from pettingzoo import ParallelEnv
-except ImportError:
-    raise VoleryError(
-        missing_package("volery.learning.team_env", "pettingzoo", "learning")
-    ) from None
+_pettingzoo = import_extra("volery.learning.team_env", "pettingzoo", "pettingzoo", "learning")
 
 Observation = NDArray[np.float32]
 
 
-class TeamEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo has no type hints
+class TeamEnv(_pettingzoo.ParallelEnv):  # type: ignore[misc,name-defined]  # it has no type hints
     """One environment of a task; its agents are the UAVs that the policy flies, by name.
 
     An episode ends for all agents at once: when the task ends it for any of them, or at the time

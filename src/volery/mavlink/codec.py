@@ -8,7 +8,7 @@ from functools import cache
 from typing import Any
 
 from volery.core.errors import BridgeError
-from volery.core.extras import missing_package
+from volery.core.extras import import_extra
 
 AUTOPILOT = 1
 """Component id MAV_COMP_ID_AUTOPILOT1."""
@@ -17,11 +17,8 @@ AUTOPILOT = 1
 @cache
 def dialect() -> Any:
     """Returns pymavlink's module of messages and enumerations. Raises `BridgeError` if missing."""
-    try:
-        from pymavlink.dialects.v20 import common
-    except ImportError:
-        raise BridgeError(missing_package("MAVLink", "pymavlink", "mavlink")) from None
-    return common
+    module = "pymavlink.dialects.v20.common"
+    return import_extra("MAVLink", module, "pymavlink", "mavlink", BridgeError)
 
 
 _HEAD = struct.Struct("<BBBBBBBHB")
@@ -36,12 +33,8 @@ def check_of(data: bytes) -> int:
 
 @cache
 def _crc() -> Callable[[bytes], int]:
-    try:
-        from fastcrc import crc16
-    except ImportError:
-        raise BridgeError(missing_package("MAVLink", "fastcrc", "mavlink")) from None
-
-    check: Callable[[bytes], int] = crc16.mcrf4xx
+    fastcrc = import_extra("MAVLink", "fastcrc", "fastcrc", "mavlink", BridgeError)
+    check: Callable[[bytes], int] = fastcrc.crc16.mcrf4xx
     return check
 
 

@@ -1,16 +1,18 @@
 """Packages of extras that the shipped nodes of a scenario need, known without importing a node.
 
-So a scenario that cannot start is refused before anything is built, and its card says what to
-install.
+So the card of a scenario that cannot start says what to install, and the scenario is refused before
+anything is built.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import invalidate_caches
 from importlib.util import find_spec
 
 from volery.core.errors import ScenarioError
+from volery.core.extras import import_extra
 from volery.scenario.node_names import is_same_node
 from volery.scenario.schema import NodeEntry, Scenario
 
@@ -47,24 +49,41 @@ NODE_PACKAGES = (
 
 
 def missing_packages(scenario: Scenario) -> str:
-    """Returns which packages the nodes of a scenario lack, with the command; empty: none."""
-    found: dict[NodePackage, None] = {}
-    for entry in scenario.node_entries:
-        for need in NODE_PACKAGES:
-            if is_same_node(entry.node, need.node) and need.is_used(entry):
-                found |= {} if _is_installed(need.module) else {need: None}
-    if not found:
+    """Returns which packages the nodes of a scenario lack, with the command; empty: none.
+
+    A package that was installed while this process runs counts.
+    """
+    invalidate_caches()
+    missing = [need for need in _needs(scenario) if not _is_installed(need.module)]
+    if not missing:
         return ""
-    needs = ", ".join(f"{need.node} needs {need.package}" for need in found)
-    extras = ",".join(sorted({need.extra for need in found}))
+    needs = ", ".join(f"{need.node} needs {need.package}" for need in missing)
+    extras = ",".join(sorted({need.extra for need in missing}))
     return f'{needs}: pip install "volery[{extras}]"'
 
 
 def check_packages(scenario: Scenario) -> None:
-    """Raises `ScenarioError` if a package that the scenario's nodes need is not installed."""
+    """Imports the packages that the scenario's nodes need.
+
+    Raises `ScenarioError` if some are not installed or cannot be imported.
+    """
     missing = missing_packages(scenario)
     if missing:
         raise ScenarioError(f"{scenario.name}: {missing}")
+    for need in _needs(scenario):
+        what = f"{scenario.name}: {need.node}"
+        import_extra(what, need.module, need.package, need.extra, ScenarioError)
+
+
+def _needs(scenario: Scenario) -> list[NodePackage]:
+    """Returns the packages that the scenario's nodes need, each once per node."""
+    found = {
+        need: None
+        for entry in scenario.node_entries
+        for need in NODE_PACKAGES
+        if is_same_node(entry.node, need.node) and need.is_used(entry)
+    }
+    return list(found)
 
 
 def _is_installed(module: str) -> bool:

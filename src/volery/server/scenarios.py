@@ -43,7 +43,8 @@ async def card_image(request: Request) -> Response:
 
 def cards_of(shelf: ScenarioCatalog) -> list[Card]:
     """Returns the cards of all scenarios that can be read."""
-    cards = [_shipped(name) for name in gallery()]
+    shipped = gallery()
+    cards = [_card(_shipped(name), uploaded=False) | shipped[name]._asdict() for name in shipped]
     cards += [_card(given, uploaded=False) for given in shelf.given()]
     for name in shelf.added():
         try:
@@ -54,8 +55,8 @@ def cards_of(shelf: ScenarioCatalog) -> list[Card]:
 
 
 @cache
-def _shipped(name: str) -> Card:
-    return _card(load_scenario(name), uploaded=False) | gallery()[name]._asdict()
+def _shipped(name: str) -> Scenario:
+    return load_scenario(name)
 
 
 def _card(scenario: Scenario, *, uploaded: bool) -> Card:

@@ -58,3 +58,15 @@ def test_an_example_runs_and_its_exit_code_is_passed_on(tmp_path, monkeypatch, c
     assert RUNNER.invoke(app, ["examples", "good", "--run"]).exit_code == 0
     assert "it ran" in capfd.readouterr().out
     assert RUNNER.invoke(app, ["examples", "bad", "--run"]).exit_code == 3
+
+
+def test_an_example_gets_its_arguments(tmp_path, monkeypatch, capfd):
+    (tmp_path / "01_one.py").write_text("import sys; print(sys.argv[1:])")
+    monkeypatch.setattr(examples, "all_examples", lambda: sorted(tmp_path.iterdir()))
+    assert RUNNER.invoke(app, ["examples", "1", "--run", "region", "7"]).exit_code == 0
+    assert "['region', '7']" in capfd.readouterr().out
+    assert RUNNER.invoke(app, ["examples", "1", "--run", "--", "--side", "7"]).exit_code == 0
+    assert "['--side', '7']" in capfd.readouterr().out
+    refused = RUNNER.invoke(app, ["examples", "1", "region", "--to", str(tmp_path / "new")])
+    assert refused.exit_code == 2
+    assert "volery examples 1 --run" in refused.stderr

@@ -142,6 +142,32 @@ def test_a_touch_down_that_shakes_the_estimate_is_a_landing(error):
     assert [k for k, _ in kinds(fleet)] == ["touch_down", "mode"]
 
 
+@pytest.mark.parametrize("speed", [2.0, 5.0])
+def test_a_landing_in_motion_brakes_before_it_descends(speed):
+    """As PX4 does (its pull request 9804); 0.6 m up, a descent would end at cruise speed."""
+    fleet = in_air((0.0, 0.0, 0.6))
+    for _ in range(30):
+        fleet.command_velocity_map(0, (speed, 0, 0))
+        track(fleet, 0.1)
+    fleet.land(0)
+    position, velocity, _ = track(fleet, 8.0)
+    level = np.linalg.norm(velocity[:, :2], axis=1)
+    assert position[level > 0.5, 2].min() > 0.4
+    assert level.min() < 0.1
+    assert kinds(fleet) == [("touch_down", "LAND"), ("mode", "LANDED")]
+
+
+def test_a_uav_that_the_wind_carries_away_descends_all_the_same():
+    wind = (25.0, 0.0, 0.0)
+    fleet = in_air((0.0, 0.0, 6.0))
+    track(fleet, 8.0, wind=wind)
+    fleet.land(0)
+    position, velocity, _ = track(fleet, 14.0, wind=wind)
+    assert velocity[:, 0].min() > 2.0
+    assert position[500, 2] > 5.9
+    assert position[-1, 2] < 4.0
+
+
 def test_low_level_hands_over_smoothly():
     fleet = in_air()
     fleet.command_attitude(0, rotations.from_rpy(0, 0.1, 0), F450.weight)

@@ -156,6 +156,19 @@ def test_old_caches_are_swept(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["now", "old4", "old5"]
 
 
+def test_each_start_counts_as_a_use_of_its_cache(tmp_path, monkeypatch):
+    """So a cache whose kernels are complete is not deleted beneath a process that runs."""
+    monkeypatch.setenv("VOLERY_CACHE_DIR", str(tmp_path))
+    folder = compiled.cache_dir.__wrapped__()
+    os.utime(folder, (0, 0))
+    assert compiled.cache_dir.__wrapped__() == folder
+    for i in range(3):
+        (folder.parent / f"older{i}").mkdir()
+        os.utime(folder.parent / f"older{i}", (1 + i, 1 + i))
+    compiled._sweep(folder.parent, folder.parent / "none")
+    assert sorted(p.name for p in folder.parent.iterdir()) == sorted([folder.name, "older2"])
+
+
 def test_only_a_brief_kernel_keeps_pythons_lock():
     def twice(x):
         return 2.0 * x

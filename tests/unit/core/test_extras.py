@@ -233,6 +233,37 @@ def test_a_scenario_without_its_packages_fails_before_anything_is_built(monkeypa
         simulation.Simulation(parse_scenario(data))
 
 
+@pytest.mark.parametrize(
+    ("code", "reason"),
+    [
+        (
+            "raise ImportError('libtbb.so.12: cannot open shared object file\\n\\nRead ...')",
+            "libtbb.so",
+        ),
+        ("raise OSError('libGL.so.1: cannot open shared object file')", "libGL.so.1"),
+        ("import a_package_that_is_missing", "No module named 'a_package_that_is_missing'"),
+    ],
+)
+def test_an_installed_package_that_does_not_load_is_not_called_missing(
+    monkeypatch, tmp_path, code, reason
+):
+    """As `import cv2` fails on servers without libGL; the command would change nothing."""
+    from volery.runtime import simulation
+
+    monkeypatch.setattr(simulation, "build_world", lambda *_: pytest.fail("a world was built"))
+    (tmp_path / "gtsam.py").write_text(code)
+    monkeypatch.delitem(sys.modules, "gtsam", raising=False)
+    monkeypatch.syspath_prepend(tmp_path)
+    data = {"name": "own", "nodes": [{"node": "slam"}], **SMALL}
+    with pytest.raises(ScenarioError) as caught:
+        simulation.Simulation(parse_scenario(data))
+    text = str(caught.value)
+    assert text.startswith("own: slam needs gtsam, which is installed but cannot be imported: ")
+    assert reason in text
+    assert "pip install" not in text
+    assert "\n" not in text
+
+
 def test_loop_closures_alone_need_gtsam(monkeypatch):
     monkeypatch.setitem(sys.modules, "gtsam", None)
     data = {"name": "own", "nodes": [{"node": "slam"}], **SMALL}

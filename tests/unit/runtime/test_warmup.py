@@ -124,6 +124,16 @@ def test_functions_are_found_by_their_names() -> None:
     assert [task_of(name_of(task)) for task in found] == found
 
 
+def test_a_deleted_cache_does_not_end_a_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As by another version's start, or by `rm -r ~/.cache/volery` beside a server."""
+    monkeypatch.setattr(tasks, "cache_dir", lambda: tmp_path / "deleted")
+    task = core_tasks.dynamics
+    tasks.do(task)
+    assert not tasks.is_done(task)
+
+
 SHARED = """
 import os, sys
 from numba.core import event

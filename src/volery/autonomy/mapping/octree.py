@@ -16,6 +16,7 @@ from volery.autonomy.perception.scan_rays import Rays
 from volery.core.arrays import Array
 from volery.core.compiled import brief_kernel
 from volery.core.errors import NodeError
+from volery.core.extras import import_extra
 
 Bytes = NDArray[np.uint8]
 
@@ -116,11 +117,8 @@ def _with_head(full: Bytes, resolution_m: float) -> bytes:
 
 
 def new_tree(resolution_m: float) -> Any:
-    """Returns an empty tree of pyoctomap. Raises NodeError if it is not installed."""
-    try:
-        import pyoctomap
-    except ImportError:
-        raise NodeError('mapping needs pyoctomap: pip install "volery[autonomy]"') from None
+    """Returns an empty tree of pyoctomap. Raises `NodeError` if it cannot be imported."""
+    pyoctomap = import_extra("mapping", "pyoctomap", "pyoctomap", "autonomy", NodeError)
     return pyoctomap.OcTree(resolution_m)
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from volery.autonomy.planning.voxel_space import VoxelSpace
 from volery.core.arrays import Array
 from volery.core.errors import NodeError, PlanError
-from volery.core.extras import missing_package
+from volery.core.extras import import_extra
 
 _OMPL = threading.Lock()
 
@@ -67,10 +67,9 @@ def plan_path(
 
 def _search(space: VoxelSpace, begin: Array, end: Array, search: PathSearch, seed: int) -> Array:
     """Returns the states (K, 3) of a path, by OMPL. The caller holds `_OMPL`."""
-    try:
-        from ompl import base, geometric, util
-    except ImportError:
-        raise NodeError(missing_package("planning", "ompl", "autonomy")) from None
+    import_extra("planning", "ompl", "ompl", "autonomy", NodeError)
+    from ompl import base, geometric, util
+
     util.setLogLevel(util.LogLevel.LOG_NONE)
     util.RNG.setSeed(1 + seed % 1_000_000_000)
     states = base.RealVectorStateSpace(3)

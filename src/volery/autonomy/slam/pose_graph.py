@@ -14,6 +14,7 @@ import numpy as np
 
 from volery.core.arrays import Array
 from volery.core.errors import NodeError
+from volery.core.extras import import_extra
 
 _ROUNDS = 12
 
@@ -90,11 +91,6 @@ def _add(gtsam: Any, graph: Any, edge: PoseGraphEdge, heights: int) -> None:
 
 
 def load_gtsam() -> Any:
-    """Returns the gtsam module. Raises NodeError if it is not installed."""
-    try:
-        import gtsam
-    except ImportError as error:
-        raise NodeError(
-            'loop closures need gtsam: pip install "volery[autonomy]", or set loop_closures = false'
-        ) from error
-    return gtsam
+    """Returns the gtsam module. Raises `NodeError` if it cannot be imported."""
+    what = "slam (unless loop_closures = false)"
+    return import_extra(what, "gtsam", "gtsam", "autonomy", NodeError)

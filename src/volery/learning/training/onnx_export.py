@@ -10,7 +10,7 @@ import numpy as np
 from volery.autonomy.policy.policy_file import Policy
 from volery.autonomy.policy.shipped_policies import load_policy
 from volery.core.errors import VoleryError, reason_of
-from volery.core.extras import missing_package
+from volery.core.extras import import_extra
 from volery.core.whole_files import write_whole
 
 _OPSET = 17
@@ -25,10 +25,7 @@ def export_onnx(name: str | Policy, file: Path) -> str:
     or the choice (N,) int64. Raises `VoleryError` without the package onnx, or if the file cannot
     be written.
     """
-    try:
-        import onnx
-    except ImportError:
-        raise VoleryError(missing_package("export to ONNX", "onnx", "train")) from None
+    onnx = import_extra("export to ONNX", "onnx", "onnx", "train")
     policy = name if isinstance(name, Policy) else load_policy(name)
     graph = _Graph(policy)
     model = onnx.helper.make_model(

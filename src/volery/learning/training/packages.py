@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
-
-from volery.core.errors import VoleryError
-from volery.core.extras import missing_package
+from volery.core.extras import import_extra
 
 _PACKAGES = (
     ("torch", "torch"),
@@ -17,7 +14,4 @@ _PACKAGES = (
 def require_training() -> None:
     """Raises `VoleryError` with the command that installs what training lacks."""
     for module, package in _PACKAGES:
-        try:
-            importlib.import_module(module)
-        except ImportError:
-            raise VoleryError(missing_package("training", package, "train")) from None
+        import_extra("training", module, package, "train")

@@ -20,7 +20,7 @@ from collections.abc import Callable
 from typing import Any
 
 from volery.core.errors import BridgeError, GraphError, UnreachableError
-from volery.core.extras import missing_package
+from volery.core.extras import import_extra
 from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import Published
 from volery.graph.qos import DEFAULT_DEPTH
@@ -264,10 +264,7 @@ class OffboardConnection:
 
 
 def _open(address: str) -> Any:
-    try:
-        from pymavlink import mavutil
-    except ImportError:
-        raise BridgeError(missing_package("MAVLink", "pymavlink", "mavlink")) from None
+    mavutil = import_extra("MAVLink", "pymavlink.mavutil", "pymavlink", "mavlink", BridgeError)
     if not _ADDRESS.fullmatch(address):
         raise BridgeError(
             f"'{address}' is no address of MAVLink: udpin:HOST:PORT, udpout:HOST:PORT, "

@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from volery.core.errors import VoleryError
-from volery.core.extras import missing_package
+from volery.core.extras import import_extra
 from volery.runtime.monitoring.progress import Progress
 
 OnProgress = Callable[[Progress], None]
@@ -22,10 +21,7 @@ def progress_bar(name: str, on_progress: OnProgress | None = None) -> Iterator[O
 
     on_progress: called with each update, too. Raises `VoleryError` without tqdm.
     """
-    try:
-        from tqdm.auto import tqdm
-    except ImportError:
-        raise VoleryError(missing_package("progress=True", "tqdm", "progress")) from None
+    tqdm = import_extra("progress=True", "tqdm.auto", "tqdm", "progress").tqdm
     bar: Any = None
 
     def update(progress: Progress) -> None:

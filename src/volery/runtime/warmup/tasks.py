@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 
@@ -55,7 +55,10 @@ def do(task: Task) -> None:
             raise
         raise NodeError(f"warm-up {name_of(task)}: {type(error).__name__}: {error}") from error
     if is_own(task):
-        _mark(task).touch()
+        with suppress(
+            OSError
+        ):  # the folder was deleted or its disk is full: the next start compiles
+            _mark(task).touch()
 
 
 def _mark(task: Task) -> Path:

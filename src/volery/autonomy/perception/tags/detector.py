@@ -9,20 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.arrays import Array
-from volery.core.errors import VoleryError
-from volery.core.extras import missing_package
+from volery.core.extras import import_extra
 
 FAMILY = "36h11"
 
 
 def load_opencv() -> Any:
-    """Returns the module `cv2`. Raises `VoleryError` if it is not installed."""
-    try:
-        import cv2
-    except ImportError:
-        text = missing_package("detection of AprilTags", "opencv-python-headless", "vision")
-        raise VoleryError(text) from None
-    return cv2
+    """Returns the module `cv2`. Raises `VoleryError` if it cannot be imported."""
+    return import_extra("detection of AprilTags", "cv2", "opencv-python-headless", "vision")
 
 
 @dataclass(frozen=True, eq=False)
