@@ -84,6 +84,19 @@ def test_who_has_more_than_its_part_waits_for_room(account):
     assert [holder.told for holder in greedy] == [["resume"], ["resume"], [], [], []]
 
 
+@pytest.mark.parametrize("left", [0, 1])
+def test_who_waits_with_less_than_its_part_is_read_again(account, left):
+    """The others do not move: it would wait until it is ended, also if its client has left."""
+    greedy = [Holder(account) for _ in range(5)]
+    for holder in greedy:
+        assert holder.hold(2)
+    for holder in greedy:
+        assert not holder.hold(2.1)
+    assert greedy[0].hold(left)  # the application has taken a message
+    assert greedy[0].told == ["resume"]
+    assert greedy[0].hold(2)
+
+
 def test_who_cannot_wait_is_refused_and_holds_what_it_had(account):
     one, other = Holder(account), Holder(account)
     assert one.hold(5)

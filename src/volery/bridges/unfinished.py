@@ -84,7 +84,7 @@ class UnfinishedMessages:
             before = self._set(share, size)
             has_room = self._total <= self._max_bytes or size <= before
             if not has_room:
-                part = self._max_bytes // len(self._shares)
+                part = self._part()
                 if size <= part:
                     evicted = self._evict_beyond(part)
                     has_room = True
@@ -93,6 +93,9 @@ class UnfinishedMessages:
                 else:
                     self._set(share, before)
             resumed = self._next_waiting()
+            if share in self._waiting and size < min(before, self._part()):
+                del self._waiting[share]
+                resumed.append(share)
             returns = self._returns_memory()
         for other in evicted:
             other.evict()
@@ -102,6 +105,10 @@ class UnfinishedMessages:
             return_free_memory()
         return has_room
 
+    def _part(self) -> int:
+        """Returns the equal part of each client that has bytes here."""
+        return self._max_bytes // max(1, len(self._shares))
+
     def _set(self, share: UnfinishedBytes, size: int) -> int:
         """Sets the bytes of a client, and returns those of before."""
         before = self._shares.get(share, 0)
@@ -109,7 +116,6 @@ class UnfinishedMessages:
             self._shares[share] = size
         else:
             self._shares.pop(share, None)
-            self._waiting.pop(share, None)
         self._total += size - before
         self._freed += max(0, before - size)
         return before
@@ -140,6 +146,7 @@ class UnfinishedMessages:
                 break
             if size > part + _READ_BYTES:
                 self._set(share, 0)
+                self._waiting.pop(share, None)
                 found.append(share)
         return found
 

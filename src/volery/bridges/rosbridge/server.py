@@ -275,6 +275,9 @@ class RosbridgeServer:
         assert isinstance(connection, GuardedConnection)
         loop = asyncio.get_running_loop()
         address = connection.remote_address or ("?", 0)
+        for sent in (connection.request, connection.response):
+            if sent is not None:
+                sent.headers.clear()  # dozens of objects that have served
         sock = connection.transport.get_extra_info("socket")
         tend(sock)
         bound_unsent(sock)
