@@ -198,13 +198,15 @@ def test_one_that_is_disarmed_and_never_answers_again_ends_the_run(opened, silen
     silence.autopilot = autopilot = StandIn(bridge.ports[0], 50, arm_at=1000, falls_silent=True)
     meet(simulation, bridge, 1)
     start(simulation, bridge._sessions, autopilot)
-    with pytest.raises(PartnerError, match=r"did not answer within 0\.5 s"):
+    with (
+        contextlib.closing(autopilot),
+        pytest.raises(PartnerError, match=r"did not answer within 0\.5 s"),
+    ):
         simulation.run(60.0)
     assert len(autopilot.sensors) == 50
     silent_s = simulation.time_s - autopilot.sensors[-1].time_usec / 1e6
-    assert silence.now_s >= 6 * 0.5
+    assert silence.now_s >= 4 * 0.5  # it sleeps for 5, of which a starved thread misses some
     assert 0.04 < silent_s <= silence.now_s  # it goes on, no faster than real time
-    autopilot.close()
 
 
 def test_a_reset_sends_them_away_and_a_restarted_one_flies(opened, caplog):
