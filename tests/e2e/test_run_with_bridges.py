@@ -120,6 +120,21 @@ def test_a_command_is_published_and_flown(run):
     assert x_of_uav1(run) > before + 0.2
 
 
+@pytest.mark.parametrize(
+    ("msgtype", "message", "reason"),
+    [
+        ("geometry_msgs/PoseStamped", "{header: {frame_id: world}}", "goals are in 'map', not in"),
+        ("geometry_msgs/PoseStamped", "{pose: {position: {z: .nan}}}", "is not finite"),
+        ("std_msgs/String", "{data: a}", "carries geometry_msgs/msg/PoseStamped, not std_msgs"),
+    ],
+)
+def test_a_published_command_that_is_refused_ends_with_the_reason(run, msgtype, message, reason):
+    words = ("topic", "pub", "/uav1/goal_pose", msgtype, message, "--once")
+    refused = volery(run, *words, ok=False)
+    assert reason in refused
+    assert refused.endswith("error: the server has refused messages to /uav1/goal_pose\n")
+
+
 def x_of_uav1(run):
     text = volery(run, "topic", "echo", "/uav1/ground_truth/odom", "--once")
     return float(re.search(r"position:\s+x: (\S+)", text)[1])

@@ -21,6 +21,8 @@ from volery.graph.messages import Published
 _DEPTH = 1000
 _CLOCK_WAIT_S = 2.0
 """Time within which a graph with a clock publishes it."""
+_REFUSAL_WAIT_S, _REFUSAL_LOOK_S = 1.0, 0.05
+"""Time within which a server refuses a command that it has received."""
 
 
 def list_topics(via: str, *, types: bool) -> None:
@@ -118,7 +120,10 @@ def measure(via: str, topic: str, *, window: int, line: Callable[[Window], str])
 def publish(
     via: str, topic: str, msgtype: str, values: str, *, rate_hz: float, times: int | None
 ) -> None:
-    """Publishes a message typed as YAML, `times` times or until Ctrl-C."""
+    """Publishes a message typed as YAML, `times` times or until Ctrl-C.
+
+    Prints why a server refuses it; raises `BridgeError` at the end if it has refused any.
+    """
     if not (math.isfinite(rate_hz) and rate_hz > 0.0):
         raise BridgeError(f"--rate: expects a positive number, not {rate_hz}")
     name = msgtype if "/msg/" in msgtype else msgtype.replace("/", "/msg/", 1)
@@ -126,7 +131,34 @@ def publish(
     with closing(open_link(via, "volery_topic_pub")) as link:
         link.advertise(topic, name)
         now_ns = partial(_graph_time, link)
-        _repeat(link, topic, lambda: read_message(values, name, now_ns), 1.0 / rate_hz, times)
+        refusals = _Refusals(link)
+        make = partial(read_message, values, name, now_ns)
+        _repeat(link, topic, make, 1.0 / rate_hz, times, refusals.look)
+        refusals.wait()
+    if refusals.texts:
+        raise BridgeError(f"the server has refused messages to {topic}")
+
+
+class _Refusals:
+    """Why a server has refused messages of a connection, where its protocol says so."""
+
+    def __init__(self, link: GraphConnection) -> None:
+        self._link = link
+        self.texts: list[str] = []
+
+    def look(self) -> None:
+        """Prints new reasons, each once."""
+        for text in getattr(self._link, "problems", ()):
+            if text not in self.texts:
+                self.texts.append(text)
+                echo_line(text, err=True)
+
+    def wait(self) -> None:
+        """Waits for the reason why the last message is refused, as long as that may take."""
+        ends = time.monotonic() + _REFUSAL_WAIT_S
+        while hasattr(self._link, "problems") and not self.texts and time.monotonic() < ends:
+            time.sleep(_REFUSAL_LOOK_S)
+            self.look()
 
 
 def _graph_time(link: GraphConnection) -> int:
@@ -150,10 +182,12 @@ def _repeat(
     make: Callable[[], object],
     period_s: float,
     times: int | None,
+    look: Callable[[], None],
 ) -> None:
     sent, due = 0, time.monotonic()
     while times is None or sent < times:
         link.publish(topic, make())
+        look()
         sent += 1
         due += period_s
         if times is None or sent < times:

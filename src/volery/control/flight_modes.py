@@ -154,11 +154,12 @@ def plan(
             brake_level(control_state, estimate, gains)
         else:
             lead_level(control_state, estimate, gains, gains.speed)
-        if control_state.braking:
-            brake_height(control_state, estimate, gains)
-        elif control_state.mode == LAND:
+        if control_state.mode == LAND:
             sink = control_state.sink if control_state.sink > 0.0 else gains.landing
-            steer_height(control_state, estimate, gains, -sink)
+            # a descent near the ground ends at once, not gently
+            steer_height(control_state, estimate, gains, 0.0 if control_state.braking else -sink)
+        elif control_state.braking:
+            brake_height(control_state, estimate, gains)
         else:
             climb = gains.take_off if control_state.mode == TAKE_OFF else gains.climb
             lead_height(control_state, estimate, gains, climb, gains.descent)

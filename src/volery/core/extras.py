@@ -23,7 +23,7 @@ def import_extra(
     """
     try:
         return import_module(module)
-    except (ImportError, OSError) as error:
+    except Exception as error:  # packages of other versions raise anything
         absent = isinstance(error, ModuleNotFoundError) and f"{module}.".startswith(
             f"{error.name}."
         )

@@ -236,9 +236,11 @@ class _Goal:
             pending = [future for future in self._futures if not future.done()]
             if runs._loop.quitting:
                 raise CommandError(runs._quit_text())
-            what = pending[0].pending_text() if pending else f"{self._name} did not happen"
+            if pending:
+                raise pending[0].timeout_error(timeout_s)
             raise WaitTimeoutError(
-                f"{what} within {timeout_s:g} s, at {runs.time_s:.2f} s; pass a longer timeout_s?"
+                f"{self._name} did not happen within {timeout_s:g} s, at {runs.time_s:.2f} s; "
+                "pass a longer timeout_s?"
             )
         return self._found()
 

@@ -88,6 +88,7 @@ def _needs(scenario: Scenario) -> list[NodePackage]:
 
 def _is_installed(module: str) -> bool:
     try:
-        return find_spec(module) is not None
+        spec = find_spec(module)
     except (ImportError, ValueError):
         return False
+    return spec is not None and spec.origin is not None  # a mere folder has no origin

@@ -231,9 +231,11 @@ class Scenario(Data):
         types = ", ".join(dict.fromkeys(group.type for group in self.uavs))
         parts = ("forest", "city", "grid_map")
         there = [part.replace("_", " ") for part in parts if getattr(self.world, part) is not None]
+        there += ["meshes"] if self.world.meshes else []
+        ground = "open ground" if self.world.terrain.kind == "flat" else "terrain"
         return (
             f"<Scenario '{self.name}': {counted(self.uav_count, 'UAV')} ({types}), "
-            f"{' and '.join(there) or 'open ground'}, {self.duration_s:g} s, seed {self.seed}>"
+            f"{' and '.join(there) or ground}, {self.duration_s:g} s, seed {self.seed}>"
         )
 
     __str__ = __repr__

@@ -179,8 +179,8 @@ def test_slips_are_told_to_who_makes_them(client):
 def test_the_endpoints_complaints_are_kept(loop, client):
     loop.graph.advertise("/number", "std_msgs/msg/Int32")
     client.subscribe("/number", STRING, wake=lambda: None)
-    until(lambda: client.problem)
-    assert "std_msgs/msg/Int32" in client.problem[0]
+    until(lambda: client.problems)
+    assert "std_msgs/msg/Int32" in client.problems[0]
 
 
 # ---------------------------------------------------------------------------------------- services
@@ -418,7 +418,7 @@ def test_unitys_endpoint_answers_calls(unity):
     other.command("response", srv_id=101)
     other.send("/do", b"\1\2")
     assert "Trigger_Response" in str(outcome.get(timeout=60.0))
-    assert "77" in client.problem[0]
+    assert "77" in client.problems[0]
 
 
 @pytest.mark.parametrize(

@@ -142,17 +142,22 @@ def test_a_touch_down_that_shakes_the_estimate_is_a_landing(error):
     assert [k for k, _ in kinds(fleet)] == ["touch_down", "mode"]
 
 
-@pytest.mark.parametrize("speed", [2.0, 5.0])
-def test_a_landing_in_motion_brakes_before_it_descends(speed):
+@pytest.mark.parametrize(
+    ("speed", "sink", "lowest"), [(2.0, 0.0, 0.4), (5.0, 0.0, 0.4), (5.0, 0.8, 0.3)]
+)
+def test_a_landing_in_motion_brakes_before_it_descends(speed, sink, lowest):
     """As PX4 does (its pull request 9804); 0.6 m up, a descent would end at cruise speed."""
     fleet = in_air((0.0, 0.0, 0.6))
     for _ in range(30):
         fleet.command_velocity_map(0, (speed, 0, 0))
         track(fleet, 0.1)
+    if sink:
+        fleet.command_velocity_map(0, (speed, 0, -sink))
+        track(fleet, 0.2)
     fleet.land(0)
     position, velocity, _ = track(fleet, 8.0)
     level = np.linalg.norm(velocity[:, :2], axis=1)
-    assert position[level > 0.5, 2].min() > 0.4
+    assert position[level > 0.5, 2].min() > lowest
     assert level.min() < 0.1
     assert kinds(fleet) == [("touch_down", "LAND"), ("mode", "LANDED")]
 

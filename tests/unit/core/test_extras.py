@@ -241,6 +241,8 @@ def test_a_scenario_without_its_packages_fails_before_anything_is_built(monkeypa
             "libtbb.so",
         ),
         ("raise OSError('libGL.so.1: cannot open shared object file')", "libGL.so.1"),
+        ("raise AttributeError('_ARRAY_API not found')", "_ARRAY_API not found"),
+        ("raise RuntimeError('module compiled against ABI version 0x1000009')", "ABI version"),
         ("import a_package_that_is_missing", "No module named 'a_package_that_is_missing'"),
     ],
 )
@@ -262,6 +264,15 @@ def test_an_installed_package_that_does_not_load_is_not_called_missing(
     assert reason in text
     assert "pip install" not in text
     assert "\n" not in text
+
+
+def test_a_folder_is_no_package(monkeypatch, tmp_path):
+    """Python takes an empty folder on its path for a package."""
+    (tmp_path / "gtsam").mkdir()
+    monkeypatch.setattr(sys, "path", [str(tmp_path)])
+    monkeypatch.delitem(sys.modules, "gtsam", raising=False)
+    data = {"name": "own", "nodes": [{"node": "slam"}], **SMALL}
+    assert "slam needs gtsam" in missing_packages(parse_scenario(data))
 
 
 def test_loop_closures_alone_need_gtsam(monkeypatch):

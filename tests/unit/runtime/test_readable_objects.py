@@ -7,7 +7,7 @@ import pytest
 
 import volery
 from volery.control.flight_modes import FlightMode
-from volery.runtime import VectorizedSimulation
+from volery.runtime import Simulation, VectorizedSimulation
 from volery.scenario.load import load_scenario, parse_scenario
 
 
@@ -44,6 +44,27 @@ def test_scenarios_and_worlds_print_what_is_in_them(flat_data):
     scenario = parse_scenario(flat_data)
     assert ", open ground, " in repr(scenario)
     assert str(scenario.world) == "seed=3 terrain=FlatTerrain(kind='flat')"
+
+
+@pytest.mark.parametrize("name", ["coverage", "grid_map"])
+def test_worlds_print_their_grid_map(name):
+    with Simulation(load_scenario(name), threads=1) as simulation:
+        assert str(simulation.world).startswith("<world: grid map")
+
+
+def test_worlds_print_terrain_and_meshes(simulate, flat_data, tmp_path):
+    (tmp_path / "ground.csv").write_text("0,0,1\n0,1,1\n")
+    corners = "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nv 0 0 1\n"
+    (tmp_path / "rock.obj").write_text(corners + "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")
+    flat_data["world"] = {
+        "terrain": {"kind": "grid", "file": str(tmp_path / "ground.csv"), "spacing_m": 500.0}
+    }
+    assert str(simulate(flat_data).world) == "<world: terrain>"
+    assert ", terrain, " in str(parse_scenario(flat_data))
+    rock = {"file": str(tmp_path / "rock.obj"), "position_m": [50.0, 50.0, 0.0]}
+    flat_data["world"]["meshes"] = [rock]
+    assert str(simulate(flat_data).world) == "<world: 1 mesh>"
+    assert ", meshes, " in str(parse_scenario(flat_data))
 
 
 def test_environments_print_as_a_line(flat_data):

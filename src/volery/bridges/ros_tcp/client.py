@@ -90,7 +90,7 @@ class RosTcpClient(RemoteClient):
         self._start(connect_timeout_s)
 
     @property
-    def problem(self) -> tuple[str, ...]:
+    def problems(self) -> tuple[str, ...]:
         """Newest error reports of the endpoint, and errors of the connection."""
         return tuple(self._problems)
 

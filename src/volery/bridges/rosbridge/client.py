@@ -83,7 +83,7 @@ class RosbridgeClient(RemoteClient):
         self._start(connect_timeout_s)
 
     @property
-    def problem(self) -> tuple[str, ...]:
+    def problems(self) -> tuple[str, ...]:
         """Newest error reports of the server."""
         return tuple(self._state.problems)
 

@@ -56,6 +56,7 @@ class SimulationWorld:
         self.terrain, self.city, self.forest, self.scene = built
         self.grid_map = grid_map
         """The grid map of the world, and its changes."""
+        self._settings = settings
         self._engine = engine
         self._check_open = check_open
         self._topics = WeatherTopics(graph, settings, lambda: self.weather, self.set_weather)
@@ -63,13 +64,18 @@ class SimulationWorld:
 
     def __repr__(self) -> str:
         parts = []
+        if self._settings.grid_map is not None:
+            parts.append("grid map")
+        if self._settings.meshes:
+            parts.append(counted(len(self._settings.meshes), "mesh", "meshes"))
         if self.forest is not None:
             parts.append(counted(len(self.forest), "tree"))
         if self.city is not None:
             parts.append(counted(len(self.city.buildings), "building"))
         if self.actors is not None:
             parts.append(counted(len(self.actors.names), "actor"))
-        return f"<world: {', '.join(parts) or 'open ground'}>"
+        ground = "open ground" if self._settings.terrain.kind == "flat" else "terrain"
+        return f"<world: {', '.join(parts) or ground}>"
 
     @property
     def weather(self) -> Weather:

@@ -236,9 +236,9 @@ class BatchCommands(Uncopied, ABC):
             try:
                 begin(self._handles()[0])  # it refuses, and says why
             except CommandError as error:
-                raise CommandError(
-                    f"{command} reaches no UAV: {error}; wait() waits for their present commands"
-                ) from None
+                under_way = any(uav.pending_command for uav in self._handles())
+                advice = "; wait() waits for their present commands" if under_way else ""
+                raise CommandError(f"{command} reaches no UAV: {error}{advice}") from None
         return FlightFutureList([begin(uav) for uav in uavs], self._now_s)
 
     def _now_s(self) -> float:

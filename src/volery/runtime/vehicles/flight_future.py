@@ -132,12 +132,20 @@ class FlightFuture(Uncopied):
         `math.inf` waits for as long as it takes. Raises `FlightError` if the command fails,
         `WaitTimeoutError` if it is not done in time, `CommandError` within a tick.
         """
-        if not self.done() and not self._source.wait(self, timeout_s):
-            raise WaitTimeoutError(
-                f"{self.command} of {self.uav} is not done within {timeout_s:g} s; it goes on: "
-                f"{self._source.describe(self)}"
-            )
+        if not self.wait_until_done(timeout_s):
+            raise self.timeout_error(timeout_s)
         return self.result()
+
+    def wait_until_done(self, timeout_s: float) -> bool:
+        """Waits like `wait`; returns whether the command is done."""
+        return self.done() or self._source.wait(self, timeout_s)
+
+    def timeout_error(self, timeout_s: float) -> WaitTimeoutError:
+        """Returns the error of a wait of `timeout_s` that has ended before the command."""
+        return WaitTimeoutError(
+            f"{self.command} of {self.uav} is not done within {timeout_s:g} s; it goes on: "
+            f"{self._source.describe(self)}"
+        )
 
     def __await__(self) -> Generator[Any, None, CommandResult]:
         """Waits while other coroutines run, without a limit of time.

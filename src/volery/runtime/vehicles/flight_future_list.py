@@ -24,7 +24,10 @@ class FlightFutureList(list[FlightFuture]):
         Returns their results. See `FlightFuture.wait`.
         """
         end_s = self._now_s() + timeout_s
-        return [future.wait(max(0.0, end_s - self._now_s())) for future in self]
+        for future in self:
+            if not future.wait_until_done(max(0.0, end_s - self._now_s())):
+                raise future.timeout_error(timeout_s)
+        return [future.result() for future in self]
 
     def __await__(self) -> Generator[Any, None, list[CommandResult]]:
         """Waits for all of them while other coroutines run; see `FlightFuture`."""

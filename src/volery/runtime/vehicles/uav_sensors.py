@@ -186,10 +186,13 @@ def find_sensor(uav: str, wanted: str, kinds: Mapping[str, str]) -> str:
     if len(found) == 1 and wanted not in _NAMED_ONLY:
         return found[0]
     known = ", ".join(kinds) or "none"
-    of_kind = f", and {' and '.join(found)} of this kind" if found else ""
+    if found:
+        names = " or ".join(f"'{name}'" for name in found)
+        advice = f"each {wanted} goes by its name, {names}"
+        raise UnknownSensorError(f"{uav} has no sensor '{wanted}': {advice}; known: {known}")
     hint = near_miss(_OTHER_NAMES.get(str(wanted).lower(), wanted), [*kinds, *kinds.values()])
     raise UnknownSensorError(
-        f"{uav} has no sensor '{wanted}'; known: {known}{of_kind}{'.' if hint else ''}{hint}"
+        f"{uav} has no sensor '{wanted}'; known: {known}{'.' if hint else ''}{hint}"
     )
 
 
