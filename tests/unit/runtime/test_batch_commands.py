@@ -160,6 +160,18 @@ def test_all_uavs_wait_within_one_timeout(simulate, three_data):
         simulation.vehicles.wait(-1.0)
 
 
+def test_a_batch_says_how_long_it_waited(simulate, flat_data):
+    """Also for a UAV whose turn comes when most of the time is over."""
+    flat_data["uavs"][0] |= {"count": 2, "position_m": [0.0, 0.0, 2.0]}
+    simulation = simulate(flat_data)
+    near, far = [0.0, 0.0, 2.5], [90.0, 0.0, 3.0]
+    with pytest.raises(WaitTimeoutError, match=r"go_to of uav2 is not done within 4 s; it goes on"):
+        simulation.vehicles.go_to([near, far]).wait(4.0)
+    futures = simulation.vehicles.go_to([near, far])
+    with pytest.raises(WaitTimeoutError, match=r"go_to of uav2 is not done within 3 s; it goes on"):
+        simulation.run_until(futures, timeout_s=3.0)
+
+
 def test_futures_of_a_batch_are_waited_for_like_that_of_one_uav(simulate, three_data):
     simulation = simulate(three_data)
     vehicles = simulation.vehicles
