@@ -55,9 +55,8 @@ def do(task: Task) -> None:
             raise
         raise NodeError(f"warm-up {name_of(task)}: {type(error).__name__}: {error}") from error
     if is_own(task):
-        with suppress(
-            OSError
-        ):  # the folder was deleted or its disk is full: the next start compiles
+        # Without its folder, or room on the disk, the next start compiles again.
+        with suppress(OSError):
             _mark(task).touch()
 
 
