@@ -13,7 +13,12 @@ port = int(sys.argv[1]) if len(sys.argv) > 1 else 9090
 side_s = float(sys.argv[2]) if len(sys.argv) > 2 else 3.0
 
 ros = roslibpy.Ros("127.0.0.1", port)
-ros.run()
+try:
+    ros.run()
+except roslibpy.core.RosTimeoutError:
+    sys.exit(
+        f"no rosbridge at port {port}; start: volery run hover --seconds 60 --bridge rosbridge"
+    )
 roslibpy.Service(ros, "/uav1/take_off", "std_srvs/srv/Trigger").call(roslibpy.ServiceRequest())
 time.sleep(4.0)
 

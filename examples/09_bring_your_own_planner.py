@@ -17,7 +17,10 @@ waypoints = int(sys.argv[2]) if len(sys.argv) > 2 else 6
 uav, height_m = "uav1", 2.5
 
 ros = roslibpy.Ros("127.0.0.1", port)
-ros.run()
+try:
+    ros.run()
+except roslibpy.core.RosTimeoutError:
+    sys.exit(f"no rosbridge at port {port}; start: volery run plug_in --bridge rosbridge")
 
 # 1. The map: nav_msgs/OccupancyGrid on /map, latched, so it arrives at once.
 maps, arrived = [], threading.Event()

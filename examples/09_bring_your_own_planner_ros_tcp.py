@@ -19,7 +19,10 @@ port = int(sys.argv[1]) if len(sys.argv) > 1 else 10000
 waypoints = int(sys.argv[2]) if len(sys.argv) > 2 else 4
 uav, height_m = "uav1", 2.5
 
-link = socket.create_connection(("127.0.0.1", port), timeout=30.0)
+try:
+    link = socket.create_connection(("127.0.0.1", port), timeout=30.0)
+except ConnectionRefusedError:
+    sys.exit(f"no server at port {port}; start: volery run plug_in --bridge ros-tcp")
 stream = link.makefile("rb")
 
 

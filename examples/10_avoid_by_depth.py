@@ -1,4 +1,7 @@
-"""Crosses a field of dead trees with a depth camera; `region` selects the simpler method."""
+"""Crosses a field of dead trees with a depth camera.
+
+`region` as argument selects the simpler method, which may hit a tree.
+"""
 
 import sys
 
@@ -10,6 +13,9 @@ nodes = {
     "whole": "depth_avoidance",
     "region": "region_avoidance",
 }
+
+if way not in nodes:
+    sys.exit(f"no method '{way}': whole or region")
 
 data = load_scenario("obstacle_field").model_dump()
 data["types"]["scout"]["nodes"][0]["node"] = nodes[way]

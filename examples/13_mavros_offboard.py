@@ -10,8 +10,12 @@ import time
 
 import roslibpy
 
-ros = roslibpy.Ros("127.0.0.1", int(sys.argv[1]) if len(sys.argv) > 1 else 9090)
-ros.run()
+port = int(sys.argv[1]) if len(sys.argv) > 1 else 9090
+ros = roslibpy.Ros("127.0.0.1", port)
+try:
+    ros.run()
+except roslibpy.core.RosTimeoutError:
+    sys.exit(f"no rosbridge at port {port}; start: volery run plug_in --bridge rosbridge")
 heard = {}
 for name, kind in {
     "state": "mavros_msgs/State",

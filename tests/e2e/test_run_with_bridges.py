@@ -284,7 +284,7 @@ def test_a_program_for_mavros_flies_unchanged():
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
-        (("--bridge", "rosbrige"), "Did you mean 'rosbridge'"),
+        (("--bridge", "rosbrige"), "did you mean 'rosbridge'"),
         (("--bridge", "rosbridge=x"), "PORT or HOST:PORT"),
         (("--bridge", "rosbridge=0.0.0.0:0"), "other machines"),
     ],

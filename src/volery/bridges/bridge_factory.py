@@ -75,7 +75,7 @@ def _unknown(name: str, names: list[str]) -> str:
             "again (from its source folder: pip install -e .)"
         )
     hint = near_miss(name, names)
-    return f"no bridge '{name}'.{hint} Bridges: {', '.join(names)}"
+    return f"no bridge '{name}'{hint} Bridges: {', '.join(names)}"
 
 
 def _parse(address: str, port: int, text: str) -> Address:

@@ -58,8 +58,8 @@ def volery(
 
 app.command(cls=PageCommand)(run)
 app.command("list")(list_scenarios)
+app.command(context_settings={"ignore_unknown_options": True})(examples)
 for _command in (
-    examples,
     serve,
     play,
     sweep,

@@ -5,7 +5,6 @@ The process that drives a study imports no user's code: it only finds files and 
 
 from __future__ import annotations
 
-import difflib
 import hashlib
 import re
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from pathlib import Path
 from volery.cluster.errors import StudyError
 from volery.cluster.study import Study, StudyMetric
 from volery.core.errors import reason_of
+from volery.core.near_names import near_miss
 
 BUILT_IN: dict[str, str] = {
     "success": "low",
@@ -82,15 +82,15 @@ def check_metrics(study: Study, where: str, folder: Path, *, is_trusted: bool) -
         if table is not None and table.metric not in names:
             raise StudyError(
                 f"{where}: key '{key}.metric': '{table.metric}' is not one of the study's "
-                f"metrics{_near(table.metric, names)}: {', '.join(names)}"
+                f"metrics{near_miss(table.metric, names)} Known: {', '.join(names)}"
             )
 
 
 def _check_function(function: str, where: str, folder: Path, *, is_trusted: bool) -> None:
     if not _FUNCTION.fullmatch(function):
         raise StudyError(
-            f"{where}: key 'metrics': no metric '{function}'{_near(function, list(BUILT_IN))}; "
-            f"built in: {', '.join(BUILT_IN)}; your own: module:function or file.py:function"
+            f"{where}: key 'metrics': no metric '{function}'{near_miss(function, BUILT_IN)} "
+            f"Built in: {', '.join(BUILT_IN)}; your own: module:function or file.py:function"
         )
     module = function.partition(":")[0]
     if source_of(function, folder) is None and module.endswith(".py"):
@@ -145,8 +145,3 @@ def fingerprint_of(entry: MetricEntry, folder: Path) -> str:
 
 def _local_spec(top: str, folder: Path) -> ModuleSpec | None:
     return PathFinder.find_spec(top, [str(folder), str(Path().resolve())])
-
-
-def _near(name: str, names: list[str]) -> str:
-    near = difflib.get_close_matches(name, names, n=1)
-    return f"; did you mean '{near[0]}'?" if near else ""

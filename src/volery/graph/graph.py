@@ -23,6 +23,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from volery.core.errors import GraphError, VoleryError
+from volery.core.plurals import counted
 from volery.graph.actions import Actions
 from volery.graph.codecs.zero import zero_message
 from volery.graph.messages import Published, message_type, type_name
@@ -125,6 +126,10 @@ class Graph:
         """Receives what `refuse` says, in the simulation's thread."""
         self._members = threading.RLock()
         """Guards changes of topics, publishers, subscribers and services."""
+
+    def __repr__(self) -> str:
+        counts = counted(len(self._topics), "topic"), counted(len(self._services), "service")
+        return f"<graph: {', '.join(counts)}>"
 
     def now_ns(self) -> int:
         """Returns the simulated time, ns."""

@@ -64,6 +64,8 @@ class _Purpose(Enum):
 
 
 _CHECKED, _RECEIVED, _LOOKED_AT = _Purpose
+_OTHER_TYPE, _NO_FIELD = _OF_MESSAGES = ("must be a message of type", "has no field")
+"""What errors say about a message as a whole, after its type or path."""
 _USUAL = {"float32": "float", "float64": "float", "string": "str", "bool": "bool"}
 """Python's class of a base type whose every value fits."""
 
@@ -109,12 +111,12 @@ def _check_class(msgtype: str, cls: Any, message: Any) -> None:
     if isinstance(message, type) or getattr(message, "__msgtype__", None) != msgtype:
         found = message.__name__ if isinstance(message, type) else type(message).__name__
         what = f"the class {found}" if isinstance(message, type) else f"{message!r:.80} ({found})"
-        raise GraphError(f"{msgtype}: must be a message of this type, not {what}")
+        raise GraphError(f"{msgtype}: {_OTHER_TYPE} {msgtype}, not {what}")
     known = cls.__dataclass_fields__
     unknown = next((name for name in vars(message) if name not in known), None)
     if unknown is not None:
         names = ", ".join(name for name in known if not name.startswith("_"))
-        raise GraphError(f"{msgtype}: has no field '{unknown}'; fields: {names}")
+        raise GraphError(f"{msgtype}: {_NO_FIELD} '{unknown}'; fields: {names}")
 
 
 def _field_copier(where: str, described: Any, purpose: _Purpose) -> Copy | None:
@@ -123,16 +125,16 @@ def _field_copier(where: str, described: Any, purpose: _Purpose) -> Copy | None:
     if kind == Nodetype.BASE:
         return None if purpose is _RECEIVED else _base_checker(where, detail[0])
     if kind == Nodetype.NAME:
-        return partial(_nested, where, _copier(detail, purpose))
+        return partial(_nested, where, detail, _copier(detail, purpose))
     (inner, inner_detail), size = detail
     length = size if kind == Nodetype.ARRAY else 0
     if inner == Nodetype.NAME:
         is_shared = purpose is _CHECKED and not _holds(inner_detail)
         looked_at = _copier(inner_detail, _LOOKED_AT if is_shared else purpose)
-        return partial(_copy_list, where, looked_at, is_shared)
+        return partial(_copy_list, where, inner_detail, looked_at, is_shared)
     if inner_detail[0] == "string":
         check = None if purpose is _RECEIVED else _base_checker(where, "string")
-        return partial(_copy_list, where, check, False)
+        return partial(_copy_list, where, "", check, False)
     if purpose is _RECEIVED:
         return received if kind == Nodetype.SEQUENCE else _writeable
     copy = _look_at_numbers if purpose is _LOOKED_AT else numbers_of
@@ -157,11 +159,16 @@ def _check_value(
     where: str, base: str, classes: Any, limits: tuple[int, int] | None, value: Any
 ) -> Any:
     if not isinstance(value, classes):
-        kind = f"{'an' if base[0] == 'i' else 'a'} {base}"
-        raise GraphError(f"{where} must be {kind}, not {value!r:.80} ({type(value).__name__})")
+        raise GraphError(
+            f"{where} must be {_kind(base)}, not {value!r:.80} ({type(value).__name__})"
+        )
     if limits is not None and not limits[0] <= value <= limits[1]:
-        raise GraphError(f"{where} must be a {base}, {limits[0]} to {limits[1]}, not {value}")
+        raise GraphError(f"{where} must be {_kind(base)}, {limits[0]} to {limits[1]}, not {value}")
     return value
+
+
+def _kind(base: str) -> str:
+    return f"{'an' if base[0] == 'i' else 'a'} {base}"
 
 
 def _check_text(where: str, base: str, value: Any) -> Any:
@@ -181,11 +188,17 @@ def _check_byte(where: str, value: Any) -> Any:
     return number - 256 if number > 127 else number
 
 
-def _nested(where: str, copy: Copy, value: Any) -> Any:
+def _nested(where: str, msgtype: str, copy: Copy, value: Any) -> Any:
     try:
         return copy(value)
     except GraphError as error:
-        raise GraphError(f"{where}: {error}") from None
+        raise _error_inside(where, msgtype, error) from None
+
+
+def _error_inside(where: str, msgtype: str, error: GraphError) -> GraphError:
+    """Returns the error of a nested message, with the path of its field: `pose.position.x`."""
+    told = str(error).removeprefix(f"{msgtype}: ")
+    return GraphError(f"{where} {told}" if told.startswith(_OF_MESSAGES) else f"{where}.{told}")
 
 
 def _writeable(values: Any) -> Any:
@@ -203,18 +216,25 @@ def _holds(msgtype: str) -> bool:
     )
 
 
-def _copy_list(where: str, copy: Copy | None, is_shared: bool, values: Any) -> Any:
-    """Returns a list of copied parts; `is_shared`: of the parts themselves, after `copy`."""
+def _copy_list(where: str, msgtype: str, copy: Copy | None, is_shared: bool, values: Any) -> Any:
+    """Returns a list of copied parts; `is_shared`: of the parts themselves, after `copy`.
+
+    msgtype: of the parts; empty for texts.
+    """
     if isinstance(values, LazyList):  # built when read, and so immutable
         return values
     if not isinstance(values, Sequence | Set) or isinstance(values, str | bytes):
         raise GraphError(f"{where} must be a list, not {values!r:.80} ({type(values).__name__})")
     if copy is None:
         return list(values)
+    copied: list[Any] = []
     try:
-        copied = [copy(value) for value in values]
+        copied.extend(map(copy, values))
     except GraphError as error:
-        raise GraphError(f"{where}[...]: {error}") from None
+        item = f"{where}[{len(copied)}]"
+        if msgtype:
+            raise _error_inside(item, msgtype, error) from None
+        raise GraphError(f"{item}{str(error).removeprefix(where)}") from None
     return list(values) if is_shared else copied
 
 

@@ -84,9 +84,10 @@ class NumberSequence(np.ndarray):
         super().__setitem__(which, value)
 
     def __add__(self, other: Any) -> Any:
-        """Joins two sequences; adds anything else."""
+        """Joins two sequences; adds anything else. Raises `TypeError` for a list, as rclpy does."""
         if self._joins(other):
             return field_of(np.concatenate([_plain(self), np.asarray(other)]))
+        self._refuse_list(other)
         return _plain(self) + _plain(other)
 
     def __iadd__(self, other: Any) -> Any:  # an `array.array` grows in place
@@ -94,9 +95,10 @@ class NumberSequence(np.ndarray):
         return self + other
 
     def __radd__(self, other: Any) -> Any:
-        """Joins an `array.array` and this; adds anything else."""
+        """Joins an `array.array` and this; else as `__add__`."""
         if self._joins(other):
             return field_of(np.concatenate([np.asarray(other), _plain(self)]))
+        self._refuse_list(other)
         return _plain(other) + _plain(self)
 
     def __mul__(self, other: Any) -> Any:
@@ -142,6 +144,13 @@ class NumberSequence(np.ndarray):
         if self._is_field and isinstance(other, list | tuple):
             return compare is operator.ne  # an `array.array` equals no list
         return compare(_plain(self), _plain(other))
+
+    def _refuse_list(self, other: Any) -> None:
+        if self._is_field and isinstance(other, list | tuple):
+            raise TypeError(
+                f"a received sequence and a {type(other).__name__} neither join nor add: join with "
+                "list(values) + [...], add with numpy.array(values) + [...]"
+            )
 
     def _joins(self, other: Any) -> bool:
         """Returns whether `array.array` would treat both as sequences."""

@@ -5,7 +5,6 @@ A file can refer only to its own folder and the shipped parts, whatever its orig
 
 from __future__ import annotations
 
-import difflib
 import re
 import tomllib
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from volery.core.errors import DataFileError, reason_of
+from volery.core.near_names import near_miss
 from volery.core.toml_text import parse_toml
 from volery.scenario.merging import merged
 
@@ -85,8 +85,7 @@ def _path_of_base(path: Path, name: Any, shipped: Path) -> Path:
         return shipped / f"{name}.toml"
     shown = name if len(name) <= _MAX_SHOWN else f"{name[:_MAX_SHOWN]}..."
     if not name.endswith(".toml"):
-        near = difflib.get_close_matches(name, known, n=1)
-        hint = f"; did you mean '{near[0]}'?" if near else "."
+        hint = near_miss(name, known)
         raise DataFileError(f"{fault} no shipped '{shown}'{hint} Allowed: {allowed}")
     if Path(name).name != name:
         raise DataFileError(f"{fault} '{shown}' lies in another folder. Allowed: {allowed}")

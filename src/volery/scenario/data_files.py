@@ -47,4 +47,4 @@ def find_data_file(name: str, shipped: Path, what: str, folder: Path | None = No
     if name in known:
         return shipped / f"{name}.toml"
     hint = near_miss(name, known)
-    raise DataFileError(f"no {what} '{name}'.{hint} Known: {', '.join(known)}, or a .toml path")
+    raise DataFileError(f"no {what} '{name}'{hint} Known: {', '.join(known)}, or a .toml path")

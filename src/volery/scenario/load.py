@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 import tomllib
 from pathlib import Path
 from typing import Any
 
 from volery.core.errors import ScenarioError, reason_of
+from volery.core.near_names import near_miss
 from volery.core.toml_text import parse_toml
 from volery.scenario import library
 from volery.scenario.access import ScenarioAccess
@@ -59,6 +59,11 @@ def parse_scenario(
 
 
 def _find(name_or_path: str | Path) -> Path:
+    if not isinstance(name_or_path, str | Path):
+        raise ScenarioError(
+            "a scenario is a shipped one's name, the path of a .toml file or a Scenario, not "
+            f"{type(name_or_path).__name__}; parse_scenario makes one of plain data"
+        )
     path = Path(name_or_path)
     if path.suffix == ".toml" or path.exists():
         if path.is_dir():
@@ -69,8 +74,7 @@ def _find(name_or_path: str | Path) -> Path:
     shipped = library.path_of(str(name_or_path))
     if shipped is None:
         known = ", ".join(library.names())
-        near = difflib.get_close_matches(str(name_or_path), library.names(), n=1)
-        hint = f"; did you mean '{near[0]}'?" if near else "."
+        hint = near_miss(name_or_path, library.names())
         raise ScenarioError(
             f"no scenario '{name_or_path}'{hint} It is neither a file nor one of: {known}"
         )

@@ -6,11 +6,11 @@ in `pyproject.toml`.
 
 from __future__ import annotations
 
-import difflib
 import warnings
 
 from volery.core.entry_points import EntryPoints
 from volery.core.errors import ScenarioError
+from volery.core.near_names import near_miss
 
 NODE_PATTERN = r"^(\w[\w-]*|[\w.]+:\w+)$"
 """Pattern of node names: a registered name or `module:Class`."""
@@ -56,8 +56,7 @@ def node_path(node: str) -> str:
     path = _REGISTERED.find(node)
     if path is None:
         known = _REGISTERED.names()
-        near = difflib.get_close_matches(node, known, n=1)
-        hint = f"; did you mean '{near[0]}'?" if near else "."
+        hint = near_miss(node, known)
         raise ScenarioError(
             f"no node '{node}'{hint} It is neither module:Class nor one of: {', '.join(known)}"
         )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from operator import index
@@ -11,6 +10,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from volery.core.errors import ScenarioError
+from volery.core.near_names import near_miss
 from volery.scenario.fleet_size import resized
 from volery.scenario.key_paths import with_key
 from volery.scenario.merging import merged
@@ -71,8 +71,7 @@ def _check_key(key: Any, known: Collection[str], where: str) -> None:
     if first[0] in ("wind", "weather"):
         raise ScenarioError(f"{where}: unknown key '{key}'; write 'world.{key}'")
     names = sorted({*known, *_SHORT_FORMS})
-    near = difflib.get_close_matches(first[0], names, n=1)
-    hint = f"; did you mean '{near[0]}'?" if near else "."
+    hint = near_miss(first[0], names)
     raise ScenarioError(f"{where}: unknown key '{key}'{hint} Allowed here: {', '.join(names)}")
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from volery.core.errors import ScenarioError
+from volery.core.near_names import near_miss
+from volery.scenario.fault_texts import fault_text
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -51,11 +52,10 @@ def describe_validation_error(
 
 def _describe(fault: Any, model: type[BaseModel], data: Any) -> str:
     key = _key(fault["loc"], data, keep_last=fault["type"] == "missing")
-    message = str(fault["msg"]).removeprefix("Value error, ")
+    message = fault_text(fault)
     if fault["type"] == "extra_forbidden":
         allowed = _sibling_keys(model, fault["loc"])
-        near = difflib.get_close_matches(str(fault["loc"][-1]), allowed, n=1)
-        hint = f"; did you mean '{near[0]}'?" if near else "."
+        hint = near_miss(fault["loc"][-1], allowed)
         return f"unknown key '{key}'{hint} Allowed here: {', '.join(allowed)}"
     if fault["type"] == "missing":
         return f"key '{key}' is missing"
@@ -64,8 +64,6 @@ def _describe(fault: Any, model: type[BaseModel], data: Any) -> str:
     one_table = fault["type"] == "tuple_type" and isinstance(fault.get("input"), dict)
     if one_table and _names_tables(model, fault["loc"]):
         return f"key '{key}': there may be several of them; write [[{key}]], not [{key}]"
-    if fault["type"] == "tuple_type":
-        message = "a list is needed, in brackets"
     found = fault.get("input")
     shown = f" (found {_short(found)})" if isinstance(found, str | int | float | bool) else ""
     return f"key '{key}': {message}{shown}"

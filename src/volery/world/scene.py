@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from volery.core.plurals import counted
 from volery.core.workers import Workers
 from volery.world.actors.moving import MovingActors
 from volery.world.embree_backend import EmbreeBackend
@@ -81,6 +82,10 @@ class Scene:
         self._uav_rows, self._actor_rows, self._uavs_per_env = NO_ROWS, NO_ROWS, 1
         self._bodies = body_table(NO_ROWS, NO_ROWS, 1)
         self._is_twin = False
+
+    def __repr__(self) -> str:
+        static = counted(self._content.instances, "static instance")
+        return f"<scene: {static}, {counted(len(self._uav_rows.scene), 'moving UAV')}>"
 
     @property
     def moving_offset(self) -> int:

@@ -6,13 +6,13 @@ of them; all others use the scenario's default species, and one warning counts t
 
 from __future__ import annotations
 
-import difflib
 import logging
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 from volery.core.errors import ScenarioError
+from volery.core.near_names import near_miss
 from volery.core.plurals import counted
 from volery.world.trees import species_names
 
@@ -57,8 +57,7 @@ def _checked(species_map: Mapping[str, str]) -> dict[str, str]:
     allowed = species_names()
     for name, target in species_map.items():
         if target not in allowed:
-            near = difflib.get_close_matches(target, allowed, n=1)
-            hint = f"; did you mean '{near[0]}'?" if near else "."
+            hint = near_miss(target, allowed)
             raise ScenarioError(
                 f"species_map.{_plain(name)!r}: unknown tree species '{_plain(target)}'{hint} "
                 f"Allowed: {', '.join(allowed)}"

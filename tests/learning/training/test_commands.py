@@ -116,7 +116,10 @@ def test_event_files_hold_scalars(folder, monkeypatch):
     ("words", "reason"),
     [
         (["train", "homming"], "unknown task 'homming'"),
-        (["train", "homing", "--algorithm", "a2c"], "algorithm: input should be 'ppo'"),
+        (
+            ["train", "homing", "--algorithm", "a2c"],
+            "key 'algorithm': 'ppo', 'dqn' or 'sac' is needed",
+        ),
         (["train", "homing", "--resume"], "no training of 'homing' in training/"),
         (
             ["train", "hover", "--algorithm", "dqn", "--no-tensorboard"],

@@ -21,9 +21,9 @@ def test_a_file_sets_options(tmp_path, encoding):
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("algorithm = 'a2c'", "algorithm: input should be 'ppo', 'dqn' or 'sac'"),
-        ("[ppo]\nepochs = 0", "ppo.epochs: input should be greater than or equal to 1"),
-        ("steps_per_s = 5", "steps_per_s: extra inputs are not permitted"),
+        ("algorithm = 'a2c'", "key 'algorithm': 'ppo', 'dqn' or 'sac' is needed (found 'a2c')"),
+        ("[ppo]\nepochs = 0", "key 'ppo.epochs': a number of at least 1 is needed"),
+        ("steps_per_s = 5", "unknown key 'steps_per_s'; did you mean 'steps'? Allowed here: "),
         ("steps = ", "not TOML"),
         ("gamma = nan", "gamma"),
     ],

@@ -137,7 +137,7 @@ def test_an_unknown_name_brings_a_hint_and_the_list():
     with pytest.raises(BridgeError) as error:
         make_bridge("mavlnk=14550", BridgeOptions())
     told = str(error.value)
-    assert told.startswith("no bridge 'mavlnk'. Did you mean 'mavlink'? Bridges: ")
+    assert told.startswith("no bridge 'mavlnk'; did you mean 'mavlink'? Bridges: ")
     assert all(name in told for name in SHIPPED)
 
 

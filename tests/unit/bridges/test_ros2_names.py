@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
+import sys
 
 import pytest
 
@@ -162,11 +162,19 @@ def test_the_domain_is_that_of_the_environment(monkeypatch):
             environment.domain_of(None)
 
 
-@pytest.mark.parametrize("middleware", ["dds", "zenoh"])
-def test_what_to_install_is_said(monkeypatch, middleware):
-    monkeypatch.setattr(importlib.util, "find_spec", lambda _name: None)
+@pytest.mark.parametrize(
+    ("middleware", "module"), [("dds", "cyclonedds.domain"), ("zenoh", "zenoh")]
+)
+def test_what_to_install_is_said(monkeypatch, tmp_path, middleware, module):
+    monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(BridgeError, match=r'pip install "volery\[ros2\]"'):
-        environment.join_ros2(environment.Ros2Environment(middleware))
+        environment.join_ros2(environment.Ros2Environment(middleware, 7))
+    for name in [each for each in sys.modules if each.partition(".")[0] in module]:
+        monkeypatch.delitem(sys.modules, name)
+    (tmp_path / f"{module.partition('.')[0]}.py").write_text("raise OSError('libddsc.so is bad')")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(BridgeError, match=r"installed but cannot be imported: libddsc.so is bad"):
+        environment.join_ros2(environment.Ros2Environment(middleware, 7))
 
 
 def test_nothing_leaves_the_machine_unless_interfaces_are_named():

@@ -12,7 +12,7 @@ BAD = {
     "seeeds = [1]": "unknown key 'seeeds'; did you mean 'seeds'",
     "seeds = [1, 1]": "contains a seed twice",
     "seeds = [1]\nrepetitions = 2": "not both",
-    "repetitions = 0": "key 'repetitions': Input should be greater than or equal to 1",
+    "repetitions = 0": "key 'repetitions': a number of at least 1 is needed",
     "metrics = ['sucess']": "no metric 'sucess'; did you mean 'success'",
     "metrics = []": "key 'metrics'",
     "metrics = ['success', 'success']": "two metrics are named 'success'",
@@ -22,7 +22,7 @@ BAD = {
         "parameters.wind: key 'world.wind.velocty_m_s' = 1.0: .*did you mean 'velocity_m_s'"
     ),
     "[parameters.seed]\nkey = 'sed'\nvalues = [1]": "unknown key 'sed'; did you mean 'seed'",
-    f"{WIND}values = []": "key 'parameters.wind.values': Tuple should have at least 1 item",
+    f"{WIND}values = []": "key 'parameters.wind.values': a list of at least 1 is needed",
     f"{WIND}values = [[900.0, 0.0, 0.0]]": "parameters.wind: .*900.0",
     WIND: "give one of 'values', 'range' with 'steps', or 'distribution'",
     f"{WIND}range = [0.0, 1.0]": "'range' and 'steps' belong together",

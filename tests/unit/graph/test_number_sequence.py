@@ -70,6 +70,15 @@ def test_sequences_join_with_arrays_of_the_node():
         ranges().index(77.0)
 
 
+def test_a_list_neither_joins_nor_adds():
+    """rclpy's `array.array` refuses it as well; numpy would add."""
+    for wrong in ([1.0], (1.0,) * len(VALUES)):
+        for join in (lambda odd: ranges() + odd, lambda odd: odd + ranges()):
+            with pytest.raises(TypeError, match=r"list\(values\) \+ \[...\]"):
+                join(wrong)
+    assert [*ranges(), 1.0] == list(ranges()) + [1.0]  # noqa: RUF005
+
+
 def test_everything_else_is_numpy_with_plain_results():
     r, plain = ranges(), np.array(VALUES, np.float32)
     np.testing.assert_array_equal(r + 1.0, plain + 1.0)

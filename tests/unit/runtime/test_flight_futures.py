@@ -152,6 +152,10 @@ def test_a_crash_fails_it_with_the_obstacle(flying):
     with pytest.raises(FlightError, match=r"failed at .* s: it hit ground at \d.* and crashed"):
         future.wait()
     assert uav.crashed
+    with pytest.raises(CommandError, match="uav1 has crashed: there is nothing to wait for"):
+        uav.wait()
+    with pytest.raises(CommandError, match="all UAVs have crashed"):
+        flying.vehicles.wait()
 
 
 def test_a_closed_simulation_takes_no_commands(flying):

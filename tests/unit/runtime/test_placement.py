@@ -184,7 +184,7 @@ def test_missing_files_name_the_places_looked_at(simulate, flat_data):
         simulate(flat_data)
     flat_data["world"] = {}
     flat_data["types"]["f450"]["airframe"] = "f45"
-    with pytest.raises(DataFileError, match="Did you mean 'f450'"):
+    with pytest.raises(DataFileError, match="did you mean 'f450'"):
         simulate(flat_data)
 
 

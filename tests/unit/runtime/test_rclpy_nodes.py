@@ -133,6 +133,34 @@ def test_unknown_types_and_modules_are_import_errors(tmp_path, monkeypatch, simu
             simulate(flat_data)
 
 
+@pytest.mark.parametrize(
+    ("line", "advice"),
+    [
+        ("import rospy", "node of ROS 1: .* --bridge ros1"),
+        ("from nav2_msgs.msg import Costmap", "files of nav2_msgs in message_packages"),
+        ("import ament_index_python.packages", "no stand-in for ament_index_python"),
+        ("import not_of_ros", r"No module named 'not_of_ros' \(wrong.py:1\)\s"),
+    ],
+)
+def test_a_missing_package_of_ros_comes_with_advice(
+    tmp_path, monkeypatch, simulate, flat_data, line, advice
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "wrong.py").write_text(f"{line}\n")
+    flat_data["types"]["f450"]["nodes"] = [{"node": "wrong:X"}]
+    with pytest.raises(ScenarioError, match=rf"cannot be imported: ModuleNotFound.*{advice}"):
+        simulate(flat_data)
+
+
+def test_a_missing_node_file_is_said_in_one_line(tmp_path, monkeypatch, simulate, flat_data):
+    monkeypatch.chdir(tmp_path)
+    flat_data["types"]["f450"]["nodes"] = [{"node": "not_there:X"}]
+    with pytest.raises(ScenarioError, match="no module 'not_there' is installed or") as raised:
+        simulate(flat_data)
+    assert str(tmp_path) in str(raised.value)
+    assert not hasattr(raised.value, "__notes__")
+
+
 def test_spinning_says_that_volery_does_it(simulate, flat_data, tmp_path, monkeypatch):
     (tmp_path / "spins.py").write_text(
         "import rclpy\n"

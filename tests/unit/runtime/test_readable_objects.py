@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+import re
 
 import pytest
 
@@ -23,6 +24,10 @@ def test_objects_print_as_a_line(simulate, flat_data):
     assert str(uav) == f"<Uav 'uav1' (f450): HOLD at ({x:.2f}, {y:.2f}, {z:.2f}) m>"
     assert str(simulation.vehicles) == "<2 UAVs: uav1 HOLD, uav2 HOLD>"
     assert str(simulation.world) == "<world: open ground>"
+    assert re.fullmatch(r"<graph: \d\d+ topics, \d\d+ services>", str(simulation.graph))
+    assert re.fullmatch(
+        r"<scene: \d+ static instances?, 2 moving UAVs>", str(simulation.world.scene)
+    )
     assert str(simulation.snapshot()) == "<Snapshot at 0.500 s of 2 UAVs>"
     simulation.vehicles.delete("uav1")
     assert str(uav) == "<Uav 'uav1' (f450): deleted>"

@@ -30,6 +30,8 @@ def test_a_scenario_as_it_is(flat_data, tmp_path):
     [
         ("hoover", {}, "no scenario 'hoover'; did you mean 'hover'"),
         ("hover", {"sed": 1}, "unknown key 'sed'; did you mean 'seed'"),
+        ({"name": "own"}, {}, "a scenario is .*, not dict; parse_scenario makes one"),
+        (None, {}, "a scenario is .*, not NoneType"),
         ("hover", {"threads": 0}, "threads must be at least 1"),
     ],
 )

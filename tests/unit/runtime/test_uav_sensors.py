@@ -126,7 +126,7 @@ def test_samples_are_views_that_later_measurements_do_not_change(simulate, all_d
 def test_errors_name_what_exists(simulate, all_data):
     simulation = simulate(all_data)
     sensors = simulation.uavs["uav1"].sensors
-    with pytest.raises(KeyError, match=r"uav1 has no sensor 'lidar': each .*; known: imu, range"):
+    with pytest.raises(KeyError, match=r"uav1 has no sensor 'lidar': each .* Known: imu, range"):
         sensors["lidar"]
     assert "lidar" not in sensors
     with pytest.raises(SensorError, match="'imu' of uav1 has no sample yet: run the simulation"):
@@ -195,7 +195,7 @@ def test_resets_snapshots_and_deleted_uavs(simulate, all_data):
     other = simulation.uavs["uav2"].sensors["imu"]
     assert other.has_sample  # of before the fleet changed
     assert dict(gone.sensors) == {}
-    with pytest.raises(KeyError, match="uav1 has no sensor 'imu'; known: none"):
+    with pytest.raises(KeyError, match=r"uav1 has no sensor 'imu'[.] Known: none"):
         gone.sensors["imu"]
     with pytest.raises(SensorError, match="uav1 has no sensor 'imu'"):
         _ = imu.latest
@@ -220,7 +220,7 @@ def test_environments_have_the_same_names(simulate, flat_data):
         assert not sensors["imu"].has_sample.any()
         with pytest.raises(SensorError, match="run the environments first"):
             _ = sensors["imu"].latest
-        with pytest.raises(KeyError, match="each lidar goes by its name, 'horizontal'; known: "):
+        with pytest.raises(KeyError, match=r"each lidar goes by its name, 'horizontal'[.] Known: "):
             sensors["lidar"]
         envs.run(0.35)
         scan, imu = sensors["horizontal"].latest, sensors["imu"].latest
@@ -266,9 +266,9 @@ def test_a_sensor_is_found_by_its_kind_where_it_is_the_only_one(simulate, flat_d
     assert "gnss" in sensors
     assert isinstance(sensors["gnss"].next(), GnssSample)
     assert "gnss" not in list(sensors)
-    with pytest.raises(SensorError, match=r"no sensor 'lidar': each .* name, 'left';"):
+    with pytest.raises(SensorError, match=r"no sensor 'lidar': each .* name, 'left'"):
         sensors["lidar"]
-    with pytest.raises(SensorError, match=r"no sensor 'gps'; known: .*fix"):
+    with pytest.raises(SensorError, match=r"no sensor 'gps'.* Known: .*fix"):
         sensors["gps"]
     with VectorizedSimulation(parse_scenario(flat_data), 2) as envs:
         assert envs.sensors["uav1"]["gnss"].name == "fix"
@@ -281,7 +281,9 @@ def test_a_sensor_is_found_by_its_kind_where_it_is_the_only_one(simulate, flat_d
 )
 def test_a_misspelt_sensor_is_suggested(simulate, all_data, wanted, meant):
     sensors = simulate(all_data).uavs["uav1"].sensors
-    with pytest.raises(SensorError, match=rf"no sensor '{wanted}'; .*Did you mean '{meant}'\?$"):
+    with pytest.raises(
+        SensorError, match=rf"no sensor '{wanted}'; did you mean '{meant}'\? Known: "
+    ):
         sensors[wanted]
-    with pytest.raises(SensorError, match=r"known: .*front$"):
+    with pytest.raises(SensorError, match=r"Known: .*front$"):
         sensors["xyz"]

@@ -167,7 +167,7 @@ def test_sensors_as_models_and_tables_replace_all():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"uavs": 0}, r"key 'uavs\[0\]\.count': .*greater than or equal to 1"),
+        ({"uavs": 0}, r"key 'uavs\[0\]\.count': .*a number of at least 1"),
         ({"uavs": 2.5}, r"key 'uavs': give a whole number or a list of groups \(found 2\.5\)"),
         ({"uavs": True}, r"key 'uavs': give a whole number .*found True"),
         ({"winds": 3}, r"unknown key 'winds'; did you mean 'wind'\? Allowed here: airframe, "),
@@ -175,7 +175,7 @@ def test_sensors_as_models_and_tables_replace_all():
         ({3: "x"}, r"a key is a text such as 'world\.wind' \(found 3\)"),
         ({"sensors": None}, r"key 'sensors': give sets \(lidar, .* \(found None\)"),
         ({"wind": 3.0}, r"key 'world\.wind\.velocity_m_s': a list is needed"),
-        ({"airframe": 7}, r"key 'types\.f450\.airframe': .*string"),
+        ({"airframe": 7}, r"key 'types\.f450\.airframe': a text is needed"),
         ({"sensors": "radar"}, r"key 'sensors': no set 'radar'; give sets \(lidar, camera"),
         ({"sensors": ["lidar", SonarSensor()]}, r"names of sets and sensors are mixed; give"),
         ({"weather": {"rain": 1}}, r"unknown key 'world\.weather\.rain'"),

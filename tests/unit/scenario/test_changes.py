@@ -36,11 +36,11 @@ def test_numbers():
         ("{", ["not JSON"]),
         ("[1]", ["JSON object"]),
         ('{"uav": 5}', ["unknown key 'uav'", "did you mean 'uavs'"]),
-        ('{"uavs": 0}', ["key 'uavs'", "greater than or equal to 1", "found 0"]),
+        ('{"uavs": 0}', ["key 'uavs'", "a number of at least 1", "found 0"]),
         ('{"uavs": "many"}', ["key 'uavs'", "many"]),
         ('{"sensors": ["radar"]}', ["key 'sensors[0]'", "'lidar'", "found 'radar'"]),
         ('{"speed": NaN}', ["speed"]),
-        ('{"tree_share": 1.5}', ["key 'tree_share'", "less than or equal to 1"]),
+        ('{"tree_share": 1.5}', ["key 'tree_share'", "a number of at most 1"]),
         ('{"seconds": -1}', ["key 'seconds'"]),
     ],
 )

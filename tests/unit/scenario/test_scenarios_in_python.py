@@ -105,7 +105,7 @@ def test_arrays_may_stand_for_lists():
     ("make", "message"),
     [
         (lambda: LidarSensor(nam="a"), r"^LidarSensor: unknown key 'nam'; did you mean 'name'\?"),
-        (lambda: ImuSensor(rate_hz=-1), r"^ImuSensor: key 'rate_hz': .*greater than 0 .*found -1"),
+        (lambda: ImuSensor(rate_hz=-1), r"^ImuSensor: key 'rate_hz': .*above 0 .*found -1"),
         (lambda: World(wind={"turbulence": "mild"}), r"^World: key 'wind\.turbulence': .*'light'"),
         (lambda: Wind(velocity_m_s=(99.0, 0, 0)), r"^Wind: velocity_m_s components must lie"),
         (lambda: UavGroup(position_m=(0, 0)), r"^UavGroup: key 'type' is missing"),

@@ -292,12 +292,12 @@ def test_noise_differs_between_scans_and_streams():
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("beams = 1081", "beams = 1", "scan.beams': Input should be greater"),
+        ("beams = 1081", "beams = 1", "scan.beams': a number of at least 2 is needed"),
         ("beams = 1081", "beems = 1081", "unknown key 'scan.beems'; did you mean 'beams'"),
-        ("max_m = 30.0", "max_m = nan", "range.max_m': Input should be a finite"),
+        ("max_m = 30.0", "max_m = nan", "range.max_m': a finite number is needed"),
         ("max_m = 30.0", "", "'range.max_m' is missing"),
         ("max_m = 30.0", "max_m = 0.01", "min_m must be below max_m"),
-        ("rate_hz = 40.0", 'rate_hz = "fast"', "scan.rate_hz': Input should be a valid number"),
+        ("rate_hz = 40.0", 'rate_hz = "fast"', "scan.rate_hz': a number is needed"),
         ("rate_hz = 40.0", "rate_hz = 400.0", "fit in one turn"),
         ("[scan]", "[scan", "not valid TOML"),
     ],

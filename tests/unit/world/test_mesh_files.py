@@ -170,3 +170,17 @@ def test_errors_name_scenario_and_key(tmp_path, box_file):
         scenario_with("a.stl", scale=-1.0)
     with pytest.raises(ScenarioError, match=r"world\.meshes\[0\]\.material"):
         scenario_with("a.stl", material="cheese")
+
+
+@pytest.mark.parametrize(
+    ("scale", "question"),
+    [
+        (1.0, None),
+        (0.01, None),
+        (500.0, "model.obj is 500 x 1e+03 x 1.5e+03 m: if the file is in mm, set scale = 0.001"),
+        (0.001, "model.obj is 0.001 x 0.002 x 0.003 m: is `scale` right?"),
+    ],
+)
+def test_a_size_that_suggests_another_unit_is_questioned(box_file, caplog, scale, question):
+    mesh_solids(scenario_with(box_file("model.obj"), scale=scale))
+    assert caplog.messages == ([] if question is None else [question])

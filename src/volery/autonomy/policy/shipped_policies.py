@@ -31,7 +31,7 @@ def find_policy(name: str, folder: Path | None = None) -> Path:
         return _FOLDER / f"{name}.npz"
     hint = near_miss(name, known)
     listed = ", ".join(known) or "none ship"
-    raise DataFileError(f"no policy '{name}'.{hint} Known: {listed}, or the path of a .npz file")
+    raise DataFileError(f"no policy '{name}'{hint} Known: {listed}, or the path of a .npz file")
 
 
 def load_policy(name: str, folder: Path | None = None) -> Policy:

@@ -9,21 +9,13 @@ from typing import Literal, NamedTuple
 
 from volery.bridges.ros2.middleware import Participant
 from volery.core.errors import BridgeError
-from volery.core.extras import missing_package
+from volery.core.extras import import_extra
 from volery.graph.nodes.imports import withdraw_ros_imports
 
 Kind = Literal["dds", "zenoh", "rclpy"]
 
 MOST_DOMAIN = 232
 """Largest domain: beyond, the ports of DDS do not fit into 16 bits (RTPS 2.5, 9.6.2.3)."""
-
-_PACKAGES = {"dds": "cyclonedds", "zenoh": "zenoh", "rclpy": "rclpy"}
-_MISSING = {
-    "dds": missing_package("ROS 2 over dds", "cyclonedds", "ros2"),
-    "zenoh": missing_package("ROS 2 over zenoh", "eclipse-zenoh", "ros2"),
-    "rclpy": "there is no rclpy: source a ROS 2 (. /opt/ros/jazzy/setup.sh) that is built for this "
-    "version of Python; without one use ros2 in place of rclpy",
-}
 
 
 class Ros2Environment(NamedTuple):
@@ -42,16 +34,15 @@ class Ros2Environment(NamedTuple):
 def join_ros2(terms: Ros2Environment) -> Participant:
     """Joins a ROS 2 graph. Raises `BridgeError` with what is missing."""
     withdraw_ros_imports()
-    package = _PACKAGES[terms.middleware]
-    if importlib.util.find_spec(package) is None:
-        raise BridgeError(_MISSING[terms.middleware])
     domain_id = domain_of(terms.domain_id)
     if terms.middleware == "dds":
+        import_extra("ROS 2 over dds", "cyclonedds.domain", "cyclonedds", "ros2", BridgeError)
         from volery.bridges.ros2.dds.participant import DdsParticipant
 
         return DdsParticipant(domain_id, _checked(terms.interfaces))
     if terms.middleware == "rclpy":
         return _sourced(domain_id)
+    import_extra("ROS 2 over zenoh", "zenoh", "eclipse-zenoh", "ros2", BridgeError)
     from volery.bridges.ros2.zenoh.participant import ZenohParticipant
 
     return ZenohParticipant(domain_id, terms.router)
@@ -59,6 +50,11 @@ def join_ros2(terms: Ros2Environment) -> Participant:
 
 def _sourced(domain_id: int) -> Participant:
     """Joins with the sourced ROS 2. Raises `BridgeError` if it does not work."""
+    if importlib.util.find_spec("rclpy") is None:
+        raise BridgeError(
+            "there is no rclpy: source a ROS 2 (. /opt/ros/jazzy/setup.sh) that is built for this "
+            "version of Python; without one use ros2 in place of rclpy"
+        )
     try:
         from volery.bridges.ros2.rcl.participant import RclParticipant
 

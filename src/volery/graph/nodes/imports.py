@@ -36,6 +36,20 @@ PYTHON_PACKAGES = (
 )
 """Packages without message types; the stand-ins have the most usual parts of them."""
 
+_ROS1_PACKAGES = ("actionlib", "dynamic_reconfigure", "roslib", "rosparam", "rospy", "tf")
+_ROS2_PACKAGES = (
+    "ament_index_python",
+    "interactive_markers",
+    "launch",
+    "launch_ros",
+    "nav2_simple_commander",
+    "ros2_numpy",
+    "rosbag2_py",
+    "rosidl_runtime_py",
+)
+"""Packages without message types that published nodes import and that have no stand-in."""
+_MESSAGE_ENDINGS = ("_interfaces", "_msgs", "_srvs")
+
 
 class _Finder(MetaPathFinder):
     """Finds `rclpy`, `tf2_ros`, their modules, and the packages of all known message types."""
@@ -98,6 +112,24 @@ def find_stand_in(
     if found is not None:
         provide_ros_imports()
     return found
+
+
+def advice_for_missing(name: str) -> str:
+    """Returns what to do about a missing package of ROS, to append to an error; else empty."""
+    package = name.partition(".")[0]
+    if package in _ROS1_PACKAGES:
+        return (
+            "; this is a node of ROS 1: run it beside the simulation with --bridge ros1 "
+            "(docs/bridges.md), or derive it from rclpy.node.Node"
+        )
+    if package in _ROS2_PACKAGES:
+        return f"; Volery has no stand-in for {package} (docs/nodes.md lists those that it has)"
+    if package.endswith(_MESSAGE_ENDINGS):
+        return (
+            f"; name a folder with the .msg files of {package} in message_packages, or with "
+            "volery node --messages (docs/ros2.md)"
+        )
+    return ""
 
 
 def withdraw_ros_imports() -> None:

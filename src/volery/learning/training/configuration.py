@@ -7,11 +7,12 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from volery.core.errors import VoleryError, reason_of
 from volery.core.toml_text import parse_toml
 from volery.scenario.base import Bounded
+from volery.scenario.validation import validated
 
 Algorithm = Literal["ppo", "dqn", "sac"]
 _BASELINES = resources.files("volery.learning") / "baselines"
@@ -113,7 +114,8 @@ class TrainingConfiguration(Bounded):
         Raises `VoleryError` for an option that is out of range.
         """
         chosen = {name: value for name, value in options.items() if value is not None}
-        return _checked({**self.model_dump(), **chosen}, "configuration of the training")
+        made = {**self.model_dump(), **chosen}
+        return validated(made, TrainingConfiguration, "configuration of the training")
 
 
 def load_configuration(task: str, file: str | Path | None = None) -> TrainingConfiguration:
@@ -140,13 +142,4 @@ def _parsed(text: str, name: str) -> TrainingConfiguration:
         data = parse_toml(text)
     except tomllib.TOMLDecodeError as error:
         raise VoleryError(f"{name}: not TOML: {error}") from None
-    return _checked(data, name)
-
-
-def _checked(data: dict[str, Any], name: str) -> TrainingConfiguration:
-    try:
-        return TrainingConfiguration.model_validate(data)
-    except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        raise VoleryError(f"{name}: {key}: {first['msg'].lower()}") from None
+    return validated(data, TrainingConfiguration, name)

@@ -25,7 +25,7 @@ from typing import Any
 
 from volery.core.errors import ScenarioError, VoleryError
 from volery.graph.nodes.failures import add_frames, place_of
-from volery.graph.nodes.imports import provide_ros_imports
+from volery.graph.nodes.imports import advice_for_missing, provide_ros_imports
 from volery.graph.nodes.launch import Launch, make_node
 from volery.graph.nodes.node import Context, Node
 from volery.scenario.access import ScenarioAccess
@@ -89,14 +89,14 @@ def find_node(entry: NodeEntry, where: str, access: ScenarioAccess) -> type[Any]
     _check_allowed(entry.node, path, where, access)
     if access.is_trusted:
         with _also_from(*_local_folders(access)):
-            return _find_class(path, where)
+            return _find_class(path, where, access)
     with _installed_only(access):
         if is_local(path.partition(":")[0], access):
             raise ScenarioError(
                 f"{where}: node '{entry.node}' is a module beside the scenario, which runs only if "
                 "you trust it: give --trust, or load_scenario(..., trust=True) in Python"
             )
-        return _find_class(path, where)
+        return _find_class(path, where, access)
 
 
 def is_local(module: str | None, access: ScenarioAccess) -> bool:
@@ -165,13 +165,22 @@ def _installed_only(access: ScenarioAccess) -> Iterator[None]:
         sys.path[:] = before
 
 
-def _find_class(path: str, where: str) -> type[Any]:
+def _find_class(path: str, where: str, access: ScenarioAccess) -> type[Any]:
     module_name, class_name = path.split(":")
     provide_ros_imports()
+    failure = f"{where}: node '{path}' cannot be imported"
     try:
         module = importlib.import_module(module_name)
     except Exception as error:
-        raise _broken(f"{where}: node '{path}' cannot be imported", error) from error
+        missing = getattr(error, "name", None) if isinstance(error, ModuleNotFoundError) else None
+        if missing and f"{module_name}.".startswith(f"{missing}."):
+            folders = " or ".join(
+                dict.fromkeys(str(each.resolve()) for each in _local_folders(access))
+            )
+            raise ScenarioError(
+                f"{failure}: no module '{missing}' is installed or lies in {folders}"
+            ) from None
+        raise _broken(failure, error, advice_for_missing(missing or "")) from error
     try:
         found = getattr(module, class_name)
     except AttributeError:
@@ -190,7 +199,7 @@ def _source_of(module: ModuleType) -> str:
     file = getattr(module, "__file__", None)
     if file is None:
         return "; the name is that of a module of Python or of ROS: rename your file"
-    return f"; it is {file}. If you mean another file of this name, rename that"
+    return f"; Python finds {file} under this name: if your file has the same name, rename it"
 
 
 def _hint(found: Any) -> str:
@@ -205,9 +214,9 @@ def _hint(found: Any) -> str:
     )
 
 
-def _broken(what: str, error: Exception) -> ScenarioError:
+def _broken(what: str, error: Exception, advice: str = "") -> ScenarioError:
     """Returns an error of the node's code, with its line and the frames of the user's files."""
     kind = "" if isinstance(error, VoleryError) else f"{type(error).__name__}: "
-    failure = ScenarioError(f"{what}: {kind}{error}{place_of(error)}")
+    failure = ScenarioError(f"{what}: {kind}{error}{place_of(error)}{advice}")
     add_frames(failure, error)
     return failure

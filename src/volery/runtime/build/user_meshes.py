@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 
 import numpy as np
@@ -16,11 +17,15 @@ from volery.world.mesh import Mesh
 from volery.world.mesh_files import FARTHEST_M, MeshFile, read_mesh
 from volery.world.scene import Look, Solid
 
+_log = logging.getLogger(__name__)
+_SMALLEST_M, _TALLEST_M = 0.02, 1000.0
+"""Sizes beyond which a mesh probably is in other units: the tallest building has 828 m."""
+
 
 def mesh_solids(scenario: Scenario) -> tuple[Solid, ...]:
     """Returns a solid for each of `world.meshes`; each file is read once.
 
-    Raises `DataFileError` with scenario and key.
+    Warns of one whose size suggests another unit. Raises `DataFileError` with scenario and key.
     """
     read: dict[tuple[Path, str | None], MeshFile] = {}
     solids = []
@@ -38,6 +43,7 @@ def mesh_solids(scenario: Scenario) -> tuple[Solid, ...]:
 def _solid(entry: UserMesh, path: Path, file: MeshFile) -> Solid:
     mesh = file.placed(_placing(entry))
     _check_distance(entry, path, mesh)
+    _question_size(path, mesh)
     colour = entry.colour or file.colour
     material, name = Material[entry.material.upper()], entry.name or path.stem
     return Solid(mesh, material, name, look=Look(colour), is_shell=not mesh.is_closed)
@@ -65,3 +71,12 @@ def _check_distance(entry: UserMesh, path: Path, mesh: Mesh) -> None:
         f"{path} extends to {far:.3g} m from the map's origin, at most {FARTHEST_M:g} m is "
         f"allowed; {advice}"
     )
+
+
+def _question_size(path: Path, mesh: Mesh) -> None:
+    size = np.subtract(*mesh.bounds[::-1])
+    shown = " x ".join(f"{value:.3g}" for value in size.tolist())
+    if size[2] > _TALLEST_M:
+        _log.warning("%s is %s m: if the file is in mm, set scale = 0.001", path.name, shown)
+    elif size.max() < _SMALLEST_M:
+        _log.warning("%s is %s m: is `scale` right?", path.name, shown)

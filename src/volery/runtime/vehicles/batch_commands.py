@@ -67,9 +67,11 @@ class BatchCommands(Uncopied, ABC):
         """Waits for the present flight commands of all UAVs, such as the take-off at the start.
 
         Returns the results of the UAVs that had a command to complete. `timeout_s` is simulated
-        time, s, for all together. See `Uav.wait`.
+        time, s, for all together. See `Uav.wait`. Raises `CommandError` if all UAVs have crashed.
         """
         check_timeout(timeout_s)
+        if self._handles() and all(uav.crashed for uav in self._handles()):
+            raise CommandError("all UAVs have crashed: there is nothing to wait for")
         pending = [future for uav in self._handles() if (future := uav.pending_command)]
         return FlightFutureList(pending, self._now_s).wait(timeout_s)
 

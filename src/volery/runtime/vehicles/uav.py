@@ -195,8 +195,11 @@ class Uav(Uncopied):
         """Waits for the present flight command, such as the take-off at the scenario's start.
 
         Returns its result, None if the UAV has no command to complete. See `FlightFuture.wait`.
+        Raises `CommandError` if it has crashed.
         """
         future = self.pending_command
+        if future is None and self.crashed:
+            raise CommandError(f"{self._path} has crashed: there is nothing to wait for")
         return None if future is None else future.wait(timeout_s)
 
     @property

@@ -189,11 +189,9 @@ def find_sensor(uav: str, wanted: str, kinds: Mapping[str, str]) -> str:
     if found:
         names = " or ".join(f"'{name}'" for name in found)
         advice = f"each {wanted} goes by its name, {names}"
-        raise UnknownSensorError(f"{uav} has no sensor '{wanted}': {advice}; known: {known}")
+        raise UnknownSensorError(f"{uav} has no sensor '{wanted}': {advice}. Known: {known}")
     hint = near_miss(_OTHER_NAMES.get(str(wanted).lower(), wanted), [*kinds, *kinds.values()])
-    raise UnknownSensorError(
-        f"{uav} has no sensor '{wanted}'; known: {known}{'.' if hint else ''}{hint}"
-    )
+    raise UnknownSensorError(f"{uav} has no sensor '{wanted}'{hint} Known: {known}")
 
 
 def _check_exists(source: SampleSource, uav: str, name: str) -> None:
