@@ -51,8 +51,8 @@ def decode_cdr(data: bytes | bytearray | memoryview, msgtype: str) -> Any:
     """Decodes CDR (version 1, either byte order) with its four bytes of header.
 
     The message's arrays are read-only and independent of `data`. Raises `GraphError` if the type is
-    unknown or the bytes are not one message of that type: too short, too long, a wrong length, text
-    that is not UTF-8.
+    unknown or the bytes are not one message of that type: too short, too long, a wrong length. Text
+    that is not UTF-8 is read as in rclpy.
     """
     known(msgtype)
     view = memoryview(data).cast("B")

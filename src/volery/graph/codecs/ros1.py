@@ -31,6 +31,7 @@ from rosbags.typesys.store import Typestore
 from volery.core.errors import GraphError
 from volery.graph.codecs.cdr import CODING_ERRORS, is_number_array, own_array
 from volery.graph.codecs.definition_store import EMPTY_MEMBER, DefinitionStore, element_type
+from volery.graph.codecs.foreign_texts import read_foreign_texts
 from volery.graph.codecs.ros1_names import ros1_name, ros2_name
 from volery.graph.codecs.zero import value_maker
 from volery.graph.typestore import typestore
@@ -92,7 +93,7 @@ class Ros1Codec:
 
         The message's arrays are read-only and independent of `data`. Fields that ROS 1 lacks are
         zero. Raises `GraphError` if the type is unknown or the bytes are not one message of that
-        type: too short, too long, a wrong length, text that is not UTF-8.
+        type: too short, too long, a wrong length. Text that is not UTF-8 is read as in rclpy.
         """
         coder = self._coder(msgtype)
         owned = data if type(data) is bytes else bytes(data)
@@ -265,7 +266,7 @@ class Ros1Codec:
             size_ros1=size,
             getsize_ros1=getsize,
             serialize_ros1=serialize,
-            deserialize_ros1=generate_deserialize_ros1(entries, store),
+            deserialize_ros1=read_foreign_texts(generate_deserialize_ros1(entries, store)),
             getsize_ros1_to_cdr=unused,
             ros1_to_cdr=unused,
             getsize_cdr_to_ros1=unused,
