@@ -129,6 +129,7 @@ def test_a_command_is_published_and_flown(run):
     ],
 )
 def test_a_published_command_that_is_refused_ends_with_the_reason(run, msgtype, message, reason):
+    volery(run, "service", "call", "/uav1/hold")  # a take-off accepts no goal
     words = ("topic", "pub", "/uav1/goal_pose", msgtype, message, "--once")
     refused = volery(run, *words, ok=False)
     assert reason in refused

@@ -47,13 +47,13 @@ def test_own_file_beside_the_scenario(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("mass_kg = 2.065", "mass_kg = -2.0", ["body.mass_kg", "greater than 0"]),
+        ("mass_kg = 2.065", "mass_kg = -2.0", ["body.mass_kg", "above 0"]),
         ("mass_kg = 2.065", "mass_kg = nan", ["body.mass_kg", "finite"]),
         ("mass_kg = 2.065", "mass = 2.065", ["mass_kg"]),
         ("mass_kg = 2.065", "mass_kg = 5.0", ["hover", "41.4 N", "weight"]),
         ("[0.0337, 0.0337, 0.0185]", "[0.01, 0.01, 0.03]", ["inertia", "sum of the other two"]),
         ("[0.0337, 0.0337, 0.0185]", "[0.0337, 0.0337]", ["inertia_kg_m2"]),
-        ("fall_time_s = 0.025", "fall_time_s = 0.0", ["rotors.fall_time_s", "greater than 0"]),
+        ("fall_time_s = 0.025", "fall_time_s = 0.0", ["rotors.fall_time_s", "above 0"]),
         ("torque_m = 0.06", "torque_m = -0.06", ["rotors.torque_m"]),
         ('direction = "cw"', 'direction = "ccw"', ["cannot steer"]),
         ('direction = "cw"', 'direction = "left"', ["direction", "'ccw' or 'cw'"]),
@@ -61,7 +61,7 @@ def test_own_file_beside_the_scenario(tmp_path):
         ("landing_m_s = 0.7", "landing_m_s = 3.0", ["landing_m_s", "below"]),
         ("[0.13, 0.13, -0.12], [-0.13, 0.13, -0.12]", "[0.13, 0.13, 0.12]", ["feet_m"]),
         ("friction = 0.8", "friction = 0.8\nglue = 1.0", ["glue", "friction"]),
-        ("cells = 4", "cells = 0", ["battery.cells", "greater than or equal to 1"]),
+        ("cells = 4", "cells = 0", ["battery.cells", "a number of at least 1"]),
         ("rated_v = 14.8", "rated_v = nan", ["battery.rated_v", "finite"]),
         ("rated_v = 14.8", "rated_v = 25.0", ["battery cannot sustain hover", "17.5 V", "sags to"]),
         ("resistance_ohm = 0.028 ", "resistance_ohm = 0.5 ", ["cannot give that power", "347 W"]),
@@ -69,7 +69,7 @@ def test_own_file_beside_the_scenario(tmp_path):
         (
             "efficiency = 0.75",
             "efficiency = 1.5",
-            ["battery.efficiency", "less than or equal to 1"],
+            ["battery.efficiency", "a number of at most 1"],
         ),
         ("rated_v = 14.8", "rated_v = 14.8\nlow = 0.05", ["critical = 0.07 must be below low"]),
         (
