@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import itertools
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -30,6 +32,8 @@ _DARKEST = 0.25
 """Start of the colour scale for plants: darker colours are invisible on the dark background."""
 _TREE_M = 0.6
 """Height above ground above which LIDAR points count as plants."""
+_LABEL = (44.0, 14.0)
+"""Width and height in points that a UAV's name takes."""
 
 Box = tuple[float, float, float, float]
 
@@ -236,6 +240,8 @@ def _draw_trees(axes: Axes, trees: Trees, box: Box) -> None:
 
 def _draw_paths(axes: Axes, flight: FlightData, outline: str) -> None:
     thin = len(flight.uavs) > 12
+    ends = [uav.position_map[-1, :2] for uav in flight.uavs if len(uav.position_map)]
+    shifts = iter(_label_shifts(np.array(ends), axes))
     for number, uav in enumerate(flight.uavs):
         if not len(uav.position_map):
             continue
@@ -258,7 +264,7 @@ def _draw_paths(axes: Axes, flight: FlightData, outline: str) -> None:
             axes.annotate(
                 uav.name,
                 line[-1],
-                xytext=(9, 6),
+                xytext=(9, next(shifts)),
                 textcoords="offset points",
                 fontsize=12,
                 fontweight="bold",
@@ -266,6 +272,31 @@ def _draw_paths(axes: Axes, flight: FlightData, outline: str) -> None:
                 zorder=8,
                 path_effects=[withStroke(linewidth=3.5, foreground=outline)],
             )
+
+
+def _label_shifts(ends: NDArray[np.floating], axes: Axes) -> list[float]:
+    """Returns how far, in points, labels at ends of paths (n, 2) move up so that none overlap."""
+    pixels = axes.transData.transform(ends) if len(ends) else np.zeros((0, 2))
+    points = pixels * 72.0 / axes.figure.dpi
+    placed: list[tuple[float, float]] = []
+    shifts = []
+    for x, y in points:
+        shift = next(
+            up
+            for up in _label_levels()
+            if all(abs(x - px) > _LABEL[0] or abs(y + up - py) > _LABEL[1] for px, py in placed)
+        )
+        placed.append((x, y + shift))
+        shifts.append(shift)
+    return shifts
+
+
+def _label_levels() -> Iterator[float]:
+    """Yields shifts in points: beside the end, then alternately below and above."""
+    yield 6.0
+    for level in itertools.count(1):
+        yield 6.0 - level * _LABEL[1]
+        yield 6.0 + level * _LABEL[1]
 
 
 def _draw_contacts(axes: Axes, flight: FlightData) -> None:
