@@ -114,6 +114,11 @@ class TopicData:
         objects. A message of k numbers (n, K); a stamp (n,), ns. Raises `VoleryError`, with
         similar names, for an unknown one.
         """
+        if not isinstance(field, str):
+            raise VoleryError(
+                f"{self.topic}: a field is a name such as '{self.fields[0]}', not {field!r}; "
+                "messages() yields messages"
+            )
         return self.columns(field)[field]
 
     def columns(self, *fields: str) -> dict[str, Column]:
@@ -165,6 +170,10 @@ class TopicData:
         return frame.set_index("time_s")
 
     # ---------------------------------------------------------------------------------- messages
+
+    def __iter__(self) -> Iterator[LoggedMessage]:
+        """Yields the messages, as `messages`."""
+        return self.messages()
 
     def messages(self) -> Iterator[LoggedMessage]:
         """Yields the messages one by one, without keeping them."""

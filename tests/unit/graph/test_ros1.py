@@ -204,21 +204,37 @@ def test_array_of_messages_without_content(tmp_path: Any) -> None:
 
 def test_texts_of_other_writers(codec: Ros1Codec) -> None:
     """Latin-1, as programs in C++ write it, in single texts, sequences and nested messages."""
-    assert codec.decode(b"\2\0\0\0\xfcb", "std_msgs/msg/String").data == "\ufffdb"
+    latin = b"\2\0\0\0\xfcb"
+    assert codec.decode(latin, "std_msgs/msg/String", is_tolerant=True).data == "\ufffdb"
+    nested = bytes(12) + latin
+    assert codec.decode(nested, "std_msgs/msg/Header", is_tolerant=True).frame_id == "\ufffdb"
     for header, order in ((b"\0\1\0\0", "<"), (b"\0\0\0\0", ">")):
         two, three, none = (struct.pack(f"{order}I", length) for length in (2, 3, 0))
-        text = header + three + b"\xfcb\0"
-        assert decode_cdr(text, "std_msgs/msg/String").data == "\ufffdb"
-        assert decode_cdr(header + none, "std_msgs/msg/String").data == ""
-        empty = decode_cdr(header + bytes(8) + none, "std_msgs/msg/Header")
-        assert empty.frame_id == ""
         names = header + bytes(8) + none + three + none + two + b"\xe9\0" + b"\0\0" + none * 4
-        assert decode_cdr(names, "sensor_msgs/msg/JointState").name == ["", "\ufffd", ""]
+        for data, msgtype, field, value in (
+            (header + three + b"\xfcb\0", "std_msgs/msg/String", "data", "\ufffdb"),
+            (header + none, "std_msgs/msg/String", "data", ""),
+            (header + bytes(8) + none, "std_msgs/msg/Header", "frame_id", ""),
+            (names, "sensor_msgs/msg/JointState", "name", ["", "\ufffd", ""]),
+        ):
+            assert getattr(decode_cdr(data, msgtype, is_tolerant=True), field) == value
+            with pytest.raises(GraphError):
+                decode_cdr(data, msgtype)
 
 
 def test_bad_text_and_header(codec: Ros1Codec) -> None:
-    with pytest.raises(GraphError, match="Missing string terminator"):
-        decode_cdr(b"\0\1\0\0\2\0\0\0ab", "std_msgs/msg/String")
+    with pytest.raises(GraphError):
+        codec.decode(b"\1\0\0\0\xff", "std_msgs/msg/String")
+    with pytest.raises(GraphError):
+        decode_cdr(b"\0\1\0\0\2\0\0\0\xff\0", "std_msgs/msg/String")
+    for is_tolerant in (False, True):
+        with pytest.raises(GraphError, match="Missing string terminator"):
+            decode_cdr(b"\0\1\0\0\2\0\0\0ab", "std_msgs/msg/String", is_tolerant=is_tolerant)
+        for data in (b"\5\0\0\0ab", b"\xff\xff\xff\xffab"):
+            with pytest.raises(GraphError):
+                codec.decode(data, "std_msgs/msg/String", is_tolerant=is_tolerant)
+            with pytest.raises(GraphError):
+                decode_cdr(b"\0\1\0\0" + data, "std_msgs/msg/String", is_tolerant=is_tolerant)
     with pytest.raises(GraphError, match="not CDR of version 1"):
         decode_cdr(b"\0\7\0\0\2\0\0\0a\0", "std_msgs/msg/String")
     with pytest.raises(GraphError, match="not CDR"):

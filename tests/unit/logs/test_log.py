@@ -395,3 +395,37 @@ def test_the_latest_field_of_a_jumping_clock_is_kept_in_order(tmp_path):
     with open_log(path) as log:
         assert log["/note"].times_ns.tolist() == [0, 10, 20, 5, 15]
         assert log["/note"]["data"].tolist() == ["0", "10", "20", "5", "15"]
+
+
+def test_numbers_are_no_fields(log):
+    with pytest.raises(VoleryError, match=r"/uav1/odom: a field is a name such as .*, not 0; mess"):
+        _ = log["/uav1/odom"][0]
+
+
+def test_text_of_other_writers_is_read(tmp_path):
+    """Latin-1 in a ROS 1 bag; in MCAP, and a string without a terminator, which Fast CDR reads."""
+    from mcap.writer import Writer
+    from rosbags.rosbag1 import Writer as BagWriter
+    from rosbags.typesys import Stores, get_typestore
+
+    bag = tmp_path / "latin.bag"
+    with BagWriter(bag) as writer:
+        store = get_typestore(Stores.ROS1_NOETIC)
+        connection = writer.add_connection("/name", "std_msgs/msg/String", typestore=store)
+        for number, text in enumerate((b"plain", b"H\xfctte", b"")):
+            writer.write(connection, number, len(text).to_bytes(4, "little") + text)
+    mcap = tmp_path / "latin.mcap"
+    with open(mcap, "wb") as file:
+        log = Writer(file)
+        log.start("ros2")
+        schema = log.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
+        channel = log.register_channel("/name", "cdr", schema)
+        for number, text in enumerate((b"plain\0", b"H\xfctte\0", b"")):
+            data = b"\0\1\0\0" + len(text).to_bytes(4, "little") + text
+            log.add_message(channel, number, data, number)
+        log.finish()
+    for path in (bag, mcap):
+        with open_log(path) as found:
+            texts = [each.message.data for each in found["/name"]]
+            assert texts == ["plain", "H\ufffdtte", ""]
+            assert list(found["/name"]["data"]) == ["plain", "H\ufffdtte", ""]

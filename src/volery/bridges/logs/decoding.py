@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import zstandard
+from rosbags.serde import SerdeError
 
 from volery.bridges.logs.budgets import MAX_CHUNK_BYTES
 from volery.bridges.logs.logged_types import as_type, is_part_of, learn_type
@@ -58,14 +59,13 @@ class LogDecoder:
 
         """
         logged, msgtype = self._types_of(record.topic)
-        decode = ros1_codec().decode if record.topic.encoding == "ros1" else _decode_cdr
         try:
-            message = decode(record.data, logged)
+            message = _read(record, logged)
         except GraphError:
             if logged == msgtype:
                 raise
             # some recorders cut definitions off, so that only the first fields are left
-            return Decoded(msgtype, decode(record.data, msgtype))
+            return Decoded(msgtype, _read(record, msgtype))
         return Decoded(msgtype, message if logged == msgtype else as_type(message, msgtype))
 
     def _types_of(self, topic: LogTopic) -> _Types:
@@ -77,8 +77,19 @@ class LogDecoder:
         return found
 
 
-def _decode_cdr(data: bytes, msgtype: str) -> Any:
-    return decode_cdr(_unpacked(data) if data.startswith(_ZSTD) else data, msgtype)
+def _read(record: LogRecord, msgtype: str) -> Any:
+    """Returns the message of a record; texts of other writers are read where they must."""
+    data = record.data
+    if record.topic.encoding == "ros1":
+        decode = ros1_codec().decode
+    else:
+        decode, data = decode_cdr, _unpacked(data) if data.startswith(_ZSTD) else data
+    try:
+        return decode(data, msgtype)
+    except GraphError as error:
+        if not isinstance(error.__context__, UnicodeDecodeError | SerdeError):
+            raise
+        return decode(data, msgtype, is_tolerant=True)
 
 
 def _unpacked(data: bytes) -> bytes:

@@ -15,6 +15,7 @@ from rosbags.typesys.base import normalize_fieldname
 from volery.core.errors import GraphError
 from volery.graph.codecs.definition_files import NUMBERS
 from volery.graph.codecs.definition_store import element_type
+from volery.graph.codecs.foreign_texts import TolerantStore
 from volery.graph.typestore import typestore
 
 _HEADER_BYTES = 4
@@ -47,19 +48,21 @@ def encode_cdr(message: Any, msgtype: str) -> bytes:
         raise GraphError(f"the message does not fit {msgtype}: {error}") from None
 
 
-def decode_cdr(data: bytes | bytearray | memoryview, msgtype: str) -> Any:
+def decode_cdr(
+    data: bytes | bytearray | memoryview, msgtype: str, *, is_tolerant: bool = False
+) -> Any:
     """Decodes CDR (version 1, either byte order) with its four bytes of header.
 
     The message's arrays are read-only and independent of `data`. Raises `GraphError` if the type is
-    unknown or the bytes are not one message of that type: too short, too long, a wrong length. Text
-    that is not UTF-8 is read as in rclpy.
+    unknown or the bytes are not one message of that type: too short, too long, a wrong length, text
+    that is not UTF-8. is_tolerant: text of other writers is read; see `foreign_texts`.
     """
     known(msgtype)
     view = memoryview(data).cast("B")
     kind = bytes(view[:2])
     if len(view) < _HEADER_BYTES or kind not in (_LITTLE_ENDIAN, _BIG_ENDIAN):
         raise GraphError(f"{msgtype}: not CDR of version 1 (header {bytes(view[:4]).hex()})")
-    store = typestore()
+    store: Any = _tolerant_store() if is_tolerant else typestore()
     definition = store.get_msgdef(msgtype)
     # A copy of the bytes after the header: arrays in it are aligned and owned by the message.
     body = bytes(view[_HEADER_BYTES:])
@@ -78,6 +81,11 @@ def decode_cdr(data: bytes | bytearray | memoryview, msgtype: str) -> Any:
     if not little or _has_bools(msgtype):
         _own_arrays(message, msgtype)
     return message
+
+
+@cache
+def _tolerant_store() -> TolerantStore:
+    return TolerantStore(typestore().get_msgdef, typestore().max_sequence_length)
 
 
 def known(msgtype: str) -> None:

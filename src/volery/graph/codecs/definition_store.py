@@ -24,7 +24,6 @@ from volery.graph.codecs.definition_files import (
     find_definition_files,
     read_definition_file,
 )
-from volery.graph.codecs.foreign_texts import read_foreign_texts
 from volery.graph.message_defaults import make_arguments_optional
 from volery.graph.message_methods import add_methods
 
@@ -69,15 +68,6 @@ class DefinitionStore(Typestore):
         self._num_foreign = 0
         self.types = _LazyDict(dict(base.types), self._load)
         self.fielddefs = _LazyDict(dict(base.fielddefs), self._load)
-
-    def get_msgdef(self, typename: str) -> Any:
-        """Returns the coders of a type, generated at its first use."""
-        coders = self.cache.get(typename)
-        if coders is None:
-            coders = super().get_msgdef(typename)
-            read_foreign_texts(coders.deserialize_cdr_le)
-            read_foreign_texts(coders.deserialize_cdr_be)
-        return coders
 
     def names(self) -> list[str]:
         """Returns the names of all types, loaded or not, sorted."""

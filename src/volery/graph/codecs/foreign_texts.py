@@ -1,14 +1,41 @@
 """Reads texts of other writers, which the decoders that `rosbags` generates refuse.
 
-As in rclpy, bytes that are not UTF-8 (Latin-1 in names, say) become U+FFFD. As in Fast CDR, a CDR
-string of length 0, without a terminator, is empty.
+Bytes that are not UTF-8 (Latin-1, as programs in C++ write it) become U+FFFD, as in rclpy. A CDR
+string of length 0, without a terminator, is empty, as in Fast CDR.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+from types import FunctionType
 from typing import Any
 
 from rosbags.serde.utils import check_string
+
+_DECODERS = ("deserialize_cdr_le", "deserialize_cdr_be", "deserialize_ros1")
+
+
+class TolerantStore:
+    """A typestore with such decoders, for generated code.
+
+    get_coders: `get_msgdef` of another typestore. longest: limit of sequences in CDR.
+    """
+
+    def __init__(self, get_coders: Callable[[str], Any], longest: int = 0) -> None:
+        self._get_coders = get_coders
+        self.max_sequence_length = longest
+        """Limit of sequences in CDR, elements."""
+        self._made: dict[str, Any] = {}
+
+    def get_msgdef(self, msgtype: str) -> Any:
+        """Returns the coders of a type."""
+        made = self._made.get(msgtype)
+        if made is None:
+            coders = self._get_coders(msgtype)
+            decoders = {name: _tolerant(getattr(coders, name)) for name in _DECODERS}
+            made = self._made[msgtype] = replace(coders, **decoders)
+        return made
 
 
 class _Text(bytes):
@@ -25,7 +52,7 @@ def _check_string(rawdata: Any, pos: int, size: int, *, cdr: bool) -> None:
         check_string(rawdata, pos, size, cdr=cdr)
 
 
-def read_foreign_texts(decode: Any) -> Any:
-    """Returns a generated decoder, changed to read such texts."""
-    decode.__globals__.update(bytes=_Text, check_string=_check_string)
-    return decode
+def _tolerant(decode: Any) -> Any:
+    """Returns a generated decoder whose calls of `bytes` and `check_string` are those above."""
+    scope = {**decode.__globals__, "bytes": _Text, "check_string": _check_string}
+    return FunctionType(decode.__code__, scope, decode.__name__)

@@ -31,7 +31,7 @@ from rosbags.typesys.store import Typestore
 from volery.core.errors import GraphError
 from volery.graph.codecs.cdr import CODING_ERRORS, is_number_array, own_array
 from volery.graph.codecs.definition_store import EMPTY_MEMBER, DefinitionStore, element_type
-from volery.graph.codecs.foreign_texts import read_foreign_texts
+from volery.graph.codecs.foreign_texts import TolerantStore
 from volery.graph.codecs.ros1_names import ros1_name, ros2_name
 from volery.graph.codecs.zero import value_maker
 from volery.graph.typestore import typestore
@@ -66,6 +66,7 @@ class Ros1Codec:
         self._ros2 = typestore() if ros2 is None else ros2
         self._ros1 = get_typestore(Stores.ROS1_NOETIC)
         self._coders: dict[str, Msgdef[Any]] = {}
+        self._tolerant = TolerantStore(self._coder)
         self._sums: dict[str, str] = {}
         self._lock = threading.RLock()
 
@@ -88,16 +89,20 @@ class Ros1Codec:
             raise GraphError(f"the message does not fit {msgtype}: {end} bytes, not {size}")
         return bytes(data)
 
-    def decode(self, data: bytes | bytearray | memoryview, msgtype: str) -> Any:
+    def decode(
+        self, data: bytes | bytearray | memoryview, msgtype: str, *, is_tolerant: bool = False
+    ) -> Any:
         """Decodes a message from ROS 1 bytes.
 
         The message's arrays are read-only and independent of `data`. Fields that ROS 1 lacks are
         zero. Raises `GraphError` if the type is unknown or the bytes are not one message of that
-        type: too short, too long, a wrong length. Text that is not UTF-8 is read as in rclpy.
+        type: too short, too long, a wrong length, text that is not UTF-8. is_tolerant: text of
+        other writers is read; see `foreign_texts`.
         """
-        coder = self._coder(msgtype)
         owned = data if type(data) is bytes else bytes(data)
-        call: Any = _Call(self._coder, len(owned) + _SPARE_ELEMENTS, 0)
+        get_coder = self._tolerant.get_msgdef if is_tolerant else self._coder
+        coder = get_coder(msgtype)
+        call: Any = _Call(get_coder, len(owned) + _SPARE_ELEMENTS, 0)
         try:
             message, end = coder.deserialize_ros1(owned, 0, coder.cls, call)
         except CODING_ERRORS as error:
@@ -266,7 +271,7 @@ class Ros1Codec:
             size_ros1=size,
             getsize_ros1=getsize,
             serialize_ros1=serialize,
-            deserialize_ros1=read_foreign_texts(generate_deserialize_ros1(entries, store)),
+            deserialize_ros1=generate_deserialize_ros1(entries, store),
             getsize_ros1_to_cdr=unused,
             ros1_to_cdr=unused,
             getsize_cdr_to_ros1=unused,
