@@ -118,6 +118,19 @@ def yaw_of(q: ArrayLike) -> Array:
     return np.asarray(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
 
 
+def heading_of(q: Sequence[float]) -> float | None:
+    """Returns the heading, rad, of a quaternion (4,) of any length, as `tf2::getYaw` does.
+
+    None for a quaternion of length 0, which messages without an orientation have.
+    """
+    x, y, z, w = map(float, q)
+    if not (x or y or z or w):
+        return None
+    largest = max(abs(x), abs(y), abs(z), abs(w))
+    x, y, z, w = x / largest, y / largest, z / largest, w / largest
+    return math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
+
+
 def exponential(rotation_vector: ArrayLike) -> Array:
     """Returns the quaternion (..., 4) of a rotation vector (..., 3), rad."""
     v = np.asarray(rotation_vector, dtype=np.float64)
