@@ -6,7 +6,7 @@ Functions take arrays whose last axis is the quaternion or vector and broadcast 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -118,7 +118,7 @@ def yaw_of(q: ArrayLike) -> Array:
     return np.asarray(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
 
 
-def heading_of(q: Sequence[float]) -> float | None:
+def heading_of(q: Iterable[float]) -> float | None:
     """Returns the heading, rad, of a quaternion (4,) of any length, as `tf2::getYaw` does.
 
     None for a quaternion of length 0, which messages without an orientation have.
