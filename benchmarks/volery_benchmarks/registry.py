@@ -341,14 +341,20 @@ BENCHES: dict[str, Bench] = {
             "driver and worker, without the start of the processes; each run a simulation of its "
             "own, or together as environments; beside a bare loop over the same runs; "
             "`killed_and_resumed`: 1 if the table of a study of 2,000 runs, whose driver was "
-            "killed five times, equals that of an uninterrupted one",
+            "killed five times, equals that of an uninterrupted one; `ray_...`: on a Ray "
+            "cluster of two network namespaces with one core each, where a worker is killed and the "
+            "link cut",
             {
                 "sweep_runs_per_s_core": Bound(20.0),
                 "sweep_runs_per_s_core_vectorized": Bound(500.0),
                 "sweep_overhead": Bound(0.03, at_most=True),
                 "killed_and_resumed": Bound(1.0),
+                "ray_efficiency": Bound(0.95),
+                "ray_digests_equal": Bound(1.0),
+                "loss_noticed_s": Bound(10.0, at_most=True),
+                "results_lost": Bound(0.0, at_most=True),
             },
-            in_all=False,  # it needs the extra "sweep"
+            in_all=False,  # it needs the extra "cluster"
             has_quick=True,
         ),
         Bench(

@@ -25,6 +25,10 @@ def sweep(
             help="Set the number of processes; default: one per core; 0: only this one.",
         ),
     ] = None,
+    ray: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Fly on a Ray cluster: HOST:PORT, or auto."),
+    ] = None,
     part: Annotated[
         str | None, typer.Option(help="Fly part I/N of the runs, as in an array job of Slurm.")
     ] = None,
@@ -52,7 +56,7 @@ def sweep(
     """
     from volery.cli.sweep import SweepCommand, parse_part
 
-    command = SweepCommand(study, out, workers, trust=trust)
+    command = SweepCommand(study, out, workers, ray, trust=trust)
     if verify is not None:
         command.verify(verify)
     elif log:

@@ -13,7 +13,7 @@ from volery.cli.trust import may_run_local_code
 from volery.cluster.errors import StudyError
 from volery.cluster.loading import LoadedStudy, load_study, read_study
 from volery.cluster.metric_names import is_local, metrics_of
-from volery.cluster.study_runs import TABLE_FILE, SweepOptions, fly_study, stored_plan
+from volery.cluster.study_runs import TABLE_FILE, SweepOptions, fly_study, on_ray, stored_plan
 from volery.cluster.summary import point_rows
 from volery.cluster.table import StudyTable
 from volery.core.plurals import counted
@@ -35,11 +35,14 @@ def parse_part(text: str | None) -> tuple[int, int] | None:
 class SweepCommand:
     """Runs one `volery sweep`; see the options of the command."""
 
-    def __init__(self, study: Path, out: Path | None, workers: int | None, *, trust: bool) -> None:
+    def __init__(
+        self, study: Path, out: Path | None, workers: int | None, ray: str | None, *, trust: bool
+    ) -> None:
         self._file = study
         self._loaded = _loaded(study, trust=trust)
         self._results = Path("runs") / self._loaded.study.name if out is None else out
         self._workers = workers
+        self._executor = None if ray is None else on_ray(ray, workers)
 
     def fly(self, part: tuple[int, int] | None, *, retry_failed: bool, report: bool) -> None:
         """Flies the missing runs and writes the table and, if wanted, the report."""
@@ -52,6 +55,7 @@ class SweepCommand:
                 self._workers,
                 part,
                 retry_failed,
+                self._executor,
                 on_progress=progress.update,
             )
             try:
@@ -72,7 +76,7 @@ class SweepCommand:
         """Repeats finished runs and compares their results."""
         from volery.cluster.verification import verify_study
 
-        options = SweepOptions(self._results, self._workers)
+        options = SweepOptions(self._results, self._workers, executor=self._executor)
         repeated, differences = verify_study(self._loaded, options, count)
         for each in differences:
             echo_line(f"run {each.run}: {each.what}")
@@ -95,7 +99,7 @@ class SweepCommand:
                 what = "no finished run" if not found else f"{len(found)} runs"
                 raise StudyError(f"--log {name}: {what} of this study in {self._results}")
             chosen += [run for run in plan.wanted() if run.id == found[0]]
-        options = SweepOptions(self._results, self._workers)
+        options = SweepOptions(self._results, self._workers, executor=self._executor)
         record_runs(self._loaded, options, chosen)
         for run in chosen:
             echo_line(f"log     {self._results / 'logs' / f'{run.id}.mcap'}")

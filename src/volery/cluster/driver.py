@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 
 from volery.cluster.batches import BatchResult, Preparation, RunBatch
 from volery.cluster.executor import BatchLoss, Executor, WorkerState
-from volery.cluster.local_pool import TIMED_OUT
 from volery.cluster.plan import RunPlan
 from volery.cluster.results_folder import ResultsFolder
 from volery.cluster.runs import RunResult, RunSpec, failure_of
 from volery.cluster.study import Study
+from volery.cluster.worker_pool import TIMED_OUT
 
 _BATCH_S = 0.25
 """Wall time that a batch of single runs should take."""

@@ -1,8 +1,8 @@
 """The contract of executors: what flies batches of runs for a driver.
 
-`local_pool.LocalPool` starts processes on this machine. Other executors (a cluster's) implement the
-same protocol; `batches` holds the plain data that they carry, and `run_worker.RunWorker` flies
-them at the other end.
+`worker_pool.WorkerPool` has workers on this machine (`process_worker`) or in a Ray cluster
+(`ray_worker`), `inline_executor` none; `batches` holds the plain data that they carry, and
+`run_worker.RunWorker` flies them at the other end.
 """
 
 from __future__ import annotations

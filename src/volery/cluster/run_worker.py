@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import errno
+import gc
 import os
+import sys
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -30,6 +32,23 @@ _TRIAL_S = 0.01
 
 class DiskFullError(StudyError):
     """No space is left for logs or results."""
+
+
+def started_worker(job: StudyJob) -> tuple[RunWorker | None, Preparation]:
+    """Returns a worker that is ready to fly, and what it found out.
+
+    None: no run of the study can start. For processes that serve one study only.
+    """
+    if job.is_trusted:  # metrics may import modules beside them when they are called
+        sys.path += [str(job.folder), str(Path().resolve())]
+    try:
+        worker = RunWorker(job)
+        prepared = worker.prepare()
+    except VoleryError as error:
+        return None, Preparation(code_version(), error=" ".join(str(error).split()))
+    gc.collect()
+    gc.freeze()  # modules and compiled code outlive all runs
+    return worker, prepared
 
 
 class RunWorker:

@@ -1,4 +1,4 @@
-"""Runs a study on this machine: `run_study`, and what the command line needs of it."""
+"""Runs a study: `run_study`, and what the command line needs of it."""
 
 from __future__ import annotations
 
@@ -14,13 +14,15 @@ from volery.cluster.errors import StudyError
 from volery.cluster.executor import Executor
 from volery.cluster.inline_executor import InlineExecutor
 from volery.cluster.loading import LoadedStudy, load_study
-from volery.cluster.local_pool import LocalPool
 from volery.cluster.metric_names import fingerprint_of, metrics_of
 from volery.cluster.plan import RunPlan
+from volery.cluster.pool_worker import PoolWorker, Replies
+from volery.cluster.process_worker import ProcessWorker
 from volery.cluster.results_folder import ResultsFolder
 from volery.cluster.runs import RunResult, RunSpec, runs_of
 from volery.cluster.study import Study
 from volery.cluster.table import StudyTable, arrow_module
+from volery.cluster.worker_pool import WorkerPool
 from volery.core.machine import usable_cores
 
 TABLE_FILE = "table.parquet"
@@ -50,23 +52,37 @@ def run_study(
     results: str | Path | None = None,
     *,
     workers: int | None = None,
+    ray: str | None = None,
     retry_failed: bool = False,
     trust: bool = False,
     on_progress: Callable[[SweepProgress], None] | None = None,
 ) -> StudyTable:
-    """Flies the missing runs of a study on this machine and returns the table of all runs.
+    """Flies the missing runs of a study and returns the table of all runs.
 
     study: a TOML file, plain data or a `Study`. results: folder of the results, which are reused;
     default: `runs/NAME`. workers: number of processes; None: one for each core; 0: this process
-    flies, for a debugger. retry_failed: whether failed runs are flown again. trust: whether metrics
-    and nodes may be modules beside the study. on_progress: called about five times a second. Also
-    writes `table.parquet` into the folder. Raises `StudyError`, naming file, key and allowed
-    values, for an invalid study, and if another driver uses the folder or the disk is full.
+    flies, for a debugger. ray: address of a Ray cluster that flies them. retry_failed: whether
+    failed runs are flown again. trust: whether metrics and nodes may be modules beside the study.
+    on_progress: called about five times a second. Also writes `table.parquet` into the folder.
+    Raises `StudyError`, naming file, key and allowed values, for an invalid study, and if another
+    driver uses the folder or the disk is full.
     """
     loaded = load_study(study, trust=trust)
     folder = Path("runs") / loaded.study.name if results is None else Path(results)
-    options = SweepOptions(folder, workers, None, retry_failed, None, on_progress)
+    executor = None if ray is None else on_ray(ray, workers)
+    options = SweepOptions(folder, workers, None, retry_failed, executor, on_progress)
     return fly_study(loaded, options)
+
+
+def on_ray(address: str, workers: int | None = None) -> ExecutorFactory:
+    """Returns what makes executors on a Ray cluster; see `ray_worker.ray_pool`."""
+
+    def start(job: StudyJob) -> Executor:
+        from volery.cluster.ray_worker import ray_pool
+
+        return ray_pool(job, address, workers)
+
+    return start
 
 
 def fly_study(loaded: LoadedStudy, options: SweepOptions) -> StudyTable:
@@ -149,9 +165,13 @@ def executor_of(loaded: LoadedStudy, options: SweepOptions, folder: ResultsFolde
         return options.executor(job)
     if options.workers == 0:
         return InlineExecutor(job)
-    folder.make(folder.path / "workers")
-    workers = options.workers or usable_cores()
-    return LocalPool(job, workers, folder.path / "workers", study.run_timeout_s)
+    programs = folder.path / "workers"
+    folder.make(programs)
+
+    def start(number: int, replies: Replies) -> PoolWorker:
+        return ProcessWorker(number, programs / f"worker_{number}.log", replies)
+
+    return WorkerPool(job, options.workers or usable_cores(), start)
 
 
 def _part_of(

@@ -7,15 +7,13 @@ driver has ended. Prints of the user's code go to standard error.
 
 from __future__ import annotations
 
-import gc
 import os
 import queue
 import sys
 import threading
-from pathlib import Path
 from typing import IO, Any
 
-from volery.cluster.batches import Preparation, StudyJob
+from volery.cluster.batches import Preparation
 from volery.cluster.runs import code_version
 from volery.cluster.worker_messages import read_message, write_message
 
@@ -40,23 +38,11 @@ def _receive(requests: IO[bytes], messages: queue.SimpleQueue[Any]) -> None:
 
 
 def _serve(messages: queue.SimpleQueue[Any], replies: IO[bytes]) -> None:
-    from volery.cluster.run_worker import DiskFullError, RunWorker
-    from volery.core.errors import VoleryError
+    from volery.cluster.run_worker import DiskFullError, started_worker
 
-    job: StudyJob = messages.get()
-    if job.is_trusted:  # metrics may import modules beside them when they are called
-        sys.path += [str(job.folder), str(Path().resolve())]
-    try:
-        worker = RunWorker(job)
-        prepared = worker.prepare()
-    except VoleryError as error:
-        text = " ".join(str(error).split())
-        write_message(replies, Preparation(code_version(), error=text))
-        return
+    worker, prepared = started_worker(messages.get())
     write_message(replies, prepared)
-    gc.collect()
-    gc.freeze()  # modules and compiled code outlive all runs
-    while True:
+    while worker is not None:
         batch = messages.get()
         try:
             write_message(replies, worker.fly(batch))

@@ -150,6 +150,12 @@ def hypercubes():
     draw([], StudySampling(method="latin_hypercube", samples=2))
 
 
+def cluster():
+    from volery.cluster.ray_worker import ray_pool
+
+    ray_pool(None, "auto", None)
+
+
 def browser():
     from volery_benchmarks.page.browser import open_browser
 
@@ -180,6 +186,7 @@ USES = [
     ("pyarrow", "pyarrow", "sweep", tables_of_runs),
     ("scipy.special", "scipy", "sweep", intervals),
     ("scipy.stats", "scipy", "sweep", hypercubes),
+    ("ray", "ray", "cluster", cluster),
     ("playwright.sync_api", "playwright", "bench", browser),
 ]
 """Modules, their packages and extras, and a use of each."""

@@ -1,18 +1,17 @@
-"""Flies batches on this machine: one process for each core, which serves all runs of a study."""
+"""Flies batches by workers that each serve all runs of a study: processes here, or Ray's actors."""
 
 from __future__ import annotations
 
 import queue
 import time
 from collections import deque
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Callable, Sequence
 
 from volery.cluster.batches import BatchResult, Preparation, RunBatch, StudyJob
 from volery.cluster.errors import StudyError
 from volery.cluster.executor import BatchLoss, WorkerState
+from volery.cluster.pool_worker import PoolWorker, Replies
 from volery.cluster.runs import code_version
-from volery.cluster.worker_handle import Reply, WorkerHandle
 
 _AHEAD = 2
 """Batches of a worker: the next one waits, so that the worker does not."""
@@ -21,23 +20,27 @@ TIMED_OUT = "exceeded run_timeout_s"
 """Beginning of the reason of a loss by a timeout."""
 
 
-class LocalPool:
-    """An executor of worker processes; see `Executor`.
+class WorkerPool:
+    """An executor of workers; see `Executor`. A worker that ends is replaced.
 
-    They are started by `prepare` as programs of their own, so no caller needs a guard around its
-    main module. A worker that ends is replaced. workers: their number. logs: folder for their
-    standard errors. run_timeout_s: wall time per run after which a worker is killed, s; None: none.
+    workers: their number. start: starts a worker by its number, whose messages go to the queue.
+    close: called when all workers have ended.
     """
 
     def __init__(
-        self, job: StudyJob, workers: int, logs: Path, run_timeout_s: float | None = None
+        self,
+        job: StudyJob,
+        workers: int,
+        start: Callable[[int, Replies], PoolWorker],
+        close: Callable[[], None] = lambda: None,
     ) -> None:
         self._job = job
         self._count = workers
-        self._logs = logs
-        self._timeout_s = run_timeout_s
-        self._replies: queue.SimpleQueue[Reply] = queue.SimpleQueue()
-        self._workers: list[WorkerHandle] = []
+        self._make = start
+        self._timeout_s = job.study.run_timeout_s
+        self._close = close
+        self._replies: Replies = queue.SimpleQueue()
+        self._workers: list[PoolWorker] = []
         self._waiting: deque[RunBatch] = deque()
         """Batches of ended workers that had not begun."""
         self._started = 0
@@ -93,28 +96,23 @@ class LocalPool:
         """Returns the state of each worker."""
         return [worker.state() for worker in self._workers]
 
-    @property
-    def pids(self) -> list[int]:
-        """Numbers of the workers' processes."""
-        return [worker.pid for worker in self._workers]
-
     def close(self) -> None:
         """Ends all workers; unfinished batches are dropped."""
         workers, self._workers = self._workers, []
         for worker in workers:
             worker.close()
+        self._close()
 
     # ------------------------------------------------------------------------------------- inside
 
-    def _has_room(self, worker: WorkerHandle) -> bool:
+    def _has_room(self, worker: PoolWorker) -> bool:
         return worker.is_ready and not worker.ending and len(worker.batches) < _AHEAD
 
-    def _start(self) -> WorkerHandle:
+    def _start(self) -> PoolWorker:
         self._started += 1
-        log = self._logs / f"worker_{self._started}.log"
-        return WorkerHandle(self._started, log, self._replies)
+        return self._make(self._started, self._replies)
 
-    def _prepared(self, worker: WorkerHandle, message: object) -> Preparation | None:
+    def _prepared(self, worker: PoolWorker, message: object) -> Preparation | None:
         """Takes a message of a worker that is not ready; returns what it found out, or None."""
         if worker not in self._workers:
             return None
@@ -133,7 +131,7 @@ class LocalPool:
         worker.is_ready = True
         return message
 
-    def _taken(self, worker: WorkerHandle, message: object) -> list[BatchResult | BatchLoss]:
+    def _taken(self, worker: PoolWorker, message: object) -> list[BatchResult | BatchLoss]:
         """Takes a message of a worker, or its end."""
         if worker not in self._workers:
             return []
@@ -149,7 +147,7 @@ class LocalPool:
             return []
         return self._replaced(worker)
 
-    def _replaced(self, worker: WorkerHandle) -> list[BatchResult | BatchLoss]:
+    def _replaced(self, worker: PoolWorker) -> list[BatchResult | BatchLoss]:
         """Replaces a worker that has ended; returns the loss of the batch that it was flying."""
         reason = worker.how_it_ended()
         worker.close()

@@ -1,21 +1,17 @@
-"""One local worker process, as its pool sees it."""
+"""A worker that is a process of this machine: `worker_process`."""
 
 from __future__ import annotations
 
 import os
-import queue
 import signal
 import subprocess
 import sys
 import threading
-import time
-from collections import deque
 from pathlib import Path
-from typing import Any
 
 from volery.cluster.batches import RunBatch, StudyJob
 from volery.cluster.errors import StudyError
-from volery.cluster.executor import WorkerState
+from volery.cluster.pool_worker import PoolWorker, Replies
 from volery.cluster.worker_messages import read_message, write_message
 from volery.core.errors import reason_of
 from volery.core.whole_files import open_new
@@ -24,29 +20,16 @@ _THREADS = ("OMP", "OPENBLAS", "MKL", "NUMBA")
 _LOG_LINES = 3
 _FAREWELL_S = 2.0
 
-Reply = tuple["WorkerHandle", Any]
-"""A worker and its message; None: its output has ended."""
 
-
-class WorkerHandle:
-    """Starts a worker; its messages go to `replies` from a thread of its own.
+class ProcessWorker(PoolWorker):
+    """Starts a process; its messages go to `replies` from a thread of its own.
 
     log: file for its standard error. Raises `StudyError` if the process cannot start.
     """
 
-    def __init__(self, number: int, log: Path, replies: queue.SimpleQueue[Reply]) -> None:
-        self.name = f"worker {number}"
-        self.batches: deque[RunBatch] = deque()
-        """Batches that it has, the present one first."""
-        self.has_greeted = False
-        """Whether it has said which version it has."""
-        self.is_ready = False
-        """Whether it has prepared."""
-        self.ending = ""
-        """Why the pool ends it; empty: it does not."""
+    def __init__(self, number: int, log: Path, replies: Replies) -> None:
+        super().__init__(f"worker {number}")
         self._log_path = log
-        self._runs = 0
-        self._began = time.monotonic()
         threads = {f"{name}_NUM_THREADS": "1" for name in _THREADS}
         try:
             with open_new(log) as errors:
@@ -67,34 +50,9 @@ class WorkerHandle:
         """Number of the process."""
         return self._process.pid
 
-    @property
-    def busy_s(self) -> float:
-        """Wall time since its present batch began, s; 0 without one."""
-        return time.monotonic() - self._began if self.batches else 0.0
-
     def send_job(self, job: StudyJob) -> None:
         """Hands over the study."""
         self._send(job)
-
-    def send(self, batch: RunBatch) -> None:
-        """Hands over a batch."""
-        if not self.batches:
-            self._began = time.monotonic()
-        self.batches.append(batch)
-        self._send(batch)
-
-    def finished(self) -> RunBatch:
-        """Removes and returns the present batch, which has ended."""
-        batch = self.batches.popleft()
-        self._runs += len(batch.runs)
-        self._began = time.monotonic()
-        return batch
-
-    def state(self) -> WorkerState:
-        """Returns its state for displays."""
-        word = "busy" if self.batches else "idle" if self.is_ready else "starting"
-        runs = len(self.batches[0].runs) if self.batches else 0
-        return WorkerState(self.name, word, self._runs, runs)
 
     def end(self, reason: str) -> None:
         """Kills the process; its output ends soon."""
@@ -125,6 +83,9 @@ class WorkerHandle:
                 except OSError:
                     continue  # what was not flushed has no reader
 
+    def _send_batch(self, batch: RunBatch) -> None:
+        self._send(batch)
+
     def _send(self, message: object) -> None:
         if self._process.stdin is not None:
             try:
@@ -132,7 +93,7 @@ class WorkerHandle:
             except OSError:
                 return  # it has ended: its listener reports that
 
-    def _listen(self, replies: queue.SimpleQueue[Reply]) -> None:
+    def _listen(self, replies: Replies) -> None:
         output = self._process.stdout
         try:
             while output is not None:

@@ -10,17 +10,22 @@ from studies import TINY, study_file
 
 from volery.cluster import StudyError, load_study, run_study
 from volery.cluster.batches import StudyJob
-from volery.cluster.local_pool import LocalPool
+from volery.cluster.process_worker import ProcessWorker
+from volery.cluster.worker_pool import WorkerPool
 
 pytest.importorskip("pyarrow")
 pytest.importorskip("scipy")
 
 
+def pool_of(job, folder):
+    return WorkerPool(job, 1, lambda k, replies: ProcessWorker(k, folder / "log", replies))
+
+
 def test_a_worker_with_another_version_is_refused(tmp_path, monkeypatch):
     loaded = load_study(TINY)
-    monkeypatch.setattr("volery.cluster.local_pool.code_version", lambda: "0.0.9+older")
+    monkeypatch.setattr("volery.cluster.worker_pool.code_version", lambda: "0.0.9+older")
     job = StudyJob(loaded.study, "study", tmp_path, False, loaded.points[0], tmp_path)
-    pool = LocalPool(job, 1, tmp_path)
+    pool = pool_of(job, tmp_path)
     try:
         with pytest.raises(StudyError, match=r"worker 1 has Volery .*, this driver 0.0.9\+older"):
             pool.prepare()
@@ -33,7 +38,7 @@ def test_a_worker_that_cannot_start_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "executable", "/no/python")
     job = StudyJob(loaded.study, "study", tmp_path, False, loaded.points[0], tmp_path)
     with pytest.raises(StudyError, match="a worker cannot start: No such file"):
-        LocalPool(job, 1, tmp_path).prepare()
+        pool_of(job, tmp_path).prepare()
 
 
 MINE = """

@@ -23,7 +23,6 @@ from pathlib import Path
 from volery.cluster import load_study
 from volery.cluster.results_folder import ResultsFolder
 from volery.cluster.study_runs import stored_plan, table_of
-from volery_benchmarks.registry import Measured
 
 _LOG = logging.getLogger(__name__)
 _RUNS, _QUICK_RUNS = 1000, 100
@@ -51,7 +50,7 @@ for run in runs_of(loaded):
 """
 
 
-def measure(*, quick: bool = False) -> Measured:
+def measure(*, quick: bool = False) -> dict[str, float]:
     """Returns the figures of the bench."""
     runs = _QUICK_RUNS if quick else _RUNS
     with tempfile.TemporaryDirectory() as folder:
@@ -65,7 +64,7 @@ def measure(*, quick: bool = False) -> Measured:
         alone_s = _sweep(alone, work) - start_s
         together_s = _sweep(_study(work, "together", runs, vectorized=True), work) - start_s
         loop_s = (before_s + _loop(alone)) / 2.0 - loop_start_s
-        figures = {
+        return {
             "sweep_runs_per_s_core": (runs - 1) / alone_s,
             "sweep_runs_per_s_core_vectorized": (runs - 1) / together_s,
             "sweep_overhead": alone_s / loop_s - 1.0,
@@ -75,7 +74,6 @@ def measure(*, quick: bool = False) -> Measured:
             **_killed(work, _QUICK_KILLED_RUNS if quick else _KILLED_RUNS),
             "load_average": os.getloadavg()[0],
         }
-    return Measured(figures)
 
 
 def _study(work: Path, name: str, runs: int, *, vectorized: bool) -> Path:
