@@ -59,8 +59,10 @@ def _describe(fault: Any, model: type[BaseModel], data: Any) -> str:
         return f"unknown key '{key}'{hint} Allowed here: {', '.join(allowed)}"
     if fault["type"] == "union_tag_invalid":
         return f"key '{key}.kind': {message}"
+    if fault["type"] == "union_tag_not_found":
+        key += ".kind"
     if fault["type"] in ("missing", "union_tag_not_found"):
-        return f"key '{key}{'' if fault['type'] == 'missing' else '.kind'}' is missing"
+        return f"key '{key}' is missing"
     if not key:
         return message
     one_table = fault["type"] == "tuple_type" and isinstance(fault.get("input"), dict)

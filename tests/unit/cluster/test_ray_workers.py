@@ -31,15 +31,20 @@ def height_m(flight, log):
 
 
 @pytest.fixture(scope="module")
-def ray_address(tmp_path_factory):
-    """Starts a cluster of this machine on loopback, with a token, as docs/sweeps.md does."""
-    ray = pytest.importorskip("ray")
+def sweep(tmp_path_factory):
+    """Starts a cluster of this machine on loopback, with a token, as docs/sweeps.md does.
+
+    Returns a function that flies a study there and returns its table.
+    """
+    pytest.importorskip("ray")
     folder = tmp_path_factory.mktemp("ray")
     token = folder / "token"
     token.write_text("0123456789abcdef0123456789abcdef")
-    variables = {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN_PATH": str(token)}
-    before = {name: os.environ.get(name) for name in variables}
-    os.environ.update(variables)
+    variables = {
+        **os.environ,
+        "RAY_AUTH_MODE": "token",
+        "RAY_AUTH_TOKEN_PATH": str(token),
+    }
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     words = [
@@ -47,10 +52,19 @@ def ray_address(tmp_path_factory):
         *("--num-cpus=2", "--include-dashboard=false", "--disable-usage-stats"),
         f"--temp-dir={folder}",
     ]
+
+    def fly(study, out, *words):
+        command = [sys.executable, "-m", "volery", "sweep", str(study), "--out", str(out)]
+        command += ["--ray", f"127.0.0.1:{port}", *words]
+        done = subprocess.run(command, env=variables, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return run_study(study, out, workers=0, trust="--trust" in words)  # all are there
+
     with (
         open(folder / "head.log", "wb") as log,
         subprocess.Popen(
             [sys.executable, "-m", "ray.scripts.scripts", *words],
+            env=variables,
             stdout=log,
             stderr=log,
             start_new_session=True,
@@ -62,20 +76,17 @@ def ray_address(tmp_path_factory):
                 assert head.poll() is None
                 assert time.monotonic() < until
                 time.sleep(0.2)
-            yield f"127.0.0.1:{port}"
+            yield fly
         finally:
-            ray.shutdown()
-            os.killpg(head.pid, signal.SIGTERM)
-            for name, value in before.items():
-                os.environ.pop(name) if value is None else os.environ.update({name: value})
+            os.killpg(head.pid, signal.SIGKILL)
 
 
 @pytest.mark.slow
-def test_a_cluster_gives_the_table_of_this_machine(ray_address, tmp_path):
+def test_a_cluster_gives_the_table_of_this_machine(sweep, tmp_path):
     (tmp_path / "mine.py").write_text(MINE.replace("flight.seed ==", "0 =="))
     text = "repetitions = 6\nlogs = 'all'\nmetrics = ['success', 'mine.py:height_m']\n"
     path = study_file(tmp_path, text)
-    far = run_study(path, tmp_path / "far", ray=ray_address, trust=True)
+    far = sweep(path, tmp_path / "far", "--trust")
     near = run_study(path, tmp_path / "near", workers=0, trust=True)
     assert far["status"] == ["done"] * 6
     assert far.repeatable == near.repeatable
@@ -85,11 +96,10 @@ def test_a_cluster_gives_the_table_of_this_machine(ray_address, tmp_path):
 
 
 @pytest.mark.slow
-def test_killed_silent_and_stuck_workers_cost_only_their_runs(ray_address, tmp_path):
+def test_killed_silent_and_stuck_workers_cost_only_their_runs(sweep, tmp_path):
     (tmp_path / "mine.py").write_text(MINE)
     text = "repetitions = 5\nrun_timeout_s = 20.0\nmetrics = ['mine.py:height_m']\n"
-    path = study_file(tmp_path, text)
-    table = run_study(path, tmp_path / "out", ray=ray_address, trust=True)
+    table = sweep(study_file(tmp_path, text), tmp_path / "out", "--trust")
     assert table["status"] == ["done", "failed", "failed", "failed", "done"]
     assert table["error"][1].startswith("its worker was lost: The actor died")
     assert table["error"][2].startswith("its worker was lost: no sign of life for")
@@ -97,10 +107,10 @@ def test_killed_silent_and_stuck_workers_cost_only_their_runs(ray_address, tmp_p
 
 
 @pytest.mark.slow
-def test_code_of_an_untrusted_study_stays_here(ray_address, tmp_path):
+def test_code_of_an_untrusted_study_stays_here(sweep, tmp_path):
     (tmp_path / "numpy.py").write_text("raise SystemExit('the study runs its code')")
     path = study_file(tmp_path, "repetitions = 1\nmetrics = ['success']\n")
-    assert run_study(path, tmp_path / "out", ray=ray_address)["status"] == ["done"]
+    assert sweep(path, tmp_path / "out")["status"] == ["done"]
 
 
 @pytest.mark.parametrize(
