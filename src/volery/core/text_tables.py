@@ -101,6 +101,8 @@ def _table_of(text: str) -> TextTable | None:
     if not rows:
         return None
     names = heading.names if heading is not None else _stripped(rows.pop(0)[1])
+    while rows and rows[-1][1][0].startswith("# ") and len(rows[-1][1]) != len(names):
+        rows.pop()  # a comment below
     # R's write.table gives row names, and no name to their column
     if separator != "," and rows and all(len(row) == len(names) + 1 for _, row in rows):
         is_named = any(row[-1].strip() for _, row in rows)
