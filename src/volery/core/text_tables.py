@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from volery.core.errors import DataFileError
+from volery.core.plain_text import plain
 from volery.core.text_files import decode_text
 
 _log = logging.getLogger(__name__)
@@ -152,7 +153,7 @@ def plain_name(name: str) -> str:
 
 def warn_of_unread(where: str, names: Iterable[str]) -> None:
     """Logs a warning about columns that are not read, once for each file; none without names."""
-    shown = ", ".join(name[:_SHOWN_LETTERS] for name in names)
+    shown = plain(", ".join(name[:_SHOWN_LETTERS] for name in names))
     if shown:
         _warn(f"{where}: columns that are not read: {shown}")
 
