@@ -11,7 +11,7 @@ import numpy as np
 
 from volery.core.arrays import Array
 from volery.core.rng import generator
-from volery.world.city.outlines import Outline
+from volery.world.city.outline import Outline
 from volery.world.materials import Material
 from volery.world.mesh import Mesh, concatenate
 from volery.world.scene_content import Look, Solid

@@ -2,8 +2,9 @@
 
 A valid footprint consists of one or more polygons: simple rings, holes inside, no overlap.
 Self-intersecting outlines are rebuilt from the areas that they enclose, open ones are closed;
-outlines without area, duplicates and buildings hidden in a taller one are dropped. The report lists
-each by id. What is no building (see `selection`) is left out and counted.
+outlines without area, duplicates, buildings hidden in a taller one and outlines whose parts are
+mapped (see `parts`) are dropped. The report lists each by id. What is no building (see `selection`)
+is left out and counted.
 """
 
 from __future__ import annotations
@@ -20,8 +21,10 @@ from volery.core.errors import DataFileError
 from volery.core.geodesy import LocalFrame
 from volery.core.plurals import counted
 from volery.world.city.geojson import Feature, Ring, read_features
-from volery.world.city.heights import Height, HeightRule, height_of
-from volery.world.city.selection import reasons_in_words, select_buildings
+from volery.world.city.heights import HeightRule, height_of
+from volery.world.city.outline import Outline
+from volery.world.city.parts import without_outlines_of_parts
+from volery.world.city.selection import is_part, reasons_in_words, select_buildings
 
 Region = tuple[float, float, float, float]
 
@@ -33,15 +36,6 @@ _MOST_MENDED = 1000
 """Maximum corners of a self-intersecting outline: it may have this number squared of parts."""
 _SAME = 0.999
 """Fraction of common area at which two footprints count as duplicates."""
-
-
-@dataclass(frozen=True, eq=False)
-class Outline:
-    """A mapped building: a shapely MultiPolygon in the map, m, with positive area."""
-
-    id: str
-    footprint: Any
-    height: Height
 
 
 @dataclass(frozen=True)
@@ -129,14 +123,16 @@ def read_outlines(
             continue
         if mended:
             repaired.append((feature.id, mended))
-        outlines.append(Outline(feature.id, footprint, height_of(feature.tags, rule)))
-    kept, again = _without_hidden(outlines)
+        height = height_of(feature.tags, rule)
+        outlines.append(Outline(feature.id, footprint, height, is_part(feature.tags)))
+    outlines, filled = without_outlines_of_parts(outlines)
+    kept, hidden = _without_hidden(outlines)
     return kept, Report(
         file=Path(path).name,
         outlines=len(features),
         buildings=len(kept),
         repaired=tuple(repaired),
-        dropped=tuple(dropped + again),
+        dropped=tuple(dropped + filled + hidden),
         guessed=tuple((o.id, o.height.fault) for o in kept if o.height.fault),
         heights=tuple(  # type: ignore[arg-type]  # three of them
             sum(o.height.source == source for o in kept)

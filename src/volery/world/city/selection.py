@@ -42,6 +42,12 @@ def select_buildings(features: Sequence[Feature]) -> Selection:
     )
 
 
+def is_part(tags: Tags) -> bool:
+    """Returns whether a building is mapped as a part of another one only."""
+    whole, part = (_text(tags, key) for key in _BUILT)
+    return bool(part) and part not in _UNBUILT and (not whole or whole in _UNBUILT)
+
+
 def reasons_in_words(others: Iterable[tuple[str, str]]) -> str:
     """Returns the most frequent reasons, separated by commas."""
     counts = Counter(why for _, why in others).most_common()

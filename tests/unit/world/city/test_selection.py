@@ -29,16 +29,17 @@ AREAS = [
 ]
 
 
-def square(x, side=10.0):
-    points = np.array([[x, 0], [x + side, 0], [x + side, side], [x, side], [x, 0]], float)
+def feature(x, properties, side=10.0):
+    return box(x, x + side, side, properties)
+
+
+def box(x0, x1, depth, properties):
+    points = np.array([[x0, 0], [x1, 0], [x1, depth], [x0, depth], [x0, 0]], float)
     enu = np.column_stack([points, np.zeros(5)])
     latitude, longitude, _ = np.degrees(FRAME.geodetic_from_enu(enu)).T
-    return np.column_stack([longitude, latitude]).tolist()
-
-
-def feature(x, properties, side=10.0):
-    geometry = {"type": "Polygon", "coordinates": [square(x, side)]}
-    return {"type": "Feature", "id": f"at {x}", "properties": properties, "geometry": geometry}
+    ring = np.column_stack([longitude, latitude]).tolist()
+    geometry = {"type": "Polygon", "coordinates": [ring]}
+    return {"type": "Feature", "id": f"at {x0}", "properties": properties, "geometry": geometry}
 
 
 @pytest.fixture
@@ -190,9 +191,9 @@ def test_a_lower_side_above_the_roof_is_told(read):
     assert report.guessed == (("at 0.0", "min_height 'low' is no length in m"),)
 
 
-def test_parts_in_the_air_hide_nothing_below_them(read):
-    """A part is hidden only in what reaches as low and as high as it."""
-    roof = {"building:part": "yes", "height": 20, "min_height": 10}
+def test_what_hangs_in_the_air_hides_nothing_below_it(read):
+    """A building is hidden only in one that reaches as low and as high as it."""
+    roof = {"building": "yes", "height": 20, "min_height": 10}
     outlines, report = read(feature(0.0, roof), feature(2.0, {"building": "yes", "height": 5}, 6.0))
     assert len(outlines) == 2
     outlines, report = read(feature(0.0, {"building": "yes", "height": 20}), feature(0.0, roof))
@@ -200,3 +201,37 @@ def test_parts_in_the_air_hide_nothing_below_them(read):
     assert report.dropped == (("at 0.0", "hidden inside at 0.0, which is as tall"),)
     outlines, _ = read(feature(0.0, roof), feature(0.0, {"building": "yes", "height": 20}))
     assert [o.height.base_m for o in outlines] == [0.0]
+
+
+def test_parts_stand_for_the_outline_that_they_fill(write):
+    """A gate: two towers, and a storey between them; rays pass through it."""
+    part = {"building:part": "yes"}
+    path = write(
+        feature(0.0, {"building": "yes", "height": 20}, 30.0),
+        box(0.0, 10.0, 30.0, part),  # without a height
+        box(10.0, 20.0, 30.0, {**part, "height": 15, "min_height": 9}),
+        box(20.0, 30.0, 30.0, {**part, "height": 12}),
+    )
+    terrain = Terrain.flat(400.0, GROUND_M, origin=(-200.0, -200.0))
+    city = build_city(path, FRAME, terrain, heights=RULE)
+    assert [b.outline.height.height_m for b in city.buildings] == [20.0, 15.0, 12.0]
+    assert city.report.dropped == (("at 0.0", "3 parts of it stand for it"),)
+    scene = Scene(terrain, None, solids=city.solids, cover=city.cover)
+    above = [[5.0, 15.0, 100.0], [15.0, 15.0, 100.0], [25.0, 15.0, 100.0]]
+    hits = scene.cast([*above, [15.0, -20.0, GROUND_M + 5.0]],
+                      [*[[0.0, 0.0, -1.0]] * 3, [0.0, 1.0, 0.0]], 150.0)  # fmt: skip
+    scene.close()
+    np.testing.assert_allclose(hits.distance[:3], [75.0, 80.0, 83.0], atol=1e-3)
+    assert not hits.distance[3] < 150.0
+
+
+def test_outlines_that_parts_do_not_fill_stay(read):
+    outlines, report = read(
+        feature(0.0, {"building": "yes", "height": 6}, 30.0),
+        box(0.0, 10.0, 30.0, {"building:part": "yes", "height": 20}),
+        box(30.0, 60.0, 30.0, {"building:part": "yes", "height": 9}),
+        feature(100.0, {"building": "yes"}),
+        box(100.0, 110.0, 10.0, {"building": "yes", "building:part": "yes", "height": 9}),
+    )
+    assert [o.height.height_m for o in outlines] == [6.0, 20.0, 9.0, 10.0]
+    assert [why for _, why in report.dropped] == ["hidden inside at 100.0, which is as tall"]
