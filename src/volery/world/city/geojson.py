@@ -25,8 +25,10 @@ from volery.world.city.tags import Tags, tags_of
 MOST_BYTES = 256_000_000
 """Maximum file size: parsed larger files would need gigabytes."""
 _WGS_84 = ("CRS84", "EPSG::4326", "EPSG:4326")
-_ID_KEYS = ("id", "@id", "osm_id", "osm_way_id", "full_id", "fid", "OBJECTID", "gml_id")
-"""Keys of ids, in the words of OpenStreetMap's and others' exporters."""
+_BINARY = (b"PK\x03\x04", b"\x1f\x8b", b"SQLite format 3\0", b"\0\0\x27\x0a")
+"""First bytes of ZIP, gzip, GeoPackage and shapefile."""
+_ID_KEYS = ("id", "@id", "osm_id", "osm_way_id", "full_id", "fid", "objectid", "gml_id")
+"""Keys of ids in lower case, in the words of OpenStreetMap's and others' exporters."""
 _SHAPES = ("Point", "MultiPoint", "LineString", "MultiLineString")
 """Valid geometries that are not outlines."""
 _GEOMETRIES = ("Polygon", "MultiPolygon", "GeometryCollection")
@@ -96,7 +98,13 @@ def _load(path: Path) -> list[Any]:
             raise DataFileError(
                 f"{path} has {size / 1e6:.0f} MB; at most {MOST_BYTES / 1e6:.0f} MB are read"
             )
-        return list(_values(decode_text(path.read_bytes())))
+        data = path.read_bytes()
+        if data.startswith(_BINARY):
+            raise DataFileError(
+                f"outlines {path} are no GeoJSON but a binary file; `ogr2ogr OUT.geojson IN` writes "
+                "GeoJSON of geographic formats"
+            )
+        return list(_values(decode_text(data)))
     except FileNotFoundError:
         raise DataFileError(f"outlines {path} do not exist") from None
     except UnicodeDecodeError:
@@ -135,7 +143,7 @@ def _id_of(feature: Mapping[str, Any], number: int) -> str:
     properties = feature.get("properties")
     if not isinstance(properties, dict | None):
         raise ValueError("'properties' must be an object or null")
-    for holder in (feature, properties or {}):
+    for holder in (feature, {key.lower(): own for key, own in (properties or {}).items()}):
         for key in _ID_KEYS:
             own = holder.get(key)
             if isinstance(own, float) and own.is_integer():  # of a table with gaps

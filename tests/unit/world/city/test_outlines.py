@@ -234,6 +234,7 @@ def test_heights_not_understood_are_told(read, height):
         ({"osm_id": 7.0}, "7"),
         ({"full_id": "w7", "osm_type": "way"}, "w7"),
         ({"OBJECTID": 12}, "12"),
+        ({"OSM_ID": "7", "HEIGHT": 9.0}, "7"),
         ({"fid": 3}, "3"),
         ({}, "#1"),
     ],
@@ -376,6 +377,10 @@ def test_what_is_no_geojson_is_one_clear_error(tmp_path, text, message):
 def test_missing_and_binary_files(tmp_path):
     with pytest.raises(DataFileError, match="do not exist"):
         read_outlines(tmp_path / "none.geojson", FRAME, rule=RULE)
+    for data in (b"PK\x03\x04\xff", b"\x1f\x8b\x08", b"SQLite format 3\0", b"\0\0\x27\x0a\0"):
+        (tmp_path / "b.geojson").write_bytes(data)
+        with pytest.raises(DataFileError, match="are no GeoJSON but a binary file; `ogr2ogr OUT"):
+            read_outlines(tmp_path / "b.geojson", FRAME, rule=RULE)
     for data in (b"\xff\xfe\x00", '{"type": "F\u00e9"}'.encode("latin-1")):
         (tmp_path / "b.geojson").write_bytes(data)
         with pytest.raises(DataFileError, match="are not UTF-8; save the file as UTF-8"):
