@@ -101,8 +101,8 @@ def _load(path: Path) -> list[Any]:
         data = path.read_bytes()
         if data.startswith(_BINARY):
             raise DataFileError(
-                f"outlines {path} are no GeoJSON but a binary file; `ogr2ogr OUT.geojson IN` writes "
-                "GeoJSON of geographic formats"
+                f"outlines {path} are no GeoJSON but a binary file; `ogr2ogr OUT.geojson IN` "
+                "converts geographic formats"
             )
         return list(_values(decode_text(data)))
     except FileNotFoundError:
