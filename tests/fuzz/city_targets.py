@@ -48,9 +48,29 @@ _COLLECTION = {
         {"type": "Feature", "properties": None, "geometry": None},
     ],
 }
+_EXPORT = {
+    "type": "FeatureCollection",
+    "features": [
+        _feature(
+            "Polygon", [_HOUSE, _YARD], building="yes", other_tags='"height"=>"9","min_height"=>"3"'
+        ),
+        _feature("Polygon", [_TOWER], tags={"building:part": "yes", "height": "20"}),
+        _feature("Polygon", [_BOW], building=None, natural="water"),
+        _feature("Polygon", [_TOWER], BUILDING="yes", HEIGHT_FT=30, other_tags='{"min_level": 2}'),
+        {
+            **_feature("GeometryCollection", None, building="roof"),
+            "geometry": {
+                "type": "GeometryCollection",
+                "geometries": [{"type": "Polygon", "coordinates": [_HOUSE]}],
+            },
+        },
+    ],
+}
 _FILES = [
     json.dumps(_COLLECTION).encode(),
     json.dumps({"type": "FeatureCollection", "features": _COLLECTION["features"][:2]}).encode(),
+    json.dumps(_EXPORT).encode(),
+    "".join(f"\x1e{json.dumps(feature)}\n" for feature in _EXPORT["features"]).encode(),
 ]
 
 
@@ -59,7 +79,7 @@ def outlines(mutator):
     if mutator.chance(0.5):
         data = mutator.bytes(_FILES)
     else:
-        text = json.dumps(mutator.plain(_COLLECTION), default=repr)
+        text = json.dumps(mutator.plain(mutator.pick((_COLLECTION, _EXPORT))), default=repr)
         data = text.encode("utf-8", "surrogatepass")
     path = path_of("outlines.geojson")
     path.write_bytes(data)

@@ -42,16 +42,20 @@ _KIND_OF_MODEL = {
     "f450_front": "camera",
 }
 _BEAMS = b"azimuth_deg,elevation_deg,time_s,ring\n-10,0,0.0,0\n0,1.5,0.001,1\n10,-2,0.002,2\n"
+_BEAMS_OF_NUMPY = b"# azimuth_deg elevation_deg time_s\n-1e1 0 0.0\n0 1.5 0.001\n# end\n"
 _TREES = (
     b"x_m,y_m,dbh_cm,height_m,species\n8,3,25,12,broadleaf\n12,-4,30,,conifer\n15,6,,9,\n",
     b"y_m,x_m\n9,9\n10,14\n",
+    b"sep=;\r\nid;X (m);Y (m);dbh_mm\r\n1;8,5;9;#NV\r\n2;9;10,5;300\r\n",
+    b'"x_m" "y_m" "species"\n"1" 8 9 "red oak"\n"2" 9 10 NA\n',
 )
-_HEIGHTS = (b"0,0,1\n0,1,2\n1,2,3\n", b"-1.5,2e0\n3,4\n")
+_HEIGHTS = (b"0,0,1\n0,1,2\n1,2,3\n", b"-1.5,2e0\n3,4\n", b'# m\n"1,5";"2"\n3;4;\n')
 _WIND = (
     b"x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s\n"
     b"-100,-100,0,1,0,0\n100,-100,0,2,0,0\n-100,100,0,1,1,0\n100,100,0,2,1,0\n"
     b"-100,-100,50,3,0,0\n100,-100,50,4,0,0\n-100,100,50,3,1,0\n100,100,50,4,1,.5\n"
 )
+_WIND_OF_EXCEL = _WIND.replace(b",", b";").replace(b".", b",").replace(b"\n", b";\r\n")
 
 
 def airframes(mutator):
@@ -109,7 +113,7 @@ def _estimated(kind):
 def beam_tables(mutator):
     """Beam patterns in tables, read alone and by a scanner in flight."""
     path = path_of("beams.csv")
-    path.write_bytes(mutator.bytes([_BEAMS]))
+    path.write_bytes(mutator.bytes([_BEAMS, _BEAMS_OF_NUMPY]))
     beams = refused_or_read(lambda: read_beams(path, 0.1, 1000))
     if beams is not None:
         assert np.isfinite(beams.direction).all()
@@ -127,7 +131,9 @@ def wind_tables(mutator):
     """Wind fields, read alone and flown in."""
     name = mutator.pick(("wind.csv", "wind.npz"))
     path = path_of(name)
-    path.write_bytes(mutator.bytes([_WIND] if name == "wind.csv" else [_wind_archive()]))
+    path.write_bytes(
+        mutator.bytes([_WIND, _WIND_OF_EXCEL] if name == "wind.csv" else [_wind_archive()])
+    )
     field = refused_or_read(lambda: read_wind_field(path))
     if field is not None:
         assert np.isfinite(field[0]).all()

@@ -19,7 +19,13 @@ from volery.world.grid_maps.grid_map import MOST_CELLS
 from volery.world.grid_maps.parsing import parse_cells
 
 OCCUPANCY = "nav_msgs/msg/OccupancyGrid"
-_MATRICES = [b"0,1,0\n1,1,0\n", b"0 1\n1 0\n\n", b"\xef\xbb\xbf0;1;\r\n1;0;\r\n", b"1.0,0e0\n0,1\n"]
+_MATRICES = [
+    b"0,1,0\n1,1,0\n",
+    b"0 1\n1 0\n\n",
+    b"\xef\xbb\xbf0;1;\r\n1;0;\r\n",
+    b"1.0,0e0\n0,1\n",
+    b'sep=;\n# m\n"1,0";"0"\nTrue;False\n',
+]
 _MAPS = [
     b"type octile\nheight 2\nwidth 3\nmap\n.@T\nGSW\n",
     b"type octile\nwidth 1\nheight 1\nmap\nO",

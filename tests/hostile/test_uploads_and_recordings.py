@@ -164,7 +164,7 @@ def test_usual_outlines_are_accepted(tmp_path: Path) -> None:
 
 
 def test_rings_without_corners_are_no_city(tmp_path: Path) -> None:
-    with pytest.raises(DataFileError, match="holds no polygon"):
+    with pytest.raises(DataFileError, match="holds no outline of a building"):
         toml_of("city", city(tmp_path / "city.geojson", []), "yard", "yard.geojson")
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import csv
+import math
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from volery.core.clock import NS_PER_S
 from volery.core.errors import DataFileError
 from volery.core.plurals import counted
+from volery.core.text_tables import TextTable, number_in, plain_name, read_table, warn_of_unread
 
 _NEEDED = ("azimuth_deg", "elevation_deg", "time_s")
 _MOST_RINGS = 65535
@@ -29,48 +30,55 @@ class BeamList(NamedTuple):
 
 
 def read_beams(path: Path, longest_s: float, most: int) -> BeamList:
-    """Reads a CSV file with the columns azimuth_deg, elevation_deg, time_s and optionally ring.
+    """Reads a table with the columns azimuth_deg, elevation_deg, time_s and optionally ring.
 
-    Times must begin at 0 or later, never decrease and not exceed `longest_s`; the file may have
-    from 2 to `most` beams. Raises `DataFileError`, naming file, line and allowed values, if the
-    file violates this.
+    `core.text_tables` reads it. Times must begin at 0 or later, never decrease and not exceed
+    `longest_s`; the file may have from 2 to `most` beams. Raises `DataFileError`, naming file, row
+    and allowed values, if the file violates this.
     """
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.DictReader(file)
-            columns = tuple(reader.fieldnames or ())
-            if not set(_NEEDED) <= set(columns) <= {*_NEEDED, "ring"}:
-                raise DataFileError(
-                    f"{path}: row 1 must name the columns {', '.join(_NEEDED)} and optionally ring"
-                )
-            rows = [_row(row, path, reader.line_num) for row in reader]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise DataFileError(f"{path}: cannot be read: {error}") from None
+    table = read_table(path, "beam table")
+    names = [plain_name(name) for name in table.heading]
+    known = (*_NEEDED, "ring")
+    if not set(_NEEDED) <= set(names) or any(names.count(name) > 1 for name in known):
+        raise DataFileError(
+            f"{path}: row 1 must name the columns {', '.join(_NEEDED)} and optionally ring"
+        )
+    unread = (table.heading[k] for k, name in enumerate(names) if name and name not in known)
+    warn_of_unread(f"beam table {path.name}", unread)
+    rows = _rows_of(table, [names.index(name) for name in known if name in names], path)
     if not 2 <= len(rows) <= most:
         raise DataFileError(f"{path}: {counted(len(rows), 'beam')}; allowed are 2 to {most}")
-    table = np.array(rows)
-    _check_times(table[:, 2], longest_s, path)
-    azimuth, elevation = np.radians(table[:, 0]), np.radians(table[:, 1])
+    beams = np.array(rows)
+    _check_times(beams[:, 2], longest_s, path)
+    azimuth, elevation = np.radians(beams[:, 0]), np.radians(beams[:, 1])
     level = np.cos(elevation)
     return BeamList(
         np.stack([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)]),
-        np.round(table[:, 2] * NS_PER_S).astype(np.int64),
-        table[:, 3].astype(np.uint16),
+        np.round(beams[:, 2] * NS_PER_S).astype(np.int64),
+        beams[:, 3].astype(np.uint16),
     )
 
 
-def _row(row: dict[str, str | None], path: Path, line: int) -> list[float]:
-    try:
-        values = [float(row[name] or "") for name in _NEEDED]
-        ring = int(row.get("ring") or 0)
-    except (ValueError, TypeError):
-        raise DataFileError(f"{path}: line {line}: every entry must be a number") from None
-    if not (np.isfinite(values).all() and abs(values[1]) <= 90.0 and 0 <= ring <= _MOST_RINGS):
-        raise DataFileError(
-            f"{path}: line {line}: numbers must be finite, elevation_deg within +-90, "
-            f"ring within 0..{_MOST_RINGS}"
-        )
-    return [*values, float(ring)]
+def _rows_of(table: TextTable, columns: list[int], path: Path) -> list[list[float]]:
+    """Returns azimuth and elevation, deg, time, s, and ring of each row."""
+    comma = table.has_decimal_commas(columns)
+    rows = []
+    for number, row in table.rows:
+        cells = [row[k] for k in columns] if len(row) == len(table.heading) else []
+        values = [number_in(cell, decimal_comma=comma) for cell in cells]
+        numbers = [value for value in values if value is not None]
+        if not cells or len(numbers) < len(values):
+            raise DataFileError(f"{path}: row {number}: every entry must be a number")
+        azimuth, elevation, time_s, ring = (*numbers, math.nan)[:4]
+        ring = 0.0 if math.isnan(ring) else ring
+        is_valid = np.isfinite((azimuth, elevation, time_s)).all() and abs(elevation) <= 90.0
+        if not (is_valid and 0.0 <= ring <= _MOST_RINGS and ring.is_integer()):
+            raise DataFileError(
+                f"{path}: row {number}: numbers must be finite, elevation_deg within +-90, "
+                f"ring within 0..{_MOST_RINGS}"
+            )
+        rows.append([azimuth, elevation, time_s, ring])
+    return rows
 
 
 def _check_times(time_s: NDArray[np.float64], longest_s: float, path: Path) -> None:

@@ -1,13 +1,14 @@
 """Reads grids of elevations: CSV matrices and ESRI ASCII grids, in m.
 
-A matrix has no header; its first row is at the lowest y. Entries are separated by commas,
-semicolons, tabs or blanks; with semicolons a comma is a decimal point. An ESRI ASCII grid begins
-with `ncols`, `nrows`, ... and its first row is at the highest y (Esri, "ESRI ASCII raster format");
-its entries are separated by blanks, in lines of any length, and may have decimal commas.
+A matrix has no header; its first row is at the lowest y. Its cells are those of `core.text_tables`.
+An ESRI ASCII grid begins with `ncols`, `nrows`, ... and its first row is at the highest y (Esri,
+"ESRI ASCII raster format"); its entries are separated by blanks, in lines of any length, and may
+have decimal commas. Comments (`#`) and Excel's first row `sep=;` are left out of both.
 """
 
 from __future__ import annotations
 
+import csv
 import math
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from volery.core.errors import DataFileError
 from volery.core.plurals import counted
 from volery.core.text_files import decode_text
+from volery.core.text_tables import is_not_measured, matrix_cells, matrix_lines
 
 _SHOWN_FAULTS = 20
 _DEEPEST_M, _HIGHEST_M = -12_000.0, 9_000.0
@@ -25,8 +27,8 @@ _NO_DATA = (-9999.0, -99999.0, -32767.0, -32768.0)
 """Common marks of cells without data."""
 _ESRI_KEYS = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize",
               "dx", "dy", "nodata_value")  # fmt: skip
-_WORDS = ("nan", "null", "na", "nodata")
-"""Words that stand for no data."""
+_WORD = "nodata"
+"""Stands for no data, as the words of `core.text_tables` do."""
 _TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 _SAME = 1e-6
 """Relative tolerance of two spacings."""
@@ -58,7 +60,8 @@ def read_elevations(path: Path, spacing_m: float) -> NDArray[np.float64]:
     return heights[::-1].copy()
 
 
-def _lines(path: Path) -> list[str]:
+def _lines(path: Path) -> list[tuple[int, str]]:
+    """Returns numbers and texts of the lines that hold the grid."""
     try:
         data = path.read_bytes()
         if data.startswith(_TIFF):
@@ -66,7 +69,7 @@ def _lines(path: Path) -> list[str]:
                 f"elevation grid {path} is a GeoTIFF; `gdal_translate -of AAIGrid` writes an ESRI "
                 "ASCII grid, which can be read"
             )
-        return decode_text(data).splitlines()
+        return list(matrix_lines(decode_text(data)))
     except FileNotFoundError:
         raise DataFileError(f"elevation grid {path} does not exist") from None
     except UnicodeDecodeError:
@@ -88,16 +91,16 @@ def _refuse_points(path: Path, heights: NDArray[np.float64]) -> None:
         )
 
 
-def _esri_head(path: Path, lines: list[str]) -> dict[str, float]:
+def _esri_head(path: Path, lines: list[tuple[int, str]]) -> dict[str, float]:
     """Returns the header of an ESRI ASCII grid by lower-case keys; empty for a plain matrix."""
     head: dict[str, float] = {}
-    for number, line in enumerate(lines, start=1):
+    for number, line in lines:
         words = line.split()
         if not words or words[0].lower() not in _ESRI_KEYS:
             break
         key, value = words[0].lower(), words[1] if len(words) > 1 else ""
         try:
-            is_word = key == "nodata_value" and value.lower() in _WORDS
+            is_word = key == "nodata_value" and bool(value) and _is_no_data(value)
             head[key] = math.nan if is_word else float(value.replace(",", "."))
         except (IndexError, ValueError):
             raise DataFileError(
@@ -108,7 +111,7 @@ def _esri_head(path: Path, lines: list[str]) -> dict[str, float]:
 
 def _rows(
     path: Path,
-    lines: list[str],
+    lines: list[tuple[int, str]],
     skipped: int,
     no_data: float | None,
     shape: tuple[float, float] | None,
@@ -118,12 +121,10 @@ def _rows(
     faults: list[str] = []
     uneven: list[str] = []
     columns = 0
-    comma = shape is not None and not any("." in line for line in lines[skipped:])
-    for number, line in enumerate(lines[skipped:], start=skipped + 1):
-        if not line.strip():
-            continue
+    comma = shape is not None and not any("." in line for _, line in lines[skipped:])
+    for number, line in lines[skipped:]:
         if shape is None or len(line.split()) == 1:
-            fields = _fields(line)
+            fields = _fields(path, number, line)
         else:
             fields = (line.replace(",", ".") if comma else line).split()
         columns = columns or len(fields)
@@ -155,16 +156,15 @@ def _rows(
     return np.array(rows)
 
 
-def _fields(line: str) -> list[str]:
-    if ";" in line:
-        fields = line.replace(",", ".").split(";")
-    elif "," in line:
-        fields = line.split(",")
-    else:
-        return line.split()
-    if not fields[-1].strip():  # a separator ends the line
-        fields.pop()
-    return fields
+def _fields(path: Path, number: int, line: str) -> list[str]:
+    try:
+        return matrix_cells(line)
+    except csv.Error as error:
+        raise DataFileError(f"elevation grid {path}: row {number}: {error}") from None
+
+
+def _is_no_data(text: str) -> bool:
+    return is_not_measured(text) or text.strip().lower() == _WORD
 
 
 def _values(fields: list[str], no_data: float | None) -> tuple[list[float], str]:
@@ -172,7 +172,7 @@ def _values(fields: list[str], no_data: float | None) -> tuple[list[float], str]
     values: list[float] = []
     for column, text in enumerate(fields, start=1):
         try:
-            value = math.nan if text.strip().lower() in _WORDS else float(text)
+            value = _value(text)
         except ValueError:
             return [], f"column {column}: not a number"
         fault = _wrong(value, no_data)
@@ -180,6 +180,16 @@ def _values(fields: list[str], no_data: float | None) -> tuple[list[float], str]
             return [], f"column {column}: {fault}"
         values.append(value)
     return values, ""
+
+
+def _value(text: str) -> float:
+    """Returns the number of a cell; NaN for a mark of missing data. Raises `ValueError`."""
+    try:
+        return float(text)
+    except ValueError:
+        if text.strip() and _is_no_data(text):
+            return math.nan
+        raise
 
 
 def _wrong(value: float, no_data: float | None) -> str:

@@ -2,19 +2,15 @@
 
 Columns `x_m` and `y_m` are required; `dbh_cm`, `height_m` and `species` may follow in any order, in
 other units (see `inventory_columns`); others are ignored. An empty field means "not measured", as
-do the marks of R, pandas and GIS programs (`NA`, `nan`, -9999). Species may have any name (see
-`species_map`). All invalid rows are reported together, with their row numbers in the file. Fields
-are separated by commas, or by semicolons, tabs or bars, as spreadsheets of many countries export
-them; then a number may have a decimal comma, and all have the same mark. Rows above the heading may
-be comments, which begin with `#`.
+do the marks of R, pandas, Excel and GIS programs (`NA`, `nan`, `#N/A`, -9999). Species may have any
+name (see `species_map`). All invalid rows are reported together, with their row numbers in the
+file. `core.text_tables` reads the fields: where they are not separated by commas, a number may have
+a decimal comma, and then all have.
 """
 
 from __future__ import annotations
 
-import csv
-import io
 import math
-import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -23,18 +19,12 @@ from numpy.typing import NDArray
 
 from volery.core.errors import DataFileError
 from volery.core.plurals import counted
-from volery.core.text_files import decode_text
+from volery.core.text_tables import is_not_measured, number_in, read_table
 from volery.world.inventory_columns import REQUIRED, ColumnOf, columns_of
 from volery.world.inventory_doubts import question
 
-_SEPARATORS = ",;\t|"
-_SPREADSHEETS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
-"""First bytes of .xlsx, .ods and .xls files."""
-_NOT_MEASURED = ("", "na", "n/a", "nan", "null", "none", "-", ".")
 _MARKS = (-999.0, -9999.0, -99999.0)
 """Numbers that stand for values that were not measured."""
-_EXCEL = re.compile(r"sep=([,;\t|])", re.IGNORECASE)
-"""First row that Excel understands, and other programs do not write."""
 _NUMBERS = ("x_m", "y_m", "dbh_cm", "height_m")
 _SHOWN_FAULTS = 20
 _SHOWN_LETTERS = 20
@@ -78,19 +68,18 @@ class Inventory:
 def read_inventory(path: str | Path) -> Inventory:
     """Reads an inventory; raises one `DataFileError` that lists every invalid row."""
     path = Path(path)
-    heading, rows, separator = _rows_of(path)
+    table = read_table(path, "inventory")
+    heading = table.heading
     try:
         columns = columns_of(heading, f"inventory {path.name}")
     except ValueError as error:
         raise DataFileError(f"inventory {path}: {error}") from None
-    fields = [row[c.position] for _, row in rows for k, c in columns.items()
-              if k in _NUMBERS and len(row) == len(heading)]  # fmt: skip
-    comma = separator != "," and any("," in field for field in fields)
+    comma = table.has_decimal_commas(c.position for k, c in columns.items() if k in _NUMBERS)
     faults: list[str] = []
     numbers: list[list[float]] = []
     names: list[str] = []
     sound: list[int] = []
-    for number, row in rows:
+    for number, row in table.rows:
         fault, values, name = _parse(row, columns, len(heading), comma=comma)
         if fault:
             faults.append(f"row {number}: {fault}")
@@ -104,36 +93,9 @@ def read_inventory(path: str | Path) -> Inventory:
         shown += f"; and rows {', '.join(others)}" if others else ""
         plural = "row" if len(faults) == 1 else "rows"
         raise DataFileError(f"inventory {path} has {len(faults)} bad {plural}: {shown}")
-    table = np.array(numbers, dtype=np.float64).reshape(-1, 4)
-    question(f"inventory {path.name}", np.array(sound, dtype=np.int64), table)
-    return Inventory(table[:, :2], table[:, 2], table[:, 3], tuple(names))
-
-
-def _rows_of(path: Path) -> tuple[list[str], list[tuple[int, list[str]]], str]:
-    """Returns the names of the columns, the other rows with their numbers, and the separator."""
-    try:
-        data = path.read_bytes()
-        if data.startswith(_SPREADSHEETS):
-            raise DataFileError(f"inventory {path} is a spreadsheet; save it as CSV in UTF-8")
-        text = decode_text(data)
-        plain = (line for line in text.splitlines() if line.strip() and not line.startswith("#"))
-        heading = next(plain, "")
-        excel = _EXCEL.fullmatch(heading)
-        separator = excel[1] if excel else max(_SEPARATORS, key=heading.count)
-        lines = csv.reader(io.StringIO(text, newline=""), delimiter=separator)
-        rows = [(k, row) for k, row in enumerate(lines, start=1) if any(f.strip() for f in row)]
-    except FileNotFoundError:
-        raise DataFileError(f"inventory {path} does not exist") from None
-    except UnicodeDecodeError:
-        raise DataFileError(f"inventory {path} is not UTF-8; save it as CSV in UTF-8") from None
-    except (OSError, csv.Error) as error:
-        raise DataFileError(f"inventory {path} cannot be read: {error}") from None
-    while rows and rows[0][1][0].startswith("#"):  # comments above the heading
-        rows.pop(0)
-    rows = rows[1:] if excel else rows
-    if not rows:
-        raise DataFileError(f"inventory {path} is empty; its first row must name the columns")
-    return [field.strip() for field in rows[0][1]], rows[1:], separator
+    measured = np.array(numbers, dtype=np.float64).reshape(-1, 4)
+    question(f"inventory {path.name}", np.array(sound, dtype=np.int64), measured)
+    return Inventory(measured[:, :2], measured[:, 2], measured[:, 3], tuple(names))
 
 
 def _parse(
@@ -147,7 +109,7 @@ def _parse(
     for name in _NUMBERS:
         column = columns.get(name)
         text = "" if column is None else row[column.position].strip()
-        value = _value(text, comma=comma)
+        value = number_in(text, decimal_comma=comma)
         shown = repr(text[:_SHOWN_LETTERS])
         if value is None:
             other = f", other rows have decimal commas: {shown}" if comma and "." in text else ""
@@ -167,19 +129,7 @@ def _parse(
             return f"{name} {value:g} {fault}", [], ""
         values.append(value / 100.0 if name == "dbh_cm" else value)
     species = row[columns["species"].position].strip() if "species" in columns else ""
-    return "", values, "" if species.lower() in _NOT_MEASURED else species
-
-
-def _value(text: str, *, comma: bool) -> float | None:
-    """Returns a number, NaN where nothing was measured; None for other text."""
-    if text.lower() in _NOT_MEASURED:
-        return math.nan
-    if comma and "." in text:
-        return None
-    try:
-        return float(text.replace(",", ".") if comma else text)
-    except ValueError:
-        return None
+    return "", values, "" if is_not_measured(species) else species
 
 
 def _wrong(column: str, value: float) -> str:

@@ -7,14 +7,11 @@ anything else are ignored.
 
 from __future__ import annotations
 
-import logging
 import math
-import re
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import NamedTuple
 
-_log = logging.getLogger(__name__)
+from volery.core.text_tables import plain_name, warn_of_unread
 
 REQUIRED = ("x_m", "y_m")
 _OPTIONAL = ("dbh_cm", "height_m", "species")
@@ -72,14 +69,13 @@ def columns_of(heading: Sequence[str], where: str) -> dict[str, ColumnOf]:
         if name not in found:
             others = f"the file has {', '.join(ignored)}; " if ignored else ""
             raise ValueError(f"column {name!r} is missing; {others}allowed: {ALLOWED}")
-    if ignored:
-        _warn(f"{where}: columns that are not read: {', '.join(ignored)}")
+    warn_of_unread(where, ignored)
     return found
 
 
 def _named(written: str) -> tuple[str, float]:
     """Returns a column's name and factor; an empty name for a column of something else."""
-    plain = re.sub(r"[^a-z0-9]+", "_", written.lower()).strip("_")
+    plain = plain_name(written)
     if plain == _SPECIES:
         return plain, 1.0
     base, _, unit = plain.rpartition("_")
@@ -100,9 +96,3 @@ def _named(written: str) -> tuple[str, float]:
         )
     factor = _UNITS_M[unit] / _FILE_UNIT_M.get(name, 1.0)
     return name, factor / math.pi if base in _CIRCUMFERENCE else factor
-
-
-@lru_cache(maxsize=100)
-def _warn(text: str) -> None:
-    """Logs a warning once, however often the same file is read."""
-    _log.warning("%s", text)

@@ -203,10 +203,28 @@ def test_a_table_of_beams_is_taken_as_it_stands(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("head", "rows"),
+    [
+        ("sep=;\nazimuth_deg;elevation_deg;time_s;ring", ["0,5;0;0;3", "90;-2,5;0,01;4"]),
+        ("Azimuth (deg)\tElevation (deg)\tTime [s]\tNote\tRing", ["0.5\t0\t0\ta\t3",
+         "90\t-2.5\t0.01\t\t4"]),
+        ("# azimuth_deg elevation_deg time_s ring", ["5e-1 0 0 3.0", "90 -2.5 0.01 4.0"]),
+    ],
+)  # fmt: skip
+def test_a_table_of_beams_as_spreadsheets_and_numpy_write_it(tmp_path, head, rows):
+    model = table_model(tmp_path, rows, head)
+    azimuth, elevation = angles_of(model)
+    np.testing.assert_allclose(azimuth, [0.5, 90.0], atol=1e-9)
+    np.testing.assert_allclose(elevation, [0.0, -2.5], atol=1e-9)
+    np.testing.assert_array_equal(model.scan.time_ns, [0, 10_000_000])
+    np.testing.assert_array_equal(model.scan.ring, [3, 4])
+
+
+@pytest.mark.parametrize(
     ("rows", "message"),
     [
         (["0,0,0,1"], "1 beam; allowed are 2"),
-        (["0,0,0,1", "0,x,0,1"], "line 3: every entry must be a number"),
+        (["0,0,0,1", "0,x,0,1"], "row 3: every entry must be a number"),
         (["0,0,0,1", "0,91,0,1"], "elevation_deg within"),
         (["0,0,0.02,1", "0,0,0.01,1"], "beam 2: time_s must not"),
         (["0,0,-0.01,1", "0,0,0.01,1"], "beam 1: time_s must not"),

@@ -99,6 +99,20 @@ def test_outlines_become_a_city_around_its_middle(checked):
     assert scenario.world.city is not None
 
 
+def test_only_buildings_of_an_export_decide_about_the_middle(checked):
+    export = json.loads(outlines())
+    (house,) = export["features"]
+    house["properties"]["building"] = "yes"
+    ring = [[24.0, 60.0], [25.5, 60.0], [25.5, 60.5], [24.0, 60.0]]
+    border = {**house, "properties": {"boundary": "administrative"}}
+    border["geometry"] = {"type": "Polygon", "coordinates": [ring]}
+    features = "\n".join(json.dumps(feature) for feature in (border, house))
+    scenario = checked("city", ".geojson", features.encode())
+    assert scenario.world.origin.latitude_deg == pytest.approx(60.17015)
+    assert scenario.world.origin.longitude_deg == pytest.approx(24.94025)
+    assert scenario.world.terrain.extent_m < 200.0
+
+
 def test_a_mesh_stands_on_the_ground_around_the_origin(checked):
     scenario = checked("mesh", ".stl", box())
     (solid,) = build_solids(scenario, build_terrain(scenario))
@@ -131,7 +145,7 @@ def test_projected_coordinates_are_moved_to_the_origin(checked):
         ("grid_map", ".png", b"\x89PNG\r\n\x1a\n broken", "grid_map.png"),
         ("grid_map", ".map", b"type octile\n", "grid_map.map"),
         ("city", ".geojson", b"{", "not valid JSON"),
-        ("city", ".geojson", b'{"type": "FeatureCollection", "features": []}', "no polygon"),
+        ("city", ".geojson", b'{"type": "FeatureCollection", "features": []}', "no outline of a b"),
         ("city", ".json", outlines([0, 0], [0, 0], [0, 0], [0, 0]), "no building is left"),
         ("city", ".json", outlines([500, 0], [1, 1], [2, 2], [500, 0]), "within 180 and 90"),
         ("mesh", ".obj", b"v 0 0 0\n", "no triangle"),

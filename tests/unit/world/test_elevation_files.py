@@ -40,6 +40,16 @@ def read(tmp_path):
         ESRI.replace("cellsize 5", "DX 5.0\nDY 5.0").replace("-7", "nan") + "4 0 6\n1.5 2 -3.25\n",
         ESRI.replace("corner", "center") + " 4  0 6 \r\n 1.5 2 -3.25 \r\n",
         "1.5,2.0,-3.25\r\n4,0,6\r\n".encode("utf-16"),  # PowerShell
+        "sep=;\r\n1,5;2,0;-3,25\r\n4;0;6\r\n",  # Excel
+        "# DEM of plot 7; in m\n1.5 2 -3.25\n# a line between\n4 0 6\n#\n",  # numpy
+        '"1.5","2.0","-3.25"\n"4","0","6"\n',
+        '"1,5";"2,0";"-3,25"\n"4";"0";"6"\n',
+        '"1.5", "2", "-3.25"\n4, 0, 6\n',
+        "1,5\t2,0\t-3,25\n4\t0\t6\n",
+        "1,5 2,0 -3,25\n4 0 6\n",
+        "1.5,\t2,\t-3.25\n4,\t0,\t6\n",
+        "1.5|2|-3.25|\n4|0|6|\n",
+        "# of GRASS\n" + ESRI + "4 0 6\n1.5 2 -3.25\n",
     ],
 )
 def test_matrices_and_esri_grids(read, content):
@@ -56,6 +66,12 @@ def test_matrices_and_esri_grids(read, content):
         ("1,2\n-12500,4\n", r"row 2, column 1: -12500 is no elevation"),
         ("1,2\n3,x\n", r"row 2, column 2: not a number"),
         ("1,2\n3,nan\n", r"row 2, column 2: nan marks a place without data"),
+        ("#VALUE!,2\n3,4\n", r"row 1, column 1: nan marks a place without data"),
+        ("1;2\n3;#N/A\n", r"row 2, column 2: nan marks a place without data"),
+        ("# a\nsep=;\n1;2\n3;x\n", r"row 4, column 2: not a number"),
+        ('"1,5","2"\n"3","4"\n', r"row 1, column 1: not a number"),
+        ("1\t\t2\n3\t4\t5\n", r"row 1, column 2: not a number"),
+        ('"' + "1" * 200_000 + '",2\n', r"row 1: field larger than field limit"),
         ("1,2\n3,inf\n", r"row 2, column 2: not finite"),
         (ESRI.replace("-7", "null") + "4 0 6\n1.5 null 3\n", r"row 8, column 2: nan marks a place"),
         (ESRI.replace("cellsize 5", "dx 5\ndy 4"), r"its dy is 4, spacing_m is 5"),

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from volery.core import text_tables
 from volery.core.errors import DataFileError
-from volery.world import inventory_columns
 from volery.world.inventory import read_inventory
 
 
@@ -44,6 +44,12 @@ def test_reads_what_ships(forest_data):
         "# plot 7, 2021\n# by hand\nx_m|y_m|dbh_cm|species\n1.5|2|30.5|oak\n3|4.25||\n",
         "Tree ID,X (m),Y (m),DBH (mm),Species,Notes\n7,1.5,2,305,oak,a\n7,3,4.25,-9999,null,\n",
         "id,easting_m,Northing [m],dbh_in,SPECIES\n1,1.5,2,12.0078740157,oak\n2,3,4.25,N/A,n/a\n",
+        "#;x_m;y_m;dbh_cm;species\n1;1,5;2;30,5;oak\n2;3;4,25;#NV;#NV\n",  # numbered rows
+        "# plot 7\n# x_m y_m dbh_cm species\n1.5e0 2e0 3.05e1 oak\n3 4.25 nan nan\n",  # numpy
+        '"x_m" "y_m" "dbh_cm" "species"\n"1" 1.5 2 30.5 "oak"\n"2" 3 4.25 NA NA\n',  # R
+        '"x_m";"y_m";"dbh_cm";"species"\n"1";1,5;2;30,5;"oak"\n"2";3;4,25;NA;NA\n',  # R
+        "x_m;y_m;dbh_cm;species\n1,5;2;30,5;oak;\n3;4,25;;;\n",
+        '"# plot 7, 2021",,,\nx_m,y_m,dbh_cm, "species"\n1.5,2,30.5, "oak"\n3,4.25,,\n',
         "x_ft,y_ft,girth_cm,species\n4.92125984252,6.56167979003,95.8185759345,oak\n"
         "9.84251968504,13.9435695538,.,\n",
     ],
@@ -59,6 +65,20 @@ def test_what_spreadsheets_pandas_and_r_write(tmp_path, text, encoding):
     assert trees.species == ("oak", "")
 
 
+@pytest.mark.parametrize(
+    "mark",
+    ["#N/A", "#VALUE!", "#DIV/0!", "#REF!", "#NAME?", "#NULL!", "#NUM!", "#SPILL!", "#WERT!",
+     "#BEZUG!", "#NV", "#N/D", " #n/a "],
+)  # fmt: skip
+def test_errors_of_excel_are_not_measured(tmp_path, mark):
+    text = f"dbh_cm,x_m,y_m,height_m,species\n{mark},1,2,{mark},{mark}\n20,3,4,5,oak\n"
+    trees = read_inventory(write(tmp_path, text))
+    assert trees.position.tolist() == [[1, 2], [3, 4]]
+    np.testing.assert_array_equal(trees.dbh_m, [np.nan, 0.2])
+    np.testing.assert_array_equal(trees.height_m, [np.nan, 5.0])
+    assert trees.species == ("", "oak")
+
+
 def test_feet_are_metres(tmp_path):
     trees = read_inventory(write(tmp_path, "x_m,y_m,Ht_ft,dbh_m\n1,2,50,0.5\n"))
     assert (trees.height_m[0], trees.dbh_m[0]) == pytest.approx((15.24, 0.5))
@@ -70,6 +90,9 @@ def test_feet_are_metres(tmp_path):
         ("x_m;y_m;dbh_cm\n1,5;2;30,5\n1.432,5;2;3\n", "row 3: x_m is not a number, other rows have "
          "decimal commas: '1.432,5'"),
         ("x_m\ty_m\n1,234\t987.5\n", "row 2: y_m is not a number, other rows have decimal commas"),
+        ("x_m,y_m,dbh_cm\n1,2,#12\n", "row 2: dbh_cm is not a number: '#12'"),
+        ("x_m,y_m\n#REF!,2\n", "row 2: x_m is empty: '#REF!'"),
+        ("x_m,y_m\n1,5,2\n3,4,2\n", "row 2: 3 fields, the heading has 2"),
         ('x_m,y_m\n"432,111.25",5\n', "row 2: x_m is not a number: '432,111.25'"),
         ("x_m,y_m\n1,2\n-9999,-9999\n", "row 3: x_m and y_m are -9999, which marks what is not"),
         ("x_m,y_m,dbh_cm\n1,2,3-Jan\n", "row 2: dbh_cm is not a number: '3-Jan'"),
@@ -85,7 +108,7 @@ def test_what_could_be_read_in_two_ways_is_refused(tmp_path, text, message):
 
 
 def test_columns_that_are_not_read_are_named(tmp_path, caplog):
-    inventory_columns._warn.cache_clear()
+    text_tables._warn.cache_clear()
     read_inventory(write(tmp_path, "tree_id,x_m,y_m,dhb_cm\n1,2,3,4\n"))
     (record,) = caplog.records
     assert record.getMessage() == "inventory trees.csv: columns that are not read: tree_id, dhb_cm"

@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
+from volery.core import text_tables
 from volery.core.errors import DataFileError
 from volery.world.weather import WindField
 
@@ -36,6 +37,39 @@ def test_csv_rows_and_columns_come_in_any_order(tmp_path):
     check(WindField.from_file(written(tmp_path, rows, heading)))
 
 
+@pytest.mark.parametrize(
+    ("separator", "heading"),
+    [
+        (";", HEADING),
+        ("\t", HEADING),
+        ("|", HEADING),
+        (" ", HEADING),
+        (" ", "# " + HEADING.replace(",", " ")),  # numpy.savetxt
+        (" ", "# a valley\n#" + HEADING),
+        (";", "sep=;\n# a valley, at noon\n" + HEADING.upper().replace(",", ";")),
+        (";", "# " + HEADING.replace(",", "; ")),
+        ("\t", '"X (m)"\t"Y (m)"\t"Z (m)"\t"Vx (m/s)"\t"Vy (m/s)"\t"Vz (m/s)"'),
+        (";", "X [m];Y [m];Z [m];vx [m/s];vy [m/s];vz [m/s]"),
+    ],
+)
+@pytest.mark.parametrize("mark", [".", ","])
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_csv_as_spreadsheets_and_numpy_write_it(tmp_path, separator, heading, mark, encoding):
+    rows = [row.replace(",", separator).replace(".", mark) for row in ROWS]
+    heading = heading.replace(",", separator) if heading == HEADING else heading
+    path = tmp_path / "WIND.TXT"
+    path.write_text("\r\n".join([heading, *rows, ""]), encoding=encoding, newline="")
+    check(WindField.from_file(path))
+
+
+def test_further_columns_of_a_csv_are_named(tmp_path, caplog):
+    text_tables._warn.cache_clear()
+    rows = [f"{k},{row},7.5" for k, row in enumerate(ROWS)]
+    check(WindField.from_file(written(tmp_path, rows, f",{HEADING},k_m2_s2")))
+    (record,) = caplog.records
+    assert record.getMessage() == "wind field wind.csv: columns that are not read: k_m2_s2"
+
+
 def test_rounded_coordinates_pass(tmp_path):
     rows = [f"{x:.3f},0,0,1,0,0" for x in np.arange(7) / 3.0]
     field = WindField.from_file(written(tmp_path, rows))
@@ -48,7 +82,7 @@ def test_rounded_coordinates_pass(tmp_path):
     [
         ({3: "10,5,0,x,0,0"}, ["row 5", "vx_m_s is not a number"]),
         ({3: "10,5,0,1,0"}, ["row 5", "5 fields, the heading has 6"]),
-        ({3: "10,5,0,nan,0,0"}, ["row 5", "vx_m_s nan", "60"]),
+        ({3: "10,5,0,nan,0,0"}, ["row 5", "vx_m_s is empty: 'nan'"]),
         ({3: "10,5,0,0,0,61"}, ["row 5", "vz_m_s 61", "60"]),
         ({4: "13,5,0,0,0,0"}, ["row 6", "x_m 13", "not on the grid 0, 10, 20"]),
         ({4: ROWS[0]}, ["row 6 repeats the node of row 2"]),
@@ -69,7 +103,9 @@ def test_bad_rows_are_told(tmp_path, change, words):
     ("rows", "heading", "words"),
     [
         ([], HEADING, "no nodes"),
-        (ROWS, "x,y,z,u,v,w", "row 1 must name the columns x_m"),
+        (ROWS, "x,y,z,u,v,w", "row 1 must name the columns x_m.*, not x, y, z, u, v, w"),
+        (ROWS, HEADING.replace("y_m", "X_M"), "row 1 must name the columns x_m"),
+        (["1,5;0;0;1.5;0;0"], HEADING.replace(",", ";"), "row 2: vx_m_s is not a number: '1.5'"),
         (
             [f"{x},0,0,1,0,0" for x in (0, 10, 25)],
             HEADING,
@@ -86,11 +122,11 @@ def test_bad_tables_are_told(tmp_path, rows, heading, words):
 def test_other_files_are_refused(tmp_path):
     with pytest.raises(DataFileError, match="does not exist"):
         WindField.from_file(tmp_path / "none.csv")
-    (tmp_path / "wind.txt").touch()
+    (tmp_path / "wind.nc").touch()
     with pytest.raises(DataFileError, match=r"\.csv or an \.npz"):
-        WindField.from_file(tmp_path / "wind.txt")
+        WindField.from_file(tmp_path / "wind.nc")
     (tmp_path / "wind.csv").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(DataFileError, match="cannot be read"):
+    with pytest.raises(DataFileError, match="is not UTF-8; save it as CSV in UTF-8"):
         WindField.from_file(tmp_path / "wind.csv")
 
 

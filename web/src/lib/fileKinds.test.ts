@@ -7,6 +7,12 @@ it("files are told apart by their endings, tables by their first line", () => {
   expect(kindOf("maze.map", "type octile")).toBe("grid_map");
   expect(kindOf("plot.csv", "\n0,1,0\n1,0,0")).toBe("grid_map");
   expect(kindOf("plot.csv", "x_m,y_m,dbh_cm,species\n1,2,30,oak")).toBe("forest");
+  expect(kindOf("plot.csv", "sep=;\r\n0;1;0\r\n")).toBe("grid_map");
+  expect(kindOf("plot.csv", "# a map\n1.000e+00 0.000e+00\n")).toBe("grid_map");
+  expect(kindOf("plot.csv", "True,False\nFalse,True\n")).toBe("grid_map");
+  expect(kindOf("plot.csv", "sep=;\r\nx_m;y_m\r\n1,5;2\r\n")).toBe("forest");
+  expect(kindOf("plot.csv", "# plot 7\n# x_m y_m\n1.0e+00 2.0e+00\n")).toBe("forest");
+  expect(kindOf("town.geojsonl", "")).toBe("city");
   expect(kindOf("room.yaml", "image: room.pgm")).toBe("grid_map");
   expect(kindOf("room.pgm", "P5")).toBe("grid_map");
   expect(kindOf("notes.constructor", "")).toBeNull();

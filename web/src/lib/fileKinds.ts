@@ -13,6 +13,8 @@ const BY_ENDING: Readonly<Record<string, FileKind>> = {
   txt: "grid_map",
   geojson: "city",
   json: "city",
+  geojsonl: "city",
+  geojsons: "city",
   glb: "mesh",
   gltf: "mesh",
   obj: "mesh",
@@ -28,10 +30,17 @@ export const ENDINGS = [...Object.keys(BY_ENDING), "csv"].map((ending) => `.${en
 export const UPLOAD_HINT =
   "a map (grid, .yaml with its image, GeoJSON, glTF, OBJ, STL, tree inventory), a scenario (TOML) or a log (MCAP, bag)";
 
-/** What a file most likely is; a table with words in its first line lists trees. Null: unknown. */
+const NUMBERS = /\d[\d.,]*e[-+]?\d+|true|false/gi;
+
+/** What a file most likely is; a table with words in its first row, or a heading in the comment
+ * above it, lists trees. Null: unknown. */
 export function kindOf(name: string, beginning: string): FileKind | null {
   const ending = name.split(".").at(-1)?.toLowerCase() ?? "";
   if (ending !== "csv") return ownEntry(BY_ENDING, ending) ?? null;
-  const first = beginning.split(/\r?\n/).find((line) => line.trim() !== "") ?? "";
-  return /[a-z]/i.test(first) ? "forest" : "grid_map";
+  const rows = beginning
+    .split(/\r\n|\r|\n/)
+    .filter((row) => row.trim() !== "" && !/^"?sep=/i.test(row));
+  const at = rows.findIndex((row) => !/^[" \t]*#/.test(row));
+  const hasWords = /[a-z]/i.test((rows[at] ?? "").replace(NUMBERS, ""));
+  return hasWords || /\b(x_|easting)/i.test(rows[at - 1] ?? "") ? "forest" : "grid_map";
 }

@@ -30,7 +30,11 @@ KINDS = {
     "grid_map": Kind(
         (".csv", ".txt", ".png", ".map", MAP_SERVER), 8_000_000, "a matrix of 0 and 1"
     ),
-    "city": Kind((".geojson", ".json"), 32_000_000, "outlines of buildings as GeoJSON"),
+    "city": Kind(
+        (".geojson", ".json", ".geojsonl", ".geojsons"),
+        32_000_000,
+        "outlines of buildings as GeoJSON",
+    ),
     "mesh": Kind((".glb", ".obj", ".stl"), 64_000_000, "a mesh in metres"),
     "forest": Kind((".csv",), 8_000_000, "trees: x_m, y_m[, dbh_cm, height_m, species]"),
     SCENARIO: Kind((".toml",), 256_000, "a scenario"),

@@ -30,6 +30,7 @@ from volery.server.uploads.kinds import (
     MOST_WALLS_M,
 )
 from volery.world.city.geojson import read_features
+from volery.world.city.selection import select_buildings
 from volery.world.grid_maps.map_server import read_map_server, write_with_image
 from volery.world.grid_maps.parsing import read_cells
 from volery.world.inventory import read_inventory
@@ -124,10 +125,10 @@ def _map_server(path: Path) -> _Part:
 
 
 def _city(path: Path) -> _Part:
-    features = read_features(path)
+    features = select_buildings(read_features(path)).buildings
     rings = [ring for feature in features for polygon in feature.polygons for ring in polygon]
     if not any(len(ring) for ring in rings):
-        raise DataFileError(f"{path}: the file holds no polygon")
+        raise DataFileError(f"{path}: the file holds no outline of a building")
     corners = np.concatenate(rings)
     longitude, latitude = ((corners.min(axis=0) + corners.max(axis=0)) / 2.0).tolist()
     frame = LocalFrame.from_degrees(latitude, longitude, 0.0)

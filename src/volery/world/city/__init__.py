@@ -1,7 +1,9 @@
 """Cities from building outlines.
 
-geojson.py     a file's features                heights.py    heights of buildings
-outlines.py    valid footprints, and a report   buildings.py  walls and roofs
+geojson.py     a file's features                tags.py       what is mapped of them
+selection.py   the buildings among them         heights.py    heights of buildings
+outlines.py    valid footprints, and a report   outline.py    one building
+parts.py       outlines and parts               buildings.py  walls and roofs
 streets.py     pavement and asphalt             furniture.py  lamps and street trees
 city.py        all of it together
 """

@@ -1,4 +1,4 @@
-"""Closed solids from footprints: walls with flat roofs, and a floor below the ground."""
+"""Closed solids from footprints: walls, flat roofs, and a floor below the ground or above it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from volery.core.arrays import Array
 from volery.core.rng import generator
-from volery.world.city.outlines import Outline
+from volery.world.city.outline import Outline
 from volery.world.materials import Material
 from volery.world.mesh import Mesh, concatenate
 from volery.world.scene_content import Look, Solid
@@ -45,6 +45,12 @@ class Building:
     roof_m: float
 
     @property
+    def floor_m(self) -> float:
+        """Height of the lower side in the map: below the ground, or above it for floating ones."""
+        base = self.outline.height.base_m
+        return self.foot_m + base if base > 0.0 else self.foot_m - FOUNDATION_M
+
+    @property
     def area_m2(self) -> float:
         """Area of the footprint."""
         return float(self.outline.footprint.area)
@@ -71,9 +77,7 @@ def solids_of(buildings: Sequence[Building], seed: int) -> tuple[Solid, ...]:
     picks = generator(seed, "city/plaster").integers(0, len(_PLASTER), len(buildings))
     return tuple(
         Solid(
-            mesh=extruded(
-                building.outline.footprint, building.foot_m - FOUNDATION_M, building.roof_m
-            ),
+            mesh=extruded(building.outline.footprint, building.floor_m, building.roof_m),
             material=Material.FACADE,
             name=f"building {building.outline.id}",
             top=Material.ROOF,

@@ -1,14 +1,16 @@
-"""Reads building outlines from GeoJSON (RFC 7946) and validates the format.
+"""Reads outlines from GeoJSON (RFC 7946) and validates the format.
 
-Anything other than GeoJSON with WGS 84 coordinates raises a `DataFileError` that names file and
-feature. Well-formed but invalid outlines (self-intersecting, too few corners) pass; `outlines`
-repairs or drops them.
+A file holds one GeoJSON object, or several: one a line, or a text sequence (RFC 8142). Anything
+other than GeoJSON with WGS 84 coordinates raises a `DataFileError` that names file and feature.
+Well-formed but invalid outlines (self-intersecting, too few corners) pass; `outlines` repairs or
+drops them.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,14 +19,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.errors import DataFileError
+from volery.core.text_files import decode_text
+from volery.world.city.tags import Tags, tags_of
 
 MOST_BYTES = 256_000_000
 """Maximum file size: parsed larger files would need gigabytes."""
 _WGS_84 = ("CRS84", "EPSG::4326", "EPSG:4326")
-_ID_KEYS = ("id", "@id", "osm_id", "osm_way_id", "full_id", "fid", "OBJECTID", "gml_id")
-"""Keys of ids, in the words of OpenStreetMap's and others' exporters."""
-_SHAPES = ("Point", "MultiPoint", "LineString", "MultiLineString", "GeometryCollection")
+_BINARY = (b"PK\x03\x04", b"\x1f\x8b", b"SQLite format 3\0", b"\0\0\x27\x0a")
+"""First bytes of ZIP, gzip, GeoPackage and shapefile."""
+_ID_KEYS = ("id", "@id", "osm_id", "osm_way_id", "full_id", "fid", "objectid", "gml_id")
+"""Keys of ids in lower case, in the words of OpenStreetMap's and others' exporters."""
+_SHAPES = ("Point", "MultiPoint", "LineString", "MultiLineString")
 """Valid geometries that are not outlines."""
+_GEOMETRIES = ("Polygon", "MultiPolygon", "GeometryCollection")
+_BETWEEN = re.compile(r"[ \t\n\r\x1e]*")
+"""White space of JSON, and the record separator of RFC 8142."""
 
 Ring = NDArray[np.float64]
 """(n, 2) longitude and latitude in degrees."""
@@ -35,32 +44,19 @@ class Feature:
     """One feature of a file.
 
     polygons: each with its outer ring first, then its holes; empty for other shapes or no geometry.
+    tags: by plain names, see `tags`.
     """
 
     id: str
     shape: str
     polygons: tuple[tuple[Ring, ...], ...]
-    properties: Mapping[str, Any]
+    tags: Tags
 
 
 def read_features(path: str | Path) -> tuple[Feature, ...]:
     """Returns all features of a file, in order; raises `DataFileError` for an invalid file."""
     path = Path(path)
-    data = _load(path)
-    kind = data.get("type") if isinstance(data, dict) else None
-    if kind in ("Polygon", "MultiPolygon"):
-        data = {"type": "Feature", "geometry": data, "crs": data.get("crs")}
-    if kind in ("Feature", "Polygon", "MultiPolygon"):
-        data = {"type": "FeatureCollection", "features": [data], "crs": data.get("crs")}
-    elif kind != "FeatureCollection":
-        raise DataFileError(
-            f"{path}: outlines must be GeoJSON: a FeatureCollection, Feature, Polygon or "
-            "MultiPolygon; this file has another 'type'"
-        )
-    _check_crs(path, data.get("crs"))
-    features = data.get("features")
-    if not isinstance(features, list):
-        raise DataFileError(f"{path}: 'features' must be a list")
+    features = [feature for data in _load(path) for feature in _features_in(path, data)]
     read = []
     for number, feature in enumerate(features, start=1):
         name = f"feature {number}"
@@ -75,22 +71,62 @@ def read_features(path: str | Path) -> tuple[Feature, ...]:
     return tuple(read)
 
 
-def _load(path: Path) -> Any:
+def _features_in(path: Path, data: Any) -> list[Any]:
+    """Returns the features of one GeoJSON object."""
+    kind = data.get("type") if isinstance(data, dict) else None
+    if kind in _GEOMETRIES:
+        data = {"type": "Feature", "geometry": data, "crs": data.get("crs")}
+    if kind in ("Feature", *_GEOMETRIES):
+        data = {"type": "FeatureCollection", "features": [data], "crs": data.get("crs")}
+    elif kind != "FeatureCollection":
+        raise DataFileError(
+            f"{path}: outlines must be GeoJSON: a FeatureCollection, Feature, Polygon, "
+            "MultiPolygon or GeometryCollection; this file has another 'type'"
+        )
+    _check_crs(path, data.get("crs"))
+    features = data.get("features")
+    if not isinstance(features, list):
+        raise DataFileError(f"{path}: 'features' must be a list")
+    return features
+
+
+def _load(path: Path) -> list[Any]:
+    """Returns the JSON values of a file, at least one."""
     try:
         size = path.stat().st_size
         if size > MOST_BYTES:
             raise DataFileError(
                 f"{path} has {size / 1e6:.0f} MB; at most {MOST_BYTES / 1e6:.0f} MB are read"
             )
-        return json.loads(path.read_text(encoding="utf-8-sig"))
+        data = path.read_bytes()
+        if data.startswith(_BINARY):
+            raise DataFileError(
+                f"outlines {path} are no GeoJSON but a binary file; `ogr2ogr OUT.geojson IN` "
+                "converts geographic formats"
+            )
+        return list(_values(decode_text(data)))
     except FileNotFoundError:
         raise DataFileError(f"outlines {path} do not exist") from None
-    except (OSError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError:
+        raise DataFileError(f"outlines {path} are not UTF-8; save the file as UTF-8") from None
+    except OSError as error:
         raise DataFileError(f"outlines {path} cannot be read: {error}") from None
     except RecursionError:
         raise DataFileError(f"{path}: not GeoJSON: nested too deeply") from None
     except ValueError as error:  # of JSON, or of an integer with thousands of digits
         raise DataFileError(f"{path}: not valid JSON: {error}") from None
+
+
+def _values(text: str) -> Iterator[Any]:
+    """Returns the JSON values that follow each other in a text."""
+    decoder = json.JSONDecoder()
+    start = _BETWEEN.match(text).end()  # type: ignore[union-attr]  # it matches no character, too
+    while True:
+        value, end = decoder.raw_decode(text, start)
+        yield value
+        start = _BETWEEN.match(text, end).end()  # type: ignore[union-attr]
+        if start == len(text):
+            return
 
 
 def _check_crs(path: Path, crs: Any) -> None:
@@ -107,7 +143,7 @@ def _id_of(feature: Mapping[str, Any], number: int) -> str:
     properties = feature.get("properties")
     if not isinstance(properties, dict | None):
         raise ValueError("'properties' must be an object or null")
-    for holder in (feature, properties or {}):
+    for holder in (feature, {key.lower(): own for key, own in (properties or {}).items()}):
         for key in _ID_KEYS:
             own = holder.get(key)
             if isinstance(own, float) and own.is_integer():  # of a table with gaps
@@ -120,26 +156,33 @@ def _id_of(feature: Mapping[str, Any], number: int) -> str:
 
 def _read(feature: Mapping[str, Any], own: str) -> Feature:
     geometry = feature.get("geometry")
-    properties = feature.get("properties") or {}
+    tags = tags_of(feature.get("properties") or {})
     if geometry is None:
-        return Feature(own, "no geometry", (), properties)
-    if not isinstance(geometry, dict):
-        raise ValueError("'geometry' must be an object or null")
-    shape = geometry.get("type")
-    if shape in _SHAPES:
-        return Feature(own, str(shape), (), properties)
-    coordinates = geometry.get("coordinates")
-    if shape == "Polygon":
-        polygons = [coordinates]
-    elif shape == "MultiPolygon":
-        polygons = _list(coordinates, "'coordinates'")
-    else:
-        raise ValueError("its geometry has an unknown 'type'")
-    read = tuple(
+        return Feature(own, "no geometry", (), tags)
+    polygons = tuple(
         tuple(_ring(ring) for ring in _list(rings, "'coordinates' of a polygon"))
-        for rings in polygons
+        for rings in _polygons_of(geometry)
     )
-    return Feature(own, str(shape), read, properties)
+    return Feature(own, str(geometry["type"]), polygons, tags)
+
+
+def _polygons_of(geometry: Any) -> list[Any]:
+    """Returns the coordinates of the polygons of a geometry; a collection may hold some."""
+    polygons: list[Any] = []
+    todo = [geometry]
+    for part in todo:
+        if not isinstance(part, dict):
+            raise ValueError("'geometry' must be an object or null")
+        shape, coordinates = part.get("type"), part.get("coordinates")
+        if shape == "GeometryCollection":
+            todo += _list(part.get("geometries"), "'geometries'")
+        elif shape == "Polygon":
+            polygons.append(coordinates)
+        elif shape == "MultiPolygon":
+            polygons += _list(coordinates, "'coordinates'")
+        elif shape not in _SHAPES:
+            raise ValueError("its geometry has an unknown 'type'")
+    return polygons
 
 
 def _list(value: Any, what: str) -> list[Any]:

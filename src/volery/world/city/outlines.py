@@ -2,8 +2,9 @@
 
 A valid footprint consists of one or more polygons: simple rings, holes inside, no overlap.
 Self-intersecting outlines are rebuilt from the areas that they enclose, open ones are closed;
-outlines without area, duplicates and buildings hidden in a taller one are dropped. The report lists
-each by id.
+outlines without area, duplicates, buildings hidden in a taller one and outlines whose parts are
+mapped (see `parts`) are dropped. The report lists each by id. What is no building (see `selection`)
+is left out and counted.
 """
 
 from __future__ import annotations
@@ -20,7 +21,10 @@ from volery.core.errors import DataFileError
 from volery.core.geodesy import LocalFrame
 from volery.core.plurals import counted
 from volery.world.city.geojson import Feature, Ring, read_features
-from volery.world.city.heights import Height, HeightRule, height_of
+from volery.world.city.heights import HeightRule, height_of
+from volery.world.city.outline import Outline
+from volery.world.city.parts import without_outlines_of_parts
+from volery.world.city.selection import is_part, reasons_in_words, select_buildings
 
 Region = tuple[float, float, float, float]
 
@@ -32,15 +36,6 @@ _MOST_MENDED = 1000
 """Maximum corners of a self-intersecting outline: it may have this number squared of parts."""
 _SAME = 0.999
 """Fraction of common area at which two footprints count as duplicates."""
-
-
-@dataclass(frozen=True, eq=False)
-class Outline:
-    """A mapped building: a shapely MultiPolygon in the map, m, with positive area."""
-
-    id: str
-    footprint: Any
-    height: Height
 
 
 @dataclass(frozen=True)
@@ -58,6 +53,8 @@ class Report:
     """Buildings whose height came from `height`, from levels, from the default."""
     outside: int
     """Outlines beyond the requested region."""
+    others: tuple[tuple[str, str], ...] = ()
+    """Features that are no buildings."""
 
     def summary(self) -> str:
         """Returns a summary in one line."""
@@ -73,7 +70,14 @@ class Report:
             )
             if count
         ]
-        return text + (": " + ", ".join(parts) if parts else "")
+        text += ": " + ", ".join(parts) if parts else ""
+        if self.others:
+            text += f"; {len(self.others)} {_no_buildings(self.others)}"
+        if self.heights[2]:
+            one = self.heights[2] == 1
+            text += f"; {self.heights[2]} {'has' if one else 'have'} no height and "
+            text += f"{'gets' if one else 'get'} the default"
+        return text
 
     def __str__(self) -> str:
         """Returns the summary, then a line for each repaired, dropped or guessed outline."""
@@ -82,6 +86,11 @@ class Report:
         lines += [f"  dropped {own}: {why}" for own, why in self.dropped]
         lines += [f"  default height for {own}: {why}" for own, why in self.guessed]
         return "\n".join(lines)
+
+
+def _no_buildings(others: Sequence[tuple[str, str]]) -> str:
+    what = "is no building" if len(others) == 1 else "are no buildings"
+    return f"{what}: {reasons_in_words(others)}"
 
 
 def read_outlines(
@@ -93,12 +102,18 @@ def read_outlines(
     Raises `DataFileError` for an invalid file, or if the outlines are far from the map's origin.
     """
     features = read_features(path)
-    _check_place(path, features, frame)
+    selection = select_buildings(features)
+    if features and not selection.buildings:
+        raise DataFileError(
+            f"{path}: it contains no outline of a building; all {len(features)} features "
+            f"{_no_buildings(selection.others)}"
+        )
+    _check_place(path, selection.buildings, frame)
     repaired: list[tuple[str, str]] = []
     dropped: list[tuple[str, str]] = []
     outlines: list[Outline] = []
     outside = 0
-    for feature in features:
+    for feature in selection.buildings:
         footprint, mended, fault = _footprint(feature, frame)
         if fault:
             dropped.append((feature.id, fault))
@@ -108,20 +123,23 @@ def read_outlines(
             continue
         if mended:
             repaired.append((feature.id, mended))
-        outlines.append(Outline(feature.id, footprint, height_of(feature.properties, rule)))
-    kept, again = _without_hidden(outlines)
+        height = height_of(feature.tags, rule)
+        outlines.append(Outline(feature.id, footprint, height, is_part(feature.tags)))
+    outlines, filled = without_outlines_of_parts(outlines)
+    kept, hidden = _without_hidden(outlines)
     return kept, Report(
         file=Path(path).name,
         outlines=len(features),
         buildings=len(kept),
         repaired=tuple(repaired),
-        dropped=tuple(dropped + again),
+        dropped=tuple(dropped + filled + hidden),
         guessed=tuple((o.id, o.height.fault) for o in kept if o.height.fault),
         heights=tuple(  # type: ignore[arg-type]  # three of them
             sum(o.height.source == source for o in kept)
             for source in ("height", "levels", "default")
         ),
         outside=outside,
+        others=selection.others,
     )
 
 
@@ -221,10 +239,11 @@ def _without_hidden(
 
 def _exact_twins(outlines: Sequence[Outline]) -> dict[int, str]:
     """Finds exact duplicates of footprint and height: a file may contain a building many times."""
-    first: dict[tuple[bytes, float], int] = {}
+    first: dict[tuple[bytes, float, float], int] = {}
     gone = {}
     for k, outline in enumerate(outlines):
-        same = first.setdefault((outline.footprint.wkb, outline.height.height_m), k)
+        height = outline.height
+        same = first.setdefault((outline.footprint.wkb, height.height_m, height.base_m), k)
         if same != k:
             gone[k] = f"the same as {outlines[same].id}"
     return gone
@@ -235,10 +254,13 @@ def _hidden(outlines: Sequence[Outline], inner: int, outer: int) -> str:
     a, b = outlines[inner], outlines[outer]
     if inner == outer or a.height.height_m > b.height.height_m:
         return ""
+    if a.height.base_m < b.height.base_m:
+        return ""
     size, other = a.footprint.area, b.footprint.area
     if size > other * (2.0 - _SAME):
         return ""
-    twins = size > _SAME * other and a.height.height_m == b.height.height_m
+    as_high = (a.height.height_m, a.height.base_m) == (b.height.height_m, b.height.base_m)
+    twins = size > _SAME * other and as_high
     if twins and inner < outer:  # the first one remains
         return ""
     if a.footprint.intersection(b.footprint).area < _SAME * size:

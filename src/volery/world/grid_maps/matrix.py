@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import csv
+
 import numpy as np
 from numpy.typing import NDArray
 
 from volery.core.errors import DataFileError
 from volery.core.plurals import counted
 from volery.core.text_files import decode_text
+from volery.core.text_tables import matrix_cells, matrix_lines
 from volery.world.grid_maps.grid_map import MOST_CELLS
 
 _ZERO, _ONE, _COMMA = (ord(character) for character in "01,")
+_WORDS = {"false": 0.0, "true": 1.0}
+"""Entries of matrices of truth values, in any case."""
 _SHOWN = 20
 """Maximum characters of the input that an error shows."""
 
@@ -18,14 +23,12 @@ _SHOWN = 20
 def parse_matrix(data: bytes, where: str) -> NDArray[np.bool_]:
     """Returns blocked cells (rows, columns), row 0: the first line.
 
-    Entries are separated by commas, semicolons or blanks; empty lines are skipped. Raises
-    `DataFileError`, naming line and column, for other input.
+    Entries are those of `core.text_tables`, or `True` and `False`. Raises `DataFileError`, naming
+    line and column, for other input.
     """
     rows: list[NDArray[np.bool_]] = []
     cells = 0
-    for number, line in enumerate(_text(data, where).splitlines(), 1):
-        if not line.strip():
-            continue
+    for number, line in matrix_lines(_text(data, where)):
         row = _row(line, f"{where}, line {number}")
         if rows and len(row) != len(rows[0]):
             raise DataFileError(
@@ -60,12 +63,10 @@ def _row(line: str, where: str) -> NDArray[np.bool_]:
         plain = ((entries == _ZERO) | (entries == _ONE)).all() and (between == _COMMA).all()
         if plain and len(entries) > len(between):
             return np.asarray(entries == _ONE)
-    if "," in line or ";" in line:
-        words = line.replace(";", ",").split(",")
-        if not words[-1].strip():  # a separator ends the line
-            words.pop()
-    else:
-        words = line.split()
+    try:
+        words = matrix_cells(line)
+    except csv.Error as error:
+        raise DataFileError(f"{where}: {error}") from None
     return np.array([_entry(word, where, k) for k, word in enumerate(words, 1)], dtype=np.bool_)
 
 
@@ -73,7 +74,7 @@ def _entry(word: str, where: str, column: int) -> bool:
     try:
         value = float(word)
     except ValueError:
-        value = -1.0
+        value = _WORDS.get(word.strip().lower(), -1.0)
     if value not in (0.0, 1.0):
         raise DataFileError(
             f"{where}, column {column}: '{word.strip()[:_SHOWN]}'; allowed are 0 and 1"

@@ -1,14 +1,13 @@
 """Reads wind fields: a CSV table of nodes or a numpy .npz archive.
 
-A .csv file names its columns `x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s` in its first row and holds one node
-of a regular grid per row, both in any order. An .npz file holds `velocity_m_s` (Z, Y, X, 3),
-`origin_m` (3,) and `spacing_m` (3,).
+A .csv or .txt file names its columns `x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s` in its first row and holds
+one node of a regular grid per row, both in any order; `core.text_tables` reads it. An .npz file
+holds `velocity_m_s` (Z, Y, X, 3), `origin_m` (3,) and `spacing_m` (3,).
 """
 
 from __future__ import annotations
 
-import csv
-import io
+import math
 import zipfile
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 from volery.core.arrays import Array
 from volery.core.errors import DataFileError
 from volery.core.plurals import counted
-from volery.core.text_files import read_text
+from volery.core.text_tables import number_in, plain_name, read_table, warn_of_unread
 from volery.scenario.wind import MAX_WIND_M_S
 
 Field = tuple[Array, tuple[float, float, float], tuple[float, float, float]]
@@ -26,6 +25,7 @@ Field = tuple[Array, tuple[float, float, float], tuple[float, float, float]]
 _COLUMNS = ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s")
 _SHAPES = {"velocity_m_s": "(Z, Y, X, 3)", "origin_m": "(3,)", "spacing_m": "(3,)"}
 _SHOWN_FAULTS = 20
+_SHOWN_LETTERS = 60
 _MOST_BYTES = 1_000_000_000
 _SLACK = 1e-2
 """Tolerance of a node's position as a fraction of the spacing: written coordinates are rounded."""
@@ -36,11 +36,12 @@ def read_wind_field(path: Path) -> Field:
 
     Raises one `DataFileError` that names the file and every invalid row.
     """
-    if path.suffix not in (".csv", ".npz"):
+    suffix = path.suffix.lower()
+    if suffix not in (".csv", ".txt", ".npz"):
         raise DataFileError(f"wind field {path}: a .csv or an .npz file is needed")
     if not path.is_file():
         raise DataFileError(f"wind field {path} does not exist")
-    return _read_npz(path) if path.suffix == ".npz" else _read_csv(path)
+    return _read_npz(path) if suffix == ".npz" else _read_csv(path)
 
 
 # --------------------------------------------------------------------------------------------- npz
@@ -120,21 +121,22 @@ def _read_csv(path: Path) -> Field:
 
 
 def _rows_of(path: Path) -> tuple[list[int], Array]:
-    """Returns row numbers in the file (the header is row 1) and the table (M, 6) of `_COLUMNS`."""
-    try:
-        rows = list(csv.reader(io.StringIO(read_text(path), newline="")))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise DataFileError(f"wind field {path} cannot be read: {error}") from None
-    heading = [name.strip() for name in rows[0]] if rows else []
-    if sorted(heading) != sorted(_COLUMNS):
-        raise DataFileError(f"wind field {path}: row 1 must name the columns {','.join(_COLUMNS)}")
-    order = [heading.index(name) for name in _COLUMNS]
+    """Returns row numbers in the file and the table (M, 6) of `_COLUMNS`."""
+    text = read_table(path, "wind field")
+    names = [plain_name(name) for name in text.heading]
+    if any(names.count(name) != 1 for name in _COLUMNS):
+        raise DataFileError(
+            f"wind field {path}: row 1 must name the columns {','.join(_COLUMNS)}, not "
+            f"{', '.join(text.heading)[:_SHOWN_LETTERS]}"
+        )
+    order = [names.index(name) for name in _COLUMNS]
+    unread = (text.heading[k] for k, name in enumerate(names) if name and name not in _COLUMNS)
+    warn_of_unread(f"wind field {path.name}", unread)
+    comma = text.has_decimal_commas(order)
     faults: list[str] = []
     numbers, table = [], []
-    for number, row in enumerate(rows[1:], start=2):
-        if not any(text.strip() for text in row):
-            continue
-        fault, values = _parse(row, order)
+    for number, row in text.rows:
+        fault, values = _parse(row, order, len(names), comma=comma)
         if fault:
             faults.append(f"row {number}: {fault}")
         else:
@@ -146,17 +148,18 @@ def _rows_of(path: Path) -> tuple[list[int], Array]:
     return numbers, np.array(table)
 
 
-def _parse(row: list[str], order: list[int]) -> tuple[str, list[float]]:
+def _parse(row: list[str], order: list[int], width: int, *, comma: bool) -> tuple[str, list[float]]:
     """Returns the error of a row ("" if none), and its numbers in the order of `_COLUMNS`."""
-    if len(row) != len(order):
-        return f"{counted(len(row), 'field')}, the heading has {len(order)}", []
+    if len(row) != width:
+        return f"{counted(len(row), 'field')}, the heading has {width}", []
     values = []
     for name, column in zip(_COLUMNS, order, strict=True):
         text = row[column].strip()
-        try:
-            value = float(text)
-        except ValueError:
-            return f"{name} is not a number", []
+        value = number_in(text, decimal_comma=comma)
+        if value is None:
+            return f"{name} is not a number: {text[:_SHOWN_LETTERS]!r}", []
+        if math.isnan(value):
+            return f"{name} is empty: {text[:_SHOWN_LETTERS]!r}", []
         limit = MAX_WIND_M_S if name.endswith("_m_s") else 1e6
         if not abs(value) <= limit:
             return f"{name} {value:g} is out of range; +-{limit:g} is allowed", []

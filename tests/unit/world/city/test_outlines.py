@@ -12,6 +12,7 @@ from volery.core.geodesy import LocalFrame
 from volery.world.city.geojson import read_features
 from volery.world.city.heights import HeightRule, height_of
 from volery.world.city.outlines import LEAST_AREA_M2, read_outlines
+from volery.world.city.tags import tags_of
 
 FRAME = LocalFrame.from_degrees(60.0, 25.0, 0.0)
 RULE = HeightRule(storey_m=3.0, default_m=10.0)
@@ -48,6 +49,9 @@ def test_a_square_becomes_itself(read):
     (outline,), report = read(feature(square(20.0, -30.0)))
     assert outline.footprint.area == pytest.approx(100.0, rel=1e-6)
     np.testing.assert_allclose(outline.footprint.bounds, (20, -30, 30, -20), atol=1e-6)
+    told = "town.geojson: 1 building of 1 outline; 1 has no height and gets the default"
+    assert report.summary() == told
+    _, report = read(feature(square(20.0, -30.0), height=12))
     assert report.summary() == "town.geojson: 1 building of 1 outline"
 
 
@@ -170,10 +174,29 @@ def test_a_region_crops(read):
         ({"building:levels": "3;4"}, 12.0, 4, "levels"),
         ({"building:levels": "0"}, 10.0, 3, "default"),
         ({}, 10.0, 3, "default"),
+        # GDAL, osmtogeojson, pyrosm; shapefiles; CityGML, Overture Maps, Microsoft
+        ({"other_tags": '"height"=>"9","building:levels"=>"4"'}, 9.0, 4, "height"),
+        ({"other_tags": '"name"=>"a \\"b\\", \\"height\\"=>\\"50\\"", "height" => "9"'}, 9.0, 3,
+         "height"),
+        ({"other_tags": '"height"=>NULL,"building:levels"=>"4"'}, 12.0, 4, "levels"),
+        ({"type": "way", "id": 5, "tags": {"building": "yes", "height": "9"}}, 9.0, 3, "height"),
+        ({"tags": '{"height": "9", "building:levels": 4}'}, 9.0, 4, "height"),
+        ({"tags": "no tags", "all_tags": '"height"=>"9"', "height": None}, 9.0, 3, "height"),
+        ({"height": 8, "other_tags": '"height"=>"9"'}, 8.0, 3, "height"),
+        ({"HEIGHT": 9.0}, 9.0, 3, "height"),
+        ({"Height_m": "9"}, 9.0, 3, "height"),
+        ({"Height [m]": "9"}, 9.0, 3, "height"),
+        ({"HEIGHT_FT": 30}, 9.144, 3, "height"),
+        ({"height_ft": "9 m"}, 9.0, 3, "height"),
+        ({"BUILDING_LEVELS": 4}, 12.0, 4, "levels"),
+        ({"measuredHeight": 9.0}, 9.0, 3, "height"),
+        ({"height": None, "num_floors": 4}, 12.0, 4, "levels"),
+        ({"height": -1.0, "confidence": 0.9}, 10.0, 3, "default"),
+        ({"HEIGHT": -9999, "levels": "-1"}, 10.0, 3, "default"),
     ],
-)
+)  # fmt: skip
 def test_heights(properties, height_m, storeys, source):
-    height = height_of(properties, RULE)
+    height = height_of(tags_of(properties), RULE)
     assert height.height_m == pytest.approx(height_m)
     assert (height.storeys, height.source, height.fault) == (storeys, source, "")
 
@@ -211,6 +234,7 @@ def test_heights_not_understood_are_told(read, height):
         ({"osm_id": 7.0}, "7"),
         ({"full_id": "w7", "osm_type": "way"}, "w7"),
         ({"OBJECTID": 12}, "12"),
+        ({"OSM_ID": "7", "HEIGHT": 9.0}, "7"),
         ({"fid": 3}, "3"),
         ({}, "#1"),
     ],
@@ -253,6 +277,71 @@ def test_a_feature_or_a_geometry_alone_is_geojson_as_well(tmp_path):
         read_features(path)
 
 
+def sequence(features):
+    """A GeoJSON text sequence, RFC 8142."""
+    return "".join(f"\x1e{json.dumps(feature)}\n" for feature in features)
+
+
+def lines(features):
+    return "\r\n".join(map(json.dumps, features))
+
+
+def printed(features):
+    return "\n".join(json.dumps(feature, indent=2) for feature in features)
+
+
+def collections(features):
+    parts = [{"type": "FeatureCollection", "features": features[k::2]} for k in (0, 1)]
+    return lines(parts) + "\n\n"
+
+
+@pytest.mark.parametrize("text_of", [sequence, lines, printed, collections])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_sequences_of_features(tmp_path, text_of, encoding):
+    features = [feature(square(20.0 * k), own=f"b{k}", height=10.0 + k) for k in range(3)]
+    path = tmp_path / "town.geojsonl"
+    path.write_text(text_of(features), encoding=encoding, newline="")
+    outlines, report = read_outlines(path, FRAME, rule=RULE)
+    found = {o.id: (o.height.height_m, round(o.footprint.bounds[0])) for o in outlines}
+    assert found == {"b0": (10.0, 0), "b1": (11.0, 20), "b2": (12.0, 40)}
+    assert report.summary() == "town.geojsonl: 3 buildings of 3 outlines"
+
+
+def test_sequences_of_geometries_and_their_faults(tmp_path):
+    path = tmp_path / "town.geojsonl"
+    path.write_text(lines([feature(square(20.0 * k))["geometry"] for k in range(2)]))
+    assert [f.id for f in read_features(path)] == ["#1", "#2"]
+    for text, message in (
+        (lines([feature(square()), 3]), "this file has another 'type'"),
+        (lines([feature(square())]) + "\n{", "not valid JSON: .*line 2"),
+        (
+            lines([feature(square()), {**feature(square()), "geometry": 3}]),
+            r"feature 2 \(id b\): 'geometry' must be an object",
+        ),
+        (
+            lines([feature(square()), {**feature(square()), "crs": {"properties": {"name": "x"}}}]),
+            "WGS 84",
+        ),
+    ):
+        path.write_text(text)
+        with pytest.raises(DataFileError, match=message):
+            read_features(path)
+
+
+def test_polygons_of_a_collection_are_outlines(read):
+    """PostGIS' ST_MakeValid returns polygons together with lines."""
+    mixed = feature(square(), own="mixed")
+    line = {"type": "LineString", "coordinates": degrees([[0, 0], [50, 50]])}
+    inner = {"type": "GeometryCollection", "geometries": [feature(square(50.0))["geometry"]]}
+    parts = [line, mixed["geometry"], inner]
+    mixed["geometry"] = {"type": "GeometryCollection", "geometries": parts}
+    alone = {**feature(square(), own="line"), "geometry": {**mixed["geometry"]}}
+    alone["geometry"]["geometries"] = [line]
+    (outline,), report = read(mixed, alone)
+    assert outline.footprint.area == pytest.approx(200.0, rel=1e-6)
+    assert report.dropped == (("line", "GeometryCollection is no outline"),)
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -288,6 +377,11 @@ def test_what_is_no_geojson_is_one_clear_error(tmp_path, text, message):
 def test_missing_and_binary_files(tmp_path):
     with pytest.raises(DataFileError, match="do not exist"):
         read_outlines(tmp_path / "none.geojson", FRAME, rule=RULE)
-    (tmp_path / "b.geojson").write_bytes(b"\xff\xfe\x00\x01")
-    with pytest.raises(DataFileError, match="cannot be read"):
-        read_outlines(tmp_path / "b.geojson", FRAME, rule=RULE)
+    for data in (b"PK\x03\x04\xff", b"\x1f\x8b\x08", b"SQLite format 3\0", b"\0\0\x27\x0a\0"):
+        (tmp_path / "b.geojson").write_bytes(data)
+        with pytest.raises(DataFileError, match="are no GeoJSON but a binary file; `ogr2ogr OUT"):
+            read_outlines(tmp_path / "b.geojson", FRAME, rule=RULE)
+    for data in (b"\xff\xfe\x00", '{"type": "F\u00e9"}'.encode("latin-1")):
+        (tmp_path / "b.geojson").write_bytes(data)
+        with pytest.raises(DataFileError, match="are not UTF-8; save the file as UTF-8"):
+            read_outlines(tmp_path / "b.geojson", FRAME, rule=RULE)
