@@ -285,6 +285,7 @@ def test_damage_within_a_message_ends_the_reading_there(tmp_path):
         (b"\x1f\x8b\x08\0" + bytes(20), "it is compressed by gzip: `gunzip` unpacks it"),
         (b"PK\x03\x04" + bytes(20), "it is compressed by zip: `unzip`"),
         (b"#ROSBAG V1.2\n" + bytes(20), "a bag of an older version: `rosbag filter"),
+        (b"ULogEnc\x01" + bytes(20), "it is an encrypted log of PX4"),
         (b"\xa3\x95\x80\x80" + bytes(20), "a dataflash log of ArduPilot"),
         (b"\x28\xb5\x2f\xfd" + bytes(20), "nothing can be unpacked"),
         (
@@ -300,6 +301,23 @@ def test_what_is_no_log_is_named_with_its_remedy(tmp_path, content, words):
         open_log(path)
     assert words in str(caught.value)
     assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "formats"),
+    [
+        (["info"], "a ROS 1 bag (version 2.0), a ROS 2 bag nor a ULog of PX4"),
+        (["play"], "a ROS 1 bag (version 2.0) nor a ROS 2 bag"),
+        (["slam"], "a ROS 1 bag (version 2.0) nor a ROS 2 bag; a scanner's text log needs"),
+        (["recover"], "an MCAP log nor a ROS 1 bag (version 2.0)"),
+    ],
+)
+def test_each_command_names_the_formats_that_it_reads(tmp_path, arguments, formats):
+    path = tmp_path / "field.toml"
+    path.write_text('name = "field"\n')
+    result = runner.invoke(app, [*arguments, str(path)])
+    assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+    assert formats in result.stderr
 
 
 def test_messages_that_sqlite_has_not_moved_are_named(bag):
